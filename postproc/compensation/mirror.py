@@ -1,0 +1,132 @@
+"""Mirror correction: move each command the other way until the predicted tool lies where it is wanted.
+
+    x_cmd <- x_cmd (-) (x_real(x_cmd) (-) x_goal)      on SE(3), position and orientation apart
+
+x_real(x_cmd) = FK_actual(equilibrium of q = IK_nominal(x_cmd) under the wrench).  One step brings the error down by
+the relative change of the deflection over the deflection itself, 2e-3 to 3e-3 on a large arm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.geometry import Poses, rotation_from_vector, vector_from_rotation
+from postproc.model import StiffnessModel
+from postproc.robot.inverse import inverse
+
+POSITION_TOLERANCE = 1e-8
+"""[m] predicted error at which a motion is done: far below what any program's digits can say."""
+
+ANGLE_TOLERANCE = 1e-8
+"""[rad]"""
+
+MAX_ITERATIONS = 20
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Where the tool really is: ``pose`` of the TCP in the robot base, ``q`` (N, 6) motor angles [rad];
+    ``reachable`` and ``settled`` (N,): the command is in reach, and the deflected robot found a stable rest."""
+
+    pose: Poses
+    q: Floats
+    reachable: Bools
+    settled: Bools
+
+
+def predict(
+    model: StiffnessModel, command: Poses, tool: Poses, wrench: Floats, status: Ints, near: Floats
+) -> Prediction:
+    """The tool's pose when the controller is sent to ``command`` (N TCP poses in the robot base) under ``wrench``
+    (N, 6), in the branch ``status`` (N,), with turns nearest to ``near`` (N, 6) [rad]."""
+    found = inverse(model.robot.nominal, command @ tool.inverse(), status, near)
+    rest = model.equilibrium(found.q, wrench, tool)
+    return Prediction(rest.pose, found.q, found.reachable, rest.converged)
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Result of the mirror iteration for N motions.
+
+    command: TCP commands in the robot base; q (N, 6): their motor angles; history (K + 1, N) [m]: predicted position
+    error before and after each iteration, NaN once a motion is done; iterations (N,) used; reachable, settled,
+    converged (N,).
+    """
+
+    command: Poses
+    q: Floats
+    history: Floats
+    iterations: Ints
+    reachable: Bools
+    settled: Bools
+    converged: Bools
+
+
+def mirror(
+    model: StiffnessModel,
+    wanted: Poses,
+    goal: Poses,
+    tool: Poses,
+    wrench: Floats,
+    status: Ints,
+    near: Floats,
+) -> Correction:
+    """Correct N commands that start at ``wanted`` so that the predicted tool comes to ``goal``.
+
+    A motion stops when it is within tolerance, out of reach, without equilibrium, or when an iteration does not
+    at least halve its error (it would not settle): ``converged`` says which, nothing diverges silently.
+    """
+    n = len(wanted)
+    rotation, position = wanted.rotation.copy(), wanted.position.copy()
+    q, iterations = near.copy(), np.zeros(n, np.int64)
+    reachable, settled, converged = np.ones(n, bool), np.ones(n, bool), np.zeros(n, bool)
+    history: list[Floats] = []
+    last = np.full(n, np.inf)
+    active = np.arange(n)
+    for iteration in range(MAX_ITERATIONS + 1):
+        here = predict(
+            model,
+            Poses(rotation[active], position[active]),
+            tool if tool.position.ndim == 1 else tool[active],
+            wrench[active],
+            status[active],
+            near[active],
+        )
+        shift, turn = difference(here.pose, goal[active])
+        error, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
+        good = here.reachable & here.settled
+        q[active], reachable[active], settled[active] = here.q, here.reachable, here.settled | ~here.reachable
+        record = np.full(n, np.nan)
+        record[active] = error
+        history.append(record)
+        iterations[active] = iteration
+        done = good & (error <= POSITION_TOLERANCE) & (angle <= ANGLE_TOLERANCE)
+        converged[active[done]] = True
+        size = error + angle  # 1 rad weighs as 1 m: both go down together
+        going = good & ~done & (size < 0.5 * last[active])
+        last[active] = size
+        if not going.any() or iteration == MAX_ITERATIONS:
+            break
+        active = active[going]
+        position[active] -= shift[going]
+        rotation[active] = rotation_from_vector(-turn[going]) @ rotation[active]
+    return Correction(
+        Poses(rotation, position), q, np.array(history), iterations, reachable, settled, converged
+    )
+
+
+def difference(real: Poses, goal: Poses) -> tuple[Floats, Floats]:
+    """real (-) goal: position difference (N, 3) [m] and rotation vector (N, 3) [rad], both in base axes."""
+    turn = vector_from_rotation(real.rotation @ np.swapaxes(goal.rotation, -1, -2))
+    return real.position - goal.position, turn
+
+
+def partly(wanted: Poses, command: Poses, gain: float) -> Poses:
+    """The share ``gain`` (0..1) of the way from ``wanted`` to ``command``."""
+    if gain == 1.0:
+        return command
+    shift, turn = difference(command, wanted)
+    return Poses(rotation_from_vector(gain * turn) @ wanted.rotation, wanted.position + gain * shift)

@@ -1,0 +1,104 @@
+"""Gravity compensator: a spring between two neighbouring links, from its energy.
+
+Klimchik, Caro, Wu, Chablat, Furet, Pashkevich, "Stiffness modeling of robotic manipulator with gravity
+compensator", eqs (1) to (4).  The spring runs from P0 on link i - 1 to P1 on link i:
+
+    s^2 = a^2 + L^2 + 2 a L cos(alpha + q) + h^2        (1), h = 0 there
+    U   = K_c (s - s0)^2 / 2
+    M_c = -dU/dq = K_c (1 - s0/s) a L sin(alpha + q)     (2)
+    d2U/dq2 = -K_c a L eta_q                             eta_q as in (4)
+
+The stiffness of the joint with the spring is K + d2U/dq2 = K - K_c a L eta_q.  Eq. (3) prints a plus; that
+reading is kept as the option ``sign: as_printed`` and is no spring.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.effects.effect import Load, Parameter, Values
+from postproc.units import DEG
+from postproc.yamlfile import Section
+
+_SOURCE = "Klimchik et al., Fig. 1 and eqs (1)-(4)"
+
+
+class SpringState(NamedTuple):
+    """Length s [m], energy U [J], torque M_c = -dU/dq [N m] and dM_c/dq [N m/rad] of the spring, each (N,)."""
+
+    length: Floats
+    energy: Floats
+    torque: Floats
+    slope: Floats
+
+
+class GravityCompensator(Load):
+    """A spring across one joint.  P0 lies at (-a_x, -a_y) and P1 at distance L along the link, seen from the axis;
+    ``h`` is their distance along the axis.
+
+    ``preload``: ``balanced``, the torque is cancelled at the unloaded pose (only its change acts); ``acting``, the
+    whole torque acts.  ``zero``: angle of the joint [rad] at which q of the paper is zero.
+    """
+
+    name = "gravity_compensator"
+    family = "elastic"
+
+    def __init__(self, joint: int, preload: str = "balanced", sign: str = "energy", zero: float = 0.0) -> None:
+        self.joint = joint
+        self.preload = preload
+        self.sign = sign
+        self.zero = zero
+        self.parameters = (
+            Parameter("K_c", "N/m", 0.0, 0.0, 1e9, _SOURCE),
+            Parameter("s0", "m", 0.0, 0.0, 10.0, _SOURCE),
+            Parameter("L", "m", 0.0, 0.0, 10.0, _SOURCE),
+            Parameter("a_x", "m", 0.0, -10.0, 10.0, _SOURCE),
+            Parameter("a_y", "m", 0.0, -10.0, 10.0, _SOURCE),
+            Parameter("h", "m", 0.0, -10.0, 10.0, "distance of the two ends along the joint axis"),
+        )
+
+    @classmethod
+    def from_options(cls, options: Section, joint_names: tuple[str, ...]) -> GravityCompensator:
+        options.only("joint", "preload", "sign", "zero_deg")
+        name = options.text("joint", choices=joint_names)
+        return cls(
+            joint_names.index(name),
+            options.text("preload", "balanced", ("balanced", "acting")),
+            options.text("sign", "energy", ("energy", "as_printed")),
+            options.number("zero_deg", 0.0, -360.0, 360.0) * DEG,
+        )
+
+    def described(self) -> dict[str, object]:
+        return {
+            "joint": f"A{self.joint + 1}",
+            "preload": self.preload,
+            "sign": self.sign,
+            "zero_deg": self.zero / DEG,
+        }
+
+    def spring(self, values: Values, angle: Floats) -> SpringState:
+        """The spring at joint angles (N,) [rad]."""
+        k, s0, length = values["K_c"], values["s0"], values["L"]
+        a, alpha = math.hypot(values["a_x"], values["a_y"]), math.atan2(values["a_y"], values["a_x"])
+        phi = alpha + angle - self.zero
+        product = a * length
+        sine, cosine = np.sin(phi), np.cos(phi)
+        s = np.sqrt(np.maximum(a * a + length * length + 2 * product * cosine + values["h"] ** 2, 1e-18))
+        ratio = s0 / s
+        eta = cosine - ratio * (product / (s * s) * sine * sine + cosine)
+        return SpringState(
+            s, 0.5 * k * (s - s0) ** 2, k * (1 - ratio) * product * sine, k * product * eta
+        )
+
+    def force(self, values: Values, coordinates: Floats, motors: Floats) -> tuple[Floats, Floats]:
+        here = self.spring(values, coordinates[self.joint])
+        rest = self.spring(values, motors[self.joint]).torque
+        sign = 1.0 if self.sign == "energy" else -1.0
+        force, slope = np.zeros_like(coordinates), np.zeros_like(coordinates)
+        force[self.joint] = sign * (here.torque - rest) + (rest if self.preload == "acting" else 0.0)
+        slope[self.joint] = sign * here.slope
+        return force, slope

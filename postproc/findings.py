@@ -1,0 +1,319 @@
+"""What the tool has to say about its input: one type, one table of codes.
+
+A finding says what (code, message), where (file, line, column) and what to do (help).  Its severity comes
+from the table: ``info`` needs no action, ``warning`` means that something was left or deserves a look,
+``error`` means that nothing was written.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+
+class Code(NamedTuple):
+    severity: str  # info | warning | error
+    title: str
+    explanation: str
+
+
+SEVERITIES = ("info", "warning", "error")
+
+CODES: dict[str, Code] = {
+    # files
+    "FIL001": Code("error", "file can not be read", "The path, or the right to read it, is wrong."),
+    "FIL002": Code("error", "file is empty", "There is nothing to compensate."),
+    "FIL003": Code("error", "file is no text", "It holds NUL bytes: a binary file, or text in UTF-16."),
+    "FIL004": Code(
+        "error", "file can not be written", "Nothing of this program was written; free the folder or disk."
+    ),
+    "FIL005": Code(
+        "error",
+        "program is compensated already",
+        "Compensating twice doubles the correction; take the original, or say --again.",
+    ),
+    "FIL006": Code(
+        "error",
+        "points are missing",
+        "Points that the cut needs are declared nowhere: the .dat of the module is not beside its .src.",
+    ),
+    "FIL007": Code(
+        "error", "output would replace an input", "Inputs are never touched; name another output."
+    ),
+    "FIL008": Code(
+        "error",
+        "output does not hold",
+        "The written program, read again, is not what was meant. Nothing was written: please report it.",
+    ),
+    "FIL009": Code(
+        "error",
+        "no motion was found",
+        "The file has no motion that this tool reads; is it of another language?",
+    ),
+    "FIL010": Code("error", "input changed while it was read", "Another process wrote the file; run again."),
+    # KRL
+    "KRL001": Code("warning", "motion not understood", "The motion is kept as it is and is not corrected."),
+    "KRL002": Code(
+        "warning", "target is an expression", "Only numbers can be corrected; the motion is kept as it is."
+    ),
+    "KRL003": Code("warning", "point is not declared", "Neither the program nor its .dat gives this point."),
+    "KRL004": Code(
+        "warning",
+        "components are missing",
+        "The point leaves components out and the point before it is not known.",
+    ),
+    "KRL005": Code(
+        "warning",
+        "base or tool is not known here",
+        "No $BASE or $TOOL that this tool can read was set before the motion.",
+    ),
+    "KRL006": Code(
+        "warning", "motion in a loop or branch", "It may run many times or never; it is kept as it is."
+    ),
+    "KRL007": Code(
+        "warning",
+        "point serves several places",
+        "Changing it would move more than this motion; it is kept as it is.",
+    ),
+    "KRL008": Code(
+        "warning", "relative motion", "Its end depends on the point before; both are kept as they are."
+    ),
+    "KRL009": Code(
+        "warning",
+        "arc or spline",
+        "Arcs and splines are read, but not corrected by this version; they are kept as they are.",
+    ),
+    "KRL010": Code(
+        "warning",
+        "call of a program that was not read",
+        "It may move the robot or change base and tool; after it the last position is not known.",
+    ),
+    "KRL011": Code(
+        "warning",
+        "base is moved by an external kinematic",
+        "Its place depends on external axes; the motion is kept as it is.",
+    ),
+    "KRL012": Code(
+        "warning", "frame is an expression", "$BASE or $TOOL is computed; motions after it are not corrected."
+    ),
+    "KRL013": Code(
+        "warning",
+        "stationary tool",
+        "With $IPO_MODE=#TCP the tool stands in the world; such motions are not corrected.",
+    ),
+    "KRL014": Code(
+        "warning", "block is not closed", "A loop, branch or DEF has no end, or an end has no begin."
+    ),
+    "KRL015": Code(
+        "warning", "motion in a local subprogram", "It may be called from many places; it is kept as it is."
+    ),
+    "KRL016": Code(
+        "info",
+        "point of the controller",
+        "A PTP to a point that $config.dat declares (HOME); an air move, it stays as it is.",
+    ),
+    "KRL017": Code(
+        "warning",
+        "frame changed before a partial point",
+        "How the controller re-expresses missing components in the new frame is not documented; the motion is kept.",
+    ),
+    "KRL018": Code("warning", "not KRL", "No DEF was found; the file may be G-code or another language."),
+    "KRL019": Code(
+        "warning",
+        "declaration not understood",
+        "A point in the .dat could not be read; motions that use it are kept as they are.",
+    ),
+    "KRL020": Code(
+        "warning",
+        "jump",
+        "Past a label that a GOTO may reach, base, tool and position are not known until they are set again.",
+    ),
+    "KRL021": Code(
+        "warning",
+        "path is in another file",
+        "A technology package reads the path from data beside the program; there is nothing to correct here.",
+    ),
+    # YAML files
+    "YML001": Code("error", "not valid YAML", "The file does not parse."),
+    "YML002": Code("error", "unknown key", "A key that has no meaning here; nothing is ignored silently."),
+    "YML003": Code("error", "missing key", "A key that must be there."),
+    "YML004": Code("error", "wrong value", "A value of the wrong kind or outside of its range."),
+    "YML005": Code("error", "wrong unit", "A unit that is not one of this quantity."),
+    # cell
+    "CEL001": Code(
+        "error",
+        "no cell",
+        "A cell.yaml must lie in the program's folder or above it, or be named with --cell.",
+    ),
+    "CEL002": Code(
+        "error",
+        "frame is missing",
+        "The program uses a base or tool number that neither it nor the cell gives.",
+    ),
+    "CEL003": Code("error", "robot is not known", "No robot file has this name."),
+    # force
+    "FRC001": Code("error", "no force", "--force was given alone, and no force belongs to the program."),
+    "FRC002": Code("error", "force not understood", "A force is 3 or 6 numbers and a frame: 0,360,560@base."),
+    "FRC003": Code("error", "force file is wrong", "A row of the force CSV can not be used."),
+    "FRC004": Code("error", "force for no motion", "The force CSV names a line that holds no motion."),
+    "FRC005": Code(
+        "error",
+        "feed direction is not known",
+        "A force in the feed frame needs a motion with a direction and a spindle axis.",
+    ),
+    "FRC006": Code(
+        "warning", "comment looks like a force", "It begins with FORCE but is none; it was not used."
+    ),
+    "FRC007": Code(
+        "info", "motions without a force", "The force CSV has no row for them; they are taken as air."
+    ),
+    "FRC008": Code(
+        "info",
+        "plunge before any feed",
+        "A force in the feed frame without a feed direction took that of the next motion of its cut.",
+    ),
+    "FRC009": Code("warning", "force on an air move", "PTP is air by definition; its force was not used."),
+    # kinematics
+    "KIN001": Code(
+        "error",
+        "pose out of reach",
+        "A programmed cutting pose can not be reached: base, tool or robot do not belong to the program.",
+    ),
+    "KIN002": Code(
+        "warning",
+        "beyond the axis limits",
+        "The pose asks an axis to leave its limits; its cut is left as it was.",
+    ),
+    "KIN003": Code(
+        "warning",
+        "near a singularity",
+        "Small corrections turn axes far here; watch this place in the first run.",
+    ),
+    "KIN004": Code(
+        "error",
+        "configuration is not known",
+        "No axes, no S and T before this motion; give `start:` in the cell.",
+    ),
+    "KIN005": Code(
+        "warning", "air move out of reach", "Nothing is corrected there; base or tool may be wrong."
+    ),
+    "KIN006": Code(
+        "warning",
+        "S or T no longer holds",
+        "The corrected pose lies on another side than the S or T that stands with it.",
+    ),
+    "KIN007": Code(
+        "warning",
+        "S or T disagree with the pose",
+        "The program states an S or T that this robot does not have at that pose.",
+    ),
+    # model
+    "MOD001": Code(
+        "warning",
+        "compensator pulls implausibly",
+        "Its static torque is far above what a balancer carries; the parameters serve for the stiffness only.",
+    ),
+    "MOD002": Code(
+        "warning",
+        "no equilibrium",
+        "The deflected robot has no stable state under this force; the cut is left as it was.",
+    ),
+    # correction
+    "COR001": Code(
+        "warning", "not converged", "The mirror correction did not settle; the cut is left as it was."
+    ),
+    "COR002": Code(
+        "error",
+        "correction too large",
+        "More than max_correction of the cell; the force, the model or a frame is wrong.",
+    ),
+    "COR003": Code(
+        "warning",
+        "cut left as it was",
+        "One of its motions could not be corrected, and a correction must not switch inside of a cut.",
+    ),
+    "COR004": Code(
+        "warning",
+        "COMPENSATE switched inside a cut",
+        "The switch is allowed in air only; the whole cut is left as it was.",
+    ),
+    "COR005": Code(
+        "warning",
+        "residual above the tolerance",
+        "The written program does not reach the wanted place within the tolerance.",
+    ),
+    "COR006": Code(
+        "info",
+        "corrected at the motions",
+        "Between the points of a motion the path is not checked by this version; no points are inserted.",
+    ),
+    "COR007": Code(
+        "info", "part of the correction applied", "--gain below 1 leaves the rest of the error, as asked."
+    ),
+    "COR008": Code(
+        "warning",
+        "corrected point leaves the limits",
+        "The correction brings an axis beyond its limits; its cut is left as it was.",
+    ),
+    "COR009": Code(
+        "warning",
+        "corrected point is out of reach",
+        "The correction leads out of reach; its cut is left as it was.",
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing to tell.  ``line`` and ``column`` count from 1; 0 where there is none."""
+
+    code: str
+    message: str
+    file: str = ""
+    line: int = 0
+    column: int = 0
+    help: str = ""
+
+    def __post_init__(self) -> None:
+        if self.code not in CODES:
+            raise ValueError(f"no such code: {self.code}")
+
+    @property
+    def severity(self) -> str:
+        return CODES[self.code].severity
+
+    @property
+    def place(self) -> str:
+        """``file:line:column`` as far as it is known."""
+        parts = [self.file, *(str(n) for n in (self.line, self.column) if n)]
+        return ":".join(part for part in parts if part)
+
+    def __str__(self) -> str:
+        return f"{self.place}{': ' if self.place else ''}{self.code} {self.message}"
+
+    def as_json(self) -> dict[str, object]:
+        return {
+            "code": self.code,
+            "severity": self.severity,
+            "file": self.file,
+            "line": self.line,
+            "column": self.column,
+            "message": self.message,
+            "help": self.help or CODES[self.code].explanation,
+        }
+
+
+class Refusal(Exception):
+    """The work can not be done; it carries the findings that say why."""
+
+    def __init__(self, *findings: Finding) -> None:
+        super().__init__("; ".join(str(finding) for finding in findings))
+        self.findings = findings
+
+
+def nearest(word: str, words: Iterable[str]) -> str:
+    """``; did you mean 'x'?`` for a misspelt word, or nothing."""
+    match = difflib.get_close_matches(word, list(words), 1, 0.5)
+    return f"; did you mean {match[0]!r}?" if match else ""

@@ -1,0 +1,139 @@
+"""Batched rigid-body geometry: rotations, KUKA's ABC angles, poses.
+
+A rotation is a (..., 3, 3) array whose columns are the axes of the turned frame.  All functions take
+any leading shape and work without a loop over it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from postproc.arrays import Floats
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Poses of a frame in another one: ``rotation`` (..., 3, 3), ``position`` (..., 3) [m]."""
+
+    rotation: Floats
+    position: Floats
+
+    @staticmethod
+    def identity() -> Poses:
+        return Poses(np.eye(3), np.zeros(3))
+
+    @staticmethod
+    def from_abc(position: ArrayLike, abc: ArrayLike) -> Poses:
+        """From a position (..., 3) [m] and KUKA angles A, B, C (..., 3) [rad]."""
+        return Poses(rotation_from_abc(abc), np.asarray(position, dtype=float))
+
+    def __matmul__(self, other: Poses) -> Poses:
+        """``a_in_w @ b_in_a`` is b in w; leading shapes broadcast."""
+        return Poses(
+            self.rotation @ other.rotation,
+            self.position + (self.rotation @ other.position[..., None])[..., 0],
+        )
+
+    def inverse(self) -> Poses:
+        back = np.swapaxes(self.rotation, -1, -2)
+        return Poses(back, -(back @ self.position[..., None])[..., 0])
+
+    def __getitem__(self, rows: Any) -> Poses:
+        return Poses(self.rotation[rows], self.position[rows])
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+
+def rotation_from_abc(abc: ArrayLike) -> Floats:
+    """R = Rz(A) Ry(B) Rx(C) from A, B, C (..., 3) [rad] (KUKA's convention, intrinsic Z-Y'-X'')."""
+    angles = np.asarray(abc, dtype=float)
+    (sa, sb, sc), (ca, cb, cc) = np.moveaxis(np.sin(angles), -1, 0), np.moveaxis(np.cos(angles), -1, 0)
+    rows = [
+        [ca * cb, ca * sb * sc - sa * cc, ca * sb * cc + sa * sc],
+        [sa * cb, sa * sb * sc + ca * cc, sa * sb * cc - ca * sc],
+        [-sb, cb * sc, cb * cc],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def abc_from_rotation(rotation: ArrayLike, near: ArrayLike | None = None) -> Floats:
+    """A, B, C (..., 3) [rad] of rotations (..., 3, 3), each angle in (-pi, pi].
+
+    Of the two triples (A, B, C) and (A + pi, pi - B, C + pi) that give the same rotation, the one nearer
+    to ``near`` (..., 3) is taken (without it, the one with |B| <= pi/2).  At B = +-pi/2 only A -+ C is
+    defined: A is then that of ``near`` (0 without it).
+    """
+    r = np.asarray(rotation, dtype=float)
+    cos_b = np.hypot(r[..., 0, 0], r[..., 1, 0])
+    locked = cos_b < 1e-9
+    wish = np.zeros(r.shape[:-1]) if near is None else np.broadcast_to(np.asarray(near, float), r.shape[:-1])
+    b = np.arctan2(-r[..., 2, 0], cos_b)
+    a = np.where(locked, wish[..., 0], np.arctan2(r[..., 1, 0], r[..., 0, 0]))
+    # C from the rotation that A leaves over; this holds at the lock as well, where R[2, 1:] vanishes.
+    sa, ca = np.sin(a), np.cos(a)
+    c = np.arctan2(sa * r[..., 0, 2] - ca * r[..., 1, 2], ca * r[..., 1, 1] - sa * r[..., 0, 1])
+    one = wrapped(np.stack([a, b, c], axis=-1))
+    if near is None:
+        return one
+    two = wrapped(np.stack([a + np.pi, np.pi - b, c + np.pi], axis=-1))
+    nearer = np.abs(wrapped(two - wish)).sum(-1) < np.abs(wrapped(one - wish)).sum(-1)
+    return np.where(nearer[..., None], two, one)
+
+
+def wrapped(angle: ArrayLike) -> Floats:
+    """Angles brought into (-pi, pi]."""
+    return np.pi - np.mod(np.pi - np.asarray(angle, dtype=float), 2 * np.pi)
+
+
+def rotation_from_vector(vector: ArrayLike) -> Floats:
+    """exp of rotation vectors (..., 3) [rad] (Rodrigues' formula)."""
+    v = np.asarray(vector, dtype=float)
+    angle2 = np.sum(v * v, axis=-1)
+    angle = np.sqrt(angle2)
+    small = angle < 1e-4
+    safe = np.where(small, 1.0, angle)
+    first = np.where(small, 1 - angle2 / 6, np.sin(safe) / safe)
+    second = np.where(small, 0.5 - angle2 / 24, (1 - np.cos(safe)) / (safe * safe))
+    k = skew(v)
+    return np.eye(3) + first[..., None, None] * k + second[..., None, None] * (k @ k)
+
+
+def vector_from_rotation(rotation: ArrayLike) -> Floats:
+    """log of rotations (..., 3, 3): rotation vectors (..., 3) [rad] with a length of at most pi.
+
+    Near pi the axis is taken from the symmetric part, so that the result stays good to about 1e-8 there.
+    """
+    r = np.asarray(rotation, dtype=float)
+    odd = 0.5 * np.stack(
+        [r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], axis=-1
+    )
+    sine = np.linalg.norm(odd, axis=-1)
+    cosine = 0.5 * (np.trace(r, axis1=-2, axis2=-1) - 1.0)
+    angle = np.arctan2(sine, cosine)
+    small = sine < 1e-7
+    factor = np.where(small, 1.0, angle / np.where(small, 1.0, sine))
+    vector = factor[..., None] * odd
+    turned = cosine < -0.99
+    if np.any(turned):
+        half = 0.5 * (r[turned] + np.swapaxes(r[turned], -1, -2))
+        outer = half - cosine[turned][..., None, None] * np.eye(3)  # (1 - cos) n n^T
+        column = np.argmax(np.diagonal(outer, axis1=-2, axis2=-1), axis=-1)
+        axis = np.take_along_axis(outer, column[:, None, None], axis=-1)[..., 0]
+        axis /= np.linalg.norm(axis, axis=-1, keepdims=True)
+        sign = np.where(np.sum(axis * odd[turned], axis=-1) < 0, -1.0, 1.0)
+        vector[turned] = (sign * angle[turned])[..., None] * axis
+    return vector
+
+
+def skew(vector: ArrayLike) -> Floats:
+    """The matrices [v]x (..., 3, 3) with [v]x u = v x u."""
+    v = np.asarray(vector, dtype=float)
+    zero = np.zeros(v.shape[:-1])
+    x, y, z = np.moveaxis(v, -1, 0)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

@@ -1,0 +1,140 @@
+"""The wanted motions of a program as read-only arrays, one row a motion.
+
+This is where the text side (documents, dialects) and the physics side (robot, effects, forces) meet:
+neither knows of the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints, frozen
+from postproc.findings import Finding
+from postproc.geometry import Poses, abc_from_rotation
+from postproc.units import DEG, MM
+
+
+class Kind(IntEnum):
+    """What a motion statement does.  PTP and AXIS are air moves whatever the force."""
+
+    PTP = 0  # point to point, to a Cartesian target
+    AXIS = 1  # point to point, to axis angles
+    LIN = 2  # straight line
+    CIRC = 3  # three-point arc
+    OTHER = 4  # a motion that is none of these (relative, spline, ...)
+
+
+@dataclass(frozen=True)
+class FrameRef:
+    """A base or tool frame as the program names it.
+
+    ``pose`` is the frame where the program itself says it (in the world for a base, on the flange for
+    a tool); None where only the controller knows it, that is entry ``number`` of BASE_DATA / TOOL_DATA.
+    ``line`` is where it was set, for messages.
+    """
+
+    number: int | None
+    pose: Poses | None
+    line: int = 0
+
+
+@dataclass(frozen=True)
+class Annotation:
+    """A comment that speaks to this tool (FORCE, COMPENSATE): it holds for motions from ``row`` on."""
+
+    row: int
+    text: str
+    line: int
+
+
+@dataclass(frozen=True)
+class Toolpath:
+    """N motions in the order of the text.
+
+    kind (N,) Kind; position (N, 3) [m] and rotation (N, 3, 3): target of the TCP in the programmed base,
+    NaN where the target is not known; axes (N, 6) [rad] for AXIS motions, NaN elsewhere; feed (N,) [m/s],
+    NaN if unknown; base, tool (N,) index into ``frames``, -1 where unknown; status, turn (N,) KUKA's S and T
+    as stated with the motion, -1 where not; line (N,) from 1.
+
+    ``refused``: row -> why that motion can not be corrected by an edit of its own (its target is not known, its
+    text serves another motion too, ...).  ``pinned``: rows whose end point a later, refused motion builds on:
+    moving them would move that one, so they can not be corrected either.
+    """
+
+    kind: Ints
+    position: Floats
+    rotation: Floats
+    axes: Floats
+    feed: Floats
+    base: Ints
+    tool: Ints
+    status: Ints
+    turn: Ints
+    line: Ints
+    frames: tuple[FrameRef, ...]
+    refused: Mapping[int, Finding] = field(default_factory=dict)
+    pinned: Mapping[int, Finding] = field(default_factory=dict)
+    annotations: tuple[Annotation, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.kind)
+        shapes = {"position": (n, 3), "rotation": (n, 3, 3), "axes": (n, 6), "feed": (n,)}
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, frozen(getattr(self, name), shape))
+        for name in ("kind", "base", "tool", "status", "turn", "line"):
+            object.__setattr__(self, name, frozen(getattr(self, name), (n,), np.int64))
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    @property
+    def known(self) -> Bools:
+        """(N,) the Cartesian target, its base and its tool are known."""
+        return np.isfinite(self.position[:, 0]) & (self.base >= 0) & (self.tool >= 0)
+
+    @property
+    def target_in_base(self) -> Poses:
+        return Poses(self.rotation, self.position)
+
+    def dump(self) -> Iterator[str]:
+        """The canonical list, one line a motion: line, kind, target (mm, deg), base, tool, feed, or the refusal."""
+        abc = abc_from_rotation(np.nan_to_num(self.rotation)) / DEG
+        for row in range(len(self)):
+            kind = Kind(self.kind[row])
+            words = [f"{self.line[row]}", kind.name]
+            if np.isfinite(self.axes[row, 0]):
+                words += [f"A{i + 1} {_number(a / DEG)}" for i, a in enumerate(self.axes[row])]
+            elif np.isfinite(self.position[row, 0]):
+                words += [f"{k} {_number(v / MM)}" for k, v in zip("XYZ", self.position[row], strict=True)]
+                words += [f"{k} {_number(v)}" for k, v in zip("ABC", abc[row], strict=True)]
+            if self.status[row] >= 0:
+                words.append(f"S {self.status[row]}")
+            if self.turn[row] >= 0:
+                words.append(f"T {self.turn[row]}")
+            for word, index in (("base", self.base[row]), ("tool", self.tool[row])):
+                words.append(f"{word} {self._frame_name(int(index))}")
+            if np.isfinite(self.feed[row]):
+                words.append(f"feed {_number(self.feed[row])} m/s")
+            if row in self.refused:
+                words.append(f"refused {self.refused[row].code}")
+            yield " ".join(words)
+
+    def _frame_name(self, index: int) -> str:
+        if index < 0:
+            return "?"
+        frame = self.frames[index]
+        if frame.pose is None:
+            return f"[{frame.number}]"
+        angles = abc_from_rotation(frame.pose.rotation) / DEG
+        numbers = [*(frame.pose.position / MM), *angles]
+        return "{" + " ".join(_number(value) for value in numbers) + "}"
+
+
+def _number(value: float) -> str:
+    """Six decimals at most, no trailing zeros, no minus zero."""
+    text = f"{value:.6f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text

@@ -1,0 +1,46 @@
+"""The only conversions between file units (mm, deg) and the SI units used inside.
+
+Everything inside is SI and radians.  A unit is a word of a file; ``to_si`` gives the factor
+that turns a number with that word into SI, and refuses a word of another dimension.
+"""
+
+from __future__ import annotations
+
+import math
+
+MM = 1e-3
+"""Metres in a millimetre."""
+
+DEG = math.pi / 180.0
+"""Radians in a degree."""
+
+# word in a file -> (SI unit, factor to SI)
+UNITS: dict[str, tuple[str, float]] = {
+    "1": ("1", 1.0),
+    "m": ("m", 1.0),
+    "mm": ("m", MM),
+    "rad": ("rad", 1.0),
+    "deg": ("rad", DEG),
+    "kg": ("kg", 1.0),
+    "N": ("N", 1.0),
+    "kN": ("N", 1e3),
+    "N m": ("N m", 1.0),
+    "N/m": ("N/m", 1.0),
+    "N/mm": ("N/m", 1e3),
+    "m/N": ("m/N", 1.0),
+    "mm/N": ("m/N", MM),
+    "N m/rad": ("N m/rad", 1.0),
+    "rad/(N m)": ("rad/(N m)", 1.0),
+    "m/s": ("m/s", 1.0),
+}
+
+
+def to_si(word: str, si_unit: str) -> float | None:
+    """Factor from the unit ``word`` of a file to ``si_unit``; None if it is not a unit of that dimension."""
+    unit = UNITS.get(" ".join(word.split()))
+    return unit[1] if unit is not None and unit[0] == si_unit else None
+
+
+def words_for(si_unit: str) -> list[str]:
+    """The words that a file may use for ``si_unit``."""
+    return [word for word, (si, _) in UNITS.items() if si == si_unit]

@@ -1,0 +1,203 @@
+"""YAML files read strictly: every mistake is told with file, line, key and what is allowed.
+
+PyYAML composes the nodes (safe: no tags are constructed, no aliases are followed); ``Section`` hands out
+checked values.  Numbers follow YAML 1.2, so ``1e-6`` is a number.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import yaml
+
+from postproc.findings import Finding, Refusal, nearest
+
+MAX_BYTES = 4_000_000
+MAX_DEPTH = 20
+_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?\Z")
+_REQUIRED = object()
+
+
+class Section:
+    """A mapping of a YAML file.  Getters raise Refusal with the line of the key they were asked for."""
+
+    def __init__(self, node: yaml.MappingNode, file: Path, where: str) -> None:
+        self.file = file
+        self.where = where
+        self.line = node.start_mark.line + 1
+        self._values: dict[str, yaml.Node] = {}
+        for key, value in node.value:
+            name = str(key.value)
+            if not isinstance(key, yaml.ScalarNode):
+                raise Refusal(
+                    _finding(file, key, "YML001", f"{where or 'the file'}: a key must be a plain word")
+                )
+            if name in self._values:
+                raise Refusal(_finding(file, key, "YML004", f"{self._path(name)} stands twice"))
+            self._values[name] = value
+        self._keys = {str(key.value): key for key, _ in node.value}
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._values and not self._is_null(key)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def _is_null(self, key: str) -> bool:
+        node = self._values[key]
+        return isinstance(node, yaml.ScalarNode) and node.style is None and node.value in ("", "~", "null")
+
+    def _path(self, key: str) -> str:
+        return f"{self.where}.{key}" if self.where else key
+
+    def error(self, code: str, message: str, key: str | None = None, help: str = "") -> Refusal:
+        """A Refusal that points at ``key`` (at the section itself without one)."""
+        node = self._keys.get(key) if key is not None else None
+        line, column = (node.start_mark.line + 1, node.start_mark.column + 1) if node else (self.line, 1)
+        name = self._path(key) if key is not None else self.where
+        text = f"{name}: {message}" if name else message
+        return Refusal(Finding(code, text, str(self.file), line, column, help))
+
+    def only(self, *allowed: str) -> None:
+        """Refuse any key that is not one of ``allowed``."""
+        for key in self._values:
+            if key not in allowed:
+                raise self.error(
+                    "YML002",
+                    f"unknown key{nearest(key, allowed)}",
+                    key,
+                    "allowed here: " + ", ".join(allowed),
+                )
+
+    def line_of(self, key: str) -> int:
+        return int(self._keys[key].start_mark.line) + 1
+
+    def section(self, key: str, default: object = _REQUIRED) -> Section:
+        """The mapping under ``key``; an empty one where it is absent and ``default`` is given."""
+        node = self._get(key, default)
+        if node is None:
+            return Section(
+                yaml.MappingNode("", [], yaml.Mark("", 0, self.line - 1, 0, None, 0)),
+                self.file,
+                self._path(key),
+            )
+        if not isinstance(node, yaml.MappingNode):
+            raise self.error("YML004", "must hold keys and values", key)
+        return Section(node, self.file, self._path(key))
+
+    def sections(self, key: str) -> list[Section]:
+        """The mappings of the list under ``key``; none where it is absent."""
+        node = self._get(key, None)
+        if node is None:
+            return []
+        if not isinstance(node, yaml.SequenceNode):
+            raise self.error("YML004", "must be a list", key)
+        found = []
+        for index, item in enumerate(node.value):
+            if not isinstance(item, yaml.MappingNode):
+                raise self.error("YML004", f"entry {index + 1} must hold keys and values", key)
+            found.append(Section(item, self.file, f"{self._path(key)}[{index + 1}]"))
+        return found
+
+    def number(
+        self, key: str, default: object = _REQUIRED, low: float = -math.inf, high: float = math.inf
+    ) -> float:
+        node = self._get(key, default)
+        if node is None:
+            return float(default)  # type: ignore[arg-type]
+        value = self._as_number(node, key)
+        if not low <= value <= high:
+            raise self.error("YML004", f"{value:g} is not within {low:g} .. {high:g}", key)
+        return value
+
+    def numbers(self, key: str, count: int, default: Sequence[float] | None = None) -> list[float]:
+        node = self._get(key, _REQUIRED if default is None else default)
+        if node is None:
+            return [float(value) for value in default or ()]
+        if not isinstance(node, yaml.SequenceNode) or len(node.value) != count:
+            raise self.error("YML004", f"must be a list of {count} numbers", key)
+        return [self._as_number(item, key) for item in node.value]
+
+    def text(self, key: str, default: object = _REQUIRED, choices: Sequence[str] = ()) -> str:
+        node = self._get(key, default)
+        if node is None:
+            return str(default)
+        if not isinstance(node, yaml.ScalarNode):
+            raise self.error("YML004", "must be a word or a text", key)
+        value = str(node.value)
+        if choices and value not in choices:
+            raise self.error(
+                "YML004", f"{value!r} is not one of {', '.join(choices)}{nearest(value, choices)}", key
+            )
+        return value
+
+    def flag(self, key: str, default: bool) -> bool:
+        return self.text(key, "true" if default else "false", ("true", "false")) == "true"
+
+    def _get(self, key: str, default: object) -> yaml.Node | None:
+        if key in self:
+            return self._values[key]
+        if default is _REQUIRED:
+            raise self.error("YML003", f"the key {key!r} is missing")
+        return None
+
+    def _as_number(self, node: yaml.Node, key: str) -> float:
+        if not isinstance(node, yaml.ScalarNode) or node.style is not None or not _NUMBER.match(node.value):
+            shown = repr(node.value) if isinstance(node, yaml.ScalarNode) else "a list or mapping"
+            raise self.error("YML004", f"{shown} is not a number", key)
+        value = float(node.value)
+        if not math.isfinite(value):
+            raise self.error("YML004", f"{node.value} is too large", key)
+        return value
+
+
+def load(path: Path) -> Section:
+    """The top mapping of a YAML file.
+
+    Raises Refusal: FIL001 (not readable), FIL002 (empty), YML001 (no YAML, no mapping, aliases, too deep).
+    """
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
+    if len(raw) > MAX_BYTES:
+        raise Refusal(Finding("YML001", f"larger than {MAX_BYTES} bytes", str(path)))
+    try:
+        text = raw.decode("utf-8-sig")
+        for event in yaml.parse(text, Loader=yaml.SafeLoader):
+            if isinstance(event, yaml.AliasEvent):
+                raise Refusal(_finding(path, event, "YML001", "aliases (*name) are not allowed"))
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    except UnicodeDecodeError as error:
+        raise Refusal(Finding("YML001", f"not UTF-8 text (byte {error.start})", str(path))) from None
+    except RecursionError:
+        raise Refusal(Finding("YML001", f"nested deeper than {MAX_DEPTH} levels", str(path))) from None
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
+        raise Refusal(Finding("YML001", str(error.problem or "not YAML"), str(path), line, column)) from None
+    except yaml.YAMLError as error:
+        raise Refusal(Finding("YML001", str(error).splitlines()[0], str(path))) from None
+    if node is None:
+        raise Refusal(Finding("FIL002", "the file is empty", str(path)))
+    if not isinstance(node, yaml.MappingNode):
+        raise Refusal(_finding(path, node, "YML001", "must hold keys and values"))
+    if _depth(node) > MAX_DEPTH:
+        raise Refusal(Finding("YML001", f"nested deeper than {MAX_DEPTH} levels", str(path)))
+    return Section(node, path, "")
+
+
+def _depth(node: yaml.Node) -> int:
+    if isinstance(node, yaml.MappingNode):
+        return 1 + max((_depth(value) for _, value in node.value), default=0)
+    if isinstance(node, yaml.SequenceNode):
+        return 1 + max((_depth(value) for value in node.value), default=0)
+    return 0
+
+
+def _finding(path: Path, node: yaml.Node | yaml.Event, code: str, message: str) -> Finding:
+    mark = node.start_mark
+    return Finding(code, message, str(path), mark.line + 1, mark.column + 1)
