@@ -53,6 +53,9 @@ CODES: dict[str, Code] = {
         "The file has no motion that this tool reads; is it of another language?",
     ),
     "FIL010": Code("error", "input changed while it was read", "Another process wrote the file; run again."),
+    "FIL011": Code(
+        "error", "name is no module name", "A KRL module is named like its file: a letter, then letters, digits, _."
+    ),
     # KRL
     "KRL001": Code("warning", "motion not understood", "The motion is kept as it is and is not corrected."),
     "KRL002": Code(

@@ -14,6 +14,7 @@ from postproc.findings import Finding, nearest
 from postproc.geometry import Poses
 from postproc.robot.chain import Chain, generalized_force, tcp_position
 from postproc.robot.description import Robot, Value, parameter_value
+from postproc.units import DEG
 
 CHUNK = 8192
 """States evaluated at once: small enough for the arrays of a sweep to stay in the cache."""
@@ -23,6 +24,9 @@ STEP_TOLERANCE = 1e-14
 
 MAX_STEPS = 60
 
+IMPLAUSIBLE_SAG = 0.5 * DEG
+"""A joint that its own balancer bends this far is not balanced: some ten times what weight does to a heavy arm."""
+
 
 @dataclass(frozen=True)
 class Term:
@@ -31,6 +35,7 @@ class Term:
     effect: Effect
     values: Values
     stated: dict[str, Value]
+    line: int = 0
 
 
 @dataclass(frozen=True)
@@ -83,7 +88,7 @@ class StiffnessModel:
                         parameter.name,
                     )
                 stated[parameter.name], values[parameter.name] = value, value.value
-            terms.append(Term(effect, values, stated))
+            terms.append(Term(effect, values, stated, section.line))
         return cls(robot, tuple(terms))
 
     def without(self, effects: Iterable[str] = (), families: Iterable[str] = ()) -> StiffnessModel:
@@ -149,7 +154,9 @@ class StiffnessModel:
         rested = (np.abs(step) < 1e-11).all(axis=0) if self.terms else np.isfinite(q).all(axis=0)
         turned = np.moveaxis(swept.rotation, -1, 0) @ tool.rotation
         pose = Poses(turned, np.ascontiguousarray(tcp_position(swept, tool).T))
-        return Equilibrium((q + theta).T, pose, stable & rested & np.isfinite(pose.position).all(axis=1), steps)
+        return Equilibrium(
+            (q + theta).T, pose, stable & rested & np.isfinite(pose.position).all(axis=1), steps
+        )
 
     def joint_compliance(self, q: Floats) -> Floats:
         """(N, n) [rad/(N m)] compliance of each coordinate, unloaded: 1 / (K_theta^0 + K_theta^GC(q)), eq. (6)."""
@@ -181,8 +188,32 @@ class StiffnessModel:
         return np.asarray(np.linalg.inv(compliance))
 
     def doubts(self) -> list[Finding]:
-        """What is implausible about the model itself."""
-        return []
+        """What is implausible about the model itself: a load that, with no force on the tool, bends a joint by
+        more than ``IMPLAUSIBLE_SAG`` somewhere within its limits (MOD001)."""
+        limits = self.robot.limits
+        angles = np.linspace(limits[:, 0], limits[:, 1], 181).T
+        findings = []
+        for term in self.terms:
+            if not isinstance(term.effect, Load):
+                continue
+            force = term.effect.force(term.values, angles, angles)[0]
+            sag = np.zeros_like(force)
+            for law in self.terms:
+                if isinstance(law.effect, ComplianceLaw):
+                    sag += np.abs(law.effect.displacement(law.values, force)[0])
+            joint, state = np.unravel_index(np.argmax(sag), sag.shape)
+            if sag[joint, state] > IMPLAUSIBLE_SAG:
+                findings.append(
+                    Finding(
+                        "MOD001",
+                        f"{term.effect.name}: {abs(force[joint, state]):.0f} N m on {self.robot.joints[joint].name} at"
+                        f" {angles[joint, state] / DEG:.0f} deg would bend it by {sag[joint, state] / DEG:.2f} deg",
+                        str(self.robot.path),
+                        term.line,
+                        help="with `preload: balanced` only the change of its torque acts",
+                    )
+                )
+        return findings
 
 
 def _rows(tool: Poses, rows: slice) -> Poses:

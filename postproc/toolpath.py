@@ -94,7 +94,7 @@ class Toolpath:
     @property
     def known(self) -> Bools:
         """(N,) the Cartesian target, its base and its tool are known."""
-        return np.isfinite(self.position[:, 0]) & (self.base >= 0) & (self.tool >= 0)
+        return np.asarray(np.isfinite(self.position[:, 0]) & (self.base >= 0) & (self.tool >= 0))
 
     @property
     def target_in_base(self) -> Poses:

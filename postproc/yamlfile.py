@@ -1,7 +1,7 @@
 """YAML files read strictly: every mistake is told with file, line, key and what is allowed.
 
-PyYAML composes the nodes (safe: no tags are constructed, no aliases are followed); ``Section`` hands out
-checked values.  Numbers follow YAML 1.2, so ``1e-6`` is a number.
+PyYAML composes the nodes (safe: tags and aliases are refused, nothing is constructed); ``Section`` hands out
+checked values.  Numbers, ``null`` and ``true`` follow YAML 1.2, so ``1e-6`` is a number and ``yes`` a word.
 """
 
 from __future__ import annotations
@@ -17,7 +17,11 @@ from postproc.findings import Finding, Refusal, nearest
 
 MAX_BYTES = 4_000_000
 MAX_DEPTH = 20
-_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)([eE][-+]?\d+)?\Z")
+_NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
+_NULLS = ("", "~", "null", "Null", "NULL")
+_FLAGS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+# no path and no terminal takes these; an escape in quotes (\0, \uD800) makes them
+_UNPRINTABLE = re.compile("[\0\ud800-\udfff]")
 _REQUIRED = object()
 
 
@@ -48,7 +52,7 @@ class Section:
 
     def _is_null(self, key: str) -> bool:
         node = self._values[key]
-        return isinstance(node, yaml.ScalarNode) and node.style is None and node.value in ("", "~", "null")
+        return isinstance(node, yaml.ScalarNode) and node.style is None and node.value in _NULLS
 
     def _path(self, key: str) -> str:
         return f"{self.where}.{key}" if self.where else key
@@ -103,23 +107,31 @@ class Section:
         return found
 
     def number(
-        self, key: str, default: object = _REQUIRED, low: float = -math.inf, high: float = math.inf
+        self,
+        key: str,
+        default: object = _REQUIRED,
+        low: float = -math.inf,
+        high: float = math.inf,
+        unit: str = "",
     ) -> float:
+        """The number under ``key``, within ``low`` .. ``high``; ``unit`` is for the message only."""
         node = self._get(key, default)
         if node is None:
             return float(default)  # type: ignore[arg-type]
-        value = self._as_number(node, key)
+        value = self._as_number(node, key, unit)
         if not low <= value <= high:
             raise self.error("YML004", f"{value:g} is not within {low:g} .. {high:g}", key)
         return value
 
-    def numbers(self, key: str, count: int, default: Sequence[float] | None = None) -> list[float]:
+    def numbers(
+        self, key: str, count: int, default: Sequence[float] | None = None, unit: str = ""
+    ) -> list[float]:
         node = self._get(key, _REQUIRED if default is None else default)
         if node is None:
             return [float(value) for value in default or ()]
         if not isinstance(node, yaml.SequenceNode) or len(node.value) != count:
             raise self.error("YML004", f"must be a list of {count} numbers", key)
-        return [self._as_number(item, key) for item in node.value]
+        return [self._as_number(item, key, unit) for item in node.value]
 
     def text(self, key: str, default: object = _REQUIRED, choices: Sequence[str] = ()) -> str:
         node = self._get(key, default)
@@ -135,69 +147,95 @@ class Section:
         return value
 
     def flag(self, key: str, default: bool) -> bool:
-        return self.text(key, "true" if default else "false", ("true", "false")) == "true"
+        node = self._get(key, default)
+        if node is None:
+            return default
+        if not isinstance(node, yaml.ScalarNode) or node.style is not None or node.value not in _FLAGS:
+            raise self.error("YML004", "must be true or false", key)
+        return _FLAGS[node.value]
+
+    def is_list(self, key: str) -> bool:
+        """Whether a list stands under ``key``, for keys that may hold a word or a list."""
+        return isinstance(self._values.get(key), yaml.SequenceNode)
 
     def _get(self, key: str, default: object) -> yaml.Node | None:
         if key in self:
             return self._values[key]
         if default is _REQUIRED:
+            if key in self._values:
+                raise self.error("YML003", "has no value", key)
             raise self.error("YML003", f"the key {key!r} is missing")
         return None
 
-    def _as_number(self, node: yaml.Node, key: str) -> float:
+    def _as_number(self, node: yaml.Node, key: str, unit: str) -> float:
         if not isinstance(node, yaml.ScalarNode) or node.style is not None or not _NUMBER.match(node.value):
-            shown = repr(node.value) if isinstance(node, yaml.ScalarNode) else "a list or mapping"
-            raise self.error("YML004", f"{shown} is not a number", key)
+            shown = repr(node.value[:40]) if isinstance(node, yaml.ScalarNode) else "a list or mapping"
+            help = f"a number in {unit}, written without the unit" if unit else ""
+            raise self.error("YML004", f"{shown} is not a number", key, help)
         value = float(node.value)
         if not math.isfinite(value):
-            raise self.error("YML004", f"{node.value} is too large", key)
+            raise self.error("YML004", f"{node.value[:40]} is too large", key)
         return value
 
 
 def load(path: Path) -> Section:
     """The top mapping of a YAML file.
 
-    Raises Refusal: FIL001 (not readable), FIL002 (empty), YML001 (no YAML, no mapping, aliases, too deep).
+    Raises Refusal: FIL001 (not readable), FIL002 (empty), YML001 (no YAML, no mapping, aliases, tags, too deep).
     """
     try:
-        raw = path.read_bytes()
+        with path.open("rb") as stream:
+            raw = stream.read(MAX_BYTES + 1)
     except OSError as error:
         raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
     if len(raw) > MAX_BYTES:
         raise Refusal(Finding("YML001", f"larger than {MAX_BYTES} bytes", str(path)))
     try:
         text = raw.decode("utf-8-sig")
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            if isinstance(event, yaml.AliasEvent):
-                raise Refusal(_finding(path, event, "YML001", "aliases (*name) are not allowed"))
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
     except UnicodeDecodeError as error:
         raise Refusal(Finding("YML001", f"not UTF-8 text (byte {error.start})", str(path))) from None
-    except RecursionError:
-        raise Refusal(Finding("YML001", f"nested deeper than {MAX_DEPTH} levels", str(path))) from None
+    try:
+        _check_events(path, text)
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
         raise Refusal(Finding("YML001", str(error.problem or "not YAML"), str(path), line, column)) from None
-    except yaml.YAMLError as error:
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        raise Refusal(Finding("YML001", str(error).splitlines()[0], str(path), line)) from None
+    except (
+        yaml.YAMLError,
+        ValueError,
+        OverflowError,
+    ) as error:  # PyYAML passes on what chr() says of "\\UFFFFFFFF"
         raise Refusal(Finding("YML001", str(error).splitlines()[0], str(path))) from None
     if node is None:
         raise Refusal(Finding("FIL002", "the file is empty", str(path)))
     if not isinstance(node, yaml.MappingNode):
         raise Refusal(_finding(path, node, "YML001", "must hold keys and values"))
-    if _depth(node) > MAX_DEPTH:
-        raise Refusal(Finding("YML001", f"nested deeper than {MAX_DEPTH} levels", str(path)))
     return Section(node, path, "")
 
 
-def _depth(node: yaml.Node) -> int:
-    if isinstance(node, yaml.MappingNode):
-        return 1 + max((_depth(value) for _, value in node.value), default=0)
-    if isinstance(node, yaml.SequenceNode):
-        return 1 + max((_depth(value) for value in node.value), default=0)
-    return 0
+def _check_events(path: Path, text: str) -> None:
+    """Refuses what is not for this house, before a node is built.
+
+    The depth is counted here because PyYAML's scanner takes time by its square, and the composer the stack.
+    """
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        if isinstance(event, yaml.AliasEvent):
+            raise Refusal(_finding(path, event, "YML001", "aliases (*name) are not allowed"))
+        if getattr(event, "tag", None) is not None:
+            raise Refusal(_finding(path, event, "YML001", "tags (!name) are not allowed"))
+        if isinstance(event, yaml.ScalarEvent) and _UNPRINTABLE.search(event.value):
+            raise Refusal(_finding(path, event, "YML001", "a text holds NUL or half a character"))
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > MAX_DEPTH:
+            raise Refusal(_finding(path, event, "YML001", f"nested deeper than {MAX_DEPTH} levels"))
 
 
 def _finding(path: Path, node: yaml.Node | yaml.Event, code: str, message: str) -> Finding:
     mark = node.start_mark
-    return Finding(code, message, str(path), mark.line + 1, mark.column + 1)
+    line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
+    return Finding(code, message, str(path), line, column)

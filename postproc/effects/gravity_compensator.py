@@ -47,7 +47,9 @@ class GravityCompensator(Load):
     name = "gravity_compensator"
     family = "elastic"
 
-    def __init__(self, joint: int, preload: str = "balanced", sign: str = "energy", zero: float = 0.0) -> None:
+    def __init__(
+        self, joint: int, preload: str = "balanced", sign: str = "energy", zero: float = 0.0
+    ) -> None:
         self.joint = joint
         self.preload = preload
         self.sign = sign
@@ -90,9 +92,7 @@ class GravityCompensator(Load):
         s = np.sqrt(np.maximum(a * a + length * length + 2 * product * cosine + values["h"] ** 2, 1e-18))
         ratio = s0 / s
         eta = cosine - ratio * (product / (s * s) * sine * sine + cosine)
-        return SpringState(
-            s, 0.5 * k * (s - s0) ** 2, k * (1 - ratio) * product * sine, k * product * eta
-        )
+        return SpringState(s, 0.5 * k * (s - s0) ** 2, k * (1 - ratio) * product * sine, k * product * eta)
 
     def force(self, values: Values, coordinates: Floats, motors: Floats) -> tuple[Floats, Floats]:
         here = self.spring(values, coordinates[self.joint])

@@ -104,9 +104,7 @@ def generalized_force(swept: Sweep, point: Floats, wrench: Floats) -> Floats:
     mx, my, mz = wrench[3:] + _cross(point, wrench[:3])
     px, py, pz = swept.origins[:, 0], swept.origins[:, 1], swept.origins[:, 2]
     zx, zy, zz = swept.axes[:, 0], swept.axes[:, 1], swept.axes[:, 2]
-    return (
-        zx * (mx - (py * fz - pz * fy)) + zy * (my - (pz * fx - px * fz)) + zz * (mz - (px * fy - py * fx))
-    )
+    return zx * (mx - (py * fz - pz * fy)) + zy * (my - (pz * fx - px * fz)) + zz * (mz - (px * fy - py * fx))
 
 
 def _cross(a: Floats, b: Floats) -> Floats:

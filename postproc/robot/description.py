@@ -142,7 +142,9 @@ def find_robot(name: str, beside: Path | None = None) -> Path:
             Finding(
                 "CEL003",
                 f"robot {name!r} is not known{nearest(name, known)}",
-                help="known robots: " + ", ".join(sorted(known)) + "; or give the path of a robot file (.yaml)",
+                help="known robots: "
+                + ", ".join(sorted(known))
+                + "; or give the path of a robot file (.yaml)",
             )
         )
     path = Path(name)
@@ -216,8 +218,12 @@ def unit_factor(section: Section, si_unit: str) -> float:
     factor = to_si(word, si_unit)
     if factor is None:
         allowed = words_for(si_unit)
-        raise section.error("YML005", f"{word!r} is no unit of this quantity{nearest(word, allowed)}", "unit",
-                            "allowed here: " + ", ".join(allowed))
+        raise section.error(
+            "YML005",
+            f"{word!r} is no unit of this quantity{nearest(word, allowed)}",
+            "unit",
+            "allowed here: " + ", ".join(allowed),
+        )
     return factor
 
 

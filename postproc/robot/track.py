@@ -69,10 +69,12 @@ def _branches(
     jump = np.isin(toolpath.kind, (Kind.PTP, Kind.AXIS))
     stated = jump & cartesian & (toolpath.status >= 0)
     lost = (jump & ~on_axes & ~cartesian) | (toolpath.kind == Kind.OTHER)
+    home = np.array([row for row, finding in toolpath.refused.items() if finding.code == "KRL016"], np.int64)
     value = np.full(len(toolpath) + 1, -1)
     value[0] = -1 if start is None else status_of(robot.nominal, start[None])[0]
     value[1:][on_axes] = status_of(robot.nominal, toolpath.axes[on_axes])
     value[1:][stated] = toolpath.status[stated] & 7
+    value[1:][home] = value[0]  # the controller's HOME is where a program starts
     sets = np.concatenate([[True], on_axes | stated | lost])
     return np.asarray(value[np.maximum.accumulate(np.where(sets, np.arange(len(sets)), 0))][1:])
 
@@ -98,8 +100,11 @@ def _settle(q: Floats, toolpath: Toolpath, start: Floats | None) -> None:
     stated = (turn >= 0) & (np.where(rows >= 0, toolpath.kind[rows], -1) == Kind.PTP)
     for axis in _TURNING:
         value = values[:, axis]
-        signed = np.where((turn >> axis) & 1 == 1, np.where(value > SIGN_MARGIN, value - 2 * np.pi, value),
-                          np.where(value < -SIGN_MARGIN, value + 2 * np.pi, value))
+        signed = np.where(
+            (turn >> axis) & 1 == 1,
+            np.where(value > SIGN_MARGIN, value - 2 * np.pi, value),
+            np.where(value < -SIGN_MARGIN, value + 2 * np.pi, value),
+        )
         reset = given | stated
         reset[0] = True
         wish = np.where(given | ~stated, value, signed)

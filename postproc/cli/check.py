@@ -1,0 +1,66 @@
+"""``compensate check``: read a program and say what is not understood."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from postproc.cli.common import Out, result_options
+
+
+@click.command()
+@click.argument("program", type=click.Path(path_type=Path), required=False)
+@click.option("--dump", is_flag=True, help="Print the canonical list of motions (mm, deg), one a line.")
+@click.option("--list-codes", is_flag=True, help="List the codes of all findings.")
+@click.option("--explain", metavar="CODE", help="Explain one code.")
+@result_options
+def check(
+    program: Path | None,
+    dump: bool,
+    list_codes: bool,
+    explain: str | None,
+    json_to: str | None,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Read PROGRAM only: findings with line and column, and a summary of its motions.
+
+    \b
+    Examples:
+      compensate check panel.src
+      compensate check panel.src --dump
+      compensate check --explain KRL007
+
+    Exit codes: 0 all understood; 3 findings; 1 unreadable.
+    """
+    from postproc.findings import CODES, nearest
+
+    if list_codes:
+        for name, code in CODES.items():
+            click.echo(f"{name} {code.severity:7} {code.title}")
+        return
+    if explain:
+        code = CODES.get(explain.upper())
+        if code is None:
+            raise click.UsageError(f"no code {explain!r}{nearest(explain.upper(), CODES)}")
+        click.echo(f"{explain.upper()} ({code.severity}): {code.title}\n{code.explanation}")
+        return
+    if program is None:
+        raise click.UsageError("name a PROGRAM to check")
+
+    from postproc.report.terminal import show_findings
+    from postproc.workflows import check as run
+
+    out = Out(json_to, quiet, verbose)
+    with out.refusals(""):
+        done = run(program)
+        out.result(done.as_json())
+    if dump and json_to != "-":
+        click.echo("\n".join(done.toolpath.dump()))
+    if not out.quiet:
+        console = out.console()
+        show_findings(console, done.findings)
+        for line in done.summary():
+            console.print(line, markup=False)
+    raise SystemExit(done.exit)

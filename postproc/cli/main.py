@@ -1,0 +1,67 @@
+"""The console script: finds the command, and turns findings into words and exit codes."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Sequence
+
+import click
+
+from postproc import __version__
+from postproc.cli.check import check
+from postproc.cli.predict import predict
+from postproc.cli.program import program
+from postproc.cli.robots import robots
+
+COMMANDS = {"program": program, "check": check, "predict": predict, "robots": robots}
+
+_NUMBERS = re.compile(r"[-+0-9.eEnaifNAIF]+(,[-+0-9.eEnaifNAIF]+)+(@[A-Za-z]+)?\Z")
+_FILES = (".csv", ".yaml", ".yml")
+
+
+@click.group(commands=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="compensate")
+def main() -> None:
+    """Make an industrial robot cut as if it did not bend.
+
+    Without a command, PROGRAM is compensated:
+
+    \b
+      compensate panel.src --force                    forces that belong to the program
+      compensate panel.src --force=-60,0,120@feed     one force, in the feed frame
+      compensate panel.src --force --gain 0.5         a first cut with half the correction
+      compensate check panel.src                      only read it, say what is not understood
+      compensate predict panel.src --force            the deflection at every pose
+    """
+
+
+def run(argv: Sequence[str] | None = None) -> None:
+    """Entry point of the console script."""
+    arguments = normalized(list(sys.argv[1:] if argv is None else argv))
+    main.main(args=arguments, prog_name="compensate")
+
+
+def normalized(arguments: list[str]) -> list[str]:
+    """The arguments with the default command named and the value of ``--force`` tied to it.
+
+    ``--force`` takes the next word only if it is a list of numbers or ends in .csv, .yaml or .yml.
+    """
+    if not arguments or arguments[0] in ("-h", "--help", "--version"):
+        return arguments or ["--help"]
+    words = arguments if arguments[0] in COMMANDS else ["program", *arguments]
+    result: list[str] = []
+    at = 0
+    while at < len(words):
+        word = words[at]
+        at += 1
+        if word == "--":
+            return [*result, *words[at - 1 :]]
+        if word == "--force":
+            follows = words[at] if at < len(words) else ""
+            if _NUMBERS.match(follows) or follows.lower().endswith(_FILES):
+                word, at = f"--force={follows}", at + 1
+            else:
+                word = "--force="
+        result.append(word)
+    return result

@@ -1,0 +1,50 @@
+"""``compensate predict``: the deflection at every pose."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from postproc.cli.common import Out, program_options
+
+
+@click.command()
+@program_options
+@click.option(
+    "--report",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write <stem>.deflection.csv and <stem>.prediction.json there.",
+)
+def predict(
+    program: Path,
+    force: str | None,
+    robot: str | None,
+    cell: Path | None,
+    strict: bool,
+    json_to: str | None,
+    quiet: bool,
+    verbose: bool,
+    report: Path | None,
+) -> None:
+    """Predict how far the tool is from PROGRAM's poses; no program is written.
+
+    \b
+    Examples:
+      compensate predict panel.src --force
+      compensate predict panel.src --force 0,360,560 --report reports
+    """
+    from postproc.report.terminal import show
+    from postproc.workflows import Request
+    from postproc.workflows import predict as run
+
+    out = Out(json_to, quiet, verbose)
+    with out.refusals(str(program)):
+        done = run(
+            Request(program=program, force=force, cell=cell, robot=robot, report=report, strict=strict)
+        )
+        out.result(done.as_json())
+    if not out.quiet:
+        show(out.console(), done, verbose)
+    raise SystemExit(done.exit)

@@ -1,0 +1,88 @@
+"""``compensate PROGRAM``: the main job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from postproc.cli.common import Out, program_options
+
+
+@click.command()
+@program_options
+@click.option(
+    "--gain",
+    type=click.FloatRange(0.0, 1.0),
+    default=1.0,
+    show_default=True,
+    help="Share of the correction that is applied; first cuts are made with 0.5.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=str,
+    metavar="PATH",
+    help="File or folder of the result [compensated/<same name>]. Another stem renames the module.",
+)
+@click.option(
+    "--report", type=click.Path(path_type=Path), metavar="DIR", help="Folder of the reports [beside it]."
+)
+@click.option("--dry-run", is_flag=True, help="Do everything but write.")
+@click.option("--again", is_flag=True, help="Compensate a program that is compensated already.")
+def program(
+    program: Path,
+    force: str | None,
+    robot: str | None,
+    cell: Path | None,
+    strict: bool,
+    json_to: str | None,
+    quiet: bool,
+    verbose: bool,
+    gain: float,
+    output: str | None,
+    report: Path | None,
+    dry_run: bool,
+    again: bool,
+) -> None:
+    """Compensate PROGRAM for the deflection of the robot (the default command).
+
+    Writes compensated/<same name> beside the input, with a report, the corrections of every motion, and a diff.
+    The input is never touched.
+
+    \b
+    Examples:
+      compensate panel.src --force
+      compensate panel.src --force 0,360,560@base --cell cell.yaml -o out/panel.src
+      compensate panel.src --force panel.force.csv --gain 0.5 --json -
+
+    Exit codes: 0 done; 3 written, but something was left or deserves a look; 1 nothing written; 2 command line.
+    """
+    from postproc.report.terminal import show
+    from postproc.workflows import Request, compensate
+
+    target = None if output is None else Path(output)
+    if target is not None and output is not None and output.endswith(("/", "\\")):
+        target = target / program.name
+    out = Out(json_to, quiet, verbose)
+    with out.refusals(str(program)):
+        done = compensate(
+            Request(
+                program=program,
+                force=force,
+                cell=cell,
+                robot=robot,
+                gain=gain,
+                output=target,
+                report=report,
+                strict=strict,
+                dry_run=dry_run,
+                again=again,
+            )
+        )
+        out.result(done.as_json())
+    if not out.quiet:
+        show(out.console(), done, verbose)
+        if dry_run:
+            click.echo("dry run: nothing was written")
+    raise SystemExit(done.exit)

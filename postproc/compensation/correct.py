@@ -1,0 +1,296 @@
+"""From wanted motions to corrected commands: what is in scope, what must stay, and by how much the rest moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.cuts import cuts_of, left_findings, spread, switched_on
+from postproc.compensation.mirror import difference, mirror, partly, predict
+from postproc.findings import Finding, Refusal
+from postproc.geometry import Poses
+from postproc.model import StiffnessModel
+from postproc.robot.track import Track, near_singular, sides
+from postproc.toolpath import Kind, Toolpath
+from postproc.units import MM
+
+
+class State(IntEnum):
+    AIR = 0  # nothing to correct
+    CORRECTED = 1
+    LEFT = 2  # could not be corrected, told
+    OFF = 3  # left alone on the program's own word (COMPENSATE OFF)
+
+
+@dataclass(frozen=True)
+class Task:
+    """All that a correction needs, N motions.  Poses are in the robot base; NaN where a target is not known.
+
+    wanted: TCP targets; base, tool (N): the programmed base in the robot base, the TCP on the flange; wrench (N, 6)
+    at the end of each motion, robot base axes; ``process``: correct what the force does and leave what the robot
+    does without it (a base that was touched off contains that); else everything is corrected.
+    ``max_correction``, ``tolerance`` [m].
+    """
+
+    file: str
+    toolpath: Toolpath
+    model: StiffnessModel
+    track: Track
+    wanted: Poses
+    base: Poses
+    tool: Poses
+    wrench: Floats
+    process: bool
+    gain: float
+    max_correction: float
+    tolerance: float
+
+
+@dataclass(frozen=True)
+class Result:
+    """state (N,) State; cut (N,), -1 in air; command: TCP commands in the robot base; before, after (N,) [m] predicted
+    position error, NaN where nothing is predicted, and before_angle, after_angle (N,) [rad]; deflection (N, 3) [m]
+    before; iterations (N,); history (K + 1, N) [m]; findings."""
+
+    state: Ints
+    cut: Ints
+    command: Poses
+    deflection: Floats
+    before: Floats
+    before_angle: Floats
+    after: Floats
+    after_angle: Floats
+    iterations: Ints
+    history: Floats
+    findings: tuple[Finding, ...]
+
+    @property
+    def corrected(self) -> Bools:
+        return self.state == State.CORRECTED
+
+
+def correct(task: Task) -> Result:
+    """Correct every motion that can be.
+
+    Raises Refusal: a cutting pose out of reach (KIN001), a configuration that nothing says (KIN004), a correction
+    larger than the cell allows (COR002).
+    """
+    path, track, n = task.toolpath, task.track, len(task.toolpath)
+    cartesian = path.known & ~np.isfinite(path.axes).all(axis=1)
+    forced = np.linalg.norm(task.wrench, axis=1) > 0
+    scope = forced if task.process else forced | cartesian
+    # In air every motion stands for itself; a cut stands and falls as a whole.
+    cut = (
+        cuts_of(scope)
+        if task.process
+        else np.where(scope, np.cumsum(scope & ~(forced & _shifted(forced))) - 1, -1)
+    )
+    on = switched_on(path)
+    findings: list[Finding] = []
+    why: dict[int, Finding] = {}
+
+    for row in np.flatnonzero(scope & on):
+        stop = path.refused.get(int(row)) or path.pinned.get(int(row))
+        if stop is not None:
+            why[int(row)] = stop
+    free = scope & on & cartesian
+    _refuse(
+        task,
+        free & (track.status < 0) & ~_in(why, n),
+        "KIN004",
+        "the robot's configuration is not known here",
+        "give `start:` (axes before the first motion) in the cell, or S and T with the PTP before it",
+    )
+    _refuse(
+        task,
+        free & forced & ~track.reachable & ~_in(why, n),
+        "KIN001",
+        "the programmed pose is out of reach",
+        "check the base, the tool and the robot of the cell against the program",
+    )
+    told = free & ~track.reachable & ~_in(why, n)
+    _note(task, why, findings, told, "KIN005", "the programmed pose is out of reach")
+    told = free & track.reachable & ~track.within & ~_in(why, n)
+    _note(task, why, findings, told, "KIN002", "the programmed pose is beyond the axis limits")
+    off = scope & ~on
+    for row in np.flatnonzero(on & scope & spread(off, cut)):
+        why.setdefault(int(row), _at(task, int(row), "COR004", "COMPENSATE is switched inside this cut"))
+
+    # What the force does, everywhere it can be predicted; then the correction, where it may be made.
+    seen = scope & cartesian & (track.status >= 0) & track.reachable
+    rows = np.flatnonzero(seen)
+    goal = _goal(task, rows)
+    here = predict(
+        task.model, task.wanted[rows], task.tool[rows], task.wrench[rows], track.status[rows], track.q[rows]
+    )
+    deflection, before, before_angle = np.full((n, 3), np.nan), np.full(n, np.nan), np.full(n, np.nan)
+    shift, turn = difference(here.pose, goal)
+    shift[~here.settled], turn[~here.settled] = np.nan, np.nan
+    deflection[rows], before[rows] = shift, np.linalg.norm(shift, axis=1)
+    before_angle[rows] = np.linalg.norm(turn, axis=1)
+
+    may = seen & on & ~spread(_in(why, n), cut)
+    rows_may = np.flatnonzero(may)
+    inside = np.searchsorted(rows, rows_may)
+    done = mirror(
+        task.model,
+        task.wanted[rows_may],
+        goal[inside],
+        task.tool[rows_may],
+        task.wrench[rows_may],
+        track.status[rows_may],
+        track.q[rows_may],
+    )
+    _judge(task, done.reachable, done.settled, done.converged, done.q, rows_may, why, findings)
+    keeps = may & ~spread(_in(why, n), cut)
+    chosen = keeps[rows_may]
+
+    rotation, position = task.wanted.rotation.copy(), task.wanted.position.copy()
+    share = partly(task.wanted[rows_may], done.command, task.gain)
+    moved = rows_may[chosen]
+    rotation[moved], position[moved] = share.rotation[chosen], share.position[chosen]
+    command = Poses(rotation, position)
+    size = np.linalg.norm(position - task.wanted.position, axis=1)
+    _refuse(
+        task,
+        np.nan_to_num(size) > task.max_correction,
+        "COR002",
+        f"the correction is {np.nanmax(size, initial=0.0) / MM:.2f} mm,"
+        f" more than max_correction ({task.max_correction / MM:g} mm)",
+        "check force, base and tool; if it is meant, raise max_correction in the cell",
+    )
+
+    state = np.full(n, State.AIR, np.int64)
+    state[scope] = State.LEFT
+    state[off] = State.OFF
+    state[keeps] = State.CORRECTED
+    iterations, history = np.zeros(n, np.int64), np.full((len(done.history), n), np.nan)
+    iterations[rows_may], history[:, rows_may] = done.iterations, done.history
+    findings += left_findings(task.file, path, cut, why)
+    _warn_sides(task, done.q, rows_may, keeps, findings)
+    _warn_singular(task, seen & forced, findings)
+    result = Result(
+        state,
+        cut,
+        command,
+        deflection,
+        before,
+        before_angle,
+        before,
+        before_angle,
+        iterations,
+        history,
+        tuple(findings),
+    )
+    return with_residual(task, result, command)
+
+
+def with_residual(task: Task, result: Result, command: Poses) -> Result:
+    """The result with its residual predicted for ``command``, the poses as they were really written."""
+    rows = np.flatnonzero(result.corrected)
+    here = predict(
+        task.model,
+        command[rows],
+        task.tool[rows],
+        task.wrench[rows],
+        task.track.status[rows],
+        task.track.q[rows],
+    )
+    shift, turn = difference(here.pose, _goal(task, rows))
+    after, after_angle = result.before.copy(), result.before_angle.copy()
+    after[rows] = np.where(here.reachable & here.settled, np.linalg.norm(shift, axis=1), np.inf)
+    after_angle[rows] = np.linalg.norm(turn, axis=1)
+    return replace(result, command=command, after=after, after_angle=after_angle)
+
+
+def _goal(task: Task, rows: Ints) -> Poses:
+    """Where the tool is to be: the wanted pose, or where the robot without force takes it."""
+    if not task.process:
+        return task.wanted[rows]
+    still = np.zeros((len(rows), 6))
+    status, near = task.track.status[rows], task.track.q[rows]
+    return predict(task.model, task.wanted[rows], task.tool[rows], still, status, near).pose
+
+
+def _judge(
+    task: Task,
+    reachable: Bools,
+    settled: Bools,
+    converged: Bools,
+    q: Floats,
+    rows: Ints,
+    why: dict[int, Finding],
+    findings: list[Finding],
+) -> None:
+    """Why motions that were tried can not be corrected after all."""
+    n = len(task.toolpath)
+    low, high = task.model.robot.limits.T
+    beyond = ((q < low) | (q > high)).any(axis=1)
+    reasons = (
+        (~reachable, "COR009", "the correction leads out of reach"),
+        (~settled, "MOD002", "the robot has no stable rest under this force"),
+        (~converged, "COR001", "the correction does not settle"),
+        (beyond, "COR008", "the correction brings an axis beyond its limits"),
+    )
+    for struck, code, message in reasons:
+        mask = np.zeros(n, bool)
+        mask[rows[struck]] = True
+        _note(task, why, findings, mask & ~_in(why, n), code, message)
+
+
+def _note(
+    task: Task, why: dict[int, Finding], findings: list[Finding], mask: Bools, code: str, message: str
+) -> None:
+    """Say it once for all motions of ``mask``, and remember it for each."""
+    rows = np.flatnonzero(mask)
+    for row in rows:
+        why[int(row)] = _at(task, int(row), code, message)
+    if len(rows):
+        findings.append(_at(task, int(rows[0]), code, message + _more(task, rows)))
+
+
+def _refuse(task: Task, mask: Bools, code: str, message: str, help: str) -> None:
+    rows = np.flatnonzero(mask)
+    if len(rows):
+        raise Refusal(_at(task, int(rows[0]), code, message + _more(task, rows), help))
+
+
+def _warn_sides(task: Task, q: Floats, rows: Ints, keeps: Bools, findings: list[Finding]) -> None:
+    """S and T stand verbatim in the text: they must still be those of the corrected pose."""
+    path = task.toolpath
+    kept = keeps[rows] & ((path.status[rows] >= 0) | (path.turn[rows] >= 0)) & (path.kind[rows] == Kind.PTP)
+    robot = task.model.robot
+    before, after = sides(robot, task.track.q[rows[kept]]), sides(robot, q[kept])
+    crossed = rows[kept][(before[0] != after[0]) | (before[1] != after[1])]
+    if len(crossed):
+        message = "the corrected pose crosses the side that S or T states" + _more(task, crossed)
+        findings.append(_at(task, int(crossed[0]), "KIN006", message))
+
+
+def _warn_singular(task: Task, mask: Bools, findings: list[Finding]) -> None:
+    rows = np.flatnonzero(mask)
+    close = rows[near_singular(task.model.robot, task.track.q[rows])]
+    if len(close):
+        message = "A5 near 0, the wrist over axis 1, or the arm stretched" + _more(task, close)
+        findings.append(_at(task, int(close[0]), "KIN003", message))
+
+
+def _more(task: Task, rows: Ints) -> str:
+    return "" if len(rows) == 1 else f" ({len(rows)} motions, to line {task.toolpath.line[rows[-1]]})"
+
+
+def _at(task: Task, row: int, code: str, message: str, help: str = "") -> Finding:
+    return Finding(code, message, task.file, int(task.toolpath.line[row]), help=help)
+
+
+def _in(why: dict[int, Finding], n: int) -> Bools:
+    mask = np.zeros(n, bool)
+    mask[list(why)] = True
+    return mask
+
+
+def _shifted(mask: Bools) -> Bools:
+    return np.concatenate([[False], mask[:-1]])

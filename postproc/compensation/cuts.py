@@ -1,0 +1,63 @@
+"""Cuts: the runs of motions between two air moves.  They are corrected whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from postproc.arrays import Bools, Ints
+from postproc.findings import Finding
+from postproc.toolpath import Toolpath
+
+
+def cuts_of(in_scope: Bools) -> Ints:
+    """(N,) number of the cut that a motion belongs to, from 0; -1 for motions outside of any.
+
+    ``in_scope`` (N,): the motion carries force.
+    """
+    begins = in_scope & ~np.concatenate([[False], in_scope[:-1]])
+    return np.where(in_scope, np.cumsum(begins) - 1, -1)
+
+
+def spread(blocked: Bools, cut: Ints) -> Bools:
+    """(N,) motions whose cut holds a blocked motion."""
+    if not blocked.any():
+        return np.zeros_like(blocked)
+    struck = np.zeros(cut.max(initial=-1) + 2, bool)
+    struck[cut[blocked]] = True
+    struck[-1] = False  # the entry that -1 points to
+    return struck[cut]
+
+
+def switched_on(toolpath: Toolpath) -> Bools:
+    """(N,) what ``COMPENSATE OFF`` / ``COMPENSATE ON`` comments say; a motion before the first of them is on."""
+    on = np.ones(len(toolpath), bool)
+    for note in toolpath.annotations:
+        words = note.text.upper().split()
+        if words[:1] == ["COMPENSATE"] and words[1:] in (["ON"], ["OFF"]):
+            on[note.row :] = words[1] == "ON"
+    return on
+
+
+def left_findings(file: str, toolpath: Toolpath, cut: Ints, why: Mapping[int, Finding]) -> list[Finding]:
+    """One finding for every cut that is left as it was, with the first reason in it."""
+    findings = []
+    for number in np.unique(cut[sorted(why)]) if why else ():
+        if number < 0:
+            continue
+        rows = np.flatnonzero(cut == number)
+        first = next(int(row) for row in rows if int(row) in why)
+        reason = why[first]
+        place = f"line {toolpath.line[first]}: " if toolpath.line[first] else ""
+        findings.append(
+            Finding(
+                "COR003",
+                f"the cut of lines {toolpath.line[rows[0]]} to {toolpath.line[rows[-1]]} ({len(rows)} motions)"
+                f" is left as it was; {place}{reason.code} {reason.message}",
+                file,
+                int(toolpath.line[rows[0]]),
+                help=reason.help,
+            )
+        )
+    return findings

@@ -1,0 +1,241 @@
+"""Lines of KRL as statements: what kind a line is, where its parts stand, which names it mentions.
+
+Works on bytes; KRL is case-insensitive, so words and names are compared in upper case.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from postproc.document import Document
+
+BOM = b"\xef\xbb\xbf"
+NAME = rb"[A-Za-z_$][A-Za-z0-9_$]*"
+
+MOTIONS = frozenset(
+    [b"PTP", b"LIN", b"CIRC", b"SPTP", b"SLIN", b"SCIRC", b"SPL"]
+    + [b"PTP_REL", b"LIN_REL", b"CIRC_REL", b"SPTP_REL", b"SLIN_REL", b"SCIRC_REL", b"SPL_REL"]
+)
+LOOPS = frozenset([b"FOR", b"WHILE", b"LOOP", b"REPEAT"])
+SPLINES = frozenset([b"SPLINE", b"PTP_SPLINE"])
+OPENS = LOOPS | SPLINES | {b"IF", b"SWITCH"}
+CLOSES: dict[bytes, frozenset[bytes]] = {
+    b"ENDIF": frozenset([b"IF"]),
+    b"ENDSWITCH": frozenset([b"SWITCH"]),
+    b"ENDFOR": frozenset([b"FOR"]),
+    b"ENDWHILE": frozenset([b"WHILE"]),
+    b"ENDLOOP": frozenset([b"LOOP"]),
+    b"UNTIL": frozenset([b"REPEAT"]),
+    b"ENDSPLINE": SPLINES,
+}
+BRANCHES = {b"ELSE": b"IF", b"CASE": b"SWITCH", b"DEFAULT": b"SWITCH"}
+POINT_TYPES = frozenset([b"FRAME", b"POS", b"E3POS", b"E6POS", b"AXIS", b"E3AXIS", b"E6AXIS"])
+RECORD_TYPES = frozenset([b"FDAT", b"LDAT", b"PDAT"])
+TYPES = POINT_TYPES | RECORD_TYPES | {b"INT", b"REAL", b"BOOL", b"CHAR"}
+KEPT = frozenset(
+    [b"HALT", b"WAIT", b"CONTINUE", b"INTERRUPT", b"TRIGGER", b"BRAKE", b"RESUME", b"EXT", b"EXTFCT"]
+    + [b"IMPORT", b"SIGNAL", b"ENUM", b"STRUC", b"ANOUT", b"ANIN", b"DIGIN", b"RETURN", b"EXIT", b"INI"]
+)
+
+_FIRST = re.compile(rb"[ \t]*(" + NAME + rb")")
+_LABEL = re.compile(rb"(" + NAME + rb")[ \t]*:[ \t]*\Z")
+_DEF = re.compile(
+    rb"(?:GLOBAL[ \t]+)?(DEFFCT[ \t]+" + NAME + rb"(?:\[[^\]]*\])?|DEF)[ \t]+(" + NAME + rb")", re.I
+)
+_DEFDAT = re.compile(rb"DEFDAT[ \t]+(" + NAME + rb")", re.I)
+_GOTO = re.compile(rb"GOTO[ \t]+(" + NAME + rb")", re.I)
+_ASSIGNMENT = re.compile(
+    rb"(" + NAME + rb")[ \t]*(?:\[([^\]]*)\])?[ \t]*"
+    rb"((?:\.[ \t]*" + NAME + rb"(?:\[[^\]]*\])?[ \t]*)*)=(?!=)[ \t]*"
+)
+_CALL = re.compile(rb"(" + NAME + rb")[ \t]*\((.*)\)\Z", re.S)
+_DECLARED = re.compile(
+    rb"(?:GLOBAL[ \t]+)?(?:DECL[ \t]+)?(GLOBAL[ \t]+)?(?:CONST[ \t]+)?(" + NAME + rb")[ \t]+(?=[A-Za-z_$])",
+    re.I,
+)
+_ITEM = re.compile(rb"(" + NAME + rb")[ \t]*(?:\[([^\]]*)\])?[ \t]*(=[ \t]*)?")
+_STRING = re.compile(rb'"[^"\r\n]*"?')
+_IDENTIFIER = re.compile(rb"(?<![A-Za-z0-9_$#'])" + NAME)
+_NUMBER = re.compile(rb"[-+]?[ \t]*(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\Z")
+_RADIX = re.compile(rb"'[ \t]*(?:[Bb][ \t]*([01]+)|[Hh][ \t]*([0-9A-Fa-f]+))[ \t]*'\Z")
+
+
+class Assignment(NamedTuple):
+    name: bytes  # upper case
+    index: bytes | None
+    path: bytes  # upper case, without the first dot: b"Z" of P.Z
+    value: bytes
+    at: int  # offset of the value in the document
+
+    @property
+    def key(self) -> bytes | None:
+        return keyed(self.name, self.index)
+
+
+class Call(NamedTuple):
+    name: bytes
+    arguments: bytes
+
+
+class Declared(NamedTuple):
+    type: bytes
+    is_global: bool
+    items: tuple[tuple[bytes | None, bytes, int], ...]  # key, value or b"", offset of the value
+
+
+class Statement(NamedTuple):
+    """One line: its kind, its first word (upper case), its code without comment, and what it says."""
+
+    kind: str
+    word: bytes
+    code: bytes
+    line: int
+    at: int  # offset of the first byte of the code
+    said: Assignment | Call | Declared | bytes | None = None
+    comment: bytes = b""
+
+
+def keyed(name: bytes, index: bytes | None) -> bytes | None:
+    """The name of a variable or of an array's element with a constant index; None for any other index."""
+    if index is None:
+        return name
+    digits = index.replace(b" ", b"").replace(b"\t", b"")
+    return name + b"[" + digits + b"]" if digits.replace(b",", b"").isdigit() else None
+
+
+def split_comment(line: bytes) -> tuple[bytes, bytes]:
+    """The code of a line, and its comment from the ``;`` on (a ``;`` inside of a string is none)."""
+    at = line.find(b";")
+    if at >= 0 and b'"' in line[:at]:
+        masked = _STRING.sub(lambda found: b"_" * len(found[0]), line)
+        at = masked.find(b";")
+    return (line, b"") if at < 0 else (line[:at], line[at:])
+
+
+def identifiers(code: bytes) -> set[bytes]:
+    """Every name that a piece of code mentions, upper case; enumeration words (#X) and strings are none."""
+    return {name.upper() for name in _IDENTIFIER.findall(_STRING.sub(b"", code))}
+
+
+def number(literal: bytes) -> float | None:
+    """The value of a numeric literal: 12, 12., - 0.5, 1.2E-05, 'B0110', 'HFF'; None if it is none."""
+    if _NUMBER.match(literal):
+        value = float(literal.replace(b" ", b"").replace(b"\t", b""))
+        return value if math.isfinite(value) else None
+    radix = _RADIX.match(literal)
+    if radix is None or len(literal) > 40:
+        return None
+    return float(int(radix[1], 2) if radix[1] else int(radix[2], 16))
+
+
+def lines(document: Document) -> Iterator[tuple[int, int, int]]:
+    """Number (from 1), start and stop (line ending included) of every line; a BOM belongs to none."""
+    starts = document.line_starts
+    first = len(BOM) if document.raw.startswith(BOM) else 0
+    stops = [*starts[1:], len(document.raw)]
+    for i, (start, stop) in enumerate(zip(starts, stops, strict=True)):
+        yield i + 1, max(start, first), stop
+
+
+def statement(raw: bytes, line: int, start: int, stop: int) -> Statement | None:
+    """The statement of a line; None for an empty or a header line.  A pure comment is of kind "comment"."""
+    code, comment = split_comment(raw[start:stop].rstrip(b"\r\n"))
+    stripped = code.lstrip(b" \t\x0c\x0b\x00\r")
+    at = start + len(code) - len(stripped)
+    code = stripped.rstrip(b" \t\x0c\x0b\x00\r")
+    if not code:
+        return Statement("comment", b"", b"", line, at, None, comment) if comment else None
+    if code.startswith(b"&"):
+        return None
+    first = _FIRST.match(code)
+    word = first[1].upper() if first else b""
+    kind, said = _kind(word, code, at)
+    return Statement(kind, word, code, line, at, said, comment)
+
+
+def _kind(word: bytes, code: bytes, at: int) -> tuple[str, Assignment | Call | Declared | bytes | None]:
+    found: re.Match[bytes] | None
+    if word in MOTIONS:
+        # A variable may bear such a name only where no motion can stand.
+        return "motion", None
+    if word in OPENS:
+        return "open", None
+    if word in CLOSES:
+        return "close", None
+    if word in BRANCHES:
+        return "branch", None
+    if word in (b"DEF", b"DEFFCT", b"GLOBAL") and (found := _DEF.match(code)):
+        return "def", found[2].upper()
+    if word in (b"END", b"ENDFCT"):
+        return "end", None
+    if word == b"GOTO" and (found := _GOTO.match(code)):
+        return "goto", found[1].upper()
+    if word in KEPT:
+        return "kept", None
+    if word == b"DECL" or word in TYPES or word == b"GLOBAL":
+        declared = declaration(code, at)
+        if declared is not None:
+            return "declaration", declared
+    if found := _ASSIGNMENT.match(code):
+        path = found[3].replace(b" ", b"").replace(b"\t", b"").upper()[1:]
+        value = Assignment(found[1].upper(), found[2], path, code[found.end() :], at + found.end())
+        return "assignment", value
+    if found := _CALL.match(code):
+        return "call", Call(found[1].upper(), found[2])
+    if found := _LABEL.match(code):
+        return "label", found[1].upper()
+    return "other", None
+
+
+def declaration(code: bytes, at: int) -> Declared | None:
+    """``[DECL] [GLOBAL] TYPE NAME[[n]] [= value] {, ...}``; None if the code is none."""
+    head = _DECLARED.match(code)
+    if head is None or head[2].upper() in (b"INTERRUPT", b"DECL"):
+        return None
+    is_global = head[1] is not None or code[:6].upper() == b"GLOBAL"
+    items: list[tuple[bytes | None, bytes, int]] = []
+    place = head.end()
+    while found := _ITEM.match(code, place):
+        place = found.end()
+        value = b""
+        if found[3]:
+            stop = value_end(code, place)
+            value = code[place:stop].rstrip()
+            items.append((keyed(found[1].upper(), found[2]), value, at + place))
+            place = stop
+        else:
+            # The size of an array is no element of it.
+            items.append((found[1].upper(), b"", at + place))
+        rest = code[place:].lstrip()
+        if not rest.startswith(b","):
+            break
+        place = len(code) - len(rest) + 1
+        place += len(code[place:]) - len(code[place:].lstrip())
+    return Declared(head[2].upper(), is_global, tuple(items)) if items else None
+
+
+def value_end(code: bytes, start: int) -> int:
+    """Where a value that begins at ``start`` ends: at the comma outside of all braces, or at the end."""
+    depth = 0
+    masked = _STRING.sub(lambda found: b"_" * len(found[0]), code)
+    for i in range(start, len(masked)):
+        letter = masked[i]
+        if letter in b"{([":
+            depth += 1
+        elif letter in b"})]":
+            depth -= 1
+        elif letter == 0x2C and depth <= 0:
+            return i
+    return len(code)
+
+
+def module_name(raw: bytes, word: bytes) -> tuple[int, int] | None:
+    """Byte range of the module's name in the first ``DEF`` (or ``DEFDAT``) line."""
+    pattern = rb"^(?:\xef\xbb\xbf)?[ \t]*(?:GLOBAL[ \t]+)?" + word + rb"[ \t]+(" + NAME + rb")"
+    if word == b"DEF":
+        pattern += rb"[ \t]*\("
+    found = re.search(pattern, raw, re.I | re.M)
+    return found.span(1) if found else None

@@ -1,0 +1,72 @@
+"""FORCE comments: modal, from their line on.
+
+``FORCE fx fy fz [mx my mz] [@frame]`` in N and N m, or ``FORCE OFF``; blanks or commas between, any case.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from postproc.findings import Finding, Refusal
+from postproc.forces.stated import BASE, NotAForce, Stated, is_number_like, parse_force
+from postproc.toolpath import Annotation, Toolpath
+
+FORM = "FORCE fx fy fz [mx my mz] [@base|world|tool|feed] in N and N m, or FORCE OFF"
+_FORCE = re.compile(r"force", re.IGNORECASE)
+_REST = re.compile(r"force(?=[\s,@]|\Z)[\s,]*", re.IGNORECASE)
+
+_OFF = ((0.0,) * 6, BASE)
+
+
+def read_annotations(toolpath: Toolpath, file: str) -> tuple[Stated | None, tuple[Finding, ...]]:
+    """What the FORCE comments state for every motion; None where there is none.
+
+    Comments that only begin with FORCE are told (FRC006).  Refusal FRC002 for every malformed one.
+    """
+    rows, forces = [], []
+    ignored, wrong = [], []
+    for annotation in sorted(toolpath.annotations, key=lambda a: a.row):
+        if not _FORCE.match(annotation.text.strip()):
+            continue
+        try:
+            force = _parse(annotation)
+        except NotAForce as error:
+            message = f"{annotation.text.strip()[:60]!r}: {error}"
+            wrong.append(Finding("FRC002", message, file, annotation.line, help=FORM))
+            continue
+        if force is None:
+            message = f"{annotation.text.strip()[:60]!r} is no force; it was not used"
+            ignored.append(Finding("FRC006", message, file, annotation.line, help=FORM))
+            continue
+        rows.append(annotation.row)
+        forces.append(force)
+    if wrong:
+        raise Refusal(*wrong)
+    if not rows:
+        return None, tuple(ignored)
+    # the last comment at or before each motion; entry 0 stands for none yet
+    chosen = np.searchsorted(np.array(rows), np.arange(len(toolpath)), side="right")
+    values = np.array([_OFF[0], *(value for value, _ in forces)])
+    frames = np.array([_OFF[1], *(frame for _, frame in forces)])
+    return Stated(values[chosen], frames[chosen]), tuple(ignored)
+
+
+def _parse(annotation: Annotation) -> tuple[tuple[float, ...], int] | None:
+    """The force of a comment; None where it is no annotation; raises NotAForce where it is a malformed one."""
+    text = annotation.text.strip()
+    word = _REST.match(text)
+    if word is None:
+        return None
+    rest = text[word.end() :]
+    second = re.split(r"[\s,]", rest, maxsplit=1)[0]
+    if second.lower() == "off":
+        if rest[len(second) :].strip():
+            raise NotAForce("nothing may follow OFF")
+        return _OFF
+    if second and not second.startswith("@") and not is_number_like(second):
+        return None
+    if not rest.partition("@")[0].strip():
+        raise NotAForce("the numbers are missing")
+    return parse_force(rest)

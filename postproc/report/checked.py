@@ -1,0 +1,61 @@
+"""What ``compensate check`` has to say of a program."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from postproc.dialects.dialect import Program
+from postproc.findings import CODES, Finding
+from postproc.report.report import exit_code, in_order_of_place
+from postproc.toolpath import Kind, Toolpath
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A program that was read."""
+
+    program: Program
+
+    @property
+    def toolpath(self) -> Toolpath:
+        return self.program.toolpath
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        return in_order_of_place(self.program.findings)
+
+    @property
+    def exit(self) -> int:
+        return 3 if exit_code(self.findings) else 0
+
+    @property
+    def kinds(self) -> dict[str, int]:
+        return {
+            Kind(kind).name: count for kind, count in sorted(Counter(self.toolpath.kind.tolist()).items())
+        }
+
+    @property
+    def refused(self) -> dict[str, int]:
+        """code -> motions that can not be corrected for it."""
+        return dict(sorted(Counter(finding.code for finding in self.toolpath.refused.values()).items()))
+
+    def summary(self) -> Iterator[str]:
+        total, refused = len(self.toolpath), sum(self.refused.values())
+        kinds = ", ".join(f"{count} {name}" for name, count in self.kinds.items())
+        yield f"{total} motions{f' ({kinds})' if kinds else ''}: {total - refused} understood, {refused} refused"
+        for code, count in self.refused.items():
+            yield f"  {count} x {code} {CODES[code].title}"
+
+    def as_json(self) -> dict[str, object]:
+        return {
+            "program": str(self.program.documents[0].path),
+            "dialect": self.program.dialect,
+            "files": [str(document.path) for document in self.program.documents],
+            "motions": len(self.toolpath),
+            "kinds": self.kinds,
+            "refused": self.refused,
+            "findings": [finding.as_json() for finding in self.findings],
+            "exit": self.exit,
+        }

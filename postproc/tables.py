@@ -1,0 +1,179 @@
+"""CSV files as columns: every mistake is told with file, line and column name.
+
+A header row, then rows with as many cells.  Comma, semicolon or tab, whichever gives the header most cells;
+where it is not the comma, a decimal comma is understood.  Blank lines and lines that begin with ``#`` are skipped.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints, frozen
+from postproc.findings import Finding, Refusal, nearest
+
+_LINE_END = re.compile(r"\r\n|\n|\r")
+_NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
+_NUMBER_CHARACTERS = frozenset("0123456789+-.eE")
+_NOTHING = ' \t;,"'  # a spreadsheet writes its empty rows as separators alone
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """``columns``: name in lower case -> cells as text, blanks stripped; ``lines`` (rows,): line of the file, from 1.
+
+    ``comments``: (line, text after the #).  ``code`` is the one that errors in this table carry.
+    """
+
+    path: Path
+    code: str
+    columns: Mapping[str, Sequence[str]]
+    lines: Ints
+    header_line: int
+    separator: str
+    comments: tuple[tuple[int, str], ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.columns
+
+    def only(self, *allowed: str) -> None:
+        """Refuses any column that is not one of ``allowed``."""
+        for name in self.columns:
+            if name not in allowed:
+                raise self.header_error(
+                    f"unknown column {name!r}{nearest(name, allowed)}", "columns: " + ", ".join(allowed)
+                )
+
+    def texts(self, name: str) -> Sequence[str]:
+        return self.columns[name]
+
+    def numbers(self, name: str) -> Floats:
+        """The column (rows,) as finite numbers, in the unit of the file."""
+        cells = self.columns[name]
+        if self.separator != ",":
+            cells = [cell.replace(",", ".", 1) if "," in cell else cell for cell in cells]
+        # float() alone would also take nan, inf, 1_0 and the digits of other scripts
+        if _NUMBER_CHARACTERS.issuperset("".join(cells)):
+            try:
+                values = np.array([float(cell) for cell in cells])
+            except ValueError:
+                pass
+            else:
+                if np.all(np.isfinite(values)):
+                    return frozen(values, (-1,))
+        for row, cell in enumerate(cells):
+            shown = self.columns[name][row][:40]
+            if not cell:
+                raise self.error(row, name, "the cell is empty")
+            if not _NUMBER.match(cell):
+                raise self.error(row, name, f"{shown!r} is not a number")
+            if not math.isfinite(float(cell)):
+                raise self.error(row, name, f"{shown!r} is too large")
+        raise ValueError("a column that is neither numbers nor wrong")
+
+    def error(self, row: int, name: str, message: str, help: str = "") -> Refusal:
+        """A Refusal that points at the cell of column ``name`` in ``row`` (from 0)."""
+        return Refusal(
+            Finding(self.code, f"column {name}: {message}", str(self.path), int(self.lines[row]), help=help)
+        )
+
+    def header_error(self, message: str, help: str = "") -> Refusal:
+        return Refusal(Finding(self.code, message, str(self.path), self.header_line, help=help))
+
+
+def read_table(path: Path, code: str) -> Table:
+    """Reads a CSV file; ``code`` is the one that findings about its contents carry.
+
+    Raises Refusal: FIL001 (not readable), FIL002 (empty), FIL003 (binary), ``code`` (header or rows are wrong).
+    """
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
+    if b"\0" in raw:
+        raise Refusal(Finding("FIL003", "holds NUL bytes; save it as plain text (UTF-8)", str(path)))
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")  # an old spreadsheet's umlauts in a comment; numbers are the same
+
+    comments, lines, kept = [], [], []
+    for number, line in enumerate(_LINE_END.split(text), start=1):
+        if line.lstrip().startswith("#"):
+            comments.append((number, line.strip()[1:].strip()))
+        elif line.strip(_NOTHING):
+            lines.append(number)
+            kept.append(line)
+    if not kept:
+        raise Refusal(Finding("FIL002", "the file has no header and no rows", str(path)))
+
+    separator = _separator(kept[0])
+    rows = _cells(path, code, kept, lines, separator)
+    names = [name.strip().lower() for name in rows[0]]
+    for index, name in enumerate(names, start=1):
+        if not name or (name in names[: index - 1]):
+            what = "has no name" if not name else f"has the name {name!r} of one before it"
+            raise Refusal(Finding(code, f"column {index} of the header {what}", str(path), lines[0]))
+    if len(rows) == 1:
+        raise Refusal(Finding(code, "there is a header, but no rows", str(path), lines[0]))
+    for number, row in zip(lines, rows, strict=True):
+        if len(row) != len(names):
+            raise Refusal(_wrong_count(path, code, number, row, names, separator))
+    columns = {
+        name: [cell.strip() for cell in cells]
+        for name, cells in zip(names, zip(*rows[1:], strict=True), strict=True)
+    }
+    return Table(
+        path, code, columns, frozen(lines[1:], (-1,), np.int64), lines[0], separator, tuple(comments)
+    )
+
+
+def _separator(header: str) -> str:
+    """The separator that cuts the header into most cells; the comma where there is but one."""
+
+    def cells(separator: str) -> int:
+        try:
+            return len(next(csv.reader([header], delimiter=separator)))
+        except csv.Error:
+            return 0
+
+    return max((",", ";", "\t"), key=cells)
+
+
+def _cells(path: Path, code: str, kept: list[str], lines: list[int], separator: str) -> list[list[str]]:
+    """The cells of each line; Refusal where quotes do not close on their line."""
+    reader = csv.reader(kept, delimiter=separator, strict=True, skipinitialspace=True)
+    rows: list[list[str]] = []
+    what = "a quote does not close on this line"
+    try:
+        for row in reader:
+            if reader.line_num != len(rows) + 1:
+                break
+            rows.append(row)
+        else:
+            return rows
+    except csv.Error as error:
+        if reader.line_num == len(rows) + 1:
+            what = f"quotes or cells are wrong ({error})"
+    raise Refusal(Finding(code, what, str(path), lines[len(rows)]))
+
+
+def _wrong_count(
+    path: Path, code: str, number: int, row: list[str], names: list[str], separator: str
+) -> Finding:
+    if len(row) < len(names):
+        message = f"{len(row)} cells where the header has {len(names)}: column {names[len(row)]} is missing"
+        help = ""
+    else:
+        message = f"{len(row)} cells where the header has {len(names)}: too many after column {names[-1]}"
+        help = "a decimal comma needs semicolons between the cells" if separator == "," else ""
+    return Finding(code, message, str(path), number, help=help)

@@ -1,0 +1,474 @@
+"""Each command as a function on paths.
+
+Reading, predicting and correcting are done by the rooms below; here they are put in their order, and nothing is
+written that was not read back from its own bytes and checked.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from postproc import __version__
+from postproc.arrays import Floats
+from postproc.cell import Cell, find_cell, frames_of, load_cell
+from postproc.compensation.correct import Result, State, Task, correct, with_residual
+from postproc.dialects import detect
+from postproc.dialects.dialect import Dialect, Program
+from postproc.document import Document, Edit, apply, undone
+from postproc.findings import Finding, Refusal
+from postproc.forces import Wrenches, wrenches
+from postproc.geometry import Poses, vector_from_rotation
+from postproc.model import StiffnessModel
+from postproc.publish import publish
+from postproc.report.checked import Checked
+from postproc.report.files import corrections_csv, unified_diff
+from postproc.report.report import Report, Spread, Worst, exit_code, in_order_of_place
+from postproc.robot.description import Robot, find_robot, load_robot, robot_files
+from postproc.robot.track import follow
+from postproc.toolpath import Toolpath
+from postproc.units import DEG, MM
+
+WORST_PLACES = 5
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the user asked for.  ``force``: None without ``--force``, "" for a bare one, else its value."""
+
+    program: Path
+    force: str | None = None
+    cell: Path | None = None
+    robot: str | None = None
+    gain: float = 1.0
+    output: Path | None = None
+    report: Path | None = None
+    strict: bool = False
+    dry_run: bool = False
+    again: bool = False
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A program with all that predicts it."""
+
+    program: Program
+    dialect: Dialect
+    cell: Cell
+    robot: Robot
+    model: StiffnessModel
+    wrenches: Wrenches
+    task: Task
+    findings: tuple[Finding, ...]
+
+
+def read_program(path: Path) -> tuple[Dialect, Program]:
+    """Read a program and what belongs to it.  Raises Refusal FIL001, FIL002, FIL003."""
+    main = _document(path)
+    if not main.raw.strip():
+        raise Refusal(Finding("FIL002", "the file is empty", str(path)))
+    dialect = detect(path, main.raw)
+    documents = (main, *(_document(companion) for companion in dialect.companions(path)))
+    return dialect, dialect.read(documents)
+
+
+def _document(path: Path) -> Document:
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
+    if b"\0" in raw:
+        at = raw.index(b"\0")
+        raise Refusal(Finding("FIL003", f"NUL at byte {at}: no text of a program", str(path)))
+    return Document(path, raw)
+
+
+def prepare(request: Request) -> Prepared:
+    """Read program, cell and robot, and find force and axes of every motion."""
+    dialect, program = read_program(request.program)
+    cell = _cell(request)
+    beside = None if request.robot else cell.path.parent
+    robot = load_robot(find_robot(cell.robot, beside))
+    full = StiffnessModel.from_robot(robot)
+    process = cell.correct == "process"
+    own: list[str] = []
+    if not process and cell.controller.absolute_accuracy:
+        own.append("geometric")
+    if not process and cell.controller.gravity_compensated:
+        own.append("weight")
+    model = full.without(families=own)
+
+    path = program.toolpath
+    if not len(path) and request.force is not None:
+        raise Refusal(
+            Finding("FIL009", f"no motion was found (read as {dialect.name})", str(request.program)),
+            *program.findings,
+        )
+    frames = frames_of(cell, path, request.program)
+    force = wrenches(request.program, path, frames, cell, request.force)
+    _missing_points(program, force.values)
+    base, tool = frames.base_in_robot, frames.tool_in_flange
+    wanted = base @ path.target_in_base
+    track = follow(robot, path, wanted @ tool.inverse(), cell.start)
+    task = Task(
+        file=request.program.name,
+        toolpath=path,
+        model=model,
+        track=track,
+        wanted=wanted,
+        base=base,
+        tool=tool,
+        wrench=force.values,
+        process=process,
+        gain=request.gain,
+        max_correction=cell.max_correction,
+        tolerance=cell.tolerance,
+    )
+    findings = [*program.findings, *force.findings, *model.doubts()]
+    findings += [
+        Finding("KIN007", "the stated T is not that of this pose", request.program.name, int(path.line[row]))
+        for row in np.flatnonzero(~track.turn_holds)
+    ]
+    return Prepared(program, dialect, cell, robot, model, force, task, tuple(findings))
+
+
+def check(path: Path) -> Checked:
+    """Read a program only."""
+    _, program = read_program(path)
+    return Checked(program)
+
+
+def robots(name: str | None) -> list[StiffnessModel]:
+    """The models of all robots, or of one."""
+    paths = [find_robot(name)] if name else list(robot_files().values())
+    return [StiffnessModel.from_robot(load_robot(path)) for path in paths]
+
+
+def _cell(request: Request) -> Cell:
+    """The cell file, or an empty cell where ``--robot`` says all that a program with its own frames needs."""
+    try:
+        cell = load_cell(request.cell or find_cell(request.program))
+    except Refusal as refusal:
+        if request.cell or not request.robot or refusal.findings[0].code != "CEL001":
+            raise
+        cell = Cell(path=Path("cell.yaml"), robot=request.robot)
+    return replace(cell, robot=request.robot) if request.robot else cell
+
+
+def _missing_points(program: Program, wrench: Floats) -> None:
+    """Refuse a cut whose points are declared nowhere because the module's data list is not there."""
+    if len(program.documents) > 1:
+        return
+    forced = np.linalg.norm(wrench, axis=1) > 0
+    lost = [
+        row for row, finding in program.toolpath.refused.items() if finding.code == "KRL003" and forced[row]
+    ]
+    if lost:
+        path, first = program.documents[0].path, program.toolpath.refused[min(lost)]
+        raise Refusal(
+            Finding(
+                "FIL006",
+                f"{first.message}; {path.with_suffix('.dat').name} is not beside {path.name}"
+                f" ({len(lost)} such motions)",
+                str(path),
+                first.line,
+                first.column,
+                help="copy the .dat of the module beside its .src",
+            )
+        )
+
+
+def predict(request: Request) -> Report:
+    """The deflection at every pose; files only where ``report`` names a folder for them."""
+    ready = prepare(request)
+    result = correct(replace(ready.task, gain=0.0))
+    findings = in_order_of_place([*ready.findings, *result.findings])
+    report = _report(request, ready, result, findings, corrected=False)
+    if request.report and not request.dry_run:
+        stem = request.program.stem
+        table = request.report / f"{stem}.deflection.csv"
+        page = request.report / f"{stem}.prediction.json"
+        report = replace(report, outputs=(str(table), str(page)))
+        _not_over_inputs(ready.program, report.outputs)
+        publish({table: corrections_csv(ready.task, result), page: _json(report)})
+    return report
+
+
+def compensate(request: Request) -> Report:
+    """The main job: read, predict, correct, write, read back.
+
+    Raises Refusal, and has then written nothing.
+    """
+    ready = prepare(request)
+    program = ready.program
+    if program.marker is not None and not request.again:
+        line, column = program.documents[0].place(program.marker.start)
+        raise Refusal(
+            Finding(
+                "FIL005",
+                "this program carries the mark of an earlier compensation",
+                str(request.program),
+                line,
+                column,
+                help="compensate the original instead, or say --again if it is meant",
+            )
+        )
+    result = correct(ready.task)
+    edits, result = _written(request, ready, result)
+    findings = [*ready.findings, *result.findings, *_closing(request, ready, result)]
+    target = _target(request)
+    outputs = _output_files(request, ready, target, edits)
+    stem = target.stem
+    folder = request.report or target.parent
+    names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff")]
+    report = _report(request, ready, result, in_order_of_place(findings), corrected=True)
+    if report.exit == 1:
+        raise Refusal(*report.findings)
+    report = replace(report, outputs=tuple(str(path) for path in (*outputs, *names)))
+    _not_over_inputs(program, report.outputs)
+    if request.dry_run:
+        return replace(report, outputs=())
+    diff = b"".join(
+        unified_diff(document, path.name, [edit for edit in edits if edit.span.file == index])
+        for index, (document, path) in enumerate(zip(program.documents, outputs, strict=True))
+    )
+    files = {
+        **outputs,
+        names[0]: _json(report),
+        names[1]: corrections_csv(ready.task, result),
+        names[2]: diff,
+    }
+    for document in program.documents:
+        if _document(document.path).digest != document.digest:
+            raise Refusal(Finding("FIL010", "the file changed while it was read", str(document.path)))
+    publish(files, last=target)
+    return report
+
+
+def _written(request: Request, ready: Prepared, result: Result) -> tuple[list[Edit], Result]:
+    """The edits of the output, and the residual predicted from the digits that they write."""
+    program, dialect, task = ready.program, ready.dialect, ready.task
+    planned = task.base.inverse() @ result.command
+    keep = ~result.corrected
+    position, rotation = planned.position.copy(), planned.rotation.copy()
+    position[keep], rotation[keep] = task.toolpath.position[keep], task.toolpath.rotation[keep]
+    decimals = {
+        "mm": _decimals(ready.cell.tolerance / MM),
+        "deg": _decimals(ready.cell.tolerance_angle / DEG),
+    }
+    edits = dialect.moved(program, position, rotation, decimals)
+    if edits:
+        edits.append(dialect.marked(program, _mark(ready)))
+    target = _target(request)
+    if target.stem != request.program.stem:
+        if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,23}", target.stem):
+            raise Refusal(Finding("FIL011", f"{target.stem!r} can not name a module", str(target)))
+        edits += dialect.renamed(program, target.stem)
+    back = _read_back(ready, edits)
+    _hold(ready, back, Poses(rotation, position), decimals, request.program)
+    return edits, with_residual(task, result, task.base @ back.target_in_base)
+
+
+def _decimals(tolerance: float) -> int:
+    """Decimals whose rounding stays below a twentieth of the tolerance; three at least."""
+    return max(3, math.ceil(-math.log10(tolerance / 10)))
+
+
+def _mark(ready: Prepared) -> str:
+    digest = _source_digest(ready.program.documents)
+    return (
+        f"by compensate {__version__}, robot {ready.robot.name} sha256:{ready.robot.digest[:16]},"
+        f" source sha256:{digest[:16]}"
+    )
+
+
+def _source_digest(documents: Sequence[Document]) -> str:
+    """SHA-256 of the main file; with companions, of all their digests in order."""
+    if len(documents) == 1:
+        return documents[0].digest
+    return hashlib.sha256("".join(document.digest for document in documents).encode()).hexdigest()
+
+
+def _read_back(ready: Prepared, edits: Sequence[Edit]) -> Toolpath:
+    """The toolpath of the bytes that are about to be written.  Raises Refusal FIL008."""
+    documents = []
+    for index, document in enumerate(ready.program.documents):
+        own = [edit for edit in edits if edit.span.file == index]
+        raw = apply(document, own)
+        if not undone(raw, document.raw, own):
+            raise Refusal(Finding("FIL008", "bytes outside of the corrections changed", str(document.path)))
+        documents.append(Document(document.path, raw))
+    return ready.dialect.read(tuple(documents)).toolpath
+
+
+def _hold(ready: Prepared, back: Toolpath, planned: Poses, decimals: dict[str, int], program: Path) -> None:
+    """The program read back is the one that was meant, motion by motion.  Raises Refusal FIL008."""
+    path = ready.task.toolpath
+    if len(back) != len(path):
+        raise Refusal(Finding("FIL008", f"{len(path)} motions became {len(back)}", str(program)))
+    for name in ("kind", "base", "tool", "status", "turn", "axes", "feed"):
+        same = np.isclose(getattr(path, name), getattr(back, name), rtol=0, atol=0, equal_nan=True)
+        if not same.all():
+            row = int(np.flatnonzero(~same.reshape(len(path), -1).all(axis=1))[0])
+            raise Refusal(Finding("FIL008", f"{name} of a motion changed", str(program), int(path.line[row])))
+    known = np.isfinite(path.position[:, 0])
+    if not (np.isfinite(back.position[:, 0]) == known).all():
+        raise Refusal(Finding("FIL008", "targets were lost or appeared", str(program)))
+    off = np.abs(back.position[known] - planned.position[known]).max(initial=0.0) / MM
+    turned = np.swapaxes(planned.rotation[known], -1, -2) @ back.rotation[known]
+    angle = np.linalg.norm(vector_from_rotation(turned), axis=1).max(initial=0.0) / DEG
+    if off > 0.5001 * 10.0 ** -decimals["mm"] + 1e-9 or angle > 1.5 * 10.0 ** -decimals["deg"] + 1e-9:
+        raise Refusal(
+            Finding("FIL008", f"a target is {off:.6f} mm, {angle:.6f} deg from what was meant", str(program))
+        )
+
+
+def _closing(request: Request, ready: Prepared, result: Result) -> list[Finding]:
+    """What is to be said of the corrected program as a whole."""
+    file, findings = request.program.name, []
+    corrected = result.corrected
+    above = corrected & (result.after > ready.cell.tolerance)
+    if request.gain < 1.0:
+        findings.append(
+            Finding("COR007", f"{request.gain:.0%} of the correction was applied, as asked", file)
+        )
+    elif above.any():
+        row = int(np.argmax(np.where(corrected, result.after, -1.0)))
+        findings.append(
+            Finding(
+                "COR005",
+                f"{result.after[row] / MM:.4f} mm remain, tolerance {ready.cell.tolerance / MM:g} mm"
+                f" ({int(above.sum())} motions)",
+                file,
+                int(ready.task.toolpath.line[row]),
+            )
+        )
+    if corrected.any():
+        cuts = len(np.unique(result.cut[corrected]))
+        findings.append(
+            Finding(
+                "COR006",
+                f"{int(corrected.sum())} end points in {cuts} cuts are corrected; between the points the path is not"
+                " checked, and each correction fades in along the first motion of its cut",
+                file,
+                help="long motions and cut entries keep a part of their error: let the CAM system post shorter"
+                " segments there",
+            )
+        )
+    return findings
+
+
+def _target(request: Request) -> Path:
+    """Where the compensated program goes."""
+    if request.output is None:
+        return request.program.parent / "compensated" / request.program.name
+    if request.output.is_dir():
+        return request.output / request.program.name
+    return request.output
+
+
+def _output_files(
+    request: Request, ready: Prepared, target: Path, edits: Sequence[Edit]
+) -> dict[Path, bytes]:
+    """path -> bytes of the program's files; companions take the program's stem and keep their suffix."""
+    files = {}
+    for index, document in enumerate(ready.program.documents):
+        path = target if index == 0 else target.with_name(target.stem + document.path.suffix)
+        if index and target.stem == request.program.stem:
+            path = target.with_name(document.path.name)
+        files[path] = apply(document, [edit for edit in edits if edit.span.file == index])
+    return files
+
+
+def _not_over_inputs(program: Program, outputs: Sequence[str]) -> None:
+    inputs = {document.path.resolve() for document in program.documents}
+    for output in outputs:
+        if Path(output).resolve() in inputs:
+            raise Refusal(Finding("FIL007", "this output is an input of the same run", output))
+    if len({Path(output).resolve() for output in outputs}) < len(outputs):
+        raise Refusal(Finding("FIL007", "two outputs have one name", outputs[0]))
+
+
+def _report(
+    request: Request, ready: Prepared, result: Result, findings: tuple[Finding, ...], corrected: bool
+) -> Report:
+    task = ready.task
+    scope = result.state != State.AIR
+    size = np.linalg.norm(result.command.position - task.wanted.position, axis=1)
+    force = np.linalg.norm(task.wrench[:, :3], axis=1)
+    order = np.argsort(-np.nan_to_num(np.where(scope, result.before, -1.0), nan=-1.0), kind="stable")
+    worst = tuple(
+        Worst(
+            int(task.toolpath.line[row]),
+            float(result.before[row] / MM),
+            float(size[row] / MM) if corrected else math.nan,
+            float(result.after[row] / MM) if corrected else math.nan,
+            float(force[row]),
+        )
+        for row in order[:WORST_PLACES]
+        if scope[row] and np.isfinite(result.before[row])
+    )
+    return Report(
+        program=str(request.program),
+        dialect=ready.dialect.name,
+        robot=ready.robot.name,
+        motions=len(task.toolpath),
+        cuts=int(result.cut.max(initial=-1)) + 1,
+        cutting=int(scope.sum()),
+        corrected=int(result.corrected.sum()) if corrected else 0,
+        inserted=0,
+        left=int((result.state == State.LEFT).sum()),
+        iterations=int(result.iterations.max(initial=0)),
+        gain=request.gain,
+        mode=ready.cell.correct,
+        force_source=ready.wrenches.source,
+        force_max_n=float(force.max(initial=0.0)),
+        before=Spread.of(result.before[scope]),
+        after=Spread.of(result.after[scope]) if corrected else None,
+        correction=Spread.of(size[result.corrected]) if corrected else None,
+        angle_before_deg=_largest(result.before_angle[scope]) / DEG,
+        angle_after_deg=_largest(result.after_angle[scope]) / DEG if corrected else None,
+        worst=worst,
+        model=_model(ready),
+        digests={
+            "robot": ready.robot.digest,
+            **{document.path.name: document.digest for document in ready.program.documents},
+        },
+        findings=findings,
+        exit=exit_code(findings, request.strict),
+    )
+
+
+def _model(ready: Prepared) -> dict[str, object]:
+    """Effects, options, values with interval and source, as they were used."""
+    return {
+        term.effect.name: {
+            **term.effect.described(),
+            "parameters": {
+                name: {
+                    "value": value.value,
+                    "interval": value.interval,
+                    "level": value.level if value.level or value.interval is None else "unstated",
+                    "source": value.source,
+                }
+                for name, value in term.stated.items()
+            },
+        }
+        for term in ready.model.terms
+    }
+
+
+def _largest(values: Floats) -> float:
+    seen = values[np.isfinite(values)]
+    return float(seen.max()) if len(seen) else math.nan
+
+
+def _json(report: Report) -> bytes:
+    return (json.dumps(report.as_json(), indent=2, allow_nan=False) + "\n").encode()

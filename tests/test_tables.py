@@ -1,0 +1,137 @@
+"""CSV tables: dialects of spreadsheets are understood, mistakes are told with line and column."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from postproc.findings import Finding, Refusal
+from postproc.tables import read_table
+
+
+def write(folder: Path, text: str | bytes) -> Path:
+    path = folder / "file.csv"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return path
+
+
+def refused(path: Path, *columns: str) -> Finding:
+    with pytest.raises(Refusal) as caught:
+        table = read_table(path, "FRC003")
+        for name in columns:
+            table.numbers(name)
+    return caught.value.findings[0]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "line,fx\n3,1.5\n7,-2e1\n",
+        "LINE ; Fx\n3;1.5\n7;-2e1\n",
+        "line;fx\n3;1,5\n7;-2e1\n",
+        "line\tfx\r\n3\t1,5\r\n7\t-2e1\r\n",
+        "\ufeffline,fx\n3,1.5\n7,-2e1",
+        '"line","fx"\n"3","1.5"\n"7", "-2e1"\n',
+        'line;"fx"\n3;"1,5"\n7;-20\n',
+    ],
+)
+def test_separators_quotes_and_decimal_commas(tmp_path, text):
+    table = read_table(write(tmp_path, text), "FRC003")
+    assert table.numbers("line").tolist() == [3.0, 7.0]
+    assert table.numbers("fx").tolist() == [1.5, -20.0]
+    assert table.lines.tolist() == [2, 3]
+    assert len(table) == 2
+    assert "fx" in table
+    assert "fy" not in table
+
+
+def test_blank_and_comment_lines_are_skipped_and_counted(tmp_path):
+    table = read_table(write(tmp_path, "# robot: kr\n\nline,fx\n1,2\n  # note\n,,\n;;\n 5 , 6 \n"), "FRC003")
+    assert table.lines.tolist() == [4, 8]
+    assert table.header_line == 3
+    assert table.numbers("line").tolist() == [1.0, 5.0]
+    assert table.comments == ((1, "robot: kr"), (5, "note"))
+
+
+def test_old_mac_line_ends_and_latin_comment(tmp_path):
+    table = read_table(write(tmp_path, b"# Fr\xe4sen\rline,fx\r1,2\r"), "FRC003")
+    assert table.comments == ((1, "Fräsen"),)
+    assert table.lines.tolist() == [3]
+
+
+def test_arrays_are_read_only(tmp_path):
+    numbers = read_table(write(tmp_path, "a\n1\n"), "FRC003").numbers("a")
+    with pytest.raises(ValueError, match="read-only"):
+        numbers[0] = 2
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "line", "words"),
+    [
+        ("", "FIL002", 0, "no header"),
+        ("# only\n\n", "FIL002", 0, "no header"),
+        (b"a\0b", "FIL003", 0, "NUL"),
+        ("line,fx\n", "FRC003", 1, "no rows"),
+        ("line,fx\n1,2\n1\n", "FRC003", 3, "1 cells where the header has 2: column fx is missing"),
+        ("line,fx\n1,2,5\n", "FRC003", 2, "3 cells where the header has 2"),
+        ("line,fx\n\n1,x\n", "FRC003", 3, "column fx: 'x' is not a number"),
+        ("line,fx\n1,nan\n", "FRC003", 2, "column fx: 'nan' is not a number"),
+        ("line,fx\n1,inf\n", "FRC003", 2, "column fx: 'inf' is not a number"),
+        ("line,fx\n1,1e999\n", "FRC003", 2, "column fx: '1e999' is too large"),
+        ("line,fx\n1,1_0\n", "FRC003", 2, "'1_0' is not a number"),
+        ("line,fx\n1,\u0663\n", "FRC003", 2, "is not a number"),
+        ("line,fx\n1,\n", "FRC003", 2, "column fx: the cell is empty"),
+        ('line,fx\n1,"1,5"\n', "FRC003", 2, "'1,5' is not a number"),
+        ("line;fx\n1;1.234,5\n", "FRC003", 2, "'1.234,5' is not a number"),
+        ("line;fx\n1;1,2,3\n", "FRC003", 2, "'1,2,3' is not a number"),
+        ("line,fx,fx\n1,2,3\n", "FRC003", 1, "column 3 of the header has the name 'fx'"),
+        ("line,fx,\n1,2,\n", "FRC003", 1, "column 3 of the header has no name"),
+        ('line,fx\n1,2\n"3,4\n5,6\n', "FRC003", 3, "quote does not close"),
+        ('line,fx\n1,"2"x\n', "FRC003", 2, "quotes"),
+        ('line,fx\n1,2\n3,"4\n', "FRC003", 3, "quotes"),
+    ],
+)
+def test_mistakes_are_told(tmp_path, text, code, line, words):
+    finding = refused(write(tmp_path, text), "line", "fx")
+    assert (finding.code, finding.line) == (code, line)
+    assert words in finding.message
+    assert finding.file.endswith("file.csv")
+
+
+def test_decimal_comma_between_commas_gets_a_hint(tmp_path):
+    assert "semicolons" in refused(write(tmp_path, "line,fx\n1,2,5\n"), "fx").help
+
+
+def test_unknown_columns_name_the_nearest(tmp_path):
+    table = read_table(write(tmp_path, "line,fxx\n1,2\n"), "FRC003")
+    with pytest.raises(Refusal, match="unknown column 'fxx'; did you mean 'fx'"):
+        table.only("line", "fx")
+
+
+def test_missing_file(tmp_path):
+    assert refused(tmp_path / "none.csv").code == "FIL001"
+    assert refused(tmp_path).code == "FIL001"
+
+
+@given(
+    st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1, max_size=20),
+    st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", ",")]),
+)
+def test_numbers_survive_every_dialect(tmp_path_factory, values, dialect):
+    separator, point = dialect
+    lines = [f"a{separator}b", *(f"{value!r}{separator}0".replace(".", point) for value in values)]
+    path = write(tmp_path_factory.getbasetemp(), "\n".join(lines))
+    assert np.array_equal(read_table(path, "FRC003").numbers("a"), values)
+
+
+@given(st.one_of(st.binary(max_size=50), st.text('ab1,;\t"\n\r#. ', max_size=50).map(str.encode)))
+def test_no_bytes_end_in_anything_but_a_refusal(tmp_path_factory, raw):
+    path = write(tmp_path_factory.getbasetemp(), raw)
+    try:
+        table = read_table(path, "FRC003")
+        for name in table.columns:
+            assert len(table.numbers(name)) == len(table)
+    except Refusal as refusal:
+        assert all(finding.file for finding in refusal.findings)
