@@ -54,7 +54,9 @@ CODES: dict[str, Code] = {
     ),
     "FIL010": Code("error", "input changed while it was read", "Another process wrote the file; run again."),
     "FIL011": Code(
-        "error", "name is no module name", "A KRL module is named like its file: a letter, then letters, digits, _."
+        "error",
+        "name is no module name",
+        "A KRL module is named like its file: a letter, then letters, digits, _.",
     ),
     # KRL
     "KRL001": Code("warning", "motion not understood", "The motion is kept as it is and is not corrected."),
@@ -200,7 +202,9 @@ CODES: dict[str, Code] = {
         "No axes, no S and T before this motion; give `start:` in the cell.",
     ),
     "KIN005": Code(
-        "warning", "air move out of reach", "Nothing is corrected there; base or tool may be wrong."
+        "warning",
+        "air move out of reach or limits",
+        "Nothing is corrected there; base, tool or robot may be wrong.",
     ),
     "KIN006": Code(
         "warning",

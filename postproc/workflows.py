@@ -6,26 +6,22 @@ written that was not read back from its own bytes and checked.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from postproc import __version__
 from postproc.arrays import Floats
 from postproc.cell import Cell, find_cell, frames_of, load_cell
-from postproc.compensation.correct import Result, State, Task, correct, with_residual
+from postproc.compensation.correct import Result, State, Task, correct
 from postproc.dialects import detect
 from postproc.dialects.dialect import Dialect, Program
-from postproc.document import Document, Edit, apply, undone
+from postproc.document import Document
 from postproc.findings import Finding, Refusal
 from postproc.forces import Wrenches, wrenches
-from postproc.geometry import Poses, vector_from_rotation
 from postproc.model import StiffnessModel
 from postproc.publish import publish
 from postproc.report.checked import Checked
@@ -33,8 +29,8 @@ from postproc.report.files import corrections_csv, unified_diff
 from postproc.report.report import Report, Spread, Worst, exit_code, in_order_of_place
 from postproc.robot.description import Robot, find_robot, load_robot, robot_files
 from postproc.robot.track import follow
-from postproc.toolpath import Toolpath
 from postproc.units import DEG, MM
+from postproc.writing import write
 
 WORST_PLACES = 5
 
@@ -113,7 +109,7 @@ def prepare(request: Request) -> Prepared:
         )
     frames = frames_of(cell, path, request.program)
     force = wrenches(request.program, path, frames, cell, request.force)
-    _missing_points(program, force.values)
+    _missing_points(program, force)
     base, tool = frames.base_in_robot, frames.tool_in_flange
     wanted = base @ path.target_in_base
     track = follow(robot, path, wanted @ tool.inverse(), cell.start)
@@ -126,6 +122,7 @@ def prepare(request: Request) -> Prepared:
         base=base,
         tool=tool,
         wrench=force.values,
+        carries=force.carries,
         process=process,
         gain=request.gain,
         max_correction=cell.max_correction,
@@ -162,16 +159,14 @@ def _cell(request: Request) -> Cell:
     return replace(cell, robot=request.robot) if request.robot else cell
 
 
-def _missing_points(program: Program, wrench: Floats) -> None:
+def _missing_points(program: Program, force: Wrenches) -> None:
     """Refuse a cut whose points are declared nowhere because the module's data list is not there."""
     if len(program.documents) > 1:
         return
-    forced = np.linalg.norm(wrench, axis=1) > 0
-    lost = [
-        row for row, finding in program.toolpath.refused.items() if finding.code == "KRL003" and forced[row]
-    ]
+    refused = program.toolpath.refused
+    lost = [row for row, why in refused.items() if why.code == "KRL003" and force.carries[row]]
     if lost:
-        path, first = program.documents[0].path, program.toolpath.refused[min(lost)]
+        path, first = program.documents[0].path, refused[min(lost)]
         raise Refusal(
             Finding(
                 "FIL006",
@@ -196,7 +191,7 @@ def predict(request: Request) -> Report:
         table = request.report / f"{stem}.deflection.csv"
         page = request.report / f"{stem}.prediction.json"
         report = replace(report, outputs=(str(table), str(page)))
-        _not_over_inputs(ready.program, report.outputs)
+        _not_over_inputs(ready, report.outputs)
         publish({table: corrections_csv(ready.task, result), page: _json(report)})
     return report
 
@@ -221,10 +216,11 @@ def compensate(request: Request) -> Report:
             )
         )
     result = correct(ready.task)
-    edits, result = _written(request, ready, result)
-    findings = [*ready.findings, *result.findings, *_closing(request, ready, result)]
     target = _target(request)
-    outputs = _output_files(request, ready, target, edits)
+    written = write(program, ready.dialect, ready.task, result, ready.cell, ready.robot, target.stem)
+    edits, result = written.edits, written.result
+    findings = [*ready.findings, *result.findings, *_closing(request, ready, result)]
+    outputs = dict(zip(_output_paths(program, target), written.contents, strict=True))
     stem = target.stem
     folder = request.report or target.parent
     names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff")]
@@ -232,7 +228,7 @@ def compensate(request: Request) -> Report:
     if report.exit == 1:
         raise Refusal(*report.findings)
     report = replace(report, outputs=tuple(str(path) for path in (*outputs, *names)))
-    _not_over_inputs(program, report.outputs)
+    _not_over_inputs(ready, report.outputs)
     if request.dry_run:
         return replace(report, outputs=())
     diff = b"".join(
@@ -250,84 +246,6 @@ def compensate(request: Request) -> Report:
             raise Refusal(Finding("FIL010", "the file changed while it was read", str(document.path)))
     publish(files, last=target)
     return report
-
-
-def _written(request: Request, ready: Prepared, result: Result) -> tuple[list[Edit], Result]:
-    """The edits of the output, and the residual predicted from the digits that they write."""
-    program, dialect, task = ready.program, ready.dialect, ready.task
-    planned = task.base.inverse() @ result.command
-    keep = ~result.corrected
-    position, rotation = planned.position.copy(), planned.rotation.copy()
-    position[keep], rotation[keep] = task.toolpath.position[keep], task.toolpath.rotation[keep]
-    decimals = {
-        "mm": _decimals(ready.cell.tolerance / MM),
-        "deg": _decimals(ready.cell.tolerance_angle / DEG),
-    }
-    edits = dialect.moved(program, position, rotation, decimals)
-    if edits:
-        edits.append(dialect.marked(program, _mark(ready)))
-    target = _target(request)
-    if target.stem != request.program.stem:
-        if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,23}", target.stem):
-            raise Refusal(Finding("FIL011", f"{target.stem!r} can not name a module", str(target)))
-        edits += dialect.renamed(program, target.stem)
-    back = _read_back(ready, edits)
-    _hold(ready, back, Poses(rotation, position), decimals, request.program)
-    return edits, with_residual(task, result, task.base @ back.target_in_base)
-
-
-def _decimals(tolerance: float) -> int:
-    """Decimals whose rounding stays below a twentieth of the tolerance; three at least."""
-    return max(3, math.ceil(-math.log10(tolerance / 10)))
-
-
-def _mark(ready: Prepared) -> str:
-    digest = _source_digest(ready.program.documents)
-    return (
-        f"by compensate {__version__}, robot {ready.robot.name} sha256:{ready.robot.digest[:16]},"
-        f" source sha256:{digest[:16]}"
-    )
-
-
-def _source_digest(documents: Sequence[Document]) -> str:
-    """SHA-256 of the main file; with companions, of all their digests in order."""
-    if len(documents) == 1:
-        return documents[0].digest
-    return hashlib.sha256("".join(document.digest for document in documents).encode()).hexdigest()
-
-
-def _read_back(ready: Prepared, edits: Sequence[Edit]) -> Toolpath:
-    """The toolpath of the bytes that are about to be written.  Raises Refusal FIL008."""
-    documents = []
-    for index, document in enumerate(ready.program.documents):
-        own = [edit for edit in edits if edit.span.file == index]
-        raw = apply(document, own)
-        if not undone(raw, document.raw, own):
-            raise Refusal(Finding("FIL008", "bytes outside of the corrections changed", str(document.path)))
-        documents.append(Document(document.path, raw))
-    return ready.dialect.read(tuple(documents)).toolpath
-
-
-def _hold(ready: Prepared, back: Toolpath, planned: Poses, decimals: dict[str, int], program: Path) -> None:
-    """The program read back is the one that was meant, motion by motion.  Raises Refusal FIL008."""
-    path = ready.task.toolpath
-    if len(back) != len(path):
-        raise Refusal(Finding("FIL008", f"{len(path)} motions became {len(back)}", str(program)))
-    for name in ("kind", "base", "tool", "status", "turn", "axes", "feed"):
-        same = np.isclose(getattr(path, name), getattr(back, name), rtol=0, atol=0, equal_nan=True)
-        if not same.all():
-            row = int(np.flatnonzero(~same.reshape(len(path), -1).all(axis=1))[0])
-            raise Refusal(Finding("FIL008", f"{name} of a motion changed", str(program), int(path.line[row])))
-    known = np.isfinite(path.position[:, 0])
-    if not (np.isfinite(back.position[:, 0]) == known).all():
-        raise Refusal(Finding("FIL008", "targets were lost or appeared", str(program)))
-    off = np.abs(back.position[known] - planned.position[known]).max(initial=0.0) / MM
-    turned = np.swapaxes(planned.rotation[known], -1, -2) @ back.rotation[known]
-    angle = np.linalg.norm(vector_from_rotation(turned), axis=1).max(initial=0.0) / DEG
-    if off > 0.5001 * 10.0 ** -decimals["mm"] + 1e-9 or angle > 1.5 * 10.0 ** -decimals["deg"] + 1e-9:
-        raise Refusal(
-            Finding("FIL008", f"a target is {off:.6f} mm, {angle:.6f} deg from what was meant", str(program))
-        )
 
 
 def _closing(request: Request, ready: Prepared, result: Result) -> list[Finding]:
@@ -374,21 +292,17 @@ def _target(request: Request) -> Path:
     return request.output
 
 
-def _output_files(
-    request: Request, ready: Prepared, target: Path, edits: Sequence[Edit]
-) -> dict[Path, bytes]:
-    """path -> bytes of the program's files; companions take the program's stem and keep their suffix."""
-    files = {}
-    for index, document in enumerate(ready.program.documents):
-        path = target if index == 0 else target.with_name(target.stem + document.path.suffix)
-        if index and target.stem == request.program.stem:
-            path = target.with_name(document.path.name)
-        files[path] = apply(document, [edit for edit in edits if edit.span.file == index])
-    return files
+def _output_paths(program: Program, target: Path) -> list[Path]:
+    """Where the program's files go: companions beside it, under its stem, with their own suffix."""
+    main = program.documents[0].path
+    renamed = target.stem != main.stem
+    companions = (document.path for document in program.documents[1:])
+    return [target, *(target.with_name(target.stem + p.suffix if renamed else p.name) for p in companions)]
 
 
-def _not_over_inputs(program: Program, outputs: Sequence[str]) -> None:
-    inputs = {document.path.resolve() for document in program.documents}
+def _not_over_inputs(ready: Prepared, outputs: Sequence[str]) -> None:
+    inputs = {document.path.resolve() for document in ready.program.documents}
+    inputs |= {ready.cell.path.resolve(), ready.robot.path.resolve()}
     for output in outputs:
         if Path(output).resolve() in inputs:
             raise Refusal(Finding("FIL007", "this output is an input of the same run", output))
@@ -429,7 +343,7 @@ def _report(
         gain=request.gain,
         mode=ready.cell.correct,
         force_source=ready.wrenches.source,
-        force_max_n=float(force.max(initial=0.0)),
+        force_max_n=ready.wrenches.max_force,
         before=Spread.of(result.before[scope]),
         after=Spread.of(result.after[scope]) if corrected else None,
         correction=Spread.of(size[result.corrected]) if corrected else None,

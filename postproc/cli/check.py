@@ -37,8 +37,8 @@ def check(
     from postproc.findings import CODES, nearest
 
     if list_codes:
-        for name, code in CODES.items():
-            click.echo(f"{name} {code.severity:7} {code.title}")
+        for name, listed in CODES.items():
+            click.echo(f"{name} {listed.severity:7} {listed.title}")
         return
     if explain:
         code = CODES.get(explain.upper())

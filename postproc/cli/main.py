@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Sequence
 
@@ -15,9 +14,6 @@ from postproc.cli.program import program
 from postproc.cli.robots import robots
 
 COMMANDS = {"program": program, "check": check, "predict": predict, "robots": robots}
-
-_NUMBERS = re.compile(r"[-+0-9.eEnaifNAIF]+(,[-+0-9.eEnaifNAIF]+)+(@[A-Za-z]+)?\Z")
-_FILES = (".csv", ".yaml", ".yml")
 
 
 @click.group(commands=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
@@ -49,6 +45,10 @@ def normalized(arguments: list[str]) -> list[str]:
     """
     if not arguments or arguments[0] in ("-h", "--help", "--version"):
         return arguments or ["--help"]
+    if "--force" not in arguments:
+        return arguments if arguments[0] in COMMANDS else ["program", *arguments]
+    from postproc.forces.stated import is_force_word
+
     words = arguments if arguments[0] in COMMANDS else ["program", *arguments]
     result: list[str] = []
     at = 0
@@ -59,7 +59,7 @@ def normalized(arguments: list[str]) -> list[str]:
             return [*result, *words[at - 1 :]]
         if word == "--force":
             follows = words[at] if at < len(words) else ""
-            if _NUMBERS.match(follows) or follows.lower().endswith(_FILES):
+            if follows and is_force_word(follows):
                 word, at = f"--force={follows}", at + 1
             else:
                 word = "--force="

@@ -15,7 +15,7 @@ from postproc.geometry import Poses
 from postproc.model import StiffnessModel
 from postproc.robot.track import Track, near_singular, sides
 from postproc.toolpath import Kind, Toolpath
-from postproc.units import MM
+from postproc.units import DEG, MM
 
 
 class State(IntEnum):
@@ -30,8 +30,9 @@ class Task:
     """All that a correction needs, N motions.  Poses are in the robot base; NaN where a target is not known.
 
     wanted: TCP targets; base, tool (N): the programmed base in the robot base, the TCP on the flange; wrench (N, 6)
-    at the end of each motion, robot base axes; ``process``: correct what the force does and leave what the robot
-    does without it (a base that was touched off contains that); else everything is corrected.
+    at the end of each motion, robot base axes; carries (N,): the motion has a force; ``process``: correct what the
+    force does and leave what the robot does without it (a base that was touched off contains that); else everything is
+    corrected.
     ``max_correction``, ``tolerance`` [m].
     """
 
@@ -43,6 +44,7 @@ class Task:
     base: Poses
     tool: Poses
     wrench: Floats
+    carries: Bools
     process: bool
     gain: float
     max_correction: float
@@ -80,7 +82,7 @@ def correct(task: Task) -> Result:
     """
     path, track, n = task.toolpath, task.track, len(task.toolpath)
     cartesian = path.known & ~np.isfinite(path.axes).all(axis=1)
-    forced = np.linalg.norm(task.wrench, axis=1) > 0
+    forced = task.carries
     scope = forced if task.process else forced | cartesian
     # In air every motion stands for itself; a cut stands and falls as a whole.
     cut = (
@@ -90,31 +92,7 @@ def correct(task: Task) -> Result:
     )
     on = switched_on(path)
     findings: list[Finding] = []
-    why: dict[int, Finding] = {}
-
-    for row in np.flatnonzero(scope & on):
-        stop = path.refused.get(int(row)) or path.pinned.get(int(row))
-        if stop is not None:
-            why[int(row)] = stop
-    free = scope & on & cartesian
-    _refuse(
-        task,
-        free & (track.status < 0) & ~_in(why, n),
-        "KIN004",
-        "the robot's configuration is not known here",
-        "give `start:` (axes before the first motion) in the cell, or S and T with the PTP before it",
-    )
-    _refuse(
-        task,
-        free & forced & ~track.reachable & ~_in(why, n),
-        "KIN001",
-        "the programmed pose is out of reach",
-        "check the base, the tool and the robot of the cell against the program",
-    )
-    told = free & ~track.reachable & ~_in(why, n)
-    _note(task, why, findings, told, "KIN005", "the programmed pose is out of reach")
-    told = free & track.reachable & ~track.within & ~_in(why, n)
-    _note(task, why, findings, told, "KIN002", "the programmed pose is beyond the axis limits")
+    why = _held(task, scope, scope & on, findings)
     off = scope & ~on
     for row in np.flatnonzero(on & scope & spread(off, cut)):
         why.setdefault(int(row), _at(task, int(row), "COR004", "COMPENSATE is switched inside this cut"))
@@ -206,6 +184,51 @@ def with_residual(task: Task, result: Result, command: Poses) -> Result:
     return replace(result, command=command, after=after, after_angle=after_angle)
 
 
+def _held(task: Task, scope: Bools, tried: Bools, findings: list[Finding]) -> dict[int, Finding]:
+    """Motions that can not be corrected as they are programmed, and why; Refusal where the input must be wrong."""
+    path, track, n = task.toolpath, task.track, len(task.toolpath)
+    why: dict[int, Finding] = {}
+    for row in np.flatnonzero(tried):
+        stop = path.refused.get(int(row)) or path.pinned.get(int(row))
+        if stop is not None:
+            why[int(row)] = stop
+    free = tried & path.known & ~np.isfinite(path.axes).all(axis=1) & ~_in(why, n)
+    _refuse(
+        task,
+        free & (track.status < 0),
+        "KIN004",
+        "the robot's configuration is not known here",
+        "give `start:` (axes before the first motion) in the cell, or S and T with the PTP before it",
+    )
+    _refuse(
+        task,
+        free & task.carries & ~track.reachable,
+        "KIN001",
+        "the programmed pose is out of reach",
+        "check the base, the tool and the robot of the cell against the program",
+    )
+    beyond = track.reachable & ~track.within
+    mask = free & beyond
+    _note(task, why, findings, mask, "KIN002", _which_axis(task, track.q, mask))
+    mask = free & ~track.reachable
+    _note(task, why, findings, mask, "KIN005", "the programmed pose is out of reach")
+    air = path.known & ~scope
+    _note(task, {}, findings, air & ~track.reachable, "KIN005", "the programmed pose is out of reach")
+    _note(task, {}, findings, ~scope & beyond, "KIN005", _which_axis(task, track.q, ~scope & beyond))
+    return why
+
+
+def _which_axis(task: Task, q: Floats, mask: Bools) -> str:
+    """The axis that is farthest beyond its limits at the first motion of ``mask``, in words."""
+    if not mask.any():
+        return ""
+    row = int(np.argmax(mask))
+    low, high = task.model.robot.limits.T
+    axis = int(np.argmax(np.maximum(low - q[row], q[row] - high)))
+    joint = task.model.robot.joints[axis]
+    return f"{joint.name} at {q[row, axis] / DEG:.1f} deg, limits {low[axis] / DEG:g} .. {high[axis] / DEG:g} deg"
+
+
 def _goal(task: Task, rows: Ints) -> Poses:
     """Where the tool is to be: the wanted pose, or where the robot without force takes it."""
     if not task.process:
@@ -229,15 +252,19 @@ def _judge(
     n = len(task.toolpath)
     low, high = task.model.robot.limits.T
     beyond = ((q < low) | (q > high)).any(axis=1)
+    axes = np.full((n, q.shape[1]), np.nan)
+    axes[rows] = q
+    struck = np.zeros(n, bool)
+    struck[rows[beyond]] = True
     reasons = (
         (~reachable, "COR009", "the correction leads out of reach"),
         (~settled, "MOD002", "the robot has no stable rest under this force"),
         (~converged, "COR001", "the correction does not settle"),
-        (beyond, "COR008", "the correction brings an axis beyond its limits"),
+        (beyond, "COR008", "the correction brings " + _which_axis(task, axes, struck)),
     )
-    for struck, code, message in reasons:
+    for failed, code, message in reasons:
         mask = np.zeros(n, bool)
-        mask[rows[struck]] = True
+        mask[rows[failed]] = True
         _note(task, why, findings, mask & ~_in(why, n), code, message)
 
 

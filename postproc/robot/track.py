@@ -40,8 +40,8 @@ def follow(robot: Robot, toolpath: Toolpath, flange: Poses, start: Floats | None
     and each axis goes the short way.  After a PTP to an unknown target the branch is unknown until something says it.
     """
     n = len(toolpath)
-    on_axes = np.isfinite(toolpath.axes).all(axis=1)
-    cartesian = toolpath.known & np.isfinite(flange.position).all(axis=1) & ~on_axes
+    on_axes = np.asarray(np.isfinite(toolpath.axes).all(axis=1))
+    cartesian = np.asarray(toolpath.known & np.isfinite(flange.position).all(axis=1) & ~on_axes)
     status = _branches(robot, toolpath, on_axes, cartesian, start)
 
     q = np.full((n, 6), np.nan)

@@ -3,12 +3,12 @@
 The program is made from the tables below; nothing is random, so that a second run gives the same bytes.
 Lengths in mm and N/mm2 as on the shop floor, except where a name says otherwise.
 
-    python samples/kr270_panel/make_panel.py [--check]
+    python samples/kr270_panel/make_panel.py
 """
 
 from __future__ import annotations
 
-import argparse
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,22 +16,21 @@ from pathlib import Path
 import numpy as np
 
 from postproc.geometry import Poses, abc_from_rotation
-from postproc.model import StiffnessModel
 from postproc.robot.description import find_robot, load_robot
 from postproc.robot.inverse import inverse
 
 PLATE = (900, 600, 30)
-BASE = Poses.from_abc([1.25, 0.45, 0.8], np.radians([-90, 0, 0]))  # corner of the plate, Z = 0 on its upper face
-TOOL = Poses.from_abc([0.3, 0.0, 0.18], np.radians([0, 90, 0]))  # spindle square to the flange, tool +Z towards the tip
+ROBOT = load_robot(find_robot("kuka_kr270"))
+BASE = Poses.from_abc([1.25, 0.45, 0.8], np.radians([-90, 0, 0]))  # a corner of the plate, Z = 0 on its top
+TOOL = Poses.from_abc([0.3, 0, 0.18], np.radians([0, 90, 0]))  # spindle square to the flange, tip-ward = +Z
 SPIN = np.radians(-45)  # A of the upright tool: places the flange beside the spindle, clear of A5 = 0
 STATUS = 6  # of the whole program: wrist in front, elbow up, A5 < 0
 
-ROBOT = load_robot(find_robot("kuka_kr270"))
-
 DIAMETER, TEETH, SPEED = 16.0, 3, 12000  # end mill, teeth, 1/min
-CLEAR, NEAR = 50.0, 0.5  # height of moves across the plate; distance above the material where the ramp begins
+CLEAR, NEAR = 50.0, 0.5  # heights: of moves across the plate; of the ramp's begin over the material
 RAPID, PLUNGE = 0.25, 0.05  # m/s
-TOLERANCE = {"rough": 0.1, "finish": 0.01}  # chord error
+TOLERANCE = {"rough": 0.2, "finish": 0.02}  # chord error
+LEAD = 12.0  # radius of the arcs onto and off a wall
 RAMP_DEPTH, RAMP_FZ = 2.5, 0.06  # at most so deep a lap; feed per tooth in the ramp
 
 # EN AW-7075-T6, cutting (t, r, a) in N/mm2 and edge (t, r, a) in N/mm: doi 10.1186/s10033-021-00536-9
@@ -52,10 +51,6 @@ class Ring:
         hx, hy = self.half_x - distance, self.half_y - distance
         return Ring(self.x, self.y, hx, hy, min(self.radius, hx, hy))
 
-    @property
-    def length(self) -> float:
-        return 4 * (self.half_x + self.half_y) - (8 - 2 * np.pi) * self.radius
-
     def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (N, 2) and outward normals (N, 2) at t in [0, 9]: half side, corner, side, ..., half side."""
         piece = np.minimum(t.astype(int), 8)
@@ -71,16 +66,15 @@ class Ring:
         return np.array([self.x, self.y]) + centre + self.radius * normal, normal
 
     def steps(self, tolerance: float, longest: float) -> np.ndarray:
-        """Parameters of one lap whose chords stay within ``tolerance`` of the corners."""
-        turn = min(2 * np.arccos(1 - tolerance / self.radius), np.radians(12))
-        sides = (2 * (self.half_x - self.radius), 2 * (self.half_y - self.radius))
-        lap = [0.0]
+        """Parameters of one lap; chords leave the corners by ``tolerance`` at most."""
+        turn = min(2 * np.arccos(1 - tolerance / self.radius), np.radians(22.5))
+        sides = 2 * (np.array([self.half_x, self.half_y]) - self.radius)
+        t = [np.zeros(1)]
         for piece in range(9):
-            side = sides[piece // 2 % 2] * (0.5 if piece in (0, 8) else 1.0)
-            count = np.pi / 2 / turn if piece % 2 else side / longest
-            count = int(np.ceil(count - 1e-9))
-            lap.extend(piece + np.arange(1, count + 1) / max(count, 1))
-        return np.array(lap)
+            side = sides[piece // 2 % 2] / (2 if piece in (0, 8) else 1)
+            count = int(np.ceil((np.pi / 2 / turn if piece % 2 else side / longest) - 1e-9))
+            t.append(piece + np.arange(1, count + 1) / max(count, 1))
+        return np.concatenate(t)
 
 
 @dataclass(frozen=True)
@@ -97,20 +91,20 @@ class Operation:
     tilt: tuple[float, float] = (0.0, 0.0)  # deg, mean and swing of the wall's lean along the contour
 
 
-POCKET_A = Ring(250, 150, 130, 85, 20)
-POCKET_B = Ring(660, 150, 80, 80, 80)
+POCKET_A = Ring(240, 150, 110, 70, 20)
+POCKET_B = Ring(640, 150, 75, 75, 75)
 POCKET_C = Ring(230, 430, 150, 30, 30)
-POCKET_D = Ring(640, 420, 110, 75, 40)
+POCKET_D = Ring(640, 400, 100, 60, 40)
 OPERATIONS = [
-    Operation("POCKET A ROUGHING", "rough", POCKET_A, (-5, -10), 8.0, 0.12, leave=0.5),
-    Operation("POCKET B ROUGHING", "rough", POCKET_B, (-5, -10), 8.0, 0.12, leave=0.5),
-    Operation("POCKET C ADAPTIVE ROUGHING", "rough", POCKET_C, (-12,), 2.5, 0.10, leave=0.5),
-    Operation("POCKET D ROUGHING", "rough", POCKET_D, (-4, -8), 7.0, 0.10, leave=0.5),
-    Operation("POCKET A WALL FINISHING", "wall", POCKET_A, (-10,), 0.5, 0.08),
-    Operation("POCKET B WALL FINISHING", "wall", POCKET_B, (-10,), 0.5, 0.08),
-    Operation("POCKET C WALL FINISHING", "wall", POCKET_C, (-12,), 0.5, 0.08),
-    Operation("POCKET D FLANK 5-AXIS PREFINISHING", "flank", POCKET_D, (-8,), 1.2, 0.08, 0.4, (9.0, 6.0)),
-    Operation("POCKET D FLANK 5-AXIS FINISHING", "flank", POCKET_D, (-8,), 0.4, 0.08, 0.0, (9.0, 6.0)),
+    Operation("POCKET A ROUGHING", "rough", POCKET_A, (-5, -10), 8.0, 0.12, leave=0.8),
+    Operation("POCKET B ROUGHING", "rough", POCKET_B, (-8,), 6.0, 0.08, leave=0.8),
+    Operation("POCKET C ADAPTIVE ROUGHING", "rough", POCKET_C, (-12,), 2.2, 0.10, leave=0.8),
+    Operation("POCKET D ROUGHING", "rough", POCKET_D, (-8,), 4.5, 0.08, leave=0.8),
+    Operation("POCKET A WALL FINISHING", "wall", POCKET_A, (-10,), 0.8, 0.08),
+    Operation("POCKET B WALL FINISHING", "wall", POCKET_B, (-8,), 0.8, 0.10),
+    Operation("POCKET C WALL FINISHING", "wall", POCKET_C, (-12,), 0.8, 0.08),
+    Operation("POCKET D FLANK 5-AXIS PREFINISHING", "flank", POCKET_D, (-8,), 0.8, 0.10, 0.6, (9.0, 6.0)),
+    Operation("POCKET D FLANK 5-AXIS FINISHING", "flank", POCKET_D, (-8,), 0.6, 0.11, 0.0, (9.0, 6.0)),
 ]
 
 
@@ -132,56 +126,51 @@ def mean_force(depth: float, width: float, fz: float) -> np.ndarray:
 
 
 def feed(fz: float) -> float:
-    """Path speed [m/s]."""
+    """Path speed [m/s] of a feed per tooth."""
     return fz * TEETH * SPEED / 60e3
 
 
 @dataclass
 class Program:
-    """The lines of the program and, for the check, the pose, force and kind of every Cartesian motion."""
+    """The lines of the program, and the points of its Cartesian motions."""
 
     lines: list[str] = field(default_factory=list)
     points: list[np.ndarray] = field(default_factory=list)  # X, Y, Z, A, B, C in the base
-    forces: list[np.ndarray] = field(default_factory=list)  # in the feed frame; zero in the air
-    force: np.ndarray = field(default_factory=lambda: np.zeros(3))
     speed: float = -1.0
-
-    def add(self, *lines: str) -> None:
-        self.lines.extend(lines)
 
     def set_speed(self, speed: float) -> None:
         if speed != self.speed:
-            self.add(f"$VEL.CP={speed:.4f}")
+            self.lines.append(f"$VEL.CP={speed:.4f}")
         self.speed = speed
 
     def set_force(self, force: np.ndarray | None) -> None:
-        self.force = np.zeros(3) if force is None else np.round(force, 1)
-        x, y, z = self.force
-        self.add(";FORCE OFF" if force is None else f";FORCE {x:.1f} {y:.1f} {z:.1f} @feed")
+        numbers = "OFF" if force is None else " ".join(f"{f:.1f}" for f in force) + " @feed"
+        self.lines.append(f";FORCE {numbers}")
 
     def move(self, point: np.ndarray, exact: bool = False) -> None:
         """A LIN that states all six components, or only Z where nothing else changes (plunge, retract)."""
         point = np.round(point, 3) + 0.0
+        if self.points and np.array_equal(point, self.points[-1]):
+            return
         keys = range(6)
         if self.points and np.array_equal(np.delete(point, 2), np.delete(self.points[-1], 2)):
             keys = [2]
         target = ",".join(f"{'XYZABC'[k]} {point[k]:.3f}" for k in keys)
-        self.add(f"LIN {{{target}}}" + ("" if exact else " C_DIS"))
+        self.lines.append(f"LIN {{{target}}}" + ("" if exact else " C_DIS"))
         self.points.append(point)
-        self.forces.append(self.force)
 
-    def air(self, *points: np.ndarray) -> None:
-        """Up, across and down: the first two rounded, the last one exact, at plunge feed."""
-        for index, point in enumerate(points):
-            self.set_speed(RAPID if index < len(points) - 1 else PLUNGE)
-            self.move(point, exact=index == len(points) - 1)
+    def approach(self, point: np.ndarray) -> None:
+        self.set_speed(RAPID)
+        self.move(at_height(point, CLEAR))
+        self.set_speed(PLUNGE)
+        self.move(point, exact=True)
 
     def retract(self) -> None:
         self.set_force(None)
         self.set_speed(RAPID)
         self.move(at_height(self.points[-1], CLEAR), exact=True)
 
-    def cut(self, points: np.ndarray, force: np.ndarray, speed: float, last: bool = True) -> None:
+    def cut(self, points: np.ndarray, force: np.ndarray, speed: float, last: bool = False) -> None:
         self.set_force(force)
         self.set_speed(speed)
         for index, point in enumerate(points):
@@ -201,50 +190,52 @@ def upright(xy: np.ndarray, z: np.ndarray | float) -> np.ndarray:
 def rough(program: Program, job: Operation) -> None:
     """Ramp along the innermost ring, one lap to level it, then a spiral outwards and a last closed lap."""
     edge = job.ring.inside(DIAMETER / 2 + job.leave)
-    laps = int(np.ceil((min(edge.half_x, edge.half_y) - 6.0) / job.width))
-    rings = [edge.inside((laps - k) * job.width) for k in range(laps + 1)] if laps else [edge]
-    lap = rings[0].steps(TOLERANCE["rough"], 20.0)
+    room = min(edge.half_x, edge.half_y) - 5.0
+    laps = int(np.ceil(room / job.width))
+    rings = [edge.inside(room * (1 - k / laps)) for k in range(laps + 1)]
+    ring, share = lap(rings[0], rings[0])
+    spiral = np.concatenate([lap(*pair)[0] for pair in itertools.pairwise([*rings, edge])])
     top = 0.0
     for floor in job.levels:
         turns = int(np.ceil((top - floor) / RAMP_DEPTH))
-        way = np.concatenate([lap[1:] / 9 + turn for turn in range(turns)])
-        start = upright(rings[0].at(np.zeros(1))[0], top + NEAR)[0]
-        program.air(at_height(start, CLEAR), start)
-        inner = np.tile(rings[0].at(lap[1:])[0], (turns, 1))
-        depth = (top - floor) / turns
-        slot = mean_force(depth, DIAMETER, RAMP_FZ)
-        program.cut(upright(inner, top + NEAR + (floor - top - NEAR) * way / turns), slot, feed(RAMP_FZ), False)
-        program.cut(upright(rings[0].at(lap[1:])[0], floor), slot / 2, feed(RAMP_FZ), False)
-        spiral = []
-        for one, two in [*zip(rings, rings[1:], strict=False), (rings[-1], rings[-1])]:
-            t = two.steps(TOLERANCE["rough"], 30.0)[1:]
-            weight = (t / 9)[:, None]
-            spiral.append((1 - weight) * one.at(t)[0] + weight * two.at(t)[0])
+        start = upright(ring[-1:], top + NEAR)[0]
+        program.approach(start)
+        down = np.concatenate([turn + share for turn in range(turns)]) / turns
+        ramp = upright(np.tile(ring, (turns, 1)), top + NEAR + (floor - top - NEAR) * down)
+        slot = mean_force((top - floor) / turns, DIAMETER, RAMP_FZ)
+        program.cut(ramp, slot, feed(RAMP_FZ))
+        program.cut(upright(ring, floor), slot / 2, feed(RAMP_FZ))
         full = mean_force(top - floor, job.width, job.fz)
-        program.cut(upright(np.concatenate(spiral), floor), full, feed(job.fz))
+        program.cut(upright(spiral, floor), full, feed(job.fz), last=True)
         program.retract()
         top = floor
 
 
+def lap(one: Ring, two: Ring) -> tuple[np.ndarray, np.ndarray]:
+    """One lap of a spiral from a ring to the next: points (N, 2) and the share of the lap at each of them."""
+    t = two.steps(TOLERANCE["rough"], 80.0)
+    outer = two.at(t)[0]
+    share = np.cumsum(np.linalg.norm(np.diff(outer, axis=0), axis=1))
+    share /= share[-1]
+    return outer[1:] + (1 - share)[:, None] * (one.at(t)[0] - outer)[1:], share
+
+
 def contour(program: Program, job: Operation) -> None:
     """One lap along the wall with arcs in and out; on a flank the tool leans with the wall."""
-    radius, floor = DIAMETER / 2, job.levels[-1]
-    longest = 4.0 if job.kind == "flank" else 40.0
-    t = np.append(job.ring.steps(TOLERANCE["finish"], longest), 9.0 + 0.2)
+    floor = job.levels[-1]
+    t = np.append(job.ring.steps(TOLERANCE["finish"], 5.0 if job.kind == "flank" else 60.0), 9.2)
     wall, out = job.ring.at(np.where(t > 9, t - 9, t))
-    lean = np.radians(job.tilt[0] + job.tilt[1] * np.sin(2 * np.pi * t / 9 * 2))[:, None]
-    tip = wall - (radius * np.cos(lean) + job.leave) * out
-    path = posed(np.column_stack([tip, floor + radius * np.sin(lean)]), lean, out)
-    arc, bend = np.linspace(0.0, np.pi / 2, 9), 12.0
-    side = bend * np.column_stack([1 - np.sin(arc), np.cos(arc)])  # leaves along +X, ends straight into the pocket
-    head = np.repeat(path[:1], 9, axis=0)
-    tail = np.repeat(path[-1:], 9, axis=0)
-    head[:, :2] += np.column_stack([-side[:, 1], side[:, 0]])
-    tail[:, :2] += np.column_stack([side[::-1, 1], side[::-1, 0]])
-    start = head[0]
-    program.air(at_height(start, CLEAR), at_height(start, start[2]))
-    force = mean_force(-floor, job.width, job.fz)
-    program.cut(np.concatenate([head[1:], path[1:], tail[1:]]), force, feed(job.fz))
+    lean = np.radians(job.tilt[0] + job.tilt[1] * np.sin(4 * np.pi * t / 9))[:, None]
+    tip = wall - (DIAMETER / 2 * np.cos(lean) + job.leave) * out
+    path = posed(np.column_stack([tip, floor + DIAMETER / 2 * np.sin(lean)]), lean, out)
+    arc = np.linspace(0.0, np.pi / 2, 9)  # the lap begins along +X, with the pocket at +Y
+    away = LEAD * np.column_stack([np.cos(arc), 1 - np.sin(arc)])
+    lead_in, lead_out = np.repeat(path[:1], 9, axis=0), np.repeat(path[-1:], 9, axis=0)
+    lead_in[:, :2] += away * [-1, 1]
+    lead_out[:, :2] += away[::-1]
+    program.approach(lead_in[0])
+    way = np.concatenate([lead_in[1:], path[1:], lead_out[1:]])
+    program.cut(way, mean_force(-floor, job.width, job.fz), feed(job.fz), last=True)
     program.retract()
 
 
@@ -258,28 +249,25 @@ def posed(tip: np.ndarray, lean: np.ndarray, out: np.ndarray) -> np.ndarray:
     return np.column_stack([tip, np.degrees(abc_from_rotation(frames))])
 
 
-def axes(program: Program) -> np.ndarray:
-    """Axis angles (N, 6) [rad] along the program."""
-    x = np.array(program.points)
+def axes(points: list[np.ndarray]) -> np.ndarray:
+    """Axis angles (N, 6) [rad] at points (N, 6) of the program."""
+    x = np.array(points)
     flange = BASE @ Poses.from_abc(x[:, :3] / 1e3, np.radians(x[:, 3:])) @ TOOL.inverse()
-    found = inverse(ROBOT.nominal, flange, np.full(len(x), STATUS), np.zeros((len(x), 6)))
-    return found.q
+    return inverse(ROBOT.nominal, flange, np.full(len(x), STATUS), np.zeros((len(x), 6))).q
 
 
-def panel() -> tuple[Program, list[tuple[str, int, int]]]:
-    program, parts = Program(), []
+def panel() -> Program:
+    program = Program()
     program.set_force(None)
     for number, job in enumerate(OPERATIONS, 1):
-        first = len(program.points)
-        program.add(";", f";OPERATION {number}: {job.name}")
-        program.add(f";TOOL T1 ENDMILL D{DIAMETER:.0f} Z{TEETH} S{SPEED}")
+        program.lines += [";", f";OPERATION {number}: {job.name}"]
+        program.lines += [f";TOOL T1 ENDMILL D{DIAMETER:.0f} Z{TEETH} S{SPEED}"]
         (rough if job.kind == "rough" else contour)(program, job)
-        parts.append((job.name, first, len(program.points)))
-    return program, parts
+    return program
 
 
 def text(program: Program) -> Iterator[str]:
-    start = np.degrees(axes(program)[0])
+    start = np.degrees(axes([at_height(program.points[0], 150.0)])[0])
     home = "PTP {" + ",".join(f"A{i} {a:.5f}" for i, a in enumerate(start, 1)) + "}"
     yield from ("&ACCESS RVP", "&REL 1", "&COMMENT PANEL 900X600X30 EN AW-7075-T6")
     yield from ("&PARAM TEMPLATE = C:\\KRC\\Roboter\\Template\\vorgabe", "&PARAM EDITMASK = *")
@@ -292,36 +280,19 @@ def text(program: Program) -> Iterator[str]:
     yield from (";", "$OUT[17]=FALSE ;SPINDLE OFF", home, "END")
 
 
-def check(program: Program, parts: list[tuple[str, int, int]]) -> None:
-    """Prints axis ranges, and force and linear deflection (eq. 5 at the end of each motion) by operation."""
-    q, force, x = axes(program), np.array(program.forces), np.array(program.points)
-    low, high = np.degrees(q.min(axis=0)), np.degrees(q.max(axis=0))
-    print("axes:", *(f"A{i + 1} {low[i]:.1f}..{high[i]:.1f}" for i in range(6)))
-    spare = np.minimum(low - np.degrees(ROBOT.limits[:, 0]), np.degrees(ROBOT.limits[:, 1]) - high)
-    print(f"least distance to a limit {spare.min():.1f} deg, largest step {np.degrees(np.ptp(q[:2], 0).max()):.1f}")
-    z = -Poses.from_abc(x[:, :3], np.radians(x[:, 3:])).rotation[:, :, 2]
-    ahead = np.diff(x[:, :3], axis=0, prepend=x[:1, :3])
-    ahead -= np.sum(ahead * z, axis=1, keepdims=True) * z
-    ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-12)
-    in_base = force[:, :1] * ahead + force[:, 1:2] * np.cross(z, ahead) + force[:, 2:] * z
-    wrench = np.column_stack([in_base @ BASE.rotation.T, np.zeros_like(force)])
-    bent = StiffnessModel.from_robot(ROBOT).linear_deflection(q, wrench, TOOL)[:, :3]
-    bent = np.linalg.norm(bent, axis=1) * 1e3
-    cutting = force.any(axis=1)
-    for name, first, last in [*parts, ("ALL", 0, len(x))]:
-        rows = np.flatnonzero(cutting[first:last]) + first
-        size = np.linalg.norm(force[rows], axis=1)
-        cuts = np.count_nonzero(np.diff(cutting[first:last].astype(int), prepend=0) == 1)
-        print(f"{name:36s} {last - first:5d} LIN, {len(rows):5d} cutting in {cuts:2d} cuts,", end=" ")
-        print(f"{size.min():.0f}..{size.max():.0f} N, {bent[rows].min():.2f}..{bent[rows].max():.2f} mm")
+def main() -> None:
+    program = panel()
+    q = np.degrees(axes(program.points))
+    spare = np.minimum(q - np.degrees(ROBOT.limits[:, 0]), np.degrees(ROBOT.limits[:, 1]) - q).min()
+    if not (spare > 10 and np.abs(q[:, 4]).min() > 20):
+        raise SystemExit(
+            f"{spare:.1f} deg to an axis limit, A5 {np.abs(q[:, 4]).min():.1f} deg from zero: too near"
+        )
+    content = "".join(line + "\r\n" for line in text(program))
+    Path(__file__).with_name("panel.src").write_bytes(content.encode("ascii"))
+    print(f"panel.src: {len(program.points)} LIN; {spare:.1f} deg or more to every axis limit;", end=" ")
+    print(", ".join(f"A{i + 1} {q[:, i].min():.1f}..{q[:, i].max():.1f}" for i in range(6)))
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--check", action="store_true", help="print axis ranges, forces and deflections")
-    arguments = parser.parse_args()
-    made, operations = panel()
-    content = "".join(line + "\r\n" for line in text(made))
-    Path(__file__).with_name("panel.src").write_bytes(content.encode("ascii"))
-    if arguments.check:
-        check(made, operations)
+    main()

@@ -52,7 +52,9 @@ def _add(result: Declarations, declared: set[bytes], key: bytes, point: Point) -
 def read_point(value: bytes, at: int, file: int, line: int) -> Point:
     """The point of an aggregate ``value`` that stands at byte ``at`` of document ``file``."""
     if not (value.startswith(b"{") and value.endswith(b"}") and value.count(b"{") == 1):
-        return Point(Unclear("KRL019", f"its declaration in line {line} of the .dat is no aggregate of numbers"))
+        return Point(
+            Unclear("KRL019", f"its declaration in line {line} of the .dat is no aggregate of numbers")
+        )
     target = parse(value, at, file)
     if isinstance(target, Unclear):
         return Point(Unclear("KRL019", f"its declaration in line {line} of the .dat: {target.message}"))

@@ -16,8 +16,7 @@ BOM = b"\xef\xbb\xbf"
 NAME = rb"[A-Za-z_$][A-Za-z0-9_$]*"
 
 MOTIONS = frozenset(
-    [b"PTP", b"LIN", b"CIRC", b"SPTP", b"SLIN", b"SCIRC", b"SPL"]
-    + [b"PTP_REL", b"LIN_REL", b"CIRC_REL", b"SPTP_REL", b"SLIN_REL", b"SCIRC_REL", b"SPL_REL"]
+    b"PTP LIN CIRC SPTP SLIN SCIRC SPL PTP_REL LIN_REL CIRC_REL SPTP_REL SLIN_REL SCIRC_REL SPL_REL".split()
 )
 LOOPS = frozenset([b"FOR", b"WHILE", b"LOOP", b"REPEAT"])
 SPLINES = frozenset([b"SPLINE", b"PTP_SPLINE"])
@@ -36,8 +35,8 @@ POINT_TYPES = frozenset([b"FRAME", b"POS", b"E3POS", b"E6POS", b"AXIS", b"E3AXIS
 RECORD_TYPES = frozenset([b"FDAT", b"LDAT", b"PDAT"])
 TYPES = POINT_TYPES | RECORD_TYPES | {b"INT", b"REAL", b"BOOL", b"CHAR"}
 KEPT = frozenset(
-    [b"HALT", b"WAIT", b"CONTINUE", b"INTERRUPT", b"TRIGGER", b"BRAKE", b"RESUME", b"EXT", b"EXTFCT"]
-    + [b"IMPORT", b"SIGNAL", b"ENUM", b"STRUC", b"ANOUT", b"ANIN", b"DIGIN", b"RETURN", b"EXIT", b"INI"]
+    b"HALT WAIT CONTINUE INTERRUPT TRIGGER BRAKE RESUME EXT EXTFCT "
+    b"IMPORT SIGNAL ENUM STRUC ANOUT ANIN DIGIN RETURN EXIT INI".split()
 )
 
 _FIRST = re.compile(rb"[ \t]*(" + NAME + rb")")
@@ -65,14 +64,14 @@ _RADIX = re.compile(rb"'[ \t]*(?:[Bb][ \t]*([01]+)|[Hh][ \t]*([0-9A-Fa-f]+))[ \t
 
 class Assignment(NamedTuple):
     name: bytes  # upper case
-    index: bytes | None
+    element: bytes | None  # what stands in the brackets of an array's element
     path: bytes  # upper case, without the first dot: b"Z" of P.Z
     value: bytes
     at: int  # offset of the value in the document
 
     @property
     def key(self) -> bytes | None:
-        return keyed(self.name, self.index)
+        return keyed(self.name, self.element)
 
 
 class Call(NamedTuple):

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from postproc.arrays import Ints
 from postproc.dialects.dialect import Places
 from postproc.dialects.krl.state import Frame, Frames, Numbers, Point, Source, State
 from postproc.dialects.krl.target import NOWHERE, Target, Unclear
 from postproc.document import Document
 from postproc.findings import Finding
 from postproc.geometry import rotation_from_abc
-from postproc.toolpath import Annotation, Kind, Toolpath
+from postproc.toolpath import Annotation, FrameRef, Kind, Toolpath
 from postproc.units import DEG, MM
 
 NAN6: Numbers = (float("nan"),) * 6
@@ -120,7 +121,8 @@ class Rows:
         the points of the .dat, whose numbers do not hold when the program assigns the name.
         """
         for row, (name, point) in self.points.items():
-            if row in self.reasons:
+            # Axis targets are air moves that are never edited.
+            if row in self.reasons or self.kind[row] == Kind.AXIS:
                 continue
             shown = name.decode("latin-1")
             plain = name.split(b"[")[0]
@@ -137,12 +139,16 @@ class Rows:
                 lines = sorted({self.line[i] for i in rows})
                 places = ", ".join(map(str, lines[:6])) + (" ..." if len(lines) > 6 else "")
                 self.reasons[row] = Reason(
-                    SHARED, f"point {shown} is the target of several motions (lines {places})", f"many {shown}"
+                    SHARED,
+                    f"point {shown} is the target of several motions (lines {places})",
+                    f"many {shown}",
                 )
             elif plain in mentioned:
                 self.reasons[row] = Reason(SHARED, f"point {shown} is read by other code too", "read")
             elif plain in assigned and id(chain[-1]) in declared:
-                self.reasons[row] = Reason(SHARED, f"point {shown} of the .dat is assigned in the program", "set")
+                self.reasons[row] = Reason(
+                    SHARED, f"point {shown} of the .dat is assigned in the program", "set"
+                )
 
     def _finding(self, row: int, code: str, message: str) -> Finding:
         line, column = self.document.place(self.at[row])
@@ -194,7 +200,9 @@ class Rows:
             if row in self.builds_on:
                 for pin in self._rows_of(self.builds_on[row]):
                     code = self.reasons[row].code
-                    message = f"the motion in line {self.line[row]} builds on this end point and is not corrected"
+                    message = (
+                        f"the motion in line {self.line[row]} builds on this end point and is not corrected"
+                    )
                     pins.setdefault(pin, self._finding(pin, code, message))
         for line, sources in self.reads:
             for pin in self._rows_of(sources):
@@ -206,18 +214,19 @@ class Rows:
         n = len(self)
         values = np.array(self.values, dtype=float).reshape(n, 6)
         refused = self.refused()
+        base, tool, used = _used(np.array(self.base, int), np.array(self.tool, int), frames.refs())
         toolpath = Toolpath(
-            kind=self.kind,  # type: ignore[arg-type]
+            kind=np.array(self.kind, dtype=np.int64),
             position=values[:, :3] * MM,
             rotation=rotation_from_abc(values[:, 3:] * DEG),
             axes=np.array(self.axes, dtype=float).reshape(n, 6) * DEG,
-            feed=self.feed,  # type: ignore[arg-type]
-            base=self.base,  # type: ignore[arg-type]
-            tool=self.tool,  # type: ignore[arg-type]
-            status=self.status,  # type: ignore[arg-type]
-            turn=self.turn,  # type: ignore[arg-type]
-            line=self.line,  # type: ignore[arg-type]
-            frames=frames.refs(),
+            feed=np.array(self.feed, dtype=float),
+            base=base,
+            tool=tool,
+            status=np.array(self.status, dtype=np.int64),
+            turn=np.array(self.turn, dtype=np.int64),
+            line=np.array(self.line, dtype=np.int64),
+            frames=used,
             refused=refused,
             pinned=self.pinned(refused),
             annotations=tuple(self.annotations),
@@ -229,6 +238,14 @@ class Rows:
             insert=np.array(self.insert, dtype=np.int64),
         )
         return toolpath, places, self.told(refused)
+
+
+def _used(base: Ints, tool: Ints, frames: tuple[FrameRef, ...]) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
+    """The indices and frames without those that no motion has: nobody needs to know their pose."""
+    kept = [i for i in range(len(frames)) if (base == i).any() or (tool == i).any()]
+    renamed = np.full(len(frames) + 1, -1, dtype=np.int64)
+    renamed[kept] = np.arange(len(kept))
+    return renamed[base], renamed[tool], tuple(frames[i] for i in kept)
 
 
 def refusal(unclear: Unclear, subject: str, cause: str = "") -> Reason:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.dialects.krl.survey import Effects
-from postproc.dialects.krl.target import NOWHERE, Target, Unclear
+from postproc.dialects.krl.target import NOWHERE, Target, Unclear, six
 from postproc.geometry import Poses
 from postproc.toolpath import FrameRef
 from postproc.units import DEG, MM
@@ -77,9 +77,9 @@ class Point:
         """The value after one component was assigned a number."""
         if isinstance(self.target, Unclear) or self.target.axes is not None:
             return Point(Unclear("KRL002", "one of its components is assigned"), origin=self)
-        values = list(self.target.values)
-        values[index] = value
-        target = replace(self.target, values=tuple(values), file=-1, start=NOWHERE, stop=NOWHERE)
+        before = self.target.values
+        values = (*before[:index], value, *before[index + 1 :])
+        target = replace(self.target, values=six(values), file=-1, start=NOWHERE, stop=NOWHERE)
         return Point(target, Unclear("KRL007", "a component of it is assigned apart"), self)
 
     def with_state(self, key: bytes, value: float | None) -> Point:
@@ -91,12 +91,16 @@ class Point:
         return Point(target, self.blocked, self)
 
 
+NO_BASE = Unclear("KRL005", "no $BASE was set before it")
+NO_TOOL = Unclear("KRL005", "no $TOOL was set before it")
+
+
 @dataclass
 class State:
     """Everything that a motion's meaning depends on; ``data``: BASE_DATA and TOOL_DATA as assigned here."""
 
-    base: Frame | Unclear = Unclear("KRL005", "no $BASE was set before it")
-    tool: Frame | Unclear = Unclear("KRL005", "no $TOOL was set before it")
+    base: Frame | Unclear = NO_BASE
+    tool: Frame | Unclear = NO_TOOL
     feed: float = float("nan")
     tool_stands: bool = False
     point: Numbers | None = None

@@ -38,7 +38,7 @@ HARMLESS = frozenset(
 HARMLESS_BEGIN = (b"SR_", b"STR", b"MSG", b"MESS", b"EKI_", b"ETH")
 PATH_FROM_FILE = (b"CR_PROCESS",)
 
-HIDDEN = re.compile(rb"\b(?:PTP|LIN|CIRC)\b", re.I)
+HIDDEN = re.compile(rb"(?<![#$\w])(?:PTP|LIN|CIRC)\b", re.I)
 """A motion word inside of a statement of a technology package."""
 
 _BAS = re.compile(rb"[ \t]*#[ \t]*([A-Za-z_][A-Za-z0-9_]*)[ \t]*(?:,[ \t]*(.*?)[ \t]*)?\Z", re.S)
@@ -86,13 +86,14 @@ class Survey:
     """``events``: index of a statement -> what it opens, branches or closes, in this order of closing.
 
     ``unclosed``: (line, what) of blocks without an end and ends without a begin; ``jumps``: labels that a GOTO
-    names; ``assigned``: names that the program assigns anywhere; ``has_routine``: whether a DEF was found.
+    names; ``assigned``: names that the program assigns anywhere; ``effects``: all that it changes anywhere.
     """
 
     events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
     routines: dict[bytes, Routine] = field(default_factory=dict)
     jumps: set[bytes] = field(default_factory=set)
     assigned: set[bytes] = field(default_factory=set)
+    effects: Effects = field(default_factory=set)
     unclosed: list[tuple[int, str]] = field(default_factory=list)
     has_routine: bool = False
 
@@ -184,6 +185,7 @@ def _close(result: Survey, stack: list[Block], statement: Statement, index: int)
 
 def _note(result: Survey, stack: list[Block], statement: Statement) -> None:
     effects, called = effects_of(statement)
+    result.effects |= effects
     result.assigned.update(effect for effect in effects if isinstance(effect, bytes))
     if stack:
         stack[-1].effects |= effects

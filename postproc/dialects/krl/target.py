@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from postproc.dialects.krl.lexing import NAME, number
@@ -131,7 +132,7 @@ def parse(text: bytes, at: int, file: int) -> Target | Unclear:
         return Unclear("KRL001", "it mixes axes with Cartesian components")
     is_axis = is_axis or (tag is not None and tag[1].upper().endswith(b"AXIS"))
     return Target(
-        _six(values), tuple(start), tuple(stop), _six(axes) if is_axis else None,
+        six(values), tuple(start), tuple(stop), six(axes) if is_axis else None,
         states[b"S"], states[b"T"], first if insert < 0 else insert, file,
     )  # fmt: skip
 
@@ -151,7 +152,8 @@ def _misread(key: bytes, field: re.Match[bytes], value: float | None) -> Unclear
     return None
 
 
-def _six(values: list[float | None]) -> Six:
+def six(values: Sequence[float | None]) -> Six:
+    """Six values as a tuple of that length."""
     x, y, z, a, b, c = values
     return (x, y, z, a, b, c)
 

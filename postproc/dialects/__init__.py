@@ -1,0 +1,21 @@
+"""The languages that can be read, in one table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from postproc.dialects.dialect import Dialect
+from postproc.dialects.krl import KrlDialect
+from postproc.findings import Finding, Refusal
+
+DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (KrlDialect(),)}
+"""Name -> dialect; the first that claims a file reads it."""
+
+
+def detect(path: Path, raw: bytes) -> Dialect:
+    """The dialect of a file by its name and content; Refusal (FIL009) if it is of none."""
+    for dialect in DIALECTS.values():
+        if dialect.claims(path, raw):
+            return dialect
+    known = ", ".join(DIALECTS)
+    raise Refusal(Finding("FIL009", f"no motion of a known language ({known}) was found", path.name))

@@ -1,0 +1,108 @@
+"""Fixtures: the command line in this process, and a small milling program in a cell of its own."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from postproc.cli.main import run
+
+CELL = """\
+robot: kuka_kr270
+tools:
+  1: {x: 120, y: 0, z: 250, a: 0, b: 30, c: 0, axis: +z}
+bases:
+  1: {x: 1500, y: -200, z: 600, a: 0, b: 0, c: 0}
+start: [0, -90, 90, 0, 45, 0]
+tolerance: 0.02
+"""
+
+LINES = [
+    "DEF part()",
+    "BAS(#INITMOV,0)",
+    "$BASE=BASE_DATA[1]",
+    "$TOOL=TOOL_DATA[1]",
+    "PTP {A1 0,A2 -90,A3 110,A4 0,A5 40,A6 0}",
+    "$VEL.CP=0.05",
+    "LIN {X 0.000,Y 0.000,Z 50.000,A 0.000,B 0.000,C 180.000}",
+    "LIN {Z 0.000}",
+    ";FORCE -360 50 560 @base",
+    "LIN {X 100.000,Y 0.000,Z -2.000,A 0.000,B 0.000,C 180.000} C_DIS",
+    "LIN {X 200.000,Y 0.000,Z -2.000,A 0.000,B 0.000,C 180.000} C_DIS ; slot",
+    "LIN {X 200.000,Y 150.000,Z -2.000,A 0.000,B 0.000,C 180.000} C_DIS",
+    "LIN {Y 300.000}",
+    ";FORCE OFF",
+    "LIN {Z 50.000}",
+    "LIN {X 400.000}",
+    "LIN {Z 0.000}",
+    ";FORCE 0 200 0",
+    "LIN {X 450.000}",
+    ";FORCE OFF",
+    "LIN {Z 80.000}",
+    "END",
+]
+
+
+@dataclass
+class Done:
+    """How a run ended."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> dict:
+        return json.loads(self.out)
+
+
+@pytest.fixture
+def compensate(capsys):
+    """``compensate(*words)`` runs the command line and returns how it ended."""
+
+    def call(*words: object) -> Done:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as end:
+            run([str(word) for word in words])
+        text = capsys.readouterr()
+        code = end.value.code
+        return Done(0 if code is None else int(code), text.out, text.err)
+
+    return call
+
+
+@dataclass
+class Job:
+    """A folder with a cell and a program."""
+
+    folder: Path
+
+    @property
+    def program(self) -> Path:
+        return self.folder / "part.src"
+
+    @property
+    def output(self) -> Path:
+        return self.folder / "compensated" / "part.src"
+
+    def write(self, lines: list[str], ending: str = "\r\n", name: str = "part.src") -> Path:
+        path = self.folder / name
+        path.write_bytes((ending.join(lines) + ending).encode("latin-1"))
+        return path
+
+    def cell(self, text: str) -> None:
+        (self.folder / "cell.yaml").write_text(text)
+
+    def nothing_written(self) -> bool:
+        return not (self.folder / "compensated").exists()
+
+
+@pytest.fixture
+def job(tmp_path) -> Job:
+    made = Job(tmp_path)
+    made.cell(CELL)
+    made.write(LINES)
+    return made
