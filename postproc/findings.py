@@ -141,7 +141,7 @@ CODES: dict[str, Code] = {
         "A technology package reads the path from data beside the program; there is nothing to correct here.",
     ),
     # YAML files
-    "YML001": Code("error", "not valid YAML", "The file does not parse."),
+    "YML001": Code("error", "not valid YAML", "It does not parse, or has aliases, tags or odd characters."),
     "YML002": Code("error", "unknown key", "A key that has no meaning here; nothing is ignored silently."),
     "YML003": Code("error", "missing key", "A key that must be there."),
     "YML004": Code("error", "wrong value", "A value of the wrong kind or outside of its range."),
@@ -161,7 +161,7 @@ CODES: dict[str, Code] = {
     # force
     "FRC001": Code("error", "no force", "--force was given alone, and no force belongs to the program."),
     "FRC002": Code("error", "force not understood", "A force is 3 or 6 numbers and a frame: 0,360,560@base."),
-    "FRC003": Code("error", "force file is wrong", "A row of the force CSV can not be used."),
+    "FRC003": Code("error", "force file is wrong", "The header or a row of the force CSV can not be used."),
     "FRC004": Code("error", "force for no motion", "The force CSV names a line that holds no motion."),
     "FRC005": Code(
         "error",

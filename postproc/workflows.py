@@ -21,7 +21,7 @@ from postproc.dialects import detect
 from postproc.dialects.dialect import Dialect, Program
 from postproc.document import Document
 from postproc.findings import Finding, Refusal
-from postproc.forces import Wrenches, wrenches
+from postproc.forces import Wrenches, is_no_force, wrenches
 from postproc.model import StiffnessModel
 from postproc.publish import publish
 from postproc.report.checked import Checked
@@ -102,7 +102,7 @@ def prepare(request: Request) -> Prepared:
     model = full.without(families=own)
 
     path = program.toolpath
-    if not len(path) and request.force is not None:
+    if not len(path) and not is_no_force(request.force):
         raise Refusal(
             Finding("FIL009", f"no motion was found (read as {dialect.name})", str(request.program)),
             *program.findings,

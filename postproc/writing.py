@@ -90,6 +90,10 @@ def _hold(path: Toolpath, back: Toolpath, planned: Poses, decimals: Mapping[str,
     """The program read back is the one that was meant, motion by motion.  Raises Refusal FIL008."""
     if len(back) != len(path):
         raise Refusal(Finding("FIL008", f"{len(path)} motions became {len(back)}", file))
+    if not len(path):
+        return
+    if back.refused.keys() != path.refused.keys():
+        raise Refusal(Finding("FIL008", "other motions than before are not understood", file))
     for name in ("kind", "base", "tool", "status", "turn", "axes", "feed"):
         before, after = getattr(path, name).reshape(len(path), -1), getattr(back, name).reshape(len(path), -1)
         same = ((before == after) | ((before != before) & (after != after))).all(axis=1)

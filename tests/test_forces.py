@@ -163,7 +163,7 @@ def test_a_cut_that_only_plunges_has_no_direction():
     for spec in ("10,0,30@feed", "0,1,0@feed", "0,0,30,1,0,0@feed", "0,0,30,0,1,0@feed"):
         (finding,) = refused(path, spec)
         assert (finding.code, finding.file, finding.line) == ("FRC005", "part.src", 11)
-        assert "no motion of this cut feeds across the spindle axis (and 1 more" in finding.message
+        assert "no motion of this cut gives it a direction across the spindle (and 1 more" in finding.message
     result = run(path, "0,0,30,0,0,2@feed")  # along the spindle no direction is needed
     assert np.allclose(result.values[1:], [[0, 0, 30, 0, 0, 2]] * 2)
     assert result.findings == ()
@@ -180,6 +180,24 @@ def test_a_direction_does_not_cross_air():
         notes=[(0, "FORCE 1 0 0 @feed", 1), (2, "FORCE OFF", 2), (3, "FORCE 1 0 0@feed", 3)],
     )
     assert refused(path, "")[0].line == 13
+
+
+def test_a_direction_is_not_taken_from_the_cut_after():
+    points = [[0, 0, 0.1], [0, 0, 0], [0, 0, 0.1], [0.1, 0, 0.1]]
+    path = path_of(points, [Kind.PTP, Kind.LIN, Kind.PTP, Kind.LIN])
+    assert refused(path, "10,0,0@feed")[0].line == 11
+
+
+def test_a_spindle_turned_into_the_last_direction_leaves_none():
+    lying = rotation_from_abc([0, np.pi / 2, 0]) @ DOWN  # the back axis along +x, where the feed went
+    path = path_of([[0, 0, 0], [0.1, 0, 0], [0.1, 0, 0]], PTP_THEN[:3], [DOWN, DOWN, lying])
+    (finding,) = refused(path, "10,0,0@feed")
+    assert (finding.code, finding.line) == ("FRC005", 12)
+    # in a cut with an unknown target it keeps its size, and is not shared with its neighbours
+    points = [[np.nan] * 3, [0, 0, 0], [0.1, 0, 0], [0.1, 0, 0], [0.2, 0.01, 0]]
+    path = path_of(points, rotations=[DOWN, DOWN, DOWN, lying, DOWN])
+    result = run(path, "0,10,0@feed")
+    assert np.allclose(np.linalg.norm(result.values, axis=1)[2:4], 10)
 
 
 def test_turning_on_the_spot_keeps_the_last_direction_across_the_new_axis():
@@ -330,6 +348,12 @@ def test_unknown_targets_keep_a_force_of_the_right_size(frame):
 def test_a_cut_with_an_unknown_target_needs_no_direction():
     # nothing after the unknown target has a direction, but that cut is left as it is anyway
     path = path_of([[0, 0, 0], [np.nan] * 3, [0.1, 0, 0]], PTP_THEN[:3])
+    result = run(path, "10,0,0@feed")
+    assert np.allclose(np.linalg.norm(result.values[1:], axis=1), 10)
+
+
+def test_a_cut_that_ends_with_an_unknown_target_needs_no_direction():
+    path = path_of([[0, 0, 0], [0, 0, -0.1], [np.nan] * 3], PTP_THEN[:3])
     result = run(path, "10,0,0@feed")
     assert np.allclose(np.linalg.norm(result.values[1:], axis=1), 10)
 
@@ -635,3 +659,26 @@ def test_processes_are_refused_clearly(tmp_path):
 
 def test_a_missing_force_table():
     assert refused(path_of(HORIZONTAL), "none.csv")[0].code == "FIL001"
+
+
+def test_a_cut_without_any_known_place_keeps_its_force(tmp_path):
+    """Nothing of the path is known, so no motion begins anywhere; the force is still there to be seen."""
+    n = 3
+    unknown = np.full((n, 3), np.nan)
+    path = Toolpath(
+        kind=np.full(n, Kind.LIN),
+        position=unknown,
+        rotation=np.full((n, 3, 3), np.nan),
+        axes=np.full((n, 6), np.nan),
+        feed=np.full(n, np.nan),
+        base=np.full(n, -1),
+        tool=np.full(n, -1),
+        status=np.full(n, -1),
+        turn=np.full(n, -1),
+        line=np.arange(1, n + 1),
+        frames=(),
+    )
+    cell = Cell(path=tmp_path / "cell.yaml", robot="kuka_kr270")
+    made = wrenches(tmp_path / "p.src", path, frames_of(cell, path, "p.src"), cell, "0,360,560")
+    assert made.carries.all()
+    np.testing.assert_allclose(made.values, [[0, 360, 560, 0, 0, 0]] * n)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from plant import kr270, random_angles, random_tools, with_compensator
 
 from postproc.effects import GravityCompensator
-from postproc.geometry import Poses, rotation_from_abc
+from postproc.geometry import Poses, rotation_from_abc, vector_from_rotation
 from postproc.model import StiffnessModel
 from postproc.robot.inverse import inverse
 from postproc.units import DEG
@@ -83,10 +83,10 @@ def test_torque_as_printed():
 
 
 def test_size_of_the_printed_spring():
-    """With Table 1's stiffness in N/m the spring pulls with up to 343 kN m: no balancer (a heavy arm needs 10 to 15)."""
+    """With Table 1's stiffness in N/m the spring's torque reaches 347 kN m: no balancer (a heavy arm needs 10 to 15)."""
     low, high = kr270().limits[A2]
     torque = np.abs(spring(TABLE_1, np.linspace(low, high, 2001)).torque).max()
-    assert torque == pytest.approx(343e3, rel=2e-3)
+    assert torque == pytest.approx(346.76e3, rel=1e-4)
     acting, balanced = model(preload="acting"), model()
     assert [finding.code for finding in acting.doubts()] == ["MOD001"]
     assert balanced.doubts() == []
@@ -148,7 +148,7 @@ def test_printed_sign_flips_the_increment():
     np.testing.assert_allclose(printed, -energy, atol=1e-6)
     expected = [TABLE_1["K_c"] * math.hypot(0.68593, 0.12030) * 0.18472 * eta(TABLE_1, angle) for angle in q[:, A2]]
     np.testing.assert_allclose(printed[:, A2], expected, rtol=1e-6)
-    assert np.abs(expected).min() > 1e3
+    assert np.median(np.abs(expected)) > 1e5
 
 
 # Eqs (5), (6)
@@ -176,11 +176,11 @@ def test_cartesian_stiffness_is_that_of_the_solved_equilibrium(build):
         up, down = (robot.equilibrium(q, np.tile(sign * unit, (10, 1)), tool).pose for sign in (1.0, -1.0))
         measured[:, :3, i] = (up.position - down.position) / 2
         turn = up.rotation @ np.swapaxes(down.rotation, 1, 2)
-        measured[:, 3:, i] = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1) / 2
+        measured[:, 3:, i] = vector_from_rotation(turn) / 2
     stiffness = robot.cartesian_stiffness(q, tool)
     compliance = np.linalg.inv(stiffness)
     scale = np.abs(compliance).max(axis=(1, 2), keepdims=True)
-    assert (np.abs(measured - compliance) / scale).max() < 1e-6
+    assert (np.abs(measured - compliance) / scale).max() < 1e-8
     np.testing.assert_allclose(compliance, np.swapaxes(compliance, 1, 2), atol=1e-9 * scale.max())
     wrench = rng.normal(size=(10, 6)) * [300.0, 300, 300, 30, 30, 30]
     through = np.linalg.solve(stiffness, wrench[..., None])[..., 0]
@@ -231,7 +231,7 @@ def test_map_of_the_square():
     assert (~within).sum() == 235
     assert [f"{size.min():.3f}", f"{size[within].min():.3f}"] == ["0.274", "0.398"]
     assert [f"{size.max():.3f}", f"{size[within].max():.3f}"] == ["3.487", "3.487"]
-    assert f"{np.linalg.norm(energy, axis=1).max():.3f}" == "3.507"
+    assert f"{np.linalg.norm(energy, axis=1).max():.4f}" == "3.5065"
     assert f"{np.linalg.norm(printed, axis=1).max():.3f}" == "3.472"
     assert f"{np.linalg.norm(energy - bare, axis=1).max():.4f}" == "0.0863"
     assert f"{np.linalg.norm(printed - bare, axis=1).max():.4f}" == "0.0688"

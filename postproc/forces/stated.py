@@ -55,6 +55,16 @@ def parse_frame(name: str) -> int:
     return FRAMES.index(word)
 
 
+def is_no_force(spec: str | None) -> bool:
+    """Whether ``--force`` says that there is none: it is absent, or a wrench of zeros."""
+    if not spec:
+        return spec is None
+    try:
+        return not any(parse_force(spec)[0])
+    except NotAForce:
+        return False
+
+
 def is_number_like(word: str) -> bool:
     """Whether a word was meant as a number, right or wrong: 12, -.5, 1e, 3N, nan."""
     return bool(_NUMBER_LIKE.match(word))

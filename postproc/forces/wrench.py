@@ -263,7 +263,7 @@ class _Turn:
         frame = self.stated.frame[rows]
         for code, turn in ((BASE, self._base), (WORLD, self._world), (TOOL, self._tool), (FEED, self._feed)):
             chosen = frame == code
-            if np.all(chosen):
+            if len(rows) and np.all(chosen):
                 wrench = turn(self._pairs(rows), rows, at)
             elif np.any(chosen):
                 wrench[chosen] = turn(self._pairs(rows[chosen]), rows[chosen], at[chosen])
@@ -320,7 +320,7 @@ def _no_direction(rows: Ints, toolpath: Toolpath, file: str) -> Finding:
     more = f" (and {len(rows) - 1} more motions)" if len(rows) > 1 else ""
     return Finding(
         "FRC005",
-        f"the force is in the feed frame, and no motion of this cut feeds across the spindle axis{more}",
+        f"the force is in the feed frame, and no motion of this cut gives it a direction across the spindle{more}",
         file,
         int(toolpath.line[rows[0]]),
         help="give the force @tool or @base here; in @feed only fz and mz need no direction",

@@ -82,13 +82,13 @@ def _branches(
 def _settle(q: Floats, toolpath: Toolpath, start: Floats | None) -> None:
     """Choose the turns of A1, A4, A6 in place, and A4 where A5 = 0 leaves it open."""
     rows = np.flatnonzero(np.isfinite(q).all(axis=1))
+    if not len(rows):
+        return
     given = np.isfinite(toolpath.axes[rows]).all(axis=1)
     values = q[rows]
     if start is not None:
         rows, given = np.concatenate([[-1], rows]), np.concatenate([[True], given])
         values = np.concatenate([start[None], values])
-    if not len(rows):
-        return
     order = np.arange(len(rows))
     straight = (np.abs(np.sin(values[:, 4])) < 1e-9) & ~given
     source = np.maximum.accumulate(np.where(straight, 0, order))

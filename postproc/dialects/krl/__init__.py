@@ -12,7 +12,7 @@ from postproc.dialects.krl import interpreter, writer
 from postproc.document import Document, Edit
 
 _CLAIM = re.compile(
-    rb"^(?:\xef\xbb\xbf)?[ \t]*(?:(?:GLOBAL[ \t]+)?DEF[ \t]+[A-Za-z_$][A-Za-z0-9_$]*[ \t]*\("
+    rb"^(?:\xef\xbb\xbf)?[ \t]*(?:(?:GLOBAL[ \t]+)?DEF[ \t]+[A-Za-z_$][A-Za-z0-9_$]*[ \t]*(?:\(|;|\r?$)"
     rb"|S?(?:PTP|LIN)[ \t]*\{)",
     re.I | re.M,
 )

@@ -166,7 +166,7 @@ def _numbered(run: Run, table: bytes, index: int, line: int) -> Frame | Unclear:
 def _set_data(run: Run, said: Assignment) -> None:
     state, table = run.state, said.name[:4]
     index = number((said.element or b"").strip())
-    if index is None:
+    if index is None or index != int(index):
         run.mentioned |= identifiers(said.value)
         state.data, state.data_lost = {}, True
         return

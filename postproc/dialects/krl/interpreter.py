@@ -32,6 +32,7 @@ from postproc.findings import Finding
 from postproc.toolpath import Annotation
 
 _ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
+_WITH = re.compile(rb"\bWITH\b", re.I)
 _MARKER = re.compile(rb"^[ \t]*;COMPENSATED [^\r\n]*", re.I | re.M)
 _MOTION = Statement("motion", b"", b"", 0, 0)
 
@@ -90,7 +91,7 @@ def _step(run: Run, index: int, item: Statement) -> None:
         run.rows.annotations.append(Annotation(len(run.rows), text, item.line))
     for what, block in run.survey.events.get(index, ()):
         if what == "open":
-            _open(run, block)
+            _open(run, block, item)
         elif what == "branch":
             _branch(run, block)
         else:
@@ -114,7 +115,7 @@ def _step(run: Run, index: int, item: Statement) -> None:
         run.mentioned |= identifiers(item.code)
 
 
-def _open(run: Run, block: Block) -> None:
+def _open(run: Run, block: Block, item: Statement) -> None:
     if isinstance(block, Routine):
         points = run.declarations.points
         if not block.is_main:
@@ -130,6 +131,8 @@ def _open(run: Run, block: Block) -> None:
     run.stack.append(Open(block, run.state.copy()))
     if block.word in LOOPS:
         run.forget(block.effects, f"in the loop of line {block.line}")
+    elif block.word in SPLINES and _WITH.search(item.code):
+        run.forget({"base", "tool"}, f"in the spline of line {block.line}: it has a WITH")
 
 
 def _branch(run: Run, block: Block) -> None:
@@ -143,7 +146,13 @@ def _close(run: Run, block: Block, line: int) -> None:
     if isinstance(block, Routine):
         run.state = State()
         run.stack = []
-    elif block.word not in SPLINES:
+    elif block.word in SPLINES:
+        # What a WITH of the spline set ends with it.
+        frames = (run.state.base, run.state.tool)
+        run.state.base, run.state.tool = opened.entry.base, opened.entry.tool
+        if frames != (run.state.base, run.state.tool):
+            run.state.lose_point(f"after the spline of line {block.line}")
+    else:
         sources = opened.sources | opened.entry.sources | run.state.sources
         run.state = opened.entry
         shown = block.word.decode("latin-1")

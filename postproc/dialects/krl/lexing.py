@@ -42,9 +42,13 @@ KEPT = frozenset(
 _FIRST = re.compile(rb"[ \t]*(" + NAME + rb")")
 _LABEL = re.compile(rb"(" + NAME + rb")[ \t]*:[ \t]*\Z")
 _DEF = re.compile(
-    rb"(?:GLOBAL[ \t]+)?(DEFFCT[ \t]+" + NAME + rb"(?:\[[^\]]*\])?|DEF)[ \t]+(" + NAME + rb")", re.I
+    rb"(?:GLOBAL[ \t]+)?(?:DEFFCT[ \t]+"
+    + NAME
+    + rb"(?:\[[^\]]*\])?|DEF)[ \t]+("
+    + NAME
+    + rb")[ \t]*(?:\(|\Z)",
+    re.I,
 )
-_DEFDAT = re.compile(rb"DEFDAT[ \t]+(" + NAME + rb")", re.I)
 _GOTO = re.compile(rb"GOTO[ \t]+(" + NAME + rb")", re.I)
 _ASSIGNMENT = re.compile(
     rb"(" + NAME + rb")[ \t]*(?:\[([^\]]*)\])?[ \t]*"
@@ -58,7 +62,7 @@ _DECLARED = re.compile(
 _ITEM = re.compile(rb"(" + NAME + rb")[ \t]*(?:\[([^\]]*)\])?[ \t]*(=[ \t]*)?")
 _STRING = re.compile(rb'"[^"\r\n]*"?')
 _IDENTIFIER = re.compile(rb"(?<![A-Za-z0-9_$#'])" + NAME)
-_NUMBER = re.compile(rb"[-+]?[ \t]*(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\Z")
+_NUMBER = re.compile(rb"[-+]?[ \t]*(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,4})?\Z")
 _RADIX = re.compile(rb"'[ \t]*(?:[Bb][ \t]*([01]+)|[Hh][ \t]*([0-9A-Fa-f]+))[ \t]*'\Z")
 
 
@@ -167,7 +171,7 @@ def _kind(word: bytes, code: bytes, at: int) -> tuple[str, Assignment | Call | D
     if word in BRANCHES:
         return "branch", None
     if word in (b"DEF", b"DEFFCT", b"GLOBAL") and (found := _DEF.match(code)):
-        return "def", found[2].upper()
+        return "def", found[1].upper()
     if word in (b"END", b"ENDFCT"):
         return "end", None
     if word == b"GOTO" and (found := _GOTO.match(code)):
@@ -235,6 +239,6 @@ def module_name(raw: bytes, word: bytes) -> tuple[int, int] | None:
     """Byte range of the module's name in the first ``DEF`` (or ``DEFDAT``) line."""
     pattern = rb"^(?:\xef\xbb\xbf)?[ \t]*(?:GLOBAL[ \t]+)?" + word + rb"[ \t]+(" + NAME + rb")"
     if word == b"DEF":
-        pattern += rb"[ \t]*\("
+        pattern += rb"[ \t]*(?:\(|;|\r?$)"
     found = re.search(pattern, raw, re.I | re.M)
     return found.span(1) if found else None

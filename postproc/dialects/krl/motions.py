@@ -31,6 +31,7 @@ class Operand:
     rest: bytes = b""
     name: bytes = b""
     point: Point | None = None
+    builds: bool = False  # it is not clear, and may leave components to the point before
 
 
 def move(run: Run, statement: Statement) -> None:
@@ -89,12 +90,13 @@ def _operand(run: Run, text: bytes, at: int) -> Operand:
     if stripped.startswith(b"{"):
         stop = stripped.find(b"}")
         if stop < 0 or b"{" in stripped[1:stop]:
-            return Operand(Unclear("KRL001", "its braces do not close"))
+            return Operand(Unclear("KRL001", "its braces do not close"), builds=True)
         rest = stripped[stop + 1 :]
         if _COMPUTED.match(rest):
             run.mentioned |= identifiers(rest)
-            return Operand(Unclear("KRL002", "its target is computed"))
-        return Operand(parse(stripped[: stop + 1], at, 0), rest)
+            return Operand(Unclear("KRL002", "its target is computed"), builds=True)
+        target = parse(stripped[: stop + 1], at, 0)
+        return Operand(target, rest, builds=isinstance(target, Unclear))
     found = _NAMED.match(stripped)
     if found is None:
         return Operand(Unclear("KRL001", "it has no target that can be read"))
@@ -103,12 +105,16 @@ def _operand(run: Run, text: bytes, at: int) -> Operand:
     key = keyed(name, found[2])
     if _COMPUTED.match(rest) or found[3].strip() or key is None:
         run.mentioned |= identifiers(stripped)
-        return Operand(Unclear("KRL002", f"its target {shown} is computed"), rest)
+        reads = READS_POSITION.search(stripped) is not None
+        return Operand(Unclear("KRL002", f"its target {shown} is computed"), rest, builds=reads)
     point = run.state.variables.get(key)
     if point is not None:
-        return Operand(point.target, rest, key, point)
+        computed = isinstance(point.target, Unclear) and point.target.code != "KRL003"
+        return Operand(point.target, rest, key, point, computed)
     if name.startswith(b"$"):
-        return Operand(Unclear("KRL002", f"its target {shown} is a variable of the controller"), rest, key)
+        reads = READS_POSITION.match(name) is not None
+        variable = Unclear("KRL002", f"its target {shown} is a variable of the controller")
+        return Operand(variable, rest, key, None, reads)
     return Operand(Unclear("KRL003", f"point {shown} is not declared"), rest, key)
 
 
@@ -123,7 +129,7 @@ def _closed(operand: Operand) -> Operand:
         message = f"'{operand.rest.strip()[:40].decode('latin-1')}' is not understood"
         if operand.name:
             message += "; an inline form without the lines that it unfolds to"
-    return Operand(Unclear("KRL001", message), b"", operand.name, operand.point)
+    return Operand(Unclear("KRL001", message), b"", operand.name, operand.point, not operand.name)
 
 
 def _cause(target: Unclear, operand: Operand | None) -> str:
@@ -141,7 +147,7 @@ def _arc(run: Run, statement: Statement, auxiliary: Operand, stop: int) -> None:
         end = _operand(run, rest[1:], stop - len(rest) + 1)
         if _CIRCLE_ANGLE.match(end.rest):
             # The arc goes on or ends before: the end point only gives the direction.
-            end = Operand(Unclear("KRL009", ""), b"", end.name, end.point)
+            end = Operand(Unclear("KRL009", ""), b"", end.name, end.point, True)
         end = _closed(end)
     row = _enter(run, statement.line, statement.at, Kind.CIRC, end.target, reason, end)
     if auxiliary.point is not None:
@@ -166,10 +172,10 @@ def _enter(
             reason = reason or Reason("KRL001", "a straight line can not go to axis angles")
     else:
         values = _filled(target.values, state.point)
-    builds = isinstance(target, Target) and bool(target.missing)
-    if builds and isinstance(target, Target) and reason is None:
+    partial = isinstance(target, Target) and bool(target.missing)
+    if partial and isinstance(target, Target) and reason is None:
         reason = _incomplete(state, target, axes if kind is Kind.AXIS else values)
-    if builds and values is not None and state.point_frames != (state.base, state.tool):
+    if partial and values is not None and state.point_frames != (state.base, state.tool):
         values = None
     if reason is None and kind is not Kind.AXIS:
         reason = _frames_missing(state)
@@ -181,8 +187,7 @@ def _enter(
     if reason is not None:
         run.rows.reasons[row] = reason
     relative = isinstance(target, Unclear) and target.code == "KRL008"
-    reads = operand is not None and READS_POSITION.match(operand.name) is not None
-    if builds or relative or reads:
+    if partial or relative or (operand is not None and operand.builds):
         run.rows.builds_on[row] = state.sources
     if operand is not None and operand.point is not None:
         operand.point.serve(row)

@@ -20,6 +20,7 @@ from postproc.dialects.krl.lexing import (
     Statement,
     identifiers,
 )
+from postproc.dialects.krl.target import EXTERNAL
 
 Effect = str | bytes
 Effects = set[Effect]
@@ -138,14 +139,16 @@ def survey(statements: Iterable[tuple[int, Statement]]) -> Survey:
             stack = [routine]
             result.events[index] = [("open", routine)]
         elif kind == "end":
-            if not stack:
+            if not stack or not stack[0].line:
+                result.events[index] = [("close", block) for block in stack[:0:-1]]
+                close_all()
                 result.unclosed.append((statement.line, f"{_shown(statement.word)} without a DEF"))
             else:
                 result.events[index] = [("close", block) for block in reversed(stack)]
                 close_all()
         elif kind == "open":
             if not stack:  # a program without DEF
-                stack = [Routine(b"DEF", statement.line, is_main=True)]
+                stack = [Routine(b"DEF", 0, is_main=True)]
                 blocks.append(stack[0])
             block = Block(statement.word, statement.line)
             blocks.append(block)
@@ -201,7 +204,9 @@ def effects_of(statement: Statement) -> tuple[Effects, bytes]:
             return set(), b""
         if said.name in _SYSTEM:
             return {_SYSTEM[said.name]}, b""
-        return (set() if said.name.startswith(b"$") else {said.name}), b""
+        if said.name.startswith(b"$") or said.path in EXTERNAL:
+            return set(), b""
+        return {said.name}, b""
     if isinstance(said, Declared):
         return {key.split(b"[")[0] for key, value, _ in said.items if key and value}, b""
     if isinstance(said, Call):
