@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import tempfile
 from collections.abc import Mapping
@@ -25,13 +26,16 @@ def publish(files: Mapping[Path, bytes], last: Path | None = None) -> None:
     at = next(iter(files), Path())
     try:
         for at, content in files.items():
+            if at.is_dir() and not at.is_symlink():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             at.parent.mkdir(parents=True, exist_ok=True)
             ready[at] = _written_beside(at, content)
         order = sorted(files, key=lambda path: path == last)
         for at in reversed(order):
             if at.exists():
-                spare[at] = _free_name(at)
-                os.replace(at, spare[at])
+                aside = at.with_name(f"{ready[at].name}.old")
+                os.replace(at, aside)
+                spare[at] = aside
         for at in order:
             os.replace(ready[at], at)
             placed.append(at)
@@ -75,12 +79,6 @@ def _written_beside(path: Path, content: bytes) -> Path:
         temporary.unlink(missing_ok=True)
         raise
     return temporary
-
-
-def _free_name(path: Path) -> Path:
-    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".old", dir=path.parent)
-    os.close(handle)
-    return Path(name)
 
 
 def _umask() -> int:

@@ -16,6 +16,7 @@ ROOMS = {
     "batch": 9,
     "workflows": 8,
     "report": 7,
+    "writing": 7,
     "diagnosis": 6,
     "identification": 5,
     "experiments": 5,
@@ -40,7 +41,7 @@ ROOMS = {
 }
 """Room -> its floor: DESIGN.md, "Rooms"."""
 
-ONE_FLOOR = {("forces", "cell")}
+ONE_FLOOR = {("forces", "cell"), ("toolpath", "geometry")}
 """Neighbours on one floor, from -> to."""
 
 TEXT = {"dialects", "document"}

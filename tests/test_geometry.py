@@ -107,7 +107,8 @@ def test_half_turns(abc):
         found = abc_from_rotation(rotation, near)
         assert same(rotation_from_abc(found), rotation, 1e-14)
         assert (found > -math.pi).all()
-    assert same(np.abs(found), np.abs(np.radians(abc)), 1e-14)
+        if near is not None:
+            assert same(np.abs(found), np.abs(near), 1e-14)
 
 
 def test_batch_of_angles_is_row_by_row():

@@ -87,8 +87,10 @@ def test_a_rigid_robot_gives_the_file_back(compensate, job):
 @pytest.mark.parametrize("bom", [b"", b"\xef\xbb\xbf"])
 @pytest.mark.parametrize("last", [True, False])
 def test_all_other_bytes_stay(compensate, job, ending, bom, last):
-    text = ending.join(LINES + ([""] if last else [])).replace("; slot", ";\t Nut fr\xe4sen  ").replace(
-        "LIN {X 200.000,Y 150", "\tlin  { X 200.000 ,Y 150"
+    text = (
+        ending.join(LINES + ([""] if last else []))
+        .replace("; slot", ";\t Nut fr\xe4sen  ")
+        .replace("LIN {X 200.000,Y 150", "\tlin  { X 200.000 ,Y 150")
     )
     raw = bom + text.encode("latin-1")
     job.program.write_bytes(raw)
@@ -227,7 +229,10 @@ def test_predict_writes_only_the_report(compensate, job):
     assert done.json["error_before_mm"] == full.json["error_before_mm"]
     assert job.nothing_written()
     compensate("predict", job.program, "--force", "--report", job.folder / "rep")
-    assert sorted(p.name for p in (job.folder / "rep").iterdir()) == ["part.deflection.csv", "part.prediction.json"]
+    assert sorted(p.name for p in (job.folder / "rep").iterdir()) == [
+        "part.deflection.csv",
+        "part.prediction.json",
+    ]
 
 
 def test_absolute_and_process_agree_where_the_robot_does_not_sag(compensate, job):
@@ -255,8 +260,21 @@ def test_the_diff_turns_the_input_into_the_output(compensate, job):
 def test_json_alone_on_standard_output(compensate, job):
     done = compensate(job.program, "--force", "--json", "-")
     assert set(done.json) >= {
-        "program", "dialect", "robot", "motions", "corrected", "inserted", "left", "iterations", "force",
-        "error_before_mm", "error_after_mm", "correction_mm", "findings", "outputs", "exit",
+        "program",
+        "dialect",
+        "robot",
+        "motions",
+        "corrected",
+        "inserted",
+        "left",
+        "iterations",
+        "force",
+        "error_before_mm",
+        "error_after_mm",
+        "correction_mm",
+        "findings",
+        "outputs",
+        "exit",
     }
     assert done.json["outputs"] == [
         str(job.output.with_name(name))

@@ -27,7 +27,7 @@ SPIN = np.radians(-45)  # A of the upright tool: places the flange beside the sp
 STATUS = 6  # of the whole program: wrist in front, elbow up, A5 < 0
 
 DIAMETER, TEETH, SPEED = 16.0, 3, 12000  # end mill, teeth, 1/min
-CLEAR, NEAR = 50.0, 0.5  # heights: of moves across the plate; of the ramp's begin over the material
+CLEAR, NEAR = 50.0, 1.0  # heights: of moves across the plate; of the ramp's begin over the material
 RAPID, PLUNGE = 0.25, 0.05  # m/s
 TOLERANCE = {"rough": 0.2, "finish": 0.02}  # chord error
 LEAD = 12.0  # radius of the arcs onto and off a wall
@@ -52,7 +52,7 @@ class Ring:
         return Ring(self.x, self.y, hx, hy, min(self.radius, hx, hy))
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points (N, 2) and outward normals (N, 2) at t in [0, 9]: half side, corner, side, ..., half side."""
+        """Points (N, 2) and outward normals (N, 2) at t in [0, 9]: half side, corner, ..., half side."""
         piece = np.minimum(t.astype(int), 8)
         part = t - piece
         corner, on_arc = piece // 2, piece % 2 == 1
@@ -152,7 +152,7 @@ class Program:
         point = np.round(point, 3) + 0.0
         if self.points and np.array_equal(point, self.points[-1]):
             return
-        keys = range(6)
+        keys = [0, 1, 2, 3, 4, 5]
         if self.points and np.array_equal(np.delete(point, 2), np.delete(self.points[-1], 2)):
             keys = [2]
         target = ",".join(f"{'XYZABC'[k]} {point[k]:.3f}" for k in keys)

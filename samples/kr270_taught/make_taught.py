@@ -1,7 +1,7 @@
-"""Writes taught.src and taught.dat: a slot and a rectangular groove, taught by hand with inline forms (KSS 8).
+"""Writes taught.src and taught.dat: a slot and a rectangular groove, taught with inline forms (KSS 8).
 
-Each point is what a controller stores at a touch-up: the pose of the axes as they stand (here to 0.001 deg, hence
-the crooked numbers), in single precision, with the status and turn of these axes.  Nothing is random.
+Each point is what a controller stores at a touch-up: the pose of the axes as they stand (here to 0.001 deg,
+hence the crooked numbers), in single precision, with their status and turn.  Nothing is random.
 
     python samples/kr270_taught/make_taught.py
 """
@@ -21,23 +21,20 @@ from postproc.robot.inverse import inverse, status_of, turn_of
 
 ROBOT = load_robot(find_robot("kuka_kr270"))
 BASE = Poses.from_abc([1.4513, -0.1186, 0.7204], np.radians([12.3, 0.05, -0.08]))  # a fixture, touched off
-TOOL = Poses.from_abc(
-    [0.30142, -0.00035, 0.17984], np.radians([0.21, 89.87, 0.0])
-)  # +Z along the spindle, tip-ward
+TOOL = Poses.from_abc([0.30142, -0.00035, 0.17984], np.radians([0.21, 89.87, 0]))  # +Z: spindle, tip-ward
 SPIN = 82.7  # A of the upright tool, deg: the flange lies beside the spindle, clear of A5 = 0
 STATUS = 6  # wrist in front, elbow up, A5 < 0
 READING = 0.001  # deg, step of the axis readings
 FEED, RAPID = 0.02, 0.25  # m/s
 
-SLOT, RAMP = (
-    (-114, 252, -67),
-    (-57, 126, -34),
-)  # N along feed, to its left, up: a full slot 3 mm deep, and its ramp
+# N along the feed, to its left, up: a full slot of 3 mm at 0.1 mm a tooth (the formula is in kr270_panel),
+# and half of it for a ramp or for the wedge that a ramp leaves
+SLOT, RAMP = (-114, 252, -67), (-57, 126, -34)
 
 
 @dataclass(frozen=True)
 class Step:
-    """One motion: its kind, the tool tip X, Y, Z in the fixture [mm], its speed, and whether it is rounded."""
+    """One motion: its kind, the tip X, Y, Z in the fixture [mm], its speed, and whether it is rounded."""
 
     kind: str  # PTP or LIN
     target: tuple[float, float, float]

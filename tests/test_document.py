@@ -1,0 +1,106 @@
+"""Laws of a document and its edits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from postproc.document import Document, Edit, Span, apply, in_order, undone
+
+
+def document(raw: bytes) -> Document:
+    return Document(Path("x.src"), raw)
+
+
+@st.composite
+def edited(draw: st.DrawFn) -> tuple[bytes, list[Edit]]:
+    """Bytes and edits on them that do not overlap, in any order."""
+    raw = draw(st.binary(max_size=200))
+    cuts = sorted(draw(st.lists(st.integers(0, len(raw)), max_size=12, unique=True)))
+    if len(cuts) % 2:
+        cuts.pop()
+    pairs = list(zip(cuts[::2], cuts[1::2], strict=True))
+    edits = [Edit(Span(0, a, draw(st.sampled_from((a, b)))), draw(st.binary(max_size=8))) for a, b in pairs]
+    return raw, draw(st.permutations(edits))
+
+
+@given(edited())
+def test_every_byte_that_no_edit_covers_is_copied(case: tuple[bytes, list[Edit]]) -> None:
+    raw, edits = case
+    written = apply(document(raw), edits)
+    assert len(written) == len(raw) + sum(len(e.text) - (e.span.stop - e.span.start) for e in edits)
+    assert undone(written, raw, edits)
+
+
+@given(edited(), st.integers(0, 400), st.integers(0, 255))
+def test_a_byte_changed_elsewhere_is_seen(case: tuple[bytes, list[Edit]], at: int, byte: int) -> None:
+    raw, edits = case
+    written = bytearray(apply(document(raw), edits))
+    if not written or written[at % len(written)] == byte:
+        return
+    written[at % len(written)] = byte
+    assert not undone(bytes(written), raw, edits)
+
+
+@given(st.binary(max_size=100))
+def test_no_edit_and_edits_by_the_same_text_change_nothing(raw: bytes) -> None:
+    assert apply(document(raw), []) == raw
+    half = len(raw) // 2
+    same = [Edit(Span(0, 0, half), raw[:half]), Edit(Span(0, half, len(raw)), raw[half:])]
+    assert apply(document(raw), same) == raw
+
+
+def test_a_shortened_or_lengthened_copy_is_seen() -> None:
+    edits = [Edit(Span(0, 1, 2), b"xy")]
+    assert undone(b"axyc", b"abc", edits)
+    assert not undone(b"axy", b"abc", edits)
+    assert not undone(b"axycc", b"abc", edits)
+
+
+@pytest.mark.parametrize("span", [(2, 1), (0, 4), (-1, 1)])
+def test_a_span_outside_is_an_error(span: tuple[int, int]) -> None:
+    with pytest.raises(ValueError, match="overlap or leave"):
+        apply(document(b"abc"), [Edit(Span(0, *span), b"")])
+
+
+def test_overlap_is_an_error() -> None:
+    with pytest.raises(ValueError, match="overlap"):
+        apply(document(b"abcdef"), [Edit(Span(0, 0, 3), b"x"), Edit(Span(0, 2, 4), b"y")])
+
+
+def test_insertions_at_one_place_keep_their_order_and_stand_before_a_replacement_there() -> None:
+    edits = [Edit(Span(0, 1, 2), b"B"), Edit(Span(0, 1, 1), b"1"), Edit(Span(0, 1, 1), b"2")]
+    assert apply(document(b"abc"), edits) == b"a12Bc"
+    assert [edit.text for edit in in_order(edits)] == [b"1", b"2", b"B"]
+
+
+def test_an_insertion_may_touch_the_end_of_a_replacement() -> None:
+    edits = [Edit(Span(0, 1, 1), b","), Edit(Span(0, 0, 1), b"X")]
+    assert apply(document(b"ab"), edits) == b"X,b"
+
+
+@given(st.lists(st.sampled_from([b"LIN", b"\r\n", b"\n", b"\r", b"\xff", b" "]), max_size=30))
+def test_places_count_lines_and_columns_from_one(words: list[bytes]) -> None:
+    raw = b"".join(words)
+    doc = document(raw)
+    for offset in range(len(raw)):
+        line, column = doc.place(offset)
+        assert line == raw[:offset].count(b"\n") + 1
+        assert column == offset - (raw[:offset].rfind(b"\n") + 1) + 1
+    lines = [doc.line(i + 1) for i in range(len(doc.line_starts))]
+    assert lines == [part.rstrip(b"\r") for part in raw.split(b"\n")]
+
+
+@pytest.mark.parametrize(
+    ("raw", "newline"),
+    [(b"a\r\nb", b"\r\n"), (b"a\nb\r\n", b"\n"), (b"a", b"\n"), (b"", b"\n"), (b"\n", b"\n")],
+)
+def test_the_line_ending_is_that_of_the_first_line(raw: bytes, newline: bytes) -> None:
+    assert document(raw).newline == newline
+
+
+def test_the_digest_is_that_of_the_bytes() -> None:
+    assert document(b"").digest == "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855"

@@ -1,0 +1,448 @@
+"""What the reader makes of KRL: cases beside their dumps, and laws over variants of them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from postproc.dialects import detect
+from postproc.dialects.dialect import Program
+from postproc.dialects.krl import KrlDialect, interpreter
+from postproc.dialects.krl.lexing import number
+from postproc.document import Document
+from postproc.findings import CODES, Refusal
+from postproc.toolpath import Kind
+from postproc.units import DEG, MM
+
+KRL = KrlDialect()
+CASES = Path(__file__).parent / "programs" / "krl"
+GOOD = sorted(CASES.glob("*.src"))
+BAD = sorted((CASES / "bad").glob("*.src"))
+FRAMES = "BAS(#BASE,1)\nBAS(#TOOL,1)\n"
+FULL = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+
+
+def documents(path: Path) -> tuple[Document, ...]:
+    return tuple(Document(p, p.read_bytes()) for p in (path, *KRL.companions(path)))
+
+
+def read(text: str | bytes, data: str = "") -> Program:
+    raw = text if isinstance(text, bytes) else text.encode("latin-1")
+    docs = [Document(Path("part.src"), raw)]
+    if data:
+        docs.append(Document(Path("part.dat"), f"DEFDAT part\n{data}ENDDAT\n".encode()))
+    return KRL.read(tuple(docs))
+
+
+def body(text: str, data: str = "") -> Program:
+    """A program with base and tool set and this text in its DEF."""
+    return read(f"DEF part()\n{FRAMES}{text}END\n", data)
+
+
+def codes(program: Program) -> dict[int, str]:
+    return {row: finding.code for row, finding in program.toolpath.refused.items()}
+
+
+def told(program: Program) -> list[str]:
+    return [finding.code for finding in program.findings]
+
+
+@pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
+def test_a_case_reads_as_its_dump(path: Path) -> None:
+    assert (
+        list(KRL.read(documents(path)).toolpath.dump()) == path.with_suffix(".dump").read_text().splitlines()
+    )
+
+
+@pytest.mark.parametrize("path", BAD, ids=lambda path: path.stem)
+def test_a_bad_case_gives_the_codes_of_its_first_line(path: Path) -> None:
+    program = KRL.read(documents(path))
+    expected = path.read_text().splitlines()[0].removeprefix("; ").split()
+    assert sorted({finding.code for finding in program.findings}) == expected
+    for finding in program.findings:
+        assert finding.file == path.name
+        assert finding.line > 0
+        assert finding.help or CODES[finding.code].explanation
+
+
+def test_every_code_has_a_case() -> None:
+    shown = {code for path in BAD for code in path.read_text().splitlines()[0].removeprefix("; ").split()}
+    assert {code for code in CODES if code.startswith("KRL")} <= shown
+
+
+VARIANTS = {
+    "crlf": lambda raw: raw.replace(b"\n", b"\r\n"),
+    "bom": lambda raw: b"\xef\xbb\xbf" + raw,
+    "no final newline": lambda raw: raw.rstrip(b"\n"),
+    "tabs": lambda raw: raw.replace(b" ", b"\t"),
+    "wide": lambda raw: raw.replace(b",", b"  ,  ").replace(b"{", b"{ ").replace(b"=", b" = "),
+    "indented": lambda raw: raw.replace(b"\n", b"\n   "),
+    "lower": bytes.lower,
+    "upper": bytes.upper,
+    "latin-1": lambda raw: raw.replace(b"\n", b" ; gr\xf6\xdfer \xb5m\n"),
+    "blank ends": lambda raw: raw.replace(b"\n", b" \t\n"),
+}
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
+def test_spelling_does_not_change_what_is_read(path: Path, variant: str) -> None:
+    if variant == "wide" and path.stem == "flow":
+        pytest.skip("blanks inside of == are another statement")
+    change = VARIANTS[variant]
+    plain = documents(path)
+    varied = tuple(Document(d.path, change(d.raw)) for d in plain)
+    assert list(KRL.read(varied).toolpath.dump()) == list(KRL.read(plain).toolpath.dump())
+
+
+@pytest.mark.parametrize("path", [*GOOD, *BAD], ids=lambda path: path.stem)
+def test_the_quick_way_and_the_general_way_are_one(path: Path) -> None:
+    same(documents(path))
+
+
+def same(docs: tuple[Document, ...]) -> None:
+    quick, general = interpreter.read(docs, fast=True), interpreter.read(docs, fast=False)
+    assert list(quick.toolpath.dump()) == list(general.toolpath.dump())
+    for name in ("position", "rotation", "axes", "feed", "base", "tool", "status", "turn", "line"):
+        np.testing.assert_array_equal(getattr(quick.toolpath, name), getattr(general.toolpath, name))
+    for name in ("start", "stop", "file", "insert"):
+        np.testing.assert_array_equal(getattr(quick.places, name), getattr(general.places, name))
+    assert quick.findings == general.findings
+    assert quick.toolpath.refused == general.toolpath.refused
+    assert quick.toolpath.pinned == general.toolpath.pinned
+
+
+COMMON = "LIN {X 1.5,Y -2.,Z +3,A 4,B 5.0,C 6,S 2,T 35,E1 0.0} C_DIS\n"
+
+
+@settings(deadline=None, max_examples=300)
+@given(
+    st.lists(st.tuples(st.integers(0, len(COMMON)), st.sampled_from(" \t,{}+-.'12AEXST;:Bb#")), max_size=3)
+)
+def test_the_two_ways_agree_on_lines_that_are_nearly_common(changes: list[tuple[int, str]]) -> None:
+    text = COMMON
+    for at, letter in changes:
+        text = text[:at] + letter + text[at:]
+    same((Document(Path("part.src"), f"DEF part()\n{FRAMES}{FULL}{text}END\n".encode()),))
+
+
+@settings(deadline=None, max_examples=150)
+@given(st.binary(max_size=300))
+def test_any_bytes_are_read_without_a_crash(raw: bytes) -> None:
+    program = KRL.read((Document(Path("part.src"), raw), Document(Path("part.dat"), raw[::-1])))
+    assert len(program.places.file) == len(program.toolpath)
+
+
+@settings(deadline=None, max_examples=150)
+@given(
+    st.sampled_from([*GOOD, *BAD]),
+    st.lists(
+        st.tuples(st.integers(0, 2000), st.integers(0, 60), st.binary(max_size=6)), min_size=1, max_size=6
+    ),
+    st.randoms(use_true_random=False),
+)
+def test_mutated_programs_are_read_without_a_crash(path: Path, cuts, random) -> None:  # type: ignore[no-untyped-def]
+    docs = []
+    for document in documents(path):
+        lines = document.raw.splitlines(keepends=True)
+        if random.random() < 0.5:
+            random.shuffle(lines)
+        raw = b"".join(lines)
+        for at, length, text in cuts:
+            at %= len(raw) + 1
+            raw = raw[:at] + text + raw[at + length :]
+        docs.append(Document(document.path, raw))
+    same(tuple(docs))
+
+
+@pytest.mark.parametrize(
+    ("literal", "value"),
+    [
+        (b"12", 12.0), (b"12.", 12.0), (b"-0.5", -0.5), (b"+50", 50.0), (b"- 30", -30.0), (b".5", 0.5),
+        (b"1.2E-05", 1.2e-5), (b"1e3", 1000.0), (b"'B0110'", 6.0), (b"'HfF'", 255.0), (b"'b1'", 1.0),
+        (b"safe", None), (b"-safe", None), (b"", None), (b"-", None), (b"1 2", None), (b"1e999", None),
+        (b"'B2'", None), (b"ROW*100", None), (b"1_0", None), (b"nan", None), (b"--1", None),
+    ],
+)  # fmt: skip
+def test_numbers(literal: bytes, value: float | None) -> None:
+    assert number(literal) == value
+
+
+def test_units_and_the_order_of_the_angles() -> None:
+    path = body("LIN {X 1000,Y 0,Z -2.5,A 90,B 0,C 90}\n").toolpath
+    np.testing.assert_allclose(path.position[0], [1.0, 0.0, -0.0025])
+    # Rz(90) Ry(0) Rx(90): tool x along y, tool y along z, tool z along x.
+    np.testing.assert_allclose(path.rotation[0], [[0, 0, 1], [1, 0, 0], [0, 1, 0]], atol=1e-15)
+
+
+def test_an_axis_motion_is_in_radians_and_has_no_position() -> None:
+    path = body("PTP {A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}\n").toolpath
+    assert path.kind[0] == Kind.AXIS
+    np.testing.assert_allclose(path.axes[0], np.array([0, -90, 90, 0, 45, 0]) * DEG)
+    assert np.isnan(path.position[0]).all()
+    assert not path.refused
+
+
+def test_places_are_those_of_the_literals() -> None:
+    program = body("LIN {C 6,Z - 30,A 4,X 'B11',B 5,Y 1.2E-05,E1 7}\n")
+    raw, places = program.documents[0].raw, program.places
+    found = [raw[a:b] for a, b in zip(places.start[0], places.stop[0], strict=True)]
+    assert found == [b"'B11'", b"1.2E-05", b"- 30", b"4", b"5", b"6"]
+    assert raw[places.insert[0] :].startswith(b",E1 7}")
+
+
+def test_points_of_the_dat_have_their_places_there() -> None:
+    program = body("LIN XP1\n", "DECL E6POS XP1={X 1,Y 2,Z 3,A 4,B 5,C 6,S 2,T 35}\n")
+    assert program.places.file[0] == 1
+    assert program.documents[1].raw[program.places.start[0, 2] : program.places.stop[0, 2]] == b"3"
+    assert program.toolpath.status[0] == 2
+    assert not program.findings
+
+
+def test_missing_components_come_from_the_point_before() -> None:
+    path = body(FULL + "LIN {Y 20}\nLIN {C 60,S 1}\n").toolpath
+    np.testing.assert_allclose(path.position / MM, [[1, 2, 3], [1, 20, 3], [1, 20, 3]])
+    assert not path.refused
+
+
+@pytest.mark.parametrize(
+    ("between", "code"),
+    [
+        ("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\n", "KRL004"),
+        ("LIN_REL {X 5}\n", "KRL004"),
+        ("LIN unknown\n", "KRL004"),
+        ("CIRC {X 1,Y 1,Z 1},{X 2,Y 2,Z 2,A 0,B 0,C 0},CA 90\n", "KRL004"),
+        ("OTHER_PROGRAM()\n", "KRL004"),
+        ("IF $IN[1] THEN\nLIN {X 5}\nENDIF\n", "KRL004"),
+        ("BAS(#BASE,2)\n", "KRL017"),
+        ("$TOOL.X=5\n", "KRL004 or KRL005"),
+    ],
+)
+def test_a_partial_point_without_a_known_point_before_is_refused(between: str, code: str) -> None:
+    program = body(FULL + between + "LIN {Y 20}\n")
+    last = len(program.toolpath) - 1
+    assert codes(program)[last] in ("KRL017", "KRL005") if " or " in code else codes(program)[last] == code
+    assert 0 in program.toolpath.pinned or last > 1
+
+
+@pytest.mark.parametrize(
+    "between",
+    [
+        "PTP $AXIS_ACT\n",
+        "LIN $POS_ACT\n",
+        "BAS(#BASE,1)\n",
+        "USERSPOT(#INIT)\n",
+        "IF $IN[1] THEN\nHALT\nENDIF\n",
+    ]
+    + ["WAIT SEC 0.5\n", "$OUT[1]=TRUE\n", ";LIN {X 9}\n", "GOTO away\naway_not:\n", "$VEL.CP=0.1\n"]
+    + ["CIRC {X 1,Y 1,Z 1},{X 1,Y 2,Z 3,A 4,B 5,C 6}\n"],
+)
+def test_what_does_not_move_the_robot_leaves_the_point_known(between: str) -> None:
+    program = body(FULL + between + "LIN {Y 20}\n")
+    last = len(program.toolpath) - 1
+    assert last not in program.toolpath.refused
+    np.testing.assert_allclose(program.toolpath.position[last] / MM, [1, 20, 3])
+
+
+@pytest.mark.parametrize(
+    ("later", "pinned"),
+    [
+        ("LIN_REL {Z 100}\n", [1]),
+        ("LIN {X 1,Y safe}\n", [1]),
+        ("LIN $POS_ACT:{Z 1}\n", [1]),
+        ("BAS(#TOOL,2)\nLIN {X 5}\n", [1]),
+        ("LOOP\nLIN {X 5}\nENDLOOP\n", [1]),
+        ("LOOP\nLIN_REL {X 5}\nENDLOOP\n", [1]),
+        ("GOTO on\n" + FULL + "on:\nLIN {X 5}\n", [1, 2]),
+        ("sub()\nEND\nDEF sub()\nPTP_REL {A1 5}\n", [1]),
+        ("here=$POS_ACT\n", [1]),
+        (FULL, []),
+        ("LIN unknown\n", []),
+    ],
+)
+def test_a_point_that_a_refused_motion_builds_on_is_pinned(later: str, pinned: list[int]) -> None:
+    program = body(FULL + FULL + later)
+    assert [row for row in program.toolpath.pinned if row not in program.toolpath.refused] == pinned
+
+
+@pytest.mark.parametrize(
+    ("code", "setting"),
+    [
+        ("base [4]", "$BASE = BASE_DATA[4]"),
+        ("base [4]", "bas ( #base , 4 )"),
+        ("base {0 0 0 0 0 0}", "BAS(#BASE,0)"),
+        ("base {0 0 0 0 0 0}", "$BASE=$NULLFRAME"),
+        ("base {0 0 0 0 0 0}", "BAS(#INITMOV,0)"),
+        ("base {7 0 0 0 0 90}", "$BASE={X 7,Y 0,Z 0,A 0,B 0,C 90}"),
+        ("base {7 0 9 0 0 90}", "$BASE={X 7,Y 0,Z 0,A 0,B 0,C 90}\n$BASE.Z=9"),
+        ("base {7 0 0 0 0 0}", "BASE_DATA[4]={X 7,Y 0,Z 0,A 0,B 0,C 0}\n$BASE=BASE_DATA[4]"),
+        ("base {7 0 8 0 0 0}", "BASE_DATA[4]={X 7,Y 0,Z 0,A 0,B 0,C 0}\nBASE_DATA[4].Z=8\nBAS(#BASE,4)"),
+        ("base {7 0 0 0 0 0}", "DECL FRAME F\nF={X 7,Y 0,Z 0,A 0,B 0,C 0}\n$BASE=F"),
+        ("base [5]", "FDAT_ACT={TOOL_NO 1,BASE_NO 5,IPO_FRAME #BASE}\nBAS(#FRAMES)"),
+        ("base ?", "$BASE={X 7}"),
+        ("base ?", "$BASE=F:{X 1,Y 0,Z 0,A 0,B 0,C 0}"),
+        ("base ?", "BAS(#BASE,n)"),
+        ("base ?", "BASE_DATA[4]=F\nBAS(#BASE,4)"),
+        ("base ?", "$BASE.X=5"),
+        ("base ?", "BAS(#EX_BASE,1)"),
+        ("base ?", "IF $IN[1] THEN\n$BASE=BASE_DATA[2]\nENDIF"),
+        ("base ?", "FDAT_ACT=FP7\nBAS(#FRAMES)"),
+    ],
+)
+def test_bases(code: str, setting: str) -> None:
+    program = body(setting + "\n" + FULL)
+    assert f" {code} tool" in list(program.toolpath.dump())[0]
+    assert (0 in program.toolpath.refused) == code.endswith("?")
+
+
+def test_a_base_number_that_the_program_sets_keeps_its_number() -> None:
+    frames = body("BASE_DATA[4]={X 7,Y 0,Z 0,A 0,B 0,C 0}\nBAS(#BASE,4)\n" + FULL).toolpath.frames
+    assert [frame.number for frame in frames] == [4, 1]
+    assert frames[0].pose is not None
+    np.testing.assert_allclose(frames[0].pose.position, [0.007, 0, 0])
+
+
+def test_equal_frames_are_one_and_unused_ones_are_none() -> None:
+    program = body("BAS(#BASE,9)\n" + 2 * ("BAS(#BASE,1)\n" + FULL + "$BASE=$WORLD\n" + FULL))
+    assert [frame.number for frame in program.toolpath.frames] == [1, 0] or len(program.toolpath.frames) == 3
+    assert len({program.toolpath.base[0], program.toolpath.base[2]}) == 1
+
+
+@pytest.mark.parametrize(
+    ("setting", "feed"),
+    [
+        ("$VEL.CP=0.25\n", 0.25), ("$VEL={CP 0.5,ORI1 200}\n", 0.5), ("BAS(#VEL_CP,0.3)\n", 0.3),
+        ("$VEL.CP=fast\n", None), ("$VEL.ORI1=3\n", None), ("BAS(#INITMOV,0)\n", None),
+        ("$VEL.CP=0.25\n$VEL.ORI1=3\n", 0.25), ("$VEL.CP=0.2\nIF x THEN\n$VEL.CP=0.1\nENDIF\n", None),
+    ],
+)  # fmt: skip
+def test_feed(setting: str, feed: float | None) -> None:
+    program = body(setting + FULL)
+    np.testing.assert_equal(program.toolpath.feed[0], np.nan if feed is None else feed)
+
+
+POINTS = "DECL E6POS XP1={X 1,Y 2,Z 3,A 4,B 5,C 6}\nDECL E6POS XP2={X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "data"),
+    [
+        ("LIN XP1\nLIN XP1\n", POINTS),
+        ("LIN XP1\nCIRC XP1,XP2\n", POINTS),
+        ("LIN XP1\nother(XP1)\n", POINTS),
+        ("LIN XP1\nIF XP1.X>5 THEN\nENDIF\n", POINTS),
+        ("LIN XP1\nTRIGGER WHEN DISTANCE=0 DELAY=0 DO log(XP1)\n", POINTS),
+        ("LIN XP1\nEND\nDEF sub()\nLIN XP1\n", POINTS),
+        ("LIN XP1\nXP1={X 1,Y 1,Z 1,A 0,B 0,C 0}\n", POINTS),
+        ("LIN XP1\n", POINTS.replace("DECL", "DECL GLOBAL")),
+        ("P={X 1,Y 2,Z 3,A 4,B 5,C 6}\nLIN P\nWHILE x\nP={X 1,Y 2,Z 3,A 4,B 5,C 6}\nENDWHILE\nLIN P\n", ""),
+        ("P={X 1,Y 2,Z 3,A 4,B 5,C 6}\nLIN P\nP.S=2\nLIN P\n", ""),
+        ("P={X 1,Y 2,Z 3,A 4,B 5,C 6}\nP.Z=4\nLIN P\n", ""),
+    ],
+)
+def test_a_point_that_serves_several_places_is_refused_with_its_target_known(text: str, data: str) -> None:
+    program = body(text, data)
+    assert codes(program)[0] == "KRL007"
+    assert np.isfinite(program.toolpath.position[0]).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "data"),
+    [
+        ("LIN XP1 C_DIS\nLIN XP2\n", POINTS),
+        ('; XP1\nmsg="XP1"\n$H_POS=XP1\nLIN XP1\n', POINTS),
+        ("DECL FRAME P\n" + 3 * "P={X 1,Y 2,Z 3,A 4,B 5,C 6}\nP.E1=0\nLIN P C_DIS\n", ""),
+        ("P[1]={X 1,Y 2,Z 3,A 4,B 5,C 6}\nP[2]={X 1,Y 2,Z 3,A 4,B 5,C 6}\nLIN P[1]\nLIN P[ 2 ]\n", ""),
+        ("PTP XHOME\nPTP XHOME\n", "DECL E6AXIS XHOME={A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}\n"),
+    ],
+)
+def test_a_point_of_one_motion_alone_is_not_refused(text: str, data: str) -> None:
+    assert not body(text, data).toolpath.refused
+
+
+def test_motions_in_blocks_are_refused_with_their_target_known() -> None:
+    program = body("LOOP\nIF a THEN\n" + FULL + "ELSE\n" + FULL + "ENDIF\nENDLOOP\n" + FULL)
+    assert codes(program) == {0: "KRL006", 1: "KRL006"}
+    assert np.isfinite(program.toolpath.position).all()
+
+
+def test_what_a_loop_sets_later_is_not_known_at_its_begin() -> None:
+    program = body("LOOP\n" + FULL + "BAS(#TOOL,2)\nENDLOOP\n")
+    assert program.toolpath.tool[0] == -1
+
+
+def test_each_branch_begins_with_the_state_before_the_block() -> None:
+    text = "SWITCH a\nCASE 1\nBAS(#TOOL,2)\n" + FULL + "CASE 2\n" + FULL + "ENDSWITCH\n"
+    program = body(text)
+    assert [program.toolpath.frames[i].number for i in program.toolpath.tool] == [2, 1]
+
+
+def test_a_called_subprogram_changes_what_it_sets() -> None:
+    sub = "END\nDEF inner()\nBAS(#TOOL,3)\nEND\nDEF outer()\ninner()\n"
+    program = body("outer()\n" + FULL + sub)
+    assert codes(program) == {0: "KRL005"}
+    assert body("outer()\n" + FULL + sub.replace("BAS(#TOOL,3)", "$OUT[1]=TRUE")).toolpath.refused == {}
+
+
+def test_an_unread_routine_is_told_once() -> None:
+    program = body("A_TOOL(1)\n" + FULL + "a_tool (2)\nBAS(#VEL_PTP,5)\nH50(GRP,1,1,GAbrir)\nSR_END()\n")
+    assert told(program) == ["KRL010"]
+
+
+def test_equal_refusals_are_told_once_and_stand_at_every_row() -> None:
+    program = body("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\n" + 200 * "LIN {X 1,Y 2,Z 3}\n")
+    assert len(program.toolpath.refused) == 200
+    assert told(program) == ["KRL004"]
+    assert "200 motions, lines 5 to 204" in program.findings[0].message
+    assert {finding.line for finding in program.toolpath.refused.values()} == set(range(5, 205))
+
+
+def test_annotations_hold_from_their_row_on() -> None:
+    text = ";FORCE 0 0 5\n" + FULL + "; compensate  off\n"
+    text += (
+        FULL.replace("\n", " ;Force OFF \n") + ";ENFORCE\n;FORCED\n;FOLD FORCE\n" + FULL + ";FORCE 1 2 3\n"
+    )
+    annotations = body(text).toolpath.annotations
+    assert [(a.row, a.text) for a in annotations] == [
+        (0, "FORCE 0 0 5"), (1, "compensate  off"), (1, "Force OFF"), (3, "FORCE 1 2 3"),
+    ]  # fmt: skip
+    assert [a.line for a in annotations] == [4, 6, 7, 12]
+
+
+def test_findings_name_line_and_column_of_the_motion() -> None:
+    finding = body("   LIN_REL {Z 5}\n").findings[0]
+    assert (finding.file, finding.line, finding.column) == ("part.src", 4, 4)
+
+
+@pytest.mark.parametrize("name", ["part.src", "part.SRC", "part.txt"])
+def test_krl_is_detected(name: str) -> None:
+    assert detect(Path(name), b"DEF part ( )\nEND\n").name == "krl"
+
+
+def test_what_is_no_program_is_not_claimed() -> None:
+    for raw in (b"", b"hello\n", b"G1 X5\n", b"N10 DEF REAL X\n", b"\x00\xff"):
+        assert not KRL.claims(Path("part.txt"), raw)
+        with pytest.raises(Refusal):
+            detect(Path("part.unknown"), raw[:2] if raw.startswith(b"\x00") else b"hello\n")
+
+
+def test_the_dat_beside_is_found_in_any_case(tmp_path: Path) -> None:
+    for name in ("Part.src", "PART.DAT", "part2.dat", "Part.csv"):
+        (tmp_path / name).write_bytes(b"")
+    assert [path.name for path in KRL.companions(tmp_path / "Part.src")] == ["PART.DAT"]
+    (tmp_path / "Part.dat").write_bytes(b"")
+    assert [path.name for path in KRL.companions(tmp_path / "Part.src")] == ["Part.dat"]
+    assert KRL.companions(tmp_path / "nowhere" / "x.src") == []
+
+
+@pytest.mark.skipif("POSTPROC_PROGRAMS" not in os.environ, reason="POSTPROC_PROGRAMS names no folder")
+def test_programs_of_a_folder_read_the_same_on_both_ways() -> None:
+    paths = [p for p in Path(os.environ["POSTPROC_PROGRAMS"]).rglob("*") if p.suffix.lower() == ".src"]
+    assert paths
+    for path in paths:
+        same(documents(path))

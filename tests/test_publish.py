@@ -1,0 +1,87 @@
+"""All files or none, whole or absent."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from postproc.findings import Refusal
+from postproc.publish import publish
+
+
+def names(folder) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_writes_all_and_leaves_no_other_file(tmp_path):
+    files = {tmp_path / "new" / "a.src": b"a", tmp_path / "new" / "a.dat": b"b"}
+    publish(files, last=tmp_path / "new" / "a.src")
+    assert names(tmp_path / "new") == ["a.dat", "a.src"]
+    publish({path: content * 2 for path, content in files.items()}, last=tmp_path / "new" / "a.src")
+    assert {path.read_bytes() for path in files} == {b"aa", b"bb"}
+    assert names(tmp_path / "new") == ["a.dat", "a.src"]
+
+
+@pytest.mark.parametrize("failing", [1, 2, 3, 4])
+def test_a_failing_rename_brings_the_old_files_back(tmp_path, monkeypatch, failing):
+    files = {tmp_path / "a.src": b"old src", tmp_path / "a.dat": b"old dat"}
+    publish(files)
+    real, calls = os.replace, [0]
+
+    def replace(source, target):
+        calls[0] += 1
+        if calls[0] == failing:
+            raise OSError(28, "No space left on device")
+        real(source, target)
+
+    monkeypatch.setattr(os, "replace", replace)
+    with pytest.raises(Refusal) as refusal:
+        publish(dict.fromkeys(files, b"new"), last=tmp_path / "a.src")
+    assert refusal.value.findings[0].code == "FIL004"
+    assert {path: path.read_bytes() for path in files} == files
+    assert names(tmp_path) == ["a.dat", "a.src"]
+
+
+def test_a_name_that_is_a_folder(tmp_path):
+    (tmp_path / "a.src").mkdir()
+    with pytest.raises(Refusal):
+        publish({tmp_path / "a.dat": b"1", tmp_path / "a.src": b"2"}, last=tmp_path / "a.src")
+    assert (tmp_path / "a.src").is_dir()
+    assert not (tmp_path / "a.dat").exists()
+
+
+LOOP = """
+import sys
+from pathlib import Path
+from postproc.publish import publish
+folder = Path(sys.argv[1])
+n = 0
+while True:
+    n += 1
+    text = (b"%d" % n) * 20000
+    publish({folder / "a.src": text, folder / "a.dat": text}, last=folder / "a.src")
+"""
+
+
+def test_a_killed_writer_never_leaves_half_a_file(tmp_path):
+    for round in range(12):
+        folder = tmp_path / str(round)
+        folder.mkdir()
+        writer = subprocess.Popen([sys.executable, "-c", LOOP, str(folder)])
+        deadline = time.monotonic() + 20
+        while not (folder / "a.src").exists() and time.monotonic() < deadline:
+            time.sleep(0.002)
+        time.sleep(0.0013 * round)
+        writer.send_signal(signal.SIGKILL)
+        writer.wait()
+        program, data = folder / "a.src", folder / "a.dat"
+        if program.exists():
+            text = program.read_bytes()
+            assert data.read_bytes() == text
+            number = text[: len(text) // 20000]
+            assert text == number * 20000
