@@ -92,8 +92,6 @@ VARIANTS = {
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
 def test_spelling_does_not_change_what_is_read(path: Path, variant: str) -> None:
-    if variant == "wide" and path.stem == "flow":
-        pytest.skip("blanks inside of == are another statement")
     change = VARIANTS[variant]
     plain = documents(path)
     varied = tuple(Document(d.path, change(d.raw)) for d in plain)
@@ -220,28 +218,23 @@ def test_missing_components_come_from_the_point_before() -> None:
         ("OTHER_PROGRAM()\n", "KRL004"),
         ("IF $IN[1] THEN\nLIN {X 5}\nENDIF\n", "KRL004"),
         ("BAS(#BASE,2)\n", "KRL017"),
-        ("$TOOL.X=5\n", "KRL004 or KRL005"),
+        ("$TOOL.X=5\n", "KRL017"),
     ],
 )
 def test_a_partial_point_without_a_known_point_before_is_refused(between: str, code: str) -> None:
     program = body(FULL + between + "LIN {Y 20}\n")
     last = len(program.toolpath) - 1
-    assert codes(program)[last] in ("KRL017", "KRL005") if " or " in code else codes(program)[last] == code
-    assert 0 in program.toolpath.pinned or last > 1
+    assert codes(program)[last] == code
 
 
 @pytest.mark.parametrize(
     "between",
     [
-        "PTP $AXIS_ACT\n",
-        "LIN $POS_ACT\n",
-        "BAS(#BASE,1)\n",
-        "USERSPOT(#INIT)\n",
-        "IF $IN[1] THEN\nHALT\nENDIF\n",
-    ]
-    + ["WAIT SEC 0.5\n", "$OUT[1]=TRUE\n", ";LIN {X 9}\n", "GOTO away\naway_not:\n", "$VEL.CP=0.1\n"]
-    + ["CIRC {X 1,Y 1,Z 1},{X 1,Y 2,Z 3,A 4,B 5,C 6}\n"],
-)
+        "PTP $AXIS_ACT\n", "LIN $POS_ACT\n", "BAS(#BASE,1)\n", "USERSPOT(#INIT)\n", "WAIT SEC 0.5\n",
+        "IF $IN[1] THEN\nHALT\nENDIF\n", "$OUT[1]=TRUE\n", ";LIN {X 9}\n", "GOTO away\nunused:\n",
+        "$VEL.CP=0.1\n", "CIRC {X 1,Y 1,Z 1},{X 1,Y 2,Z 3,A 4,B 5,C 6}\n",
+    ],
+)  # fmt: skip
 def test_what_does_not_move_the_robot_leaves_the_point_known(between: str) -> None:
     program = body(FULL + between + "LIN {Y 20}\n")
     last = len(program.toolpath) - 1
@@ -296,21 +289,21 @@ def test_a_point_that_a_refused_motion_builds_on_is_pinned(later: str, pinned: l
 )
 def test_bases(code: str, setting: str) -> None:
     program = body(setting + "\n" + FULL)
-    assert f" {code} tool" in list(program.toolpath.dump())[0]
+    assert f" {code} tool" in next(program.toolpath.dump())
     assert (0 in program.toolpath.refused) == code.endswith("?")
 
 
 def test_a_base_number_that_the_program_sets_keeps_its_number() -> None:
     frames = body("BASE_DATA[4]={X 7,Y 0,Z 0,A 0,B 0,C 0}\nBAS(#BASE,4)\n" + FULL).toolpath.frames
-    assert [frame.number for frame in frames] == [4, 1]
-    assert frames[0].pose is not None
-    np.testing.assert_allclose(frames[0].pose.position, [0.007, 0, 0])
+    assert [frame.number for frame in frames] == [1, 4]
+    assert frames[1].pose is not None
+    np.testing.assert_allclose(frames[1].pose.position, [0.007, 0, 0])
 
 
 def test_equal_frames_are_one_and_unused_ones_are_none() -> None:
     program = body("BAS(#BASE,9)\n" + 2 * ("BAS(#BASE,1)\n" + FULL + "$BASE=$WORLD\n" + FULL))
-    assert [frame.number for frame in program.toolpath.frames] == [1, 0] or len(program.toolpath.frames) == 3
-    assert len({program.toolpath.base[0], program.toolpath.base[2]}) == 1
+    assert [frame.number for frame in program.toolpath.frames] == [1, 0]
+    assert program.toolpath.base.tolist() == [0, 1, 0, 1]
 
 
 @pytest.mark.parametrize(
