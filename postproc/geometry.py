@@ -82,7 +82,7 @@ def abc_from_rotation(rotation: ArrayLike, near: ArrayLike | None = None) -> Flo
         return one
     two = wrapped(np.stack([a + np.pi, np.pi - b, c + np.pi], axis=-1))
     nearer = np.abs(wrapped(two - wish)).sum(-1) < np.abs(wrapped(one - wish)).sum(-1)
-    return np.where(nearer[..., None], two, one)
+    return np.where((nearer & ~locked)[..., None], two, one)
 
 
 def wrapped(angle: ArrayLike) -> Floats:

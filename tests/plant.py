@@ -65,9 +65,7 @@ class Plant:
             values = dict(term.values)
             if isinstance(term.effect, GravityCompensator):
                 assert term.effect.joint == 1
-                spring = Spring(
-                    **values, zero=term.effect.zero, balanced=term.effect.preload == "balanced"
-                )
+                spring = Spring(**values, zero=term.effect.zero, balanced=term.effect.preload == "balanced")
             else:
                 compliance = np.array([values[f"c{i}"] for i in range(1, 7)])
         return cls(model.robot.arm, compliance, spring)

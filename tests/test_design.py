@@ -94,7 +94,11 @@ def arrows(root):
 
 def offences(root):
     """What breaks the rules, in words."""
-    told = [f"{name}: the room {room_of(name)!r} has no floor" for name in modules(root) if room_of(name) not in ROOMS]
+    told = [
+        f"{name}: the room {room_of(name)!r} has no floor"
+        for name in modules(root)
+        if room_of(name) not in ROOMS
+    ]
     pairs = arrows(root)
     for name, target in pairs:
         here, there = room_of(name), room_of(target)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays as array_of
 from scipy.spatial.transform import Rotation
@@ -72,6 +72,10 @@ def test_rotation_comes_back_at_and_near_the_lock(a, c, off, end, side):
 
 
 @given(a=turns, c=turns, end=st.sampled_from([-1, 1]), wish=turns)
+@example(a=0.0, c=math.pi, end=1, wish=0.0)
+@example(a=1.0, c=1.0 - math.pi, end=1, wish=0.0)
+@example(a=-1.0, c=math.pi - 1.0, end=1, wish=-0.7)
+@example(a=0.3, c=0.3, end=-1, wish=-2.9)
 def test_at_the_lock_a_is_the_wished_one(a, c, end, wish):
     rotation = rotation_from_abc([a, end * math.pi / 2, c])
     assert abs(wrapped(abc_from_rotation(rotation, [wish, end * math.pi / 2, 0.0])[0] - wish)) < 1e-12
@@ -100,7 +104,9 @@ def test_near_takes_the_nearer_of_both_triples(rotation, wish):
     assert np.abs(wrapped(chosen - wish)).sum() == pytest.approx(distance.min(), abs=1e-9)
 
 
-@pytest.mark.parametrize("abc", [(180, 0, 0), (-180, 0, 0), (0, 0, 180), (0, 0, -180), (0, 180, 0), (180, 0, 180)])
+@pytest.mark.parametrize(
+    "abc", [(180, 0, 0), (-180, 0, 0), (0, 0, 180), (0, 0, -180), (0, 180, 0), (180, 0, 180)]
+)
 def test_half_turns(abc):
     rotation = rotation_from_abc(np.radians(abc))
     for near in (None, np.radians(abc)):
@@ -150,7 +156,9 @@ def test_rotation_vector_turns_about_itself(axis, angle):
     assert same(found @ axis, axis, 1e-14)
 
 
-@given(directions, st.one_of(st.floats(0.0, 3.0), st.sampled_from([1e-15, 1e-9, 9.9e-8, 1.1e-7, 9e-5, 1.1e-4])))
+@given(
+    directions, st.one_of(st.floats(0.0, 3.0), st.sampled_from([1e-15, 1e-9, 9.9e-8, 1.1e-7, 9e-5, 1.1e-4]))
+)
 def test_vector_comes_back(axis, angle):
     vector = axis * angle
     assert same(vector_from_rotation(rotation_from_vector(vector)), vector, 1e-15 + 1e-14 * angle)

@@ -252,6 +252,8 @@ def test_what_does_not_move_the_robot_leaves_the_point_known(between: str) -> No
         ("LOOP\nLIN {X 5}\nENDLOOP\n", [1]),
         ("LOOP\nLIN_REL {X 5}\nENDLOOP\n", [1]),
         ("GOTO on\n" + FULL + "on:\nLIN {X 5}\n", [1, 2]),
+        ("IF a THEN\n" + FULL + "ENDIF\nLIN {X 5}\n", [1]),
+        ("SWITCH a\nCASE 1\n" + FULL + "CASE 2\nLIN_REL {X 1}\nENDSWITCH\n", [1]),
         ("sub()\nEND\nDEF sub()\nPTP_REL {A1 5}\n", [1]),
         ("here=$POS_ACT\n", [1]),
         (FULL, []),
@@ -328,6 +330,7 @@ POINTS = "DECL E6POS XP1={X 1,Y 2,Z 3,A 4,B 5,C 6}\nDECL E6POS XP2={X 1,Y 2,Z 3,
         ("LIN XP1\nLIN XP1\n", POINTS),
         ("LIN XP1\nCIRC XP1,XP2\n", POINTS),
         ("LIN XP1\nother(XP1)\n", POINTS),
+        ('LIN XP1\nH50("a;b",XP1)\n', POINTS),
         ("LIN XP1\nIF XP1.X>5 THEN\nENDIF\n", POINTS),
         ("LIN XP1\nTRIGGER WHEN DISTANCE=0 DELAY=0 DO log(XP1)\n", POINTS),
         ("LIN XP1\nEND\nDEF sub()\nLIN XP1\n", POINTS),
@@ -380,6 +383,24 @@ def test_a_called_subprogram_changes_what_it_sets() -> None:
     program = body("outer()\n" + FULL + sub)
     assert codes(program) == {0: "KRL005"}
     assert body("outer()\n" + FULL + sub.replace("BAS(#TOOL,3)", "$OUT[1]=TRUE")).toolpath.refused == {}
+
+
+def test_a_routine_of_the_file_goes_before_one_of_a_package_with_its_name() -> None:
+    program = body(FULL + "H50()\nLIN {X 5}\nEND\nDEF H50()\nLIN {Z 9}\n")
+    assert codes(program)[1] == "KRL004"
+
+
+def test_lines_of_any_length_are_read_in_time() -> None:
+    blank = " " * 300_000
+    for line in (
+        f"LIN {{X {blank} 5",
+        f"P{blank}Q{blank}[",
+        f"DECL{blank}FRAME{blank}",
+        f"{blank}X" * 3,
+        '"' * 300_000,
+    ):
+        program = body(line + "\n" + FULL)
+        assert program.toolpath.line[-1] == 5
 
 
 def test_an_unread_routine_is_told_once() -> None:

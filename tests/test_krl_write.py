@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from pathlib import Path
 
 import numpy as np
@@ -147,6 +148,17 @@ def test_moved_rows_reach_their_target_and_the_others_stay(text: str, data: st.D
 @settings(deadline=None, max_examples=60)
 @given(st.sampled_from(sorted(CASES.glob("*.src"))), st.integers(0, 2**32 - 1))
 def test_cases_moved_at_random_reach_their_targets(path: Path, seed: int) -> None:
+    move_at_random(path, seed)
+
+
+@pytest.mark.skipif("POSTPROC_PROGRAMS" not in os.environ, reason="POSTPROC_PROGRAMS names no folder")
+def test_programs_of_a_folder_moved_at_random_reach_their_targets() -> None:
+    for path in Path(os.environ["POSTPROC_PROGRAMS"]).rglob("*"):
+        if path.suffix.lower() == ".src":
+            move_at_random(path, 1)
+
+
+def move_at_random(path: Path, seed: int) -> None:
     program = KRL.read(tuple(Document(p, p.read_bytes()) for p in (path, *KRL.companions(path))))
     random = np.random.default_rng(seed)
     rows = free(program) & (random.random(len(program.toolpath)) < 0.6)

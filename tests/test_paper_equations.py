@@ -83,7 +83,7 @@ def test_torque_as_printed():
 
 
 def test_size_of_the_printed_spring():
-    """With Table 1's stiffness in N/m the spring's torque reaches 347 kN m: no balancer (a heavy arm needs 10 to 15)."""
+    """With Table 1's stiffness in N/m the torque reaches 347 kN m: no balancer (a heavy arm needs 10 to 15)."""
     low, high = kr270().limits[A2]
     torque = np.abs(spring(TABLE_1, np.linspace(low, high, 2001)).torque).max()
     assert torque == pytest.approx(346.76e3, rel=1e-4)
@@ -146,7 +146,9 @@ def test_printed_sign_flips_the_increment():
     energy = 1 / model().joint_compliance(q) - bare
     printed = 1 / model(sign="as_printed").joint_compliance(q) - bare
     np.testing.assert_allclose(printed, -energy, atol=1e-6)
-    expected = [TABLE_1["K_c"] * math.hypot(0.68593, 0.12030) * 0.18472 * eta(TABLE_1, angle) for angle in q[:, A2]]
+    expected = [
+        TABLE_1["K_c"] * math.hypot(0.68593, 0.12030) * 0.18472 * eta(TABLE_1, angle) for angle in q[:, A2]
+    ]
     np.testing.assert_allclose(printed[:, A2], expected, rtol=1e-6)
     assert np.median(np.abs(expected)) > 1e5
 
@@ -238,7 +240,7 @@ def test_map_of_the_square():
 
 
 def test_linear_answer_is_close_to_the_equilibrium():
-    """At these loads eq. (5) misses the deflected balance by some tens of micrometres at most, and by more than noise."""
+    """At these loads eq. (5) misses the deflected balance by some tens of micrometres, and by more than noise."""
     q, wrench, tool, _ = square()
     robot = model()
     rest = robot.equilibrium(q, wrench, tool)

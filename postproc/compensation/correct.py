@@ -192,7 +192,10 @@ def _held(task: Task, scope: Bools, tried: Bools, findings: list[Finding]) -> di
         stop = path.refused.get(int(row)) or path.pinned.get(int(row))
         if stop is not None:
             why[int(row)] = stop
-    free = tried & path.known & ~np.isfinite(path.axes).all(axis=1) & ~_in(why, n)
+    cartesian = path.known & ~np.isfinite(path.axes).all(axis=1)
+    for row in np.flatnonzero(tried & ~cartesian):
+        why.setdefault(int(row), _at(task, int(row), "COR003", "its target is not known"))
+    free = tried & cartesian & ~_in(why, n)
     _refuse(
         task,
         free & (track.status < 0),

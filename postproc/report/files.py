@@ -127,6 +127,5 @@ def _edited(document: Document, first: int, final: int, edits: Sequence[Edit]) -
 
 
 def _lines(document: Document, first: int, final: int) -> list[bytes]:
-    starts = document.line_starts
-    ends = [*starts[1:], len(document.raw)]
-    return [document.raw[starts[i] : ends[i]] for i in range(first - 1, final)]
+    bounds = [*document.line_starts[first - 1 : final + 1], len(document.raw)]
+    return [document.raw[bounds[i] : bounds[i + 1]] for i in range(final - first + 1)]

@@ -33,7 +33,7 @@ from postproc.toolpath import Annotation
 
 _ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 _WITH = re.compile(rb"\bWITH\b", re.I)
-_MARKER = re.compile(rb"^[ \t]*;COMPENSATED [^\r\n]*", re.I | re.M)
+_MARKER = re.compile(rb"^(?:\xef\xbb\xbf)?([ \t]*;COMPENSATED [^\r\n]*)", re.M)
 _MOTION = Statement("motion", b"", b"", 0, 0)
 
 Line = Statement | tuple[int, int, int]
@@ -68,7 +68,7 @@ def read(documents: tuple[Document, ...], fast: bool = True) -> Program:
         toolpath=toolpath,
         places=places,
         findings=tuple(findings),
-        marker=Span(0, *marker.span()) if marker else None,
+        marker=Span(0, *marker.span(1)) if marker else None,
         marker_at=_marker_at(source, found),
         names=tuple(_names(documents)),
     )
@@ -166,14 +166,14 @@ def _call(run: Run, item: Statement, said: Call) -> None:
         return
     words = identifiers(said.arguments)
     run.mentioned |= words
-    if is_harmless(said.name):
-        return
     shown = said.name.decode("latin-1")
     why = f"after the call of {shown} in line {item.line}"
     routine = run.survey.routines.get(said.name)
     if routine is not None:
         run.rows.sources[b"routine %d" % routine.line] |= run.state.sources
         run.forget(routine.effects | words, why)
+        return
+    if is_harmless(said.name):
         return
     run.forget({"point", *words}, why)
     if said.name.startswith(PATH_FROM_FILE):

@@ -15,6 +15,9 @@ from postproc.document import Document
 BOM = b"\xef\xbb\xbf"
 NAME = rb"[A-Za-z_$][A-Za-z0-9_$]*"
 
+LONGEST = 8192
+"""Bytes of code in a line; controllers write lines of 1300.  What is longer is no KRL and is not taken apart."""
+
 MOTIONS = frozenset(
     b"PTP LIN CIRC SPTP SLIN SCIRC SPL PTP_REL LIN_REL CIRC_REL SPTP_REL SLIN_REL SCIRC_REL SPL_REL".split()
 )
@@ -164,6 +167,8 @@ def _kind(word: bytes, code: bytes, at: int) -> tuple[str, Assignment | Call | D
     if word in MOTIONS:
         # A variable may bear such a name only where no motion can stand.
         return "motion", None
+    if len(code) > LONGEST:
+        return "other", None
     if word in OPENS:
         return "open", None
     if word in CLOSES:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from postproc.dialects.krl.lexing import LOOPS, NAME, SPLINES, Statement, identifiers, keyed
+from postproc.dialects.krl.lexing import LONGEST, LOOPS, NAME, SPLINES, Statement, identifiers, keyed
 from postproc.dialects.krl.rows import Reason, refusal
 from postproc.dialects.krl.run import Run
 from postproc.dialects.krl.state import Numbers, Point, State
@@ -36,6 +36,9 @@ class Operand:
 
 def move(run: Run, statement: Statement) -> None:
     """Takes up a motion statement."""
+    if len(statement.code) > LONGEST:
+        unknown_motion(run, statement)
+        return
     word = statement.word
     text = statement.code[len(word) :]
     at = statement.at + len(word)

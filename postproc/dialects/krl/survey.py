@@ -32,11 +32,10 @@ READS_POSITION = re.compile(rb"\$(?:POS|AXIS)_(?:ACT|FOR|BACK|INT|RET)", re.I)
 
 HARMLESS = frozenset(
     b"USERSPOT USER_GRP H50 H70 A10 A20 A10_INI DELMENS IR_STOPM P00 PULSE CWRITE CREAD SREAD SWRITE COPEN CCLOSE "
-    b"CAST_TO CAST_FROM VARSTATE MBX_REC MSGNOTIFY MSGQUIT MSGDIALOG MSGLOOP CLEAR_TIMER EB_TEST LDAT_CHECK "
-    b"ON_ERROR_PROCEED ERR_RAISE ERR_CLEAR SET_CD_PARAMS KRLMSG TM_CONTROL IR_RESUME GRIPPER BGRIPPER "
-    b"STRCLEAR STRCOPY STRADD CONFIRM LOAD_CHECK SPS_INI".split()
+    b"CAST_TO CAST_FROM VARSTATE MBX_REC MSGNOTIFY MSGQUIT MSGDIALOG MSGLOOP ON_ERROR_PROCEED ERR_RAISE ERR_CLEAR "
+    b"STRCLEAR STRCOPY STRADD CONFIRM".split()
 )
-HARMLESS_BEGIN = (b"SR_", b"STR", b"MSG", b"MESS", b"EKI_", b"ETH")
+HARMLESS_BEGIN = (b"SR_", b"EKI_")
 PATH_FROM_FILE = (b"CR_PROCESS",)
 
 HIDDEN = re.compile(rb"(?<![#$\w])(?:PTP|LIN|CIRC)\b", re.I)
@@ -213,9 +212,8 @@ def effects_of(statement: Statement) -> tuple[Effects, bytes]:
         if said.name == b"BAS":
             command = bas(said.arguments)
             return set(_BAS_EFFECTS.get(command[0], set())) if command else {"base", "tool", "feed"}, b""
-        if is_harmless(said.name):
-            return set(), b""
-        return set(identifiers(said.arguments)), said.name
+        words: Effects = set() if is_harmless(said.name) else set(identifiers(said.arguments))
+        return words, said.name
     return ({"point"} if statement.kind == "other" and HIDDEN.search(statement.code) else set()), b""
 
 
@@ -228,7 +226,10 @@ def _settle(result: Survey, blocks: list[Block]) -> None:
             before = len(block.effects)
             for name in block.calls:
                 routine = result.routines.get(name)
-                block.effects |= routine.effects if routine else {"point"}
+                if routine is not None:
+                    block.effects |= routine.effects
+                elif not is_harmless(name):
+                    block.effects.add("point")
             changed = changed or len(block.effects) != before
 
 

@@ -1,0 +1,40 @@
+"""Hand-made motions for tests: a Toolpath from TCP poses, without a program's text."""
+
+import numpy as np
+
+from postproc.geometry import Poses
+from postproc.toolpath import FrameRef, Kind, Toolpath
+
+
+def milling_angles(count, rng):
+    """(N, 6) [rad] where a heavy arm mills: in front of itself, well inside of the limits, away from singularities."""
+    centre = np.radians([0.0, -55.0, 80.0, 0.0, 60.0, 0.0])
+    spread = np.radians([60.0, 25.0, 30.0, 80.0, 30.0, 150.0])
+    return centre + spread * rng.uniform(-1.0, 1.0, (count, 6))
+
+
+def motions(target: Poses, kind=Kind.LIN, axes=None, status=-1, turn=-1, **more) -> Toolpath:
+    """One motion per pose of ``target`` (N), base and tool known; line 10 is the first.
+
+    ``axes``: row -> (6,) [rad]; those rows become AXIS motions.  ``status``, ``turn``, ``kind``: for all, or (N,).
+    """
+    n = len(target)
+    kinds, joint = np.broadcast_to(kind, n).copy(), np.full((n, 6), np.nan)
+    position, rotation = target.position.copy(), target.rotation.copy()
+    for row, angles in (axes or {}).items():
+        kinds[row], joint[row], position[row], rotation[row] = Kind.AXIS, angles, np.nan, np.nan
+    world = Poses.identity()
+    return Toolpath(
+        kind=kinds,
+        position=position,
+        rotation=rotation,
+        axes=joint,
+        feed=np.full(n, 0.05),
+        base=np.zeros(n),
+        tool=np.ones(n),
+        status=np.broadcast_to(status, n),
+        turn=np.broadcast_to(turn, n),
+        line=np.arange(10, 10 + n),
+        frames=(FrameRef(1, world), FrameRef(1, world)),
+        **more,
+    )
