@@ -176,7 +176,7 @@ def frames_of(cell: Cell, toolpath: Toolpath, file: str | Path) -> Frames:
     """
     tools = {number: tool.pose for number, tool in cell.tools.items()}
     robot_from_world = cell.robot_base.inverse()
-    known = toolpath.known
+    known = toolpath.known | ((toolpath.anchor >= 0) & (toolpath.base >= 0) & (toolpath.tool >= 0))
     missing = _missing(cell, toolpath, toolpath.base[known], cell.bases, "base", str(file))
     missing += _missing(cell, toolpath, toolpath.tool[known], tools, "tool", str(file))
     if missing:

@@ -7,14 +7,14 @@ neither knows of the other.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, frozen
 from postproc.findings import Finding
-from postproc.geometry import Poses, abc_from_rotation
+from postproc.geometry import Poses, abc_from_rotation, rotation_from_abc
 from postproc.units import DEG, MM
 
 
@@ -60,6 +60,9 @@ class Toolpath:
     NaN if unknown; base, tool (N,) index into ``frames``, -1 where unknown; status, turn (N,) KUKA's S and T
     as stated with the motion, -1 where not; line (N,) from 1.
 
+    ``anchor`` (N,): the AXIS row whose end point gives the components that a partial target leaves out, -1 where
+    none; ``given`` (N, 6) [m, rad] X, Y, Z, A, B, C of such a target, NaN where left out.  ``completed`` fills them in.
+
     ``refused``: row -> why that motion can not be corrected by an edit of its own (its target is not known, its
     text serves another motion too, ...).  ``pinned``: rows whose end point a later, refused motion builds on:
     moving them would move that one, so they can not be corrected either.
@@ -79,13 +82,18 @@ class Toolpath:
     refused: Mapping[int, Finding] = field(default_factory=dict)
     pinned: Mapping[int, Finding] = field(default_factory=dict)
     annotations: tuple[Annotation, ...] = ()
+    anchor: Ints = field(default_factory=lambda: np.empty(0, np.int64))
+    given: Floats = field(default_factory=lambda: np.empty((0, 6)))
 
     def __post_init__(self) -> None:
         n = len(self.kind)
-        shapes = {"position": (n, 3), "rotation": (n, 3, 3), "axes": (n, 6), "feed": (n,)}
+        if not len(self.anchor):
+            object.__setattr__(self, "anchor", np.full(n, -1))
+            object.__setattr__(self, "given", np.full((n, 6), np.nan))
+        shapes = {"position": (n, 3), "rotation": (n, 3, 3), "axes": (n, 6), "feed": (n,), "given": (n, 6)}
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(getattr(self, name), shape))
-        for name in ("kind", "base", "tool", "status", "turn", "line"):
+        for name in ("kind", "base", "tool", "status", "turn", "line", "anchor"):
             object.__setattr__(self, name, frozen(getattr(self, name), (n,), np.int64))
 
     def __len__(self) -> int:
@@ -100,6 +108,18 @@ class Toolpath:
     def target_in_base(self) -> Poses:
         return Poses(self.rotation, self.position)
 
+    def completed(self, reached: Poses) -> Toolpath:
+        """The toolpath with its anchored targets known; ``reached`` (N): where the AXIS motion of ``anchor`` brings
+        the TCP, in the base and with the tool of the row itself."""
+        rows = np.flatnonzero(self.anchor >= 0)
+        if not len(rows):
+            return self
+        there = np.concatenate([reached.position[rows], abc_from_rotation(reached.rotation[rows])], axis=1)
+        values = np.where(np.isnan(self.given[rows]), there, self.given[rows])
+        position, rotation = self.position.copy(), self.rotation.copy()
+        position[rows], rotation[rows] = values[:, :3], rotation_from_abc(values[:, 3:])
+        return replace(self, position=position, rotation=rotation)
+
     def dump(self) -> Iterator[str]:
         """The canonical list, one line a motion: line, kind, target (mm, deg), base, tool, feed, or the refusal."""
         abc = abc_from_rotation(np.nan_to_num(self.rotation)) / DEG
@@ -108,6 +128,12 @@ class Toolpath:
             words = [f"{self.line[row]}", kind.name]
             if np.isfinite(self.axes[row, 0]):
                 words += [f"A{i + 1} {_number(a / DEG)}" for i, a in enumerate(self.axes[row])]
+            elif self.anchor[row] >= 0:
+                words += [
+                    f"{k} {'?' if np.isnan(v) else _number(v / unit)}"
+                    for k, v, unit in zip("XYZABC", self.given[row], [MM] * 3 + [DEG] * 3, strict=True)
+                ]
+                words.append(f"from line {self.line[self.anchor[row]]}")
             elif np.isfinite(self.position[row, 0]):
                 words += [f"{k} {_number(v / MM)}" for k, v in zip("XYZ", self.position[row], strict=True)]
                 words += [f"{k} {_number(v)}" for k, v in zip("ABC", abc[row], strict=True)]

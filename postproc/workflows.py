@@ -28,7 +28,8 @@ from postproc.report.checked import Checked
 from postproc.report.files import corrections_csv, unified_diff
 from postproc.report.report import Report, Spread, Worst, exit_code, in_order_of_place
 from postproc.robot.description import Robot, find_robot, load_robot, robot_files
-from postproc.robot.track import follow
+from postproc.robot.track import follow, nominal_flange
+from postproc.toolpath import Toolpath
 from postproc.units import DEG, MM
 from postproc.writing import write
 
@@ -88,7 +89,7 @@ def _document(path: Path) -> Document:
 
 def prepare(request: Request) -> Prepared:
     """Read program, cell and robot, and find force and axes of every motion."""
-    dialect, program = read_program(request.program)
+    dialect, read = read_program(request.program)
     cell = _cell(request)
     beside = None if request.robot else cell.path.parent
     robot = load_robot(find_robot(cell.robot, beside))
@@ -101,7 +102,8 @@ def prepare(request: Request) -> Prepared:
         own.append("weight")
     model = full.without(families=own)
 
-    path = program.toolpath
+    path = completed(read.toolpath, cell, robot, request.program)
+    program = replace(read, toolpath=path)
     if not len(path) and not is_no_force(request.force):
         raise Refusal(
             Finding("FIL009", f"no motion was found (read as {dialect.name})", str(request.program)),
@@ -114,7 +116,7 @@ def prepare(request: Request) -> Prepared:
     wanted = base @ path.target_in_base
     track = follow(robot, path, wanted @ tool.inverse(), cell.start)
     task = Task(
-        file=request.program.name,
+        file=str(request.program),
         toolpath=path,
         model=model,
         track=track,
@@ -130,7 +132,7 @@ def prepare(request: Request) -> Prepared:
     )
     findings = [*program.findings, *force.findings, *model.doubts()]
     findings += [
-        Finding("KIN007", "the stated T is not that of this pose", request.program.name, int(path.line[row]))
+        Finding("KIN007", "the stated T is not that of this pose", str(request.program), int(path.line[row]))
         for row in np.flatnonzero(~track.turn_holds)
     ]
     return Prepared(program, dialect, cell, robot, model, force, task, tuple(findings))
@@ -180,6 +182,18 @@ def _missing_points(program: Program, force: Wrenches) -> None:
         )
 
 
+def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpath:
+    """The toolpath with targets that continue an axis motion filled in from where that one leads."""
+    rows = np.flatnonzero(path.anchor >= 0)
+    if not len(rows):
+        return path
+    frames = frames_of(cell, path, program)
+    axes = np.zeros((len(path), 6))
+    axes[rows] = path.axes[path.anchor[rows]]
+    flange = nominal_flange(robot, axes)
+    return path.completed(frames.base_in_robot.inverse() @ flange @ frames.tool_in_flange)
+
+
 def predict(request: Request) -> Report:
     """The deflection at every pose; files only where ``report`` names a folder for them."""
     ready = prepare(request)
@@ -217,7 +231,16 @@ def compensate(request: Request) -> Report:
         )
     result = correct(ready.task)
     target = _target(request)
-    written = write(program, ready.dialect, ready.task, result, ready.cell, ready.robot, target.stem)
+    written = write(
+        program,
+        ready.dialect,
+        ready.task,
+        result,
+        ready.cell,
+        ready.robot,
+        target.stem,
+        lambda path: completed(path, ready.cell, ready.robot, request.program),
+    )
     edits, result = written.edits, written.result
     findings = [*ready.findings, *result.findings, *_closing(request, ready, result)]
     outputs = dict(zip(_output_paths(program, target), written.contents, strict=True))
@@ -250,7 +273,7 @@ def compensate(request: Request) -> Report:
 
 def _closing(request: Request, ready: Prepared, result: Result) -> list[Finding]:
     """What is to be said of the corrected program as a whole."""
-    file, findings = request.program.name, []
+    file, findings = str(request.program), []
     corrected = result.corrected
     above = corrected & (result.after > ready.cell.tolerance)
     if request.gain < 1.0:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,10 +33,18 @@ class Written:
 
 
 def write(
-    program: Program, dialect: Dialect, task: Task, result: Result, cell: Cell, robot: Robot, stem: str
+    program: Program,
+    dialect: Dialect,
+    task: Task,
+    result: Result,
+    cell: Cell,
+    robot: Robot,
+    stem: str,
+    completed: Callable[[Toolpath], Toolpath],
 ) -> Written:
     """Turn a correction into text, under the module name ``stem``.
 
+    ``completed``: fills in what a target that was read back leaves to the axis motion before it.
     Raises Refusal FIL011 (no module name) and FIL008 (what was read back is not what was meant).
     """
     path = task.toolpath
@@ -57,7 +65,9 @@ def write(
         edits += dialect.renamed(program, stem)
     contents = _contents(program, edits)
     documents = zip(program.documents, contents, strict=True)
-    back = dialect.read(tuple(Document(document.path, raw) for document, raw in documents)).toolpath
+    back = completed(
+        dialect.read(tuple(Document(document.path, raw) for document, raw in documents)).toolpath
+    )
     _hold(path, back, planned, decimals, main.name)
     return Written(tuple(edits), contents, with_residual(task, result, task.base @ back.target_in_base))
 

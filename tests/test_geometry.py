@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays as array_of
 from scipy.spatial.transform import Rotation
@@ -37,6 +37,7 @@ def same(one, other, tolerance):
 # KUKA's A, B, C
 
 
+@settings(deadline=None)
 @given(abcs)
 def test_abc_are_turns_about_z_then_new_y_then_new_x(abc):
     """R = Rz(A) Ry(B) Rx(C)."""
@@ -51,6 +52,7 @@ def test_senses_of_abc():
     assert same(rotation_from_abc([0, 0, quarter]) @ y, z, 1e-15)
 
 
+@settings(deadline=None)
 @given(rotations)
 def test_rotation_comes_back_from_its_angles(rotation):
     abc = abc_from_rotation(rotation)
@@ -61,6 +63,7 @@ def test_rotation_comes_back_from_its_angles(rotation):
     assert same(rotation_from_abc(abc), rotation, 1e-14 if cosine > 1e-9 else 3e-9)
 
 
+@settings(deadline=None)
 @given(a=turns, c=turns, off=tiny, end=st.sampled_from([-1, 1]), side=st.sampled_from([-1, 1]))
 def test_rotation_comes_back_at_and_near_the_lock(a, c, off, end, side):
     """B = +-90 deg, exactly and near it from both sides."""
@@ -71,17 +74,17 @@ def test_rotation_comes_back_at_and_near_the_lock(a, c, off, end, side):
         assert same(rotation_from_abc(found), rotation, 1e-14 if off > 1e-9 else 3e-9)
 
 
+@settings(deadline=None)
 @given(a=turns, c=turns, end=st.sampled_from([-1, 1]), wish=turns)
-@example(a=0.0, c=math.pi, end=1, wish=0.0)
-@example(a=1.0, c=1.0 - math.pi, end=1, wish=0.0)
-@example(a=-1.0, c=math.pi - 1.0, end=1, wish=-0.7)
-@example(a=0.3, c=0.3, end=-1, wish=-2.9)
+@example(a=-1.177, c=math.pi, end=-1, wish=-1.177)
+@example(a=-0.882, c=math.pi, end=1, wish=-0.882)
 def test_at_the_lock_a_is_the_wished_one(a, c, end, wish):
     rotation = rotation_from_abc([a, end * math.pi / 2, c])
     assert abs(wrapped(abc_from_rotation(rotation, [wish, end * math.pi / 2, 0.0])[0] - wish)) < 1e-12
     assert abc_from_rotation(rotation)[0] == 0.0
 
 
+@settings(deadline=None)
 @given(abcs)
 def test_near_gives_back_the_triple_it_was(abc):
     """Also where B is beyond 90 deg, and at the lock, where A and C could be others."""
@@ -92,6 +95,7 @@ def test_near_gives_back_the_triple_it_was(abc):
         assert same(wrapped(found - abc), 0.0, tolerance)
 
 
+@settings(deadline=None)
 @given(rotations, abcs)
 def test_near_takes_the_nearer_of_both_triples(rotation, wish):
     if math.hypot(rotation[0, 0], rotation[1, 0]) < 1e-6:
@@ -132,6 +136,7 @@ def test_batch_of_angles_is_row_by_row():
 # wrapped
 
 
+@settings(deadline=None)
 @given(st.floats(-1e3, 1e3))
 def test_wrapped_is_the_same_angle_within_half_a_turn(angle):
     found = float(wrapped(angle))
@@ -149,6 +154,7 @@ def test_half_a_turn_is_positive():
 # rotation vectors
 
 
+@settings(deadline=None)
 @given(directions, st.floats(0.0, math.pi))
 def test_rotation_vector_turns_about_itself(axis, angle):
     found = rotation_from_vector(axis * angle)
@@ -156,6 +162,7 @@ def test_rotation_vector_turns_about_itself(axis, angle):
     assert same(found @ axis, axis, 1e-14)
 
 
+@settings(deadline=None)
 @given(
     directions, st.one_of(st.floats(0.0, 3.0), st.sampled_from([1e-15, 1e-9, 9.9e-8, 1.1e-7, 9e-5, 1.1e-4]))
 )
@@ -164,6 +171,7 @@ def test_vector_comes_back(axis, angle):
     assert same(vector_from_rotation(rotation_from_vector(vector)), vector, 1e-15 + 1e-14 * angle)
 
 
+@settings(deadline=None)
 @given(directions, st.one_of(st.floats(1e-7, 0.2), st.sampled_from([1e-15, 1e-12, 1e-9, 1e-8, 1e-7])))
 def test_vector_comes_back_near_half_a_turn(axis, short):
     vector = axis * (math.pi - short)
@@ -173,6 +181,7 @@ def test_vector_comes_back_near_half_a_turn(axis, short):
         assert same(back, vector, 1e-13)
 
 
+@settings(deadline=None)
 @given(directions)
 def test_half_a_turn_has_either_axis(axis):
     """R = 2 n n^T - 1, symmetric: the log has length pi and lies on the axis, with one sign or the other."""
@@ -193,6 +202,7 @@ def test_batch_of_vectors_is_row_by_row():
         assert same(back[index], vector_from_rotation(rotation[index]), 1e-15)
 
 
+@settings(deadline=None)
 @given(vectors, vectors)
 def test_skew_is_the_cross_product(v, u):
     assert same(skew(v) @ u, np.cross(v, u), 1e-15)
@@ -201,6 +211,7 @@ def test_skew_is_the_cross_product(v, u):
 # Poses
 
 
+@settings(deadline=None)
 @given(poses, poses, poses)
 def test_poses_are_a_group(a, b, c):
     for one, other in (
@@ -214,6 +225,7 @@ def test_poses_are_a_group(a, b, c):
         assert same(one.position, other.position, 1e-14)
 
 
+@settings(deadline=None)
 @given(poses, poses, vectors)
 def test_product_takes_a_point_through_both(a, b, point):
     def moved(pose, p):

@@ -16,6 +16,7 @@ from postproc.dialects.krl import KrlDialect, interpreter
 from postproc.dialects.krl.lexing import number
 from postproc.document import Document
 from postproc.findings import CODES, Refusal
+from postproc.geometry import Poses
 from postproc.toolpath import Kind
 from postproc.units import DEG, MM
 
@@ -65,7 +66,7 @@ def test_a_bad_case_gives_the_codes_of_its_first_line(path: Path) -> None:
     expected = path.read_text().splitlines()[0].removeprefix("; ").split()
     assert sorted({finding.code for finding in program.findings}) == expected
     for finding in program.findings:
-        assert finding.file == path.name
+        assert finding.file == str(path)
         assert finding.line > 0
         assert finding.help or CODES[finding.code].explanation
 
@@ -211,7 +212,8 @@ def test_missing_components_come_from_the_point_before() -> None:
 @pytest.mark.parametrize(
     ("between", "code"),
     [
-        ("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\n", "KRL004"),
+        ("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\nLIN {A 5}\n", "KRL004"),
+        ("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\n$TOOL=TOOL_DATA[2]\n", "KRL017"),
         ("LIN_REL {X 5}\n", "KRL004"),
         ("LIN unknown\n", "KRL004"),
         ("CIRC {X 1,Y 1,Z 1},{X 2,Y 2,Z 2,A 0,B 0,C 0},CA 90\n", "KRL004"),
@@ -409,11 +411,27 @@ def test_an_unread_routine_is_told_once() -> None:
 
 
 def test_equal_refusals_are_told_once_and_stand_at_every_row() -> None:
-    program = body("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\n" + 200 * "LIN {X 1,Y 2,Z 3}\n")
-    assert len(program.toolpath.refused) == 200
-    assert told(program) == ["KRL004"]
-    assert "200 motions, lines 5 to 204" in program.findings[0].message
-    assert {finding.line for finding in program.toolpath.refused.values()} == set(range(5, 205))
+    program = body("LIN_REL {X 5}\n" + 200 * "LIN {X 1,Y 2,Z 3}\n")
+    assert len(program.toolpath.refused) == 201
+    assert told(program) == ["KRL008", "KRL004"]
+    assert "200 motions, lines 5 to 204" in program.findings[1].message
+    assert {finding.line for finding in program.toolpath.refused.values()} == set(range(4, 205))
+
+
+def test_components_left_out_after_an_axis_motion_are_left_to_it() -> None:
+    program = body("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\nLIN {Z 450}\nLIN {X 1,Y 2}\nLIN {A 1,B 2,C 3}\n")
+    path = program.toolpath
+    assert not path.refused
+    assert path.anchor.tolist() == [-1, 0, 0, -1]
+    np.testing.assert_allclose(path.given[1] * 1e3, [np.nan, np.nan, 450, *[np.nan] * 3])
+    np.testing.assert_allclose(path.given[2] * 1e3, [1, 2, 450, *[np.nan] * 3])
+    assert path.known.tolist() == [False, False, False, True]
+    there = Poses.from_abc(np.tile([7.0, 8.0, 9.0], (4, 1)), np.tile([0.1, 0.2, 0.3], (4, 1)))
+    full = path.completed(there)
+    np.testing.assert_allclose(full.position[1:3], [[7, 8, 0.45], [0.001, 0.002, 0.45]])
+    np.testing.assert_allclose(full.rotation[2], there.rotation[2], atol=1e-12)
+    assert full.known.tolist() == [False, True, True, True]
+    assert "X ? Y ? Z 450 A ? B ? C ? from line 4" in list(path.dump())[1]
 
 
 def test_annotations_hold_from_their_row_on() -> None:

@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 from conftest import CELL, LINES
 
+from postproc.cell import load_cell
 from postproc.dialects.krl import KrlDialect
 from postproc.document import Document
+from postproc.robot.chain import Chain
+from postproc.robot.description import find_robot, load_robot
 
 RIGID = """\
 name: rigid
@@ -153,6 +156,33 @@ def test_another_stem_renames_the_module(compensate, job):
 def test_a_folder_as_output(compensate, job):
     compensate(job.program, "--force", "-o", f"{job.folder}/new/")
     assert (job.folder / "new" / "part.src").is_file()
+
+
+def test_a_point_that_continues_an_axis_motion(compensate, job):
+    """Components left out after a PTP in axes are those of the place where it leads."""
+    lines = [line for line in LINES if "Z 50.000,A" not in line]
+    lines[5:5] = ["LIN {Z 50.000}", ";FORCE 0 100 0", "LIN {Z 20.000}", ";FORCE OFF", "LIN {Z 60.000}"]
+    lines[10:12] = ["LIN {X 0.000,Y 0.000,Z 50.000,A 0.000,B 0.000,C 180.000}", "LIN {Z 0.000}"]
+    job.write(lines)
+    done = compensate(job.program, "--force", "--json", "-")
+    assert done.code == 0, done.err
+    assert done.json["corrected"] >= 4
+    assert done.json["error_after_mm"]["max"] <= 0.002
+    written = job.output.read_bytes().decode().splitlines()
+    assert written[6] == "LIN {Z 50.000}"
+    for component in ",X ", ",Y ", ",A ", ",B ", ",C ":
+        assert component in written[8]
+        assert component in written[10]
+    # Where the axes lead, by Pinocchio: the point behind the cut goes back there.
+    robot = load_robot(find_robot("kuka_kr270"))
+    chain = Chain(robot.joints, robot.flange)
+    flange = chain.reference_flange(np.deg2rad([[0, -90, 110, 0, 40, 0]]))
+    cell = load_cell(job.folder / "cell.yaml")
+    tcp = cell.bases[1].inverse() @ flange[0] @ cell.tools[1].pose
+    numbers = dict(word.split() for word in written[10].split("{")[1].split("}")[0].split(","))
+    assert float(numbers["X"]) == pytest.approx(tcp.position[0] * 1e3, abs=1e-3)
+    assert float(numbers["Y"]) == pytest.approx(tcp.position[1] * 1e3, abs=1e-3)
+    assert float(numbers["Z"]) == 60
 
 
 def test_the_dat_travels_along(compensate, job):

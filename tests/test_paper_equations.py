@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from plant import kr270, random_angles, random_tools, with_compensator
 
@@ -46,6 +46,7 @@ def compliance_only():
 # Eq. (1)
 
 
+@settings(deadline=None)
 @given(values=springs, angle=angles, zero=st.floats(-1.0, 1.0))
 def test_length_is_the_distance_of_the_two_points(values, angle, zero):
     """Seen along the axis of A2, x forward and z up: P0 at (-a_x, -a_y), P1 on the arm, which falls as A2 grows."""
@@ -66,6 +67,7 @@ def test_length_as_printed():
 # Eq. (2)
 
 
+@settings(deadline=None)
 @given(values=springs, angle=angles)
 def test_torque_is_the_slope_of_the_energy(values, angle):
     step = 1e-5
@@ -103,6 +105,7 @@ def eta(values, angle):
     return math.cos(alpha + angle) - values["s0"] / s * (lever + math.cos(alpha + angle))
 
 
+@settings(deadline=None)
 @given(values=springs, angle=angles)
 def test_curvature_of_the_energy_is_minus_kc_a_l_eta(values, angle):
     step = 1e-5

@@ -267,10 +267,14 @@ def test_near_singular_places(robot):
         q = clear.copy()
         q[axis] = degrees * DEG
         assert not near_singular(robot, q[None])[0]
-    q = np.array(
-        [[0.0, -math.pi / 2, math.acos(-0.35 / math.hypot(1.1, 0.055)) + math.pi / 2 - 0.05, 0, 0.8, 0]]
-    )
-    assert near_singular(robot, q)[0]  # wrist over axis 1
+    upright = math.acos(-0.35 / math.hypot(1.1, 0.055)) + math.pi / 2 - math.atan2(0.055, 1.1)
+    for off, expected in (
+        (0.0, True),
+        (0.02, True),
+        (0.04, False),
+    ):  # wrist that far (rad x 1.1 m) from axis 1
+        q = np.array([[0.0, -math.pi / 2, upright - off, 0, 0.8, 0]])
+        assert near_singular(robot, q)[0] == expected
 
 
 # follow: the axes along a program

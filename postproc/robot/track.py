@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.geometry import Poses, wrapped
+from postproc.robot.chain import Chain
 from postproc.robot.description import Robot
 from postproc.robot.inverse import inverse, status_of, turn_of
 from postproc.toolpath import Kind, Toolpath
@@ -114,6 +115,13 @@ def _settle(q: Floats, toolpath: Toolpath, start: Floats | None) -> None:
         values[:, axis] = value + 2 * np.pi * turns
     keep = rows >= 0
     q[rows[keep]] = values[keep]
+
+
+def nominal_flange(robot: Robot, q: Floats) -> Poses:
+    """Flange poses (N) that the controller computes from axis angles (N, 6) [rad]."""
+    limits = [(joint.lower, joint.upper) for joint in robot.joints]
+    joints = robot.nominal.joints([joint.name for joint in robot.joints], limits)
+    return Chain(joints, robot.nominal.flange()).flange(q)
 
 
 def sides(robot: Robot, q: Floats) -> tuple[Ints, Ints]:

@@ -196,7 +196,7 @@ def _label(run: Run, item: Statement, name: bytes) -> None:
 
 
 def _tell_structure(run: Run) -> None:
-    name = run.document.path.name
+    name = str(run.document.path)
     for line, what in run.survey.unclosed:
         run.findings.append(Finding("KRL014", what, name, line, 1, HELP["KRL014"]))
     if not run.survey.has_routine:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from postproc.dialects.krl.lexing import LONGEST, LOOPS, NAME, SPLINES, Statement, identifiers, keyed
 from postproc.dialects.krl.rows import Reason, refusal
 from postproc.dialects.krl.run import Run
-from postproc.dialects.krl.state import Numbers, Point, State
+from postproc.dialects.krl.state import Anchor, Numbers, Point, State
 from postproc.dialects.krl.survey import HERE, READS_POSITION, in_spline
-from postproc.dialects.krl.target import Six, Target, Unclear, parse
+from postproc.dialects.krl.target import Six, Target, Unclear, parse, six
 from postproc.toolpath import Kind
 
 _NAMED = re.compile(
@@ -165,6 +165,7 @@ def _enter(
     state = run.state
     values: Numbers | None = None
     axes: Numbers | None = None
+    anchor: Anchor | None = None
     if isinstance(target, Unclear):
         reason = reason or refusal(target, _subject(target, operand), _cause(target, operand))
     elif target.axes is not None:
@@ -175,8 +176,10 @@ def _enter(
             reason = reason or Reason("KRL001", "a straight line can not go to axis angles")
     else:
         values = _filled(target.values, state.point)
+        if values is None and state.point_frames == (state.base, state.tool):
+            values, anchor = _anchored(target.values, state.anchor)
     partial = isinstance(target, Target) and bool(target.missing)
-    if partial and isinstance(target, Target) and reason is None:
+    if partial and isinstance(target, Target) and reason is None and anchor is None:
         reason = _incomplete(state, target, axes if kind is Kind.AXIS else values)
     if partial and values is not None and state.point_frames != (state.base, state.tool):
         values = None
@@ -186,7 +189,7 @@ def _enter(
     if structure is not None and (reason is None or reason.code != "KRL016"):
         reason = structure
     clear = target if isinstance(target, Target) else None
-    row = run.rows.add(kind, line, at, state, values, axes, clear)
+    row = run.rows.add(kind, line, at, state, values, axes, clear, anchor)
     if reason is not None:
         run.rows.reasons[row] = reason
     relative = isinstance(target, Unclear) and target.code == "KRL008"
@@ -196,6 +199,10 @@ def _enter(
         operand.point.serve(row)
         run.rows.points[row] = (operand.name, operand.point)
     _advance(state, line, values, axes, reason)
+    if axes is not None:
+        anchor = Anchor(row)
+    if anchor is not None:
+        state.anchor, state.point_frames = anchor, (state.base, state.tool)
     state.sources = frozenset([row])
     return row
 
@@ -214,7 +221,7 @@ def _advance(
     elif axes is not None:
         state.lose_point(f"after the axis motion in line {line}")
         state.axes = axes
-    elif reason is None or reason.code != "KRL004":
+    elif reason is None or reason.code != "KRL004" or state.anchor is not None:
         state.lose_point(f"after the motion in line {line}")
 
 
@@ -232,15 +239,30 @@ def _filled(own: Six, before: Numbers | None) -> Numbers | None:
     return (u, v, w, d, e, f)
 
 
+def _anchored(own: Six, anchor: Anchor | None) -> tuple[Numbers | None, Anchor | None]:
+    """The components with those of ``anchor``: all six, or what is then still left to its axis motion.
+
+    Of A, B, C all three or none must be left: how the controller writes an orientation is its own choice.
+    """
+    if anchor is None:
+        return None, None
+    given = six([old if new is None else new for new, old in zip(own, anchor.given, strict=True)])
+    full = _filled(given, None)
+    if full is not None:
+        return full, None
+    angles = [value is None for value in given[3:]]
+    return None, Anchor(anchor.row, given) if all(angles) or not any(angles) else None
+
+
 def _incomplete(state: State, target: Target, values: Numbers | None) -> Reason | None:
     names = ", ".join(target.missing)
+    if target.axes is None and state.point_frames not in (None, (state.base, state.tool)):
+        return Reason("KRL017", f"{names} left out, and base or tool changed since the point before")
     if values is None:
         why = state.point_lost
         if target.axes is not None and not why.startswith("no motion"):
             why = "the motion before it does not give the axes"
         return Reason("KRL004", f"{names} left out, and the position is not known: {why}", why)
-    if target.axes is None and state.point_frames != (state.base, state.tool):
-        return Reason("KRL017", f"{names} left out, and base or tool changed since the point before")
     return None
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.dialects.dialect import Places
-from postproc.dialects.krl.state import Frame, Frames, Numbers, Point, Source, State
+from postproc.dialects.krl.state import Anchor, Frame, Frames, Numbers, Point, Source, State
 from postproc.dialects.krl.target import NOWHERE, Target, Unclear
 from postproc.document import Document
 from postproc.findings import Finding
@@ -70,6 +70,7 @@ class Rows:
     stop: list[tuple[int, ...]] = field(default_factory=list)
     file: list[int] = field(default_factory=list)
     insert: list[int] = field(default_factory=list)
+    anchors: dict[int, Anchor] = field(default_factory=dict)
     reasons: dict[int, Reason] = field(default_factory=dict)
     points: dict[int, tuple[bytes, Point]] = field(default_factory=dict)
     builds_on: dict[int, frozenset[Source]] = field(default_factory=dict)
@@ -89,8 +90,11 @@ class Rows:
         values: Numbers | None,
         axes: Numbers | None = None,
         target: Target | None = None,
+        anchor: Anchor | None = None,
     ) -> int:
         """Adds a motion; gives its row."""
+        if anchor is not None:
+            self.anchors[len(self.kind)] = anchor
         self.kind.append(kind)
         self.values.append(NAN6 if values is None else values)
         self.axes.append(NAN6 if axes is None else axes)
@@ -100,7 +104,7 @@ class Rows:
         self.tool.append(state.tool.index if isinstance(state.tool, Frame) else -1)
         self.line.append(line)
         self.at.append(at)
-        if target is None or target.axes is not None or values is None:
+        if target is None or target.axes is not None or (values is None and anchor is None):
             self.start.append(NOWHERE)
             self.stop.append(NOWHERE)
             self.file.append(-1)
@@ -152,7 +156,7 @@ class Rows:
 
     def _finding(self, row: int, code: str, message: str) -> Finding:
         line, column = self.document.place(self.at[row])
-        return Finding(code, message, self.document.path.name, line, column, HELP.get(code, ""))
+        return Finding(code, message, str(self.document.path), line, column, HELP.get(code, ""))
 
     def refused(self) -> dict[int, Finding]:
         return {
@@ -215,6 +219,10 @@ class Rows:
         values = np.array(self.values, dtype=float).reshape(n, 6)
         refused = self.refused()
         base, tool, used = _used(np.array(self.base, int), np.array(self.tool, int), frames.refs())
+        anchor, given = np.full(n, -1), np.full((n, 6), np.nan)
+        for row, at in self.anchors.items():
+            anchor[row] = at.row
+            given[row] = [np.nan if value is None else value for value in at.given]
         toolpath = Toolpath(
             kind=np.array(self.kind, dtype=np.int64),
             position=values[:, :3] * MM,
@@ -230,6 +238,8 @@ class Rows:
             refused=refused,
             pinned=self.pinned(refused),
             annotations=tuple(self.annotations),
+            anchor=anchor,
+            given=given * ([MM] * 3 + [DEG] * 3),
         )
         places = Places(
             start=np.array(self.start, dtype=np.int64).reshape(n, 6),

@@ -50,7 +50,7 @@ class Run:
         self.told.add((code, message))
         line, column = self.document.place(statement.at)
         self.findings.append(
-            Finding(code, message, self.document.path.name, line, column, HELP.get(code, ""))
+            Finding(code, message, str(self.document.path), line, column, HELP.get(code, ""))
         )
 
     def forget(self, effects: set[str | bytes], why: str) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.dialects.krl.survey import Effects
-from postproc.dialects.krl.target import NOWHERE, Target, Unclear, six
+from postproc.dialects.krl.target import NOWHERE, Six, Target, Unclear, six
 from postproc.geometry import Poses
 from postproc.toolpath import FrameRef
 from postproc.units import DEG, MM
@@ -91,6 +91,14 @@ class Point:
         return Point(target, self.blocked, self)
 
 
+@dataclass(frozen=True, slots=True)
+class Anchor:
+    """An end point of which ``given`` is known, and the rest is where the axis motion of ``row`` leads."""
+
+    row: int
+    given: Six = (None,) * 6
+
+
 NO_BASE = Unclear("KRL005", "no $BASE was set before it")
 NO_TOOL = Unclear("KRL005", "no $TOOL was set before it")
 
@@ -105,6 +113,7 @@ class State:
     tool_stands: bool = False
     point: Numbers | None = None
     point_frames: tuple[Frame | Unclear, Frame | Unclear] | None = None
+    anchor: Anchor | None = None
     point_lost: str = "no motion stands before it"
     axes: Numbers | None = None
     sources: frozenset[Source] = frozenset()
@@ -118,7 +127,7 @@ class State:
         return replace(self, variables=dict(self.variables), data=dict(self.data))
 
     def lose_point(self, why: str) -> None:
-        self.point = self.axes = self.point_frames = None
+        self.point = self.axes = self.point_frames = self.anchor = None
         self.point_lost = why
 
     def forget(self, effects: Effects, why: str, has_tcp_mode: bool) -> set[bytes]:
