@@ -259,6 +259,11 @@ CODES: dict[str, Code] = {
     "COR007": Code(
         "info", "part of the correction applied", "--gain below 1 leaves the rest of the error, as asked."
     ),
+    "COR010": Code(
+        "info",
+        "no force",
+        "Without --force the tool is not loaded, and nothing is to be corrected; the output is the input.",
+    ),
     "COR008": Code(
         "warning",
         "corrected point leaves the limits",

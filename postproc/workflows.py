@@ -275,6 +275,8 @@ def _closing(request: Request, ready: Prepared, result: Result) -> list[Finding]
     """What is to be said of the corrected program as a whole."""
     file, findings = str(request.program), []
     corrected = result.corrected
+    if request.force is None and not corrected.any():
+        findings.append(Finding("COR010", "--force was not given: nothing is corrected", file))
     above = corrected & (result.after > ready.cell.tolerance)
     if request.gain < 1.0:
         findings.append(

@@ -182,6 +182,9 @@ def test_output_over_the_input(compensate, job):
 
 def test_wrong_words_on_the_command_line(compensate, job):
     assert compensate(job.program, "--forse").code == 2
+    typo = compensate("chek", job.program)
+    assert typo.code == 2
+    assert "did you mean 'check'" in typo.err
     assert compensate(job.program, "--gain", "2").code == 2
     assert compensate(job.program, "other.src").code == 2
     assert compensate("check").code == 2

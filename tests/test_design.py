@@ -39,7 +39,7 @@ ROOMS = {
     "arrays": 0,
     "__init__": 0,
 }
-"""Room -> its floor: DESIGN.md, "Rooms"."""
+"""Room -> its floor.  A new room gets its floor here."""
 
 ONE_FLOOR = {("forces", "cell"), ("toolpath", "geometry")}
 """Neighbours on one floor, from -> to."""

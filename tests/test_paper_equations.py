@@ -206,7 +206,7 @@ def test_a_case_by_hand():
     np.testing.assert_allclose(deflection, [forward, 0, -down, 0, sum(turns), 0], rtol=1e-12, atol=1e-18)
 
 
-# The machining square, as PHYSICS reads it
+# The machining square, under one reading of what the paper leaves open
 
 
 def square():
@@ -255,7 +255,7 @@ def test_linear_answer_is_close_to_the_equilibrium():
 
 
 def test_zero_of_q_and_unit_of_kc():
-    """The other readings of the paper move the compensator's effect as PHYSICS says."""
+    """The other readings of the paper move the effect of the compensator."""
     q, wrench, tool, _ = square()
     bare = compliance_only().linear_deflection(q, wrench, tool)[:, :3]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 
@@ -12,6 +13,7 @@ from postproc.cli.check import check
 from postproc.cli.predict import predict
 from postproc.cli.program import program
 from postproc.cli.robots import robots
+from postproc.findings import nearest
 
 COMMANDS = {"program": program, "check": check, "predict": predict, "robots": robots}
 
@@ -34,8 +36,12 @@ def main() -> None:
 
 def run(argv: Sequence[str] | None = None) -> None:
     """Entry point of the console script."""
-    arguments = normalized(list(sys.argv[1:] if argv is None else argv))
-    main.main(args=arguments, prog_name="compensate")
+    words = list(sys.argv[1:] if argv is None else argv)
+    if words and words[0].isalpha() and words[0] not in COMMANDS and not os.path.exists(words[0]):
+        hint = nearest(words[0], COMMANDS)
+        click.echo(f"Error: no command and no file {words[0]!r}{hint}", err=True)
+        raise SystemExit(2)
+    main.main(args=normalized(words), prog_name="compensate")
 
 
 def normalized(arguments: list[str]) -> list[str]:

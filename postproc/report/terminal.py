@@ -43,6 +43,7 @@ def _rows(report: Report) -> Iterable[tuple[str, str]]:
     )
     yield "robot", escape(report.robot)
     yield "force", escape(f"{report.force_source}, at most {report.force_max_n:.0f} N")
+    yield "errors", "predicted, at the end points of cutting motions"
     yield "error before", f"{_spread(report.before)}, orientation {_deg(report.angle_before_deg)}"
     if report.after is not None and report.correction is not None and report.angle_after_deg is not None:
         share = "" if report.gain == 1.0 else f"; gain {report.gain:g}"

@@ -1,0 +1,81 @@
+"""The samples do what their READMEs say."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SAMPLES = Path(__file__).resolve().parent.parent / "samples"
+
+
+@pytest.fixture
+def sample(tmp_path):
+    def copy(name: str) -> Path:
+        target = tmp_path / name
+        shutil.copytree(SAMPLES / name, target, ignore=shutil.ignore_patterns("compensated"))
+        return target
+
+    return copy
+
+
+NUMBER = re.compile(rb"-?\d+\.\d+")
+
+
+def test_panel(compensate, sample):
+    program = sample("kr270_panel") / "panel.src"
+    done = compensate(program, "--force", "--json", "-")
+    report = done.json
+    assert done.code == 0, done.err
+    assert report["motions"] >= 2000
+    assert report["left"] == 0
+    assert 0.3 <= report["error_before_mm"]["max"] <= 4
+    assert report["error_after_mm"]["max"] <= 0.002
+    before = program.read_bytes().split(b"\r\n")
+    after = (program.parent / "compensated" / "panel.src").read_bytes().split(b"\r\n")
+    marker = [line for line in after if line.startswith(b";COMPENSATED ")]
+    assert len(marker) == 1
+    after.remove(marker[0])
+    assert len(before) == len(after)
+    for old, new in zip(before, after, strict=True):
+        if old != new and b"{X " in old:
+            assert NUMBER.sub(b"#", old) == NUMBER.sub(b"#", new)
+        elif old != new:  # a partial point, completed
+            assert old.startswith(b"LIN {Z ")
+
+
+def test_taught(compensate, sample):
+    folder = sample("kr270_taught")
+    done = compensate(folder / "taught.src", "--force", "--json", "-")
+    assert done.code == 0, done.err
+    assert done.json["corrected"] == 18
+    assert done.json["error_after_mm"]["max"] <= 0.002
+    before = (folder / "taught.src").read_bytes().splitlines()
+    after = (folder / "compensated" / "taught.src").read_bytes().splitlines()
+    assert [line for line in after if not line.startswith(b";COMPENSATED ")] == before
+    data = [(folder / where / "taught.dat").read_bytes() for where in (".", "compensated")]
+    changed = [(old, new) for old, new in zip(*(d.splitlines() for d in data), strict=True) if old != new]
+    assert len(changed) == 18
+    for old, new in changed:
+        assert old.startswith(b"DECL E6POS XP")
+        assert old[old.index(b",S ") :] == new[new.index(b",S ") :]
+
+
+@pytest.mark.parametrize(
+    ("name", "script", "files"),
+    [
+        ("kr270_panel", "make_panel.py", ["panel.src"]),
+        ("kr270_taught", "make_taught.py", ["taught.src", "taught.dat"]),
+    ],
+)
+def test_a_sample_can_be_made_again(sample, name, script, files):
+    folder = sample(name)
+    before = [(folder / file).read_bytes() for file in files]
+    for file in files:
+        (folder / file).unlink()
+    subprocess.run([sys.executable, script], cwd=folder, check=True, capture_output=True)
+    assert [(folder / file).read_bytes() for file in files] == before
