@@ -72,6 +72,9 @@ class StiffnessModel:
                 )
             section.only("effect", "options", "parameters")
             effect = EFFECTS[entry.name].from_options(section.section("options", {}), names)
+            for term in terms:
+                if (term.effect.name, term.effect.described()) == (effect.name, effect.described()):
+                    raise section.error("YML004", f"the same effect stands in line {term.line}", "effect")
             given = section.section("parameters")
             given.only(*(parameter.name for parameter in effect.parameters))
             stated, values = {}, {}

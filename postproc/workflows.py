@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -35,6 +35,9 @@ from postproc.writing import write
 
 WORST_PLACES = 5
 
+Stage = Callable[[str], None]
+"""Is told the name of each stage as it begins."""
+
 
 @dataclass(frozen=True)
 class Request:
@@ -50,6 +53,7 @@ class Request:
     strict: bool = False
     dry_run: bool = False
     again: bool = False
+    json: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -194,26 +198,32 @@ def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpa
     return path.completed(frames.base_in_robot.inverse() @ flange @ frames.tool_in_flange)
 
 
-def predict(request: Request) -> Report:
+def _silent(_stage: str) -> None:
+    """Progress that nobody watches."""
+
+
+def predict(request: Request, stage: Stage = _silent) -> Report:
     """The deflection at every pose; files only where ``report`` names a folder for them."""
     ready = prepare(request)
+    stage("predicting")
     result = correct(replace(ready.task, gain=0.0))
     findings = in_order_of_place([*ready.findings, *result.findings])
     report = _report(request, ready, result, findings, corrected=False)
-    if request.report and not request.dry_run:
-        stem = request.program.stem
-        table = request.report / f"{stem}.deflection.csv"
-        page = request.report / f"{stem}.prediction.json"
-        report = replace(report, outputs=(str(table), str(page)))
-        _not_over_inputs(ready, report.outputs)
-        publish({table: corrections_csv(ready.task, result), page: _json(report)})
+    files: dict[Path, bytes] = {}
+    pages = [] if request.json is None else [request.json]
+    if request.report:
+        files[request.report / f"{request.program.stem}.deflection.csv"] = corrections_csv(ready.task, result)
+        pages.append(request.report / f"{request.program.stem}.prediction.json")
+    report = replace(report, outputs=tuple(str(path) for path in (*files, *pages)))
+    _not_over_inputs(ready, report.outputs)
+    publish({**files, **dict.fromkeys(pages, _json(report))})
     return report
 
 
-def compensate(request: Request) -> Report:
+def compensate(request: Request, stage: Stage = _silent) -> Report:
     """The main job: read, predict, correct, write, read back.
 
-    Raises Refusal, and has then written nothing.
+    ``stage`` is told what is being done.  Raises Refusal, and has then written nothing.
     """
     ready = prepare(request)
     program = ready.program
@@ -229,7 +239,9 @@ def compensate(request: Request) -> Report:
                 help="compensate the original instead, or say --again if it is meant",
             )
         )
+    stage("correcting")
     result = correct(ready.task)
+    stage("writing, and reading back")
     target = _target(request)
     written = write(
         program,
@@ -247,6 +259,8 @@ def compensate(request: Request) -> Report:
     stem = target.stem
     folder = request.report or target.parent
     names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff")]
+    names += [] if request.json is None else [request.json]
+    stage("reporting")
     report = _report(request, ready, result, in_order_of_place(findings), corrected=True)
     if report.exit == 1:
         raise Refusal(*report.findings)
@@ -263,6 +277,7 @@ def compensate(request: Request) -> Report:
         names[0]: _json(report),
         names[1]: corrections_csv(ready.task, result),
         names[2]: diff,
+        **dict.fromkeys(names[3:], _json(report)),
     }
     for document in program.documents:
         if _document(document.path).digest != document.digest:

@@ -186,6 +186,9 @@ def test_wrong_words_on_the_command_line(compensate, job):
     assert typo.code == 2
     assert "did you mean 'check'" in typo.err
     assert compensate(job.program, "--gain", "2").code == 2
+    before = job.program.read_bytes()
+    assert compensate(job.program, "--force", "--json", job.program).code == 2
+    assert job.program.read_bytes() == before
     assert compensate(job.program, "other.src").code == 2
     assert compensate("check").code == 2
     assert compensate("check", "--explain", "NIL000").code == 2

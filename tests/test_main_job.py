@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import os
 import subprocess
 import sys
@@ -285,6 +286,18 @@ def test_the_diff_turns_the_input_into_the_output(compensate, job):
         pytest.skip("no patch command")
     assert done.returncode == 0, done.stdout
     assert patched.read_bytes() == job.output.read_bytes()
+
+
+def test_json_into_a_file(compensate, job):
+    done = compensate(job.program, "--force", "--json", job.folder / "r" / "part.json")
+    assert done.code == 0
+    assert "error before" in done.out
+    report = json.loads((job.folder / "r" / "part.json").read_text())
+    assert report == json.loads(job.output.with_name("part.report.json").read_text())
+    refused = compensate(job.program, "--force=7", "--json", job.folder / "r" / "part.json")
+    assert refused.code == 1
+    failed = json.loads((job.folder / "r" / "part.json").read_text())
+    assert (failed["exit"], failed["outputs"], failed["findings"][0]["code"]) == (1, [], "FRC002")
 
 
 def test_json_alone_on_standard_output(compensate, job):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +15,13 @@ import click
 from postproc.findings import Finding, Refusal
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+def _json_name(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
+    """A file of another kind is never overwritten by a result."""
+    if value is None or value == "-" or value.lower().endswith(".json"):
+        return value
+    raise click.BadParameter(f"{value!r} must end in .json, or be - for standard output")
 
 
 def program_options(command: _Command) -> _Command:
@@ -44,7 +52,11 @@ def result_options(command: _Command) -> _Command:
     for decorate in reversed(
         (
             click.option(
-                "--json", "json_to", metavar="PATH|-", help="Machine-readable result; - is standard output."
+                "--json",
+                "json_to",
+                metavar="PATH|-",
+                callback=_json_name,
+                help="Machine-readable result, into a .json file; - is standard output.",
             ),
             click.option("-q", "--quiet", is_flag=True, help="Only errors."),
             click.option("-v", "--verbose", is_flag=True, help="With every finding, what to do."),
@@ -69,9 +81,14 @@ class Out:
         width = None if stream.isatty() else 160
         return Console(file=stream, width=width, highlight=False)
 
-    def result(self, result: dict[str, object]) -> None:
-        """Write the machine-readable result where it was asked for."""
-        if self.json_to is None:
+    @property
+    def json_file(self) -> Path | None:
+        """The file that the machine-readable result goes to, if it is one."""
+        return Path(self.json_to) if self.json_to not in (None, "-") else None
+
+    def result(self, result: dict[str, object], written: bool = False) -> None:
+        """Write the machine-readable result where it was asked for; ``written``: the file has it already."""
+        if self.json_to is None or (written and self.json_to != "-"):
             return
         text = json.dumps(result, indent=2, allow_nan=False) + "\n"
         if self.json_to == "-":
@@ -80,6 +97,26 @@ class Out:
         from postproc.publish import publish
 
         publish({Path(self.json_to): text.encode()})
+
+    @contextlib.contextmanager
+    def stages(self) -> Iterator[Callable[[str], None]]:
+        """A function that names the stage at hand; shown on a terminal once the work takes over a second."""
+        if self.quiet or not sys.stderr.isatty():
+            yield lambda name: None
+            return
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+        progress = Progress(*columns, console=self.console(error=True), transient=True)
+        task = progress.add_task("reading")
+        timer = threading.Timer(1.0, progress.start)
+        timer.daemon = True
+        timer.start()
+        try:
+            yield lambda name: progress.update(task, description=name)
+        finally:
+            timer.cancel()
+            progress.stop()
 
     @contextlib.contextmanager
     def refusals(self, program: str) -> Iterator[None]:

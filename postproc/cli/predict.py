@@ -40,11 +40,18 @@ def predict(
     from postproc.workflows import predict as run
 
     out = Out(json_to, quiet, verbose)
-    with out.refusals(str(program)):
-        done = run(
-            Request(program=program, force=force, cell=cell, robot=robot, report=report, strict=strict)
-        )
-        out.result(done.as_json())
+    request = Request(
+        program=program,
+        force=force,
+        cell=cell,
+        robot=robot,
+        report=report,
+        strict=strict,
+        json=out.json_file,
+    )
+    with out.refusals(str(program)), out.stages() as stage:
+        done = run(request, stage)
+    out.result(done.as_json(), written=True)
     if not out.quiet:
         show(out.console(), done, verbose)
     raise SystemExit(done.exit)

@@ -65,7 +65,7 @@ def program(
     if target is not None and output is not None and output.endswith(("/", "\\")):
         target = target / program.name
     out = Out(json_to, quiet, verbose)
-    with out.refusals(str(program)):
+    with out.refusals(str(program)), out.stages() as stage:
         done = compensate(
             Request(
                 program=program,
@@ -78,9 +78,11 @@ def program(
                 strict=strict,
                 dry_run=dry_run,
                 again=again,
-            )
+                json=out.json_file,
+            ),
+            stage,
         )
-        out.result(done.as_json())
+    out.result(done.as_json(), written=not dry_run)
     if not out.quiet:
         show(out.console(), done, verbose)
         if dry_run:
