@@ -100,6 +100,12 @@ class StiffnessModel:
         kept = (t for t in self.terms if t.effect.name not in names and t.effect.family not in kinds)
         return replace(self, terms=tuple(kept))
 
+    def changed(self, term: int, parameter: str, value: float) -> StiffnessModel:
+        """The model with another value (SI) of one parameter of its ``term``-th effect."""
+        old = self.terms[term]
+        new = replace(old, values={**old.values, parameter: value})
+        return replace(self, terms=(*self.terms[:term], new, *self.terms[term + 1 :]))
+
     @cached_property
     def chain(self) -> Chain:
         return Chain(self.robot.joints, self.robot.flange)
