@@ -140,6 +140,11 @@ CODES: dict[str, Code] = {
         "path is in another file",
         "A technology package reads the path from data beside the program; there is nothing to correct here.",
     ),
+    "KRL022": Code(
+        "warning",
+        "external axes move",
+        "One that carries the robot or the workpiece puts both elsewhere than the cell says; make sure that none does.",
+    ),
     # YAML files
     "YML001": Code("error", "not valid YAML", "It does not parse, or has aliases, tags or odd characters."),
     "YML002": Code("error", "unknown key", "A key that has no meaning here; nothing is ignored silently."),
@@ -227,6 +232,26 @@ CODES: dict[str, Code] = {
         "no equilibrium",
         "The deflected robot has no stable state under this force; the cut is left as it was.",
     ),
+    # map
+    "MAP001": Code(
+        "error", "no gravity compensator", "--sign chooses how a compensator is read; this robot's model has none."
+    ),
+    "MAP002": Code(
+        "warning",
+        "nothing is in reach",
+        "The arm gets to no cell of the grid; no picture and no CSV were written. Look at ranges, tool and orientation.",
+    ),
+    "MAP003": Code(
+        "warning",
+        "cells without an equilibrium",
+        "The deflected robot has no stable state there under this force; these cells have no value.",
+    ),
+    "MAP004": Code("info", "slices left out of the picture", "The CSV has all of them."),
+    "MAP005": Code(
+        "warning",
+        "nothing gives way",
+        "The robot file states no compliance, or none that this force acts on: a map of zeros says nothing.",
+    ),
     # correction
     "COR001": Code(
         "warning", "not converged", "The mirror correction did not settle; the cut is left as it was."
@@ -263,6 +288,11 @@ CODES: dict[str, Code] = {
         "info",
         "no force",
         "Without --force the tool is not loaded, and nothing is to be corrected; the output is the input.",
+    ),
+    "COR011": Code(
+        "warning",
+        "comment looks like a switch",
+        "It begins with COMPENSATE but is neither COMPENSATE OFF nor COMPENSATE ON; it was not used.",
     ),
     "COR008": Code(
         "warning",

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
-from postproc.effects import EFFECTS, ComplianceLaw, Effect, Load, Values
+from postproc.arrays import Bools, Floats, frozen
+from postproc.effects import EFFECTS, ComplianceLaw, Conditions, Effect, Load, Offset, State, Values
 from postproc.findings import Finding, nearest
 from postproc.geometry import Poses
-from postproc.robot.chain import Chain, generalized_force, tcp_position
+from postproc.robot.chain import Chain, generalized_force, jacobian
 from postproc.robot.description import Robot, Value, parameter_value
 from postproc.units import DEG
 
@@ -23,6 +23,12 @@ STEP_TOLERANCE = 1e-14
 """Largest last step of the equilibrium [rad]; the next error is smaller by the rate of convergence."""
 
 MAX_STEPS = 60
+
+STANDARD_GRAVITY = 9.80665
+"""[m/s2]"""
+
+NOTHING = Conditions()
+"""Nothing else is known of the states."""
 
 IMPLAUSIBLE_SAG = 0.5 * DEG
 """A joint that its own balancer bends this far is not balanced: some ten times what weight does to a heavy arm."""
@@ -40,10 +46,11 @@ class Term:
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Loaded states: ``coordinates`` (N, n) [rad], motor angle plus displacement; ``pose`` of the TCP in the robot
-    base; ``converged`` (N,): a stable equilibrium was found; ``steps`` iterations of the slowest state."""
+    """Loaded states: ``coordinates`` (N, m) [rad, m], of them ``displacement`` (N, m) by load; ``pose`` of the TCP in
+    the robot base; ``converged`` (N,): a stable equilibrium was found; ``steps`` iterations of the slowest state."""
 
     coordinates: Floats
+    displacement: Floats
     pose: Poses
     converged: Bools
     steps: int
@@ -51,15 +58,15 @@ class Equilibrium:
 
 @dataclass(frozen=True)
 class StiffnessModel:
-    """Chain and effects of one robot; immutable."""
+    """Chain and effects of one robot; immutable.  ``gravity`` (3,) [m/s2] in axes of the robot base."""
 
     robot: Robot
     terms: tuple[Term, ...]
+    gravity: Floats = field(default_factory=lambda: frozen([0.0, 0.0, -STANDARD_GRAVITY], (3,)))
 
     @classmethod
     def from_robot(cls, robot: Robot) -> StiffnessModel:
         """The model that a robot file describes.  Raises Refusal with file, line and key."""
-        names = tuple(joint.name for joint in robot.joints)
         terms: list[Term] = []
         for entry in robot.effects:
             section = entry.section
@@ -71,11 +78,11 @@ class StiffnessModel:
                     "known effects: " + ", ".join(EFFECTS),
                 )
             section.only("effect", "options", "parameters")
-            effect = EFFECTS[entry.name].from_options(section.section("options", {}), names)
+            effect = EFFECTS[entry.name].from_options(section.section("options", {}), robot.joints)
             for term in terms:
                 if (term.effect.name, term.effect.described()) == (effect.name, effect.described()):
                     raise section.error("YML004", f"the same effect stands in line {term.line}", "effect")
-            given = section.section("parameters")
+            given = section.section("parameters", {})
             given.only(*(parameter.name for parameter in effect.parameters))
             stated, values = {}, {}
             for parameter in effect.parameters:
@@ -108,115 +115,223 @@ class StiffnessModel:
 
     @cached_property
     def chain(self) -> Chain:
-        return Chain(self.robot.joints, self.robot.flange)
+        """The joints, with the extra coordinates that the effects need and no others."""
+        extras = (name for term in self.terms for name in term.effect.coordinates)
+        return Chain(self.robot.joints, self.robot.flange, extras)
 
-    def equilibrium(self, q: Floats, wrench: Floats, tool: Poses) -> Equilibrium:
-        """Where the robot comes to rest with its motors at ``q`` (N, n) [rad] under ``wrench`` (N, 6) [N, N m] at the
-        TCP, robot base axes; ``tool``: TCP on the flange, one pose or N.
+    def equilibrium(
+        self,
+        q: Floats,
+        wrench: Floats,
+        tool: Poses,
+        conditions: Conditions = NOTHING,
+        start: Floats | None = None,
+    ) -> Equilibrium:
+        """Where the robot comes to rest with its motors at ``q`` (N, n) [rad, m] under ``wrench`` (N, 6) [N, N m] at
+        the TCP, robot base axes; ``tool``: TCP on the flange, one pose or N.
 
-        Solves theta = C(J(q + theta)^T w + loads(q + theta)), the balance on the deflected pose, by a Newton
-        iteration with the diagonal of the loads' and laws' derivatives; the small rest of the Jacobian (the
-        wrench's lever moving with the pose) makes it linear with a rate of about 5e-3.
+        ``start`` (N, m): displacement to begin with, that of a state nearby; the result does not depend on it.
+
+        Solves theta = C(J^T w + loads) at coordinates rest + theta, the balance on the deflected pose, by a Newton
+        iteration with the diagonal of the loads' and laws' derivatives.  What the diagonal leaves out (the lever of
+        the wrench moving with the pose, weights) makes it linear with a rate of about 5e-3.
         """
-        count = len(q)
-        coordinates, converged, steps = np.empty_like(q), np.empty(count, bool), 0
+        if any(term.effect.by_direction for term in self.terms) and conditions.direction is None:
+            conditions = replace(conditions, direction=approach(q))
+        count, m = len(q), self.chain.size
+        coordinates, theta = np.empty((count, m)), np.empty((count, m))
+        converged, steps = np.empty(count, bool), 0
         rotation, position = np.empty((count, 3, 3)), np.empty((count, 3))
-        for start in range(0, count, CHUNK):
-            rows = slice(start, start + CHUNK)
+        for begin in range(0, count, CHUNK):
+            rows = slice(begin, begin + CHUNK)
             part = self._equilibrium(
-                np.ascontiguousarray(q[rows].T), np.ascontiguousarray(wrench[rows].T), _rows(tool, rows)
+                np.ascontiguousarray(q[rows].T),
+                np.ascontiguousarray(wrench[rows].T),
+                tool if tool.position.ndim == 1 else tool[rows],
+                conditions.part(rows),
+                np.zeros((m, len(q[rows]))) if start is None else np.array(start[rows].T, order="C"),
             )
-            coordinates[rows], converged[rows] = part.coordinates, part.converged
+            coordinates[rows], theta[rows], converged[rows] = (
+                part.coordinates,
+                part.displacement,
+                part.converged,
+            )
             rotation[rows], position[rows] = part.pose.rotation, part.pose.position
             steps = max(steps, part.steps)
-        return Equilibrium(coordinates, Poses(rotation, position), converged, steps)
+        return Equilibrium(coordinates, theta, Poses(rotation, position), converged, steps)
 
-    def _equilibrium(self, q: Floats, wrench: Floats, tool: Poses) -> Equilibrium:
-        theta = np.zeros_like(q)
-        step = np.full(q.shape, np.inf)
-        swept = self.chain.sweep(q)
-        stable = np.ones(q.shape[1], bool)
+    def _equilibrium(
+        self, motors: Floats, wrench: Floats, tool: Poses, conditions: Conditions, theta: Floats
+    ) -> Equilibrium:
+        chain = self.chain
+        rest = self._rest(motors, conditions)
+        if not self._laws:
+            theta = np.zeros_like(rest)
+        step = np.full(theta.shape, np.inf) if self._laws else np.zeros_like(theta)
+        stable = np.ones(theta.shape[1], bool)
         steps = 0
-        while self.terms and steps < MAX_STEPS:
-            force = generalized_force(swept, tcp_position(swept, tool), wrench)
-            slope = np.zeros_like(force)
-            for term in self.terms:
-                if isinstance(term.effect, Load):
-                    extra, extra_slope = term.effect.force(term.values, q + theta, q)
-                    force += extra
-                    slope += extra_slope
+        swept = chain.sweep(rest + theta, tool, conditions.spindle)
+        while self._laws and steps < MAX_STEPS:
+            state = State(chain, self.gravity, motors, rest, rest + theta, swept, wrench, conditions)
+            force, slope = self._forces(state)
             target, compliance = np.zeros_like(force), np.zeros_like(force)
-            for term in self.terms:
-                if isinstance(term.effect, ComplianceLaw):
-                    bent, gives = term.effect.displacement(term.values, force)
-                    target += bent
-                    compliance += gives
+            for law, values in self._laws:
+                law.add_displacement(values, state, force, target, compliance)
             # A load that pushes away faster than the joint holds (C dM/dq >= 1) has no stable rest.
             stiffening = 1.0 - compliance * slope
             stable &= (stiffening > 0).all(axis=0)
             step = (target - theta) / np.where(stiffening > 0, stiffening, np.inf)
             theta += step
             steps += 1
-            swept = self.chain.sweep(q + theta)
+            swept = chain.sweep(rest + theta, tool, conditions.spindle)
             if not np.nanmax(np.abs(step), initial=0.0) > STEP_TOLERANCE:
                 break
-        rested = (np.abs(step) < 1e-11).all(axis=0) if self.terms else np.isfinite(q).all(axis=0)
-        turned = np.moveaxis(swept.rotation, -1, 0) @ tool.rotation
-        pose = Poses(turned, np.ascontiguousarray(tcp_position(swept, tool).T))
-        return Equilibrium(
-            (q + theta).T, pose, stable & rested & np.isfinite(pose.position).all(axis=1), steps
+        rested = stable & (np.abs(step) < 1e-11).all(axis=0) & np.isfinite(swept.position).all(axis=0)
+        return Equilibrium((rest + theta).T, theta.T, swept.pose, rested, steps)
+
+    def _rest(self, motors: Floats, conditions: Conditions) -> Floats:
+        """(m, N) coordinates without load: motors and offsets."""
+        rest = np.zeros((self.chain.size, motors.shape[1]))
+        rest[self.chain.motors] = motors
+        offset = np.zeros_like(rest)
+        for term in self.terms:
+            if isinstance(term.effect, Offset):
+                term.effect.add_offset(term.values, self.chain, motors, conditions, offset)
+        return rest + offset
+
+    def _forces(self, state: State) -> tuple[Floats, Floats]:
+        """Generalized forces (m, N) of wrench and loads, and the loads' derivatives, coordinate by coordinate."""
+        force = generalized_force(state.swept, state.swept.position, state.wrench)
+        slope = np.zeros_like(force)
+        for load, values in self._loads:
+            load.add_force(values, state, force, slope)
+        return force, slope
+
+    @cached_property
+    def _laws(self) -> list[tuple[ComplianceLaw, Values]]:
+        return [(t.effect, t.values) for t in self.terms if isinstance(t.effect, ComplianceLaw)]
+
+    @cached_property
+    def _loads(self) -> list[tuple[Load, Values]]:
+        return [(t.effect, t.values) for t in self.terms if isinstance(t.effect, Load)]
+
+    def state(
+        self,
+        q: Floats,
+        wrench: Floats,
+        tool: Poses,
+        conditions: Conditions = NOTHING,
+        displacement: Floats | None = None,
+    ) -> State:
+        """What effects see of N states: at rest, or displaced by ``displacement`` (N, m)."""
+        motors = np.ascontiguousarray(q.T)
+        rest = self._rest(motors, conditions)
+        coordinates = rest if displacement is None else rest + displacement.T
+        swept = self.chain.sweep(coordinates, tool, conditions.spindle)
+        return State(
+            self.chain,
+            self.gravity,
+            motors,
+            rest,
+            coordinates,
+            swept,
+            np.asarray(wrench, float).T,
+            conditions,
         )
 
-    def joint_compliance(self, q: Floats) -> Floats:
-        """(N, n) [rad/(N m)] compliance of each coordinate, unloaded: 1 / (K_theta^0 + K_theta^GC(q)), eq. (6)."""
-        angles = np.ascontiguousarray(q.T)
-        force, slope = np.zeros_like(angles), np.zeros_like(angles)
-        for term in self.terms:
-            if isinstance(term.effect, Load):
-                extra, extra_slope = term.effect.force(term.values, angles, angles)
-                force, slope = force + extra, slope + extra_slope
-        gives = np.zeros_like(angles)
-        for term in self.terms:
-            if isinstance(term.effect, ComplianceLaw):
-                gives = gives + term.effect.displacement(term.values, force)[1]
+    def compliance(self, state: State) -> Floats:
+        """(N, m) [rad/(N m), m/N] compliance of each coordinate at ``state``, its own part of the loads' stiffness in
+        it: 1 / (K_theta^0 + K_theta^GC(q)), eq. (6)."""
+        force, slope = self._forces(state)
+        target, gives = np.zeros_like(force), np.zeros_like(force)
+        for law, values in self._laws:
+            law.add_displacement(values, state, force, target, gives)
         return np.asarray((gives / (1.0 - gives * slope)).T)
 
-    def linear_deflection(self, q: Floats, wrench: Floats, tool: Poses) -> Floats:
-        """Deflection twists (N, 6) [m, rad] of the TCP by eq. (5), linearized at ``q``: J K_theta^-1 J^T w."""
-        jacobian = self.chain.jacobian(q, tool)
-        torque = np.einsum("nij,ni->nj", jacobian, wrench)
-        return np.einsum("nij,nj->ni", jacobian, self.joint_compliance(q) * torque)
+    def joint_compliance(self, q: Floats) -> Floats:
+        """(N, n) [rad/(N m)] compliance of the joints of the unloaded robot at ``q`` (N, n): eq. (6), inverted."""
+        state = self.state(q, np.zeros((len(q), 6)), Poses.identity())
+        return self.compliance(state)[:, self.chain.motor_rows]
 
-    def cartesian_stiffness(self, q: Floats, tool: Poses) -> Floats:
-        """K_C = (J K_theta^-1 J^T)^-1 (N, 6, 6) [N/m, N/rad, ...], eq. (5); robot base axes, unloaded.
+    def linear_deflection(
+        self, q: Floats, wrench: Floats, tool: Poses, conditions: Conditions = NOTHING
+    ) -> Floats:
+        """Deflection twists (N, 6) [m, rad] of the TCP by eq. (5), linearized at ``q`` (N, n): J K_theta^-1 J^T w."""
+        state = self.state(q, np.zeros((len(q), 6)), tool, conditions)
+        j = jacobian(state.swept)
+        torque = np.einsum("nij,ni->nj", j, wrench)
+        return np.einsum("nij,nj->ni", j, self.compliance(state) * torque)
+
+    def cartesian_compliance(
+        self, q: Floats, wrench: Floats | None, tool: Poses, conditions: Conditions = NOTHING
+    ) -> Floats:
+        """Change of the TCP's pose with a small wrench, (N, 6, 6) [m/N, rad/(N m), ...], robot base axes.
+
+        Unloaded (``wrench`` None): J K_theta^-1 J^T, the inverse of eq. (5).  Loaded: at the equilibrium under
+        ``wrench`` (N, 6), with the geometric stiffness: J (1 - C H)^-1 C J^T, H = d(J^T w + loads)/d(coordinates).
+        """
+        if wrench is None:
+            state = self.state(q, np.zeros((len(q), 6)), tool, conditions)
+            j = jacobian(state.swept)
+            return np.einsum("nij,nj,nkj->nik", j, self.compliance(state), j)
+        rest = self.equilibrium(q, wrench, tool, conditions)
+        state = self.state(q, wrench, tool, conditions, rest.displacement)
+        j = jacobian(state.swept)
+        force, _ = self._forces(state)
+        target, gives = np.zeros_like(force), np.zeros_like(force)
+        for law, values in self._laws:
+            law.add_displacement(values, state, force, target, gives)
+        c = gives.T[:, :, None] * np.eye(self.chain.size)
+        inner = np.linalg.solve(np.eye(self.chain.size) - c @ self._curvature(state, tool), c)
+        return np.asarray(j @ inner @ np.swapaxes(j, 1, 2))
+
+    def cartesian_stiffness(
+        self, q: Floats, tool: Poses, wrench: Floats | None = None, conditions: Conditions = NOTHING
+    ) -> Floats:
+        """K_C (N, 6, 6) [N/m, N/rad, ...], the inverse of ``cartesian_compliance``; eq. (5) without ``wrench``.
 
         Raises numpy.linalg.LinAlgError where a rigid joint or a singularity leaves a direction without compliance.
         """
-        jacobian = self.chain.jacobian(q, tool)
-        compliance = np.einsum("nij,nj,nkj->nik", jacobian, self.joint_compliance(q), jacobian)
-        return np.asarray(np.linalg.inv(compliance))
+        return np.asarray(np.linalg.inv(self.cartesian_compliance(q, wrench, tool, conditions)))
+
+    def _curvature(self, state: State, tool: Poses) -> Floats:
+        """H (N, m, m): derivative of the generalized forces by the coordinates, central differences."""
+        size, step = self.chain.size, 1e-6
+        h = np.empty((state.motors.shape[1], size, size))
+        for k in range(size):
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = state.coordinates.copy()
+                moved[k] += sign * step
+                swept = self.chain.sweep(moved, tool, state.conditions.spindle)
+                ends.append(self._forces(replace(state, coordinates=moved, swept=swept))[0])
+            h[:, :, k] = ((ends[0] - ends[1]) / (2 * step)).T
+        return h
 
     def doubts(self) -> list[Finding]:
         """What is implausible about the model itself: a load that, with no force on the tool, bends a joint by
         more than ``IMPLAUSIBLE_SAG`` somewhere within its limits (MOD001)."""
         limits = self.robot.limits
-        angles = np.linspace(limits[:, 0], limits[:, 1], 181).T
+        angles = np.linspace(limits[:, 0], limits[:, 1], 181)
+        state = self.state(angles, np.zeros((len(angles), 6)), Poses.identity())
         findings = []
         for term in self.terms:
             if not isinstance(term.effect, Load):
                 continue
-            force = term.effect.force(term.values, angles, angles)[0]
-            sag = np.zeros_like(force)
-            for law in self.terms:
-                if isinstance(law.effect, ComplianceLaw):
-                    sag += np.abs(law.effect.displacement(law.values, force)[0])
-            joint, state = np.unravel_index(np.argmax(sag), sag.shape)
-            if sag[joint, state] > IMPLAUSIBLE_SAG:
+            force, slope = np.zeros_like(state.rest), np.zeros_like(state.rest)
+            term.effect.add_force(term.values, state, force, slope)
+            sag, gives = np.zeros_like(force), np.zeros_like(force)
+            for law, values in self._laws:
+                law.add_displacement(values, state, force, sag, gives)
+            sag = np.abs(sag[self.chain.motor_rows])
+            force = force[self.chain.motor_rows]
+            joint, at = np.unravel_index(np.argmax(sag), sag.shape)
+            if sag[joint, at] > IMPLAUSIBLE_SAG:
                 findings.append(
                     Finding(
                         "MOD001",
-                        f"{term.effect.name}: {abs(force[joint, state]):.0f} N m on {self.robot.joints[joint].name} at"
-                        f" {angles[joint, state] / DEG:.0f} deg would bend it by {sag[joint, state] / DEG:.2f} deg",
+                        f"{term.effect.name}: {abs(force[joint, at]):.0f} N m on {self.robot.joints[joint].name} at"
+                        f" {angles[at, joint] / DEG:.0f} deg would bend it by {sag[joint, at] / DEG:.2f} deg",
                         str(self.robot.path),
                         term.line,
                         help="with `preload: balanced` only the change of its torque acts",
@@ -225,5 +340,9 @@ class StiffnessModel:
         return findings
 
 
-def _rows(tool: Poses, rows: slice) -> Poses:
-    return tool if tool.position.ndim == 1 else tool[rows]
+def approach(q: Floats) -> Floats:
+    """(N, n) sense -1, 0, 1 in which each motor came to its place, from the order of the states; the last one stays
+    where a motor did not move, and the first state has none."""
+    moved = np.sign(np.diff(q, axis=0, prepend=q[:1]))
+    last = np.maximum.accumulate(np.where(moved != 0, np.arange(len(q))[:, None], 0), axis=0)
+    return np.take_along_axis(moved, last, axis=0)

@@ -25,7 +25,7 @@ class Kind(IntEnum):
     AXIS = 1  # point to point, to axis angles
     LIN = 2  # straight line
     CIRC = 3  # three-point arc
-    OTHER = 4  # a motion that is none of these (relative, spline, ...)
+    OTHER = 4  # a motion that is none of these (spline, ...)
 
 
 @dataclass(frozen=True)

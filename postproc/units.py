@@ -31,6 +31,11 @@ UNITS: dict[str, tuple[str, float]] = {
     "mm/N": ("m/N", MM),
     "N m/rad": ("N m/rad", 1.0),
     "rad/(N m)": ("rad/(N m)", 1.0),
+    "N m/rad3": ("N m/rad3", 1.0),
+    "N/m3": ("N/m3", 1.0),
+    "kg m": ("kg m", 1.0),
+    "m/K": ("m/K", 1.0),
+    "mm/K": ("m/K", MM),
     "m/s": ("m/s", 1.0),
 }
 

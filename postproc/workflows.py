@@ -15,22 +15,26 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.cell import Cell, find_cell, frames_of, load_cell
+from postproc.cell import Cell, Frames, find_cell, frames_of, load_cell
 from postproc.compensation.correct import Result, State, Task, correct
 from postproc.dialects import detect
 from postproc.dialects.dialect import Dialect, Program
 from postproc.document import Document
+from postproc.effects import Conditions
 from postproc.findings import Finding, Refusal
 from postproc.forces import Wrenches, is_no_force, wrenches
-from postproc.model import StiffnessModel
+from postproc.geometry import Poses, rotation_from_abc
+from postproc.model import StiffnessModel, approach
 from postproc.publish import publish
 from postproc.report.checked import Checked
 from postproc.report.files import corrections_csv, unified_diff
 from postproc.report.report import Report, Spread, Worst, exit_code, in_order_of_place
+from postproc.report.workspace import Mapped, map_csv, slices_shown
 from postproc.robot.description import Robot, find_robot, load_robot, robot_files
-from postproc.robot.track import follow, nominal_flange
-from postproc.toolpath import Toolpath
+from postproc.robot.track import Track, follow, nominal_flange
+from postproc.toolpath import Kind, Toolpath
 from postproc.units import DEG, MM
+from postproc.workspace import Grid, Load, Survey, has_compensator, survey, with_sign
 from postproc.writing import write
 
 WORST_PLACES = 5
@@ -53,6 +57,26 @@ class Request:
     strict: bool = False
     dry_run: bool = False
     again: bool = False
+    json: Path | None = None
+
+
+@dataclass(frozen=True)
+class MapRequest:
+    """A map that the user asked for: per axis of the robot base one value or (from, to), each range in ``points``."""
+
+    robot: str
+    ranges_mm: tuple[tuple[float, ...], ...]
+    points: int
+    tool_mm_deg: tuple[float, ...]
+    orientation_deg: tuple[float, ...]
+    wrench: tuple[float, ...]
+    frame: str
+    linear: bool = False
+    sign: str | None = None
+    ignore_limits: bool = False
+    status: int = 2
+    picture: Path | None = None
+    csv: Path | None = None
     json: Path | None = None
 
 
@@ -104,7 +128,8 @@ def prepare(request: Request) -> Prepared:
         own.append("geometric")
     if not process and cell.controller.gravity_compensated:
         own.append("weight")
-    model = full.without(families=own)
+    gravity = cell.robot_base.rotation.T @ full.gravity
+    model = replace(full.without(families=own), gravity=gravity)
 
     path = completed(read.toolpath, cell, robot, request.program)
     program = replace(read, toolpath=path)
@@ -129,17 +154,32 @@ def prepare(request: Request) -> Prepared:
         tool=tool,
         wrench=force.values,
         carries=force.carries,
+        conditions=_conditions(request, path, cell, frames, model, force, track.q),
         process=process,
         gain=request.gain,
         max_correction=cell.max_correction,
         tolerance=cell.tolerance,
     )
     findings = [*program.findings, *force.findings, *model.doubts()]
-    findings += [
-        Finding("KIN007", "the stated T is not that of this pose", str(request.program), int(path.line[row]))
-        for row in np.flatnonzero(~track.turn_holds)
-    ]
+    findings += _disagreeing(request.program, path, track)
     return Prepared(program, dialect, cell, robot, model, force, task, tuple(findings))
+
+
+def _disagreeing(program: Path, path: Toolpath, track: Track) -> list[Finding]:
+    """What S and T state with a motion, and the axes that bring the robot there, disagree on (KIN007)."""
+    # A path motion keeps the branch that the robot is in, whatever its S says.
+    elsewhere = (path.status >= 0) & (track.status >= 0) & (path.status & 7 != track.status)
+    elsewhere &= path.known & np.isin(path.kind, (Kind.LIN, Kind.CIRC))
+    findings = []
+    for mask, message in (
+        (~track.turn_holds, "the stated T is not that of this pose"),
+        (elsewhere, "the stated S is not the configuration in which the robot comes here"),
+    ):
+        rows = np.flatnonzero(mask)
+        if len(rows):
+            more = f" ({len(rows)} motions, to line {path.line[rows[-1]]})" if len(rows) > 1 else ""
+            findings.append(Finding("KIN007", message + more, str(program), int(path.line[rows[0]])))
+    return findings
 
 
 def check(path: Path) -> Checked:
@@ -154,6 +194,104 @@ def robots(name: str | None) -> list[StiffnessModel]:
     return [StiffnessModel.from_robot(load_robot(path)) for path in paths]
 
 
+def _silent(_stage: str) -> None:
+    """Progress that nobody watches."""
+
+
+def map_workspace(request: MapRequest, stage: Stage = _silent) -> Mapped:
+    """The deflection over a part of the workspace.  Raises Refusal, and has then written nothing."""
+    robot = load_robot(find_robot(request.robot))
+    model = StiffnessModel.from_robot(robot)
+    if request.sign is not None:
+        if not has_compensator(model):
+            raise Refusal(
+                Finding("MAP001", f"--sign {request.sign}, but no gravity_compensator", str(robot.path))
+            )
+        model = with_sign(model, request.sign)
+    load = _load(request)
+    stage("computing")
+    found = survey(model, _grid(request), load)
+    signs = {
+        str(term.effect.described()["sign"]) for term in model.terms if "sign" in term.effect.described()
+    }
+    mapped = Mapped(
+        survey=found,
+        load=load,
+        robot=robot.name,
+        digest=robot.digest,
+        axes=tuple(joint.name for joint in robot.joints),
+        effects=tuple(term.effect.name for term in model.terms),
+        stated=request.wrench,
+        frame=request.frame,
+        sign=", ".join(sorted(signs)) or None,
+    )
+    findings = [*_map_findings(found, request), *model.doubts()]
+    files: dict[Path, bytes] = {}
+    if found.mapped.any():
+        stage("drawing")
+        if request.csv is not None:
+            files[request.csv] = map_csv(mapped)
+        if request.picture is not None:
+            from postproc.report.picture import picture
+
+            files[request.picture] = picture(mapped, request.picture.suffix[1:].lower())
+    pages = [] if request.json is None else [request.json]
+    mapped = replace(
+        mapped,
+        findings=tuple(findings),
+        outputs=tuple(str(path) for path in (*files, *pages)),
+        exit=exit_code(findings),
+    )
+    publish({**files, **dict.fromkeys(pages, _json(mapped))})
+    return mapped
+
+
+def _grid(request: MapRequest) -> Grid:
+    axes = []
+    for ends in request.ranges_mm:
+        low, high = ends[0], ends[-1]
+        several = low < high and request.points > 1
+        axes.append(np.linspace(low, high, request.points) if several else np.array([(low + high) / 2]))
+    return Grid(*(values * MM for values in axes))
+
+
+def _load(request: MapRequest) -> Load:
+    place, turn = np.array(request.tool_mm_deg[:3]) * MM, np.array(request.tool_mm_deg[3:]) * DEG
+    orientation = rotation_from_abc(np.array(request.orientation_deg) * DEG)
+    wrench = np.array(request.wrench).reshape(2, 3)
+    if request.frame == "tool":
+        wrench = wrench @ orientation.T
+    return Load(
+        tool=Poses.from_abc(place, turn),
+        orientation=orientation,
+        wrench=wrench.ravel(),
+        status=request.status,
+        linear=request.linear,
+        ignore_limits=request.ignore_limits,
+    )
+
+
+def _map_findings(found: Survey, request: MapRequest) -> list[Finding]:
+    """What is to be said of a map as a whole."""
+    findings = []
+    cells, unsettled = len(found.q), int(found.unsettled.sum())
+    if not found.mapped.any():
+        beyond = int(found.in_reach.sum())
+        help = f"{beyond} cells are only beyond the axis limits: --ignore-limits" if beyond else ""
+        findings.append(
+            Finding("MAP002", f"none of {cells} cells can be reached with S {request.status}", help=help)
+        )
+    elif unsettled:
+        findings.append(Finding("MAP003", f"{unsettled} of {cells} cells have no equilibrium"))
+    elif not np.nanmax(found.size) > 0:
+        findings.append(Finding("MAP005", "the deflection is zero everywhere"))
+    slices = found.grid.shape[2]
+    shown = len(slices_shown(slices))
+    if request.picture is not None and found.mapped.any() and min(found.grid.shape) > 1 and shown < slices:
+        findings.append(Finding("MAP004", f"the picture shows {shown} of {slices} slices along z"))
+    return findings
+
+
 def _cell(request: Request) -> Cell:
     """The cell file, or an empty cell where ``--robot`` says all that a program with its own frames needs."""
     try:
@@ -163,6 +301,40 @@ def _cell(request: Request) -> Cell:
             raise
         cell = Cell(path=Path("cell.yaml"), robot=request.robot)
     return replace(cell, robot=request.robot) if request.robot else cell
+
+
+def _conditions(
+    request: Request,
+    path: Toolpath,
+    cell: Cell,
+    frames: Frames,
+    model: StiffnessModel,
+    force: Wrenches,
+    q: Floats,
+) -> Conditions:
+    """What the model's effects need to know of the motions: spindle axes, weights on the flange, senses of approach."""
+    spindle = None
+    if "spindle.z" in model.chain.names:
+        spindle = frames.spindle_in_tool
+        lost = np.flatnonzero(force.carries & ~np.isfinite(spindle[:, 0]))
+        if len(lost):
+            raise Refusal(
+                Finding(
+                    "CEL002",
+                    "the spindle axis of this tool is not known, and the model has a tool_compliance",
+                    str(request.program),
+                    int(path.line[lost[0]]),
+                    help="add the tool to the cell, with its axis",
+                )
+            )
+    mass, com = np.zeros(len(path)), np.zeros((len(path), 3))
+    for row, frame in enumerate(path.frames):
+        tool = cell.tools.get(frame.number or 0)
+        if tool is not None and tool.mass is not None and tool.com is not None:
+            mass[path.tool == row], com[path.tool == row] = tool.mass, tool.com
+    return Conditions(
+        spindle=spindle, direction=np.nan_to_num(approach(q)), payload_mass=mass, payload_com=com
+    )
 
 
 def _missing_points(program: Program, force: Wrenches) -> None:
@@ -196,10 +368,6 @@ def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpa
     axes[rows] = path.axes[path.anchor[rows]]
     flange = nominal_flange(robot, axes)
     return path.completed(frames.base_in_robot.inverse() @ flange @ frames.tool_in_flange)
-
-
-def _silent(_stage: str) -> None:
-    """Progress that nobody watches."""
 
 
 def predict(request: Request, stage: Stage = _silent) -> Report:
@@ -255,7 +423,8 @@ def compensate(request: Request, stage: Stage = _silent) -> Report:
     )
     edits, result = written.edits, written.result
     findings = [*ready.findings, *result.findings, *_closing(request, ready, result)]
-    outputs = dict(zip(_output_paths(program, target), written.contents, strict=True))
+    paths = _output_paths(program, target)
+    outputs = dict(zip(paths, written.contents, strict=True))
     stem = target.stem
     folder = request.report or target.parent
     names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff")]
@@ -264,7 +433,7 @@ def compensate(request: Request, stage: Stage = _silent) -> Report:
     report = _report(request, ready, result, in_order_of_place(findings), corrected=True)
     if report.exit == 1:
         raise Refusal(*report.findings)
-    report = replace(report, outputs=tuple(str(path) for path in (*outputs, *names)))
+    report = replace(report, outputs=tuple(str(path) for path in (*paths, *names)))
     _not_over_inputs(ready, report.outputs)
     if request.dry_run:
         return replace(report, outputs=())
@@ -324,10 +493,10 @@ def _closing(request: Request, ready: Prepared, result: Result) -> list[Finding]
 
 
 def _target(request: Request) -> Path:
-    """Where the compensated program goes."""
+    """Where the compensated program goes; a name without a suffix is a folder."""
     if request.output is None:
         return request.program.parent / "compensated" / request.program.name
-    if request.output.is_dir():
+    if request.output.is_dir() or (request.program.suffix and not request.output.suffix):
         return request.output / request.program.name
     return request.output
 
@@ -424,5 +593,5 @@ def _largest(values: Floats) -> float:
     return float(seen.max()) if len(seen) else math.nan
 
 
-def _json(report: Report) -> bytes:
+def _json(report: Report | Mapped) -> bytes:
     return (json.dumps(report.as_json(), indent=2, allow_nan=False) + "\n").encode()

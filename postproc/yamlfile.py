@@ -124,13 +124,15 @@ class Section:
         return value
 
     def numbers(
-        self, key: str, count: int, default: Sequence[float] | None = None, unit: str = ""
+        self, key: str, count: int | None, default: Sequence[float] | None = None, unit: str = ""
     ) -> list[float]:
+        """A list of ``count`` numbers (of one or more without it)."""
         node = self._get(key, _REQUIRED if default is None else default)
         if node is None:
             return [float(value) for value in default or ()]
-        if not isinstance(node, yaml.SequenceNode) or len(node.value) != count:
-            raise self.error("YML004", f"must be a list of {count} numbers", key)
+        right = isinstance(node, yaml.SequenceNode) and len(node.value) == (count or max(1, len(node.value)))
+        if not isinstance(node, yaml.SequenceNode) or not right:
+            raise self.error("YML004", f"must be a list of {count or 'one or more'} numbers", key)
         return [self._as_number(item, key, unit) for item in node.value]
 
     def text(self, key: str, default: object = _REQUIRED, choices: Sequence[str] = ()) -> str:

@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from postproc.effects import Conditions, State
 from postproc.geometry import Poses
+from postproc.robot.chain import Chain
 from postproc.toolpath import FrameRef, Kind, Toolpath
 
 
@@ -38,3 +40,21 @@ def motions(target: Poses, kind=Kind.LIN, axes=None, status=-1, turn=-1, **more)
         frames=(FrameRef(1, world), FrameRef(1, world)),
         **more,
     )
+
+
+def load_of(effect, values, robot, coordinates, motors):
+    """Force and slope (n, N) of a load at displaced ``coordinates`` (n, N) of a robot with ``motors`` at (n, N)."""
+    chain = Chain(robot.joints, robot.flange)
+    state = State(
+        chain=chain,
+        gravity=np.array([0.0, 0.0, -9.81]),
+        motors=motors,
+        rest=motors,
+        coordinates=coordinates,
+        swept=chain.sweep(coordinates, Poses.identity()),
+        wrench=np.zeros((6, motors.shape[1])),
+        conditions=Conditions(),
+    )
+    force, slope = np.zeros_like(coordinates), np.zeros_like(coordinates)
+    effect.add_force(values, state, force, slope)
+    return force, slope

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from postproc.effects import GravityCompensator
+from postproc.effects.gravity_compensator import GravityCompensator
 from postproc.geometry import Poses
 from postproc.model import StiffnessModel, Term
 from postproc.robot.description import KukaLengths, Robot, find_robot, load_robot
@@ -187,6 +187,7 @@ def with_compensator(model: StiffnessModel, **change: object) -> StiffnessModel:
         if isinstance(term.effect, GravityCompensator):
             old = term.effect
             effect = GravityCompensator(
+                model.robot.joints,
                 old.joint,
                 str(change.get("preload", old.preload)),
                 str(change.get("sign", old.sign)),

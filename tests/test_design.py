@@ -20,6 +20,7 @@ ROOMS = {
     "diagnosis": 6,
     "identification": 5,
     "experiments": 5,
+    "workspace": 5,
     "compensation": 5,
     "model": 4,
     "effects": 3,

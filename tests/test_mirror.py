@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from motions import milling_angles, motions
+from motions import load_of, milling_angles, motions
 from plant import SOFTER, kr270, random_tools, random_wrenches, with_compensator
 from scipy.optimize import brentq
 
@@ -13,8 +13,8 @@ from postproc.compensation.cuts import cuts_of, spread
 from postproc.compensation.mirror import MAX_ITERATIONS, difference, mirror, partly, predict
 from postproc.findings import Finding, Refusal
 from postproc.geometry import Poses, rotation_from_vector
-from postproc.model import StiffnessModel
-from postproc.robot.chain import generalized_force, tcp_position
+from postproc.model import NOTHING, StiffnessModel
+from postproc.robot.chain import generalized_force
 from postproc.robot.inverse import inverse, status_of
 from postproc.robot.track import follow
 from postproc.toolpath import Annotation, Kind
@@ -50,10 +50,12 @@ class Problem:
         self.status = status_of(model.robot.nominal, self.near)
 
     def mirror(self):
-        return mirror(self.model, self.wanted, self.wanted, self.tool, self.wrench, self.status, self.near)
+        return mirror(
+            self.model, self.wanted, self.wanted, self.tool, self.wrench, NOTHING, self.status, self.near
+        )
 
     def predict(self, command):
-        return predict(self.model, command, self.tool, self.wrench, self.status, self.near)
+        return predict(self.model, command, self.tool, self.wrench, NOTHING, self.status, self.near)
 
 
 def stepped(command, shift, turn):
@@ -102,6 +104,7 @@ def test_one_motion_is_corrected_as_in_the_batch():
             problem.wanted[rows],
             problem.tool[rows],
             problem.wrench[rows],
+            NOTHING,
             problem.status[rows],
             problem.near[rows],
         )
@@ -166,8 +169,8 @@ def inverse_of(problem, goal):
 
 def motor_angles(model, goal_angles, tool, wrench):
     """Motors that bring the deflected coordinates to ``goal_angles``: explicit, but for A2 with a balanced spring."""
-    swept = model.chain.sweep(np.ascontiguousarray(goal_angles.T))
-    torque = generalized_force(swept, tcp_position(swept, tool), wrench.T).T
+    swept = model.chain.sweep(np.ascontiguousarray(goal_angles.T), tool)
+    torque = generalized_force(swept, swept.position, wrench.T).T
     compliance = np.array([model.terms[0].values[f"c{i}"] for i in range(1, 7)])
     motors = goal_angles - compliance * torque
     for term in model.terms[1:]:
@@ -176,7 +179,9 @@ def motor_angles(model, goal_angles, tool, wrench):
             def miss(a2, angles=angles, without=motor[1], term=term):
                 stand = angles.copy()
                 stand[1] = a2
-                load = term.effect.force(term.values, angles[:, None], stand[:, None])[0][1, 0]
+                load = load_of(term.effect, term.values, model.robot, angles[:, None], stand[:, None])[0][
+                    1, 0
+                ]
                 return a2 - (without - compliance[1] * load)
 
             motors[row, 1] = brentq(miss, motor[1] - 0.1, motor[1] + 0.1, xtol=1e-15)
@@ -236,7 +241,7 @@ def test_unstable_spring_is_reported_as_no_rest():
         [1.0, 1.0, 0.0, 0.0], [100.0, 0, 300, 0, 0, 0]
     )  # a pencil on its tip does not rest either
     wanted = model.chain.flange(q) @ TOOL
-    done = mirror(model, wanted, wanted, TOOL, wrench, np.full(4, 2), q)
+    done = mirror(model, wanted, wanted, TOOL, wrench, NOTHING, np.full(4, 2), q)
     assert done.settled.tolist() == [False, True] * 2
     assert done.converged.tolist() == [False, True] * 2
     assert done.reachable.all()
@@ -245,7 +250,7 @@ def test_unstable_spring_is_reported_as_no_rest():
 def test_out_of_reach_is_reported():
     model = full()
     wanted = Poses(np.eye(3)[None], np.array([[5.0, 0.0, 1.0]]))
-    done = mirror(model, wanted, wanted, TOOL, np.ones((1, 6)), np.array([2]), np.zeros((1, 6)))
+    done = mirror(model, wanted, wanted, TOOL, np.ones((1, 6)), NOTHING, np.array([2]), np.zeros((1, 6)))
     assert not done.reachable[0]
     assert not done.converged[0]
 
@@ -306,6 +311,7 @@ def task(
         tool=tool,
         wrench=wrench,
         carries=carries,
+        conditions=NOTHING,
         process=process,
         gain=gain,
         max_correction=max_correction,
@@ -343,6 +349,7 @@ def test_cuts_are_corrected_and_air_is_not_touched():
         result.command[job_rows],
         TOOL,
         job.wrench[job_rows],
+        NOTHING,
         job.track.status[job_rows],
         job.track.q[job_rows],
     )
@@ -567,7 +574,7 @@ def test_process_keeps_the_sag_and_absolute_removes_it():
     still = np.zeros((9, 6))
 
     def real(job, command, wrench):
-        return predict(model, command, job.tool, wrench, job.track.status, job.track.q).pose
+        return predict(model, command, job.tool, wrench, NOTHING, job.track.status, job.track.q).pose
 
     sagged = real(process, process.wanted, still)
     sag = np.linalg.norm(sagged.position - process.wanted.position, axis=1)

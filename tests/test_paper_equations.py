@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from motions import load_of
 from plant import kr270, random_angles, random_tools, with_compensator
 
-from postproc.effects import GravityCompensator
+from postproc.effects.gravity_compensator import GravityCompensator
 from postproc.geometry import Poses, rotation_from_abc, vector_from_rotation
 from postproc.model import StiffnessModel
 from postproc.robot.inverse import inverse
@@ -32,7 +33,9 @@ angles = st.floats(-math.pi, math.pi)
 
 
 def spring(values, angle, effect=None):
-    return (effect or GravityCompensator(A2)).spring(values, np.atleast_1d(np.asarray(angle, float)))
+    return (effect or GravityCompensator(kr270().joints, A2)).spring(
+        values, np.atleast_1d(np.asarray(angle, float))
+    )
 
 
 def model(**change):
@@ -53,7 +56,7 @@ def test_length_is_the_distance_of_the_two_points(values, angle, zero):
     p0 = np.array([-values["a_x"], 0.0, -values["a_y"]])
     turned = angle - zero
     p1 = np.array([values["L"] * np.cos(turned), values["h"], -values["L"] * np.sin(turned)])
-    found = spring(values, angle, GravityCompensator(A2, zero=zero)).length
+    found = spring(values, angle, GravityCompensator(kr270().joints, A2, zero=zero)).length
     assert found[0] == pytest.approx(np.linalg.norm(p1 - p0), rel=1e-12)
 
 
@@ -121,12 +124,12 @@ def test_curvature_of_the_energy_is_minus_kc_a_l_eta(values, angle):
 @pytest.mark.parametrize("sign", ["energy", "as_printed"])
 def test_slope_belongs_to_the_force(preload, sign):
     """What the solver is given as derivative is that of the force, at displaced coordinates."""
-    effect = GravityCompensator(A2, preload, sign)
+    effect = GravityCompensator(kr270().joints, A2, preload, sign)
     motors = random_angles(kr270(), 20, np.random.default_rng(4)).T
     here, step = motors + 1e-3, np.zeros_like(motors)
     step[A2] = 1e-6
-    up, down = (effect.force(TABLE_1, here + move, motors)[0] for move in (step, -step))
-    force, slope = effect.force(TABLE_1, here, motors)
+    up, down = (load_of(effect, TABLE_1, kr270(), here + move, motors)[0] for move in (step, -step))
+    force, slope = load_of(effect, TABLE_1, kr270(), here, motors)
     np.testing.assert_allclose((up - down)[A2] / 2e-6, slope[A2], rtol=1e-5, atol=10.0)
     others = np.arange(6) != A2
     assert not force[others].any()
@@ -137,9 +140,13 @@ def test_preload_is_the_torque_at_the_motor_angle():
     motors = random_angles(kr270(), 20, np.random.default_rng(5)).T
     torque = spring(TABLE_1, motors[A2]).torque
     for sign in ("energy", "as_printed"):
-        at_rest = GravityCompensator(A2, "balanced", sign).force(TABLE_1, motors, motors)[0]
+        at_rest = load_of(
+            GravityCompensator(kr270().joints, A2, "balanced", sign), TABLE_1, kr270(), motors, motors
+        )[0]
         assert not at_rest.any()
-        acting = GravityCompensator(A2, "acting", sign).force(TABLE_1, motors, motors)[0]
+        acting = load_of(
+            GravityCompensator(kr270().joints, A2, "acting", sign), TABLE_1, kr270(), motors, motors
+        )[0]
         np.testing.assert_allclose(acting[A2], torque, rtol=1e-14)
 
 

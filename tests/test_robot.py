@@ -12,7 +12,7 @@ from plant import kr270, random_angles, random_tools
 from postproc.findings import Finding, Refusal
 from postproc.geometry import Poses, vector_from_rotation, wrapped
 from postproc.model import StiffnessModel
-from postproc.robot.chain import Chain, generalized_force, tcp_position
+from postproc.robot.chain import Chain, generalized_force
 from postproc.robot.description import KukaLengths, find_robot, load_robot, robot_files
 from postproc.robot.inverse import inverse, status_of, turn_of
 from postproc.robot.track import follow, near_singular, sides
@@ -89,8 +89,8 @@ def test_jacobian_is_the_derivative(chain, robot):
 def test_generalized_force_is_the_jacobian_transposed(chain, robot):
     rng = np.random.default_rng(4)
     q, tool, wrench = random_angles(robot, 50, rng), random_tools(50, rng), rng.normal(size=(50, 6))
-    swept = chain.sweep(np.ascontiguousarray(q.T))
-    torque = generalized_force(swept, tcp_position(swept, tool), wrench.T)
+    swept = chain.sweep(np.ascontiguousarray(q.T), tool)
+    torque = generalized_force(swept, swept.position, wrench.T)
     assert np.abs(torque.T - np.einsum("nij,ni->nj", chain.jacobian(q, tool), wrench)).max() < 1e-14
 
 

@@ -10,12 +10,13 @@ import click
 
 from postproc import __version__
 from postproc.cli.check import check
+from postproc.cli.map import map_
 from postproc.cli.predict import predict
 from postproc.cli.program import program
 from postproc.cli.robots import robots
 from postproc.findings import nearest
 
-COMMANDS = {"program": program, "check": check, "predict": predict, "robots": robots}
+COMMANDS = {"program": program, "check": check, "predict": predict, "map": map_, "robots": robots}
 
 
 @click.group(commands=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
@@ -31,6 +32,7 @@ def main() -> None:
       compensate panel.src --force --gain 0.5         a first cut with half the correction
       compensate check panel.src                      only read it, say what is not understood
       compensate predict panel.src --force            the deflection at every pose
+      compensate map --robot kuka_kr270 ...           where in the workspace the robot is stiff
     """
 
 

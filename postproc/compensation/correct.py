@@ -8,8 +8,9 @@ from enum import IntEnum
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.cuts import cuts_of, left_findings, spread, switched_on
+from postproc.compensation.cuts import cuts_of, left_findings, spread, switch_findings, switched_on
 from postproc.compensation.mirror import difference, mirror, partly, predict
+from postproc.effects import Conditions
 from postproc.findings import Finding, Refusal
 from postproc.geometry import Poses
 from postproc.model import StiffnessModel
@@ -30,9 +31,9 @@ class Task:
     """All that a correction needs, N motions.  Poses are in the robot base; NaN where a target is not known.
 
     wanted: TCP targets; base, tool (N): the programmed base in the robot base, the TCP on the flange; wrench (N, 6)
-    at the end of each motion, robot base axes; carries (N,): the motion has a force; ``process``: correct what the
-    force does and leave what the robot does without it (a base that was touched off contains that); else everything is
-    corrected.
+    at the end of each motion, robot base axes; carries (N,): the motion has a force; conditions (N): what else is
+    known; ``process``: correct what the force does and leave what the robot does without it (a base that was touched
+    off contains that); else everything is corrected.
     ``max_correction``, ``tolerance`` [m].
     """
 
@@ -45,6 +46,7 @@ class Task:
     tool: Poses
     wrench: Floats
     carries: Bools
+    conditions: Conditions
     process: bool
     gain: float
     max_correction: float
@@ -91,7 +93,7 @@ def correct(task: Task) -> Result:
         else np.where(scope, np.cumsum(scope & ~(forced & _shifted(forced))) - 1, -1)
     )
     on = switched_on(path)
-    findings: list[Finding] = []
+    findings = switch_findings(task.file, path)
     why = _held(task, scope, scope & on, findings)
     off = scope & ~on
     for row in np.flatnonzero(on & scope & spread(off, cut)):
@@ -102,7 +104,13 @@ def correct(task: Task) -> Result:
     rows = np.flatnonzero(seen)
     goal = _goal(task, rows)
     here = predict(
-        task.model, task.wanted[rows], task.tool[rows], task.wrench[rows], track.status[rows], track.q[rows]
+        task.model,
+        task.wanted[rows],
+        task.tool[rows],
+        task.wrench[rows],
+        task.conditions.part(rows),
+        track.status[rows],
+        track.q[rows],
     )
     deflection, before, before_angle = np.full((n, 3), np.nan), np.full(n, np.nan), np.full(n, np.nan)
     shift, turn = difference(here.pose, goal)
@@ -119,6 +127,7 @@ def correct(task: Task) -> Result:
         goal[inside],
         task.tool[rows_may],
         task.wrench[rows_may],
+        task.conditions.part(rows_may),
         track.status[rows_may],
         track.q[rows_may],
     )
@@ -174,6 +183,7 @@ def with_residual(task: Task, result: Result, command: Poses) -> Result:
         command[rows],
         task.tool[rows],
         task.wrench[rows],
+        task.conditions.part(rows),
         task.track.status[rows],
         task.track.q[rows],
     )
@@ -238,7 +248,9 @@ def _goal(task: Task, rows: Ints) -> Poses:
         return task.wanted[rows]
     still = np.zeros((len(rows), 6))
     status, near = task.track.status[rows], task.track.q[rows]
-    return predict(task.model, task.wanted[rows], task.tool[rows], still, status, near).pose
+    return predict(
+        task.model, task.wanted[rows], task.tool[rows], still, task.conditions.part(rows), status, near
+    ).pose
 
 
 def _judge(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 import numpy as np
@@ -9,6 +10,9 @@ import numpy as np
 from postproc.arrays import Bools, Ints
 from postproc.findings import Finding
 from postproc.toolpath import Toolpath
+
+
+_SWITCH = re.compile(r"COMPENSATE\s+(ON|OFF)(?![A-Z0-9_])", re.IGNORECASE)
 
 
 def cuts_of(in_scope: Bools) -> Ints:
@@ -34,10 +38,23 @@ def switched_on(toolpath: Toolpath) -> Bools:
     """(N,) what ``COMPENSATE OFF`` / ``COMPENSATE ON`` comments say; a motion before the first of them is on."""
     on = np.ones(len(toolpath), bool)
     for note in toolpath.annotations:
-        words = note.text.upper().split()
-        if words[:1] == ["COMPENSATE"] and words[1:] in (["ON"], ["OFF"]):
-            on[note.row :] = words[1] == "ON"
+        if found := _SWITCH.match(note.text.strip()):
+            on[note.row :] = found[1].upper() == "ON"
     return on
+
+
+def switch_findings(file: str, toolpath: Toolpath) -> list[Finding]:
+    """The comments that begin with COMPENSATE and switch nothing."""
+    return [
+        Finding(
+            "COR011",
+            f"{note.text.strip()[:60]!r} is neither COMPENSATE OFF nor COMPENSATE ON; it was not used",
+            file,
+            note.line,
+        )
+        for note in toolpath.annotations
+        if note.text.strip().upper().startswith("COMPENSATE") and not _SWITCH.match(note.text.strip())
+    ]
 
 
 def left_findings(file: str, toolpath: Toolpath, cut: Ints, why: Mapping[int, Finding]) -> list[Finding]:

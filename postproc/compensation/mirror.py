@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.effects import Conditions
 from postproc.geometry import Poses, rotation_from_vector, vector_from_rotation
 from postproc.model import StiffnessModel
 from postproc.robot.inverse import inverse
@@ -33,18 +34,29 @@ class Prediction:
 
     pose: Poses
     q: Floats
+    displacement: Floats
     reachable: Bools
     settled: Bools
 
 
 def predict(
-    model: StiffnessModel, command: Poses, tool: Poses, wrench: Floats, status: Ints, near: Floats
+    model: StiffnessModel,
+    command: Poses,
+    tool: Poses,
+    wrench: Floats,
+    conditions: Conditions,
+    status: Ints,
+    near: Floats,
+    start: Floats | None = None,
 ) -> Prediction:
     """The tool's pose when the controller is sent to ``command`` (N TCP poses in the robot base) under ``wrench``
-    (N, 6), in the branch ``status`` (N,), with turns nearest to ``near`` (N, 6) [rad]."""
+    (N, 6), in the branch ``status`` (N,), with turns nearest to ``near`` (N, 6) [rad].
+
+    ``start`` (N, m): the displacement of a state nearby, to begin the equilibrium with.
+    """
     found = inverse(model.robot.nominal, command @ tool.inverse(), status, near)
-    rest = model.equilibrium(found.q, wrench, tool)
-    return Prediction(rest.pose, found.q, found.reachable, rest.converged)
+    rest = model.equilibrium(found.q, wrench, tool, conditions, start)
+    return Prediction(rest.pose, found.q, rest.displacement, found.reachable, rest.converged)
 
 
 @dataclass(frozen=True)
@@ -71,6 +83,7 @@ def mirror(
     goal: Poses,
     tool: Poses,
     wrench: Floats,
+    conditions: Conditions,
     status: Ints,
     near: Floats,
 ) -> Correction:
@@ -85,6 +98,7 @@ def mirror(
     reachable, settled, converged = np.ones(n, bool), np.ones(n, bool), np.zeros(n, bool)
     history: list[Floats] = []
     last = np.full(n, np.inf)
+    bent: Floats | None = None
     active = np.arange(n)
     for iteration in range(MAX_ITERATIONS + 1):
         here = predict(
@@ -92,8 +106,10 @@ def mirror(
             Poses(rotation[active], position[active]),
             tool if tool.position.ndim == 1 else tool[active],
             wrench[active],
+            conditions.part(active),
             status[active],
             near[active],
+            bent,
         )
         shift, turn = difference(here.pose, goal[active])
         error, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
@@ -110,7 +126,7 @@ def mirror(
         last[active] = size
         if not going.any() or iteration == MAX_ITERATIONS:
             break
-        active = active[going]
+        active, bent = active[going], here.displacement[going]
         position[active] -= shift[going]
         rotation[active] = rotation_from_vector(-turn[going]) @ rotation[active]
     return Correction(

@@ -2,16 +2,58 @@
 
 from __future__ import annotations
 
-from postproc.effects.effect import ComplianceLaw, Effect, Load, Parameter, Values
+from postproc.effects.backlash import Backlash
+from postproc.effects.base_compliance import BaseCompliance
+from postproc.effects.base_offset import BaseOffset
+from postproc.effects.effect import ComplianceLaw, Conditions, Effect, Load, Offset, Parameter, State, Values
+from postproc.effects.force_sensor import ForceSensor
 from postproc.effects.gravity_compensator import GravityCompensator
+from postproc.effects.hysteresis import Hysteresis
 from postproc.effects.joint_compliance import JointCompliance
+from postproc.effects.joint_coupling import JointCoupling
+from postproc.effects.joint_offset import JointOffset
+from postproc.effects.joint_stiffening import JointStiffening
+from postproc.effects.link_compliance import LinkCompliance
+from postproc.effects.link_geometry import LinkGeometry
+from postproc.effects.link_gravity import LinkGravity
+from postproc.effects.payload import Payload
+from postproc.effects.thermal_growth import ThermalGrowth
+from postproc.effects.tool_compliance import ToolCompliance
+from postproc.effects.tool_offset import ToolOffset
+from postproc.effects.transmission_error import TransmissionError
 
 EFFECTS: dict[str, type[Effect]] = {
     effect.name: effect
     for effect in (
         JointCompliance,
+        ToolCompliance,
         GravityCompensator,
+        LinkGravity,
+        Payload,
+        BaseCompliance,
+        LinkCompliance,
+        JointStiffening,
+        Backlash,
+        Hysteresis,
+        TransmissionError,
+        JointOffset,
+        LinkGeometry,
+        JointCoupling,
+        ToolOffset,
+        BaseOffset,
+        ThermalGrowth,
+        ForceSensor,
     )
 }
 
-__all__ = ["EFFECTS", "ComplianceLaw", "Effect", "Load", "Parameter", "Values"]
+__all__ = [
+    "EFFECTS",
+    "ComplianceLaw",
+    "Conditions",
+    "Effect",
+    "Load",
+    "Offset",
+    "Parameter",
+    "State",
+    "Values",
+]

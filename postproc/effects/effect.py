@@ -1,18 +1,22 @@
 """What an effect is: a named piece of physics with parameters, added to one chain.
 
-An effect acts on the generalized coordinates of the chain (motor angle q plus displacement) in one of the ways
-below; the solver in ``model`` only sums.  Arrays are component first, (n, N): n coordinates, N states.
-A parameter at its null value is the same as no effect.
+An effect acts on the generalized coordinates of the chain in one of three ways: as an *offset* of coordinates, as a
+*load* on them, or as a *compliance law* (displacement under a generalized force).  The solver in ``model`` only sums.
+Arrays are component first: n joints, m coordinates, N states.  A parameter at its null value is the same as no effect.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar, Self
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
 
 from postproc.arrays import Floats
+from postproc.robot.chain import Chain, Sweep
+from postproc.robot.description import Joint
 from postproc.yamlfile import Section
 
 Values = Mapping[str, float]
@@ -20,7 +24,7 @@ Values = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Parameter:
-    """Name, SI unit, null value (effect absent), bounds, and where its definition comes from."""
+    """Name, SI unit, null value (effect absent), bounds, where its definition comes from, and the joint it is of."""
 
     name: str
     unit: str
@@ -28,39 +32,128 @@ class Parameter:
     lower: float = -math.inf
     upper: float = math.inf
     source: str = ""
+    joint: str = ""
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What else is known of N states; None where it is not.
+
+    spindle (N, 3): unit vector of the spindle, tip-ward, in tool axes; direction (N, n): sense in which each joint came
+    to its place (-1, 0, 1); temperature (N,) [K] over that of the calibration; time (N,) [s] since then; payload_mass
+    (N,) [kg] and payload_com (N, 3) [m, flange axes]: what hangs on the flange.
+    """
+
+    spindle: Floats | None = None
+    direction: Floats | None = None
+    temperature: Floats | None = None
+    time: Floats | None = None
+    payload_mass: Floats | None = None
+    payload_com: Floats | None = None
+
+    def part(self, rows: Any) -> Conditions:
+        """The conditions of some states."""
+        given = {f.name: getattr(self, f.name) for f in fields(self)}
+        return replace(self, **{name: None if v is None else v[rows] for name, v in given.items()})
+
+
+@dataclass(frozen=True)
+class State:
+    """N states of a chain as an effect sees them.
+
+    motors (n, N): as commanded; rest (m, N): coordinates without load, motors and offsets; coordinates (m, N): where
+    they are now; swept: the chain there; wrench (6, N) at the TCP, robot base axes; gravity (3,) [m/s2].
+    """
+
+    chain: Chain
+    gravity: Floats
+    motors: Floats
+    rest: Floats
+    coordinates: Floats
+    swept: Sweep
+    wrench: Floats
+    conditions: Conditions
 
 
 class Effect:
-    """Base of all effects.  ``family``: ``elastic``, ``geometric`` or ``weight`` (what a controller may correct)."""
+    """Base of all effects.
+
+    ``family``: what a controller may already correct (``geometric``, ``weight``), or ``elastic``, ``gear``.
+    ``coordinates``: extra coordinates of the chain that it needs.  ``by_direction``: it asks how joints came to their
+    place.
+    """
 
     name: ClassVar[str]
     family: ClassVar[str]
+    by_direction: ClassVar[bool] = False
     parameters: tuple[Parameter, ...]
+    coordinates: tuple[str, ...] = ()
 
     @classmethod
-    def from_options(cls, options: Section, joint_names: tuple[str, ...]) -> Self:
+    def from_options(cls, options: Section, joints: Sequence[Joint]) -> Self:
         """The effect as the ``options:`` of a robot file describe it.  Raises Refusal with the line."""
-        raise NotImplementedError
+        options.only()
+        return cls(joints)
+
+    def __init__(self, joints: Sequence[Joint]) -> None:
+        """The effect without options, on an arm with ``joints``."""
 
     def described(self) -> dict[str, object]:
         """The options, for reports."""
         return {}
 
 
-class ComplianceLaw(Effect):
-    """Displacement of the coordinates as a function of the generalized force on them."""
+class Offset(Effect):
+    """Coordinates that stand elsewhere than the controller believes."""
 
-    def displacement(self, values: Values, force: Floats) -> tuple[Floats, Floats]:
-        """Displacement (n, N) [rad] under ``force`` (n, N) [N m], and its derivative, coordinate by coordinate."""
+    def add_offset(
+        self, values: Values, chain: Chain, motors: Floats, conditions: Conditions, offset: Floats
+    ) -> None:
+        """Add to ``offset`` (m, N) [rad, m], in place."""
+        raise NotImplementedError
+
+
+class ComplianceLaw(Effect):
+    """Displacement of coordinates as a function of the generalized force on them."""
+
+    def add_displacement(
+        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
+    ) -> None:
+        """Add to ``displacement`` (m, N) [rad, m] under ``force`` (m, N) [N m, N], and its derivative to ``slope``,
+        coordinate by coordinate; both in place."""
         raise NotImplementedError
 
 
 class Load(Effect):
-    """A generalized force on the coordinates, from an energy."""
+    """A generalized force on coordinates."""
 
-    def force(self, values: Values, coordinates: Floats, motors: Floats) -> tuple[Floats, Floats]:
-        """Force (n, N) [N m] at displaced ``coordinates`` (n, N) of a robot whose ``motors`` stand at (n, N) [rad].
+    conservative: ClassVar[bool] = True
 
-        The second result is its derivative with respect to the coordinates, coordinate by coordinate.
-        """
+    def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
+        """Add to ``force`` (m, N) [N m, N] and its derivative by the own coordinate to ``slope``; both in place."""
         raise NotImplementedError
+
+    def energy(self, values: Values, state: State) -> Floats:
+        """Energy (N,) [J] of which the force is the negative gradient (where ``conservative``)."""
+        raise NotImplementedError
+
+
+def per_joint(
+    joints: Sequence[Joint],
+    letter: str,
+    units: tuple[str, str],
+    lower: float,
+    upper: float,
+    source: str,
+    null: float = 0.0,
+) -> tuple[Parameter, ...]:
+    """One parameter a joint, ``letter`` and number; ``units`` of a turning and of a sliding joint."""
+    return tuple(
+        Parameter(f"{letter}{i}", units[joint.kind != "revolute"], null, lower, upper, source, joint.name)
+        for i, joint in enumerate(joints, 1)
+    )
+
+
+def column(values: Values, parameters: Sequence[Parameter]) -> Floats:
+    """The values of ``parameters`` as a column (k, 1)."""
+    return np.array([values[parameter.name] for parameter in parameters])[:, None]

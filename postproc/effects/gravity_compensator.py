@@ -15,12 +15,14 @@ reading is kept as the option ``sign: as_printed`` and is no spring.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.effects.effect import Load, Parameter, Values
+from postproc.effects.effect import Load, Parameter, State, Values
+from postproc.robot.description import Joint
 from postproc.units import DEG
 from postproc.yamlfile import Section
 
@@ -48,9 +50,15 @@ class GravityCompensator(Load):
     family = "elastic"
 
     def __init__(
-        self, joint: int, preload: str = "balanced", sign: str = "energy", zero: float = 0.0
+        self,
+        joints: Sequence[Joint],
+        joint: int = 1,
+        preload: str = "balanced",
+        sign: str = "energy",
+        zero: float = 0.0,
     ) -> None:
         self.joint = joint
+        self.joint_name = joints[joint].name
         self.preload = preload
         self.sign = sign
         self.zero = zero
@@ -64,11 +72,13 @@ class GravityCompensator(Load):
         )
 
     @classmethod
-    def from_options(cls, options: Section, joint_names: tuple[str, ...]) -> GravityCompensator:
+    def from_options(cls, options: Section, joints: Sequence[Joint]) -> Self:
         options.only("joint", "preload", "sign", "zero_deg")
-        name = options.text("joint", choices=joint_names)
+        names = [joint.name for joint in joints if joint.kind == "revolute"]
+        name = options.text("joint", choices=names)
         return cls(
-            joint_names.index(name),
+            joints,
+            [joint.name for joint in joints].index(name),
             options.text("preload", "balanced", ("balanced", "acting")),
             options.text("sign", "energy", ("energy", "as_printed")),
             options.number("zero_deg", 0.0, -360.0, 360.0) * DEG,
@@ -76,7 +86,7 @@ class GravityCompensator(Load):
 
     def described(self) -> dict[str, object]:
         return {
-            "joint": f"A{self.joint + 1}",
+            "joint": self.joint_name,
             "preload": self.preload,
             "sign": self.sign,
             "zero_deg": self.zero / DEG,
@@ -94,11 +104,15 @@ class GravityCompensator(Load):
         eta = cosine - ratio * (product / (s * s) * sine * sine + cosine)
         return SpringState(s, 0.5 * k * (s - s0) ** 2, k * (1 - ratio) * product * sine, k * product * eta)
 
-    def force(self, values: Values, coordinates: Floats, motors: Floats) -> tuple[Floats, Floats]:
-        here = self.spring(values, coordinates[self.joint])
-        rest = self.spring(values, motors[self.joint]).torque
+    def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
+        row = state.chain.motor_rows[self.joint]
+        here = self.spring(values, state.coordinates[row])
+        rest = self.spring(values, state.rest[row]).torque
         sign = 1.0 if self.sign == "energy" else -1.0
-        force, slope = np.zeros_like(coordinates), np.zeros_like(coordinates)
-        force[self.joint] = sign * (here.torque - rest) + (rest if self.preload == "acting" else 0.0)
-        slope[self.joint] = sign * here.slope
-        return force, slope
+        force[row] += sign * (here.torque - rest) + (rest if self.preload == "acting" else 0.0)
+        slope[row] += sign * here.slope
+
+    def energy(self, values: Values, state: State) -> Floats:
+        row = state.chain.motor_rows[self.joint]
+        rest = self.spring(values, state.rest[row]).torque if self.preload == "balanced" else 0.0
+        return np.asarray(self.spring(values, state.coordinates[row]).energy + rest * state.coordinates[row])

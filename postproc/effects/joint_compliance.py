@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
 
 from postproc.arrays import Floats
-from postproc.effects.effect import ComplianceLaw, Parameter, Values
-from postproc.yamlfile import Section
+from postproc.effects.effect import ComplianceLaw, State, Values, column, per_joint
+from postproc.robot.description import Joint
 
 
 class JointCompliance(ComplianceLaw):
-    """theta_i = c_i tau_i, c_i [rad/(N m)]; zero is a rigid joint.
+    """theta_i = c_i tau_i, c_i [rad/(N m)] (a sliding joint: [m/N]); zero is a rigid joint.
 
     The inverse of K_theta^0 in eq. (6) of Klimchik et al.; c_i are the k_i of their Table 1.
     """
@@ -18,17 +18,13 @@ class JointCompliance(ComplianceLaw):
     name = "joint_compliance"
     family = "elastic"
 
-    def __init__(self, joint_names: tuple[str, ...]) -> None:
-        self.parameters = tuple(
-            Parameter(f"c{i}", "rad/(N m)", 0.0, 0.0, 1e-2, "VJM: Klimchik et al., Sec. 3")
-            for i in range(1, len(joint_names) + 1)
-        )
+    def __init__(self, joints: Sequence[Joint]) -> None:
+        source = "virtual joint model: Klimchik et al., Sec. 3"
+        self.parameters = per_joint(joints, "c", ("rad/(N m)", "m/N"), 0.0, 1e-2, source)
 
-    @classmethod
-    def from_options(cls, options: Section, joint_names: tuple[str, ...]) -> JointCompliance:
-        options.only()
-        return cls(joint_names)
-
-    def displacement(self, values: Values, force: Floats) -> tuple[Floats, Floats]:
-        compliance = np.array([values[p.name] for p in self.parameters])[:, None]
-        return compliance * force, compliance
+    def add_displacement(
+        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
+    ) -> None:
+        compliance, motors = column(values, self.parameters), state.chain.motors
+        displacement[motors] += compliance * force[motors]
+        slope[motors] += compliance

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import os
 from collections.abc import Sequence
 
 import numpy as np
@@ -75,7 +76,7 @@ def unified_diff(document: Document, name: str, edits: Sequence[Edit]) -> bytes:
     blocks = _changed_lines(document, edits)
     if not blocks:
         return b""
-    out = [f"--- {document.path.name}\n+++ {name}\n".encode()]
+    out = [b"--- %s\n+++ %s\n" % (os.fsencode(document.path.name), os.fsencode(name))]
     hunks: list[list[tuple[int, int, list[Edit]]]] = []
     for block in blocks:
         if hunks and block[0] - hunks[-1][-1][1] <= 2 * CONTEXT:
@@ -123,7 +124,7 @@ def _edited(document: Document, first: int, final: int, edits: Sequence[Edit]) -
     stop = max(start, stop)
     part = Document(document.path, document.raw[start:stop])
     here = [Edit(Span(0, e.span.start - start, e.span.stop - start), e.text) for e in edits]
-    return apply(part, here).splitlines(keepends=True)
+    return io.BytesIO(apply(part, here)).readlines()
 
 
 def _lines(document: Document, first: int, final: int) -> list[bytes]:

@@ -1,117 +1,245 @@
 """The kinematic chain: described by Pinocchio, evaluated for whole batches in numpy.
 
-Pinocchio's model is the one description and the reference.  Its joint placements are read back into the
-batch evaluation, which works component-wise on arrays with the poses in the last, contiguous axis.
+A chain is a row of coordinates, each a turn about or a shift along the z axis of its own frame: the motors, and
+between them the extra coordinates that a model asks for by name:
+
+    base.x .y .z .rx .ry .rz         before the first joint, axes of the robot base
+    A2.growth                        before joint A2, along the line from the joint before to it
+    A2.x .y .z .rx .ry .rz           at joint A2 before its own motion, axes of its frame (z is the joint's axis)
+    tool.x .y .z .rx .ry .rz         at the TCP, axes of the tool
+    spindle.x .y .z                  at the TCP, z along the spindle, tip-ward
+
+Pinocchio's model describes the chain up to the flange and is the reference.  Its joint placements are read back into
+the batch evaluation, which works component-wise on arrays with the states in the last, contiguous axis.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
-from postproc.arrays import Floats
+from postproc.arrays import Bools, Floats
 from postproc.geometry import Poses
 from postproc.robot.description import Joint
+
+TOOL = Poses.identity()
+"""A TCP on the flange itself."""
+
+_SIX = ("x", "y", "z", "rx", "ry", "rz")
+# Frames whose z axis is x, y, z of the site: rotations of zeros and ones.
+_Z_ALONG = [np.roll(np.eye(3), shift, axis=1) for shift in (2, 1, 0)]
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """The chain at N states, component first: ``axes`` and ``origins`` (n, 3, N) of the joints in the robot base,
-    ``rotation`` (3, 3, N; row, column) and ``position`` (3, N) of the flange [m]."""
+    """The chain at N states, component first.
+
+    axes, origins (m, 3, N): of the coordinates, in the robot base; turns (m,): a turn, or else a shift; tcp: the three
+    columns (3, N) of its rotation; position (3, N) [m] of the TCP; flange: columns and position of the flange; links:
+    the columns of the frame behind each motor.
+    """
 
     axes: Floats
     origins: Floats
-    rotation: Floats
+    turns: Bools
+    tcp: tuple[Floats, ...]
     position: Floats
+    flange: tuple[tuple[Floats, ...], Floats]
+    links: tuple[tuple[Floats, ...], ...]
+
+    @property
+    def pose(self) -> Poses:
+        """The TCP (N) in the robot base."""
+        return _poses(self.tcp, self.position)
 
 
 class Chain:
-    """A serial chain of revolute joints about their own z axes, with a flange at its end."""
+    """A serial chain of ``joints`` with a ``flange``, and the extra coordinates named in ``extras``.
 
-    def __init__(self, joints: tuple[Joint, ...], flange: Poses) -> None:
+    names (m,): of the coordinates; motors: where the joints stand among them (a slice without extras).
+    """
+
+    def __init__(self, joints: Sequence[Joint], flange: Poses, extras: Iterable[str] = ()) -> None:
+        wanted = set(extras)
         self.model = pin.Model()
-        parent = 0
+        self._at = Poses.identity()
+        self._parent = 0
+        self._arm: list[tuple[Floats, Floats, bool]] = []
+        names: list[str] = []
+        motors: list[int] = []
+        names += self._site("base", wanted)
         for joint in joints:
-            placement = pin.SE3(np.array(joint.placement.rotation), np.array(joint.placement.position))
-            parent = self.model.addJoint(parent, pin.JointModelRZ(), placement, joint.name)
-        tip = pin.SE3(np.array(flange.rotation), np.array(flange.position))
-        frame = pin.Frame("flange", parent, 0, tip, pin.FrameType.OP_FRAME)
+            if f"{joint.name}.growth" in wanted:
+                self._add(f"{joint.name}.growth", _z_along(joint.placement.position), turns=False)
+                names.append(f"{joint.name}.growth")
+            self._at = self._at @ joint.placement
+            names += self._site(joint.name, wanted)
+            motors.append(len(names))
+            names.append(joint.name)
+            self._add(joint.name, np.eye(3), joint.kind == "revolute")
+        tip = self._at @ flange
+        frame = pin.Frame("flange", self._parent, 0, _se3(tip), pin.FrameType.OP_FRAME)
         self.flange_id = self.model.addFrame(frame)
-        self._placements = [self.model.jointPlacements[i] for i in range(1, self.model.njoints)]
-        self._tip = self.model.frames[self.flange_id].placement
+        self._tip = tip
+        self._tool = [name for name in (f"tool.{axis}" for axis in _SIX) if name in wanted]
+        self._spindle = [name for name in ("spindle.x", "spindle.y", "spindle.z") if name in wanted]
+        self.names = (*names, *self._tool, *self._spindle)
+        unknown = wanted.difference(self.names)
+        if unknown:
+            raise ValueError(f"a chain has no coordinates {sorted(unknown)}")
+        self.index = {name: i for i, name in enumerate(self.names)}
+        self.motors = slice(0, len(motors)) if motors == list(range(len(motors))) else np.array(motors)
+        self.motor_rows = np.array(motors)
+        turns = [*(turns for *_, turns in self._arm), *(name[5] == "r" for name in self._tool)]
+        self.turns = np.array([*turns, *(False for _ in self._spindle)])
 
     @property
     def size(self) -> int:
-        return int(self.model.nq)
+        """Number of coordinates, m."""
+        return len(self.names)
 
-    def sweep(self, q: Floats) -> Sweep:
-        """Evaluate at joint angles ``q`` (n, N) [rad]."""
-        n, count = q.shape
-        sines, cosines = np.sin(q), np.cos(q)
-        axes, origins = np.empty((n, 3, count)), np.empty((n, 3, count))
-        columns = [np.repeat(unit[:, None], count, axis=1) for unit in np.eye(3)]
+    def _site(self, site: str, wanted: set[str]) -> list[str]:
+        """Add the wanted ones of the six coordinates at the place where the chain ends now; their names."""
+        names = []
+        for axis, word in enumerate(_SIX):
+            if f"{site}.{word}" in wanted:
+                self._add(f"{site}.{word}", _Z_ALONG[axis % 3], turns=axis >= 3)
+                names.append(f"{site}.{word}")
+        return names
+
+    def _add(self, name: str, axes: Floats, turns: bool) -> None:
+        """A coordinate about or along the z column of ``axes``; what follows stands in the axes before it."""
+        placement = self._at @ Poses(axes, np.zeros(3))
+        joint = pin.JointModelRZ() if turns else pin.JointModelPZ()
+        self._parent = self.model.addJoint(self._parent, joint, _se3(placement), name)
+        described = self.model.jointPlacements[self._parent]
+        self._arm.append((described.rotation.copy(), described.translation.copy(), turns))
+        self._at = Poses(axes.T, np.zeros(3))
+
+    def sweep(self, coordinates: Floats, tool: Poses, spindle: Floats | None = None) -> Sweep:
+        """Evaluate at ``coordinates`` (m, N) [rad, m].
+
+        ``tool``: TCP on the flange, one pose or N; ``spindle`` (3, N): unit vector of the spindle, tip-ward, in tool
+        axes (tool z without it).
+        """
+        count = coordinates.shape[1]
+        axes, origins = np.empty((self.size, 3, count)), np.empty((self.size, 3, count))
+        columns: list[Floats] = [np.repeat(unit[:, None], count, axis=1) for unit in np.eye(3)]
         position = np.zeros((3, count))
-        for i, placement in enumerate(self._placements):
-            position = _along(columns, placement.translation, position)
-            x, y, z = (_along(columns, column) for column in placement.rotation.T)
-            sine, cosine = sines[i], cosines[i]
-            columns = [cosine * x + sine * y, cosine * y - sine * x, z]
-            axes[i], origins[i] = z, position
-        position = _along(columns, self._tip.translation, position)
+        links = []
+        motors = set(self.motor_rows.tolist())
+        for i, (rotation, translation, turns) in enumerate(self._arm):
+            position = _along(columns, translation, position)
+            columns = [_along(columns, column) for column in rotation.T]
+            axes[i], origins[i] = columns[2], position
+            if turns:
+                columns[:2] = _turned(columns[0], columns[1], coordinates[i])
+            else:
+                position = position + coordinates[i] * columns[2]
+            if i in motors:
+                links.append(tuple(columns))
+        position = _along(columns, self._tip.position, position)
         columns = [_along(columns, column) for column in self._tip.rotation.T]
-        return Sweep(axes, origins, np.stack(columns, axis=1), position)
+        flange = (tuple(columns), position)
+        position = position + _combined(columns, tool.position)
+        columns = [_combined(columns, tool.rotation[..., k]) for k in range(3)]
+        i = len(self._arm)
+        for name in self._tool:
+            k = "xyz".index(name[-1])
+            axes[i], origins[i] = columns[k], position
+            if self.turns[i]:
+                a, b = (k + 1) % 3, (k + 2) % 3
+                columns[a], columns[b] = _turned(columns[a], columns[b], coordinates[i])
+            else:
+                position = position + coordinates[i] * columns[k]
+            i += 1
+        if self._spindle:
+            for name, direction in zip(self._spindle, self._spindle_axes(columns, spindle), strict=True):
+                axes[i], origins[i] = direction, position
+                position = position + coordinates[self.index[name]] * direction
+                i += 1
+        return Sweep(axes, origins, self.turns, tuple(columns), position, flange, tuple(links))
+
+    def _spindle_axes(self, columns: list[Floats], spindle: Floats | None) -> list[Floats]:
+        """Directions (3, N) of the spindle coordinates: two across the spindle, one along it."""
+        if spindle is None:
+            three = columns
+        else:
+            along = _combined(columns, spindle.T)
+            # The tool axis least along the spindle, made square to it; across the spindle all directions are alike.
+            least = np.argmin(np.abs(spindle), axis=0)
+            guide = np.choose(least, columns)
+            across = guide - np.sum(guide * along, axis=0) * along
+            across = across / np.sqrt(np.sum(across * across, axis=0))
+            three = [across, np.cross(along, across, axis=0), along]
+        return [three["xyz".index(name[-1])] for name in self._spindle]
+
+    def placed(self, q: Floats) -> Floats:
+        """Coordinates (m, N) of a rigid robot with its motors at ``q`` (N, n) [rad]."""
+        coordinates = np.zeros((self.size, len(q)))
+        coordinates[self.motors] = q.T
+        return coordinates
 
     def flange(self, q: Floats) -> Poses:
-        """Flange poses at ``q`` (N, n) [rad] in the robot base."""
-        swept = self.sweep(np.ascontiguousarray(q.T))
-        return Poses(np.moveaxis(swept.rotation, -1, 0), np.ascontiguousarray(swept.position.T))
+        """Flange poses (N) of the rigid robot at ``q`` (N, n) [rad], in the robot base."""
+        return _poses(*self.sweep(self.placed(q), TOOL).flange)
 
     def jacobian(self, q: Floats, tool: Poses) -> Floats:
-        """Geometric Jacobians (N, 6, n) of the TCP: linear part first, axes of the robot base.
-
-        Column i is [z_i x (p - p_i); z_i] (a revolute joint).
-        """
-        swept = self.sweep(np.ascontiguousarray(q.T))
-        arm = tcp_position(swept, tool)[None] - swept.origins
-        linear = np.cross(swept.axes, arm, axis=1)
-        return np.moveaxis(np.concatenate([linear, swept.axes], axis=1), (0, 1, 2), (2, 1, 0))
+        """Geometric Jacobians (N, 6, m) of the TCP at ``q`` (N, n): linear part first, axes of the robot base."""
+        return jacobian(self.sweep(self.placed(q), tool))
 
     def reference_flange(self, q: Floats) -> Poses:
         """``flange`` by Pinocchio itself, state by state: the reference for the batch evaluation."""
         data = self.model.createData()
         rotation, position = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
-        for row, state in enumerate(q):
+        for row, state in enumerate(self.placed(q)[: self.model.nq].T):
             pin.framesForwardKinematics(self.model, data, state)
             rotation[row] = data.oMf[self.flange_id].rotation
             position[row] = data.oMf[self.flange_id].translation
         return Poses(rotation, position)
 
 
-def tcp_position(swept: Sweep, tool: Poses) -> Floats:
-    """(3, N) [m] position of the TCP; ``tool`` is its pose on the flange, one or N."""
-    offset = np.broadcast_to(tool.position, (swept.position.shape[1], 3)).T
-    return swept.position + np.einsum("ijn,jn->in", swept.rotation, offset)
+def jacobian(swept: Sweep) -> Floats:
+    """Geometric Jacobians (N, 6, m) of the TCP: column [z x (p - p_i); z] of a turn, [z; 0] of a shift."""
+    turns = swept.turns[:, None, None]
+    lever = np.cross(swept.axes, swept.position[None] - swept.origins, axis=1)
+    linear, angular = np.where(turns, lever, swept.axes), np.where(turns, swept.axes, 0.0)
+    return np.moveaxis(np.concatenate([linear, angular], axis=1), (0, 1, 2), (2, 1, 0))
 
 
 def generalized_force(swept: Sweep, point: Floats, wrench: Floats) -> Floats:
-    """J^T w (n, N) [N m] of a wrench (6, N) [N, N m] that acts at ``point`` (3, N) [m]; robot base axes.
+    """J^T w (m, N) [N m, N] of a wrench (6, N) [N, N m] that acts at ``point`` (3, N) [m]; robot base axes.
 
-    tau_i = z_i . (m + (p - p_i) x f)
+    tau_i = z_i . (m + (p - p_i) x f) for a turn, z_i . f for a shift.
     """
     fx, fy, fz = wrench[:3]
-    mx, my, mz = wrench[3:] + _cross(point, wrench[:3])
+    mx, my, mz = wrench[3:] + cross(point, wrench[:3])
     px, py, pz = swept.origins[:, 0], swept.origins[:, 1], swept.origins[:, 2]
     zx, zy, zz = swept.axes[:, 0], swept.axes[:, 1], swept.axes[:, 2]
-    return zx * (mx - (py * fz - pz * fy)) + zy * (my - (pz * fx - px * fz)) + zz * (mz - (px * fy - py * fx))
+    force = (
+        zx * (mx - (py * fz - pz * fy)) + zy * (my - (pz * fx - px * fz)) + zz * (mz - (px * fy - py * fx))
+    )
+    if not swept.turns.all():
+        shifts = ~swept.turns
+        force[shifts] = zx[shifts] * fx + zy[shifts] * fy + zz[shifts] * fz
+    return force
 
 
-def _cross(a: Floats, b: Floats) -> Floats:
+def cross(a: Floats, b: Floats) -> Floats:
+    """a x b of (3, N) arrays."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def _along(columns: list[Floats], weights: Floats, start: Floats | None = None) -> Floats:
+def _turned(first: Floats, second: Floats, angle: Floats) -> tuple[Floats, Floats]:
+    """Two axes (3, N) turned by ``angle`` (N,) in their plane, from the first to the second."""
+    sine, cosine = np.sin(angle), np.cos(angle)
+    return cosine * first + sine * second, cosine * second - sine * first
+
+
+def _along(columns: Sequence[Floats], weights: Floats, start: Floats | None = None) -> Floats:
     """start + sum of weight * column; the many zeros of a robot's placements cost nothing."""
     total = start
     for column, weight in zip(columns, weights, strict=True):
@@ -120,3 +248,32 @@ def _along(columns: list[Floats], weights: Floats, start: Floats | None = None) 
         term = column if weight == 1.0 else weight * column
         total = term if total is None else total + term
     return np.zeros_like(columns[0]) if total is None else total
+
+
+def _combined(columns: Sequence[Floats], weights: Floats) -> Floats:
+    """Sum of weight * column (3, N); ``weights`` (3,) for all states or (N, 3)."""
+    if weights.ndim == 1:
+        return _along(columns, weights)
+    return columns[0] * weights[:, 0] + columns[1] * weights[:, 1] + columns[2] * weights[:, 2]
+
+
+def _poses(columns: Sequence[Floats], position: Floats) -> Poses:
+    rotation = np.empty((position.shape[1], 3, 3))
+    for k, column in enumerate(columns):
+        rotation[:, :, k] = column.T
+    return Poses(rotation, np.ascontiguousarray(position.T))
+
+
+def _z_along(direction: Floats) -> Floats:
+    """A rotation whose z column points along ``direction`` (any for a zero vector)."""
+    length = float(np.linalg.norm(direction))
+    if length == 0.0:
+        return np.eye(3)
+    z = direction / length
+    x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+    x /= np.linalg.norm(x)
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def _se3(pose: Poses) -> pin.SE3:
+    return pin.SE3(np.array(pose.rotation), np.array(pose.position))

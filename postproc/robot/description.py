@@ -17,16 +17,17 @@ from postproc.yamlfile import Section, load
 
 @dataclass(frozen=True)
 class Joint:
-    """A revolute joint: it turns about the z axis of its own frame.
+    """A joint that turns about (``revolute``) or moves along (``prismatic``) the z axis of its own frame.
 
-    ``placement``: that frame in the frame of the joint before (of the base for the first), at angle zero.
-    ``lower``, ``upper`` [rad].
+    ``placement``: that frame in the frame of the joint before (of the base for the first), at value zero.
+    ``lower``, ``upper`` [rad, m].
     """
 
     name: str
     placement: Poses
     lower: float
     upper: float
+    kind: str = "revolute"
 
 
 @dataclass(frozen=True)

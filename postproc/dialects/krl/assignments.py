@@ -222,7 +222,10 @@ def _set_variable(run: Run, said: Assignment) -> None:
         return
     run.mentioned |= identifiers(said.value)
     value, before = number(said.value.strip()), variables.get(key)
-    if before is None or said.path in EXTERNAL:
+    if before is None:
+        return
+    if said.path in EXTERNAL:
+        variables[key] = before.with_external(said.path, value)
         return
     if said.path in (b"S", b"T"):
         variables[key] = before.with_state(said.path, value)

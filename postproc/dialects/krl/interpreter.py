@@ -25,7 +25,15 @@ from postproc.dialects.krl.lexing import (
 from postproc.dialects.krl.rows import HELP, Rows
 from postproc.dialects.krl.run import Open, Run
 from postproc.dialects.krl.state import State
-from postproc.dialects.krl.survey import HIDDEN, PATH_FROM_FILE, Block, Routine, is_harmless, survey
+from postproc.dialects.krl.survey import (
+    HIDDEN,
+    PATH_FROM_FILE,
+    Block,
+    Routine,
+    functions_of,
+    is_harmless,
+    survey,
+)
 from postproc.dialects.krl.target import QUICK, quick
 from postproc.document import Document, Span
 from postproc.findings import Finding
@@ -33,7 +41,7 @@ from postproc.toolpath import Annotation
 
 _ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 _WITH = re.compile(rb"\bWITH\b", re.I)
-_MARKER = re.compile(rb"^(?:\xef\xbb\xbf)?([ \t]*;COMPENSATED [^\r\n]*)", re.M)
+_MARKER = re.compile(rb"^(?:\xef\xbb\xbf)?([ \t]*;COMPENSATED by compensate [^\r\n]*)", re.M)
 _MOTION = Statement("motion", b"", b"", 0, 0)
 
 Line = Statement | tuple[int, int, int]
@@ -89,6 +97,8 @@ def _step(run: Run, index: int, item: Statement) -> None:
     if item.comment and _ANNOTATION.match(item.comment):
         text = item.comment[1:].decode("latin-1").strip()
         run.rows.annotations.append(Annotation(len(run.rows), text, item.line))
+    for name in functions_of(item):
+        _called(run, item, name, item.code)
     for what, block in run.survey.events.get(index, ()):
         if what == "open":
             _open(run, block, item)
@@ -164,19 +174,24 @@ def _call(run: Run, item: Statement, said: Call) -> None:
     if said.name == b"BAS":
         command(run, item, said.arguments)
         return
-    words = identifiers(said.arguments)
-    run.mentioned |= words
-    shown = said.name.decode("latin-1")
+    run.mentioned |= identifiers(said.arguments)
+    _called(run, item, said.name, said.arguments)
+
+
+def _called(run: Run, item: Statement, name: bytes, given: bytes) -> None:
+    """Takes up that a routine or function ran; the names in ``given`` may come back from it changed."""
+    words = identifiers(given)
+    shown = name.decode("latin-1")
     why = f"after the call of {shown} in line {item.line}"
-    routine = run.survey.routines.get(said.name)
+    routine = run.survey.routines.get(name)
     if routine is not None:
         run.rows.sources[b"routine %d" % routine.line] |= run.state.sources
         run.forget(routine.effects | words, why)
         return
-    if is_harmless(said.name):
+    if is_harmless(name):
         return
     run.forget({"point", *words}, why)
-    if said.name.startswith(PATH_FROM_FILE):
+    if name.startswith(PATH_FROM_FILE):
         run.tell("KRL021", f"{shown} reads its path from a file; nothing of that is corrected", item)
     else:
         message = (

@@ -20,6 +20,14 @@ _APPROXIMATION = re.compile(rb"(?:[ \t,]*C_(?:DIS|VEL|ORI|PTP|SPL)\b){0,2}[ \t]*
 _COMPUTED = re.compile(rb"[ \t]*[:+\-*/(]")
 _WITH = re.compile(rb"[ \t]*(?:C_[A-Za-z]+[ \t]*)*WITH\b", re.I)
 _CIRCLE_ANGLE = re.compile(rb"[ \t]*,[ \t]*CA\b", re.I)
+_RELATIVE = {
+    b"PTP_REL": Kind.PTP,
+    b"SPTP_REL": Kind.PTP,
+    b"LIN_REL": Kind.LIN,
+    b"SLIN_REL": Kind.LIN,
+    b"CIRC_REL": Kind.CIRC,
+    b"SCIRC_REL": Kind.CIRC,
+}
 _HOME = re.compile(rb"X?HOME[1-5]?\Z")
 
 
@@ -51,7 +59,9 @@ def move(run: Run, statement: Statement) -> None:
         reason = Reason(
             "KRL008", "a relative motion; it and the motion before it are kept as they are", "rel"
         )
-        _enter(run, statement.line, statement.at, Kind.OTHER, Unclear("KRL008", ""), reason)
+        spline = in_spline(item.block for item in run.stack)
+        kind = Kind.OTHER if spline else _RELATIVE.get(word, Kind.OTHER)
+        _enter(run, statement.line, statement.at, kind, Unclear("KRL008", ""), reason)
         return
     if word in (b"CIRC", b"SCIRC"):
         _arc(run, statement, operand, at + len(text))
@@ -190,6 +200,8 @@ def _enter(
         reason = structure
     clear = target if isinstance(target, Target) else None
     row = run.rows.add(kind, line, at, state, values, axes, clear, anchor)
+    if clear is not None and clear.external:
+        run.rows.follow_external(row, clear)
     if reason is not None:
         run.rows.reasons[row] = reason
     relative = isinstance(target, Unclear) and target.code == "KRL008"

@@ -47,6 +47,7 @@ HELP = {
     "KRL015": "Move the cut into the first DEF of the file, or make the subprogram a file of its own.",
     "KRL016": "Nothing needs to be done.",
     "KRL017": "Write all of X, Y, Z, A, B, C in the first motion after the change of frame.",
+    "KRL022": "Correct only cuts in which no external axis carries the robot or the workpiece.",
     "KRL019": "Write the declaration as an aggregate of numbers.",
 }
 
@@ -77,6 +78,8 @@ class Rows:
     reads: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
     sources: defaultdict[bytes, set[Source]] = field(default_factory=lambda: defaultdict(set))
     annotations: list[Annotation] = field(default_factory=list)
+    external: dict[bytes, float | None] = field(default_factory=dict)
+    moving: dict[bytes, int] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -117,6 +120,20 @@ class Rows:
         self.status.append(-1 if target is None else target.status)
         self.turn.append(-1 if target is None else target.turn)
         return len(self.kind) - 1
+
+    def follow_external(self, row: int, target: Target) -> None:
+        """Notes in ``moving`` the first row at which an external axis is not where it was before."""
+        for key, value in target.external:
+            if value is None or self.external.setdefault(key, value) != value:
+                self.moving.setdefault(key, row)
+
+    def told_external(self) -> list[Finding]:
+        names = {key.decode(): row for key, row in sorted(self.moving.items())}
+        if not names:
+            return []
+        verb = "moves" if len(names) == 1 else "move"
+        message = f"{', '.join(names)} {verb}; robot and base are taken as standing still"
+        return [self._finding(min(names.values()), "KRL022", message)]
 
     def judge_points(self, mentioned: set[bytes], assigned: set[bytes], declared: set[int]) -> None:
         """Refuses the motions whose point serves more than them.
@@ -247,7 +264,7 @@ class Rows:
             file=np.array(self.file, dtype=np.int64),
             insert=np.array(self.insert, dtype=np.int64),
         )
-        return toolpath, places, self.told(refused)
+        return toolpath, places, [*self.told(refused), *self.told_external()]
 
 
 def _used(base: Ints, tool: Ints, frames: tuple[FrameRef, ...]) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:

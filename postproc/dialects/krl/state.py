@@ -82,6 +82,13 @@ class Point:
         target = replace(self.target, values=six(values), file=-1, start=NOWHERE, stop=NOWHERE)
         return Point(target, Unclear("KRL007", "a component of it is assigned apart"), self)
 
+    def with_external(self, key: bytes, value: float | None) -> Point:
+        """The same numbers, with an external axis somewhere else (None: not known)."""
+        if isinstance(self.target, Unclear):
+            return self
+        external = (*(item for item in self.target.external if item[0] != key), (key, value))
+        return Point(replace(self.target, external=external), self.blocked, self)
+
     def with_state(self, key: bytes, value: float | None) -> Point:
         """The same numbers, with another S or T (None: not known)."""
         if isinstance(self.target, Unclear):

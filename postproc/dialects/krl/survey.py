@@ -13,12 +13,14 @@ from dataclasses import dataclass, field
 from postproc.dialects.krl.lexing import (
     BRANCHES,
     CLOSES,
+    NAME,
     SPLINES,
     Assignment,
     Call,
     Declared,
     Statement,
     identifiers,
+    without_strings,
 )
 from postproc.dialects.krl.target import EXTERNAL
 
@@ -33,13 +35,24 @@ READS_POSITION = re.compile(rb"\$(?:POS|AXIS)_(?:ACT|FOR|BACK|INT|RET)", re.I)
 HARMLESS = frozenset(
     b"USERSPOT USER_GRP H50 H70 A10 A20 A10_INI DELMENS IR_STOPM P00 PULSE CWRITE CREAD SREAD SWRITE COPEN CCLOSE "
     b"CAST_TO CAST_FROM VARSTATE MBX_REC MSGNOTIFY MSGQUIT MSGDIALOG MSGLOOP ON_ERROR_PROCEED ERR_RAISE ERR_CLEAR "
-    b"STRCLEAR STRCOPY STRADD CONFIRM".split()
+    b"STRCLEAR STRCOPY STRADD CONFIRM "
+    b"ABS SIN COS TAN ACOS ATAN ATAN2 SQRT FRAND FORWARD INVERSE INV_POS EK EB EO LK TOOL_ADJ VARTYPE GETVARSIZE "
+    b"STRCOMP STRFIND STRLEN STRDECLLEN STRTOBOOL STRTOINT STRTOREAL STRTOSTRING STRTOFRAME STRTOPOS STRTOE3POS "
+    b"STRTOE6POS STRTOAXIS STRTOE3AXIS STRTOE6AXIS GET_SIG_INF GETSYSSTATE GETCYCDEF GET_DECL_PLACE GET_MSGBUFFER "
+    b"IS_KEY_PRESSED TIMER_LIMIT ISMESSAGESET SET_KRLMSG EXISTS_KRLMSG CLEAR_KRLMSG SET_KRLDLG EXISTS_KRLDLG".split()
 )
 HARMLESS_BEGIN = (b"SR_", b"EKI_")
 PATH_FROM_FILE = (b"CR_PROCESS",)
 
 HIDDEN = re.compile(rb"(?<![#$\w])(?:PTP|LIN|CIRC)\b", re.I)
 """A motion word inside of a statement of a technology package."""
+
+_FUNCTION = re.compile(rb"(?<![A-Za-z0-9_$#.'])(" + NAME + rb")[ \t]*\(")
+_WORDS = frozenset(
+    b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN WHILE UNTIL FOR TO STEP SWITCH CASE WAIT SEC RETURN".split()
+)
+_CALLING = frozenset(["assignment", "call", "open", "close"])
+"""Kinds of statement whose expressions may call functions, besides WAIT and RETURN."""
 
 _BAS = re.compile(rb"[ \t]*#[ \t]*([A-Za-z_][A-Za-z0-9_]*)[ \t]*(?:,[ \t]*(.*?)[ \t]*)?\Z", re.S)
 _BAS_EFFECTS: dict[bytes, Effects] = {
@@ -109,6 +122,17 @@ def is_harmless(name: bytes) -> bool:
     return name in HARMLESS or name.startswith(HARMLESS_BEGIN)
 
 
+def functions_of(statement: Statement) -> list[bytes]:
+    """The functions that the expressions of a statement call, those of KRL itself left out; upper case."""
+    if statement.kind not in _CALLING and statement.word not in (b"WAIT", b"RETURN"):
+        return []
+    code = without_strings(statement.code)
+    if isinstance(statement.said, Call):
+        code = without_strings(statement.said.arguments)
+    names = dict.fromkeys(name.upper() for name in _FUNCTION.findall(code))
+    return [name for name in names if name not in _WORDS]
+
+
 def survey(statements: Iterable[tuple[int, Statement]]) -> Survey:
     """Goes over the statements (index, statement) once; a motion line in the common form may be left out of
     the parsing, only its kind counts."""
@@ -152,6 +176,7 @@ def survey(statements: Iterable[tuple[int, Statement]]) -> Survey:
             block = Block(statement.word, statement.line)
             blocks.append(block)
             stack.append(block)
+            _note(result, stack, statement)
             result.events[index] = [("open", block)]
         elif kind == "branch":
             if len(stack) > 1 and stack[-1].word == BRANCHES[statement.word]:
@@ -176,6 +201,7 @@ def _close(result: Survey, stack: list[Block], statement: Statement, index: int)
     if not depth:
         result.unclosed.append((statement.line, f"{_shown(statement.word)} without its begin"))
         return
+    _note(result, stack, statement)
     closed = stack[depth:][::-1]
     result.unclosed.extend((block.line, f"{_shown(block.word)} has no end") for block in closed[:-1])
     result.events[index] = [("close", block) for block in closed]
@@ -187,10 +213,15 @@ def _close(result: Survey, stack: list[Block], statement: Statement, index: int)
 
 def _note(result: Survey, stack: list[Block], statement: Statement) -> None:
     effects, called = effects_of(statement)
+    functions = functions_of(statement)
+    if not all(map(is_harmless, functions)):
+        # What is handed to a function may come back changed.
+        effects = effects | identifiers(statement.code)
     result.effects |= effects
     result.assigned.update(effect for effect in effects if isinstance(effect, bytes))
     if stack:
         stack[-1].effects |= effects
+        stack[-1].calls.update(functions)
         if called:
             stack[-1].calls.add(called)
 

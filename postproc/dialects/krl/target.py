@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from postproc.dialects.krl.lexing import NAME, number
 
@@ -23,12 +24,14 @@ _PLAIN = rb"[-+]?\d{1,15}(?:\.\d{0,20})?"
 _REAL = rb"(" + _PLAIN + rb")"
 _STATE = rb"(\d{1,9}|'[Bb][01]{1,30}')"
 _EXTERNAL = b"".join(rb"(?:[ \t]*,[ \t]*E%d[ \t]+" % i + _PLAIN + rb")?" for i in range(1, 7))
+External = tuple[tuple[bytes, float | None], ...]
 QUICK = re.compile(
     rb"[ \t]*(LIN|PTP)[ \t]*\{[ \t]*"
     + rb"[ \t]*,[ \t]*".join(key + rb"[ \t]+" + _REAL for key in COMPONENTS)
     + rb"(?:[ \t]*,[ \t]*S(?=[ \t'])[ \t]*" + _STATE + rb"[ \t]*,[ \t]*T(?=[ \t'])[ \t]*" + _STATE + rb")?"
+    + rb"("
     + _EXTERNAL
-    + rb"[ \t]*\}[ \t]*(?:C_(?:DIS|VEL|ORI|PTP)[ \t]*)?\r?\n?\Z",
+    + rb")[ \t]*\}[ \t]*(?:C_(?:DIS|VEL|ORI|PTP)[ \t]*)?\r?\n?\Z",
     re.I,
 )  # fmt: skip
 """The line that nearly all lines of a generated program are; ``parse`` gives the same for it, slower."""
@@ -40,7 +43,8 @@ class Target:
 
     values: X, Y, Z [mm], A, B, C [deg], None where missing; start, stop: byte range of each literal, -1 where
     there is none; axes: A1..A6 [deg] of an axis target, else None; status, turn: S and T, -1 where missing;
-    insert: offset at which missing components are written; file: document that holds it, -1 if none does.
+    insert: offset at which missing components are written; file: document that holds it, -1 if none does;
+    external: the external axes that it names, with None for what is not a number.
     """
 
     values: Six
@@ -51,6 +55,7 @@ class Target:
     turn: int = -1
     insert: int = -1
     file: int = -1
+    external: External = ()
 
     @property
     def missing(self) -> list[str]:
@@ -69,13 +74,19 @@ class Unclear:
 
 def quick(found: re.Match[bytes]) -> Target:
     """The target of a line that ``QUICK`` matched, in document 0."""
-    _, x, y, z, a, b, c, status, turn = found.groups()
+    _, x, y, z, a, b, c, status, turn, external = found.groups()
+    others = _externals(external) if external else ()
     spans = [found.span(i) for i in range(2, 8)]
     start, stop = zip(*spans, strict=True)
     values = (float(x), float(y), float(z), float(a), float(b), float(c))
     if status is None:
-        return Target(values, start, stop, None, -1, -1, stop[5], 0)
-    return Target(values, start, stop, None, _integer(status), _integer(turn), stop[5], 0)
+        return Target(values, start, stop, None, -1, -1, stop[5], 0, others)
+    return Target(values, start, stop, None, _integer(status), _integer(turn), stop[5], 0, others)
+
+
+@lru_cache(maxsize=1024)
+def _externals(text: bytes) -> External:
+    return tuple((field[1].upper(), number(field[3])) for field in _FIELD.finditer(text, text.find(b",") + 1))
 
 
 def _integer(literal: bytes) -> int:
@@ -96,6 +107,7 @@ def parse(text: bytes, at: int, file: int) -> Target | Unclear:
     start, stop = list(NOWHERE), list(NOWHERE)
     states = {b"S": -1, b"T": -1}
     seen: set[bytes] = set()
+    external: list[tuple[bytes, float | None]] = []
     first = insert = -1
     while place < len(inner):
         field = _FIELD.match(inner, place)
@@ -120,6 +132,8 @@ def parse(text: bytes, at: int, file: int) -> Target | Unclear:
             axes[AXES[key]] = value
         elif value is not None and key in states:
             states[key] = int(value)
+        elif key in EXTERNAL:
+            external.append((key, value))
         place = field.end()
         if place < len(inner):
             place += 1
@@ -133,7 +147,7 @@ def parse(text: bytes, at: int, file: int) -> Target | Unclear:
     is_axis = is_axis or (tag is not None and tag[1].upper().endswith(b"AXIS"))
     return Target(
         six(values), tuple(start), tuple(stop), six(axes) if is_axis else None,
-        states[b"S"], states[b"T"], first if insert < 0 else insert, file,
+        states[b"S"], states[b"T"], first if insert < 0 else insert, file, tuple(external),
     )  # fmt: skip
 
 

@@ -1,0 +1,203 @@
+"""``compensate map``: the deflection over a plane or a box of the workspace."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from postproc.cli.common import Out, result_options
+
+_NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
+_FAR = 100_000.0  # mm; no arm is longer
+
+Numbers = tuple[float, ...]
+Callback = Callable[[click.Context, click.Parameter, str], Numbers]
+
+
+def _number(word: str, limit: float) -> float:
+    if not _NUMBER.match(word) or not math.isfinite(float(word)):
+        raise click.BadParameter(f"{word[:40]!r} is not a number")
+    if abs(float(word)) > limit:
+        raise click.BadParameter(f"{word[:40]} is beyond {limit:g}")
+    return float(word)
+
+
+def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numbers:
+    """``a:b`` or one value, mm."""
+    values = tuple(_number(word.strip(), _FAR) for word in text.split(":"))
+    if len(values) > 2:
+        raise click.BadParameter(f"{text[:40]!r} is neither one value nor a range a:b")
+    if len(values) == 2 and not values[0] < values[1]:
+        raise click.BadParameter(f"range {text[:40]!r} must rise: {values[0]:g} is not below {values[1]:g}")
+    return values
+
+
+def _list(counts: tuple[int, ...], names: str) -> Callback:
+    """Numbers between commas, as many as one of ``counts``."""
+
+    def parse(_context: click.Context, _option: click.Parameter, text: str) -> Numbers:
+        values = tuple(_number(word.strip(), _FAR) for word in text.split(","))
+        if len(values) not in counts:
+            raise click.BadParameter(f"{len(values)} numbers where {names} is needed")
+        return values
+
+    return parse
+
+
+def _ending(*endings: str) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:
+    """A file of another kind is never overwritten by a result."""
+
+    def check(_context: click.Context, _option: click.Parameter, path: Path | None) -> Path | None:
+        if path is not None and path.suffix.lower() not in endings:
+            raise click.BadParameter(f"{str(path)!r} must end in {' or '.join(endings)}")
+        return path
+
+    return check
+
+
+@click.command("map")
+@click.option("--robot", required=True, metavar="NAME|FILE", help="The robot.")
+@click.option("--x", required=True, metavar="A:B", callback=_range, help="Range or one value, mm, robot base.")
+@click.option("--y", required=True, metavar="A:B", callback=_range, help="The same for y.")
+@click.option("--z", required=True, metavar="A:B", callback=_range, help="The same for z.")
+@click.option(
+    "--grid",
+    type=click.IntRange(1, 1_000_000),
+    default=21,
+    show_default=True,
+    help="Points along each range; with 1, its middle.",
+)
+@click.option(
+    "--tool",
+    metavar="X,Y,Z[,A,B,C]",
+    default="0,0,0",
+    callback=_list((3, 6), "x,y,z or x,y,z,a,b,c"),
+    help="TCP on the flange, mm and deg [the flange].",
+)
+@click.option(
+    "--orientation",
+    metavar="A,B,C",
+    default="0,0,180",
+    show_default=True,
+    callback=_list((3,), "A,B,C"),
+    help="Orientation of the tool in the robot base, deg.",
+)
+@click.option(
+    "--force",
+    required=True,
+    metavar="SPEC",
+    help="What acts on the tool at its TCP: 0,360,560@base (or world, the same here; or tool), N; six numbers with "
+    "moments in N m.",
+)
+@click.option("--linear", is_flag=True, help="Linearized, eq. (5), instead of the balance on the deflected pose.")
+@click.option(
+    "--sign",
+    type=click.Choice(["energy", "as_printed"]),
+    help="How eq. (3) of the gravity compensator is read [as the robot file says].",
+)
+@click.option("--ignore-limits", is_flag=True, help="Count cells beyond the axis limits as reached.")
+@click.option(
+    "--status",
+    type=click.IntRange(0, 7),
+    default=2,
+    show_default=True,
+    help="Branch of the arm as KUKA's S: 1 wrist overhead, 2 elbow up, 4 A5 below zero, added up.",
+)
+@click.option(
+    "--picture",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.png|svg",
+    callback=_ending(".png", ".svg"),
+    help="Draw the map; of a box, slices along z.",
+)
+@click.option(
+    "--csv",
+    "csv_to",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.csv",
+    callback=_ending(".csv"),
+    help="One row a cell.",
+)
+@result_options
+def map_(
+    robot: str,
+    x: Numbers,
+    y: Numbers,
+    z: Numbers,
+    grid: int,
+    tool: Numbers,
+    orientation: Numbers,
+    force: str,
+    linear: bool,
+    sign: str | None,
+    ignore_limits: bool,
+    status: int,
+    picture: Path | None,
+    csv_to: Path | None,
+    json_to: str | None,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Map how far a force moves the tool over the workspace, and how much of it the gravity compensator changes.
+
+    Two ranges make a plane, three a box, one a line; the deflection is that of the force alone, loaded minus unloaded.
+
+    \b
+    Examples:
+      compensate map --robot kuka_kr270 --x 800:2200 --y=-1000:1000 --z 500 --tool 0,0,300 --force=-360,0,560
+      compensate map --robot kuka_kr270 --x 800:2200 --y 0 --z 200:1800 --force 0,0,-500@tool --picture map.png
+      compensate map --robot kuka_kr270 --x 800:2200 --y=-900:900 --z 300:1500 --grid 15 --force 300,0,0 --csv box.csv
+
+    Exit codes: 0 done; 3 nothing in reach, or something deserves a look; 1 could not; 2 command line.
+    """
+    from postproc.forces.stated import FEED, FORM, FRAMES, NotAForce, parse_force
+    from postproc.report.workspace import show_map
+    from postproc.workflows import MapRequest, map_workspace
+    from postproc.workspace import MAX_CELLS
+
+    try:
+        wrench, frame = parse_force(force)
+    except NotAForce as error:
+        raise click.BadParameter(f"{error}; a map takes {FORM}", param_hint="--force") from None
+    if frame == FEED:
+        raise click.BadParameter(
+            "nothing is fed in a map: give the force @base or @tool", param_hint="--force"
+        )
+    if not any(wrench):
+        raise click.BadParameter("a force of zero bends nothing", param_hint="--force")
+    ranged = sum(len(values) == 2 for values in (x, y, z))
+    if grid**ranged > MAX_CELLS:
+        raise click.BadParameter(
+            f"{grid} points along {ranged} ranges make {grid**ranged:.3g} cells, more than {MAX_CELLS}",
+            param_hint="--grid",
+        )
+    if picture is not None and (ranged == 0 or grid == 1):
+        raise click.BadParameter("there is nothing to draw of a single cell", param_hint="--picture")
+
+    out = Out(json_to, quiet, verbose)
+    request = MapRequest(
+        robot=robot,
+        ranges_mm=(x, y, z),
+        points=grid,
+        tool_mm_deg=(*tool, 0.0, 0.0, 0.0)[:6],
+        orientation_deg=orientation,
+        wrench=wrench,
+        frame=FRAMES[frame],
+        linear=linear,
+        sign=sign,
+        ignore_limits=ignore_limits,
+        status=status,
+        picture=picture,
+        csv=csv_to,
+        json=out.json_file,
+    )
+    with out.refusals("map"), out.stages() as stage:
+        done = map_workspace(request, stage)
+    out.result(done.as_json(), written=True)
+    if not out.quiet:
+        show_map(out.console(), done, verbose)
+    raise SystemExit(done.exit)

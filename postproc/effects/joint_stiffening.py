@@ -1,0 +1,37 @@
+"""Joint stiffening: gears that grow stiffer with load, a cubic spring beside the joint's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.effects.effect import Load, State, Values, column, per_joint
+from postproc.robot.description import Joint
+
+
+class JointStiffening(Load):
+    """tau_i = -k_i d_i^3, U = k_i d_i^4 / 4, with d_i the elastic displacement of joint i.
+
+    Together with joint_compliance the joint holds tau = d / c + k d^3; on a rigid joint it does nothing.
+    """
+
+    name = "joint_stiffening"
+    family = "elastic"
+
+    def __init__(self, joints: Sequence[Joint]) -> None:
+        source = "cubic term of a gear's torsion curve"
+        self.parameters = per_joint(joints, "k", ("N m/rad3", "N/m3"), 0.0, 1e15, source)
+
+    def _displacement(self, state: State) -> Floats:
+        motors = state.chain.motors
+        return np.asarray(state.coordinates[motors] - state.rest[motors])
+
+    def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
+        k, bent, motors = column(values, self.parameters), self._displacement(state), state.chain.motors
+        force[motors] -= k * bent**3
+        slope[motors] -= 3 * k * bent**2
+
+    def energy(self, values: Values, state: State) -> Floats:
+        return np.asarray((column(values, self.parameters) * self._displacement(state) ** 4 / 4).sum(axis=0))

@@ -1,0 +1,59 @@
+"""Payload: what hangs on the flange bends the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.effects.effect import Load, Parameter, State, Values
+from postproc.robot.chain import cross
+from postproc.robot.description import Joint
+
+
+class Payload(Load):
+    """A weight on the flange: ``mass`` [kg] with its centre at ``x``, ``y``, ``z`` [m] in flange axes, besides the tool
+    that the cell states (its mass and centre come with the conditions).
+
+    U = -m g . p_c
+    """
+
+    name = "payload"
+    family = "weight"
+
+    def __init__(self, joints: Sequence[Joint]) -> None:
+        source = "a point mass on the flange"
+        self.parameters = (
+            Parameter("mass", "kg", 0.0, 0.0, 5000.0, source),
+            *(Parameter(axis, "m", 0.0, -5.0, 5.0, source) for axis in "xyz"),
+        )
+
+    def _weights(self, values: Values, state: State) -> list[tuple[Floats, Floats]]:
+        """Mass (N,) or scalar and centre (3, N) in the robot base of each weight."""
+        columns, position = state.swept.flange
+        centre = sum((values[axis] * column for axis, column in zip("xyz", columns, strict=True)), position)
+        weights = [(np.asarray(values["mass"]), np.asarray(centre))]
+        given = state.conditions
+        if given.payload_mass is not None and given.payload_com is not None:
+            hung = sum((x * column for x, column in zip(given.payload_com.T, columns, strict=True)), position)
+            weights.append((given.payload_mass, np.asarray(hung)))
+        return weights
+
+    def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
+        swept, g = state.swept, state.gravity[:, None]
+        before = state.chain.motor_rows[-1] + 1  # what stands before the flange carries it
+        for mass, centre in self._weights(values, state):
+            for i in range(before):
+                axis = swept.axes[i]
+                if swept.turns[i]:
+                    lever = centre - swept.origins[i]
+                    force[i] += mass * np.sum(axis * cross(lever, g), axis=0)
+                    slope[i] += mass * np.sum(axis * cross(cross(axis, lever), g), axis=0)
+                else:
+                    force[i] += mass * np.sum(axis * g, axis=0)
+
+    def energy(self, values: Values, state: State) -> Floats:
+        return np.asarray(
+            sum(-mass * (state.gravity @ centre) for mass, centre in self._weights(values, state))
+        )

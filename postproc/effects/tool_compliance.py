@@ -1,0 +1,32 @@
+"""Tool compliance: cutter, holder and spindle give way at the tool centre point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from postproc.arrays import Floats
+from postproc.effects.effect import ComplianceLaw, Parameter, State, Values
+from postproc.robot.description import Joint
+
+
+class ToolCompliance(ComplianceLaw):
+    """Shifts of the TCP: ``radial`` [m/N] across the spindle, alike in all directions, ``axial`` [m/N] along it."""
+
+    name = "tool_compliance"
+    family = "elastic"
+    coordinates = ("spindle.x", "spindle.y", "spindle.z")
+
+    def __init__(self, joints: Sequence[Joint]) -> None:
+        source = "static compliance at the tip of cutter, holder and spindle"
+        self.parameters = tuple(
+            Parameter(name, "m/N", 0.0, 0.0, 1e-5, source) for name in ("radial", "axial")
+        )
+
+    def add_displacement(
+        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
+    ) -> None:
+        for name in self.coordinates:
+            row = state.chain.index[name]
+            compliance = values["axial" if name.endswith("z") else "radial"]
+            displacement[row] += compliance * force[row]
+            slope[row] += compliance

@@ -1,0 +1,13 @@
+"""Tool offset: the TCP is not where the tool data say."""
+
+from __future__ import annotations
+
+from postproc.effects.frame_offset import FrameOffset
+
+
+class ToolOffset(FrameOffset):
+    """The TCP is not where the tool data say: shift and turn in tool axes."""
+
+    name = "tool_offset"
+    site = "tool"
+    source = "error of a tool calibration"

@@ -1,0 +1,205 @@
+"""A strict, small reader of URDF: the joints between two links, with fixed ones merged.
+
+Only what kinematics needs is read (links, joints, origins, axes); meshes, masses and limits are passed over, so that
+no file beside the URDF has to be there.  Lengths are metres and angles radians, as the format says.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from xml.parsers import expat
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.findings import Finding, Refusal, nearest
+from postproc.geometry import Poses, rotation_from_abc
+from postproc.robot.geometries import Link, frame_with_z
+
+MAX_BYTES = 4_000_000
+MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
+
+
+@dataclass
+class _Joint:
+    name: str
+    kind: str
+    line: int
+    parent: str = ""
+    child: str = ""
+    origin: Poses | None = None
+    axis: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Arm:
+    """The moving joints from base to tip: ``names``, ``kinds`` and ``links``, and the ``tip`` in the last link."""
+
+    names: tuple[str, ...]
+    kinds: tuple[str, ...]
+    links: tuple[Link, ...]
+    tip: Poses
+
+
+def read_urdf(path: Path, base: str | None = None, tip: str | None = None) -> Arm:
+    """The arm from link ``base`` (the only root without it) to link ``tip`` (the only end without it).
+
+    Raises Refusal: FIL001 (not readable), URD001 (with the line).
+    """
+    joints, links = _parse(path)
+    by_child: dict[str, _Joint] = {}
+    for joint in joints:
+        for link in (joint.parent, joint.child):
+            if link not in links:
+                raise _wrong(path, joint.line, f"joint {joint.name}: no link {link!r}{nearest(link, links)}")
+        if joint.child in by_child:
+            raise _wrong(path, joint.line, f"link {joint.child!r} hangs on two joints")
+        by_child[joint.child] = joint
+    for name in (base, tip):
+        if name is not None and name not in links:
+            raise _wrong(path, 0, f"no link {name!r}{nearest(name, links)}")
+    end = tip or _only(path, [link for link in links if link not in {j.parent for j in joints}], "tip")
+    way, at = [], end
+    while at in by_child and at != base:
+        joint = by_child[at]
+        way.append(joint)
+        at = joint.parent
+        if len(way) > len(joints):
+            raise _wrong(path, joint.line, "the joints go round in a circle")
+    if base is None:
+        _only(path, [link for link in links if link not in by_child], "base")
+    elif at != base:
+        raise _wrong(path, 0, f"the link {end!r} does not hang on {base!r}")
+    return _merged(path, way[::-1])
+
+
+def _only(path: Path, found: list[str], key: str) -> str:
+    if not found:
+        raise _wrong(path, 0, "the joints go round in a circle")
+    if len(found) > 1:
+        words = "the joints branch: several ends" if key == "tip" else "several roots"
+        raise _wrong(path, 0, f"{words}, {', '.join(found)}", f"name one with `{key}:`")
+    return found[0]
+
+
+def _merged(path: Path, way: list[_Joint]) -> Arm:
+    names, kinds, links = [], [], []
+    at = Poses.identity()
+    for joint in way:
+        at = at @ (joint.origin or Poses.identity())
+        if joint.kind == "fixed":
+            continue
+        axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else joint.axis
+        frame = Poses(frame_with_z(axis), np.zeros(3))
+        names.append(joint.name)
+        kinds.append(MOVING[joint.kind])
+        links.append(Link(at @ frame, frame.inverse()))
+        at = Poses.identity()
+    if not links:
+        raise _wrong(path, 0, "no joint moves between base and tip")
+    return Arm(tuple(names), tuple(kinds), tuple(links), at)
+
+
+def _parse(path: Path) -> tuple[list[_Joint], dict[str, int]]:
+    """All joints, and the lines of all links."""
+    try:
+        with path.open("rb") as stream:
+            raw = stream.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
+    if len(raw) > MAX_BYTES:
+        raise _wrong(path, 0, f"larger than {MAX_BYTES} bytes")
+    joints: list[_Joint] = []
+    links: dict[str, int] = {}
+    stack: list[str] = []
+    parser = expat.ParserCreate()
+
+    def begin(tag: str, words: dict[str, str]) -> None:
+        line = parser.CurrentLineNumber
+        if not stack and tag != "robot":
+            raise _wrong(path, line, f"<{tag}> where <robot> is expected")
+        if tag.startswith("xacro:"):
+            raise _wrong(path, line, "xacro has to be expanded first (ros2 run xacro xacro)")
+        if stack == ["robot"] and tag == "link":
+            name = _word(path, line, tag, words, "name")
+            if name in links:
+                raise _wrong(path, line, f"link {name!r} stands twice")
+            links[name] = line
+        elif stack == ["robot"] and tag == "joint":
+            joints.append(_joint(path, line, words, joints))
+        elif stack == ["robot", "joint"]:
+            _detail(path, line, joints[-1], tag, words)
+        stack.append(tag)
+
+    def end(tag: str) -> None:
+        stack.pop()
+        if stack == ["robot"] and tag == "joint":
+            joint = joints[-1]
+            for key in ("parent", "child"):
+                if not getattr(joint, key):
+                    raise _wrong(path, joint.line, f"joint {joint.name} has no <{key}>")
+
+    def doctype(*_: object) -> None:
+        raise _wrong(path, parser.CurrentLineNumber, "a DOCTYPE is not allowed")
+
+    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    parser.StartDoctypeDeclHandler = doctype
+    try:
+        parser.Parse(raw, True)
+    except expat.ExpatError as error:
+        raise _wrong(path, error.lineno, f"not XML: {expat.errors.messages[error.code]}") from None
+    return joints, links
+
+
+def _joint(path: Path, line: int, words: dict[str, str], before: list[_Joint]) -> _Joint:
+    name, kind = _word(path, line, "joint", words, "name"), _word(path, line, "joint", words, "type")
+    if kind != "fixed" and kind not in MOVING:
+        allowed = ", ".join(("fixed", *MOVING))
+        raise _wrong(path, line, f"joint {name}: type {kind!r}{nearest(kind, MOVING)}", f"read here: {allowed}")
+    if any(joint.name == name for joint in before):
+        raise _wrong(path, line, f"joint {name!r} stands twice")
+    return _Joint(name, kind, line)
+
+
+def _detail(path: Path, line: int, joint: _Joint, tag: str, words: dict[str, str]) -> None:
+    if tag == "mimic":
+        raise _wrong(path, line, f"joint {joint.name} mimics another one: not a serial arm")
+    if tag in ("parent", "child"):
+        setattr(joint, tag, _word(path, line, tag, words, "link"))
+    elif tag == "origin":
+        place, turn = (_three(path, line, words.get(key, "0 0 0")) for key in ("xyz", "rpy"))
+        joint.origin = Poses(_snapped(rotation_from_abc(turn[::-1])), place)
+    elif tag == "axis":
+        axis = _three(path, line, _word(path, line, tag, words, "xyz"))
+        length = float(np.linalg.norm(axis))
+        if length < 1e-6:
+            raise _wrong(path, line, f"joint {joint.name}: an axis without a direction")
+        joint.axis = axis / length
+
+
+def _snapped(rotation: Floats) -> Floats:
+    """Quarter turns written with nine digits or more are meant: made of zeros and ones."""
+    near = np.round(rotation)
+    return near if np.abs(rotation - near).max() < 1e-9 else rotation
+
+
+def _word(path: Path, line: int, tag: str, words: dict[str, str], key: str) -> str:
+    if not words.get(key):
+        raise _wrong(path, line, f"<{tag}> without {key!r}")
+    return words[key]
+
+
+def _three(path: Path, line: int, text: str) -> Floats:
+    try:
+        values = [float(word) for word in text.split()]
+    except ValueError:
+        values = []
+    if len(values) != 3 or not all(math.isfinite(value) for value in values):
+        raise _wrong(path, line, f"{text[:60]!r} is not three numbers")
+    return np.array(values)
+
+
+def _wrong(path: Path, line: int, message: str, help: str = "") -> Refusal:
+    return Refusal(Finding("URD001", message, str(path), line, help=help))

@@ -1,0 +1,158 @@
+"""The stiffness of a robot over its workspace: the deflection under one wrench at every cell of a grid."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, frozen
+from postproc.effects import GravityCompensator
+from postproc.geometry import Poses
+from postproc.model import StiffnessModel
+from postproc.robot.inverse import inverse
+
+MAX_CELLS = 1_000_000
+"""More cells than a picture can show or a spreadsheet can open."""
+
+BATCH = 8192
+"""Cells evaluated at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """Places of the TCP in the robot base: all combinations of the coordinates ``x``, ``y``, ``z`` [m]."""
+
+    x: Floats
+    y: Floats
+    z: Floats
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        return len(self.x), len(self.y), len(self.z)
+
+    @property
+    def positions(self) -> Floats:
+        """(N, 3) [m]; z runs fastest, x slowest."""
+        return np.stack(np.meshgrid(self.x, self.y, self.z, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+@dataclass(frozen=True)
+class Load:
+    """What is asked at every cell.  ``tool``: TCP on the flange; ``orientation`` (3, 3) of the tool in the robot
+    base; ``wrench`` (6,) [N, N m] at the TCP, robot base axes; ``status``: branch S of the arm.
+
+    ``linear``: eq. (5), linearized at the unloaded pose, in place of the balance on the deflected one.
+    """
+
+    tool: Poses
+    orientation: Floats
+    wrench: Floats
+    status: int = 0b010
+    linear: bool = False
+    ignore_limits: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """A surveyed grid, one row a cell in the order of ``grid.positions``.
+
+    ``q`` (N, n) [rad], NaN out of reach; ``in_reach`` (N,) the arm gets there; ``within`` (N,) and inside of its axis
+    limits; ``mapped`` (N,) the cells that were asked for and can be had; ``deflection`` (N, 3) [m] of the TCP in
+    robot base axes, what the wrench does; ``without``: the same without gravity compensator, None if there is none.
+    Deflections are NaN where not mapped, and where the loaded arm has no equilibrium.
+    """
+
+    grid: Grid
+    q: Floats
+    in_reach: Bools
+    within: Bools
+    mapped: Bools
+    deflection: Floats
+    without: Floats | None
+
+    @property
+    def size(self) -> Floats:
+        """(N,) [m] length of the deflection."""
+        return np.asarray(np.linalg.norm(self.deflection, axis=1))
+
+    @property
+    def size_without(self) -> Floats | None:
+        return None if self.without is None else np.asarray(np.linalg.norm(self.without, axis=1))
+
+    @property
+    def difference(self) -> Floats | None:
+        """(N,) [m] length of the difference of both deflection vectors."""
+        if self.without is None:
+            return None
+        return np.asarray(np.linalg.norm(self.deflection - self.without, axis=1))
+
+    @property
+    def unsettled(self) -> Bools:
+        """(N,) mapped cells in which the arm finds no equilibrium."""
+        lost = np.isnan(self.deflection).any(axis=1)
+        if self.without is not None:
+            lost |= np.isnan(self.without).any(axis=1)
+        return np.asarray(self.mapped & lost)
+
+
+def has_compensator(model: StiffnessModel) -> bool:
+    return any(isinstance(term.effect, GravityCompensator) for term in model.terms)
+
+
+def with_sign(model: StiffnessModel, sign: str) -> StiffnessModel:
+    """The model with eq. (3) of its compensators read as ``energy`` or ``as_printed``."""
+    terms = []
+    for term in model.terms:
+        if isinstance(term.effect, GravityCompensator):
+            effect = copy.copy(term.effect)
+            effect.sign = sign
+            term = replace(term, effect=effect)
+        terms.append(term)
+    return replace(model, terms=tuple(terms))
+
+
+def survey(model: StiffnessModel, grid: Grid, load: Load) -> Survey:
+    """The deflection at every cell of ``grid``, in batches."""
+    places = grid.positions
+    parts = [_survey(model, places[at : at + BATCH], load) for at in range(0, len(places), BATCH)]
+    q, in_reach, within, mapped, deflection = (np.concatenate(column) for column in list(zip(*parts))[:5])
+    without = np.concatenate([part[5] for part in parts]) if has_compensator(model) else None
+    columns = [frozen(in_reach, dtype=bool), frozen(within, dtype=bool), frozen(mapped, dtype=bool)]
+    return Survey(
+        grid, frozen(q), *columns, frozen(deflection), None if without is None else frozen(without)
+    )
+
+
+def _survey(
+    model: StiffnessModel, places: Floats, load: Load
+) -> tuple[Floats, Bools, Bools, Bools, Floats, Floats]:
+    count, robot = len(places), model.robot
+    flange = Poses(np.broadcast_to(load.orientation, (count, 3, 3)), places) @ load.tool.inverse()
+    low, high = robot.limits.T
+    middle = np.broadcast_to((low + high) / 2, (count, len(low)))
+    found = inverse(robot.nominal, flange, np.full(count, load.status), middle)
+    margin = 1e-9
+    inside = ((found.q >= low - margin) & (found.q <= high + margin)).all(axis=1)
+    within = found.reachable & inside
+    mapped = found.reachable if load.ignore_limits else within
+
+    q = found.q[mapped]
+    wrench = np.broadcast_to(load.wrench, (len(q), 6))
+    results = []
+    for variant in (model, model.without(["gravity_compensator"])):
+        bent = np.full((count, 3), np.nan)
+        bent[mapped] = _deflection(variant, q, wrench, load)
+        results.append(bent)
+    return found.q, found.reachable, within, mapped, results[0], results[1]
+
+
+def _deflection(model: StiffnessModel, q: Floats, wrench: Floats, load: Load) -> Floats:
+    """(N, 3) [m] how far the wrench moves the TCP: loaded minus unloaded; NaN without an equilibrium."""
+    if load.linear:
+        return model.linear_deflection(q, wrench, load.tool)[:, :3]
+    loaded = model.equilibrium(q, wrench, load.tool)
+    free = model.equilibrium(q, np.zeros_like(wrench), load.tool)
+    rests = (loaded.converged & free.converged)[:, None]
+    return np.where(rests, loaded.pose.position - free.pose.position, np.nan)
