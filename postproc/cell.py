@@ -30,6 +30,7 @@ _KEYS = (
     "tools",
     "bases",
     "force",
+    "force_ci95",
     "process",
     "correct",
     "start",
@@ -76,9 +77,11 @@ class Controller:
 class Cell:
     """One checked cell file.
 
-    robot_base: robot root in $WORLD; bases: in $WORLD; start (6,) and orientation (3,) A, B, C: [rad];
+    robot_base: robot root in $WORLD; bases: in $WORLD; orientation (3,) A, B, C: [rad];
+    start_stated (6,) or (7,): joint values before the first motion, deg, mm for a linear axis;
     tolerance, max_correction, min_segment [m]; tolerance_angle [rad].  ``force`` is the text of the key, a path
-    in it is relative to the cell file; ``force_line`` is where it stands.
+    in it is relative to the cell file; ``force_line`` is where it stands.  ``force_ci95``: half width of the 95 %
+    interval of all forces, as a share of them; None where nothing is stated.
     """
 
     path: Path
@@ -88,10 +91,12 @@ class Cell:
     bases: dict[int, Poses] = field(default_factory=dict)
     force: str | None = None
     force_line: int = 0
+    force_ci95: float | None = None
     process: str | None = None
     process_line: int = 0
     correct: str = "process"
-    start: Floats | None = None
+    start_stated: Floats | None = None
+    start_line: int = 0
     orientation: Floats | None = None
     tolerance: float = 0.02 * MM
     tolerance_angle: float = 0.01 * DEG
@@ -100,6 +105,11 @@ class Cell:
     max_growth: float = 2.0
     controller: Controller = Controller()
     integer_words: str = "mm"
+
+    @property
+    def start(self) -> Floats | None:
+        """The values of ``start_stated`` as angles [rad]."""
+        return None if self.start_stated is None else frozen(self.start_stated * DEG)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,10 +161,12 @@ def load_cell(path: Path) -> Cell:
         bases={number: _frame(section) for number, section in _numbered(top, "bases")},
         force=_force(top),
         force_line=top.line_of("force") if "force" in top else 0,
+        force_ci95=top.number("force_ci95", low=0.0, high=1.0) if "force_ci95" in top else None,
         process=_word(top, "process") if "process" in top else None,
         process_line=top.line_of("process") if "process" in top else 0,
         correct=top.text("correct", "process", ("process", "absolute")),
-        start=frozen(np.array(top.numbers("start", 6, unit="deg")) * DEG, (6,)) if "start" in top else None,
+        start_stated=_start(top),
+        start_line=top.line_of("start") if "start" in top else 0,
         orientation=_orientation(top),
         tolerance=_positive(top, "tolerance", 0.02, "mm") * MM,
         tolerance_angle=_positive(top, "tolerance_deg", 0.01, "deg") * DEG,
@@ -314,6 +326,13 @@ def _frame(section: Section, *more: str) -> Poses:
 
 def _robot_base(top: Section) -> Poses:
     return _frame(top.section("robot_base")) if "robot_base" in top else Poses.identity()
+
+
+def _start(top: Section) -> Floats | None:
+    """Six values, or seven for an arm with an external joint."""
+    if "start" not in top:
+        return None
+    return frozen(top.numbers("start", 7 if top.length("start") == 7 else 6, unit="deg"))
 
 
 def _orientation(top: Section) -> Floats | None:

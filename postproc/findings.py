@@ -163,6 +163,7 @@ CODES: dict[str, Code] = {
         "The program uses a base or tool number that neither it nor the cell gives.",
     ),
     "CEL003": Code("error", "robot is not known", "No robot file has this name."),
+    "URD001": Code("error", "URDF is wrong", "The robot description can not be read as one serial arm."),
     # force
     "FRC001": Code("error", "no force", "--force was given alone, and no force belongs to the program."),
     "FRC002": Code("error", "force not understood", "A force is 3 or 6 numbers and a frame: 0,360,560@base."),
@@ -234,7 +235,9 @@ CODES: dict[str, Code] = {
     ),
     # map
     "MAP001": Code(
-        "error", "no gravity compensator", "--sign chooses how a compensator is read; this robot's model has none."
+        "error",
+        "no gravity compensator",
+        "--sign chooses how a compensator is read; this robot's model has none.",
     ),
     "MAP002": Code(
         "warning",
@@ -251,6 +254,12 @@ CODES: dict[str, Code] = {
         "warning",
         "nothing gives way",
         "The robot file states no compliance, or none that this force acts on: a map of zeros says nothing.",
+    ),
+    "MAP006": Code("error", "arm without S", "S names the branches of KUKA-type arms; leave --status out."),
+    "MAP007": Code(
+        "info",
+        "postures are free",
+        "Each cell is solved on its own from the middle of the axis limits; a step in the map may be one of posture.",
     ),
     # correction
     "COR001": Code(

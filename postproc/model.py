@@ -24,6 +24,9 @@ STEP_TOLERANCE = 1e-14
 
 MAX_STEPS = 60
 
+STILL = 1e-9
+"""[rad, m] A motor that moves less stands still: it is the rounding of an inverse kinematics, not a motion."""
+
 STANDARD_GRAVITY = 9.80665
 """[m/s2]"""
 
@@ -136,8 +139,7 @@ class StiffnessModel:
         iteration with the diagonal of the loads' and laws' derivatives.  What the diagonal leaves out (the lever of
         the wrench moving with the pose, weights) makes it linear with a rate of about 5e-3.
         """
-        if any(term.effect.by_direction for term in self.terms) and conditions.direction is None:
-            conditions = replace(conditions, direction=approach(q))
+        conditions = self._completed(q, conditions)
         count, m = len(q), self.chain.size
         coordinates, theta = np.empty((count, m)), np.empty((count, m))
         converged, steps = np.empty(count, bool), 0
@@ -189,6 +191,12 @@ class StiffnessModel:
         rested = stable & (np.abs(step) < 1e-11).all(axis=0) & np.isfinite(swept.position).all(axis=0)
         return Equilibrium((rest + theta).T, theta.T, swept.pose, rested, steps)
 
+    def _completed(self, q: Floats, conditions: Conditions) -> Conditions:
+        """The conditions, with the senses of approach from the order of ``q`` (N, n) where they are asked for."""
+        if conditions.direction is None and any(term.effect.by_direction for term in self.terms):
+            return replace(conditions, direction=approach(q))
+        return conditions
+
     def _rest(self, motors: Floats, conditions: Conditions) -> Floats:
         """(m, N) coordinates without load: motors and offsets."""
         rest = np.zeros((self.chain.size, motors.shape[1]))
@@ -224,6 +232,7 @@ class StiffnessModel:
         displacement: Floats | None = None,
     ) -> State:
         """What effects see of N states: at rest, or displaced by ``displacement`` (N, m)."""
+        conditions = self._completed(q, conditions)
         motors = np.ascontiguousarray(q.T)
         rest = self._rest(motors, conditions)
         coordinates = rest if displacement is None else rest + displacement.T
@@ -342,7 +351,8 @@ class StiffnessModel:
 
 def approach(q: Floats) -> Floats:
     """(N, n) sense -1, 0, 1 in which each motor came to its place, from the order of the states; the last one stays
-    where a motor did not move, and the first state has none."""
-    moved = np.sign(np.diff(q, axis=0, prepend=q[:1]))
+    where a motor did not move by more than ``STILL``, and the first state has none."""
+    way = np.diff(q, axis=0, prepend=q[:1])
+    moved = np.where(np.abs(way) <= STILL, 0.0, np.sign(way))
     last = np.maximum.accumulate(np.where(moved != 0, np.arange(len(q))[:, None], 0), axis=0)
     return np.take_along_axis(moved, last, axis=0)

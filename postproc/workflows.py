@@ -17,6 +17,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.cell import Cell, Frames, find_cell, frames_of, load_cell
 from postproc.compensation.correct import Result, State, Task, correct
+from postproc.compensation.doubt import doubt_of
 from postproc.dialects import detect
 from postproc.dialects.dialect import Dialect, Program
 from postproc.document import Document
@@ -31,7 +32,8 @@ from postproc.report.files import corrections_csv, unified_diff
 from postproc.report.report import Report, Spread, Worst, exit_code, in_order_of_place
 from postproc.report.workspace import Mapped, map_csv, slices_shown
 from postproc.robot.description import Robot, find_robot, load_robot, robot_files
-from postproc.robot.track import Track, follow, nominal_flange
+from postproc.robot.geometries import SerialArm
+from postproc.robot.track import Track, all_axes, follow, nominal_flange
 from postproc.toolpath import Kind, Toolpath
 from postproc.units import DEG, MM
 from postproc.workspace import Grid, Load, Survey, has_compensator, survey, with_sign
@@ -74,7 +76,7 @@ class MapRequest:
     linear: bool = False
     sign: str | None = None
     ignore_limits: bool = False
-    status: int = 2
+    status: int | None = None
     picture: Path | None = None
     csv: Path | None = None
     json: Path | None = None
@@ -143,7 +145,7 @@ def prepare(request: Request) -> Prepared:
     _missing_points(program, force)
     base, tool = frames.base_in_robot, frames.tool_in_flange
     wanted = base @ path.target_in_base
-    track = follow(robot, path, wanted @ tool.inverse(), cell.start)
+    track = follow(robot, path, wanted @ tool.inverse(), _start(cell, robot))
     task = Task(
         file=str(request.program),
         toolpath=path,
@@ -208,6 +210,9 @@ def map_workspace(request: MapRequest, stage: Stage = _silent) -> Mapped:
                 Finding("MAP001", f"--sign {request.sign}, but no gravity_compensator", str(robot.path))
             )
         model = with_sign(model, request.sign)
+    free = isinstance(robot.nominal, SerialArm)
+    if free and request.status is not None:
+        raise Refusal(Finding("MAP006", f"--status {request.status}, but this arm has no S", str(robot.path)))
     load = _load(request)
     stage("computing")
     found = survey(model, _grid(request), load)
@@ -219,13 +224,14 @@ def map_workspace(request: MapRequest, stage: Stage = _silent) -> Mapped:
         load=load,
         robot=robot.name,
         digest=robot.digest,
-        axes=tuple(joint.name for joint in robot.joints),
+        axes=tuple((joint.name, "mm" if joint.kind == "prismatic" else "deg") for joint in robot.joints),
         effects=tuple(term.effect.name for term in model.terms),
         stated=request.wrench,
         frame=request.frame,
         sign=", ".join(sorted(signs)) or None,
+        status=None if free else load.status,
     )
-    findings = [*_map_findings(found, request), *model.doubts()]
+    findings = [*_map_findings(found, mapped.status, request.picture is not None), *model.doubts()]
     files: dict[Path, bytes] = {}
     if found.mapped.any():
         stage("drawing")
@@ -265,29 +271,30 @@ def _load(request: MapRequest) -> Load:
         tool=Poses.from_abc(place, turn),
         orientation=orientation,
         wrench=wrench.ravel(),
-        status=request.status,
+        status=2 if request.status is None else request.status,
         linear=request.linear,
         ignore_limits=request.ignore_limits,
     )
 
 
-def _map_findings(found: Survey, request: MapRequest) -> list[Finding]:
+def _map_findings(found: Survey, status: int | None, drawn: bool) -> list[Finding]:
     """What is to be said of a map as a whole."""
     findings = []
     cells, unsettled = len(found.q), int(found.unsettled.sum())
+    if status is None:
+        findings.append(Finding("MAP007", "the arm has no S: neighbouring cells may differ in posture"))
     if not found.mapped.any():
         beyond = int(found.in_reach.sum())
         help = f"{beyond} cells are only beyond the axis limits: --ignore-limits" if beyond else ""
-        findings.append(
-            Finding("MAP002", f"none of {cells} cells can be reached with S {request.status}", help=help)
-        )
+        branch = "" if status is None else f" with S {status}"
+        findings.append(Finding("MAP002", f"none of {cells} cells can be reached{branch}", help=help))
     elif unsettled:
         findings.append(Finding("MAP003", f"{unsettled} of {cells} cells have no equilibrium"))
     elif not np.nanmax(found.size) > 0:
         findings.append(Finding("MAP005", "the deflection is zero everywhere"))
     slices = found.grid.shape[2]
     shown = len(slices_shown(slices))
-    if request.picture is not None and found.mapped.any() and min(found.grid.shape) > 1 and shown < slices:
+    if drawn and found.mapped.any() and min(found.grid.shape) > 1 and shown < slices:
         findings.append(Finding("MAP004", f"the picture shows {shown} of {slices} slices along z"))
     return findings
 
@@ -358,6 +365,19 @@ def _missing_points(program: Program, force: Wrenches) -> None:
         )
 
 
+def _start(cell: Cell, robot: Robot) -> Floats | None:
+    """The joint values (n,) before the first motion [rad, m].  Raises Refusal YML004."""
+    stated = cell.start_stated
+    if stated is None:
+        return None
+    names = [joint.name for joint in robot.joints]
+    if len(stated) != len(names):
+        message = f"start: {len(stated)} values; {robot.name} has {len(names)} joints: {', '.join(names)}"
+        raise Refusal(Finding("YML004", message, str(cell.path), cell.start_line))
+    units = np.array([DEG if joint.kind == "revolute" else MM for joint in robot.joints])
+    return np.asarray(stated * units)
+
+
 def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpath:
     """The toolpath with targets that continue an axis motion filled in from where that one leads."""
     rows = np.flatnonzero(path.anchor >= 0)
@@ -366,7 +386,7 @@ def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpa
     frames = frames_of(cell, path, program)
     axes = np.zeros((len(path), 6))
     axes[rows] = path.axes[path.anchor[rows]]
-    flange = nominal_flange(robot, axes)
+    flange = nominal_flange(robot, all_axes(robot, axes, _start(cell, robot)))
     return path.completed(frames.base_in_robot.inverse() @ flange @ frames.tool_in_flange)
 
 
@@ -559,6 +579,7 @@ def _report(
         angle_before_deg=_largest(result.before_angle[scope]) / DEG,
         angle_after_deg=_largest(result.after_angle[scope]) / DEG if corrected else None,
         worst=worst,
+        doubt=doubt_of(task, result, ready.cell.force_ci95),
         model=_model(ready),
         digests={
             "robot": ready.robot.digest,

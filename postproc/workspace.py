@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, frozen
-from postproc.effects import GravityCompensator
+from postproc.arrays import Bools, Floats
+from postproc.effects.gravity_compensator import GravityCompensator
 from postproc.geometry import Poses
 from postproc.model import StiffnessModel
 from postproc.robot.inverse import inverse
@@ -18,6 +18,9 @@ MAX_CELLS = 1_000_000
 
 BATCH = 8192
 """Cells evaluated at once."""
+
+MARGIN = 1e-9
+"""An axis [rad] that stands on its limit is within."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,44 +118,46 @@ def with_sign(model: StiffnessModel, sign: str) -> StiffnessModel:
 
 def survey(model: StiffnessModel, grid: Grid, load: Load) -> Survey:
     """The deflection at every cell of ``grid``, in batches."""
-    places = grid.positions
-    parts = [_survey(model, places[at : at + BATCH], load) for at in range(0, len(places), BATCH)]
-    q, in_reach, within, mapped, deflection = (np.concatenate(column) for column in list(zip(*parts))[:5])
-    without = np.concatenate([part[5] for part in parts]) if has_compensator(model) else None
-    columns = [frozen(in_reach, dtype=bool), frozen(within, dtype=bool), frozen(mapped, dtype=bool)]
-    return Survey(
-        grid, frozen(q), *columns, frozen(deflection), None if without is None else frozen(without)
-    )
+    places, axes = grid.positions, len(model.robot.limits)
+    count = len(places)
+    q, in_reach, within = np.empty((count, axes)), np.empty(count, bool), np.empty(count, bool)
+    mapped, deflection, without = np.empty(count, bool), np.empty((count, 3)), np.empty((count, 3))
+    bare = model.without([GravityCompensator.name]) if has_compensator(model) else None
+    for start in range(0, count, BATCH):
+        rows = slice(start, start + BATCH)
+        q[rows], in_reach[rows], within[rows] = _arm(model, places[rows], load)
+        mapped[rows] = in_reach[rows] if load.ignore_limits else within[rows]
+        deflection[rows] = _deflection(model, q[rows], mapped[rows], load)
+        if bare is not None:
+            without[rows] = _deflection(bare, q[rows], mapped[rows], load)
+    for array in (q, in_reach, within, mapped, deflection, without):
+        array.setflags(write=False)
+    return Survey(grid, q, in_reach, within, mapped, deflection, None if bare is None else without)
 
 
-def _survey(
-    model: StiffnessModel, places: Floats, load: Load
-) -> tuple[Floats, Bools, Bools, Bools, Floats, Floats]:
+def _arm(model: StiffnessModel, places: Floats, load: Load) -> tuple[Floats, Bools, Bools]:
+    """Angles that the controller takes to bring the TCP to ``places`` (N, 3); in reach; within the axis limits."""
     count, robot = len(places), model.robot
     flange = Poses(np.broadcast_to(load.orientation, (count, 3, 3)), places) @ load.tool.inverse()
     low, high = robot.limits.T
-    middle = np.broadcast_to((low + high) / 2, (count, len(low)))
-    found = inverse(robot.nominal, flange, np.full(count, load.status), middle)
-    margin = 1e-9
-    inside = ((found.q >= low - margin) & (found.q <= high + margin)).all(axis=1)
-    within = found.reachable & inside
-    mapped = found.reachable if load.ignore_limits else within
-
-    q = found.q[mapped]
-    wrench = np.broadcast_to(load.wrench, (len(q), 6))
-    results = []
-    for variant in (model, model.without(["gravity_compensator"])):
-        bent = np.full((count, 3), np.nan)
-        bent[mapped] = _deflection(variant, q, wrench, load)
-        results.append(bent)
-    return found.q, found.reachable, within, mapped, results[0], results[1]
+    middle = np.nan_to_num((low + high) / 2)
+    found = inverse(
+        robot.nominal, flange, np.full(count, load.status), np.broadcast_to(middle, (count, len(middle)))
+    )
+    inside = ((found.q >= low - MARGIN) & (found.q <= high + MARGIN)).all(axis=1)
+    return found.q, found.reachable, found.reachable & inside
 
 
-def _deflection(model: StiffnessModel, q: Floats, wrench: Floats, load: Load) -> Floats:
-    """(N, 3) [m] how far the wrench moves the TCP: loaded minus unloaded; NaN without an equilibrium."""
+def _deflection(model: StiffnessModel, angles: Floats, mapped: Bools, load: Load) -> Floats:
+    """(N, 3) [m] how far the wrench moves the TCP, loaded minus unloaded; NaN where not mapped or never at rest."""
+    q = angles[mapped]
+    wrench = np.tile(load.wrench, (len(q), 1))
+    moved = np.full((len(angles), 3), np.nan)
     if load.linear:
-        return model.linear_deflection(q, wrench, load.tool)[:, :3]
+        moved[mapped] = model.linear_deflection(q, wrench, load.tool)[:, :3]
+        return moved
     loaded = model.equilibrium(q, wrench, load.tool)
     free = model.equilibrium(q, np.zeros_like(wrench), load.tool)
     rests = (loaded.converged & free.converged)[:, None]
-    return np.where(rests, loaded.pose.position - free.pose.position, np.nan)
+    moved[mapped] = np.where(rests, loaded.pose.position - free.pose.position, np.nan)
+    return moved

@@ -156,6 +156,11 @@ class Section:
             raise self.error("YML004", "must be true or false", key)
         return _FLAGS[node.value]
 
+    def length(self, key: str) -> int:
+        """Entries of the list under ``key``, for lists of several lengths; 0 where there is no list."""
+        node = self._values.get(key)
+        return len(node.value) if isinstance(node, yaml.SequenceNode) else 0
+
     def is_list(self, key: str) -> bool:
         """Whether a list stands under ``key``, for keys that may hold a word or a list."""
         return isinstance(self._values.get(key), yaml.SequenceNode)

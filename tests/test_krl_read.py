@@ -405,6 +405,51 @@ def test_lines_of_any_length_are_read_in_time() -> None:
         assert program.toolpath.line[-1] == 5
 
 
+def test_functions_in_expressions_are_calls() -> None:
+    function = "END\nDEFFCT INT setter(n:IN)\nBAS(#BASE,n)\nRETURN 1\nENDFCT\nDEF last()\n"
+    for line in (
+        "r = setter(2)",
+        "IF setter(2) == 1 THEN\nENDIF",
+        "WAIT FOR (setter(2) == 1)",
+        "calc(setter(2))",
+    ):
+        assert codes(body(line + "\n" + FULL + function)) == {0: "KRL005"}, line
+    for line in ("r=probe()", "WHILE busy(1) AND (a==1)\nENDWHILE", "REPEAT\nUNTIL done(1)"):
+        program = body(FULL + line + "\nLIN {X 5}\n")
+        assert codes(program) == {1: "KRL004"}, line
+        assert "KRL010" in told(program)
+        assert list(program.toolpath.pinned) == [0]
+
+
+def test_functions_of_krl_itself_move_nothing() -> None:
+    lines = 'r=ABS(-1)+STRLEN("probe(1)")\nIF (a==1) AND NOT (b==2) THEN\nENDIF\nWAIT FOR ($IN[1])\nWAIT SEC (1)\n'
+    assert told(body(FULL + lines + "LIN {X 5}\n")) == []
+
+
+def test_relative_motions_are_what_they_are_named() -> None:
+    text = "LIN_REL {X 5}\nSPTP_REL {A1 5}\nCIRC_REL {X 1},{X 2}\nSPLINE\nSLIN_REL {X 1}\nENDSPLINE\n"
+    assert [Kind(k).name for k in body(text).toolpath.kind] == ["LIN", "PTP", "CIRC", "OTHER"]
+
+
+@pytest.mark.parametrize(
+    ("text", "moves"),
+    [
+        (FULL.replace("}", ",E1 1.0}") + FULL.replace("}", ",E1 1}"), False),
+        (FULL.replace("}", ",E1 1.0}") + FULL + FULL.replace("}", ",E1 1.5}"), True),
+        ("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0,E2 1}\n" + FULL.replace("}", ",E2 wide}"), True),
+        ("P={X 1,Y 2,Z 3,A 4,B 5,C 6}\nP.E1=1\nLIN P\nP={X 1,Y 2,Z 3,A 4,B 5,C 6}\nP.E1=2\nLIN P\n", True),
+    ],
+)
+def test_external_axes_that_move_are_told(text: str, moves: bool) -> None:
+    assert told(body(text)) == (["KRL022"] if moves else [])
+
+
+def test_a_frame_of_the_dat_that_the_program_changes_is_not_known() -> None:
+    data = "DEFDAT part\nDECL FRAME B1={X 1,Y 2,Z 3,A 0,B 0,C 0}\nENDDAT\n"
+    assert body("$BASE=B1\n" + FULL, data).toolpath.refused == {}
+    assert codes(body("$BASE=B1\n" + FULL + "B1.Z=B1.Z+10\n", data)) == {0: "KRL005"}
+
+
 def test_an_unread_routine_is_told_once() -> None:
     program = body("A_TOOL(1)\n" + FULL + "a_tool (2)\nBAS(#VEL_PTP,5)\nH50(GRP,1,1,GAbrir)\nSR_END()\n")
     assert told(program) == ["KRL010"]

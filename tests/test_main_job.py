@@ -159,6 +159,19 @@ def test_a_folder_as_output(compensate, job):
     assert (job.folder / "new" / "part.src").is_file()
 
 
+def test_a_name_without_suffix_as_output_is_a_folder(compensate, job):
+    assert compensate(job.program, "--force", "-o", job.folder / "new").code == 0
+    assert (job.folder / "new" / "part.src").is_file()
+
+
+def test_an_output_named_like_its_companion(compensate, job):
+    (job.folder / "part.dat").write_text("DEFDAT part\nENDDAT\n")
+    done = compensate(job.program, "--force", "-o", job.folder / "new" / "other.dat")
+    assert done.code == 1
+    assert "FIL007" in done.err
+    assert not (job.folder / "new").exists()
+
+
 def test_a_point_that_continues_an_axis_motion(compensate, job):
     """Components left out after a PTP in axes are those of the place where it leads."""
     lines = [line for line in LINES if "Z 50.000,A" not in line]
@@ -216,6 +229,40 @@ def test_compensate_off_leaves_a_part_alone(compensate, job):
     job.write(lines)
     done = compensate(job.program, "--force", "--json", "-")
     assert (done.code, done.json["corrected"], done.json["left"]) == (0, 4, 0)
+
+
+def test_words_behind_the_switch_are_a_remark(compensate, job):
+    lines = list(LINES)
+    lines.insert(lines.index(";FORCE 0 200 0"), ";COMPENSATE OFF, this is probing")
+    job.write(lines)
+    done = compensate(job.program, "--force", "--json", "-")
+    assert (done.code, done.json["corrected"], done.json["left"]) == (0, 4, 0)
+
+
+def test_a_switch_that_is_none_is_told(compensate, job):
+    lines = list(LINES)
+    lines.insert(lines.index(";FORCE 0 200 0"), ";COMPENSATE: OFF")
+    job.write(lines)
+    done = compensate(job.program, "--force", "--json", "-")
+    assert (done.code, done.json["corrected"]) == (3, 5)
+    assert [f["line"] for f in done.json["findings"] if f["code"] == "COR011"] == [18]
+
+
+def test_a_relative_motion_between_cuts_keeps_the_configuration(compensate, job):
+    lines = list(LINES)
+    lines[lines.index("LIN {X 400.000}")] = "LIN_REL {Z 100}"
+    at = lines.index("LIN {Z 0.000}", 10)
+    lines[at] = "LIN {X 400.000,Y 300.000,Z 0.000,A 0.000,B 0.000,C 180.000}"
+    job.write(lines)
+    done = compensate(job.program, "--force", "--json", "-")
+    assert (done.code, done.json["corrected"], done.json["left"]) == (3, 5, 0)
+
+
+def test_stated_configurations_that_are_not_the_robots_are_told_once(compensate, job):
+    job.write([line.replace("C 180.000}", "C 180.000,S 6,T 63}") for line in LINES])
+    done = compensate(job.program, "--force", "--json", "-")
+    told = sorted(f["message"][:12] for f in done.json["findings"] if f["code"] == "KIN007")
+    assert told == ["the stated S", "the stated T"]
 
 
 def test_switching_inside_a_cut_leaves_the_whole_cut(compensate, job):
@@ -286,6 +333,27 @@ def test_the_diff_turns_the_input_into_the_output(compensate, job):
         pytest.skip("no patch command")
     assert done.returncode == 0, done.stdout
     assert patched.read_bytes() == job.output.read_bytes()
+
+
+@pytest.mark.parametrize("line", ["WAIT SEC 1\r", ";a\rb", "LIN {X 250.000} ;a\rb"])
+def test_a_carriage_return_inside_of_a_line_breaks_no_diff(compensate, job, line):
+    lines = list(LINES)
+    lines.insert(12, line)
+    job.write(lines, "\n")
+    compensate(job.program, "--force")
+    diff = job.output.with_name("part.diff").read_bytes().split(b"\n")[2:]
+    assert {line[:1] for line in diff if line} <= {b"@", b" ", b"+", b"-"}
+
+
+def test_a_file_name_that_is_no_text(compensate, job):
+    name = os.fsdecode(b"t\xe4st.src")
+    try:
+        program = job.write(LINES, name=name)
+    except OSError:
+        pytest.skip("the file system takes no such name")
+    assert compensate(program, "--force").code == 0
+    diff = (job.folder / "compensated" / name).with_suffix(".diff").read_bytes()
+    assert diff.startswith(b"--- t\xe4st.src\n+++ t\xe4st.src\n")
 
 
 def test_json_into_a_file(compensate, job):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -39,6 +40,10 @@ def main() -> None:
 def run(argv: Sequence[str] | None = None) -> None:
     """Entry point of the console script."""
     words = list(sys.argv[1:] if argv is None else argv)
+    for stream in (sys.stdout, sys.stderr):
+        # A name or a comment that the terminal can not show is no reason to stop.
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     if words and words[0].isalpha() and words[0] not in COMMANDS and not os.path.exists(words[0]):
         hint = nearest(words[0], COMMANDS)
         click.echo(f"Error: no command and no file {words[0]!r}{hint}", err=True)

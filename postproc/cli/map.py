@@ -61,7 +61,9 @@ def _ending(*endings: str) -> Callable[[click.Context, click.Parameter, Path | N
 
 @click.command("map")
 @click.option("--robot", required=True, metavar="NAME|FILE", help="The robot.")
-@click.option("--x", required=True, metavar="A:B", callback=_range, help="Range or one value, mm, robot base.")
+@click.option(
+    "--x", required=True, metavar="A:B", callback=_range, help="Range or one value, mm, robot base."
+)
 @click.option("--y", required=True, metavar="A:B", callback=_range, help="The same for y.")
 @click.option("--z", required=True, metavar="A:B", callback=_range, help="The same for z.")
 @click.option(
@@ -93,7 +95,9 @@ def _ending(*endings: str) -> Callable[[click.Context, click.Parameter, Path | N
     help="What acts on the tool at its TCP: 0,360,560@base (or world, the same here; or tool), N; six numbers with "
     "moments in N m.",
 )
-@click.option("--linear", is_flag=True, help="Linearized, eq. (5), instead of the balance on the deflected pose.")
+@click.option(
+    "--linear", is_flag=True, help="Linearized, eq. (5), instead of the balance on the deflected pose."
+)
 @click.option(
     "--sign",
     type=click.Choice(["energy", "as_printed"]),
@@ -103,9 +107,7 @@ def _ending(*endings: str) -> Callable[[click.Context, click.Parameter, Path | N
 @click.option(
     "--status",
     type=click.IntRange(0, 7),
-    default=2,
-    show_default=True,
-    help="Branch of the arm as KUKA's S: 1 wrist overhead, 2 elbow up, 4 A5 below zero, added up.",
+    help="Branch of a KUKA-type arm, S: 1 wrist overhead, 2 elbow up, 4 A5 below zero, added up [2].",
 )
 @click.option(
     "--picture",
@@ -135,7 +137,7 @@ def map_(
     linear: bool,
     sign: str | None,
     ignore_limits: bool,
-    status: int,
+    status: int | None,
     picture: Path | None,
     csv_to: Path | None,
     json_to: str | None,

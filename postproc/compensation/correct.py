@@ -14,7 +14,7 @@ from postproc.effects import Conditions
 from postproc.findings import Finding, Refusal
 from postproc.geometry import Poses
 from postproc.model import StiffnessModel
-from postproc.robot.track import Track, near_singular, sides
+from postproc.robot.track import Track, near_singular, sides, singular_words
 from postproc.toolpath import Kind, Toolpath
 from postproc.units import DEG, MM
 
@@ -239,7 +239,11 @@ def _which_axis(task: Task, q: Floats, mask: Bools) -> str:
     low, high = task.model.robot.limits.T
     axis = int(np.argmax(np.maximum(low - q[row], q[row] - high)))
     joint = task.model.robot.joints[axis]
-    return f"{joint.name} at {q[row, axis] / DEG:.1f} deg, limits {low[axis] / DEG:g} .. {high[axis] / DEG:g} deg"
+    word, unit = ("deg", DEG) if joint.kind == "revolute" else ("mm", MM)
+    return (
+        f"{joint.name} at {q[row, axis] / unit:.1f} {word},"
+        f" limits {low[axis] / unit:g} .. {high[axis] / unit:g} {word}"
+    )
 
 
 def _goal(task: Task, rows: Ints) -> Poses:
@@ -316,7 +320,7 @@ def _warn_singular(task: Task, mask: Bools, findings: list[Finding]) -> None:
     rows = np.flatnonzero(mask)
     close = rows[near_singular(task.model.robot, task.track.q[rows])]
     if len(close):
-        message = "A5 near 0, the wrist over axis 1, or the arm stretched" + _more(task, close)
+        message = singular_words(task.model.robot) + _more(task, close)
         findings.append(_at(task, int(close[0]), "KIN003", message))
 
 

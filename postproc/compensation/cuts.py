@@ -11,7 +11,6 @@ from postproc.arrays import Bools, Ints
 from postproc.findings import Finding
 from postproc.toolpath import Toolpath
 
-
 _SWITCH = re.compile(r"COMPENSATE\s+(ON|OFF)(?![A-Z0-9_])", re.IGNORECASE)
 
 

@@ -62,13 +62,14 @@ class GravityCompensator(Load):
         self.preload = preload
         self.sign = sign
         self.zero = zero
+        at, along = self.joint_name, "distance of the two ends along the joint axis"
         self.parameters = (
-            Parameter("K_c", "N/m", 0.0, 0.0, 1e9, _SOURCE),
-            Parameter("s0", "m", 0.0, 0.0, 10.0, _SOURCE),
-            Parameter("L", "m", 0.0, 0.0, 10.0, _SOURCE),
-            Parameter("a_x", "m", 0.0, -10.0, 10.0, _SOURCE),
-            Parameter("a_y", "m", 0.0, -10.0, 10.0, _SOURCE),
-            Parameter("h", "m", 0.0, -10.0, 10.0, "distance of the two ends along the joint axis"),
+            Parameter("K_c", "N/m", 0.0, 0.0, 1e9, _SOURCE, at),
+            Parameter("s0", "m", 0.0, 0.0, 10.0, _SOURCE, at),
+            Parameter("L", "m", 0.0, 0.0, 10.0, _SOURCE, at),
+            Parameter("a_x", "m", 0.0, -10.0, 10.0, _SOURCE, at),
+            Parameter("a_y", "m", 0.0, -10.0, 10.0, _SOURCE, at),
+            Parameter("h", "m", 0.0, -10.0, 10.0, along, at),
         )
 
     @classmethod

@@ -17,8 +17,9 @@ class LinkGravity(Load):
     """Weight of the links from their first moments m c [kg m]: of link i about its joint, axes of the robot base at the
     zero pose, with the mass of all that follows counted at the next joint.
 
-    U = -sum of g . R_i (m c)_i; a link's mass itself is seen by no turn.  ``mass`` [kg], of the whole arm, acts on
-    shifts before it (base, linear axis).
+    U = -g . (sum of R_i (m c)_i + m p_1); from the first turning joint on, masses themselves are seen by no turn.
+    ``mass`` m [kg], of the whole arm, acts at the origin p_1 of that joint, on what stands before it (base, linear
+    axis).  Shifts behind it carry nothing here.
     """
 
     name = "link_gravity"
@@ -49,22 +50,25 @@ class LinkGravity(Load):
 
     def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
         moments = self._moments(values, state)
-        g, swept = state.gravity[:, None], state.swept
-        follows = np.searchsorted(state.chain.motor_rows, np.arange(len(swept.turns)))
-        for i, turns in enumerate(swept.turns):
-            if follows[i] == len(moments):
-                continue
-            axis, moment = swept.axes[i], moments[follows[i]]
-            if turns:
+        g, swept, chain = state.gravity[:, None], state.swept, state.chain
+        first = _first_turn(chain)
+        follows = np.searchsorted(chain.motor_rows, np.arange(chain.motor_rows[-1] + 1))
+        for i, joint in enumerate(follows):
+            axis, moment = swept.axes[i], moments[joint]
+            if i < first:
+                moment = moment + values["mass"] * (swept.origins[first] - swept.origins[i])
+            if swept.turns[i]:
                 force[i] += np.sum(axis * cross(moment, g), axis=0)
                 slope[i] += np.sum(axis * cross(cross(axis, moment), g), axis=0)
-            else:
+            elif i < first:
                 force[i] += values["mass"] * np.sum(axis * g, axis=0)
 
     def energy(self, values: Values, state: State) -> Floats:
-        lifted = values["mass"] * np.zeros(state.motors.shape[1])
-        for i, turns in enumerate(state.swept.turns):
-            if not turns and i < state.chain.motor_rows[-1]:
-                along = state.gravity @ state.swept.axes[i]
-                lifted = lifted - values["mass"] * along * state.coordinates[i]
-        return np.asarray(lifted - state.gravity @ self._moments(values, state)[0])
+        origin = state.swept.origins[_first_turn(state.chain)]
+        return np.asarray(-state.gravity @ (self._moments(values, state)[0] + values["mass"] * origin))
+
+
+def _first_turn(chain: Chain) -> int:
+    """The coordinate of the first turning joint."""
+    rows = chain.motor_rows
+    return int(rows[np.argmax(chain.turns[rows])])

@@ -35,7 +35,7 @@ def picture(mapped: Mapped, kind: str) -> bytes:
         figure = (_curve, _curve, _plane, _slices)[len(ranged)](mapped, ranged)
         canvas = FigureCanvasAgg(figure)
         stream = io.BytesIO()
-        smaller = {"pil_kwargs": {"optimize": True}} if kind == "png" else {}
+        smaller: dict[str, Any] = {"pil_kwargs": {"optimize": True}} if kind == "png" else {}
         stamp = {"Software": None} if kind == "png" else {"Date": None}
         canvas.figure.savefig(stream, format=kind, dpi=DPI, metadata=stamp, **smaller)
     return stream.getvalue()
@@ -99,7 +99,9 @@ def _curve(mapped: Mapped, ranged: list[int]) -> Figure:
         _dim(axes)
         half = np.diff(along).mean() / 2
         for start, stop in _runs(np.isfinite(values)):
-            axes.axvspan(along[start] - half, along[stop] + half, facecolor="white", edgecolor="none", zorder=0)
+            axes.axvspan(
+                along[start] - half, along[stop] + half, facecolor="white", edgecolor="none", zorder=0
+            )
         axes.plot(along, values, marker=".", color="#31688e", linewidth=1.6)
         axes.set_title(_heading(quantity, values), fontsize=10)
         axes.set_ylabel("mm")
@@ -226,7 +228,7 @@ def _title(mapped: Mapped) -> str:
 def _heading(quantity: Quantity, values: Floats) -> str:
     name = {"deflection_mm": "deflection"}.get(quantity.key, "compensator on/off, difference")
     least, greatest = _bounds(values)
-    decimals = int(np.clip(2 - np.floor(np.log10(max(greatest, 1e-9))), 0, 9))
+    decimals = int(np.clip(2 - np.floor(np.log10(max(greatest, 1e-9))), 3, 9))
     return f"{name}: {least:.{decimals}f} to {greatest:.{decimals}f} mm"
 
 

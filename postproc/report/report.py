@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.compensation.doubt import Doubt
 from postproc.findings import SEVERITIES, Finding
 from postproc.units import MM
 
@@ -67,6 +68,7 @@ class Report:
     angle_before_deg: float
     angle_after_deg: float | None
     worst: tuple[Worst, ...]
+    doubt: Doubt
     model: dict[str, object]
     digests: dict[str, str]
     findings: tuple[Finding, ...]
@@ -90,13 +92,16 @@ class Report:
             "gain": self.gain,
             "correct": self.mode,
             "force": {"source": self.force_source, "max_n": round(self.force_max_n, 3)},
-            "error_before_mm": self.before.as_mm(),
-            "error_after_mm": self.after.as_mm() if self.after else None,
+            "error_before_mm": {**self.before.as_mm(), "ci95": _finite(self.doubt.before / MM)},
+            "error_after_mm": {**self.after.as_mm(), "ci95": _finite(self.doubt.after / MM)}
+            if self.after
+            else None,
             "correction_mm": self.correction.as_mm() if self.correction else None,
             "angle_before_deg": {"max": _finite(self.angle_before_deg)},
             "angle_after_deg": None
             if self.angle_after_deg is None
             else {"max": _finite(self.angle_after_deg)},
+            "doubt": _doubt(self.doubt),
             "model": self.model,
             "digests": self.digests,
             "findings": [finding.as_json() for finding in self.findings],
@@ -129,6 +134,17 @@ def in_order_of_place(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 
 def with_outputs(report: Report, outputs: Sequence[str]) -> Report:
     return replace(report, outputs=tuple(outputs))
+
+
+def _doubt(doubt: Doubt) -> dict[str, object]:
+    return {
+        "lower_bound": doubt.lower_bound,
+        "without_interval": [name for name, _ in doubt.tenth],
+        "ten_percent_mm": {name: _finite(length / MM) for name, length in doubt.tenth},
+        "level_unstated": list(doubt.level_unstated),
+        "blame": [{"parameter": name, "share": round(share, 6)} for name, share in doubt.blame],
+        "unstable": doubt.unstable,
+    }
 
 
 def _finite(value: float) -> float | None:

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from postproc.arrays import Floats
+from postproc.geometry import Poses
 from postproc.model import StiffnessModel
-from postproc.robot.description import Value
+from postproc.robot.description import Robot, Value
+from postproc.robot.geometries import KukaLengths, KukaVariant
 from postproc.units import DEG, MM
 
 
@@ -31,10 +35,19 @@ def show_robot(console: Console, models: Sequence[StiffnessModel]) -> None:
     robot = model.robot
     console.print(Text(f"{robot.name}: {robot.maker_name}", style="bold"))
     console.print(Text(robot.about), Text(""))
-    lengths = "  ".join(f"{name} {value / MM:g}" for name, value in asdict(robot.arm).items())
-    console.print(Text(f"links [mm]  {lengths}\n  {robot.geometry_source}"))
-    limits = "  ".join(f"{j.name} {j.lower / DEG:g}..{j.upper / DEG:g}" for j in robot.joints)
-    console.print(Text(f"limits [deg]  {limits}\n  {robot.limits_source}\n"))
+    console.print(Text(f"{_geometry_words(robot)}\n  {robot.geometry_source}"))
+    if robot.nominal is not robot.arm and robot.nominal != robot.arm:
+        console.print(Text("the controller believes another geometry"))
+    console.print(Text(f"{_limits_words(robot)}\n  {robot.limits_source}"))
+    if robot.external is not None:
+        console.print(Text(f"external  {robot.joints[robot.external].name}: keeps its value of `start`"))
+    if robot.masses:
+        masses = "  ".join(f"{mass.joint} {mass.mass:g}" for mass in robot.masses)
+        console.print(Text(f"masses [kg]  {masses}\n  {robot.masses_source}"))
+    for mechanism in robot.mechanisms:
+        at = f" at {mechanism.joint}" if mechanism.joint else ""
+        console.print(Text(f"mechanism  {mechanism.name} ({mechanism.kind}){at}\n  {mechanism.source}"))
+    console.print()
     for term in model.terms:
         options = ", ".join(f"{key} {value}" for key, value in term.effect.described().items())
         table = Table(
@@ -60,8 +73,23 @@ def robot_json(model: StiffnessModel) -> dict[str, object]:
         "maker_name": robot.maker_name,
         "file": str(robot.path),
         "digest": robot.digest,
-        "geometry": {"kuka_m": asdict(robot.arm), "source": robot.geometry_source},
-        "limits_deg": {j.name: [j.lower / DEG, j.upper / DEG] for j in robot.joints},
+        "geometry": {**_geometry_json(robot), "source": robot.geometry_source},
+        "limits_deg": {j.name: [j.lower / DEG, j.upper / DEG] for j in robot.joints if j.kind == "revolute"},
+        "limits_mm": {j.name: [j.lower / MM, j.upper / MM] for j in robot.joints if j.kind == "prismatic"},
+        "external": None if robot.external is None else robot.joints[robot.external].name,
+        "mechanisms": [
+            {
+                "name": mechanism.name,
+                "kind": mechanism.kind,
+                "joint": mechanism.joint,
+                "source": mechanism.source,
+                "quantities": {
+                    name: {"values": quantity.values.tolist(), "unit": quantity.unit}
+                    for name, quantity in mechanism.quantities.items()
+                },
+            }
+            for mechanism in robot.mechanisms
+        ],
         "effects": {
             term.effect.name: {
                 **term.effect.described(),
@@ -74,6 +102,51 @@ def robot_json(model: StiffnessModel) -> dict[str, object]:
             for term in model.terms
         },
     }
+
+
+def _lengths(robot: Robot) -> KukaLengths | None:
+    if isinstance(robot.arm, KukaLengths):
+        return robot.arm
+    return robot.arm.lengths if isinstance(robot.arm, KukaVariant) else None
+
+
+def _geometry_words(robot: Robot) -> str:
+    """Link lengths, or where each joint lies and points with all values at zero."""
+    lengths = _lengths(robot)
+    if lengths is not None:
+        words = "  ".join(f"{name} {value / MM:g}" for name, value in asdict(lengths).items())
+        rail = getattr(robot.arm, "rail", None)
+        on = "" if rail is None else f"  on a linear axis along {_vector(rail)}"
+        return f"links [mm]  {words}{on}"
+    lines = [f"geometry  {robot.arm.kind}; at zero [mm, axes of the base]"]
+    at = Poses.identity()
+    for joint in robot.joints:
+        at = at @ joint.placement
+        verb = "turns about" if joint.kind == "revolute" else "moves along"
+        lines.append(f"  {joint.name} at {_vector(at.position / MM)} {verb} {_vector(at.rotation[:, 2])}")
+    tip = at @ robot.flange
+    return "\n".join([*lines, f"  flange at {_vector(tip.position / MM)}, z {_vector(tip.rotation[:, 2])}"])
+
+
+def _geometry_json(robot: Robot) -> dict[str, object]:
+    lengths = _lengths(robot)
+    axes = [
+        {"name": axis.name, "kind": axis.kind, "sign": axis.sign, "offset": axis.offset} for axis in robot.axes
+    ]
+    found: dict[str, object] = {"kind": robot.arm.kind, "axes": axes}
+    return found if lengths is None else {**found, "kuka_m": asdict(lengths)}
+
+
+def _limits_words(robot: Robot) -> str:
+    words = []
+    for joint in robot.joints:
+        unit, word = (DEG, "") if joint.kind == "revolute" else (MM, " mm")
+        words.append(f"{joint.name} {joint.lower / unit:g}..{joint.upper / unit:g}{word}")
+    return "limits [deg]  " + "  ".join(words)
+
+
+def _vector(values: Floats) -> str:
+    return "(" + ", ".join(f"{value + 0.0:.6g}" for value in np.round(values, 6)) + ")"
 
 
 def _interval(value: Value) -> str:

@@ -11,11 +11,15 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from postproc.compensation.doubt import FORCE, Doubt
 from postproc.findings import CODES, Finding
 from postproc.report.report import Report, Spread
 from postproc.units import MM
 
 _STYLES = {"info": "cyan", "warning": "yellow", "error": "bold red"}
+NAMED = 3
+"""Parameters that the line on the doubt names."""
+
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
 
@@ -44,10 +48,12 @@ def _rows(report: Report) -> Iterable[tuple[str, str]]:
     yield "robot", escape(report.robot)
     yield "force", escape(f"{report.force_source}, at most {report.force_max_n:.0f} N")
     yield "errors", "predicted, at the end points of cutting motions"
-    yield "error before", f"{_spread(report.before)}, orientation {_deg(report.angle_before_deg)}"
+    before = _spread(report.before, _interval(report.doubt, report.doubt.before))
+    yield "error before", f"{before}, orientation {_deg(report.angle_before_deg)}"
     if report.after is not None and report.correction is not None and report.angle_after_deg is not None:
         share = "" if report.gain == 1.0 else f"; gain {report.gain:g}"
-        yield "error after", f"{_spread(report.after)}, orientation {_deg(report.angle_after_deg)}"
+        after = _spread(report.after, _interval(report.doubt, report.doubt.after))
+        yield "error after", f"{after}, orientation {_deg(report.angle_after_deg)}"
         yield "correction", f"{_spread(report.correction)} ({report.iterations} iterations{share})"
         yield (
             "motions",
@@ -56,6 +62,10 @@ def _rows(report: Report) -> Iterable[tuple[str, str]]:
                 " with nothing to correct"
             ),
         )
+    if report.doubt.worst >= 0:
+        yield "doubt", escape(_doubt(report.doubt))
+        if report.doubt.lower_bound:
+            yield "", escape(_left_out(report.doubt))
 
 
 def _worst(report: Report) -> Table:
@@ -89,10 +99,71 @@ def printable(text: str) -> str:
     return _CONTROL.sub("?", text)
 
 
-def _spread(spread: Spread) -> str:
+def _interval(doubt: Doubt, half_width: float) -> str:
+    """`` +- 0.11 (95 %)``; empty where nothing is known."""
+    if math.isnan(half_width):
+        return ""
+    return f" +- {_two_digits(half_width / MM)}{' or more' if doubt.lower_bound else ''} (95 %)"
+
+
+def _doubt(doubt: Doubt) -> str:
+    """Where the intervals come from."""
+    if not doubt.intervals:
+        return "not known, nothing has an interval"
+    seen, told = 0.0, []
+    for name, share in doubt.blame[:NAMED]:
+        name = f"{FORCE}, one scale for all motions" if name == FORCE else name
+        told.append(f"{name} ({100 * share:.0f} %)")
+        seen += share
+        if seen > 0.95:
+            break
+    parts = ["mostly " + ", ".join(_once(told)) if told else "none from the intervals"]
+    if len(doubt.level_unstated) == 1:
+        parts.append("the level of 1 interval is not stated")
+    elif doubt.level_unstated:
+        parts.append(f"levels of {len(doubt.level_unstated)} intervals are not stated")
+    return "; ".join(parts)
+
+
+def _left_out(doubt: Doubt) -> str:
+    """What the intervals leave out, and what a tenth of it is worth."""
+    names = [(name, length) for name, length in doubt.tenth if name != FORCE]
+    parts = []
+    if names:
+        words = ", ".join(_once([name for name, _ in names[:NAMED]]))
+        more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+        has = f"has no interval (10 % of it: {_two_digits(names[0][1] / MM)} mm)"
+        if len(names) > 1:
+            each = ", ".join(_two_digits(length / MM) for _, length in names[:NAMED])
+            has = f"have no interval (10 % of each: {each} mm)"
+        parts.append(f"{words}{more} {has}")
+    for _, length in (entry for entry in doubt.tenth if entry[0] == FORCE):
+        tenth = f"(10 % of it: {_two_digits(length / MM)} mm)"
+        parts.append(f"nor has the force {tenth}" if parts else f"the force has no interval {tenth}")
+    if doubt.unstable:
+        parts.append(f"{doubt.unstable} motions have no stable rest within the intervals")
+    return "at least: " + ", ".join(parts)
+
+
+def _once(names: Sequence[str]) -> list[str]:
+    """``effect.a, effect.b`` as ``effect.a, b``."""
+    effects = [name.partition(".")[0] for name in names]
+    return [
+        name.partition(".")[2] if i and effects[i] == effects[i - 1] else name for i, name in enumerate(names)
+    ]
+
+
+def _two_digits(value: float) -> str:
+    """Two significant digits without an exponent."""
+    if value == 0 or not math.isfinite(value):
+        return "0" if value == 0 else "-"
+    return f"{value:.{max(0, 1 - math.floor(math.log10(abs(value))))}f}"
+
+
+def _spread(spread: Spread, interval: str = "") -> str:
     if math.isnan(spread.max):
         return "-"
-    return f"max {spread.max / MM:.4f} mm, rms {spread.rms / MM:.4f} mm, 95 % below {spread.p95 / MM:.4f} mm"
+    return f"max {spread.max / MM:.4f} mm{interval}, rms {spread.rms / MM:.4f} mm, 95 % below {spread.p95 / MM:.4f} mm"
 
 
 def _deg(value: float) -> str:

@@ -62,18 +62,23 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Mapped:
-    """What ``compensate map`` has to say.  ``axes``: names of the robot's axes; ``frame``: that of the stated force
-    ``stated`` (6,) [N, N m]; ``sign``: of the compensator's eq. (3), None without compensator."""
+    """What ``compensate map`` has to say.
+
+    ``axes``: names and units (deg, mm) of the robot's axes; ``frame``: that of the stated force ``stated`` (6,)
+    [N, N m]; ``sign``: of the compensator's eq. (3), None without compensator; ``status``: None for an arm that has
+    none.
+    """
 
     survey: Survey
     load: Load
     robot: str
     digest: str
-    axes: tuple[str, ...]
+    axes: tuple[tuple[str, str], ...]
     effects: tuple[str, ...]
     stated: tuple[float, ...]
     frame: str
     sign: str | None
+    status: int | None
     findings: tuple[Finding, ...] = ()
     outputs: tuple[str, ...] = ()
     exit: int = 0
@@ -84,9 +89,7 @@ class Mapped:
         survey = self.survey
         return (
             Quantity("deflection_mm", "deflection", survey.size),
-            Quantity(
-                "deflection_without_compensator_mm", "without gravity compensator", survey.size_without
-            ),
+            Quantity("deflection_without_compensator_mm", "without gravity compensator", survey.size_without),
             Quantity("compensator_difference_mm", "difference of the two", survey.difference),
         )
 
@@ -109,6 +112,11 @@ class Mapped:
     def method(self) -> str:
         return "linear" if self.load.linear else "equilibrium"
 
+    @property
+    def axis_values(self) -> Floats:
+        """(N, n) in the units of ``axes``."""
+        return np.asarray(self.survey.q / [DEG if unit == "deg" else MM for _, unit in self.axes])
+
     def place(self, row: int) -> dict[str, float]:
         """Coordinates [mm] of a cell."""
         return dict(zip(("x_mm", "y_mm", "z_mm"), _mm(self.survey.grid.positions[row]), strict=True))
@@ -129,7 +137,7 @@ class Mapped:
                 "points": list(grid.shape),
                 "orientation_deg": np.round(abc[0], 9).tolist(),
                 "tool": [*_mm(load.tool.position), *np.round(abc[1], 9).tolist()],
-                "status": load.status,
+                "status": self.status,
             },
             "method": self.method,
             "sign": self.sign,
@@ -176,11 +184,11 @@ def show_map(console: Console, mapped: Mapped, verbose: bool = False) -> None:
                 table.add_row(quantity.title, *cells)
         console.print(table)
     extremes = mapped.quantities[0].extremes
-    if extremes:
+    if extremes and extremes[1].value > 0:
         for name, extreme in zip(("stiffest", "softest"), extremes, strict=True):
             axes = ", ".join(
-                f"{axis} {angle:.1f}"
-                for axis, angle in zip(mapped.axes, mapped.survey.q[extreme.row] / DEG, strict=True)
+                f"{axis} {round(value, 1) + 0.0:.1f}" + (" mm" if unit == "mm" else "")
+                for (axis, unit), value in zip(mapped.axes, mapped.axis_values[extreme.row], strict=True)
             )
             place = _list(mapped.place(extreme.row).values())
             console.print(
@@ -197,9 +205,10 @@ def _rows(mapped: Mapped) -> Iterator[tuple[str, str]]:
     yield "cells", f"{region(mapped)} in the robot base: {mapped.cells} cells"
     pose = abc_from_rotation(np.stack([load.orientation, load.tool.rotation])) / DEG
     turned = f", turned {_list(pose[1])} deg," if np.abs(pose[1]).max() > 1e-9 else ""
+    branch = "" if mapped.status is None else f", S {mapped.status}"
     yield (
         "tool",
-        f"TCP {_list(_mm(load.tool.position))} mm{turned} on the flange, A B C {_list(pose[0])} deg, S {load.status}",
+        f"TCP {_list(_mm(load.tool.position))} mm{turned} on the flange, A B C {_list(pose[0])} deg{branch}",
     )
     yield "force", mapped.force
     sign = f"; compensator: sign {mapped.sign}" if mapped.sign else "; no gravity compensator"
@@ -244,7 +253,7 @@ def map_csv(mapped: Mapped) -> bytes:
         ("without_dx_mm without_dy_mm without_dz_mm", without / MM, 6),
         ("without_mm", bare[:, None] / MM, 6),
         ("difference_mm", difference[:, None] / MM, 6),
-        (" ".join(f"{axis}_deg" for axis in mapped.axes), survey.q / DEG, 6),
+        (" ".join(f"{axis}_{unit}" for axis, unit in mapped.axes), mapped.axis_values, 6),
     ]
     heads, columns = [], []
     for names, values, decimals in blocks:

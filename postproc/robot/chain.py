@@ -122,7 +122,7 @@ class Chain:
     def sweep(self, coordinates: Floats, tool: Poses, spindle: Floats | None = None) -> Sweep:
         """Evaluate at ``coordinates`` (m, N) [rad, m].
 
-        ``tool``: TCP on the flange, one pose or N; ``spindle`` (3, N): unit vector of the spindle, tip-ward, in tool
+        ``tool``: TCP on the flange, one pose or N; ``spindle`` (N, 3): unit vector of the spindle, tip-ward, in tool
         axes (tool z without it).
         """
         count = coordinates.shape[1]
@@ -168,9 +168,9 @@ class Chain:
         if spindle is None:
             three = columns
         else:
-            along = _combined(columns, spindle.T)
+            along = _combined(columns, spindle)
             # The tool axis least along the spindle, made square to it; across the spindle all directions are alike.
-            least = np.argmin(np.abs(spindle), axis=0)
+            least = np.argmin(np.abs(spindle), axis=1)
             guide = np.choose(least, columns)
             across = guide - np.sum(guide * along, axis=0) * along
             across = across / np.sqrt(np.sum(across * across, axis=0))

@@ -1,7 +1,8 @@
-"""Inverse kinematics of an arm with a spherical wrist, in closed form, as its controller does it.
+"""Inverse kinematics as the controller does it: closed form for a spherical wrist, Newton's for any other arm.
 
-A configuration (branch) is written as KUKA's status S: bit 0 wrist root in the overhead area, bit 1 elbow
-(A3 beyond the stretched arm), bit 2 A5 < 0.  The turn T has bit i set where axis i + 1 is negative.
+For a KUKA-type arm a configuration (branch) is written as KUKA's status S: bit 0 wrist root in the overhead area, bit 1 elbow
+(A3 beyond the stretched arm), bit 2 A5 < 0.  The turn T has bit i set where axis i + 1 is negative.  Other arms have
+neither: their branch is the one that leads on from the angles before.
 """
 
 from __future__ import annotations
@@ -12,7 +13,8 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.geometry import Poses, rotation_from_vector, wrapped
-from postproc.robot.description import KukaLengths
+from postproc.robot.geometries import Geometry, KukaLengths, KukaVariant, SerialArm
+from postproc.robot.newton import inverse_near
 
 _UNTURN_FLANGE = np.round(rotation_from_vector([0.0, -np.pi / 2, 0.0]))
 _SINGULAR = 1e-9
@@ -20,18 +22,54 @@ _SINGULAR = 1e-9
 
 @dataclass(frozen=True)
 class Inverse:
-    """Solutions: ``q`` (N, 6) [rad], NaN where out of reach; ``reachable`` (N,)."""
+    """Solutions: ``q`` (N, n) [rad, m], NaN where out of reach; ``reachable`` (N,)."""
 
     q: Floats
     reachable: Bools
 
 
-def inverse(arm: KukaLengths, flange: Poses, status: Ints, near: Floats) -> Inverse:
-    """Axis angles that bring the flange to poses in the robot base.
+def inverse(arm: Geometry, flange: Poses, status: Ints, near: Floats) -> Inverse:
+    """Joint values that bring the flange to poses in the robot base; FK(inverse(x)) = x to rounding.
 
-    ``status`` (N,): the branch to take.  ``near`` (N, 6) [rad]: each axis is given the multiple of a turn
-    nearest to it, and its value where an axis is not defined (A1 with the wrist over axis 1, A4 at A5 = 0).
-    FK(inverse(x)) = x to rounding wherever the pose is in reach.
+    ``near`` (N, n) [rad, m]: each axis is given the multiple of a turn nearest to it, and its value where an axis is
+    not defined or is the external one.  KUKA-type arms take the branch ``status`` (N,), others that of ``near`` (see
+    ``newton.inverse_near``).
+    """
+    if isinstance(arm, SerialArm):
+        return Inverse(*inverse_near(arm, flange, near))
+    if isinstance(arm, KukaLengths):
+        return _closed_form(arm, flange, status, near)
+    if arm.rail is not None:
+        way = arm.signs[0] * near[:, 0] + arm.offsets[0]
+        flange = Poses(flange.rotation, flange.position - way[:, None] * arm.rail)
+    found = _closed_form(arm.lengths, flange, status, kuka_angles(arm, near))
+    return Inverse(controller_values(arm, found.q, near), found.reachable)
+
+
+def kuka_angles(arm: KukaLengths | KukaVariant, q: Floats) -> Floats:
+    """(N, 6) [rad] angles of a KUKA-type arm from the values (N, n) of its controller."""
+    if isinstance(arm, KukaLengths):
+        return q
+    return np.asarray(arm.signs[-6:] * q[:, -6:] + arm.offsets[-6:])
+
+
+def controller_values(arm: KukaLengths | KukaVariant, angles: Floats, like: Floats) -> Floats:
+    """(N, n) the other way: A2, A3 and A5 within half a turn of the middle of their limits; a linear axis keeps its
+    value of ``like`` (N, n)."""
+    if isinstance(arm, KukaLengths):
+        return angles
+    values = like.copy()
+    values[:, -6:] = arm.signs[-6:] * (angles - arm.offsets[-6:])
+    for i in (-5, -4, -2):
+        middle = (arm.axes[i].lower + arm.axes[i].upper) / 2
+        values[:, i] += 2 * np.pi * np.round((middle - values[:, i]) / (2 * np.pi))
+    return values
+
+
+def _closed_form(arm: KukaLengths, flange: Poses, status: Ints, near: Floats) -> Inverse:
+    """Angles (N, 6) of a KUKA-type arm.
+
+    A1 is that of ``near`` with the wrist over axis 1, A4 with A5 = 0.
     """
     rotation = flange.rotation @ _UNTURN_FLANGE
     centre = flange.position - arm.d6 * rotation[..., 0]
@@ -78,11 +116,16 @@ def forearm_tilt(arm: KukaLengths) -> float:
     return float(np.arctan2(-arm.a3, arm.d4))
 
 
-def status_of(arm: KukaLengths, q: Floats) -> Ints:
-    """S (N,) of axis angles (N, 6) [rad]."""
-    wrist = arm.a1 + arm.a2 * np.cos(q[:, 1])
-    wrist = wrist + np.hypot(arm.d4, arm.a3) * np.cos(q[:, 1] + q[:, 2] + forearm_tilt(arm))
-    bits = [wrist < 0, wrapped(q[:, 2] + forearm_tilt(arm)) > 0, q[:, 4] < 0]
+def status_of(arm: Geometry, q: Floats) -> Ints:
+    """S (N,) of joint values (N, n) [rad, m]; 0 for an arm that is not KUKA's."""
+    if isinstance(arm, SerialArm):
+        return np.zeros(len(q), np.int64)
+    lengths = arm if isinstance(arm, KukaLengths) else arm.lengths
+    q = kuka_angles(arm, q)
+    tilt = forearm_tilt(lengths)
+    wrist = lengths.a1 + lengths.a2 * np.cos(q[:, 1])
+    wrist = wrist + np.hypot(lengths.d4, lengths.a3) * np.cos(q[:, 1] + q[:, 2] + tilt)
+    bits = [wrist < 0, wrapped(q[:, 2] + tilt) > 0, q[:, 4] < 0]
     return sum((bit.astype(np.int64) << i for i, bit in enumerate(bits)), np.zeros(len(q), np.int64))
 
 

@@ -59,7 +59,10 @@ def main() -> None:
 
 def run(words: str) -> None:
     done = subprocess.run([sys.executable, "-m", "postproc", *words.split()], check=False)
-    if done.returncode not in (0, 3):  # 3: cells at the rim whose correction leaves the axis limits stay as they are
+    if done.returncode not in (
+        0,
+        3,
+    ):  # 3: cells at the rim whose correction leaves the axis limits stay as they are
         raise SystemExit(done.returncode)
 
 
@@ -100,7 +103,8 @@ def report(moved: dict[str, dict[str, tuple[float, ...]]]) -> None:
     for title, places in moved.items():
         both = places.keys() & classical.keys()
         apart = max(math.dist(places[line], classical[line]) for line in both)
-        print(f"{title:20}  {len(places):5}  {max(map(math.hypot, *zip(*places.values()))):21.4f}  {apart:36.4f}")
+        largest = max(math.hypot(*move) for move in places.values())
+        print(f"{title:20}  {len(places):5}  {largest:21.4f}  {apart:36.4f}")
 
 
 if __name__ == "__main__":

@@ -243,6 +243,9 @@ def _pose(run: Run, value: bytes, at: int) -> Target | Unclear:
     found = _NAMED.match(value)
     key = keyed(found[1].upper(), found[2]) if found else None
     point = run.state.variables.get(key) if key is not None else None
+    declared = point is not None and key is not None and point is run.declarations.points.get(key)
+    if declared and key is not None and key.split(b"[")[0] in run.survey.assigned:
+        return Unclear("KRL002", "its value in the .dat is not kept by the program")
     if point is not None and isinstance(point.target, Target):
         return replace(point.target, file=-1, start=NOWHERE, stop=NOWHERE)
     return Unclear("KRL002", "its value is computed")

@@ -1,0 +1,251 @@
+"""Inverse kinematics of any serial arm, numerically, for whole batches.
+
+    J dq = e,  dq = (J^T J + (|e|^2 / 2 + w) I)^-1 J^T e        (damping after Sugihara, IEEE T-RO 27, 2011)
+
+e: what is left to the target, position over the arm's size and rotation vector.  The damping goes with the error, so
+that the last steps are Newton's own.  A target that is far is gone to in steps along the straight way to it, so that
+the solution stays in the branch of its start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats
+from postproc.geometry import Poses, rotation_from_vector, vector_from_rotation
+from postproc.robot.chain import TOOL, Chain, jacobian
+from postproc.robot.geometries import SerialArm
+
+TOLERANCE = 5e-13
+"""[m, rad] what may be left of a solved pose."""
+
+STEP = 0.15
+"""Way to a target gone at once: rad, and parts of the arm's size."""
+
+FAR = 0.3
+"""A target farther than this from where ``near`` stands is another posture: any branch will do."""
+
+_CHUNK = 4096
+_WEIGHT = 1e-16
+_LARGEST_TURN = 0.5
+_STARTS = 24
+
+
+class Solver:
+    """One arm: its chain, the columns that move, its size [m]."""
+
+    def __init__(self, arm: SerialArm) -> None:
+        names = [axis.name for axis in arm.axes]
+        limits = [(axis.lower, axis.upper) for axis in arm.axes]
+        joints = arm.joints(names, limits)
+        self.chain = Chain(joints, arm.flange())
+        self.free = np.array([i for i in range(len(joints)) if i != arm.held])
+        self.low, self.high = arm.limits.T
+        self.turns = np.array([joint.kind == "revolute" for joint in joints])
+        places = [joint.placement.position for joint in joints[1:]] + [arm.flange().position]
+        self.size = float(sum(np.linalg.norm(place) for place in places))
+
+    def left(self, q: Floats, target: Poses) -> tuple[Floats, Floats]:
+        """What is left to the targets, e (N, 6), and the Jacobian (N, 6, k) of the moving columns, both scaled."""
+        swept = self.chain.sweep(np.ascontiguousarray(q.T), TOOL)
+        here = swept.pose
+        turn = vector_from_rotation(target.rotation @ np.swapaxes(here.rotation, 1, 2))
+        error = np.concatenate([(target.position - here.position) / self.size, turn], axis=1)
+        slope = jacobian(swept)[:, :, self.free]
+        slope[:, :3] /= self.size
+        return error, slope
+
+    def solve(self, q: Floats, target: Poses, steps: int = 40, done: float = 0.0) -> tuple[Floats, Bools]:
+        """From ``q`` (N, n) to ``target`` (N): the angles, and where what is left is below the tolerance.
+
+        ``done``: stop at this error instead of the tolerance.  Rows that make no headway are given up.
+        """
+        q, good = q.copy(), np.zeros(len(q), bool)
+        active = np.flatnonzero(np.isfinite(q).all(axis=1) & np.isfinite(target.position).all(axis=1))
+        before = np.full(len(q), np.inf)
+        for step in range(steps):
+            if not len(active):
+                break
+            error, slope = self.left(q[active], target[active])
+            size = np.maximum(
+                np.linalg.norm(error[:, :3], axis=1) * self.size, np.linalg.norm(error[:, 3:], axis=1)
+            )
+            reached = size <= max(TOLERANCE, done)
+            good[active[reached]] = True
+            keep = ~reached
+            if step % 8 == 7:
+                keep &= size < 0.5 * before[active]
+                before[active] = size
+            active, error, slope = active[keep], error[keep], slope[keep]
+            transposed = np.swapaxes(slope, 1, 2)
+            damping = 0.5 * np.sum(error * error, axis=1) + _WEIGHT
+            normal = transposed @ slope + damping[:, None, None] * np.eye(slope.shape[2])
+            move = np.linalg.solve(normal, transposed @ error[:, :, None])[:, :, 0]
+            largest = np.abs(move * self.turns[self.free]).max(axis=1, initial=0.0)
+            move *= np.minimum(1.0, _LARGEST_TURN / np.maximum(largest, 1e-300))[:, None]
+            q[np.ix_(active, self.free)] += move
+        return q, good
+
+    def distance(self, q: Floats, target: Poses) -> Floats:
+        """(N,) how far the flange at ``q`` is from its target: rad, and parts of the arm's size."""
+        error = self.left(q, target)[0]
+        return np.asarray(
+            np.maximum(np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1))
+        )
+
+    def follow(self, q: Floats, target: Poses) -> tuple[Floats, Bools]:
+        """``solve`` along the straight way from where the flange is at ``q``, in steps of ``STEP``."""
+        swept = self.chain.sweep(np.ascontiguousarray(q.T), TOOL)
+        here = swept.pose
+        way = target.position - here.position
+        turn = vector_from_rotation(target.rotation @ np.swapaxes(here.rotation, 1, 2))
+        length = np.maximum(np.linalg.norm(way, axis=1) / self.size, np.linalg.norm(turn, axis=1))
+        pieces = np.ceil(np.nan_to_num(length, nan=0.0) / STEP).astype(np.int64)
+        q = q.copy()
+        for piece in range(1, int(pieces.max(initial=0))):
+            rows = np.flatnonzero(pieces > piece)
+            share = (piece / pieces[rows])[:, None]
+            rotation = rotation_from_vector(share * turn[rows]) @ here.rotation[rows]
+            between = Poses(rotation, here.position[rows] + share * way[rows])
+            q[rows], _ = self.solve(q[rows], between, steps=7, done=1e-3)
+        return self.solve(q, target)
+
+    def search(self, near: Floats, target: Poses) -> tuple[Floats, Bools]:
+        """Solutions in any branch: within the limits if there is one, and of those the nearest to ``near``."""
+        best, good = near.copy(), np.zeros(len(near), bool)
+        cost = np.full(len(near), np.inf)
+        draws = np.random.default_rng(0).random((_STARTS, len(self.low)))
+        low = np.where(self.turns, np.maximum(self.low, -np.pi), self.low)
+        high = np.where(self.turns, np.minimum(self.high, np.pi), self.high)
+        for draw in draws:
+            start = near.copy()
+            start[:, self.free] = (low + draw * (high - low))[self.free]
+            found, fine = self.solve(start, target)
+            found = self.inside(found, near)
+            away = np.abs(found - near).max(axis=1) + 1e3 * ~self.within(found)
+            better = fine & (away < cost)
+            best[better], cost[better], good[better] = found[better], away[better], True
+        return best, good
+
+    def inside(self, q: Floats, near: Floats) -> Floats:
+        """Each turning axis at the whole turns nearest to ``near`` that its limits allow; nearest at all without any."""
+        q = q.copy()
+        for i in self.free[self.turns[self.free]]:
+            turns = np.round((near[:, i] - q[:, i]) / (2 * np.pi))
+            least = np.ceil((self.low[i] - q[:, i]) / (2 * np.pi) - 1e-12)
+            most = np.floor((self.high[i] - q[:, i]) / (2 * np.pi) + 1e-12)
+            q[:, i] += 2 * np.pi * np.where(least <= most, np.clip(turns, least, most), turns)
+        return q
+
+    def within(self, q: Floats) -> Bools:
+        return np.asarray(((q >= self.low - 1e-9) & (q <= self.high + 1e-9)).all(axis=1))
+
+
+@lru_cache(maxsize=16)
+def solver_of(arm: SerialArm) -> Solver:
+    return Solver(arm)
+
+
+def inverse_near(arm: SerialArm, flange: Poses, near: Floats) -> tuple[Floats, Bools]:
+    """(N, n) [rad, m] the solution that ``near`` leads to, and where there is one.
+
+    The held joint keeps its value of ``near``.  A target near to where ``near`` stands is solved in its branch or not
+    at all; for one that is ``FAR`` any branch will do, within the limits and near to ``near`` if there is a choice.
+    """
+    solver = solver_of(arm)
+    return _chunked(lambda rows: _inverse_near(solver, flange[rows], near[rows]), near)
+
+
+def _inverse_near(solver: Solver, flange: Poses, near: Floats) -> tuple[Floats, Bools]:
+    known = np.isfinite(near).all(axis=1) & np.isfinite(flange.position).all(axis=1)
+    q, good = np.full(near.shape, np.nan), np.zeros(len(near), bool)
+    rows = np.flatnonzero(known)
+    q[rows], good[rows] = solver.follow(near[rows], flange[rows])
+    far = rows[solver.distance(near[rows], flange[rows]) > FAR]
+    q[far] = solver.inside(q[far], near[far])
+    again = far[~good[far] | ~solver.within(q[far])]
+    if len(again):
+        found, fine = solver.search(near[again], flange[again])
+        better = fine & (~good[again] | solver.within(found))
+        q[again[better]], good[again[better]] = found[better], True
+    q[~good] = np.nan
+    return q, good
+
+
+def follow_rows(
+    arm: SerialArm, flange: Poses, begins: Bools, starts: Floats, jumps: Bools
+) -> tuple[Floats, Bools]:
+    """Rows in order, each solved from the one before; (M, n) [rad, m] NaN where not reached, and (M,) reached.
+
+    ``begins`` (M,): the row before is not the last solution but ``starts`` (M, n); it must be set in row 0.  ``jumps``
+    (M,): point to point, so that another branch or turn may be taken where the one so far has no way or leaves the
+    limits.  A row that is not reached is passed over.
+
+    Solved in about sqrt(M) stretches side by side.  A quick run over the ends of the stretches guesses where each
+    begins; then all march together, one row at a time; a stretch that turns out to have begun elsewhere than the one
+    before it ends is marched again.  So the result is that of one march from the first row to the last.
+    """
+    solver = solver_of(arm)
+    count = len(starts)
+    stride = max(1, int(np.ceil(np.sqrt(count))))
+    heads = np.arange(0, count, stride)
+    q, good = np.full(starts.shape, np.nan), np.zeros(count, bool)
+
+    last_begin = np.maximum.accumulate(np.where(begins, np.arange(count), 0))
+    state = np.empty((len(heads), starts.shape[1]))
+    state[0] = starts[0]
+    for k in range(1, len(heads)):
+        before = heads[k] - 1
+        fresh = last_begin[before] >= heads[k - 1]
+        base = starts[last_begin[before]] if fresh else state[k - 1]
+        there, fine = _stepped(solver, base[None], flange[before : before + 1], jumps[before : before + 1])
+        state[k] = there[0] if fine[0] else base
+    ends = state.copy()
+    dirty = np.ones(len(heads), bool)
+    while dirty.any():
+        todo = np.flatnonzero(dirty)
+        ends[todo] = state[todo]
+        for offset in range(stride):
+            part = todo[heads[todo] + offset < count]
+            rows = heads[part] + offset
+            base = np.where(begins[rows, None], starts[rows], ends[part])
+            found, fine = _stepped(solver, base, flange[rows], jumps[rows])
+            ends[part] = np.where(fine[:, None], found, base)
+            q[rows], good[rows] = np.where(fine[:, None], found, np.nan), fine
+        moved = np.abs(ends[:-1] - state[1:]).max(axis=1, initial=0.0) > 1e-7
+        dirty = np.concatenate([[False], moved & ~begins[heads[1:]]])
+        state[1:][dirty[1:]] = ends[:-1][dirty[1:]]
+    return q, good
+
+
+def _stepped(solver: Solver, base: Floats, flange: Poses, jumps: Bools) -> tuple[Floats, Bools]:
+    found, fine = solver.follow(base, flange)
+    rows = np.flatnonzero(jumps & fine)
+    found[rows] = solver.inside(found[rows], found[rows])
+    again = np.flatnonzero(jumps & ~(fine & solver.within(found)) & np.isfinite(base).all(axis=1))
+    if len(again):
+        other, well = solver.search(base[again], flange[again])
+        better = well & (~fine[again] | solver.within(other))
+        found[again[better]], fine[again[better]] = other[better], True
+    return found, fine
+
+
+def weakest(arm: SerialArm, q: Floats) -> Floats:
+    """(N,) smallest singular value of the Jacobian of the moving joints, lengths as parts of the arm's size."""
+    solver = solver_of(arm)
+    swept = solver.chain.sweep(np.ascontiguousarray(np.nan_to_num(q).T), TOOL)
+    slope = jacobian(swept)[:, :, solver.free]
+    slope[:, :3] /= solver.size
+    return np.asarray(np.linalg.svd(slope, compute_uv=False)[:, -1])
+
+
+def _chunked(solve: Callable[[slice], tuple[Floats, Bools]], like: Floats) -> tuple[Floats, Bools]:
+    q, good = np.empty_like(like), np.empty(len(like), bool)
+    for start in range(0, len(like), _CHUNK):
+        rows = slice(start, start + _CHUNK)
+        q[rows], good[rows] = solve(rows)
+    return q, good
+
