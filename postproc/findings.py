@@ -242,7 +242,7 @@ CODES: dict[str, Code] = {
     "MAP002": Code(
         "warning",
         "nothing is in reach",
-        "The arm gets to no cell of the grid; no picture and no CSV were written. Look at ranges, tool and orientation.",
+        "The arm gets to no cell of the grid; no picture and no CSV were written. Look at ranges, tool, orientation.",
     ),
     "MAP003": Code(
         "warning",

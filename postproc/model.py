@@ -24,6 +24,10 @@ STEP_TOLERANCE = 1e-14
 
 MAX_STEPS = 60
 
+NUDGE = 1e-9
+"""[rad, m] Where an equilibrium begins: beside the unloaded pose, so that a column pressed exactly along its line falls
+over instead of standing on its tip."""
+
 STILL = 1e-9
 """[rad, m] A motor that moves less stands still: it is the rounding of an inverse kinematics, not a motion."""
 
@@ -151,7 +155,9 @@ class StiffnessModel:
                 np.ascontiguousarray(wrench[rows].T),
                 tool if tool.position.ndim == 1 else tool[rows],
                 conditions.part(rows),
-                np.zeros((m, len(q[rows]))) if start is None else np.array(start[rows].T, order="C"),
+                np.repeat(NUDGE * np.cos(np.arange(m))[:, None], len(q[rows]), axis=1)
+                if start is None
+                else np.array(start[rows].T, order="C"),
             )
             coordinates[rows], theta[rows], converged[rows] = (
                 part.coordinates,

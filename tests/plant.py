@@ -1,31 +1,64 @@
 """The arm of a robot file as a MuJoCo model: the independent engine that the stiffness model is held against.
 
-Built from the same physical description by MuJoCo's own means: nested bodies with hinges, joint springs about the
-motor angle, the gravity compensator as a spatial tendon between two sites.  The arm is written down here once more
-(axes A1 -z, A2 +y, A3 +y, A4 -x, A5 +y, A6 -x; stretched forward at zero) and nothing of ``postproc.robot.chain``
-is used.  Equilibria are found by Newton's method on MuJoCo's generalized forces.
+Built from the same physical description by MuJoCo's own means: nested bodies with hinges and slides, joint springs
+(straight and cubic) about the motor angle, the gravity compensator as a spatial tendon between two sites, weights as
+masses under gravity.  The arm is written down here once more (axes A1 -z, A2 +y, A3 +y, A4 -x, A5 +y, A6 -x; stretched
+forward at zero) and nothing of ``postproc.robot.chain`` or of the effects' own physics is used.  Equilibria are found
+by Newton's method on MuJoCo's generalized forces.
+
+From the ground up: six coordinates of the base (three slides, three hinges); in front of every motor a bearing with
+two hinges across the axis; at the TCP three slides along and across the spindle.  What has no spring stands still.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
+from postproc.effects import Conditions
 from postproc.effects.gravity_compensator import GravityCompensator
 from postproc.geometry import Poses
 from postproc.model import StiffnessModel, Term
 from postproc.robot.description import KukaLengths, Robot, find_robot, load_robot
 
 AXES = ("0 0 -1", "0 1 0", "0 1 0", "-1 0 0", "0 1 0", "-1 0 0")
+ACROSS = (
+    ("1 0 0", "0 -1 0"),
+    ("0 0 1", "1 0 0"),
+    ("0 0 1", "1 0 0"),
+    ("0 0 1", "0 1 0"),
+    ("0 0 1", "1 0 0"),
+    ("0 0 1", "0 1 0"),
+)
+"""x and y of each joint's frame, its axis being z: x stands up where the axis lies, forward where it stands."""
+
+BASE = [f"base.{word}" for word in ("x", "y", "z", "rx", "ry", "rz")]
+MOTORS = [f"A{i}" for i in range(1, 7)]
+TILTS = [f"A{i}.r{axis}" for i in range(1, 7) for axis in "xy"]
+TIP = ["spindle.x", "spindle.y", "spindle.z"]
+
 STEP_TOLERANCE = 1e-13
-_TINY = '<inertial pos="0 0 0" mass="1e-6" diaginertia="1e-6 1e-6 1e-6"/>'
+GRAVITY = 9.80665
+_TINY = '<inertial pos="0 0 0" mass="1e-9" diaginertia="1e-9 1e-9 1e-9"/>'
+
+LINKS = (
+    (180.0, (0.12, -0.03, 0.40)),
+    (160.0, (0.55, 0.11, 0.02)),
+    (140.0, (0.28, -0.06, 0.05)),
+    (70.0, (-0.45, 0.01, -0.02)),
+    (40.0, (0.03, 0.02, -0.04)),
+    (15.0, (0.14, 0.01, 0.02)),
+)
+"""Mass [kg] and centre [m, from the joint, axes of the base at the zero pose] of each link, for a heavy arm."""
 
 
 class Rest(NamedTuple):
-    """A loaded state: coordinates (6,) [rad], position (3,) [m] and rotation (3, 3) of the TCP in the base."""
+    """A loaded state: coordinates (6,) [rad] of the joints, position (3,) [m] and rotation (3, 3) of the TCP in the
+    base."""
 
     coordinates: np.ndarray
     position: np.ndarray
@@ -46,63 +79,199 @@ class Spring:
     balanced: bool = True
 
 
-class Plant:
-    """The arm with a spring of 1 / compliance in every joint."""
+def _zeros(count: int) -> np.ndarray:
+    return field(default_factory=lambda: np.zeros(count))  # type: ignore[no-any-return]
 
-    def __init__(self, arm: KukaLengths, compliance: np.ndarray, spring: Spring | None = None) -> None:
+
+@dataclass(frozen=True)
+class Hardware:
+    """What an arm may have beside joints that give way; SI, 0 = not there.
+
+    compliance of base (6,), tilts (12,) and the tip across and along the spindle; cubic (6,) [N m/rad3] of the joints;
+    links: mass and centre of each; hung: mass on the flange and centre in its axes; gap (6,) [rad] whole; width (6,)
+    [rad] of hysteresis; zero (6,) [rad]; wave: (joint, harmonic, sine, cosine); ratio: (joint, of joint) -> share;
+    growth: joint -> [m/K or m/s]; shift: joint -> (2,) [m] of its axis; turn (12,) [rad] of the axes; base and tool
+    offset (6,); gauge: gain and bias (7,).
+    """
+
+    base: np.ndarray = _zeros(6)
+    tilts: np.ndarray = _zeros(12)
+    radial: float = 0.0
+    axial: float = 0.0
+    cubic: np.ndarray = _zeros(6)
+    links: tuple[tuple[float, tuple[float, ...]], ...] = ()
+    hung: tuple[tuple[float, tuple[float, ...]], ...] = ()
+    gap: np.ndarray = _zeros(6)
+    width: np.ndarray = _zeros(6)
+    zero: np.ndarray = _zeros(6)
+    wave: tuple[tuple[int, float, float, float], ...] = ()
+    ratio: Mapping[tuple[int, int], float] = field(default_factory=dict)
+    growth: Mapping[int, float] = field(default_factory=dict)
+    by_time: bool = False
+    shift: Mapping[int, np.ndarray] = field(default_factory=dict)
+    turn: np.ndarray = _zeros(12)
+    base_offset: np.ndarray = _zeros(6)
+    tool_offset: np.ndarray = _zeros(6)
+    gauge: np.ndarray = _zeros(7)
+
+
+class Plant:
+    """The arm with a spring of 1 / compliance in every joint, and what ``hardware`` says."""
+
+    def __init__(
+        self,
+        arm: KukaLengths,
+        compliance: np.ndarray,
+        spring: Spring | None = None,
+        hardware: Hardware | None = None,
+    ) -> None:
         self.balanced = spring is not None and spring.balanced
-        self.model = mujoco.MjModel.from_xml_string(_xml(arm, compliance, spring))
+        self.arm, self.hardware = arm, hardware or Hardware()
+        gives = self._compliances(np.asarray(compliance, float))
+        self.model = mujoco.MjModel.from_xml_string(_xml(arm, gives, spring, self.hardware))
         self.data = mujoco.MjData(self.model)
-        self.last = self.model.body("link6").id
-        self.d6 = arm.d6
         self.size = self.model.nv
+        self._row = {name: int(self.model.joint(name).dofadr[0]) for name in (*BASE, *MOTORS, *TILTS, *TIP)}
+        self._motors = np.array([self._row[name] for name in MOTORS])
+        self._gives = np.array([gives[self.model.joint(i).name] for i in range(self.size)])
+        self._free = np.flatnonzero(self._gives)
+        self._bearings = [self.model.body(f"bearing{i}").id for i in range(1, 7)]
+        self._places = self.model.body_pos[self._bearings].copy()
+        self._last, self._tip = self.model.body("link6").id, self.model.body("tip").id
+        self.d6 = arm.d6
+
+    def _compliances(self, joints: np.ndarray) -> dict[str, float]:
+        """Coordinate -> compliance; 0 where it is held."""
+        have = self.hardware
+        tip = (have.radial, have.radial, have.axial)
+        pairs = ((BASE, have.base), (MOTORS, joints), (TILTS, have.tilts), (TIP, tip))
+        return {name: float(c) for names, values in pairs for name, c in zip(names, values, strict=True)}
 
     @classmethod
-    def of(cls, model: StiffnessModel) -> Plant:
-        """The plant of a model's robot with the values of its effects."""
-        compliance, spring = np.zeros(6), None
+    def of(cls, model: StiffnessModel, links: tuple[tuple[float, tuple[float, ...]], ...] = LINKS) -> Plant:
+        """The plant of a model's robot with the values of its effects; weights of the links are those of ``links``."""
+        compliance, spring, have = np.zeros(6), None, Hardware()
         for term in model.terms:
-            values = dict(term.values)
+            name, values = term.effect.name, dict(term.values)
             if isinstance(term.effect, GravityCompensator):
                 assert term.effect.joint == 1
                 spring = Spring(**values, zero=term.effect.zero, balanced=term.effect.preload == "balanced")
-            else:
+            elif name == "joint_compliance":
                 compliance = np.array([values[f"c{i}"] for i in range(1, 7)])
-        return cls(model.robot.arm, compliance, spring)
+            elif name == "link_gravity":
+                have = replace(have, links=links)
+            else:
+                have = replace(have, **_PARTS[name](values, term.effect))
+        return cls(model.robot.arm, compliance, spring, have)
+
+    def first_moments(self, amount: float = 0.0) -> dict[str, float]:
+        """The links' weights as a model is told of them: first moments about the joints, with the mass of all that
+        follows at the next joint; ``amount``: kelvin or seconds since the calibration."""
+        moments, follows = {}, 0.0
+        places = [*self._placed(amount), np.zeros(3)]
+        for i in range(6, 0, -1):
+            mass, centre = self.hardware.links[i - 1]
+            moment = mass * np.array(centre) + follows * places[i]
+            moments |= dict(zip((f"m{axis}{i}" for axis in "xyz"), moment.tolist(), strict=True))
+            follows += mass
+        return {**moments, "mass": follows}
 
     def passive(self, coordinates: np.ndarray, motors: np.ndarray) -> np.ndarray:
-        """(6,) [N m] torque of all springs on the joints, motors at ``motors``."""
-        self._place(coordinates, motors)
-        return self.data.qfrc_passive - self.data.qfrc_bias
+        """(6,) [N m] torque of springs and weights on the joints (6,), motors at ``motors``."""
+        self._place(self._whole(coordinates), self._whole(motors))
+        return (self.data.qfrc_passive - self.data.qfrc_bias)[self._motors]
 
-    def rest(self, motors: np.ndarray, wrench: np.ndarray, tool: Poses) -> Rest:
-        """The static equilibrium under ``wrench`` (6,) at the TCP, base axes."""
+    def rest(
+        self,
+        motors: np.ndarray,
+        wrench: np.ndarray,
+        tool: Poses,
+        conditions: Conditions | None = None,
+        row: int = 0,
+    ) -> Rest:
+        """The static equilibrium under ``wrench`` (6,) at the TCP, base axes; ``row`` of the conditions."""
+        given, have = conditions or Conditions(), self.hardware
+        along = np.array([0.0, 0, 1]) if given.spindle is None else given.spindle[row]
+        amount = given.time if have.by_time else given.temperature
+        self.model.body_pos[self._bearings] = self._placed(0.0 if amount is None else amount[row])
+        self._set_tip(tool, along)
+        if wrench.any():
+            wrench = (1 + have.gauge[0]) * (wrench - have.gauge[1:])
+        free = self._unloaded(motors, None if given.direction is None else given.direction[row])
         held = np.zeros(self.size)
         if self.balanced:
-            # at the motor angles the joint springs are slack: what is left is the tendon
-            held = -self.passive(motors, motors)
-        coordinates = motors.copy()
-        for _ in range(30):
+            # without load the joints' springs are slack: what is left is the tendon
+            self._place(free, free)
+            held = -self.data.qfrc_passive.copy()
+        moving, coordinates = self._free, free.copy()
+        for _ in range(40):
             step = np.linalg.solve(
-                self._slope(coordinates, motors, held, wrench, tool),
-                -self._residual(coordinates, motors, held, wrench, tool),
+                self._slope(coordinates, free, held, wrench),
+                -self._residual(coordinates, free, held, wrench)[moving],
             )
-            coordinates = coordinates + step
+            coordinates[moving] += step
             if np.abs(step).max() < STEP_TOLERANCE:
-                self._place(coordinates, motors)
-                return Rest(coordinates, *self._tcp(tool))
+                self._place(coordinates, free)
+                return Rest(coordinates[self._motors], *self._tcp())
         raise ArithmeticError("Newton's method found no equilibrium")
 
     def energy(self, coordinates: np.ndarray, motors: np.ndarray) -> float:
         """[J] in all springs."""
-        self._place(coordinates, motors)
+        self._place(self._whole(coordinates), self._whole(motors))
         mujoco.mj_energyPos(self.model, self.data)
         return float(self.data.energy[0])
 
     def spring_length(self, coordinates: np.ndarray) -> float:
         """[m] from P0 to P1."""
-        self._place(coordinates, coordinates)
+        self._place(self._whole(coordinates), self._whole(coordinates))
         return float(self.data.ten_length[0])
+
+    def _whole(self, joints: np.ndarray) -> np.ndarray:
+        whole = np.zeros(self.size)
+        whole[self._motors] = joints
+        return whole
+
+    def _unloaded(self, motors: np.ndarray, direction: np.ndarray | None) -> np.ndarray:
+        """All coordinates without load: where the controller sends the motors, and what it does not know of."""
+        have, stand = self.hardware, motors + self.hardware.zero
+        for joint, harmonic, sine, cosine in have.wave:
+            stand[joint] += sine * np.sin(harmonic * motors[joint]) + cosine * np.cos(harmonic * motors[joint])
+        for (joint, other), share in have.ratio.items():
+            stand[joint] += share * motors[other]
+        if direction is not None:
+            stand = stand - 0.5 * have.width * direction
+        whole = self._whole(stand)
+        whole[[self._row[name] for name in BASE]] = have.base_offset
+        whole[[self._row[name] for name in TILTS]] = have.turn
+        return whole
+
+    def _placed(self, amount: float) -> np.ndarray:
+        """(6, 3) place of each bearing on the link before: grown, and with its axis shifted."""
+        places = self._places.copy()
+        for joint, rate in self.hardware.growth.items():
+            places[joint] *= 1 + rate * amount / np.linalg.norm(places[joint])
+        for joint, way in self.hardware.shift.items():
+            places[joint] += sum(
+                w * np.array(axis.split(), float) for w, axis in zip(way, ACROSS[joint], strict=True)
+            )
+        return places
+
+    def _set_tip(self, tool: Poses, along: np.ndarray) -> None:
+        """Put the tip's body at the TCP, with its z axis along the spindle."""
+        x, y, z, *turns = self.hardware.tool_offset
+        turned = tool.rotation
+        for axis, angle in zip(np.eye(3), turns, strict=True):
+            quaternion, matrix = np.zeros(4), np.zeros(9)
+            mujoco.mju_axisAngle2Quat(quaternion, axis, angle)
+            mujoco.mju_quat2Mat(matrix, quaternion)
+            turned = turned @ matrix.reshape(3, 3)
+        flange = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # z out along the forearm
+        self.model.body_pos[self._tip] = [self.d6, 0, 0] + flange @ (tool.position + tool.rotation @ [x, y, z])
+        # any frame with this z axis: across the spindle all directions are alike
+        frame = np.zeros(4)
+        mujoco.mju_quatZ2Vec(frame, flange @ turned @ along)
+        self.model.body_quat[self._tip] = frame
+        self._tool_in_link = flange @ turned
 
     def _place(self, coordinates: np.ndarray, motors: np.ndarray) -> None:
         self.model.qpos_spring[:] = motors
@@ -110,59 +279,132 @@ class Plant:
         mujoco.mj_fwdPosition(self.model, self.data)
         mujoco.mj_fwdVelocity(self.model, self.data)
 
-    def _tcp(self, tool: Poses) -> tuple[np.ndarray, np.ndarray]:
-        turned = self.data.xmat[self.last].reshape(3, 3)
-        flange = turned @ np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # z out along the forearm
-        centre = self.data.xpos[self.last] + self.d6 * turned[:, 0]
-        return centre + flange @ tool.position, flange @ tool.rotation
+    def _tcp(self) -> tuple[np.ndarray, np.ndarray]:
+        turned = self.data.xmat[self._last].reshape(3, 3)
+        return self.data.xpos[self._tip].copy(), turned @ self._tool_in_link
 
     def _residual(
-        self,
-        coordinates: np.ndarray,
-        motors: np.ndarray,
-        held: np.ndarray,
-        wrench: np.ndarray,
-        tool: Poses,
+        self, coordinates: np.ndarray, free: np.ndarray, held: np.ndarray, wrench: np.ndarray
     ) -> np.ndarray:
-        springs = self.passive(coordinates, motors)
+        self._place(coordinates, free)
         linear, angular = np.zeros((3, self.size)), np.zeros((3, self.size))
-        mujoco.mj_jac(self.model, self.data, linear, angular, self._tcp(tool)[0], self.last)
-        return springs + held + linear.T @ wrench[:3] + angular.T @ wrench[3:]
+        mujoco.mj_jac(self.model, self.data, linear, angular, self.data.xpos[self._tip], self._tip)
+        force = self.data.qfrc_passive - self.data.qfrc_bias + held
+        force += linear.T @ wrench[:3] + angular.T @ wrench[3:]
+        if self.hardware.gap.any():
+            # the torque on a joint's own spring shifts it to one side of its gap
+            rows = self._motors
+            stiffness = 1 / self._gives[rows]
+            torque = force[rows] + stiffness * (coordinates - free)[rows]
+            force[rows] += stiffness * 0.5 * self.hardware.gap * np.tanh(torque / 10.0)
+        return force
 
-    def _slope(self, coordinates: np.ndarray, *rest: object) -> np.ndarray:
-        step = 1e-6
-        columns = [
-            (self._residual(coordinates + step * e, *rest) - self._residual(coordinates - step * e, *rest))
-            / (2 * step)
-            for e in np.eye(self.size)
-        ]
+    def _slope(self, coordinates: np.ndarray, *rest: np.ndarray) -> np.ndarray:
+        step, columns = 1e-6, []
+        for row in self._free:
+            move = np.zeros(self.size)
+            move[row] = step
+            ends = [self._residual(coordinates + sign * move, *rest)[self._free] for sign in (1, -1)]
+            columns.append((ends[0] - ends[1]) / (2 * step))
         return np.stack(columns, axis=1)
 
 
-def _xml(arm: KukaLengths, compliance: np.ndarray, spring: Spring | None) -> str:
+# Parameters of an effect -> fields of Hardware.
+
+
+def _list(values: Mapping[str, float], *names: str) -> np.ndarray:
+    return np.array([values[name] for name in names])
+
+
+def _joints(values: Mapping[str, float], letter: str) -> np.ndarray:
+    return _list(values, *(f"{letter}{i}" for i in range(1, 7)))
+
+
+_PARTS = {
+    "base_compliance": lambda v, e: {"base": _list(v, "c_x", "c_y", "c_z", "c_rx", "c_ry", "c_rz")},
+    "link_compliance": lambda v, e: {"tilts": _list(v, *(f"c{i}{a}" for i in range(1, 7) for a in "xy"))},
+    "tool_compliance": lambda v, e: {"radial": v["radial"], "axial": v["axial"]},
+    "joint_stiffening": lambda v, e: {"cubic": _joints(v, "k")},
+    "payload": lambda v, e: {"hung": ((v["mass"], (v["x"], v["y"], v["z"])),)},
+    "backlash": lambda v, e: {"gap": _joints(v, "b")},
+    "hysteresis": lambda v, e: {"width": _joints(v, "w")},
+    "joint_offset": lambda v, e: {"zero": _joints(v, "o")},
+    "transmission_error": lambda v, e: {
+        "wave": tuple(
+            (i, h, v[f"s{i + 1}_{h:g}"], v[f"c{i + 1}_{h:g}"]) for i in range(6) for h in e.harmonics
+        )
+    },
+    "joint_coupling": lambda v, e: {"ratio": {(int(r[1]) - 1, int(r[2]) - 1): x for r, x in v.items()}},
+    "thermal_growth": lambda v, e: {
+        "growth": {int(g[1]) - 1: x for g, x in v.items()},
+        "by_time": e.variable == "time",
+    },
+    "link_geometry": lambda v, e: {
+        "shift": {i: np.array([v.get(f"d{a}{i + 1}", 0.0) for a in "xy"]) for i in range(6)},
+        "turn": np.array([v.get(f"r{a}{i}", 0.0) for i in range(1, 7) for a in "xy"]),
+    },
+    "base_offset": lambda v, e: {"base_offset": _list(v, "x", "y", "z", "rx", "ry", "rz")},
+    "tool_offset": lambda v, e: {"tool_offset": _list(v, "x", "y", "z", "rx", "ry", "rz")},
+    "force_sensor": lambda v, e: {"gauge": _list(v, "gain", "fx", "fy", "fz", "mx", "my", "mz")},
+}
+
+
+# The XML.
+
+
+def _xml(arm: KukaLengths, gives: Mapping[str, float], spring: Spring | None, have: Hardware) -> str:
     places = [(0, 0, 0), (arm.a1, 0, arm.d1), (arm.a2, 0, 0), (arm.d4, 0, arm.a3), (0, 0, 0), (0, 0, 0)]
-    body, sites, tendon = "", {}, ""
+    sites, tendon = {}, ""
     if spring is not None:
-        # P0 on link 1 behind and below axis 2; P1 on link 2 along the upper arm, which falls as A2 grows
-        p0 = (arm.a1 - spring.a_x, 0.0, arm.d1 - spring.a_y)
+        # P0 behind and below axis 2, on what carries it; P1 along the upper arm, which falls as A2 grows
+        p0 = (-spring.a_x, 0.0, -spring.a_y)
         p1 = (spring.L * np.cos(spring.zero), spring.h, spring.L * np.sin(spring.zero))
-        sites = {1: _site("P0", p0), 2: _site("P1", p1)}
+        sites = {"bearing2": _site("P0", p0), "link2": _site("P1", p1)}
         tendon = (
             f'<tendon><spatial name="spring" stiffness="{spring.K_c!r}" springlength="{spring.s0!r} {spring.s0!r}">'
             '<site site="P0"/><site site="P1"/></spatial></tendon>'
         )
+    # the flange's x, y, z are -z, y, x of the last link
+    hung = "".join(
+        f'<body pos="{_words((arm.d6 + z, y, -x))}">{_weight(mass, (0, 0, 0))}</body>'
+        for mass, (x, y, z) in have.hung
+    )
+    tip = "".join(_joint(name, "slide", axis, gives) for name, axis in zip(TIP, _UNITS, strict=True))
+    body = f'<body name="tip">{tip}{_TINY}</body>{hung}'
     for i in range(6, 0, -1):
-        stiffness = float(1.0 / compliance[i - 1])
-        body = (
-            f'<body name="link{i}" pos="{_words(places[i - 1])}">'
-            f'<joint name="A{i}" type="hinge" axis="{AXES[i - 1]}" stiffness="{stiffness!r}"/>'
-            f"{_TINY}{sites.get(i, '')}{body}</body>"
+        weight = _weight(*have.links[i - 1]) if have.links else _TINY
+        motor = _joint(f"A{i}", "hinge", AXES[i - 1], gives, have.cubic[i - 1])
+        tilts = "".join(
+            _joint(f"A{i}.r{a}", "hinge", axis, gives) for a, axis in zip("xy", ACROSS[i - 1], strict=True)
         )
+        body = f'<body name="link{i}">{motor}{weight}{sites.get(f"link{i}", "")}{body}</body>'
+        body = (
+            f'<body name="bearing{i}" pos="{_words(places[i - 1])}">'
+            f"{tilts}{_TINY}{sites.get(f'bearing{i}', '')}{body}</body>"
+        )
+    ground = "".join(
+        _joint(name, "hinge" if ".r" in name else "slide", axis, gives)
+        for name, axis in zip(BASE, (*_UNITS, *_UNITS), strict=True)
+    )
     return (
         '<mujoco><compiler angle="radian" autolimits="false"/>'
-        '<option gravity="0 0 0"><flag contact="disable" energy="enable"/></option>'
-        f"<worldbody>{body}</worldbody>{tendon}</mujoco>"
+        f'<option gravity="0 0 {-GRAVITY}"><flag contact="disable" energy="enable"/></option>'
+        f'<worldbody><body name="ground">{ground}{_TINY}{body}</body></worldbody>{tendon}</mujoco>'
     )
+
+
+_UNITS = ("1 0 0", "0 1 0", "0 0 1")
+
+
+def _joint(name: str, kind: str, axis: str, gives: Mapping[str, float], cubic: float = 0.0) -> str:
+    stiffness = 1.0 / gives[name] if gives[name] else 0.0
+    return (
+        f'<joint name="{name}" type="{kind}" axis="{axis}" stiffness="{stiffness!r} 0 {float(cubic)!r}"/>'
+    )
+
+
+def _weight(mass: float, centre: tuple[float, ...]) -> str:
+    return f'<inertial pos="{_words(centre)}" mass="{mass!r}" diaginertia="1 1 1"/>'
 
 
 def _site(name: str, place: tuple[float, ...]) -> str:

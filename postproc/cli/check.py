@@ -50,7 +50,7 @@ def check(
         raise click.UsageError("name a PROGRAM to check")
 
     from postproc.report.terminal import show_findings
-    from postproc.workflows import check as run
+    from postproc.workflows.listing import check as run
 
     out = Out(json_to, quiet, verbose)
     with out.refusals(""):

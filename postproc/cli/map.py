@@ -158,7 +158,7 @@ def map_(
     """
     from postproc.forces.stated import FEED, FORM, FRAMES, NotAForce, parse_force
     from postproc.report.workspace import show_map
-    from postproc.workflows import MapRequest, map_workspace
+    from postproc.workflows.workspace import MapRequest, map_workspace
     from postproc.workspace import MAX_CELLS
 
     try:

@@ -36,8 +36,8 @@ def predict(
       compensate predict panel.src --force 0,360,560 --report reports
     """
     from postproc.report.terminal import show
-    from postproc.workflows import Request
-    from postproc.workflows import predict as run
+    from postproc.workflows.preparation import Request
+    from postproc.workflows.program import predict as run
 
     out = Out(json_to, quiet, verbose)
     request = Request(

@@ -59,7 +59,8 @@ def program(
     Exit codes: 0 done; 3 written, but something was left or deserves a look; 1 nothing written; 2 command line.
     """
     from postproc.report.terminal import show
-    from postproc.workflows import Request, compensate
+    from postproc.workflows.preparation import Request
+    from postproc.workflows.program import compensate
 
     target = None if output is None else Path(output)
     if target is not None and output is not None and output.endswith(("/", "\\")):
@@ -82,7 +83,7 @@ def program(
             ),
             stage,
         )
-    out.result(done.as_json(), written=not dry_run)
+    out.result(done.as_json(), written=True)
     if not out.quiet:
         show(out.console(), done, verbose)
         if dry_run:

@@ -19,7 +19,7 @@ def robots(name: str | None, json_to: str | None, quiet: bool, verbose: bool) ->
       compensate robots kuka_kr270
     """
     from postproc.report.robot import list_robots, robot_json, show_robot
-    from postproc.workflows import robots as run
+    from postproc.workflows.listing import robots as run
 
     out = Out(json_to, quiet, verbose)
     with out.refusals(""):

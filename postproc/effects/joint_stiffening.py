@@ -12,7 +12,8 @@ from postproc.robot.description import Joint
 
 
 class JointStiffening(Load):
-    """tau_i = -k_i d_i^3, U = k_i d_i^4 / 4, with d_i the elastic displacement of joint i.
+    """tau_i = -k_i d_i^3, U = k_i d_i^4 / 4, with d_i the displacement of joint i under load (a gap's
+    included).
 
     Together with joint_compliance the joint holds tau = d / c + k d^3; on a rigid joint it does nothing.
     """
@@ -30,8 +31,9 @@ class JointStiffening(Load):
 
     def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
         k, bent, motors = column(values, self.parameters), self._displacement(state), state.chain.motors
-        force[motors] -= k * bent**3
-        slope[motors] -= 3 * k * bent**2
+        square = bent * bent
+        force[motors] -= k * square * bent
+        slope[motors] -= 3 * k * square
 
     def energy(self, values: Values, state: State) -> Floats:
         return np.asarray((column(values, self.parameters) * self._displacement(state) ** 4 / 4).sum(axis=0))

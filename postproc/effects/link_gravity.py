@@ -9,7 +9,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.effects.effect import Load, Parameter, State, Values
 from postproc.geometry import Poses
-from postproc.robot.chain import Chain, cross
+from postproc.robot.chain import Chain, weight_about
 from postproc.robot.description import Joint
 
 
@@ -50,7 +50,7 @@ class LinkGravity(Load):
 
     def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
         moments = self._moments(values, state)
-        g, swept, chain = state.gravity[:, None], state.swept, state.chain
+        swept, chain = state.swept, state.chain
         first = _first_turn(chain)
         follows = np.searchsorted(chain.motor_rows, np.arange(chain.motor_rows[-1] + 1))
         for i, joint in enumerate(follows):
@@ -58,10 +58,11 @@ class LinkGravity(Load):
             if i < first:
                 moment = moment + values["mass"] * (swept.origins[first] - swept.origins[i])
             if swept.turns[i]:
-                force[i] += np.sum(axis * cross(moment, g), axis=0)
-                slope[i] += np.sum(axis * cross(cross(axis, moment), g), axis=0)
+                torque, change = weight_about(axis, moment, state.gravity)
+                force[i] += torque
+                slope[i] += change
             elif i < first:
-                force[i] += values["mass"] * np.sum(axis * g, axis=0)
+                force[i] += values["mass"] * (state.gravity @ axis)
 
     def energy(self, values: Values, state: State) -> Floats:
         origin = state.swept.origins[_first_turn(state.chain)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.effects.effect import Load, Parameter, State, Values
-from postproc.robot.chain import cross
+from postproc.robot.chain import weight_about
 from postproc.robot.description import Joint
 
 
@@ -41,17 +41,17 @@ class Payload(Load):
         return weights
 
     def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
-        swept, g = state.swept, state.gravity[:, None]
+        swept, g = state.swept, state.gravity
         before = state.chain.motor_rows[-1] + 1  # what stands before the flange carries it
         for mass, centre in self._weights(values, state):
             for i in range(before):
                 axis = swept.axes[i]
                 if swept.turns[i]:
-                    lever = centre - swept.origins[i]
-                    force[i] += mass * np.sum(axis * cross(lever, g), axis=0)
-                    slope[i] += mass * np.sum(axis * cross(cross(axis, lever), g), axis=0)
+                    torque, change = weight_about(axis, centre - swept.origins[i], g)
+                    force[i] += mass * torque
+                    slope[i] += mass * change
                 else:
-                    force[i] += mass * np.sum(axis * g, axis=0)
+                    force[i] += mass * (g @ axis)
 
     def energy(self, values: Values, state: State) -> Floats:
         return np.asarray(

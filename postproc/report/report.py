@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -111,6 +113,12 @@ class Report:
         }
 
 
+class Jsonable(Protocol):
+    """A result that has a machine-readable form."""
+
+    def as_json(self) -> dict[str, object]: ...
+
+
 def exit_code(findings: Sequence[Finding], strict: bool = False) -> int:
     """0 done, 3 something was left or deserves a look, 1 nothing was written; ``strict``: warnings are errors."""
     worst = max((SEVERITIES.index(finding.severity) for finding in findings), default=0)
@@ -149,3 +157,8 @@ def _doubt(doubt: Doubt) -> dict[str, object]:
 
 def _finite(value: float) -> float | None:
     return round(value, 7) if np.isfinite(value) else None
+
+
+def json_bytes(result: Jsonable) -> bytes:
+    """A machine-readable result as the bytes of its file."""
+    return (json.dumps(result.as_json(), indent=2, allow_nan=False) + "\n").encode()

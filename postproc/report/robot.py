@@ -131,7 +131,8 @@ def _geometry_words(robot: Robot) -> str:
 def _geometry_json(robot: Robot) -> dict[str, object]:
     lengths = _lengths(robot)
     axes = [
-        {"name": axis.name, "kind": axis.kind, "sign": axis.sign, "offset": axis.offset} for axis in robot.axes
+        {"name": axis.name, "kind": axis.kind, "sign": axis.sign, "offset": axis.offset}
+        for axis in robot.axes
     ]
     found: dict[str, object] = {"kind": robot.arm.kind, "axes": axes}
     return found if lengths is None else {**found, "kuka_m": asdict(lengths)}

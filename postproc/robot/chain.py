@@ -233,6 +233,15 @@ def cross(a: Floats, b: Floats) -> Floats:
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
+def weight_about(axis: Floats, moment: Floats, gravity: Floats) -> tuple[Floats, Floats]:
+    """Torque (N,) [N m] about ``axis`` (3, N) of a weight whose first moment from the axis is ``moment`` (3, N) [kg m],
+    and its derivative by the turn: a . (M x g) and a . ((a x M) x g) = (a . M)(a . g) - M . g."""
+    (ax, ay, az), (mx, my, mz), (gx, gy, gz) = axis, moment, gravity.tolist()
+    torque = ax * (my * gz - mz * gy) + ay * (mz * gx - mx * gz) + az * (mx * gy - my * gx)
+    slope = (ax * mx + ay * my + az * mz) * (gx * ax + gy * ay + gz * az) - (gx * mx + gy * my + gz * mz)
+    return torque, slope
+
+
 def _turned(first: Floats, second: Floats, angle: Floats) -> tuple[Floats, Floats]:
     """Two axes (3, N) turned by ``angle`` (N,) in their plane, from the first to the second."""
     sine, cosine = np.sin(angle), np.cos(angle)

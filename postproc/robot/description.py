@@ -66,7 +66,7 @@ class Mass:
 
 @dataclass(frozen=True)
 class Quantity:
-    """Numbers of a mechanism in SI: ``values`` (k,), ``unit`` the SI unit, ``source`` (empty: that of the mechanism)."""
+    """Numbers of a mechanism: ``values`` (k,) in the SI ``unit``; ``source``, empty where it is the mechanism's."""
 
     values: Floats
     unit: str
@@ -387,7 +387,9 @@ def _check_count(section: Section, axes: tuple[Axis, ...], count: int) -> None:
     if len(axes) < count:
         raise section.error("YML003", f"{count - len(axes)} of the geometry's {count} joints missing")
     if len(axes) > count:
-        raise section.error("YML004", f"the geometry has {count} joints, {len(axes)} are given", axes[count].name)
+        raise section.error(
+            "YML004", f"the geometry has {count} joints, {len(axes)} are given", axes[count].name
+        )
 
 
 def _held(axes: tuple[Axis, ...], section: Section) -> int | None:

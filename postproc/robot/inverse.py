@@ -1,8 +1,8 @@
 """Inverse kinematics as the controller does it: closed form for a spherical wrist, Newton's for any other arm.
 
-For a KUKA-type arm a configuration (branch) is written as KUKA's status S: bit 0 wrist root in the overhead area, bit 1 elbow
-(A3 beyond the stretched arm), bit 2 A5 < 0.  The turn T has bit i set where axis i + 1 is negative.  Other arms have
-neither: their branch is the one that leads on from the angles before.
+For a KUKA-type arm a configuration (branch) is written as KUKA's status S: bit 0 wrist root in the overhead area,
+bit 1 elbow (A3 beyond the stretched arm), bit 2 A5 < 0.  The turn T has bit i set where axis i + 1 is negative.
+Other arms have neither: their branch is the one that leads on from the angles before.
 """
 
 from __future__ import annotations

@@ -22,15 +22,20 @@ from postproc.robot.geometries import SerialArm
 TOLERANCE = 5e-13
 """[m, rad] what may be left of a solved pose."""
 
-STEP = 0.15
+STEP = 0.05
 """Way to a target gone at once: rad, and parts of the arm's size."""
+
+FINE_STEP = 0.005
+"""The same where axes turn far."""
+
+LEAP = 0.5
+"""[rad] An axis that turns farther in one step has leapt to another branch, or nearly so."""
 
 FAR = 0.3
 """A target farther than this from where ``near`` stands is another posture: any branch will do."""
 
 _CHUNK = 4096
 _WEIGHT = 1e-16
-_LARGEST_TURN = 0.5
 _STARTS = 24
 
 
@@ -84,8 +89,6 @@ class Solver:
             damping = 0.5 * np.sum(error * error, axis=1) + _WEIGHT
             normal = transposed @ slope + damping[:, None, None] * np.eye(slope.shape[2])
             move = np.linalg.solve(normal, transposed @ error[:, :, None])[:, :, 0]
-            largest = np.abs(move * self.turns[self.free]).max(axis=1, initial=0.0)
-            move *= np.minimum(1.0, _LARGEST_TURN / np.maximum(largest, 1e-300))[:, None]
             q[np.ix_(active, self.free)] += move
         return q, good
 
@@ -96,22 +99,31 @@ class Solver:
             np.maximum(np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1))
         )
 
-    def follow(self, q: Floats, target: Poses) -> tuple[Floats, Bools]:
-        """``solve`` along the straight way from where the flange is at ``q``, in steps of ``STEP``."""
+    def follow(self, q: Floats, target: Poses, stride: float = STEP) -> tuple[Floats, Bools, Bools]:
+        """``solve`` along the straight way from where the flange is at ``q``, in steps of ``stride``; third, where no
+        step failed on the way and no axis leapt."""
         swept = self.chain.sweep(np.ascontiguousarray(q.T), TOOL)
         here = swept.pose
         way = target.position - here.position
         turn = vector_from_rotation(target.rotation @ np.swapaxes(here.rotation, 1, 2))
         length = np.maximum(np.linalg.norm(way, axis=1) / self.size, np.linalg.norm(turn, axis=1))
-        pieces = np.ceil(np.nan_to_num(length, nan=0.0) / STEP).astype(np.int64)
-        q = q.copy()
+        pieces = np.ceil(np.nan_to_num(length, nan=0.0) / stride).astype(np.int64)
+        q, smooth = q.copy(), np.ones(len(q), bool)
         for piece in range(1, int(pieces.max(initial=0))):
-            rows = np.flatnonzero(pieces > piece)
+            rows = np.flatnonzero(smooth & (pieces > piece))
+            if not len(rows):
+                break
             share = (piece / pieces[rows])[:, None]
             rotation = rotation_from_vector(share * turn[rows]) @ here.rotation[rows]
             between = Poses(rotation, here.position[rows] + share * way[rows])
-            q[rows], _ = self.solve(q[rows], between, steps=7, done=1e-3)
-        return self.solve(q, target)
+            there, reached = self.solve(q[rows], between, steps=7, done=1e-4)
+            smooth[rows] &= reached & ~self._leaps(q[rows], there)
+            q[rows] = there
+        found, good = self.solve(q, target)
+        return found, good, smooth & good & ~self._leaps(q, found)
+
+    def _leaps(self, before: Floats, after: Floats) -> Bools:
+        return np.asarray(np.abs((after - before) * self.turns).max(axis=1, initial=0.0) > LEAP)
 
     def search(self, near: Floats, target: Poses) -> tuple[Floats, Bools]:
         """Solutions in any branch: within the limits if there is one, and of those the nearest to ``near``."""
@@ -131,7 +143,7 @@ class Solver:
         return best, good
 
     def inside(self, q: Floats, near: Floats) -> Floats:
-        """Each turning axis at the whole turns nearest to ``near`` that its limits allow; nearest at all without any."""
+        """Each turning axis at the whole turns nearest to ``near`` within its limits, nearest at all without any."""
         q = q.copy()
         for i in self.free[self.turns[self.free]]:
             turns = np.round((near[:, i] - q[:, i]) / (2 * np.pi))
@@ -163,7 +175,7 @@ def _inverse_near(solver: Solver, flange: Poses, near: Floats) -> tuple[Floats, 
     known = np.isfinite(near).all(axis=1) & np.isfinite(flange.position).all(axis=1)
     q, good = np.full(near.shape, np.nan), np.zeros(len(near), bool)
     rows = np.flatnonzero(known)
-    q[rows], good[rows] = solver.follow(near[rows], flange[rows])
+    q[rows], good[rows], _ = solver.follow(near[rows], flange[rows])
     far = rows[solver.distance(near[rows], flange[rows]) > FAR]
     q[far] = solver.inside(q[far], near[far])
     again = far[~good[far] | ~solver.within(q[far])]
@@ -182,7 +194,8 @@ def follow_rows(
 
     ``begins`` (M,): the row before is not the last solution but ``starts`` (M, n); it must be set in row 0.  ``jumps``
     (M,): point to point, so that another branch or turn may be taken where the one so far has no way or leaves the
-    limits.  A row that is not reached is passed over.
+    limits.  A path, on the contrary, that leads through a singular place or out of reach is not followed into another
+    branch: its end counts as not reached.  A row that is not reached is passed over.
 
     Solved in about sqrt(M) stretches side by side.  A quick run over the ends of the stretches guesses where each
     begins; then all march together, one row at a time; a stretch that turns out to have begun elsewhere than the one
@@ -222,7 +235,11 @@ def follow_rows(
 
 
 def _stepped(solver: Solver, base: Floats, flange: Poses, jumps: Bools) -> tuple[Floats, Bools]:
-    found, fine = solver.follow(base, flange)
+    """One motion on from ``base``: a path in its own branch or not at all, a jump in another one if need be."""
+    found, fine, smooth = solver.follow(base, flange)
+    rows = np.flatnonzero(~jumps & fine & ~smooth)
+    if len(rows):
+        found[rows], _, fine[rows] = solver.follow(base[rows], flange[rows], FINE_STEP)
     rows = np.flatnonzero(jumps & fine)
     found[rows] = solver.inside(found[rows], found[rows])
     again = np.flatnonzero(jumps & ~(fine & solver.within(found)) & np.isfinite(base).all(axis=1))
@@ -248,4 +265,3 @@ def _chunked(solve: Callable[[slice], tuple[Floats, Bools]], like: Floats) -> tu
         rows = slice(start, start + _CHUNK)
         q[rows], good[rows] = solve(rows)
     return q, good
-

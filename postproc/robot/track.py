@@ -23,14 +23,15 @@ SIGN_MARGIN = 0.01 * DEG
 """An axis nearer to zero than this satisfies either sign of T: taught values are rounded."""
 
 WEAK = 0.004
-"""Smallest singular value of a general arm's Jacobian (lengths as parts of its size) below which axes turn far: it marks
-about as many states of a KR 270 as the limits of its closed form do."""
+"""Smallest singular value of a general arm's Jacobian (lengths as parts of its size) below which axes turn far.  It
+marks about as many states of a KR 270 as the places of its closed form do."""
 
 
 @dataclass(frozen=True)
 class Track:
     """q (N, n) [rad, m], NaN where unknown or out of reach; status (N,) branch taken (0 for an arm that is not KUKA's),
-    -1 where nothing says it; reachable (N,); within (N,) inside of the axis limits; turn_holds (N,) the stated T is that of ``q``."""
+    -1 where nothing says it; reachable (N,); within (N,) inside of the axis limits; turn_holds (N,) the stated T is
+    that of ``q``."""
 
     q: Floats
     status: Ints
@@ -142,7 +143,8 @@ def _branches(
     stated = jump & cartesian & (toolpath.status >= 0)
     if isinstance(robot.nominal, SerialArm):
         stated = np.zeros_like(stated)
-    lost = (jump & ~on_axes & ~cartesian) | (toolpath.kind == Kind.OTHER)
+    # A path motion keeps its branch wherever it leads; only a jump to an unknown place loses it.
+    lost = (jump | (toolpath.kind == Kind.OTHER)) & ~on_axes & ~cartesian
     home = _home(toolpath)
     value = np.full(len(toolpath) + 1, -1)
     value[0] = -1 if start is None else status_of(robot.nominal, start[None])[0]

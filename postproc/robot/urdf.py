@@ -157,7 +157,9 @@ def _joint(path: Path, line: int, words: dict[str, str], before: list[_Joint]) -
     name, kind = _word(path, line, "joint", words, "name"), _word(path, line, "joint", words, "type")
     if kind != "fixed" and kind not in MOVING:
         allowed = ", ".join(("fixed", *MOVING))
-        raise _wrong(path, line, f"joint {name}: type {kind!r}{nearest(kind, MOVING)}", f"read here: {allowed}")
+        raise _wrong(
+            path, line, f"joint {name}: type {kind!r}{nearest(kind, MOVING)}", f"read here: {allowed}"
+        )
     if any(joint.name == name for joint in before):
         raise _wrong(path, line, f"joint {name!r} stands twice")
     return _Joint(name, kind, line)

@@ -1,0 +1,1 @@
+"""Each command as a function on paths: the rooms below, put in their order."""

@@ -1,0 +1,252 @@
+"""The main job and its prediction, on paths.
+
+Nothing is written that was not read back from its own bytes and checked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.compensation.correct import Result, State, correct
+from postproc.compensation.doubt import doubt_of
+from postproc.dialects.dialect import Program
+from postproc.findings import Finding, Refusal
+from postproc.publish import publish
+from postproc.report.files import corrections_csv, unified_diff
+from postproc.report.report import Report, Spread, Worst, exit_code, in_order_of_place, json_bytes
+from postproc.units import DEG, MM
+from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, read_document, silent
+from postproc.writing import write
+
+WORST_PLACES = 5
+
+
+def predict(request: Request, stage: Stage = silent) -> Report:
+    """The deflection at every pose; files only where ``report`` names a folder for them."""
+    ready = prepare(request)
+    stage("predicting")
+    result = correct(replace(ready.task, gain=0.0))
+    findings = in_order_of_place([*ready.findings, *result.findings])
+    report = _report(request, ready, result, findings, corrected=False)
+    files: dict[Path, bytes] = {}
+    pages = [] if request.json is None else [request.json]
+    if request.report:
+        files[request.report / f"{request.program.stem}.deflection.csv"] = corrections_csv(ready.task, result)
+        pages.append(request.report / f"{request.program.stem}.prediction.json")
+    report = replace(report, outputs=tuple(str(path) for path in (*files, *pages)))
+    _not_over_inputs(ready, report.outputs)
+    publish({**files, **dict.fromkeys(pages, json_bytes(report))})
+    return report
+
+
+def compensate(request: Request, stage: Stage = silent) -> Report:
+    """The main job: read, predict, correct, write, read back.
+
+    ``stage`` is told what is being done.  Raises Refusal, and has then written nothing.
+    """
+    ready = prepare(request)
+    program = ready.program
+    if program.marker is not None and not request.again:
+        line, column = program.documents[0].place(program.marker.start)
+        raise Refusal(
+            Finding(
+                "FIL005",
+                "this program carries the mark of an earlier compensation",
+                str(request.program),
+                line,
+                column,
+                help="compensate the original instead, or say --again if it is meant",
+            )
+        )
+    stage("correcting")
+    result = correct(ready.task)
+    stage("writing, and reading back")
+    target = _target(request)
+    written = write(
+        program,
+        ready.dialect,
+        ready.task,
+        result,
+        ready.cell,
+        ready.robot,
+        target.stem,
+        lambda path: completed(path, ready.cell, ready.robot, request.program),
+    )
+    edits, result = written.edits, written.result
+    findings = [*ready.findings, *result.findings, *_closing(request, ready, result)]
+    paths = _output_paths(program, target)
+    outputs = dict(zip(paths, written.contents, strict=True))
+    stem = target.stem
+    folder = request.report or target.parent
+    names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff")]
+    names += [] if request.json is None else [request.json]
+    stage("reporting")
+    report = _report(request, ready, result, in_order_of_place(findings), corrected=True)
+    if report.exit == 1:
+        raise Refusal(*report.findings)
+    report = replace(report, outputs=tuple(str(path) for path in (*paths, *names)))
+    _not_over_inputs(ready, report.outputs)
+    if request.dry_run:
+        return replace(report, outputs=())
+    diff = b"".join(
+        unified_diff(document, path.name, [edit for edit in edits if edit.span.file == index])
+        for index, (document, path) in enumerate(zip(program.documents, outputs, strict=True))
+    )
+    files = {
+        **outputs,
+        names[0]: json_bytes(report),
+        names[1]: corrections_csv(ready.task, result),
+        names[2]: diff,
+        **dict.fromkeys(names[3:], json_bytes(report)),
+    }
+    for document in program.documents:
+        if read_document(document.path).digest != document.digest:
+            raise Refusal(Finding("FIL010", "the file changed while it was read", str(document.path)))
+    publish(files, last=target)
+    return report
+
+
+def _closing(request: Request, ready: Prepared, result: Result) -> list[Finding]:
+    """What is to be said of the corrected program as a whole."""
+    file, findings = str(request.program), []
+    corrected = result.corrected
+    if ready.task.process and not ready.wrenches.any:
+        said = "--force was not given" if request.force is None else "no motion carries a force"
+        findings.append(Finding("COR010", f"{said}: nothing is corrected", file))
+    above = corrected & (result.after > ready.cell.tolerance)
+    if request.gain < 1.0:
+        findings.append(
+            Finding("COR007", f"{request.gain:.0%} of the correction was applied, as asked", file)
+        )
+    elif above.any():
+        row = int(np.argmax(np.where(corrected, result.after, -1.0)))
+        findings.append(
+            Finding(
+                "COR005",
+                f"{result.after[row] / MM:.4f} mm remain, tolerance {ready.cell.tolerance / MM:g} mm"
+                f" ({int(above.sum())} motions)",
+                file,
+                int(ready.task.toolpath.line[row]),
+            )
+        )
+    if corrected.any():
+        cuts = len(np.unique(result.cut[corrected]))
+        findings.append(
+            Finding(
+                "COR006",
+                f"{int(corrected.sum())} end points in {cuts} cuts are corrected; between the points the path is not"
+                " checked, and each correction fades in along the first motion of its cut",
+                file,
+                help="long motions and cut entries keep a part of their error: let the CAM system post shorter"
+                " segments there",
+            )
+        )
+    return findings
+
+
+def _target(request: Request) -> Path:
+    """Where the compensated program goes; a name without a suffix is a folder."""
+    if request.output is None:
+        return request.program.parent / "compensated" / request.program.name
+    if request.output.is_dir() or (request.program.suffix and not request.output.suffix):
+        return request.output / request.program.name
+    return request.output
+
+
+def _output_paths(program: Program, target: Path) -> list[Path]:
+    """Where the program's files go: companions beside it, under its stem, with their own suffix."""
+    main = program.documents[0].path
+    renamed = target.stem != main.stem
+    companions = (document.path for document in program.documents[1:])
+    return [target, *(target.with_name(target.stem + p.suffix if renamed else p.name) for p in companions)]
+
+
+def _not_over_inputs(ready: Prepared, outputs: Sequence[str]) -> None:
+    inputs = {document.path.resolve() for document in ready.program.documents}
+    inputs |= {ready.cell.path.resolve(), ready.robot.path.resolve()}
+    for output in outputs:
+        if Path(output).resolve() in inputs:
+            raise Refusal(Finding("FIL007", "this output is an input of the same run", output))
+    if len({Path(output).resolve() for output in outputs}) < len(outputs):
+        raise Refusal(Finding("FIL007", "two outputs have one name", outputs[0]))
+
+
+def _report(
+    request: Request, ready: Prepared, result: Result, findings: tuple[Finding, ...], corrected: bool
+) -> Report:
+    task = ready.task
+    scope = result.state != State.AIR
+    size = np.linalg.norm(result.command.position - task.wanted.position, axis=1)
+    force = np.linalg.norm(task.wrench[:, :3], axis=1)
+    order = np.argsort(-np.nan_to_num(np.where(scope, result.before, -1.0), nan=-1.0), kind="stable")
+    worst = tuple(
+        Worst(
+            int(task.toolpath.line[row]),
+            float(result.before[row] / MM),
+            float(size[row] / MM) if corrected else math.nan,
+            float(result.after[row] / MM) if corrected else math.nan,
+            float(force[row]),
+        )
+        for row in order[:WORST_PLACES]
+        if scope[row] and np.isfinite(result.before[row])
+    )
+    return Report(
+        program=str(request.program),
+        dialect=ready.dialect.name,
+        robot=ready.robot.name,
+        motions=len(task.toolpath),
+        cuts=int(result.cut.max(initial=-1)) + 1,
+        cutting=int(scope.sum()),
+        corrected=int(result.corrected.sum()) if corrected else 0,
+        inserted=0,
+        left=int((result.state == State.LEFT).sum()),
+        iterations=int(result.iterations.max(initial=0)),
+        gain=request.gain,
+        mode=ready.cell.correct,
+        force_source=ready.wrenches.source,
+        force_max_n=ready.wrenches.max_force,
+        before=Spread.of(result.before[scope]),
+        after=Spread.of(result.after[scope]) if corrected else None,
+        correction=Spread.of(size[result.corrected]) if corrected else None,
+        angle_before_deg=_largest(result.before_angle[scope]) / DEG,
+        angle_after_deg=_largest(result.after_angle[scope]) / DEG if corrected else None,
+        worst=worst,
+        doubt=doubt_of(task, result, ready.cell.force_ci95),
+        model=_model(ready),
+        digests={
+            "robot": ready.robot.digest,
+            **{document.path.name: document.digest for document in ready.program.documents},
+        },
+        findings=findings,
+        exit=exit_code(findings, request.strict),
+    )
+
+
+def _model(ready: Prepared) -> dict[str, object]:
+    """Effects, options, values with interval and source, as they were used."""
+    return {
+        term.effect.name: {
+            **term.effect.described(),
+            "parameters": {
+                name: {
+                    "value": value.value,
+                    "interval": value.interval,
+                    "level": value.level if value.level or value.interval is None else "unstated",
+                    "source": value.source,
+                }
+                for name, value in term.stated.items()
+            },
+        }
+        for term in ready.model.terms
+    }
+
+
+def _largest(values: Floats) -> float:
+    seen = values[np.isfinite(values)]
+    return float(seen.max()) if len(seen) else math.nan

@@ -1,0 +1,139 @@
+"""The map of a workspace, on paths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from postproc.findings import Finding, Refusal
+from postproc.geometry import Poses, rotation_from_abc
+from postproc.model import StiffnessModel
+from postproc.publish import publish
+from postproc.report.report import exit_code, json_bytes
+from postproc.report.workspace import Mapped, map_csv, slices_shown
+from postproc.robot.description import find_robot, load_robot
+from postproc.robot.geometries import SerialArm
+from postproc.units import DEG, MM
+from postproc.workflows.preparation import Stage, silent
+from postproc.workspace import Grid, Load, Survey, has_compensator, survey, with_sign
+
+
+@dataclass(frozen=True)
+class MapRequest:
+    """A map that the user asked for: per axis of the robot base one value or (from, to), each range in ``points``."""
+
+    robot: str
+    ranges_mm: tuple[tuple[float, ...], ...]
+    points: int
+    tool_mm_deg: tuple[float, ...]
+    orientation_deg: tuple[float, ...]
+    wrench: tuple[float, ...]
+    frame: str
+    linear: bool = False
+    sign: str | None = None
+    ignore_limits: bool = False
+    status: int | None = None
+    picture: Path | None = None
+    csv: Path | None = None
+    json: Path | None = None
+
+
+def map_workspace(request: MapRequest, stage: Stage = silent) -> Mapped:
+    """The deflection over a part of the workspace.  Raises Refusal, and has then written nothing."""
+    robot = load_robot(find_robot(request.robot))
+    model = StiffnessModel.from_robot(robot)
+    if request.sign is not None:
+        if not has_compensator(model):
+            raise Refusal(
+                Finding("MAP001", f"--sign {request.sign}, but no gravity_compensator", str(robot.path))
+            )
+        model = with_sign(model, request.sign)
+    free = isinstance(robot.nominal, SerialArm)
+    if free and request.status is not None:
+        raise Refusal(Finding("MAP006", f"--status {request.status}, but this arm has no S", str(robot.path)))
+    load = _load(request)
+    stage("computing")
+    found = survey(model, _grid(request), load)
+    signs = {
+        str(term.effect.described()["sign"]) for term in model.terms if "sign" in term.effect.described()
+    }
+    mapped = Mapped(
+        survey=found,
+        load=load,
+        robot=robot.name,
+        digest=robot.digest,
+        axes=tuple((joint.name, "mm" if joint.kind == "prismatic" else "deg") for joint in robot.joints),
+        effects=tuple(term.effect.name for term in model.terms),
+        stated=request.wrench,
+        frame=request.frame,
+        sign=", ".join(sorted(signs)) or None,
+        status=None if free else load.status,
+    )
+    findings = [*_map_findings(found, mapped.status, request.picture is not None), *model.doubts()]
+    files: dict[Path, bytes] = {}
+    if found.mapped.any():
+        stage("drawing")
+        if request.csv is not None:
+            files[request.csv] = map_csv(mapped)
+        if request.picture is not None:
+            from postproc.report.picture import picture
+
+            files[request.picture] = picture(mapped, request.picture.suffix[1:].lower())
+    pages = [] if request.json is None else [request.json]
+    mapped = replace(
+        mapped,
+        findings=tuple(findings),
+        outputs=tuple(str(path) for path in (*files, *pages)),
+        exit=exit_code(findings),
+    )
+    publish({**files, **dict.fromkeys(pages, json_bytes(mapped))})
+    return mapped
+
+
+def _grid(request: MapRequest) -> Grid:
+    axes = []
+    for ends in request.ranges_mm:
+        low, high = ends[0], ends[-1]
+        several = low < high and request.points > 1
+        axes.append(np.linspace(low, high, request.points) if several else np.array([(low + high) / 2]))
+    return Grid(*(values * MM for values in axes))
+
+
+def _load(request: MapRequest) -> Load:
+    place, turn = np.array(request.tool_mm_deg[:3]) * MM, np.array(request.tool_mm_deg[3:]) * DEG
+    orientation = rotation_from_abc(np.array(request.orientation_deg) * DEG)
+    wrench = np.array(request.wrench).reshape(2, 3)
+    if request.frame == "tool":
+        wrench = wrench @ orientation.T
+    return Load(
+        tool=Poses.from_abc(place, turn),
+        orientation=orientation,
+        wrench=wrench.ravel(),
+        status=2 if request.status is None else request.status,
+        linear=request.linear,
+        ignore_limits=request.ignore_limits,
+    )
+
+
+def _map_findings(found: Survey, status: int | None, drawn: bool) -> list[Finding]:
+    """What is to be said of a map as a whole."""
+    findings = []
+    cells, unsettled = len(found.q), int(found.unsettled.sum())
+    if status is None:
+        findings.append(Finding("MAP007", "the arm has no S: neighbouring cells may differ in posture"))
+    if not found.mapped.any():
+        beyond = int(found.in_reach.sum())
+        help = f"{beyond} cells are only beyond the axis limits: --ignore-limits" if beyond else ""
+        branch = "" if status is None else f" with S {status}"
+        findings.append(Finding("MAP002", f"none of {cells} cells can be reached{branch}", help=help))
+    elif unsettled:
+        findings.append(Finding("MAP003", f"{unsettled} of {cells} cells have no equilibrium"))
+    elif not np.nanmax(found.size) > 0:
+        findings.append(Finding("MAP005", "the deflection is zero everywhere"))
+    slices = found.grid.shape[2]
+    shown = len(slices_shown(slices))
+    if drawn and found.mapped.any() and min(found.grid.shape) > 1 and shown < slices:
+        findings.append(Finding("MAP004", f"the picture shows {shown} of {slices} slices along z"))
+    return findings
