@@ -19,7 +19,7 @@ from postproc.units import DEG
 CHUNK = 8192
 """States evaluated at once: small enough for the arrays of a sweep to stay in the cache."""
 
-STEP_TOLERANCE = 1e-14
+STEP_TOLERANCE = 1e-13
 """Largest last step of the equilibrium [rad]; the next error is smaller by the rate of convergence."""
 
 MAX_STEPS = 60
@@ -61,6 +61,26 @@ class Equilibrium:
     pose: Poses
     converged: Bools
     steps: int
+
+
+@dataclass(frozen=True)
+class _Problems:
+    """N states to be solved, component first: motors (n, N), rest (m, N), wrench (6, N)."""
+
+    motors: Floats
+    rest: Floats
+    wrench: Floats
+    tool: Poses
+    conditions: Conditions
+
+    def part(self, rows: Bools) -> _Problems:
+        return _Problems(
+            self.motors[:, rows],
+            self.rest[:, rows],
+            self.wrench[:, rows],
+            self.tool if self.tool.position.ndim == 1 else self.tool[rows],
+            self.conditions.part(rows),
+        )
 
 
 @dataclass(frozen=True)
@@ -171,31 +191,60 @@ class StiffnessModel:
     def _equilibrium(
         self, motors: Floats, wrench: Floats, tool: Poses, conditions: Conditions, theta: Floats
     ) -> Equilibrium:
-        chain = self.chain
         rest = self._rest(motors, conditions)
         if not self._laws:
             theta = np.zeros_like(rest)
-        step = np.full(theta.shape, np.inf) if self._laws else np.zeros_like(theta)
-        stable = np.ones(theta.shape[1], bool)
-        steps = 0
-        swept = chain.sweep(rest + theta, tool, conditions.spindle)
+        count, steps = theta.shape[1], 0
+        last, stable = np.zeros(count), np.ones(count, bool)
+        # the states still on their way, and how far they are bent
+        rows, bent = np.arange(count), theta
+        problems = _Problems(motors, rest, wrench, tool, conditions)
         while self._laws and steps < MAX_STEPS:
-            state = State(chain, self.gravity, motors, rest, rest + theta, swept, wrench, conditions)
-            force, slope = self._forces(state)
-            target, compliance = np.zeros_like(force), np.zeros_like(force)
-            for law, values in self._laws:
-                law.add_displacement(values, state, force, target, compliance)
-            # A load that pushes away faster than the joint holds (C dM/dq >= 1) has no stable rest.
-            stiffening = 1.0 - compliance * slope
-            stable &= (stiffening > 0).all(axis=0)
-            step = (target - theta) / np.where(stiffening > 0, stiffening, np.inf)
-            theta += step
+            step, holds = self._step(problems, bent)
+            bent += step
             steps += 1
-            swept = chain.sweep(rest + theta, tool, conditions.spindle)
-            if not np.nanmax(np.abs(step), initial=0.0) > STEP_TOLERANCE:
+            size = np.abs(step).max(axis=0)
+            last[rows] = size
+            stable[rows] &= holds
+            moving = size > STEP_TOLERANCE
+            if not moving.any():
                 break
-        rested = stable & (np.abs(step) < 1e-11).all(axis=0) & np.isfinite(swept.position).all(axis=0)
+            if 4 * moving.sum() < 3 * len(rows):
+                theta[:, rows] = bent
+                rows, bent = rows[moving], bent[:, moving]
+                problems = problems.part(moving)
+        theta[:, rows] = bent
+        swept = self.chain.sweep(rest + theta, tool, conditions.spindle)
+        rested = stable & (last < 1e-11) & np.isfinite(swept.position).all(axis=0)
         return Equilibrium((rest + theta).T, theta.T, swept.pose, rested, steps)
+
+    def _step(self, given: _Problems, theta: Floats) -> tuple[Floats, Bools]:
+        """The step (m, N) of the iteration from displacement ``theta`` (m, N), and whether the diagonal holds (N,)."""
+        coordinates = given.rest + theta
+        swept = self.chain.sweep(coordinates, given.tool, given.conditions.spindle)
+        state = State(
+            self.chain,
+            self.gravity,
+            given.motors,
+            given.rest,
+            coordinates,
+            swept,
+            given.wrench,
+            given.conditions,
+        )
+        force, slope = self._forces(state)
+        target, compliance = self._displacement(state, force)
+        # A load that pushes away faster than the joint holds (C dM/dq >= 1) has no stable rest.
+        stiffening = 1.0 - compliance * slope
+        holds = stiffening > 0
+        return (target - theta) / np.where(holds, stiffening, np.inf), np.asarray(holds.all(axis=0))
+
+    def _displacement(self, state: State, force: Floats) -> tuple[Floats, Floats]:
+        """Displacement (m, N) by all laws under ``force`` (m, N), and its derivative, coordinate by coordinate."""
+        displacement, slope = np.zeros_like(force), np.zeros_like(force)
+        for law, values in self._laws:
+            law.add_displacement(values, state, force, displacement, slope)
+        return displacement, slope
 
     def _completed(self, q: Floats, conditions: Conditions) -> Conditions:
         """The conditions, with the senses of approach from the order of ``q`` (N, n) where they are asked for."""
@@ -258,9 +307,7 @@ class StiffnessModel:
         """(N, m) [rad/(N m), m/N] compliance of each coordinate at ``state``, its own part of the loads' stiffness in
         it: 1 / (K_theta^0 + K_theta^GC(q)), eq. (6)."""
         force, slope = self._forces(state)
-        target, gives = np.zeros_like(force), np.zeros_like(force)
-        for law, values in self._laws:
-            law.add_displacement(values, state, force, target, gives)
+        _, gives = self._displacement(state, force)
         return np.asarray((gives / (1.0 - gives * slope)).T)
 
     def joint_compliance(self, q: Floats) -> Floats:
@@ -293,9 +340,7 @@ class StiffnessModel:
         state = self.state(q, wrench, tool, conditions, rest.displacement)
         j = jacobian(state.swept)
         force, _ = self._forces(state)
-        target, gives = np.zeros_like(force), np.zeros_like(force)
-        for law, values in self._laws:
-            law.add_displacement(values, state, force, target, gives)
+        _, gives = self._displacement(state, force)
         c = gives.T[:, :, None] * np.eye(self.chain.size)
         inner = np.linalg.solve(np.eye(self.chain.size) - c @ self._curvature(state, tool), c)
         return np.asarray(j @ inner @ np.swapaxes(j, 1, 2))
@@ -335,9 +380,7 @@ class StiffnessModel:
                 continue
             force, slope = np.zeros_like(state.rest), np.zeros_like(state.rest)
             term.effect.add_force(term.values, state, force, slope)
-            sag, gives = np.zeros_like(force), np.zeros_like(force)
-            for law, values in self._laws:
-                law.add_displacement(values, state, force, sag, gives)
+            sag, _ = self._displacement(state, force)
             sag = np.abs(sag[self.chain.motor_rows])
             force = force[self.chain.motor_rows]
             joint, at = np.unravel_index(np.argmax(sag), sag.shape)

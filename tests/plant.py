@@ -79,8 +79,8 @@ class Spring:
     balanced: bool = True
 
 
-def _zeros(count: int) -> np.ndarray:
-    return field(default_factory=lambda: np.zeros(count))  # type: ignore[no-any-return]
+NONE = np.zeros(12)
+NONE.setflags(write=False)
 
 
 @dataclass(frozen=True)
@@ -94,25 +94,25 @@ class Hardware:
     offset (6,); gauge: gain and bias (7,).
     """
 
-    base: np.ndarray = _zeros(6)
-    tilts: np.ndarray = _zeros(12)
+    base: np.ndarray = field(default_factory=lambda: NONE[:6])
+    tilts: np.ndarray = field(default_factory=lambda: NONE)
     radial: float = 0.0
     axial: float = 0.0
-    cubic: np.ndarray = _zeros(6)
+    cubic: np.ndarray = field(default_factory=lambda: NONE[:6])
     links: tuple[tuple[float, tuple[float, ...]], ...] = ()
     hung: tuple[tuple[float, tuple[float, ...]], ...] = ()
-    gap: np.ndarray = _zeros(6)
-    width: np.ndarray = _zeros(6)
-    zero: np.ndarray = _zeros(6)
+    gap: np.ndarray = field(default_factory=lambda: NONE[:6])
+    width: np.ndarray = field(default_factory=lambda: NONE[:6])
+    zero: np.ndarray = field(default_factory=lambda: NONE[:6])
     wave: tuple[tuple[int, float, float, float], ...] = ()
     ratio: Mapping[tuple[int, int], float] = field(default_factory=dict)
     growth: Mapping[int, float] = field(default_factory=dict)
     by_time: bool = False
     shift: Mapping[int, np.ndarray] = field(default_factory=dict)
-    turn: np.ndarray = _zeros(12)
-    base_offset: np.ndarray = _zeros(6)
-    tool_offset: np.ndarray = _zeros(6)
-    gauge: np.ndarray = _zeros(7)
+    turn: np.ndarray = field(default_factory=lambda: NONE)
+    base_offset: np.ndarray = field(default_factory=lambda: NONE[:6])
+    tool_offset: np.ndarray = field(default_factory=lambda: NONE[:6])
+    gauge: np.ndarray = field(default_factory=lambda: NONE[:7])
 
 
 class Plant:
@@ -235,7 +235,8 @@ class Plant:
         """All coordinates without load: where the controller sends the motors, and what it does not know of."""
         have, stand = self.hardware, motors + self.hardware.zero
         for joint, harmonic, sine, cosine in have.wave:
-            stand[joint] += sine * np.sin(harmonic * motors[joint]) + cosine * np.cos(harmonic * motors[joint])
+            phase = harmonic * motors[joint]
+            stand[joint] += sine * np.sin(phase) + cosine * np.cos(phase)
         for (joint, other), share in have.ratio.items():
             stand[joint] += share * motors[other]
         if direction is not None:
@@ -266,7 +267,8 @@ class Plant:
             mujoco.mju_quat2Mat(matrix, quaternion)
             turned = turned @ matrix.reshape(3, 3)
         flange = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # z out along the forearm
-        self.model.body_pos[self._tip] = [self.d6, 0, 0] + flange @ (tool.position + tool.rotation @ [x, y, z])
+        centre = tool.position + tool.rotation @ [x, y, z]
+        self.model.body_pos[self._tip] = [self.d6, 0, 0] + flange @ centre
         # any frame with this z axis: across the spindle all directions are alike
         frame = np.zeros(4)
         mujoco.mju_quatZ2Vec(frame, flange @ turned @ along)
@@ -398,9 +400,7 @@ _UNITS = ("1 0 0", "0 1 0", "0 0 1")
 
 def _joint(name: str, kind: str, axis: str, gives: Mapping[str, float], cubic: float = 0.0) -> str:
     stiffness = 1.0 / gives[name] if gives[name] else 0.0
-    return (
-        f'<joint name="{name}" type="{kind}" axis="{axis}" stiffness="{stiffness!r} 0 {float(cubic)!r}"/>'
-    )
+    return f'<joint name="{name}" type="{kind}" axis="{axis}" stiffness="{stiffness!r} 0 {float(cubic)!r}"/>'
 
 
 def _weight(mass: float, centre: tuple[float, ...]) -> str:

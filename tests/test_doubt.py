@@ -1,6 +1,7 @@
 """The doubt of a prediction: linear propagation against drawn robots, what is left out, and how it is told."""
 
 import re
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -30,6 +31,7 @@ from postproc.compensation.mirror import predict
 from postproc.findings import Refusal
 from postproc.geometry import Poses, rotation_from_vector
 from postproc.model import NOTHING, StiffnessModel
+from postproc.report.terminal import _doubt
 from postproc.robot.description import Value, find_robot
 from postproc.robot.track import follow
 
@@ -283,6 +285,17 @@ def test_a_lower_bound_exactly_where_a_figure_in_use_has_no_interval(model, forc
     told = doubt_of(task, correct(task), force_ci95)
     assert {name for name, _ in told.tenth} == missing
     assert told.lower_bound == bool(missing)
+
+
+def test_a_parameter_is_in_use_where_it_is_not_at_its_null():
+    """Whatever number its null is."""
+    model = paper()
+    first = model.terms[0]
+    effect = copy(first.effect)
+    effect.parameters = tuple(replace(p, null=first.values[p.name]) for p in effect.parameters)
+    unused = replace(model, terms=(replace(first, effect=effect), *model.terms[1:]))
+    assert [entry.name for entry in spreads(model).without_interval] == ["joint_compliance.c1"]
+    assert not spreads(unused).without_interval
 
 
 def test_a_tenth_of_what_has_no_interval():
@@ -628,6 +641,19 @@ def test_intervals_of_zero_are_told_as_zero(compensate, job):
     assert " mm +- 0 or more (95 %)" in row_of(words, "error before")
     assert row_of(words, "doubt") == "none from the intervals"
     assert "at least: the force has no interval (10 % of it: " in words
+
+
+@pytest.mark.parametrize(
+    ("blame", "words"),
+    [
+        ({"a.x": 0.97, "a.y": 0.03}, "mostly a.x (97 %)"),
+        ({"a.x": 0.6, "a.y": 0.3, "b.x": 0.08, "b.y": 0.02}, "mostly a.x (60 %), y (30 %), b.x (8 %)"),
+        ({"a.x": 0.5, "b.x": 0.48, "a.y": 0.02}, "mostly a.x (50 %), b.x (48 %)"),
+        ({"a.x": 0.8, "force": 0.2}, "mostly a.x (80 %), force, one scale for all motions (20 %)"),
+    ],
+)
+def test_blame_in_words_names_what_makes_up_the_doubt(blame, words):
+    assert _doubt(doubt.Doubt(np.arange(1), len(blame), (), 0, blame=tuple(blame.items()))) == words
 
 
 def test_prediction_alone_has_the_same_doubt(compensate, job):

@@ -222,6 +222,29 @@ def test_the_start_is_not_written_to():
     model.equilibrium(q, wrench, tool, given, start)
 
 
+def test_what_effects_see_of_a_state_stays_together():
+    """Also when most states are done and the others go on alone."""
+    counts = []
+
+    class Watched(EFFECTS["joint_compliance"]):
+        def add_displacement(self, values, state, *arrays):
+            rows = state.conditions.time.astype(int)
+            counts.append(len(rows))
+            assert np.array_equal(state.motors, q[rows].T)
+            assert np.array_equal(state.rest, q[rows].T)
+            assert np.array_equal(state.wrench, wrench[rows].T)
+            assert state.swept.position.shape == (3, len(rows))
+            super().add_displacement(values, state, *arrays)
+
+    base = joints_only()
+    model = with_terms(replace(base, terms=()), (Watched(kr270().joints), base.terms[0].values))
+    q, wrench, tool, given = problem(500, 42)
+    rest = model.equilibrium(q, wrench, tool, replace(given, time=np.arange(500.0)))
+    assert rest.converged.all()
+    assert counts[0] == 500
+    assert counts[-1] < 300
+
+
 # When there is none
 
 
@@ -287,9 +310,8 @@ def test_a_compensator_stronger_than_its_joint_is_told():
         rest = model.equilibrium(q, wrench, TOOL)
         assert np.isfinite(rest.coordinates).all()
         # there, the joint's own 3.3e6 N m/rad and the spring's are one negative stiffness
-        falls = 1 - model.terms[0].values["c2"] * model.terms[1].effect.spring(
-            model.terms[1].values, q[:, 1]
-        ).slope <= 0
+        joint, spring = model.terms
+        falls = joint.values["c2"] * spring.effect.spring(spring.values, q[:, 1]).slope >= 1
         assert falls.tolist() == [False, False, False, True]
         assert not rest.converged[falls].any()
         assert rest.converged[~falls].all() or preload == "acting"
@@ -305,7 +327,7 @@ def test_a_state_that_is_not_known_is_no_rest_and_spoils_no_other():
     assert found.converged.tolist() == [True, False, True, False, False, True]
     good = found.converged
     assert np.abs(found.coordinates - expected.coordinates)[good].max() < 1e-15
-    assert found.steps == expected.steps
+    assert found.steps <= expected.steps
     alone = model.equilibrium(q[1:2], wrench[1:2], tool[1:2], given.part(slice(1, 2)))
     assert not alone.converged[0]
 

@@ -360,10 +360,25 @@ def test_home_is_where_the_program_starts(ur5):
         assert np.isnan(track.q[3]).all()
 
 
+def test_s_of_a_ptp_says_nothing_here(ur5):
+    """Neither does it bring back a posture that was lost, nor does it choose one."""
+    target = winding(ur5, 4)
+    words = {"kind": [Kind.LIN, Kind.OTHER, Kind.PTP, Kind.LIN], "refused": {1: Finding("KRL001", "spline")}}
+    lost = Poses(target.rotation.copy(), target.position.copy())
+    lost.rotation[1], lost.position[1] = np.nan, np.nan
+    track = follow(ur5, motions(lost, **words, status=6, turn=5), lost, START)
+    assert track.status.tolist() == [0, -1, -1, -1]
+    assert np.isnan(track.q[1:]).all()
+    track = follow(ur5, motions(target, kind=Kind.PTP, status=6, turn=5), target, START)
+    assert np.abs(track.q - follow(ur5, motions(target), target, START).q).max() < 1e-12
+    assert track.turn_holds.all()
+
+
 def test_motion_out_of_reach_is_passed_over(ur5):
     target = winding(ur5, 30)
     position = target.position.copy()
-    position[[0, 7, 8]] = [3.0, -2.0, -1.0]  # behind the robot: turned towards it, the arm is in another posture
+    # turned towards a place behind the robot, the arm is in another posture
+    position[[0, 7, 8]] = [3.0, -2.0, -1.0]
     track = follow(ur5, motions(target), Poses(target.rotation, position), START)
     assert np.flatnonzero(~track.reachable).tolist() == [0, 7, 8]
     assert np.isnan(track.q[[0, 7, 8]]).all()
@@ -385,7 +400,7 @@ def test_ptp_may_take_another_branch_where_its_own_has_no_way():
 
 
 def straight_ways(robot, count, seed=5):
-    """Random straight motions: starts (N, 6), targets (N), where 200 small steps lead, and whether these were smooth."""
+    """Random straight motions: starts (N, 6), targets (N), where 200 small steps lead, and if these were smooth."""
     solver, rng = solver_of(robot.nominal), np.random.default_rng(seed)
     low, high = robot.limits.T
     starts = rng.uniform(np.maximum(low, -np.pi), np.minimum(high, np.pi), (count, 6))
@@ -422,6 +437,24 @@ def test_long_straight_motion_stays_in_its_branch(name):
     assert same[smooth].mean() > 0.98
     assert (reached & ~same)[smooth].mean() < 0.02
     assert reached[~smooth].mean() < 0.1
+
+
+def test_motion_that_is_not_reached_leaves_the_posture(ur5):
+    """Out of the start's posture, to where no path leads, and back: the posture is still that of the start."""
+    starts, target, _, smooth = straight_ways(ur5, 150)
+    rows = np.flatnonzero(~smooth)
+    n = len(rows)
+    home = nominal_flange(ur5, starts[rows])
+    there, back = target[rows], home
+    rotation = np.stack([home.rotation, there.rotation, back.rotation], axis=1).reshape(-1, 3, 3)
+    position = np.stack([home.position, there.position, back.position], axis=1).reshape(-1, 3)
+    axes = {3 * i: starts[row] for i, row in enumerate(rows)}
+    path = Poses(rotation, position)
+    kinds = np.tile([Kind.AXIS, Kind.LIN, Kind.LIN], n)
+    track = follow(ur5, motions(path, kind=kinds, axes=axes), path, None)
+    lost = ~track.reachable[1::3]
+    assert lost.sum() > 20
+    assert np.abs(track.q[2::3] - starts[rows])[lost].max() < 1e-9
 
 
 def test_point_to_point_needs_no_straight_way(ur5):
@@ -631,6 +664,27 @@ def test_main_job_on_a_rail(compensate, job):
     assert [line for line in after if b"sha256" not in line] == [
         line for line in before.splitlines() if line not in mark
     ]
+
+
+def test_partial_point_after_an_axis_motion_on_a_rail(compensate, job):
+    """What it leaves out is where the axis motion led, the rail where ``start`` says."""
+    lines = job.program.read_text(encoding="latin-1").splitlines()
+    first = next(i for i, line in enumerate(lines) if line.startswith("LIN {X 0.000"))
+    lines[first] = "LIN {Z 60.000}"
+    lines = [*lines[: first + 1], ";FORCE -360 50 560 @base", "LIN {Z 40.000}", ";FORCE OFF", "END"]
+    job.write(lines)
+    floor = compensate("predict", job.program, "--force", "--json", "-").json
+    text = find_robot("kuka_kr270").read_text(encoding="utf-8")
+    text = text.replace("  kuka:", "  rail: +y\n  kuka:").replace("  A1:", RAIL_JOINT)
+    for i in range(6, 0, -1):
+        text = text.replace(f"      c{i}:", f"      c{i + 1}:")
+    (job.folder / "rail.yaml").write_text(text, encoding="utf-8")
+    cell = (job.folder / "cell.yaml").read_text(encoding="utf-8")
+    cell = cell.replace("kuka_kr270", "rail.yaml").replace("y: -200", "y: 1800")
+    job.cell(cell.replace("start: [0,", "start: [2000, 0,"))
+    rail = compensate("predict", job.program, "--force", "--json", "-").json
+    assert floor["error_before_mm"]["max"] > 0.1
+    assert rail["error_before_mm"]["max"] == pytest.approx(floor["error_before_mm"]["max"], rel=1e-9)
 
 
 def test_start_of_another_count_is_told(compensate, job):

@@ -402,10 +402,14 @@ def test_home_is_where_the_program_starts(robot, chain):
     assert track.reachable.all()
 
 
-def test_motion_of_unknown_kind_loses_the_branch(robot, chain):
+def test_motion_of_unknown_kind_loses_the_branch_where_it_leads_nowhere_known(robot, chain):
     q = steps(A5=[45.0, 45.0, 45.0, 45.0])
     kinds = [Kind.LIN, Kind.OTHER, Kind.LIN, Kind.LIN]
-    track = tracked(robot, chain, q, q[0], kind=kinds, axes={3: q[3]})
+    known = tracked(robot, chain, q, q[0], kind=kinds, axes={3: q[3]})
+    assert known.status.tolist() == [2, 2, 2, 2]
+    target = chain.flange(q)
+    target.rotation[1], target.position[1] = np.nan, np.nan
+    track = follow(robot, motions(target, kind=kinds, axes={3: q[3]}), target, q[0])
     assert track.status.tolist() == [2, -1, -1, 2]
 
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.effects.effect import Load, Parameter, State, Values
+from postproc.robot.chain import sine_and_cosine
 from postproc.robot.description import Joint
 from postproc.units import DEG
 from postproc.yamlfile import Section
@@ -99,7 +100,7 @@ class GravityCompensator(Load):
         a, alpha = math.hypot(values["a_x"], values["a_y"]), math.atan2(values["a_y"], values["a_x"])
         phi = alpha + angle - self.zero
         product = a * length
-        sine, cosine = np.sin(phi), np.cos(phi)
+        sine, cosine = sine_and_cosine(phi)
         s = np.sqrt(np.maximum(a * a + length * length + 2 * product * cosine + values["h"] ** 2, 1e-18))
         ratio = s0 / s
         eta = cosine - ratio * (product / (s * s) * sine * sine + cosine)

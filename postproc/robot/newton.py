@@ -28,9 +28,6 @@ STEP = 0.05
 FINE_STEP = 0.005
 """The same where axes turn far."""
 
-LEAP = 0.5
-"""[rad] An axis that turns farther in one step has leapt to another branch, or nearly so."""
-
 FAR = 0.3
 """A target farther than this from where ``near`` stands is another posture: any branch will do."""
 
@@ -52,6 +49,10 @@ class Solver:
         self.turns = np.array([joint.kind == "revolute" for joint in joints])
         places = [joint.placement.position for joint in joints[1:]] + [arm.flange().position]
         self.size = float(sum(np.linalg.norm(place) for place in places))
+        self.first = int(self.free[0])
+        after = [np.linalg.norm(place) for place in places[self.first :]]
+        ways = np.maximum(np.abs(self.low), np.abs(self.high))[self.first :]
+        self.reach = float(sum(after) + ways[~self.turns[self.first :]].sum())
 
     def left(self, q: Floats, target: Poses) -> tuple[Floats, Floats]:
         """What is left to the targets, e (N, 6), and the Jacobian (N, 6, k) of the moving columns, both scaled."""
@@ -99,16 +100,22 @@ class Solver:
             np.maximum(np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1))
         )
 
+    def beyond(self, q: Floats, target: Poses) -> Bools:
+        """(N,) farther from the first joint that moves than all links and ways after it together."""
+        swept = self.chain.sweep(np.ascontiguousarray(q.T), TOOL)
+        away = np.linalg.norm(target.position - swept.origins[self.first].T, axis=1)
+        return np.asarray(away > 1.001 * self.reach)
+
     def follow(self, q: Floats, target: Poses, stride: float = STEP) -> tuple[Floats, Bools, Bools]:
         """``solve`` along the straight way from where the flange is at ``q``, in steps of ``stride``; third, where no
-        step failed on the way and no axis leapt."""
+        step failed on the way."""
         swept = self.chain.sweep(np.ascontiguousarray(q.T), TOOL)
         here = swept.pose
         way = target.position - here.position
         turn = vector_from_rotation(target.rotation @ np.swapaxes(here.rotation, 1, 2))
         length = np.maximum(np.linalg.norm(way, axis=1) / self.size, np.linalg.norm(turn, axis=1))
         pieces = np.ceil(np.nan_to_num(length, nan=0.0) / stride).astype(np.int64)
-        q, smooth = q.copy(), np.ones(len(q), bool)
+        q, smooth = q.copy(), ~self.beyond(q, target)
         for piece in range(1, int(pieces.max(initial=0))):
             rows = np.flatnonzero(smooth & (pieces > piece))
             if not len(rows):
@@ -116,17 +123,18 @@ class Solver:
             share = (piece / pieces[rows])[:, None]
             rotation = rotation_from_vector(share * turn[rows]) @ here.rotation[rows]
             between = Poses(rotation, here.position[rows] + share * way[rows])
-            there, reached = self.solve(q[rows], between, steps=7, done=1e-4)
-            smooth[rows] &= reached & ~self._leaps(q[rows], there)
-            q[rows] = there
+            q[rows], smooth[rows] = self.solve(q[rows], between, steps=7, done=1e-4)
         found, good = self.solve(q, target)
-        return found, good, smooth & good & ~self._leaps(q, found)
-
-    def _leaps(self, before: Floats, after: Floats) -> Bools:
-        return np.asarray(np.abs((after - before) * self.turns).max(axis=1, initial=0.0) > LEAP)
+        return found, good, smooth & good
 
     def search(self, near: Floats, target: Poses) -> tuple[Floats, Bools]:
         """Solutions in any branch: within the limits if there is one, and of those the nearest to ``near``."""
+        best, good = near.copy(), np.zeros(len(near), bool)
+        rows = np.flatnonzero(~self.beyond(near, target))
+        best[rows], good[rows] = self._search(near[rows], target[rows])
+        return best, good
+
+    def _search(self, near: Floats, target: Poses) -> tuple[Floats, Bools]:
         best, good = near.copy(), np.zeros(len(near), bool)
         cost = np.full(len(near), np.inf)
         draws = np.random.default_rng(0).random((_STARTS, len(self.low)))

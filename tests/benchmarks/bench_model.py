@@ -2,9 +2,11 @@
 
     OMP_NUM_THREADS=1 python -m pytest tests/benchmarks
 
-``us_per_pose`` stands in the extra info of each case (``--benchmark-json FILE``) and in the table below the run.
+Time of this process, not of the clock: what else the machine does is not counted.  ``us_per_pose`` stands in the extra
+info of each case (``--benchmark-json FILE``) and in the table below the run.
 """
 
+import time
 from functools import cache
 
 import numpy as np
@@ -19,7 +21,9 @@ from postproc.model import NOTHING, StiffnessModel
 from postproc.robot.inverse import status_of
 
 EQUILIBRIUM_US, MIRROR_US, ALL_TIMES = 4.0, 10.0, 10.0
-"""Goals: microseconds a pose on one core, and how many times the time of the KR 270 all effects may take."""
+"""Goals: microseconds a pose on one core, and how many times the goal of the KR 270 all effects may take."""
+
+pytestmark = pytest.mark.benchmark(timer=time.process_time)
 
 TABLE: dict[str, float] = {}
 
@@ -98,7 +102,8 @@ def test_all_effects(benchmark):
         lambda: everything().equilibrium(q, wrench, tool, given),
     )
     assert rest.converged.mean() > 0.99
-    assert benchmark.extra_info["us_per_pose"] < ALL_TIMES * TABLE[f"equilibrium, a tool a pose, {count}"]
+    benchmark.extra_info["coordinates"] = everything().chain.size
+    assert benchmark.extra_info["us_per_pose"] < ALL_TIMES * EQUILIBRIUM_US
 
 
 def test_time_is_linear():
