@@ -197,7 +197,9 @@ class Plant:
         self._set_tip(tool, along)
         if wrench.any():
             wrench = (1 + have.gauge[0]) * (wrench - have.gauge[1:])
-        free = self._unloaded(motors, None if given.direction is None else given.direction[row])
+        came = None if given.direction is None else given.direction[row]
+        self._came = np.zeros(len(self._motors)) if came is None else came
+        free = self._unloaded(motors, came)
         held = np.zeros(self.size)
         if self.balanced:
             # without load the joints' springs are slack: what is left is the tendon
@@ -294,11 +296,11 @@ class Plant:
         force = self.data.qfrc_passive - self.data.qfrc_bias + held
         force += linear.T @ wrench[:3] + angular.T @ wrench[3:]
         if self.hardware.gap.any():
-            # the torque on a joint's own spring shifts it to one side of its gap
+            # the torque on a joint's own spring shifts it to one side of its gap; friction of 20 N m holds it back
             rows = self._motors
             stiffness = 1 / self._gives[rows]
             torque = force[rows] + stiffness * (coordinates - free)[rows]
-            force[rows] += stiffness * 0.5 * self.hardware.gap * np.tanh(torque / 10.0)
+            force[rows] += stiffness * 0.5 * self.hardware.gap * np.tanh((torque - 20.0 * self._came) / 10.0)
         return force
 
     def _slope(self, coordinates: np.ndarray, *rest: np.ndarray) -> np.ndarray:

@@ -290,7 +290,9 @@ def test_slope_of_a_law_is_the_derivative_of_its_displacement(name, arm):
     force = rng.normal(size=state.rest.shape) * np.array([0.0, 1.0, 10.0, 1000.0])[rng.integers(0, 4, 12)]
     _, slope = displacement_of(law, values, state, force)
     assert (slope >= 0).all()  # nothing moves against the force
-    assert not displacement_of(law, values, state, 0 * force)[0].any()
+    # without load everything is slack, but for what friction holds where it came from
+    idle = replace(state, conditions=replace(state.conditions, direction=None))
+    assert not displacement_of(law, values, idle, 0 * force)[0].any()
     for k in range(state.chain.size):
         ends = []
         for sign in (1, -1):
@@ -426,6 +428,22 @@ def test_backlash_under_a_load_within_the_transition():
     wrench = np.array([[0.0, 0, 0, 0, 7.0, 0]])  # A2 turns about +y: 7 N m, whatever the pose
     found = model.equilibrium(q, wrench, Poses.identity()).displacement[0, 1]
     assert found == pytest.approx(0.5e-3 * np.tanh(0.7), rel=1e-12)
+
+
+def test_backlash_without_load_stays_on_the_side_it_came_from():
+    joints = kr270().joints
+    law = made("backlash", joints)
+    model = with_terms(bare(), (law, nulls(law) | {"b2": 1e-3}))
+    q = np.tile(np.radians([0.0, -90, 90, 0, 0, 0]), (3, 1))
+    came = np.zeros((3, 6))
+    came[:, 1] = [1.0, -1.0, 0.0]
+    none = np.zeros((3, 6))
+    rest = model.equilibrium(q, none, Poses.identity(), Conditions(direction=came))
+    side = np.tanh(2.0)
+    np.testing.assert_allclose(rest.displacement[:, 1], np.array([-side, side, 0.0]) * 0.5e-3, rtol=1e-12)
+    heavy = np.tile([0.0, 0, -560, 0, 0, 0], (3, 1))
+    pressed = model.equilibrium(q, heavy, Poses.identity(), Conditions(direction=came))
+    np.testing.assert_allclose(pressed.displacement[:, 1], 0.5e-3, rtol=1e-9)
 
 
 def bare():
