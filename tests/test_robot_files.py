@@ -548,6 +548,8 @@ URDF_ERRORS = {
     "twice": (URDF.replace('name="w3"', 'name="w2"'), "joint 'w2' stands twice", '<parent link="l5"'),
     "link twice": (URDF.replace('<link name="l6"/>', '<link name="l5"/>'), "stands twice", '<joint name="end"'),
     "doctype": ("<!DOCTYPE robot [<!ENTITY a 'b'>]>\n" + URDF.split("\n", 1)[1], "DOCTYPE", "<!DOCTYPE"),
+    "absent mesh": (URDF.replace("package://nowhere/base.stl", "base.stl"), "mesh 'base.stl' does not exist", "<mesh"),
+    "mesh elsewhere": (URDF.replace("package://nowhere/base.stl", "../base.stl"), "outside of the URDF's", "<mesh"),
     "only fixed": ('<robot name="x"><link name="a"/><link name="b"/><joint name="c" type="fixed"><parent link="a"/>'
                    '<child link="b"/></joint></robot>', "no joint moves", None),
 }  # fmt: skip
@@ -591,6 +593,13 @@ def test_named_links_that_do_not_fit_are_told(tmp_path):
     for words, told in (("tip: tool1", "no link 'tool1'"), ("base: l6, tip: l2", "does not hang on")):
         text = BY_URDF.replace("{file: arm.urdf}", f"{{file: arm.urdf, {words}}}")
         assert told in refused(write(tmp_path, text, URDF)).message
+
+
+def test_mesh_in_its_place_is_no_mistake(tmp_path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "base.stl").write_bytes(b"")
+    text = URDF.replace("package://nowhere/base.stl", "meshes/base.stl")
+    assert len(load_robot(write(tmp_path, BY_URDF, text)).joints) == 6
 
 
 def test_urdf_stays_in_its_folder(tmp_path):

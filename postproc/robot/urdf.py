@@ -1,7 +1,9 @@
 """A strict, small reader of URDF: the joints between two links, with fixed ones merged.
 
-Only what kinematics needs is read (links, joints, origins, axes); meshes, masses and limits are passed over, so that
-no file beside the URDF has to be there.  Lengths are metres and angles radians, as the format says.
+Only what kinematics needs is read (links, joints, origins, axes); masses and limits are passed over, and no mesh is
+opened.  A mesh that is named by a path must all the same lie where it says, inside of the URDF's folder: a file that was
+torn from its place is hardly the one that was meant.  ``package://`` names, which only a ROS installation can resolve,
+are passed over.  Lengths are metres and angles radians, as the format says.
 """
 
 from __future__ import annotations
@@ -131,6 +133,8 @@ def _parse(path: Path) -> tuple[list[_Joint], dict[str, int]]:
             joints.append(_joint(path, line, words, joints))
         elif stack == ["robot", "joint"]:
             _detail(path, line, joints[-1], tag, words)
+        elif tag == "mesh":
+            _mesh(path, line, _word(path, line, tag, words, "filename"))
         stack.append(tag)
 
     def end(tag: str) -> None:
@@ -179,6 +183,19 @@ def _detail(path: Path, line: int, joint: _Joint, tag: str, words: dict[str, str
         if length < 1e-6:
             raise _wrong(path, line, f"joint {joint.name}: an axis without a direction")
         joint.axis = axis / length
+
+
+def _mesh(path: Path, line: int, name: str) -> None:
+    """Refuse a mesh that is not there, or not inside of the URDF's folder."""
+    if "://" in name and not name.startswith("file://"):
+        return
+    mesh = path.parent / name.removeprefix("file://")
+    if not mesh.resolve().is_relative_to(path.parent.resolve()):
+        raise _wrong(path, line, f"mesh {name!r} lies outside of the URDF's folder")
+    if not mesh.is_file():
+        raise _wrong(
+            path, line, f"mesh {name!r} does not exist", "put it there, or take the mesh out: it is not used"
+        )
 
 
 def _snapped(rotation: Floats) -> Floats:
