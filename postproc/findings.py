@@ -288,7 +288,7 @@ CODES: dict[str, Code] = {
     "COR006": Code(
         "info",
         "corrected at the motions",
-        "Between the points of a motion the path is not checked by this version; no points are inserted.",
+        "Between the end points of a motion no points are inserted by this version; what is left there is told.",
     ),
     "COR007": Code(
         "info", "part of the correction applied", "--gain below 1 leaves the rest of the error, as asked."

@@ -96,6 +96,7 @@ def job(model, count=10, process=True, wrench=None, gain=1.0, seed=5):
         base=Poses(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))),
         tool=tool,
         wrench=wrench,
+        wrench_start=wrench,
         carries=np.ones(count, bool),
         conditions=NOTHING,
         process=process,

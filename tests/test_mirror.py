@@ -310,6 +310,7 @@ def task(
         base=world,
         tool=tool,
         wrench=wrench,
+        wrench_start=wrench,
         carries=carries,
         conditions=NOTHING,
         process=process,

@@ -31,9 +31,9 @@ class Task:
     """All that a correction needs, N motions.  Poses are in the robot base; NaN where a target is not known.
 
     wanted: TCP targets; base, tool (N): the programmed base in the robot base, the TCP on the flange; wrench (N, 6)
-    at the end of each motion, robot base axes; carries (N,): the motion has a force; conditions (N): what else is
-    known; ``process``: correct what the force does and leave what the robot does without it (a base that was touched
-    off contains that); else everything is corrected.
+    at the end of each motion and wrench_start at its begin, robot base axes; carries (N,): the motion has a force;
+    conditions (N): what else is known; ``process``: correct what the force does and leave what the robot does without
+    it (a base that was touched off contains that); else everything is corrected.
     ``max_correction``, ``tolerance`` [m].
     """
 
@@ -45,6 +45,7 @@ class Task:
     base: Poses
     tool: Poses
     wrench: Floats
+    wrench_start: Floats
     carries: Bools
     conditions: Conditions
     process: bool

@@ -1,9 +1,9 @@
 """A strict, small reader of URDF: the joints between two links, with fixed ones merged.
 
 Only what kinematics needs is read (links, joints, origins, axes); masses and limits are passed over, and no mesh is
-opened.  A mesh that is named by a path must all the same lie where it says, inside of the URDF's folder: a file that was
-torn from its place is hardly the one that was meant.  ``package://`` names, which only a ROS installation can resolve,
-are passed over.  Lengths are metres and angles radians, as the format says.
+opened.  A mesh that is named by a path must all the same lie where it says, inside of the URDF's folder: a file that
+was torn from its place is hardly the one that was meant.  ``package://`` names, which only a ROS installation can
+resolve, are passed over.  Lengths are metres and angles radians, as the format says.
 """
 
 from __future__ import annotations

@@ -122,6 +122,7 @@ def prepare(request: Request) -> Prepared:
         base=base,
         tool=tool,
         wrench=force.values,
+        wrench_start=force.start,
         carries=force.carries,
         conditions=_conditions(request, path, cell, frames, model, force, track.q),
         process=process,

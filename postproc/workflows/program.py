@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.compensation.between import midway_errors
 from postproc.compensation.correct import Result, State, correct
 from postproc.compensation.doubt import doubt_of
 from postproc.dialects.dialect import Program
@@ -136,14 +137,19 @@ def _closing(request: Request, ready: Prepared, result: Result) -> list[Finding]
             )
         )
     if corrected.any():
-        cuts = len(np.unique(result.cut[corrected]))
+        middle = midway_errors(ready.task, result)
+        over = int((middle > ready.cell.tolerance).sum())
+        row = int(np.argmax(np.nan_to_num(middle)))
         findings.append(
             Finding(
                 "COR006",
-                f"{int(corrected.sum())} end points in {cuts} cuts are corrected; between the points the path is not"
-                " checked, and each correction fades in along the first motion of its cut",
+                f"{int(corrected.sum())} end points are corrected, the way between them is not: half way along straight"
+                f" motions the tool is up to {np.nanmax(middle, initial=0.0) / MM:.4f} mm from the line (worst here),"
+                f" above the tolerance in {over} motions",
                 file,
-                help="long motions and cut entries keep a part of their error: let the CAM system post shorter"
+                int(ready.task.toolpath.line[row]),
+                help="a correction fades in along the first motion of its cut, and along the side behind a corner where"
+                " the force turns; long motions bend differently in their middle: let the CAM system post short"
                 " segments there",
             )
         )
