@@ -11,7 +11,7 @@ from postproc.effects import EFFECTS, ComplianceLaw, Conditions
 from postproc.geometry import Poses, rotation_from_vector
 from postproc.model import StiffnessModel, Term
 from postproc.robot.chain import Chain
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 
 SIZES = {
     "1": 0.05,

@@ -23,7 +23,8 @@ from postproc.effects import Conditions
 from postproc.effects.gravity_compensator import GravityCompensator
 from postproc.geometry import Poses
 from postproc.model import StiffnessModel, Term
-from postproc.robot.description import KukaLengths, Robot, find_robot, load_robot
+from postproc.robot.description import Robot, find_robot, load_robot
+from postproc.robot.geometries import KukaLengths
 
 AXES = ("0 0 -1", "0 1 0", "0 1 0", "-1 0 0", "0 1 0", "-1 0 0")
 ACROSS = (

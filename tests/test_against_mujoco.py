@@ -8,7 +8,7 @@ from plant import SOFTER, Plant, kr270, random_angles, random_tools, random_wren
 
 from postproc.geometry import vector_from_rotation
 from postproc.model import StiffnessModel
-from postproc.robot.description import KukaLengths
+from postproc.robot.geometries import KukaLengths
 
 COUNT = 100
 

@@ -18,7 +18,7 @@ from effects_at_work import (
 from plant import kr270, random_angles, random_tools, random_wrenches
 
 from postproc import model as model_module
-from postproc.effects import EFFECTS, ComplianceLaw, Conditions, Load, Offset, State
+from postproc.effects import EFFECTS, ComplianceLaw, Conditions, EnergyLoad, Load, Offset, State
 from postproc.geometry import Poses, vector_from_rotation
 from postproc.robot.chain import Chain
 from postproc.units import UNITS
@@ -230,13 +230,11 @@ def test_sensitivity_is_smooth_and_every_parameter_does_something(name):
 
 @arms
 @pytest.mark.parametrize("gravity", [GRAVITY, UPRIGHT], ids=["tilted", "upright"])
-@pytest.mark.parametrize("name", of_kind(Load))
+@pytest.mark.parametrize("name", of_kind(EnergyLoad))
 def test_slope_of_a_load_is_the_derivative_of_its_force(name, gravity, arm):
     rng = np.random.default_rng(8)
     joints = ARMS[arm]()
     load, state = made(name, joints), state_of(joints, rng, gravity=gravity)
-    if not load.conservative:
-        pytest.skip("has no slope: it is part of the wrench")
     values = sampled(load, rng)
     _, slope = force_of(load, values, state)
     found, scale = jacobian_of(load, values, state)
@@ -254,15 +252,11 @@ def jacobian_of(load, values, state, step=1e-5):
 
 
 @arms
-@pytest.mark.parametrize("name", of_kind(Load))
+@pytest.mark.parametrize("name", of_kind(EnergyLoad))
 def test_force_is_the_gradient_of_one_energy(name, arm):
     rng = np.random.default_rng(9)
     joints = ARMS[arm]()
     load, state = made(name, joints), state_of(joints, rng)
-    if not load.conservative:
-        with pytest.raises(NotImplementedError):
-            load.energy(sampled(load, rng), state)
-        return
     values, step = sampled(load, rng), 1e-5
     force, _ = force_of(load, values, state)
     energy = load.energy(values, state)

@@ -13,7 +13,8 @@ from postproc.findings import Finding, Refusal
 from postproc.geometry import Poses, vector_from_rotation, wrapped
 from postproc.model import StiffnessModel
 from postproc.robot.chain import Chain, generalized_force
-from postproc.robot.description import KukaLengths, find_robot, load_robot, robot_files
+from postproc.robot.description import find_robot, load_robot, robot_files
+from postproc.robot.geometries import KukaLengths
 from postproc.robot.inverse import inverse, status_of, turn_of
 from postproc.robot.track import follow, near_singular, sides
 from postproc.toolpath import Kind

@@ -5,7 +5,17 @@ from __future__ import annotations
 from postproc.effects.backlash import Backlash
 from postproc.effects.base_compliance import BaseCompliance
 from postproc.effects.base_offset import BaseOffset
-from postproc.effects.effect import ComplianceLaw, Conditions, Effect, Load, Offset, Parameter, State, Values
+from postproc.effects.effect import (
+    ComplianceLaw,
+    Conditions,
+    Effect,
+    EnergyLoad,
+    Load,
+    Offset,
+    Parameter,
+    State,
+    Values,
+)
 from postproc.effects.force_sensor import ForceSensor
 from postproc.effects.gravity_compensator import GravityCompensator
 from postproc.effects.hysteresis import Hysteresis
@@ -51,6 +61,7 @@ __all__ = [
     "ComplianceLaw",
     "Conditions",
     "Effect",
+    "EnergyLoad",
     "Load",
     "Offset",
     "Parameter",

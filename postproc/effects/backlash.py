@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.effects.effect import ComplianceLaw, State, Values, column, per_joint
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 from postproc.yamlfile import Section
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from postproc.arrays import Floats
-from postproc.effects.effect import ComplianceLaw, Parameter, State, Values, column
-from postproc.robot.description import Joint
+from postproc.effects.effect import LinearCompliance, Parameter
+from postproc.robot.geometries import Joint
 
 
-class BaseCompliance(ComplianceLaw):
+class BaseCompliance(LinearCompliance):
     """Three shifts c_x, c_y, c_z [m/N] along and three turns c_rx, c_ry, c_rz [rad/(N m)] about the axes of the robot
     base, in this order from the ground up."""
 
@@ -30,11 +29,3 @@ class BaseCompliance(ComplianceLaw):
             )
             for name in self.coordinates
         )
-
-    def add_displacement(
-        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
-    ) -> None:
-        rows = [state.chain.index[name] for name in self.coordinates]
-        compliance = column(values, self.parameters)
-        displacement[rows] += compliance * force[rows]
-        slope[rows] += compliance

@@ -8,6 +8,7 @@ Arrays are component first: n joints, m coordinates, N states.  A parameter at i
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, ClassVar, Self
@@ -16,7 +17,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.robot.chain import Chain, Sweep
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 from postproc.yamlfile import Section
 
 Values = Mapping[str, float]
@@ -103,39 +104,56 @@ class Effect:
         return {}
 
 
-class Offset(Effect):
+class Offset(Effect, ABC):
     """Coordinates that stand elsewhere than the controller believes."""
 
+    @abstractmethod
     def add_offset(
         self, values: Values, chain: Chain, motors: Floats, conditions: Conditions, offset: Floats
     ) -> None:
         """Add to ``offset`` (m, N) [rad, m], in place."""
-        raise NotImplementedError
 
 
-class ComplianceLaw(Effect):
+class ComplianceLaw(Effect, ABC):
     """Displacement of coordinates as a function of the generalized force on them."""
 
+    @abstractmethod
     def add_displacement(
         self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
     ) -> None:
         """Add to ``displacement`` (m, N) [rad, m] under ``force`` (m, N) [N m, N], and its derivative to ``slope``,
         coordinate by coordinate; both in place."""
-        raise NotImplementedError
 
 
-class Load(Effect):
+class LinearCompliance(ComplianceLaw):
+    """theta_i = c_i tau_i: one parameter a coordinate of ``coordinates``, in that order."""
+
+    def rows(self, chain: Chain) -> Any:
+        """Where the coordinates stand in the chain."""
+        return [chain.index[name] for name in self.coordinates]
+
+    def add_displacement(
+        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
+    ) -> None:
+        rows, compliance = self.rows(state.chain), column(values, self.parameters)
+        displacement[rows] += compliance * force[rows]
+        slope[rows] += compliance
+
+
+class Load(Effect, ABC):
     """A generalized force on coordinates."""
 
-    conservative: ClassVar[bool] = True
-
+    @abstractmethod
     def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
         """Add to ``force`` (m, N) [N m, N] and its derivative by the own coordinate to ``slope``; both in place."""
-        raise NotImplementedError
 
+
+class EnergyLoad(Load):
+    """A load that is the negative gradient of an energy."""
+
+    @abstractmethod
     def energy(self, values: Values, state: State) -> Floats:
-        """Energy (N,) [J] of which the force is the negative gradient (where ``conservative``)."""
-        raise NotImplementedError
+        """Energy (N,) [J]."""
 
 
 def per_joint(

@@ -9,7 +9,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.effects.effect import Load, Parameter, State, Values
 from postproc.robot.chain import generalized_force
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 
 
 class ForceSensor(Load):
@@ -21,7 +21,6 @@ class ForceSensor(Load):
 
     name = "force_sensor"
     family = "sensor"
-    conservative = False
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         source = "static error of a force gauge"

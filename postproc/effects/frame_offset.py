@@ -8,7 +8,7 @@ from typing import ClassVar
 from postproc.arrays import Floats
 from postproc.effects.effect import Conditions, Offset, Parameter, Values, column
 from postproc.robot.chain import Chain
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 
 
 class FrameOffset(Offset):

@@ -21,9 +21,9 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.effects.effect import Load, Parameter, State, Values
+from postproc.effects.effect import EnergyLoad, Parameter, State, Values
 from postproc.robot.chain import sine_and_cosine
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 from postproc.units import DEG
 from postproc.yamlfile import Section
 
@@ -39,7 +39,7 @@ class SpringState(NamedTuple):
     slope: Floats
 
 
-class GravityCompensator(Load):
+class GravityCompensator(EnergyLoad):
     """A spring across one joint.  P0 lies at (-a_x, -a_y) and P1 at distance L along the link, seen from the axis;
     ``h`` is their distance along the axis.
 

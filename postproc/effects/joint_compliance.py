@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
-from postproc.arrays import Floats
-from postproc.effects.effect import ComplianceLaw, State, Values, column, per_joint
-from postproc.robot.description import Joint
+from postproc.effects.effect import LinearCompliance, per_joint
+from postproc.robot.chain import Chain
+from postproc.robot.geometries import Joint
 
 
-class JointCompliance(ComplianceLaw):
+class JointCompliance(LinearCompliance):
     """theta_i = c_i tau_i, c_i [rad/(N m)] (a sliding joint: [m/N]); zero is a rigid joint.
 
     The inverse of K_theta^0 in eq. (6) of Klimchik et al.; c_i are the k_i of their Table 1.
@@ -22,9 +23,5 @@ class JointCompliance(ComplianceLaw):
         source = "virtual joint model: Klimchik et al., Sec. 3"
         self.parameters = per_joint(joints, "c", ("rad/(N m)", "m/N"), 0.0, 1e-2, source)
 
-    def add_displacement(
-        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
-    ) -> None:
-        compliance, motors = column(values, self.parameters), state.chain.motors
-        displacement[motors] += compliance * force[motors]
-        slope[motors] += compliance
+    def rows(self, chain: Chain) -> Any:
+        return chain.motors

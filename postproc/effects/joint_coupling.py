@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from postproc.arrays import Floats
 from postproc.effects.effect import Conditions, Offset, Parameter, Values
 from postproc.robot.chain import Chain
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 
 
 class JointCoupling(Offset):

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.effects.effect import Load, State, Values, column, per_joint
-from postproc.robot.description import Joint
+from postproc.effects.effect import EnergyLoad, State, Values, column, per_joint
+from postproc.robot.geometries import Joint
 
 
-class JointStiffening(Load):
+class JointStiffening(EnergyLoad):
     """tau_i = -k_i d_i^3, U = k_i d_i^4 / 4, with d_i the displacement of joint i under load (a gap's
     included).
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from postproc.arrays import Floats
-from postproc.effects.effect import ComplianceLaw, Parameter, State, Values, column
-from postproc.robot.description import Joint
+from postproc.effects.effect import LinearCompliance, Parameter
+from postproc.robot.geometries import Joint
 
 
-class LinkCompliance(ComplianceLaw):
+class LinkCompliance(LinearCompliance):
     """Two small turns per joint, about the x and y axes of its frame (z is the joint's axis), before its own motion:
     theta = c tau, c [rad/(N m)]."""
 
@@ -24,11 +23,3 @@ class LinkCompliance(ComplianceLaw):
             for axis in "xy"
         )
         self.coordinates = tuple(f"{joint.name}.r{axis}" for joint in joints for axis in "xy")
-
-    def add_displacement(
-        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
-    ) -> None:
-        rows = [state.chain.index[name] for name in self.coordinates]
-        compliance = column(values, self.parameters)
-        displacement[rows] += compliance * force[rows]
-        slope[rows] += compliance

@@ -10,7 +10,7 @@ from postproc.arrays import Floats
 from postproc.effects.effect import Conditions, Offset, Parameter, Values, column
 from postproc.geometry import Poses
 from postproc.robot.chain import Chain
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 
 _STATES = 60
 _INDEPENDENT = 1e-6

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.effects.effect import Load, Parameter, State, Values
+from postproc.effects.effect import EnergyLoad, Parameter, State, Values
 from postproc.geometry import Poses
 from postproc.robot.chain import Chain, weight_about
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 
 
-class LinkGravity(Load):
+class LinkGravity(EnergyLoad):
     """Weight of the links from their first moments m c [kg m]: of link i about its joint, axes of the robot base at the
     zero pose, with the mass of all that follows counted at the next joint.
 

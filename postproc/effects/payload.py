@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.effects.effect import Load, Parameter, State, Values
+from postproc.effects.effect import EnergyLoad, Parameter, State, Values
 from postproc.robot.chain import weight_about
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 
 
-class Payload(Load):
+class Payload(EnergyLoad):
     """A weight on the flange: ``mass`` [kg] with its centre at ``x``, ``y``, ``z`` [m] in flange axes, besides the tool
     that the cell states (its mass and centre come with the conditions).
 

@@ -10,7 +10,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.effects.effect import Conditions, Offset, Parameter, Values, column
 from postproc.robot.chain import Chain
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 from postproc.yamlfile import Section
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from postproc.arrays import Floats
 from postproc.effects.effect import ComplianceLaw, Parameter, State, Values
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 
 
 class ToolCompliance(ComplianceLaw):

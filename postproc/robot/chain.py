@@ -23,7 +23,7 @@ import pinocchio as pin
 
 from postproc.arrays import Bools, Floats
 from postproc.geometry import Poses
-from postproc.robot.description import Joint
+from postproc.robot.geometries import Joint
 
 TOOL = Poses.identity()
 """A TCP on the flange itself."""
