@@ -228,6 +228,12 @@ CODES: dict[str, Code] = {
         "compensator pulls implausibly",
         "Its static torque is far above what a balancer carries; the parameters serve for the stiffness only.",
     ),
+    "MOD003": Code(
+        "warning",
+        "robot does not give way",
+        "Its robot file states no compliance, so no force moves the tool and nothing is corrected for it; measure the"
+        " arm's stiffness and write it into the file.",
+    ),
     "MOD002": Code(
         "warning",
         "no equilibrium",

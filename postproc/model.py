@@ -368,6 +368,11 @@ class StiffnessModel:
             h[:, :, k] = ((ends[0] - ends[1]) / (2 * step)).T
         return h
 
+    @property
+    def gives_way(self) -> bool:
+        """Whether any force moves the tool."""
+        return bool(self._laws)
+
     def doubts(self) -> list[Finding]:
         """What is implausible about the model itself: a load that, with no force on the tool, bends a joint by
         more than ``IMPLAUSIBLE_SAG`` somewhere within its limits (MOD001)."""

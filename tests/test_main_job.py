@@ -83,7 +83,8 @@ def test_without_force_nothing_changes(compensate, job):
 def test_a_rigid_robot_gives_the_file_back(compensate, job):
     (job.folder / "rigid.yaml").write_text(RIGID)
     done = compensate(job.program, "--force", "--robot", job.folder / "rigid.yaml")
-    assert done.code == 0, done.err
+    assert done.code == 3, done.err
+    assert "MOD003 rigid has no compliance" in done.out
     assert job.output.read_bytes() == job.program.read_bytes()
 
 

@@ -131,6 +131,12 @@ def prepare(request: Request) -> Prepared:
         tolerance=cell.tolerance,
     )
     findings = [*program.findings, *force.findings, *model.doubts()]
+    if force.any and not model.gives_way:
+        findings.append(
+            Finding(
+                "MOD003", f"{robot.name} has no compliance: under this force nothing bends", str(robot.path)
+            )
+        )
     if not isinstance(robot.nominal, SerialArm):
         findings += _disagreeing(request.program, path, track)
     return Prepared(program, dialect, cell, robot, model, force, task, tuple(findings))
