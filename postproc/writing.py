@@ -81,7 +81,7 @@ def _mark(program: Program, robot: Robot) -> str:
     """Says which version, robot file and source made the output."""
     digests = [document.digest for document in program.documents]
     source = digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
-    return f"by compensate {__version__}, robot {robot.name} sha256:{robot.digest[:16]}, source sha256:{source[:16]}"
+    return f"{__version__}, robot {robot.name} sha256:{robot.digest[:16]}, source sha256:{source[:16]}"
 
 
 def _contents(program: Program, edits: Sequence[Edit]) -> tuple[bytes, ...]:

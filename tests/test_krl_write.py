@@ -259,26 +259,30 @@ def test_a_pinned_point_is_not_moved() -> None:
 @pytest.mark.parametrize(
     ("raw", "result"),
     [
-        (b"&REL 1\r\nDEF a()\r\nEND\r\n", b"&REL 1\r\nDEF a()\r\n;COMPENSATED by x\r\nEND\r\n"),
-        (b"&REL 1\nLIN {X 1}\n", b"&REL 1\n;COMPENSATED by x\nLIN {X 1}\n"),
-        (b"\xef\xbb\xbfLIN {X 1}", b"\xef\xbb\xbf;COMPENSATED by x\nLIN {X 1}"),
-        (b"\xef\xbb\xbfDEF a()\nEND", b"\xef\xbb\xbfDEF a()\n;COMPENSATED by x\nEND"),
-        (b"DEF a()", b"DEF a()\n;COMPENSATED by x"),
-        (b"DEF a()\r\n;COMPENSATED of old  \r\nEND", b"DEF a()\r\n;COMPENSATED by x\r\nEND"),
-        (b"", b";COMPENSATED by x\n"),
+        (b"&REL 1\r\nDEF a()\r\nEND\r\n", b"&REL 1\r\nDEF a()\r\n;COMPENSATED by compensate x\r\nEND\r\n"),
+        (b"&REL 1\nLIN {X 1}\n", b"&REL 1\n;COMPENSATED by compensate x\nLIN {X 1}\n"),
+        (b"\xef\xbb\xbfLIN {X 1}", b"\xef\xbb\xbf;COMPENSATED by compensate x\nLIN {X 1}"),
+        (b"\xef\xbb\xbfDEF a()\nEND", b"\xef\xbb\xbfDEF a()\n;COMPENSATED by compensate x\nEND"),
+        (b"DEF a()", b"DEF a()\n;COMPENSATED by compensate x"),
+        (
+            b"DEF a()\r\n;COMPENSATED by compensate old  \r\nEND",
+            b"DEF a()\r\n;COMPENSATED by compensate x\r\nEND",
+        ),
+        (b"", b";COMPENSATED by compensate x\n"),
     ],
 )
 def test_the_marker_is_written_once(raw: bytes, result: bytes) -> None:
     program = read(raw)
-    marked = apply(program.documents[0], [KRL.marked(program, "by x")])
+    marked = apply(program.documents[0], [KRL.marked(program, "x")])
     assert marked == result
     again = read(marked)
     assert again.marker is not None
-    assert apply(again.documents[0], [KRL.marked(again, "by x")]) == result
+    assert apply(again.documents[0], [KRL.marked(again, "x")]) == result
 
 
 def test_a_program_without_the_marker_has_none() -> None:
-    assert read(b'DEF a()\n;COMPENSATE OFF\nmsg=";COMPENSATED x"\nEND\n').marker is None
+    assert read(b'DEF a()\n;COMPENSATE OFF\nmsg=";COMPENSATED by compensate x"\nEND\n').marker is None
+    assert read(b"DEF a()\n;COMPENSATED for the wear of the tool\nEND\n").marker is None
 
 
 def test_renaming_changes_the_module_name_in_both_files() -> None:

@@ -45,7 +45,7 @@ class KrlDialect:
         return writer.moved(program, position, rotation, decimals)
 
     def marked(self, program: Program, text: str) -> Edit:
-        comment = b";COMPENSATED " + text.encode("latin-1", "replace")
+        comment = b";COMPENSATED by compensate " + text.encode("latin-1", "replace")
         if program.marker is not None:
             return Edit(program.marker, comment)
         document, at = program.documents[0], program.marker_at.start

@@ -41,7 +41,7 @@ from postproc.toolpath import Annotation
 
 _ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 _WITH = re.compile(rb"\bWITH\b", re.I)
-_MARKER = re.compile(rb"^(?:\xef\xbb\xbf)?([ \t]*;COMPENSATED [^\r\n]*)", re.M)
+_MARKER = re.compile(rb"^(?:\xef\xbb\xbf)?([ \t]*;COMPENSATED by compensate [^\r\n]*)", re.M)
 _MOTION = Statement("motion", b"", b"", 0, 0)
 
 Line = Statement | tuple[int, int, int]
