@@ -479,6 +479,14 @@ def test_components_left_out_after_an_axis_motion_are_left_to_it() -> None:
     assert "X ? Y ? Z 450 A ? B ? C ? from line 4" in list(path.dump())[1]
 
 
+@pytest.mark.parametrize("name", ["$ROBROOT", "$WORLD"])
+def test_a_program_that_places_the_robot_is_not_corrected_from_there_on(name: str) -> None:
+    program = body(FULL + name.lower() + " = {X 0,Y 0,Z 500,A 0,B 0,C 0}\n$BASE=BASE_DATA[1]\n" + 2 * FULL)
+    assert [finding.code for finding in program.toolpath.refused.values()] == ["KRL005", "KRL005"]
+    assert sorted(program.toolpath.refused) == [1, 2]
+    assert "set in line 5" in program.findings[0].message
+
+
 def test_annotations_hold_from_their_row_on() -> None:
     text = ";FORCE 0 0 5\n" + FULL + "; compensate  off\n"
     text += (

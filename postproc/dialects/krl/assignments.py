@@ -46,6 +46,9 @@ def assign(run: Run, statement: Statement, said: Assignment) -> None:
         state.tool_stands = not said.value.strip().upper().endswith(b"#BASE")
     elif name in (b"BASE_DATA", b"TOOL_DATA"):
         _set_data(run, said)
+    elif name in (b"$ROBROOT", b"$WORLD"):
+        run.root_set = run.root_set or statement.line
+        run.mentioned |= identifiers(said.value)
     elif name == b"FDAT_ACT":
         state.frames_record = _record(run, said, state.frames_record)
     elif name == b"LDAT_ACT":

@@ -194,7 +194,7 @@ def _enter(
     if partial and values is not None and state.point_frames != (state.base, state.tool):
         values = None
     if reason is None and kind is not Kind.AXIS:
-        reason = _frames_missing(state)
+        reason = _frames_missing(run)
     structure = _structure(run)
     if structure is not None and (reason is None or reason.code != "KRL016"):
         reason = structure
@@ -278,7 +278,10 @@ def _incomplete(state: State, target: Target, values: Numbers | None) -> Reason 
     return None
 
 
-def _frames_missing(state: State) -> Reason | None:
+def _frames_missing(run: Run) -> Reason | None:
+    state = run.state
+    if run.root_set is not None:
+        return Reason("KRL005", f"the robot's own place in the world is set in line {run.root_set}", "root")
     if state.tool_stands:
         return Reason("KRL013", "the tool stands in the world ($IPO_MODE=#TCP)", "tcp")
     for frame in (state.base, state.tool):

@@ -24,7 +24,8 @@ class Open:
 
 @dataclass(eq=False)
 class Run:
-    """``mentioned``: names that code reads, other than as the target of a motion."""
+    """``mentioned``: names that code reads, other than as the target of a motion.  ``root_set``: the line, if any, from
+    which on the program itself says where the robot stands in the world."""
 
     document: Document
     survey: Survey
@@ -37,6 +38,7 @@ class Run:
     findings: list[Finding] = field(default_factory=list)
     mentioned: set[bytes] = field(default_factory=set)
     told: set[tuple[str, str]] = field(default_factory=set)
+    root_set: int | None = None
 
     @property
     def routine(self) -> Routine | None:
