@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -54,11 +54,13 @@ class Term:
 @dataclass(frozen=True)
 class Equilibrium:
     """Loaded states: ``coordinates`` (N, m) [rad, m], of them ``displacement`` (N, m) by load; ``pose`` of the TCP in
-    the robot base; ``converged`` (N,): a stable equilibrium was found; ``steps`` iterations of the slowest state."""
+    the robot base, ``mount`` (N, 3) [m] its place without the spindle's own give; ``converged`` (N,): a stable equilibrium
+    was found; ``steps`` iterations of the slowest state."""
 
     coordinates: Floats
     displacement: Floats
     pose: Poses
+    mount: Floats
     converged: Bools
     steps: int
 
@@ -134,11 +136,20 @@ class StiffnessModel:
         kept = (t for t in self.terms if t.effect.name not in names and t.effect.family not in kinds)
         return replace(self, terms=tuple(kept))
 
-    def changed(self, term: int, parameter: str, value: float) -> StiffnessModel:
-        """The model with another value (SI) of one parameter of its ``term``-th effect."""
-        old = self.terms[term]
-        new = replace(old, values={**old.values, parameter: value})
-        return replace(self, terms=(*self.terms[:term], new, *self.terms[term + 1 :]))
+    def changed(self, values: Mapping[tuple[int, str], float]) -> StiffnessModel:
+        """The model with other values (SI) of some parameters: (index of the effect in ``terms``, name) -> value."""
+        terms = list(self.terms)
+        for (term, parameter), value in values.items():
+            terms[term] = replace(terms[term], values={**terms[term].values, parameter: value})
+        new = replace(self, terms=tuple(terms))
+        # the same effects need the same chain
+        vars(new)["chain"] = self.chain
+        return new
+
+    def added(self, effect: Effect, values: Values | None = None) -> StiffnessModel:
+        """The model with one more effect, at its null values where ``values`` says nothing."""
+        nulls = {parameter.name: parameter.null for parameter in effect.parameters}
+        return replace(self, terms=(*self.terms, Term(effect, {**nulls, **(values or {})}, {})))
 
     @cached_property
     def chain(self) -> Chain:
@@ -167,7 +178,7 @@ class StiffnessModel:
         count, m = len(q), self.chain.size
         coordinates, theta = np.empty((count, m)), np.empty((count, m))
         converged, steps = np.empty(count, bool), 0
-        rotation, position = np.empty((count, 3, 3)), np.empty((count, 3))
+        rotation, position, mount = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty((count, 3))
         for begin in range(0, count, CHUNK):
             rows = slice(begin, begin + CHUNK)
             part = self._equilibrium(
@@ -184,9 +195,9 @@ class StiffnessModel:
                 part.displacement,
                 part.converged,
             )
-            rotation[rows], position[rows] = part.pose.rotation, part.pose.position
+            rotation[rows], position[rows], mount[rows] = part.pose.rotation, part.pose.position, part.mount
             steps = max(steps, part.steps)
-        return Equilibrium(coordinates, theta, Poses(rotation, position), converged, steps)
+        return Equilibrium(coordinates, theta, Poses(rotation, position), mount, converged, steps)
 
     def _equilibrium(
         self, motors: Floats, wrench: Floats, tool: Poses, conditions: Conditions, theta: Floats
@@ -216,7 +227,7 @@ class StiffnessModel:
         theta[:, rows] = bent
         swept = self.chain.sweep(rest + theta, tool, conditions.spindle)
         rested = stable & (last < 1e-11) & np.isfinite(swept.position).all(axis=0)
-        return Equilibrium((rest + theta).T, theta.T, swept.pose, rested, steps)
+        return Equilibrium((rest + theta).T, theta.T, swept.pose, swept.mount.T, rested, steps)
 
     def _step(self, given: _Problems, theta: Floats) -> tuple[Floats, Bools]:
         """The step (m, N) of the iteration from displacement ``theta`` (m, N), and whether the diagonal holds (N,)."""

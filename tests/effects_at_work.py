@@ -1,6 +1,6 @@
 """Effects with values, for tests over the whole table: nothing here knows any effect by name.
 
-An effect is made with its defaults; how large a value is follows from the unit of its parameter alone.
+An effect is made with its defaults; how large a value is follows from its parameter alone.
 """
 
 from dataclasses import replace
@@ -12,25 +12,6 @@ from postproc.geometry import Poses, rotation_from_vector
 from postproc.model import StiffnessModel, Term
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
-
-SIZES = {
-    "1": 0.05,
-    "m": 0.3,
-    "rad": 3e-4,
-    "kg": 60.0,
-    "kg m": 100.0,
-    "N": 30.0,
-    "N m": 10.0,
-    "N/m": 2e6,
-    "m/N": 2e-8,
-    "N m/rad": 1e6,
-    "rad/(N m)": 1e-7,
-    "N m/rad3": 3e10,
-    "N/m3": 1e15,
-    "m/K": 1e-5,
-    "m/s": 1e-7,
-}
-"""SI unit of a parameter -> a size that is felt on a heavy arm, and leaves it standing."""
 
 
 def made(name, joints):
@@ -46,7 +27,7 @@ def sampled(effect, rng):
     values = {}
     for p in effect.parameters:
         sign = rng.choice([-1.0, 1.0]) if p.lower < 0 else 1.0
-        values[p.name] = float(np.clip(sign * rng.uniform(0.5, 1.0) * SIZES[p.unit], p.lower, p.upper))
+        values[p.name] = float(np.clip(sign * rng.uniform(0.5, 1.0) * p.scale, p.lower, p.upper))
     return values
 
 

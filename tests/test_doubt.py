@@ -72,7 +72,7 @@ def every(model, share):
 def valued(model, **values):
     for index, term in enumerate(model.terms):
         for name in set(values) & set(term.values):
-            model = model.changed(index, name, values[name])
+            model = model.changed({(index, name): values[name]})
     return model
 
 
@@ -128,7 +128,7 @@ def drawn(task, command, names, root, force=0.0):
         model = task.model
         for name, moved in zip(names, root @ rng.normal(size=root.shape[1]), strict=True):
             index, parameter, value = place[name]
-            model = model.changed(index, parameter, value + moved)
+            model = model.changed({(index, parameter): value + moved})
         wrench = (1.0 + force * rng.normal()) * task.wrench
         rest = model.equilibrium(q, np.concatenate([wrench, wrench, still]), tool, NOTHING, near)
         assert rest.converged.all()
@@ -307,7 +307,7 @@ def test_a_tenth_of_what_has_no_interval():
     tenths = dict(told.tenth)
     row = np.array([told.worst])
     softer = _real(
-        task, task.model.changed(0, "c1", 1.1 * task.model.terms[0].values["c1"]), task.wanted, task.wrench
+        task, task.model.changed({(0, "c1"): 1.1 * task.model.terms[0].values["c1"]}), task.wanted, task.wrench
     )
     more = np.linalg.norm(softer - _real(task, task.model, task.wanted, task.wrench), axis=1)
     assert tenths["joint_compliance.c1"] == pytest.approx(more[row][0], rel=0.01)
@@ -438,9 +438,9 @@ def test_steps_stop_at_the_bounds():
     asked = []
 
     class Watched(StiffnessModel):
-        def changed(self, term, parameter, value):
-            asked.append(value)
-            return super().changed(term, parameter, value)
+        def changed(self, values):
+            asked.extend(values.values())
+            return super().changed(values)
 
     task = job(model, 4)
     watched = Watched(model.robot, model.terms)

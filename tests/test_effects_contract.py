@@ -210,7 +210,7 @@ def test_sensitivity_is_smooth_and_every_parameter_does_something(name):
     term, (q, wrench, tool, given) = len(model.terms) - 1, problem(15, 5)
 
     def pose(parameter, value):
-        rest = model.changed(term, parameter.name, value).equilibrium(q, 5 * wrench, tool, given)
+        rest = model.changed({(term, parameter.name): value}).equilibrium(q, 5 * wrench, tool, given)
         assert rest.converged.all()
         return rest.pose
 

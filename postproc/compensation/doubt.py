@@ -161,7 +161,7 @@ def sensitivities(
             if entry.term < 0:
                 rest = model.equilibrium(q, value * wrench, tool, conditions, start)
             else:
-                stepped = model.changed(entry.term, entry.parameter, value)
+                stepped = model.changed({(entry.term, entry.parameter): value})
                 rest = stepped.equilibrium(q, wrench, tool, conditions, start)
             ends.append(np.where(rest.converged[:, None], rest.pose.position, np.nan))
         found[:, :, column] = (ends[1] - ends[0]) / (high - low)

@@ -22,10 +22,33 @@ from postproc.yamlfile import Section
 
 Values = Mapping[str, float]
 
+SIZES = {
+    "1": 0.05,
+    "m": 1e-3,
+    "rad": 3e-4,
+    "kg": 60.0,
+    "kg m": 100.0,
+    "N": 30.0,
+    "N m": 10.0,
+    "N/m": 2e6,
+    "m/N": 2e-8,
+    "N m/rad": 1e6,
+    "rad/(N m)": 1e-7,
+    "N m/rad3": 3e10,
+    "N/m3": 1e15,
+    "m/K": 1e-5,
+    "m/s": 1e-7,
+}
+"""SI unit of a parameter -> a size that is felt on a heavy arm, and leaves it standing."""
+
 
 @dataclass(frozen=True)
 class Parameter:
-    """Name, SI unit, null value (effect absent), bounds, where its definition comes from, and the joint it is of."""
+    """Name, SI unit, null value (effect absent), bounds, where its definition comes from, and the joint it is of.
+
+    ``hardware``: a dimension of built hardware, known from a drawing rather than from how the robot bends.  ``size``:
+    one that is felt, the unit in which fits count; 0 takes that of the SI unit.
+    """
 
     name: str
     unit: str
@@ -34,6 +57,13 @@ class Parameter:
     upper: float = math.inf
     source: str = ""
     joint: str = ""
+    hardware: bool = False
+    size: float = 0.0
+
+    @property
+    def scale(self) -> float:
+        """``size``, or that of the unit."""
+        return self.size or SIZES[self.unit]
 
 
 @dataclass(frozen=True)

@@ -66,11 +66,11 @@ class GravityCompensator(EnergyLoad):
         at, along = self.joint_name, "distance of the two ends along the joint axis"
         self.parameters = (
             Parameter("K_c", "N/m", 0.0, 0.0, 1e9, _SOURCE, at),
-            Parameter("s0", "m", 0.0, 0.0, 10.0, _SOURCE, at),
-            Parameter("L", "m", 0.0, 0.0, 10.0, _SOURCE, at),
-            Parameter("a_x", "m", 0.0, -10.0, 10.0, _SOURCE, at),
-            Parameter("a_y", "m", 0.0, -10.0, 10.0, _SOURCE, at),
-            Parameter("h", "m", 0.0, -10.0, 10.0, along, at),
+            Parameter("s0", "m", 0.0, 0.0, 10.0, _SOURCE, at, size=0.3),
+            Parameter("L", "m", 0.0, 0.0, 10.0, _SOURCE, at, hardware=True, size=0.3),
+            Parameter("a_x", "m", 0.0, -10.0, 10.0, _SOURCE, at, hardware=True, size=0.3),
+            Parameter("a_y", "m", 0.0, -10.0, 10.0, _SOURCE, at, hardware=True, size=0.3),
+            Parameter("h", "m", 0.0, -10.0, 10.0, along, at, hardware=True, size=0.3),
         )
 
     @classmethod

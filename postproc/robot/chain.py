@@ -38,8 +38,9 @@ class Sweep:
     """The chain at N states, component first.
 
     axes, origins (m, 3, N): of the coordinates, in the robot base; turns (m,): a turn, or else a shift; tcp: the three
-    columns (3, N) of its rotation; position (3, N) [m] of the TCP; flange: columns and position of the flange; links:
-    the columns of the frame behind each motor.
+    columns (3, N) of its rotation; position (3, N) [m] of the TCP; mount (3, N) [m]: the same without what the
+    spindle's coordinates shift it, where the tool's body is; flange: columns and position of the flange; links: the
+    columns of the frame behind each motor.
     """
 
     axes: Floats
@@ -47,6 +48,7 @@ class Sweep:
     turns: Bools
     tcp: tuple[Floats, ...]
     position: Floats
+    mount: Floats
     flange: tuple[tuple[Floats, ...], Floats]
     links: tuple[tuple[Floats, ...], ...]
 
@@ -156,12 +158,13 @@ class Chain:
             else:
                 position = position + coordinates[i] * columns[k]
             i += 1
+        mount = position
         if self._spindle:
             for name, direction in zip(self._spindle, self._spindle_axes(columns, spindle), strict=True):
                 axes[i], origins[i] = direction, position
                 position = position + coordinates[self.index[name]] * direction
                 i += 1
-        return Sweep(axes, origins, self.turns, tuple(columns), position, flange, tuple(links))
+        return Sweep(axes, origins, self.turns, tuple(columns), position, mount, flange, tuple(links))
 
     def _spindle_axes(self, columns: list[Floats], spindle: Floats | None) -> list[Floats]:
         """Directions (3, N) of the spindle coordinates: two across the spindle, one along it."""
