@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -87,11 +87,15 @@ class _Problems:
 
 @dataclass(frozen=True)
 class StiffnessModel:
-    """Chain and effects of one robot; immutable.  ``gravity`` (3,) [m/s2] in axes of the robot base."""
+    """Chain and effects of one robot; immutable.  ``gravity`` (3,) [m/s2] in axes of the robot base.
+
+    ``covariance``: labelled names (k,) of parameters that were fitted together, and their covariance (k, k) in SI.
+    """
 
     robot: Robot
     terms: tuple[Term, ...]
     gravity: Floats = field(default_factory=lambda: frozen([0.0, 0.0, -STANDARD_GRAVITY], (3,)))
+    covariance: tuple[tuple[str, ...], Floats] | None = None
 
     @classmethod
     def from_robot(cls, robot: Robot) -> StiffnessModel:
@@ -128,13 +132,15 @@ class StiffnessModel:
                     )
                 stated[parameter.name], values[parameter.name] = value, value.value
             terms.append(Term(effect, values, stated, section.line))
-        return cls(robot, tuple(terms))
+        model = cls(robot, tuple(terms))
+        return replace(model, covariance=model._stated_covariance())
 
     def without(self, effects: Iterable[str] = (), families: Iterable[str] = ()) -> StiffnessModel:
         """The model with some effects, or families of effects, taken out."""
         names, kinds = set(effects), set(families)
         kept = (t for t in self.terms if t.effect.name not in names and t.effect.family not in kinds)
-        return replace(self, terms=tuple(kept))
+        model = replace(self, terms=tuple(kept))
+        return replace(model, covariance=_part(self.covariance, dict(model._labelled())))
 
     def changed(self, values: Mapping[tuple[int, str], float]) -> StiffnessModel:
         """The model with other values (SI) of some parameters: (index of the effect in ``terms``, name) -> value."""
@@ -145,6 +151,25 @@ class StiffnessModel:
         # the same effects need the same chain
         vars(new)["chain"] = self.chain
         return new
+
+    def label(self, term: int) -> str:
+        """The name of its ``term``-th effect, with a number from the second of that name on."""
+        name = self.terms[term].effect.name
+        earlier = sum(other.effect.name == name for other in self.terms[:term])
+        return f"{name}#{earlier + 1}" if earlier else name
+
+    def _labelled(self) -> Iterator[tuple[str, Value | None]]:
+        """Each parameter as label.name, and what the robot file says of it."""
+        for index, term in enumerate(self.terms):
+            for parameter in term.effect.parameters:
+                yield f"{self.label(index)}.{parameter.name}", term.stated.get(parameter.name)
+
+    def _stated_covariance(self) -> tuple[tuple[str, ...], Floats] | None:
+        """D R D of the file's correlations R and standard deviations D; of what has a 95 % interval there still."""
+        names, relation = self.robot.correlation
+        stated = {name: value.deviation for name, value in self._labelled() if value and value.level}
+        deviation = np.array([stated.get(name) or 0.0 for name in names])
+        return _part((names, relation * np.outer(deviation, deviation)), stated)
 
     def added(self, effect: Effect, values: Values | None = None) -> StiffnessModel:
         """The model with one more effect, at its null values where ``values`` says nothing."""
@@ -412,6 +437,15 @@ class StiffnessModel:
                     )
                 )
         return findings
+
+
+def _part(
+    covariance: tuple[tuple[str, ...], Floats] | None, kept: Container[str]
+) -> tuple[tuple[str, ...], Floats] | None:
+    """The covariance of the names ``kept``; None of none."""
+    names, matrix = covariance or ((), np.zeros((0, 0)))
+    rows = [i for i, name in enumerate(names) if name in kept]
+    return (tuple(names[i] for i in rows), frozen(matrix[np.ix_(rows, rows)])) if rows else None
 
 
 def approach(q: Floats) -> Floats:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 
@@ -12,9 +13,13 @@ from postproc.arrays import Floats, Ints, frozen
 from postproc.findings import Finding, Refusal, nearest
 from postproc.geometry import Poses
 from postproc.robot.geometries import Axis, Geometry, Joint, KukaVariant, SerialArm
+from postproc.robot.provenance import Identification, correlations, read_identification
 from postproc.robot.reading import geometry_kind, read_axes, read_geometry, unit_factor
 from postproc.units import UNITS
-from postproc.yamlfile import Section, load
+from postproc.yamlfile import Section, parsed, read
+
+COVERAGE = 1.96
+"""Half width of a 95 % interval over the standard deviation (normal distribution)."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,15 @@ class Value:
     interval: float | None
     level: float | None
     source: str
+
+    @property
+    def deviation(self) -> float | None:
+        """Standard deviation, of a normal distribution; a level that is not stated is taken for 95 %."""
+        if self.interval is None:
+            return None
+        if self.level in (None, 0.95):
+            return self.interval / COVERAGE
+        return self.interval / NormalDist().inv_cdf(0.5 * (1.0 + float(self.level or 0.0)))
 
 
 @dataclass(frozen=True)
@@ -71,7 +85,8 @@ class Robot:
     """A robot file.  ``arm``: geometry of the actual robot, ``nominal``: the one that the controller believes.
 
     All values of joints are the controller's (see ``geometries``).  ``external``: column of the joint of seven that a
-    program does not place the flange with; it stays where it was.
+    program does not place the flange with; it stays where it was.  ``identified``: runs of the tool that gave it new
+    values, in order.  ``raw``: the bytes of the file.
     """
 
     name: str
@@ -91,6 +106,8 @@ class Robot:
     masses: tuple[Mass, ...] = ()
     masses_source: str = ""
     mechanisms: tuple[Mechanism, ...] = ()
+    identified: tuple[Identification, ...] = ()
+    raw: bytes = field(default=b"", repr=False)
 
     @property
     def limits(self) -> Floats:
@@ -101,6 +118,11 @@ class Robot:
     def programmed(self) -> Ints:
         """(6,) columns of the joints that a program's six axis values are: all but the external one."""
         return np.array([i for i in range(len(self.joints)) if i != self.external])
+
+    @property
+    def correlation(self) -> tuple[tuple[str, ...], Floats]:
+        """Names (k,) of parameters that were fitted, as effect.parameter, and their correlation (k, k)."""
+        return correlations(self.identified)
 
 
 def folders() -> list[Path]:
@@ -142,14 +164,29 @@ def find_robot(name: str, beside: Path | None = None) -> Path:
 
 def load_robot(path: Path) -> Robot:
     """Read and check a robot file.  Raises Refusal with file, line and key."""
-    top = load(path)
+    return robot_of(read(path), path)
+
+
+def robot_of(raw: bytes, path: Path) -> Robot:
+    """The robot of a file ``path`` that holds ``raw``; the file itself need not be there.  Raises Refusal with file,
+    line and key."""
+    top = parsed(raw, path)
     top.only(
-        "name", "maker_name", "about", "geometry", "controller", "joints", "masses", "effects", "mechanisms"
+        "name",
+        "maker_name",
+        "about",
+        "geometry",
+        "controller",
+        "joints",
+        "masses",
+        "effects",
+        "mechanisms",
+        "identified",
     )
     geometry = top.section("geometry")
     kind = geometry_kind(geometry)
     axes = read_axes(top.section("joints"))
-    arm, read = read_geometry(geometry, kind, axes, top.section("joints"))
+    arm, others = read_geometry(geometry, kind, axes, top.section("joints"))
     nominal = arm
     if "controller" in top:
         controller = top.section("controller")
@@ -159,11 +196,11 @@ def load_robot(path: Path) -> Robot:
                 "YML004", f"the controller's geometry must be of the same kind, {kind}", believed
             )
         nominal, more = read_geometry(controller, kind, axes, top.section("joints"))
-        read += more
+        others += more
     names = [axis.name for axis in axes]
     limits = [(axis.lower, axis.upper) for axis in axes]
-    digest = hashlib.sha256(path.read_bytes())
-    for other in read:
+    digest = hashlib.sha256(raw)
+    for other in others:
         digest.update(other.read_bytes())
     return Robot(
         name=top.text("name"),
@@ -183,6 +220,8 @@ def load_robot(path: Path) -> Robot:
         masses=_masses(top.section("masses"), names, arm) if "masses" in top else (),
         masses_source=top.section("masses").text("source") if "masses" in top else "",
         mechanisms=_mechanisms(top, names),
+        identified=tuple(read_identification(section) for section in top.sections("identified")),
+        raw=raw,
     )
 
 

@@ -1,0 +1,1 @@
+"""Parameters of the model from measurements: what a campaign saw, the fit, and how far it can be believed."""

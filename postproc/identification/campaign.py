@@ -1,0 +1,249 @@
+"""What the readings of a campaign see of a model, and what stands between the two: tracker and targets.
+
+A reading sees one point of the robot at one state: a target on the flange, or without targets the TCP.
+
+    absolute     T_s (p + R c)                             T_s: the robot base in the tracker's frame of session s
+    deflection   (p + R c) loaded - (p + R c) unloaded     with the same motors, robot base axes
+
+p, R: place and rotation of the tool at the equilibrium, c the target in tool axes.  T_s, and c where it is not stated,
+are nuisances: found with every fit, and credited to no effect.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.effects import Conditions
+from postproc.geometry import Poses, rotation_from_vector, skew, vector_from_rotation
+from postproc.measurements import Readings
+from postproc.model import StiffnessModel, approach
+
+ONE_POSE = 1e-6
+"""[rad, m] Motors that differ by less stand in one pose."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The tool at every state of a campaign: ``rotation`` (S, 3, 3); ``body`` (S, 3) [m], the place of the TCP without
+    what the spindle gives, ``tip`` (S, 3) with it; ``displacement`` (S, m), to begin a model nearby with; ``converged``
+    (S,)."""
+
+    rotation: Floats
+    body: Floats
+    tip: Floats
+    displacement: Floats
+    converged: Bools
+
+
+@dataclass(frozen=True)
+class Nuisances:
+    """Where tracker and targets are: ``frames`` (M) of the robot base in the tracker's frame, one a session; ``places``
+    (K, 3) [m] of the targets in tool axes from the TCP; ``turns`` (K, 3, 3) of their frames in it."""
+
+    frames: Poses
+    places: Floats
+    turns: Floats
+
+
+class Campaign:
+    """Readings as a model sees them.
+
+    q (S, n), wrench (S, 6), conditions (S): the states that differ.  at (R,): the state of each reading, of a deflection
+    the loaded one, still (R,) its unloaded one.  pose (R,): readings with the motors in one place share a number, of
+    ``poses``.  tracked: the tracker's frame is not known; posed: rotations are measured too.  targets (K,): names,
+    place_known, turn_known (K,) what is stated of them.
+    """
+
+    def __init__(self, readings: Readings, tool: Poses | None = None) -> None:
+        """``tool``: TCP on the flange where the readings do not state one."""
+        self.readings = readings
+        stated = tool if readings.tool is None else readings.tool
+        self.tool = Poses.identity() if stated is None else stated
+        self.tracked = not (readings.deflection or readings.in_robot_frame)
+        self.posed = readings.rotation is not None
+        self._find_states()
+        named = readings.targets
+        self.at_tip = not named
+        self.targets = named or ("",)
+        free = stated is None and self.tracked
+        self.place_known: Bools = np.array([name in readings.places for name in named] or [not free])
+        # of a target the place is stated, of a tool the axes too
+        self.turn_known: Bools = np.array([False for _ in named] or [not free])
+        into_tool = self.tool.inverse()
+        self.stated_places = np.array(
+            [into_tool.rotation @ readings.places[n] + into_tool.position if n in readings.places else into_tool.position
+             for n in named] or [np.zeros(3)]
+        )  # fmt: skip
+        self.stated_turns = np.tile(np.eye(3), (len(self.targets), 1, 1))
+        self.nuisance_names = tuple(self._nuisance_names())
+
+    def __len__(self) -> int:
+        return len(self.readings)
+
+    def knowing(self, other: Campaign, given: Nuisances) -> Campaign:
+        """The campaign with the targets that ``other`` found, by their names, as stated ones."""
+        new = copy(self)
+        new.place_known, new.turn_known = self.place_known.copy(), self.turn_known.copy()
+        new.stated_places, new.stated_turns = self.stated_places.copy(), self.stated_turns.copy()
+        for k, name in enumerate(self.targets):
+            if name in other.targets:
+                at = other.targets.index(name)
+                new.stated_places[k], new.stated_turns[k] = given.places[at], given.turns[at]
+                new.place_known[k] = new.turn_known[k] = True
+        new.nuisance_names = tuple(new._nuisance_names())
+        return new
+
+    def shifted(self, by: Floats) -> Campaign:
+        """The campaign with its measured positions and rotations moved by (R, 3 or 6) [m, rad]."""
+        new = copy(self)
+        rotation = self.readings.rotation
+        if rotation is not None:
+            rotation = rotation_from_vector(by[:, 3:]) @ rotation
+        new.readings = replace(self.readings, value=self.readings.value + by[:, :3], rotation=rotation)
+        return new
+
+    def _find_states(self) -> None:
+        readings, count = self.readings, len(self.readings)
+        sense = approach(readings.q) if readings.direction is None else readings.direction
+        parts = [readings.q, readings.wrench, sense, readings.temperature, readings.time]
+        key = np.column_stack([part for part in parts if part is not None])
+        if readings.deflection:
+            unloaded = key.copy()
+            unloaded[:, readings.q.shape[1] : readings.q.shape[1] + 6] = 0.0
+            key = np.concatenate([key, unloaded])
+        _, first, of = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        of, row = of.reshape(-1), first % count
+        self.q = readings.q[row]
+        self.wrench = np.where((first < count)[:, None], readings.wrench[row], 0.0)
+        given = Conditions(direction=sense, temperature=readings.temperature, time=readings.time)
+        self.conditions = given.part(row)
+        self.at: Ints = of[:count]
+        self.still: Ints | None = of[count:] if readings.deflection else None
+        _, pose = np.unique(np.round(readings.q / ONE_POSE), axis=0, return_inverse=True)
+        self.pose: Ints = pose.reshape(-1)
+        self.poses = int(self.pose.max()) + 1
+
+    def seen(self, model: StiffnessModel, start: Floats | None = None) -> Seen:
+        """All states at rest under ``model``; ``start`` (S, m): displacement of a model nearby."""
+        rest = model.equilibrium(self.q, self.wrench, self.tool, self.conditions, start)
+        return Seen(rest.pose.rotation, rest.mount, rest.pose.position, rest.displacement, rest.converged)
+
+    def points(self, seen: Seen, places: Floats, at: Ints) -> Floats:
+        """(R, 3) [m] what each reading would see in states ``at`` (R,), robot base."""
+        origin = seen.tip if self.at_tip else seen.body
+        place = places[self.readings.target]
+        return np.asarray(origin[at] + (seen.rotation[at] @ place[:, :, None])[:, :, 0])
+
+    def expected(self, seen: Seen, given: Nuisances) -> tuple[Floats, Floats | None]:
+        """(R, 3) [m], and rotations (R, 3, 3) where they are measured, in the axes of the readings; NaN where the model
+        has no rest."""
+        points = self.points(seen, given.places, self.at)
+        lost = ~seen.converged[self.at]
+        rotation = seen.rotation[self.at]
+        if self.still is not None:
+            points = points - self.points(seen, given.places, self.still)
+            lost = lost | ~seen.converged[self.still]
+            rotation = rotation @ np.swapaxes(seen.rotation[self.still], 1, 2)
+        else:
+            rotation = rotation @ given.turns[self.readings.target]
+        points = np.where(lost[:, None], np.nan, points)
+        if self.tracked:
+            frame = given.frames[self.readings.session]
+            points = (frame.rotation @ points[:, :, None])[:, :, 0] + frame.position
+            rotation = frame.rotation @ rotation
+        return points, rotation if self.posed else None
+
+    def residual(self, seen: Seen, given: Nuisances) -> Floats:
+        """(R, 3) [m], or (R, 6) [m, rad] where rotations are measured: measured minus expected, in the axes of the
+        readings; NaN where nothing was measured or the model has no rest."""
+        position, rotation = self.expected(seen, given)
+        left = self.readings.value - position
+        if rotation is None or self.readings.rotation is None:
+            return left
+        away = np.full_like(left, np.nan)
+        known = np.isfinite(self.readings.rotation).all(axis=(1, 2)) & np.isfinite(position).all(axis=1)
+        away[known] = vector_from_rotation(
+            self.readings.rotation[known] @ np.swapaxes(rotation[known], 1, 2)
+        )
+        return np.concatenate([left, away], axis=1)
+
+    def in_base(self, residual: Floats, given: Nuisances) -> Floats:
+        """A residual (R, 3 or 6) in axes of the robot base; NaN coordinates count as no residual there."""
+        if not self.tracked:
+            return residual
+        back = np.swapaxes(given.frames.rotation, 1, 2)[self.readings.session]
+        halves = [np.nan_to_num(residual[:, k : k + 3]) for k in range(0, residual.shape[1], 3)]
+        return np.concatenate([(back @ half[:, :, None])[:, :, 0] for half in halves], axis=1)
+
+    # Nuisances as columns of a fit.
+
+    def start(self) -> Nuisances:
+        """Tracker in the robot base, targets at their stated places or on the flange."""
+        sessions = len(self.readings.sessions)
+        frames = Poses(np.tile(np.eye(3), (sessions, 1, 1)), np.zeros((sessions, 3)))
+        return Nuisances(frames, self.stated_places, self.stated_turns)
+
+    def _blocks(self) -> list[tuple[str, int]]:
+        """What is not known, three columns each, and of which session or target it is."""
+        blocks = []
+        if self.tracked:
+            for k in range(len(self.readings.sessions)):
+                blocks += [("shift", k), ("turn", k)]
+        for k in range(len(self.targets)):
+            if not self.place_known[k]:
+                blocks.append(("place", k))
+            if self.posed and self.still is None and not self.turn_known[k]:
+                blocks.append(("axes", k))
+        return blocks
+
+    def _nuisance_names(self) -> list[str]:
+        names = []
+        for kind, k in self._blocks():
+            of = self.readings.sessions[k] if kind in ("shift", "turn") else self.targets[k]
+            what = "registration" if kind in ("shift", "turn") else "target"
+            axes = ("x", "y", "z") if kind in ("shift", "place") else ("rx", "ry", "rz")
+            names += [f"{what}{f' {of}' if of else ''}.{axis}" for axis in axes]
+        return names
+
+    def nuisance_columns(self, seen: Seen, given: Nuisances) -> Floats:
+        """(R, 3 or 6, U) derivative of ``expected`` by the steps of ``moved``."""
+        found = np.zeros((len(self), 6, len(self.nuisance_names)))
+        points = self.points(seen, given.places, self.at)
+        axes = given.frames.rotation[self.readings.session]
+        for block, (kind, k) in enumerate(self._blocks()):
+            columns = slice(3 * block, 3 * block + 3)
+            if kind in ("shift", "turn"):
+                of = self.readings.session == k
+                if kind == "shift":
+                    found[of, :3, columns] = axes[of]
+                else:
+                    found[of, :3, columns] = -axes[of] @ skew(points[of])
+                    found[of, 3:, columns] = axes[of]
+                continue
+            of = self.readings.target == k
+            rotation = seen.rotation[self.at[of]]
+            if self.still is not None:
+                rotation = rotation - seen.rotation[self.still[of]]
+            rows = slice(0, 3) if kind == "place" else slice(3, 6)
+            found[of, rows, columns] = axes[of] @ rotation if self.tracked else rotation
+        return found if self.posed else found[:, :3]
+
+    def moved(self, given: Nuisances, step: Floats) -> Nuisances:
+        """The nuisances after a step (U,) [m, rad]: frames T (exp(turn) p + shift), targets c + place, exp(axes) turn."""
+        rotation, position = given.frames.rotation.copy(), given.frames.position.copy()
+        places, turns = given.places.copy(), given.turns.copy()
+        for block, (kind, k) in enumerate(self._blocks()):
+            part = step[3 * block : 3 * block + 3]
+            if kind == "shift":
+                position[k] += rotation[k] @ part
+            elif kind == "turn":
+                rotation[k] = rotation[k] @ rotation_from_vector(part)
+            elif kind == "place":
+                places[k] += part
+            else:
+                turns[k] = rotation_from_vector(part) @ turns[k]
+        return Nuisances(Poses(rotation, position), places, turns)

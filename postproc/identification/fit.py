@@ -1,0 +1,262 @@
+"""Parameters of effects from a campaign, with intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats
+from postproc.findings import Finding, Refusal
+from postproc.identification.campaign import Campaign
+from postproc.identification.identifiable import Dropped, Insight, insight
+from postproc.identification.noise import Noise, Weighting, noise_of, shared_error, weighting
+from postproc.identification.registration import registered
+from postproc.identification.solve import Point, at, descended, prior_rows, scales, with_columns
+from postproc.identification.unknowns import Unknown
+from postproc.model import StiffnessModel
+
+UNLIKELY = 0.01
+"""Probability below which the residuals are taken to be more than the stated scatter."""
+
+AT_BOUND = 1e-9
+"""Of a parameter's size."""
+
+HUBER = 2.795
+"""Length of a residual [its standard deviation] from which a robust fit weighs it down: 95 % of a normal one in space
+are shorter."""
+
+Stage = Callable[[str], None]
+
+
+def silent(_stage: str) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter as found (SI), its 95 % interval (half width), and whether it lies at a bound."""
+
+    unknown: Unknown
+    value: float
+    ci95: float
+    at_bound: bool
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A campaign fitted.  point: the model found and what it leaves; unknowns (k,): found; dropped: asked for, and left as
+    they were; covariance (k, k) [SI]; factor: variance of the readings over what ``noise`` says, ``scatter_exceeded`` if
+    that is clearly more; freedom: of the residuals; quantile: half width of an interval over its deviation."""
+
+    campaign: Campaign
+    noise: Noise
+    weights: Weighting
+    point: Point
+    unknowns: tuple[Unknown, ...]
+    dropped: tuple[Dropped, ...]
+    covariance: Floats
+    condition: float
+    factor: float
+    scatter_exceeded: bool
+    freedom: int
+    quantile: float
+
+    @property
+    def model(self) -> StiffnessModel:
+        return self.point.model
+
+    @cached_property
+    def residual(self) -> Floats:
+        """(R, 3) [m] what is left of each position, axes of the robot base."""
+        return self.campaign.in_base(self.point.residual, self.point.given)[:, :3]
+
+    @cached_property
+    def estimates(self) -> tuple[Estimate, ...]:
+        deviation = np.sqrt(np.diag(self.covariance))
+        found = []
+        values = self.point.values(self.unknowns)
+        for unknown, value, wide in zip(self.unknowns, values.tolist(), deviation.tolist(), strict=True):
+            p = unknown.parameter
+            edge = min(value - p.lower, p.upper - value) < AT_BOUND * p.scale
+            found.append(Estimate(unknown, value, self.quantile * wide, edge))
+        return tuple(found)
+
+
+def fit(
+    campaign: Campaign,
+    model: StiffnessModel,
+    unknowns: Sequence[Unknown],
+    rows: Bools | None = None,
+    robust: bool = False,
+    stage: Stage = silent,
+) -> Fit:
+    """The weighted least squares of the readings ``rows`` (R,) (all without it) over the unknowns and nuisances.
+
+    Unknowns that the readings can not give stay as they are and are named.  Intervals come from the covariance of the
+    linearized problem at the solution; where the residuals are clearly larger than the stated scatter, or none is
+    stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).
+
+    Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to begin with has no rest.
+    """
+    noise = noise_of(campaign.readings)
+    rows = np.ones(len(campaign), bool) if rows is None else rows
+    point = at(campaign, model, campaign.start())
+    if not point.seen.converged.all():
+        lost = int((~point.seen.converged).sum())
+        raise Refusal(
+            Finding("IDN003", f"{lost} of {len(campaign.q)} states have no stable rest", str(model.robot.path))
+        )
+    stage("registering")
+    given = registered(campaign, point.seen, rows)
+    point = replace(point, given=given, residual=campaign.residual(point.seen, given))
+    weights = weighting(campaign, noise, point.residual).times(rows.astype(float))
+    _enough(campaign, weights, unknowns)
+    point = _awake(campaign, point, unknowns)
+    begin = point
+    free, dropped = list(unknowns), list[Dropped]()
+    stage("fitting")
+    while True:
+        point = descended(campaign, point, free, weights)
+        if robust:
+            point, weights = _robust(campaign, point, free, weights, rows)
+        weights = _with_turns(campaign, point, noise, weights)
+        if weights.shared == 0.0:
+            weights = replace(weights, shared=shared_error(point.residual, weights))
+        point = with_columns(campaign, descended(campaign, point, free, weights), free)
+        found = _insight(campaign, point, free, weights, 1.0)
+        factor, exceeded, freedom, quantile = _variance(campaign, point, free, weights, noise, found)
+        found = _insight(campaign, point, free, weights, factor)
+        if not found.dropped:
+            break
+        dropped += found.dropped
+        gone = [free[i] for i in range(len(free)) if i not in found.kept]
+        free = [free[i] for i in found.kept]
+        model = point.model.changed({u.key: u.value for u in gone})
+        point = at(campaign, model, point.given, begin.seen.displacement)
+    scale = scales(free)
+    return Fit(
+        campaign, noise, weights, point, tuple(free), tuple(dropped),
+        found.covariance * np.outer(scale, scale), found.condition, factor, exceeded, freedom, quantile,
+    )  # fmt: skip
+
+
+def _enough(campaign: Campaign, weights: Weighting, unknowns: Sequence[Unknown]) -> None:
+    priors = sum(unknown.prior is not None for unknown in unknowns)
+    wanted = len(unknowns) - priors + len(campaign.nuisance_names)
+    if weights.counts < wanted:
+        raise Refusal(
+            Finding(
+                "IDN002",
+                f"{weights.counts} measured numbers for {wanted} unknowns: {len(unknowns) - priors} parameters and"
+                f" {len(campaign.nuisance_names)} of the tracker and its targets",
+                str(campaign.readings.files[0]),
+                help="measure more poses, or ask for fewer effects with --effects",
+            )
+        )
+
+
+def _awake(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Point:
+    """The point, with the effects that move nothing at all where they stand begun at the sizes of their parameters."""
+    found = with_columns(campaign, point, unknowns).columns
+    assert found is not None
+    still = ~np.nan_to_num(np.abs(found)).any(axis=(0, 1))
+    asleep = {
+        u.key: u.parameter.scale
+        for u in unknowns
+        if all(still[i] for i, other in enumerate(unknowns) if other.term == u.term)
+        and all(point.model.terms[u.term].values[p.name] == p.null for p in [u.parameter])
+    }
+    if not asleep:
+        return point
+    tried = at(campaign, point.model.changed(asleep), point.given)
+    moves = with_columns(campaign, tried, unknowns).columns
+    assert moves is not None
+    # what moves nothing at its size either stays at its null
+    wakes = {
+        u.term for i, u in enumerate(unknowns) if u.key in asleep and np.nan_to_num(np.abs(moves[:, :, i])).max() > 1e-9
+    }
+    woken = {key: value for key, value in asleep.items() if key[0] in wakes}
+    return at(campaign, point.model.changed(woken), point.given) if woken else point
+
+
+def _robust(
+    campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, rows: Bools
+) -> tuple[Point, Weighting]:
+    """Reweighted until the weights stand: those of Huber for the length of a reading's residual."""
+    plain = replace(weights, weight=np.where(weights.weight > 0, weights.weight, 0.0))
+    share = np.ones(len(rows))
+    for _ in range(20):
+        length = lengths(point.residual, plain)
+        level = spread_of(length[rows])
+        now = np.minimum(1.0, HUBER * level / np.maximum(length, 1e-300))
+        if np.abs(now - share).max() < 1e-3:
+            break
+        share = now
+        # squares of residuals count by the weight: its root goes to the row
+        weights = plain.times(np.sqrt(share))
+        point = descended(campaign, point, free, weights)
+    return point, weights
+
+
+def lengths(residual: Floats, weights: Weighting) -> Floats:
+    """(R,) length of each residual in standard deviations of one coordinate, made that of three where fewer count."""
+    on = weights.weight > 0
+    square = np.where(on, np.nan_to_num(residual) * weights.weight, 0.0) ** 2
+    return np.sqrt(3.0 * square.sum(axis=1) / np.maximum(on.sum(axis=1), 1))
+
+
+def spread_of(length: Floats) -> float:
+    """One standard deviation of a coordinate by the median of lengths in space, at least 1 (1.538: that of chi with 3)."""
+    return max(1.0, float(np.median(length)) / 1.538)
+
+
+def _with_turns(campaign: Campaign, point: Point, noise: Noise, weights: Weighting) -> Weighting:
+    """Where no scatter of rotations is stated, they scatter as they are seen to, against the positions."""
+    if not campaign.posed or campaign.readings.sigma_turn is not None:
+        return weights
+    scaled = np.nan_to_num(point.residual) * weights.weight
+    on = weights.weight > 0
+    place, turn = (np.sqrt((scaled[:, s] ** 2).sum() / max(1, on[:, s].sum())) for s in (slice(0, 3), slice(3, 6)))
+    if place == 0 or turn == 0:
+        return weights
+    weight = weights.weight.copy()
+    weight[:, 3:] *= (max(place, 1.0) if noise.known else place) / turn
+    return replace(weights, weight=weight)
+
+
+def _insight(
+    campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, factor: float
+) -> Insight:
+    assert point.columns is not None and point.nuisance is not None
+    columns = np.nan_to_num(weights(point.columns))
+    nuisance = weights(point.nuisance)
+    return insight(free, columns, nuisance, campaign.nuisance_names, prior_rows(free), point.values(free), factor)
+
+
+def _variance(
+    campaign: Campaign,
+    point: Point,
+    free: Sequence[Unknown],
+    weights: Weighting,
+    noise: Noise,
+    found: Insight,
+) -> tuple[float, bool, int, float]:
+    """Variance of the readings over the assumed one, whether that is clearly more, degrees of freedom, and the 97.5 %
+    quantile that goes with them."""
+    from scipy.stats import chi2, norm, t
+
+    left = weights(point.residual)
+    squares = float(left @ left)
+    assert point.nuisance is not None
+    nuisances = int(np.linalg.matrix_rank(weights(point.nuisance))) if len(campaign.nuisance_names) else 0
+    without_prior = sum(free[i].prior is None for i in found.kept)
+    freedom = max(0, weights.counts - nuisances - without_prior)
+    if freedom == 0:
+        return 1.0, False, 0, float(norm.ppf(0.975))
+    exceeded = noise.known and squares > chi2.ppf(1.0 - UNLIKELY, freedom)
+    if noise.known and not exceeded:
+        return 1.0, False, freedom, float(norm.ppf(0.975))
+    return squares / freedom, exceeded, freedom, float(t.ppf(0.975, freedom))

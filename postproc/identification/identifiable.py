@@ -1,0 +1,164 @@
+"""What the readings can tell of the unknowns: rank, columns that must be left out, sums, correlations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.identification.unknowns import Unknown
+
+UNSEEN = 1e-4
+"""Standard deviations of all readings together by which a parameter of its usual size must move them."""
+
+REDUNDANT = 1e-5
+"""A column whose part outside of the others is smaller than this share of it adds nothing."""
+
+FAR = 10.0
+"""Usual sizes of a parameter."""
+
+PART = 1e-3
+"""A smaller share of a dropped column is not worth naming."""
+
+COVERAGE = 1.96
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """An unknown that the readings can not give: ``why`` in words, and with which others (name -> weight) it only shows
+    together."""
+
+    name: str
+    why: str
+    together: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True)
+class Insight:
+    """kept: unknowns that can be found; dropped: the others; covariance (k, k) of the kept ones in units of their
+    ``scale``, for readings of unit variance; condition: of the kept columns, each made as long as the next."""
+
+    kept: tuple[int, ...]
+    dropped: tuple[Dropped, ...]
+    covariance: Floats
+    condition: float
+
+
+def insight(
+    unknowns: Sequence[Unknown],
+    columns: Floats,
+    nuisance: Floats,
+    nuisance_names: Sequence[str],
+    prior: Floats,
+    values: Floats,
+    factor: float = 1.0,
+) -> Insight:
+    """What whitened ``columns`` (n, P) of the unknowns, per scale, and ``nuisance`` (n, U) tell.
+
+    prior (P, P): rows of the priors; values (P,) [SI] at hand; factor: variance of the readings over the assumed one.
+    Columns are judged after what the nuisances explain is taken out, in their order: one that those before it can
+    imitate is left out.  Then the least certain is, as long as one says nothing: its 95 % interval is wider than its
+    value, and than the stated one or, where none is stated, ``FAR`` times the parameter's usual size.
+    """
+    basis = _basis(nuisance)
+    outside = np.concatenate([columns - basis @ (basis.T @ columns), prior])
+    whole = np.concatenate([columns, prior])
+    kept: list[int] = []
+    dropped: list[Dropped] = []
+    frame = np.empty((len(outside), 0))
+    for k, unknown in enumerate(unknowns):
+        size = float(np.linalg.norm(whole[:, k]))
+        if size < UNSEEN:
+            dropped.append(Dropped(unknown.name, "no reading moves with it"))
+            continue
+        rest = outside[:, k] - frame @ (frame.T @ outside[:, k])
+        rest -= frame @ (frame.T @ rest)
+        length = float(np.linalg.norm(rest))
+        if length < REDUNDANT * size:
+            dropped.append(_explained(k, unknowns, kept, whole, nuisance, nuisance_names))
+            continue
+        frame = np.column_stack([frame, rest / length])
+        kept.append(k)
+    while kept:
+        part = outside[:, kept]
+        covariance = _inverse(part) * factor
+        wide = COVERAGE * np.sqrt(np.diag(covariance))
+        limit = np.array([_limit(unknowns[k], values[k]) / unknowns[k].parameter.scale for k in kept])
+        worst = int(np.argmax(wide / limit))
+        if wide[worst] <= limit[worst]:
+            length = np.linalg.norm(part, axis=0)
+            values_of = np.linalg.svd(part / length, compute_uv=False)
+            return Insight(tuple(kept), tuple(dropped), covariance, float(values_of[0] / values_of[-1]))
+        unknown = unknowns[kept[worst]]
+        wider = wide[worst] * unknown.parameter.scale
+        dropped.append(Dropped(unknown.name, f"seen too weakly: +- {wider:.2g} {unknown.parameter.unit}"))
+        del kept[worst]
+    return Insight((), tuple(dropped), np.zeros((0, 0)), np.nan)
+
+
+def _limit(unknown: Unknown, value: float) -> float:
+    """[SI] An interval wider than this says nothing of the unknown."""
+    null = unknown.parameter.null
+    usual = 0.0 if unknown.stated is None else abs(unknown.stated.value - null)
+    return max(abs(value - null), usual or FAR * unknown.parameter.scale)
+
+
+def _basis(columns: Floats) -> Floats:
+    """Orthonormal columns that span ``columns`` (n, U), as far as they are independent."""
+    length = np.linalg.norm(columns, axis=0)
+    used = columns[:, length > 0] / length[length > 0]
+    if not used.shape[1]:
+        return np.zeros((len(columns), 0))
+    u, s, _ = np.linalg.svd(used, full_matrices=False)
+    return np.asarray(u[:, s > 1e-8 * s[0]])
+
+
+def _inverse(part: Floats) -> Floats:
+    """(A^T A)^-1 by the R of A's columns, each made of length one."""
+    length = np.linalg.norm(part, axis=0)
+    back = np.linalg.inv(np.linalg.qr(part / length, mode="r")) / length[:, None]
+    return np.asarray(back @ back.T)
+
+
+def _explained(
+    k: int,
+    unknowns: Sequence[Unknown],
+    kept: Sequence[int],
+    columns: Floats,
+    nuisance: Floats,
+    nuisance_names: Sequence[str],
+) -> Dropped:
+    """Which of the kept columns and nuisances the column ``k`` is made of."""
+    padded = np.concatenate([nuisance, np.zeros((len(columns) - len(nuisance), nuisance.shape[1]))])
+    others = np.concatenate([columns[:, list(kept)], padded], axis=1)
+    length = np.linalg.norm(others, axis=0)
+    length[length == 0] = 1.0
+    share = np.linalg.lstsq(others / length, columns[:, k], rcond=1e-9)[0]
+    size = np.linalg.norm(columns[:, k])
+    names = [unknowns[i].name for i in kept]
+    weights = share / length
+    parts = [i for i in np.argsort(-np.abs(share)) if abs(share[i]) > PART * size]
+    own = unknowns[k].parameter.scale
+    together = tuple(
+        (names[i], float(weights[i] * unknowns[kept[i]].parameter.scale / own)) for i in parts if i < len(kept)
+    )
+    frames = sorted({nuisance_names[i - len(kept)].split(".")[0] for i in parts if i >= len(kept)})
+    words = [name for name, _ in together] + [f"the {frame}" for frame in frames]
+    return Dropped(unknowns[k].name, f"only seen together with {', '.join(words)}", together)
+
+
+def strong_correlations(
+    names: Sequence[str], covariance: Floats, above: float
+) -> tuple[tuple[str, str, float], ...]:
+    """Pairs with a correlation of more than ``above``, strongest first."""
+    deviation = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(deviation, deviation)
+    pairs = [
+        (names[i], names[k], float(correlation[i, k]))
+        for i in range(len(names))
+        for k in range(i)
+        if abs(correlation[i, k]) > above
+    ]
+    return tuple(sorted(pairs, key=lambda pair: -abs(pair[2])))

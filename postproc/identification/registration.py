@@ -1,0 +1,91 @@
+"""Where the tracker and the targets are, before anything else is fitted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats
+from postproc.geometry import Poses
+from postproc.identification.campaign import Campaign, Nuisances, Seen
+
+MAX_STEPS = 60
+SAMPLE = 300
+"""Readings looked at while the tracker's turn is searched for."""
+
+
+def registered(campaign: Campaign, seen: Seen, rows: Bools) -> Nuisances:
+    """Nuisances with the least squares of ``rows`` (R,), every session by itself, the largest first.
+
+    The turn of a tracker may be any, and the place of a target on the flange enters together with it: Gauss-Newton
+    from the 24 turns of a cube, the best of which is refined.
+    """
+    given = campaign.start()
+    session = campaign.readings.session
+    usable = rows & np.isfinite(campaign.readings.value).all(axis=1) & seen.converged[campaign.at]
+    if campaign.tracked:
+        for k in np.argsort(-np.bincount(session[usable], minlength=len(campaign.readings.sessions))):
+            own = np.flatnonzero(usable & (session == k))
+            if len(own):
+                given = _session(campaign, seen, given, int(k), own)
+    if campaign.posed and campaign.still is None:
+        given = _turned_targets(campaign, seen, given, usable)
+    return given
+
+
+def _session(campaign: Campaign, seen: Seen, given: Nuisances, k: int, own: Floats) -> Nuisances:
+    some = own[np.linspace(0, len(own) - 1, min(len(own), SAMPLE)).round().astype(int)]
+    best, least = given, np.inf
+    for turn in _cube_turns():
+        rotation = given.frames.rotation.copy()
+        rotation[k] = turn
+        tried = replace(given, frames=Poses(rotation, given.frames.position))
+        tried, size = _descended(campaign, seen, tried, some, 12)
+        if size < least:
+            best, least = tried, size
+    return _descended(campaign, seen, best, own, MAX_STEPS)[0]
+
+
+def _descended(
+    campaign: Campaign, seen: Seen, given: Nuisances, rows: Floats, steps: int
+) -> tuple[Nuisances, float]:
+    """Gauss-Newton on positions: the nuisances, and the mean square that is left [m2]."""
+    last = np.inf
+    for _ in range(steps):
+        left = campaign.residual(seen, given)[rows, :3]
+        size = float(np.mean(left**2))
+        if not size < last * (1 - 1e-9):
+            break
+        last = size
+        columns = campaign.nuisance_columns(seen, given)[rows, :3]
+        step = np.linalg.lstsq(columns.reshape(left.size, -1), left.reshape(-1), rcond=1e-9)[0]
+        given = campaign.moved(given, step)
+    return given, last
+
+
+def _turned_targets(campaign: Campaign, seen: Seen, given: Nuisances, usable: Bools) -> Nuisances:
+    """The axes of targets whose turn is not stated: the mean of what each reading says."""
+    readings, turns = campaign.readings, given.turns.copy()
+    assert readings.rotation is not None
+    rotation = seen.rotation[campaign.at]
+    if campaign.tracked:
+        rotation = given.frames.rotation[readings.session] @ rotation
+    for k in np.flatnonzero(~campaign.turn_known):
+        own = usable & (readings.target == k) & np.isfinite(readings.rotation).all(axis=(1, 2))
+        if own.any():
+            total = (np.swapaxes(rotation[own], 1, 2) @ readings.rotation[own]).sum(axis=0)
+            u, _, v = np.linalg.svd(total)
+            turns[k] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v
+    return replace(given, turns=turns)
+
+
+def _cube_turns() -> list[Floats]:
+    """The 24 rotations of a cube."""
+    found = []
+    for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)):
+        for sign in np.ndindex(2, 2):
+            turn = np.eye(3)[list(order)] * (1.0 - 2.0 * np.array([*sign, 0]))[:, None]
+            turn[2] *= np.linalg.det(turn)
+            found.append(turn)
+    return found

@@ -1,0 +1,145 @@
+"""How a fit stands on readings that it did not see, and whether its intervals hold without their assumptions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats
+from postproc.geometry import Poses
+from postproc.identification.campaign import Campaign, Nuisances
+from postproc.identification.fit import Fit
+from postproc.identification.registration import registered
+from postproc.identification.solve import at, descended
+
+SEED = 20260101
+
+OTHER_STATION = 3.0
+"""A registration that leaves so many times more than one of its own does not hold for other readings."""
+
+Progress = Callable[[int, int], None]
+
+
+def nothing(_done: int, _all: int) -> None:
+    pass
+
+
+def folds_of(campaign: Campaign, folds: int, seed: int = SEED) -> Floats:
+    """(R,) the fold of each reading: poses are dealt out at random, all readings of one into one fold."""
+    dealt = np.random.default_rng(seed).permutation(campaign.poses) % folds
+    return np.asarray(dealt[campaign.pose])
+
+
+def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
+    """(R, 3) [m] residuals of every reading, robot base axes, by a fit without its fold; NaN where it does not count.
+
+    Each fold's fit starts from the one of all readings, with its columns: it ends where any start would.
+    """
+    campaign = fitted.campaign
+    fold = folds_of(campaign, folds)
+    left = np.full((len(campaign), 3), np.nan)
+    for k in range(folds):
+        rows = fold == k
+        weights = fitted.weights.times((~rows).astype(float))
+        point = descended(campaign, fitted.point, fitted.unknowns, weights, keep_columns=True)
+        left[rows] = campaign.in_base(point.residual, point.given)[rows, :3]
+        progress(k + 1, folds)
+    left[~counted(fitted)] = np.nan
+    return left
+
+
+def counted(fitted: Fit) -> Bools:
+    """(R,) readings with a whole position that count in the fit."""
+    return np.asarray((fitted.weights.weight[:, :3] > 0).all(axis=1))
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Readings that were not fitted: ``before``, ``after`` (R, 3) [m] residuals of the models before and after, robot base
+    axes; ``registered_anew``: their tracker stood elsewhere."""
+
+    campaign: Campaign
+    before: Floats
+    after: Floats
+    registered_anew: bool
+
+
+def validated(before: Fit, after: Fit, campaign: Campaign) -> Validation:
+    """What both fits say of readings ``campaign`` that neither has seen.
+
+    Targets are where the fit found them.  The tracker stands where it stood for the fit, if it is the same session (or
+    there is but one on either side) and that holds; else it is registered anew from these readings.
+    """
+    anew, left = False, []
+    for fitted in (before, after):
+        known = campaign.knowing(fitted.campaign, fitted.point.given)
+        point = at(known, fitted.model, known.start())
+        given = registered(known, point.seen, np.ones(len(known), bool))
+        if known.tracked:
+            kept = _stations(fitted, known, given)
+            own, there = (np.nanmean(known.residual(point.seen, g)[:, :3] ** 2) for g in (given, kept))
+            if there <= OTHER_STATION**2 * own:
+                given = kept
+            else:
+                anew = True
+        left.append(known.in_base(known.residual(point.seen, given), given)[:, :3])
+    return Validation(campaign, left[0], left[1], anew)
+
+
+def _stations(fitted: Fit, campaign: Campaign, given: Nuisances) -> Nuisances:
+    """``given``, with the tracker of the fit for sessions that it knows."""
+    names, known = campaign.readings.sessions, fitted.campaign.readings.sessions
+    pairs = [(k, known.index(name)) for k, name in enumerate(names) if name in known]
+    if len(names) == len(known) == 1:
+        pairs = [(0, 0)]
+    rotation, position = given.frames.rotation.copy(), given.frames.position.copy()
+    for k, other in pairs:
+        rotation[k], position[k] = fitted.point.given.frames.rotation[other], fitted.point.given.frames.position[other]
+    return replace(given, frames=Poses(rotation, position))
+
+
+@dataclass(frozen=True)
+class Bootstrap:
+    """deviation (k,) [SI] of each unknown over ``draws`` refits."""
+
+    deviation: Floats
+    draws: int
+
+
+def bootstrap(fitted: Fit, draws: int, progress: Progress = nothing) -> Bootstrap:
+    """Wild bootstrap (Liu 1988): each reading's residual, made as large as it was before the fit took its part, with a
+    random sign on what is expected, and fitted anew.  Readings of one pose that share an error share the sign."""
+    campaign, point = fitted.campaign, fitted.point
+    rng = np.random.default_rng(SEED)
+    values = point.values(fitted.unknowns)
+    grown = point.residual / _free_share(fitted)[:, None]
+    found = np.empty((draws, len(fitted.unknowns)))
+    for draw in range(draws):
+        sign = rng.choice([-1.0, 1.0], campaign.poses)[campaign.pose]
+        if fitted.weights.shared == 0:
+            sign = rng.choice([-1.0, 1.0], len(campaign))
+        moved = sign[:, None] * grown - point.residual
+        drawn = campaign.shifted(moved)
+        begin = replace(point, residual=point.residual + moved)
+        # a prior is a reading like the others: it would have been another one
+        unknowns = [
+            u if u.prior is None else replace(u, value=float(rng.normal(value, u.prior)))
+            for u, value in zip(fitted.unknowns, values, strict=True)
+        ]
+        ends = descended(drawn, begin, unknowns, fitted.weights, keep_columns=True, max_steps=6)
+        found[draw] = ends.values(unknowns)
+        progress(draw + 1, draws)
+    return Bootstrap(found.std(axis=0, ddof=1), draws)
+
+
+def _free_share(fitted: Fit) -> Floats:
+    """(R,) root of the share of a reading's variance that its residual keeps, 1 - leverage."""
+    point, weights = fitted.point, fitted.weights
+    assert point.columns is not None and point.nuisance is not None
+    matrix = np.concatenate([weights(point.columns), weights(point.nuisance)], axis=1)
+    length = np.linalg.norm(matrix, axis=0)
+    u, s, _ = np.linalg.svd(matrix[:, length > 0] / length[length > 0], full_matrices=False)
+    leverage = (u[:, s > 1e-8 * s[0]] ** 2).sum(axis=1).reshape(point.residual.shape)
+    return np.sqrt(np.clip(1.0 - leverage.mean(axis=1), 0.05, 1.0))
