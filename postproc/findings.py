@@ -163,6 +163,16 @@ CODES: dict[str, Code] = {
         "The program uses a base or tool number that neither it nor the cell gives.",
     ),
     "CEL003": Code("error", "robot is not known", "No robot file has this name."),
+    "ROB001": Code(
+        "error",
+        "robot file would lose its URDF",
+        "A robot file names a URDF in its own folder or below; the new file would lie elsewhere.",
+    ),
+    "ROB002": Code(
+        "error",
+        "robot file can not be edited",
+        "New values are written into the text as it is; this layout leaves no place for them.",
+    ),
     "URD001": Code("error", "URDF is wrong", "The robot description can not be read as one serial arm."),
     # force
     "FRC001": Code("error", "no force", "--force was given alone, and no force belongs to the program."),
@@ -239,6 +249,113 @@ CODES: dict[str, Code] = {
         "no equilibrium",
         "The deflected robot has no stable state under this force; the cut is left as it was.",
     ),
+    # measurements
+    # identification
+    "IDN001": Code(
+        "error",
+        "no such effect or parameter",
+        "Effects are named as in a robot file, parameters as effect.parameter.",
+    ),
+    "IDN002": Code("error", "fewer readings than unknowns", "Nothing can be found from so few numbers."),
+    "IDN003": Code(
+        "error",
+        "model has no stable rest",
+        "With these values the robot would fall over; the robot file is wrong.",
+    ),
+    "IDN010": Code("error", "joint angles look like radians", "The columns A1..An are in degrees."),
+    "IDN011": Code("error", "poses are alike", "What a pose shows is the same for all of them."),
+    "IDN012": Code(
+        "error", "deflections are of no robot's size", "Their unit or that of the forces is another one."
+    ),
+    "IDN013": Code(
+        "error",
+        "loads say nothing",
+        "Without a load, or with one that never changes, its effect can not be seen.",
+    ),
+    "IDN014": Code(
+        "error", "readings fit after one change", "A column or a unit is another one than the header says."
+    ),
+    "IDN015": Code("warning", "readings fit badly", "Much of what was measured is not explained."),
+    "IDN016": Code(
+        "warning", "readings are of another robot", "The name in the readings is not that of the robot file."
+    ),
+    "IDN017": Code("error", "nothing can be found", "No parameter asked for shows in these readings."),
+    "IDN018": Code(
+        "warning",
+        "outlier",
+        "The reading lies far from where all others put it; --drop-outliers leaves it out.",
+    ),
+    "IDN019": Code("info", "outlier left out", "As asked for; the fit is without this reading."),
+    "IDN020": Code(
+        "warning",
+        "parameter can not be found",
+        "It keeps the value of the robot file; other poses or loads may show it.",
+    ),
+    "IDN021": Code(
+        "info",
+        "parameter is part of the registration",
+        "A place of the tracker or of its target does the same.",
+    ),
+    "IDN022": Code(
+        "warning",
+        "parameter is at its bound",
+        "The readings ask for more than is possible; something else is missing.",
+    ),
+    "IDN023": Code(
+        "warning",
+        "readings contradict the robot file",
+        "The interval in the robot file, or the model, is wrong.",
+    ),
+    "IDN024": Code(
+        "info", "more is left than scatter", "The model does not explain all; an effect may be missing."
+    ),
+    "IDN025": Code(
+        "info",
+        "parameters are correlated",
+        "The readings hardly tell them apart; their sum or ratio is known better.",
+    ),
+    "IDN026": Code(
+        "warning",
+        "interval differs by bootstrap",
+        "Few readings, outliers or a bent problem: trust the wider one.",
+    ),
+    "IDN027": Code(
+        "warning",
+        "no gain on poses not fitted",
+        "What was fitted does not hold elsewhere; ask for fewer effects.",
+    ),
+    "IDN028": Code(
+        "info", "registered anew", "The validation's tracker is registered from its own readings."
+    ),
+    "IDN029": Code(
+        "info",
+        "readings of a pose share an error",
+        "It counts in the weights: more targets of a pose say less than more poses.",
+    ),
+    "IDN030": Code(
+        "info", "level of an interval is not stated", "A prior with such an interval counts as one of 95 %."
+    ),
+    "MEA001": Code(
+        "error", "measurements are wrong", "A comment, the header or a row of the CSV can not be used."
+    ),
+    "MEA002": Code("error", "no readings yet", "No row of the CSV holds a measured value."),
+    "MEA003": Code("info", "rows without a reading", "Planned, but not measured: they were left out."),
+    "MEA004": Code("warning", "comment looks like a key", "It is close to a key, but none; it was not used."),
+    "MEA005": Code("warning", "target never occurs", "A place is stated for a target that no row measures."),
+    "MEA006": Code(
+        "warning",
+        "time runs backwards",
+        "Rows stand in the order of time: drift, backlash and hysteresis are read from it.",
+    ),
+    "MEA007": Code(
+        "warning",
+        "repeats of different states",
+        "REPEAT is the id of one state, measured again; rows with other joint angles or loads repeat nothing.",
+    ),
+    "MEA008": Code(
+        "error", "files do not belong together", "Files that are read as one must agree in what they say."
+    ),
+    "MEA009": Code("info", "frame is not used", "Deflections stand in the axes of the robot base."),
     # map
     "MAP001": Code(
         "error",

@@ -1,12 +1,14 @@
 """CSV files as columns: every mistake is told with file, line and column name.
 
 A header row, then rows with as many cells.  Comma, semicolon or tab, whichever gives the header most cells;
-where it is not the comma, a decimal comma is understood.  Blank lines and lines that begin with ``#`` are skipped.
+where it is not the comma, a decimal comma is understood.  Blank lines and lines that begin with ``#`` are skipped,
+above the header also those that a spreadsheet has put in quotes.
 """
 
 from __future__ import annotations
 
 import csv
+import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
@@ -22,13 +24,15 @@ _LINE_END = re.compile(r"\r\n|\n|\r")
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
 _NUMBER_CHARACTERS = frozenset("0123456789+-.eE")
 _NOTHING = ' \t;,"'  # a spreadsheet writes its empty rows as separators alone
+_MISSING = frozenset(("", "-", "nan", "n/a"))
 
 
 @dataclass(frozen=True, eq=False)
 class Table:
     """``columns``: name in lower case -> cells as text, blanks stripped; ``lines`` (rows,): line of the file, from 1.
 
-    ``comments``: (line, text after the #).  ``code`` is the one that errors in this table carry.
+    ``comments``: (line, text after the #).  ``code`` is the one that errors in this table carry.  ``digest``: SHA-256
+    of the bytes that were read.
     """
 
     path: Path
@@ -38,6 +42,7 @@ class Table:
     header_line: int
     separator: str
     comments: tuple[tuple[int, str], ...] = ()
+    digest: str = ""
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -58,19 +63,36 @@ class Table:
 
     def numbers(self, name: str) -> Floats:
         """The column (rows,) as finite numbers, in the unit of the file."""
+        return frozen(self._numbers(name, range(len(self))))
+
+    def numbers_or_nan(self, name: str) -> Floats:
+        """The column (rows,) as finite numbers, NaN where a cell is empty, ``-``, ``nan`` or ``n/a``."""
         cells = self.columns[name]
+        missing = {cell for cell in set(cells) if is_missing(cell)}
+        if not missing:
+            return self.numbers(name)
+        given = [row for row, cell in enumerate(cells) if cell not in missing]
+        values = np.full(len(self), np.nan)
+        values[given] = self._numbers(name, given)
+        return frozen(values)
+
+    def _numbers(self, name: str, rows: Sequence[int]) -> Floats:
+        """The cells of some ``rows`` as finite numbers (len(rows),)."""
+        cells = self.columns[name]
+        if len(rows) < len(cells):
+            cells = [cells[row] for row in rows]
         if self.separator != ",":
             cells = [cell.replace(",", ".", 1) if "," in cell else cell for cell in cells]
         # float() alone would also take nan, inf, 1_0 and the digits of other scripts
         if _NUMBER_CHARACTERS.issuperset("".join(cells)):
             try:
-                values = np.array([float(cell) for cell in cells])
+                values = np.array(list(map(float, cells)))
             except ValueError:
                 pass
             else:
                 if np.all(np.isfinite(values)):
-                    return frozen(values, (-1,))
-        for row, cell in enumerate(cells):
+                    return values
+        for row, cell in zip(rows, cells, strict=True):
             shown = self.columns[name][row][:40]
             if not cell:
                 raise self.error(row, name, "the cell is empty")
@@ -95,21 +117,14 @@ def read_table(path: Path, code: str) -> Table:
 
     Raises Refusal: FIL001 (not readable), FIL002 (empty), FIL003 (binary), ``code`` (header or rows are wrong).
     """
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
-    if b"\0" in raw:
-        raise Refusal(Finding("FIL003", "holds NUL bytes; save it as plain text (UTF-8)", str(path)))
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = raw.decode("latin-1")  # an old spreadsheet's umlauts in a comment; numbers are the same
-
-    comments, lines, kept = [], [], []
-    for number, line in enumerate(_LINE_END.split(text), start=1):
-        if line.lstrip().startswith("#"):
-            comments.append((number, line.strip()[1:].strip()))
+    raw = _bytes(path)
+    comments: list[tuple[int, str]] = []
+    lines: list[int] = []
+    kept: list[str] = []
+    for number, line in enumerate(_LINE_END.split(_text(raw)), start=1):
+        comment = _comment(line, above=not kept)
+        if comment is not None:
+            comments.append((number, comment))
         elif line.strip(_NOTHING):
             lines.append(number)
             kept.append(line)
@@ -129,12 +144,73 @@ def read_table(path: Path, code: str) -> Table:
         if len(row) != len(names):
             raise Refusal(_wrong_count(path, code, number, row, names, separator))
     columns = {
-        name: [cell.strip() for cell in cells]
+        name: list(map(str.strip, cells))
         for name, cells in zip(names, zip(*rows[1:], strict=True), strict=True)
     }
     return Table(
-        path, code, columns, frozen(lines[1:], (-1,), np.int64), lines[0], separator, tuple(comments)
+        path,
+        code,
+        columns,
+        frozen(lines[1:], (-1,), np.int64),
+        lines[0],
+        separator,
+        tuple(comments),
+        hashlib.sha256(raw).hexdigest(),
     )
+
+
+def comments_above(path: Path) -> tuple[tuple[int, str], ...]:
+    """(line, text after the #) of the comments above the header; the table itself may be wrong.
+
+    Raises Refusal FIL001 (not readable), FIL003 (binary).
+    """
+    found = []
+    for number, line in enumerate(_LINE_END.split(_text(_bytes(path))), start=1):
+        comment = _comment(line, above=True)
+        if comment is not None:
+            found.append((number, comment))
+        elif line.strip(_NOTHING):
+            break
+    return tuple(found)
+
+
+def is_missing(cell: str) -> bool:
+    """Whether a cell is empty, or says that there is nothing: ``-``, ``nan``, ``n/a`` in any case."""
+    return cell.lower() in _MISSING
+
+
+def finite_number(text: str) -> float | None:
+    """The number that ``text`` is, with a decimal point; None if it is none, or too large."""
+    return float(text) if _NUMBER.match(text) and math.isfinite(float(text)) else None
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
+    if b"\0" in raw:
+        raise Refusal(Finding("FIL003", "holds NUL bytes; save it as plain text (UTF-8)", str(path)))
+    return raw
+
+
+def _text(raw: bytes) -> str:
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")  # an old spreadsheet's umlauts in a comment; numbers are the same
+
+
+def _comment(line: str, above: bool) -> str | None:
+    """The text of a comment, None if ``line`` is none.
+
+    A spreadsheet puts a comment that holds separators in quotes and fills the row up with separators; below the
+    header quotes belong to cells.
+    """
+    begun = line.lstrip()
+    if above:
+        begun = begun.lstrip('"')
+    return begun[1:].rstrip(_NOTHING).strip() if begun.startswith("#") else None
 
 
 def _separator(header: str) -> str:

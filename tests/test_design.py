@@ -42,7 +42,12 @@ ROOMS = {
 }
 """Room -> its floor.  A new room gets its floor here."""
 
-ONE_FLOOR = {("forces", "cell"), ("toolpath", "geometry")}
+ONE_FLOOR = {
+    ("forces", "cell"),
+    ("toolpath", "geometry"),
+    ("measurements", "tables"),
+    ("measurements", "geometry"),
+}
 """Neighbours on one floor, from -> to."""
 
 TEXT = {"dialects", "document"}

@@ -1,5 +1,6 @@
 """CSV tables: dialects of spreadsheets are understood, mistakes are told with line and column."""
 
+import hashlib
 from contextlib import suppress
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from postproc.findings import Finding, Refusal
-from postproc.tables import read_table
+from postproc.tables import comments_above, finite_number, read_table
 
 
 def write(folder: Path, text: str | bytes) -> Path:
@@ -63,6 +64,52 @@ def test_old_mac_line_ends_and_latin_comment(tmp_path):
     table = read_table(write(tmp_path, b"# Fr\xe4sen\rline,fx\r1,2\r"), "FRC003")
     assert table.comments == ((1, "Fräsen"),)
     assert table.lines.tolist() == [3]
+
+
+def test_comments_that_a_spreadsheet_put_in_quotes(tmp_path):
+    text = '# robot: kr,,\n"# tool: 0, 0, 200",,\n#\nname,fx\n"#1",2\n#2,3\n'
+    path = write(tmp_path, text)
+    table = read_table(path, "FRC003")
+    assert table.comments == ((1, "robot: kr"), (2, "tool: 0, 0, 200"), (3, ""), (6, "2,3"))
+    assert table.texts("name") == ["#1"]
+    assert comments_above(path) == table.comments[:3]
+
+
+def test_comments_above_a_table_that_is_wrong(tmp_path):
+    assert comments_above(write(tmp_path, "# a: 1\n\nx,x\n1\n# b\n")) == ((1, "a: 1"),)
+    with pytest.raises(Refusal, match="FIL003"):
+        comments_above(write(tmp_path, b"# a\0"))
+
+
+def test_the_digest_is_that_of_the_file(tmp_path):
+    path = write(tmp_path, "\ufeffa\r\n1\r\n")
+    assert read_table(path, "FRC003").digest == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_missing_numbers(tmp_path):
+    table = read_table(write(tmp_path, "a;b;c\n1,5;;2\n-;NaN;3\nn/a;nan;4\n-2;N/A;5\n"), "FRC003")
+    assert np.array_equal(table.numbers_or_nan("a"), [1.5, np.nan, np.nan, -2.0], equal_nan=True)
+    assert np.isnan(table.numbers_or_nan("b")).all()
+    assert table.numbers_or_nan("c").tolist() == [2, 3, 4, 5]
+    assert not table.numbers_or_nan("a").flags.writeable
+    with pytest.raises(Refusal, match=r"file.csv:3: FRC003 column a: '-' is not a number"):
+        table.numbers("a")
+
+
+@pytest.mark.parametrize("cell", ["x", "--", "inf", "1_0", "na n", "1e999"])
+def test_what_is_neither_number_nor_missing(tmp_path, cell):
+    table = read_table(write(tmp_path, f"a,b\n,1\n\n1,1\n{cell},1\n"), "FRC003")
+    with pytest.raises(Refusal) as caught:
+        table.numbers_or_nan("a")
+    assert caught.value.findings[0].line == 5
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [("1.5", 1.5), ("-2e1", -20.0), ("1,5", None), ("nan", None), ("1e999", None), ("", None)],
+)
+def test_finite_numbers(text, number):
+    assert finite_number(text) == number
 
 
 def test_arrays_are_read_only(tmp_path):

@@ -52,16 +52,16 @@ class Nuisances:
 class Campaign:
     """Readings as a model sees them.
 
-    q (S, n), wrench (S, 6), conditions (S): the states that differ.  at (R,): the state of each reading, of a deflection
-    the loaded one, still (R,) its unloaded one.  pose (R,): readings with the motors in one place share a number, of
-    ``poses``.  tracked: the tracker's frame is not known; posed: rotations are measured too.  targets (K,): names,
-    place_known, turn_known (K,) what is stated of them.
+    q (S, n), wrench (S, 6), conditions (S): the states that differ.  at (R,): the state of each reading, of a
+    deflection the loaded one, still (R,) its unloaded one.  pose (R,): readings with the motors in one place share a
+    number, of ``poses``.  tracked: the tracker's frame is not known; posed: rotations are measured too.  targets (K,):
+    names, place_known, turn_known (K,) what is stated of them.
     """
 
     def __init__(self, readings: Readings, tool: Poses | None = None) -> None:
         """``tool``: TCP on the flange where the readings do not state one."""
         self.readings = readings
-        stated = tool if readings.tool is None else readings.tool
+        self.stated_tool = stated = tool if readings.tool is None else readings.tool
         self.tool = Poses.identity() if stated is None else stated
         self.tracked = not (readings.deflection or readings.in_robot_frame)
         self.posed = readings.rotation is not None
@@ -73,11 +73,12 @@ class Campaign:
         self.place_known: Bools = np.array([name in readings.places for name in named] or [not free])
         # of a target the place is stated, of a tool the axes too
         self.turn_known: Bools = np.array([False for _ in named] or [not free])
+        # begun with on the flange where nothing is stated
+        on_flange = [readings.places.get(name, np.zeros(3)) for name in named] or [self.tool.position]
         into_tool = self.tool.inverse()
         self.stated_places = np.array(
-            [into_tool.rotation @ readings.places[n] + into_tool.position if n in readings.places else into_tool.position
-             for n in named] or [np.zeros(3)]
-        )  # fmt: skip
+            [into_tool.rotation @ place + into_tool.position for place in on_flange]
+        )
         self.stated_turns = np.tile(np.eye(3), (len(self.targets), 1, 1))
         self.nuisance_names = tuple(self._nuisance_names())
 
@@ -109,7 +110,11 @@ class Campaign:
     def _find_states(self) -> None:
         readings, count = self.readings, len(self.readings)
         sense = approach(readings.q) if readings.direction is None else readings.direction
-        parts = [readings.q, readings.wrench, sense, readings.temperature, readings.time]
+        # growth counts from the first reading: what was there before is geometry
+        warmth, time = (
+            None if given is None else given - given[0] for given in (readings.temperature, readings.time)
+        )
+        parts = [readings.q, readings.wrench, sense, warmth, time]
         key = np.column_stack([part for part in parts if part is not None])
         if readings.deflection:
             unloaded = key.copy()
@@ -119,7 +124,7 @@ class Campaign:
         of, row = of.reshape(-1), first % count
         self.q = readings.q[row]
         self.wrench = np.where((first < count)[:, None], readings.wrench[row], 0.0)
-        given = Conditions(direction=sense, temperature=readings.temperature, time=readings.time)
+        given = Conditions(direction=sense, temperature=warmth, time=time)
         self.conditions = given.part(row)
         self.at: Ints = of[:count]
         self.still: Ints | None = of[count:] if readings.deflection else None
@@ -166,9 +171,7 @@ class Campaign:
             return left
         away = np.full_like(left, np.nan)
         known = np.isfinite(self.readings.rotation).all(axis=(1, 2)) & np.isfinite(position).all(axis=1)
-        away[known] = vector_from_rotation(
-            self.readings.rotation[known] @ np.swapaxes(rotation[known], 1, 2)
-        )
+        away[known] = vector_from_rotation(self.readings.rotation[known] @ np.swapaxes(rotation[known], 1, 2))
         return np.concatenate([left, away], axis=1)
 
     def in_base(self, residual: Floats, given: Nuisances) -> Floats:
@@ -233,7 +236,8 @@ class Campaign:
         return found if self.posed else found[:, :3]
 
     def moved(self, given: Nuisances, step: Floats) -> Nuisances:
-        """The nuisances after a step (U,) [m, rad]: frames T (exp(turn) p + shift), targets c + place, exp(axes) turn."""
+        """The nuisances after a step (U,) [m, rad]: frames T (exp(turn) p + shift), targets c + place and
+        exp(axes) turn."""
         rotation, position = given.frames.rotation.copy(), given.frames.position.copy()
         places, turns = given.places.copy(), given.turns.copy()
         for block, (kind, k) in enumerate(self._blocks()):

@@ -30,9 +30,7 @@ def columns(
         step = STEP * max(parameter.scale, abs(value))
         low, high = max(value - step, parameter.lower), min(value + step, parameter.upper)
         ends = [
-            campaign.expected(
-                campaign.seen(model.changed({unknown.key: end}), seen.displacement), given
-            )
+            campaign.expected(campaign.seen(model.changed({unknown.key: end}), seen.displacement), given)
             for end in (low, high)
         ]
         per = parameter.scale / (high - low)

@@ -47,13 +47,21 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Fit:
-    """A campaign fitted.  point: the model found and what it leaves; unknowns (k,): found; dropped: asked for, and left as
-    they were; covariance (k, k) [SI]; factor: variance of the readings over what ``noise`` says, ``scatter_exceeded`` if
-    that is clearly more; freedom: of the residuals; quantile: half width of an interval over its deviation."""
+    """A campaign fitted.
+
+    start, asked: the model to begin with and the unknowns asked for; weights: as used, plain_weights: before a robust
+    fit changed them; point: the model found and what it leaves; unknowns (k,): found; dropped: asked for, and left as
+    they were; covariance (k, k) [SI]; condition: see ``Insight``; factor: variance of the readings over what ``noise``
+    says, scatter_exceeded if that is clearly more; freedom: of the residuals; quantile: half width of an interval over
+    its deviation.
+    """
 
     campaign: Campaign
+    start: StiffnessModel
+    asked: tuple[Unknown, ...]
     noise: Noise
     weights: Weighting
+    plain_weights: Weighting
     point: Point
     unknowns: tuple[Unknown, ...]
     dropped: tuple[Dropped, ...]
@@ -101,31 +109,35 @@ def fit(
 
     Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to begin with has no rest.
     """
-    noise = noise_of(campaign.readings)
+    noise, start = noise_of(campaign.readings), model
     rows = np.ones(len(campaign), bool) if rows is None else rows
     point = at(campaign, model, campaign.start())
     if not point.seen.converged.all():
         lost = int((~point.seen.converged).sum())
         raise Refusal(
-            Finding("IDN003", f"{lost} of {len(campaign.q)} states have no stable rest", str(model.robot.path))
+            Finding(
+                "IDN003", f"{lost} of {len(campaign.q)} states have no stable rest", str(model.robot.path)
+            )
         )
     stage("registering")
     given = registered(campaign, point.seen, rows)
     point = replace(point, given=given, residual=campaign.residual(point.seen, given))
-    weights = weighting(campaign, noise, point.residual).times(rows.astype(float))
+    weights = plain = weighting(campaign, noise, point.residual).times(rows.astype(float))
     _enough(campaign, weights, unknowns)
     point = _awake(campaign, point, unknowns)
     begin = point
     free, dropped = list(unknowns), list[Dropped]()
     stage("fitting")
     while True:
-        point = descended(campaign, point, free, weights)
+        point = descended(campaign, point, free, plain)
+        told = _with_turns(campaign, point, noise, plain)
+        told = replace(told, shared=shared_error(point.residual, told))
+        if told.shared != plain.shared or told.weight is not plain.weight:
+            plain, point = told, descended(campaign, point, free, told)
+        weights = plain
         if robust:
-            point, weights = _robust(campaign, point, free, weights, rows)
-        weights = _with_turns(campaign, point, noise, weights)
-        if weights.shared == 0.0:
-            weights = replace(weights, shared=shared_error(point.residual, weights))
-        point = with_columns(campaign, descended(campaign, point, free, weights), free)
+            point, weights = _robust(campaign, point, free, plain, rows)
+        point = with_columns(campaign, point, free)
         found = _insight(campaign, point, free, weights, 1.0)
         factor, exceeded, freedom, quantile = _variance(campaign, point, free, weights, noise, found)
         found = _insight(campaign, point, free, weights, factor)
@@ -138,7 +150,7 @@ def fit(
         point = at(campaign, model, point.given, begin.seen.displacement)
     scale = scales(free)
     return Fit(
-        campaign, noise, weights, point, tuple(free), tuple(dropped),
+        campaign, start, tuple(unknowns), noise, weights, plain, point, tuple(free), tuple(dropped),
         found.covariance * np.outer(scale, scale), found.condition, factor, exceeded, freedom, quantile,
     )  # fmt: skip
 
@@ -152,7 +164,7 @@ def _enough(campaign: Campaign, weights: Weighting, unknowns: Sequence[Unknown])
                 "IDN002",
                 f"{weights.counts} measured numbers for {wanted} unknowns: {len(unknowns) - priors} parameters and"
                 f" {len(campaign.nuisance_names)} of the tracker and its targets",
-                str(campaign.readings.files[0]),
+                campaign.readings.where(0)[0],
                 help="measure more poses, or ask for fewer effects with --effects",
             )
         )
@@ -160,33 +172,20 @@ def _enough(campaign: Campaign, weights: Weighting, unknowns: Sequence[Unknown])
 
 def _awake(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Point:
     """The point, with the effects that move nothing at all where they stand begun at the sizes of their parameters."""
-    found = with_columns(campaign, point, unknowns).columns
-    assert found is not None
-    still = ~np.nan_to_num(np.abs(found)).any(axis=(0, 1))
+    point = with_columns(campaign, point, unknowns)
+    moves = np.abs(np.nan_to_num(point.taken[0])).max(axis=(0, 1), initial=0.0) > 0
+    awake = {u.term for u, moved in zip(unknowns, moves, strict=True) if moved}
     asleep = {
-        u.key: u.parameter.scale
-        for u in unknowns
-        if all(still[i] for i, other in enumerate(unknowns) if other.term == u.term)
-        and all(point.model.terms[u.term].values[p.name] == p.null for p in [u.parameter])
+        u.key: u.parameter.scale for u in unknowns if u.term not in awake and u.value == u.parameter.null
     }
-    if not asleep:
-        return point
-    tried = at(campaign, point.model.changed(asleep), point.given)
-    moves = with_columns(campaign, tried, unknowns).columns
-    assert moves is not None
-    # what moves nothing at its size either stays at its null
-    wakes = {
-        u.term for i, u in enumerate(unknowns) if u.key in asleep and np.nan_to_num(np.abs(moves[:, :, i])).max() > 1e-9
-    }
-    woken = {key: value for key, value in asleep.items() if key[0] in wakes}
-    return at(campaign, point.model.changed(woken), point.given) if woken else point
+    return at(campaign, point.model.changed(asleep), point.given) if asleep else point
 
 
 def _robust(
     campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, rows: Bools
 ) -> tuple[Point, Weighting]:
     """Reweighted until the weights stand: those of Huber for the length of a reading's residual."""
-    plain = replace(weights, weight=np.where(weights.weight > 0, weights.weight, 0.0))
+    plain = weights
     share = np.ones(len(rows))
     for _ in range(20):
         length = lengths(point.residual, plain)
@@ -209,7 +208,8 @@ def lengths(residual: Floats, weights: Weighting) -> Floats:
 
 
 def spread_of(length: Floats) -> float:
-    """One standard deviation of a coordinate by the median of lengths in space, at least 1 (1.538: that of chi with 3)."""
+    """One standard deviation of a coordinate by the median of lengths in space, at least 1 (1.538: the median of
+    chi with 3 degrees of freedom)."""
     return max(1.0, float(np.median(length)) / 1.538)
 
 
@@ -219,21 +219,23 @@ def _with_turns(campaign: Campaign, point: Point, noise: Noise, weights: Weighti
         return weights
     scaled = np.nan_to_num(point.residual) * weights.weight
     on = weights.weight > 0
-    place, turn = (np.sqrt((scaled[:, s] ** 2).sum() / max(1, on[:, s].sum())) for s in (slice(0, 3), slice(3, 6)))
-    if place == 0 or turn == 0:
+    place, turn = (
+        np.sqrt((scaled[:, s] ** 2).sum() / max(1, on[:, s].sum())) for s in (slice(0, 3), slice(3, 6))
+    )
+    like = (max(place, 1.0) if noise.known else place) / turn if turn > 0 and place > 0 else 1.0
+    if abs(like - 1.0) < 0.05:
         return weights
     weight = weights.weight.copy()
-    weight[:, 3:] *= (max(place, 1.0) if noise.known else place) / turn
+    weight[:, 3:] *= like
     return replace(weights, weight=weight)
 
 
 def _insight(
     campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, factor: float
 ) -> Insight:
-    assert point.columns is not None and point.nuisance is not None
-    columns = np.nan_to_num(weights(point.columns))
-    nuisance = weights(point.nuisance)
-    return insight(free, columns, nuisance, campaign.nuisance_names, prior_rows(free), point.values(free), factor)
+    columns, nuisance = (np.nan_to_num(weights(part)) for part in point.taken)
+    prior, values = prior_rows(free), point.values(free)
+    return insight(free, columns, nuisance, campaign.nuisance_names, prior, values, factor)
 
 
 def _variance(
@@ -250,8 +252,7 @@ def _variance(
 
     left = weights(point.residual)
     squares = float(left @ left)
-    assert point.nuisance is not None
-    nuisances = int(np.linalg.matrix_rank(weights(point.nuisance))) if len(campaign.nuisance_names) else 0
+    nuisances = int(np.linalg.matrix_rank(weights(point.taken[1]))) if campaign.nuisance_names else 0
     without_prior = sum(free[i].prior is None for i in found.kept)
     freedom = max(0, weights.counts - nuisances - without_prior)
     if freedom == 0:

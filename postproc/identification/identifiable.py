@@ -142,7 +142,9 @@ def _explained(
     parts = [i for i in np.argsort(-np.abs(share)) if abs(share[i]) > PART * size]
     own = unknowns[k].parameter.scale
     together = tuple(
-        (names[i], float(weights[i] * unknowns[kept[i]].parameter.scale / own)) for i in parts if i < len(kept)
+        (names[i], float(weights[i] * unknowns[kept[i]].parameter.scale / own))
+        for i in parts
+        if i < len(kept)
     )
     frames = sorted({nuisance_names[i - len(kept)].split(".")[0] for i in parts if i >= len(kept)})
     words = [name for name, _ in together] + [f"the {frame}" for frame in frames]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, Ints
 from postproc.identification.campaign import Campaign
 from postproc.measurements import Readings
 
@@ -22,8 +22,9 @@ CLEARLY_SHARED = 3.3
 
 @dataclass(frozen=True)
 class Noise:
-    """``sigma`` (R,) [m] of each coordinate, ``sigma_turn`` (R,) [rad]; ``known``: stated or seen in repeats, or else only
-    ratios count; ``source``: in words; ``repeats`` [m] one sigma of repeated readings (NaN without), of ``freedom``."""
+    """``sigma`` (R,) [m] of each coordinate, ``sigma_turn`` (R,) [rad]; ``known``: stated or seen in repeats, or else
+    only ratios count; ``source``: in words; ``repeats`` [m] one sigma of repeated readings (NaN without), of
+    ``freedom``."""
 
     sigma: Floats
     sigma_turn: Floats
@@ -68,7 +69,7 @@ def _pure_error(readings: Readings) -> tuple[float, int]:
     return (float(np.sqrt(total / freedom)) if freedom else np.nan), freedom
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Weighting:
     """Residuals and columns in standard deviations.
 
@@ -77,7 +78,7 @@ class Weighting:
     """
 
     weight: Floats
-    pose: Floats
+    pose: Ints
     shared: float = 0.0
 
     def __call__(self, values: Floats) -> Floats:
@@ -127,7 +128,7 @@ def shared_error(residual: Floats, weights: Weighting) -> float:
     return float(np.sqrt(share))
 
 
-def _by_pose(pose: Floats, values: Floats) -> Floats:
+def _by_pose(pose: Ints, values: Floats) -> Floats:
     """Sums (poses, ...) of ``values`` (R, ...)."""
     total = np.zeros((int(pose.max()) + 1, *values.shape[1:]))
     np.add.at(total, pose, values)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
+from postproc.arrays import Bools, Floats, Ints
 from postproc.geometry import Poses
 from postproc.identification.campaign import Campaign, Nuisances, Seen
 
@@ -26,7 +26,7 @@ def registered(campaign: Campaign, seen: Seen, rows: Bools) -> Nuisances:
     usable = rows & np.isfinite(campaign.readings.value).all(axis=1) & seen.converged[campaign.at]
     if campaign.tracked:
         for k in np.argsort(-np.bincount(session[usable], minlength=len(campaign.readings.sessions))):
-            own = np.flatnonzero(usable & (session == k))
+            own = np.flatnonzero(usable & (session == k)).astype(np.int64)
             if len(own):
                 given = _session(campaign, seen, given, int(k), own)
     if campaign.posed and campaign.still is None:
@@ -34,7 +34,7 @@ def registered(campaign: Campaign, seen: Seen, rows: Bools) -> Nuisances:
     return given
 
 
-def _session(campaign: Campaign, seen: Seen, given: Nuisances, k: int, own: Floats) -> Nuisances:
+def _session(campaign: Campaign, seen: Seen, given: Nuisances, k: int, own: Ints) -> Nuisances:
     some = own[np.linspace(0, len(own) - 1, min(len(own), SAMPLE)).round().astype(int)]
     best, least = given, np.inf
     for turn in _cube_turns():
@@ -48,7 +48,7 @@ def _session(campaign: Campaign, seen: Seen, given: Nuisances, k: int, own: Floa
 
 
 def _descended(
-    campaign: Campaign, seen: Seen, given: Nuisances, rows: Floats, steps: int
+    campaign: Campaign, seen: Seen, given: Nuisances, rows: Ints, steps: int
 ) -> tuple[Nuisances, float]:
     """Gauss-Newton on positions: the nuisances, and the mean square that is left [m2]."""
     last = np.inf
@@ -60,7 +60,7 @@ def _descended(
         last = size
         columns = campaign.nuisance_columns(seen, given)[rows, :3]
         step = np.linalg.lstsq(columns.reshape(left.size, -1), left.reshape(-1), rcond=1e-9)[0]
-        given = campaign.moved(given, step)
+        given = campaign.moved(given, np.asarray(step, float))
     return given, last
 
 

@@ -39,6 +39,13 @@ class Point:
     nuisance: Floats | None = None
     settled: bool = False
 
+    @property
+    def taken(self) -> tuple[Floats, Floats]:
+        """columns and nuisance, which must have been taken."""
+        if self.columns is None or self.nuisance is None:
+            raise ValueError("a point whose columns were not taken")
+        return self.columns, self.nuisance
+
     def values(self, unknowns: Sequence[Unknown]) -> Floats:
         """(P,) [SI]"""
         return np.array([self.model.terms[u.term].values[u.parameter.name] for u in unknowns])
@@ -97,13 +104,12 @@ def descended(
         return left, int(lost.sum())
 
     left, lost = residuals(point)
-    fresh = keep_columns
+    fresh = point.columns is not None
     for _ in range(max_steps):
         if not fresh:
             point, fresh = with_columns(campaign, point, unknowns), True
-        assert point.columns is not None and point.nuisance is not None
         x = point.values(unknowns) / scale
-        matrix = np.concatenate([weights(point.columns), weights(point.nuisance)], axis=1)
+        matrix = np.concatenate([weights(part) for part in point.taken], axis=1)
         extra = np.concatenate([prior, np.zeros((len(x), len(loose)))], axis=1)
         matrix = np.nan_to_num(np.concatenate([matrix, extra]))
         if matrix.shape[1] == 0:

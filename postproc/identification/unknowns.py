@@ -42,9 +42,9 @@ class Asked:
 def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False) -> Asked:
     """The unknowns that ``words`` name: effects, or single parameters as effect.parameter.
 
-    An effect that the model does not have is added at its null, with the dimensions of a mechanism of its kind where the
-    robot file has one.  Dimensions of hardware, unless named by themselves, are taken from the robot file: with an interval
-    as a prior, without one as they stand.  ``priors``: every stated interval counts as a prior.
+    An effect that the model does not have is added at its null, with the dimensions of a mechanism of its kind where
+    the robot file has one.  Dimensions of hardware, unless named by themselves, are taken from the robot file: with an
+    interval as a prior, without one as they stand.  ``priors``: every stated interval counts as a prior.
 
     Raises Refusal IDN001 for a name that is not known.
     """
@@ -77,8 +77,12 @@ def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False)
                     continue
                 unknowns.append(Unknown(name, index, parameter, term.values[parameter.name], stated, prior))
         if not found:
-            known = [p.name for term in model.terms if term.effect.name == effect for p in term.effect.parameters]
-            raise _unknown_name(f"{effect} has no parameter {single!r}{nearest(single, known)}", ", ".join(known))
+            known = [
+                p.name for term in model.terms if term.effect.name == effect for p in term.effect.parameters
+            ]
+            raise _unknown_name(
+                f"{effect} has no parameter {single!r}{nearest(single, known)}", ", ".join(known)
+            )
     return Asked(model, tuple(unknowns), tuple(held))
 
 

@@ -57,8 +57,8 @@ def counted(fitted: Fit) -> Bools:
 
 @dataclass(frozen=True)
 class Validation:
-    """Readings that were not fitted: ``before``, ``after`` (R, 3) [m] residuals of the models before and after, robot base
-    axes; ``registered_anew``: their tracker stood elsewhere."""
+    """Readings that were not fitted: ``before``, ``after`` (R, 3) [m] residuals of the models before and after, robot
+    base axes; ``registered_anew``: their tracker stood elsewhere."""
 
     campaign: Campaign
     before: Floats
@@ -96,7 +96,10 @@ def _stations(fitted: Fit, campaign: Campaign, given: Nuisances) -> Nuisances:
         pairs = [(0, 0)]
     rotation, position = given.frames.rotation.copy(), given.frames.position.copy()
     for k, other in pairs:
-        rotation[k], position[k] = fitted.point.given.frames.rotation[other], fitted.point.given.frames.position[other]
+        rotation[k], position[k] = (
+            fitted.point.given.frames.rotation[other],
+            fitted.point.given.frames.position[other],
+        )
     return replace(given, frames=Poses(rotation, position))
 
 
@@ -137,8 +140,7 @@ def bootstrap(fitted: Fit, draws: int, progress: Progress = nothing) -> Bootstra
 def _free_share(fitted: Fit) -> Floats:
     """(R,) root of the share of a reading's variance that its residual keeps, 1 - leverage."""
     point, weights = fitted.point, fitted.weights
-    assert point.columns is not None and point.nuisance is not None
-    matrix = np.concatenate([weights(point.columns), weights(point.nuisance)], axis=1)
+    matrix = np.concatenate([weights(part) for part in point.taken], axis=1)
     length = np.linalg.norm(matrix, axis=0)
     u, s, _ = np.linalg.svd(matrix[:, length > 0] / length[length > 0], full_matrices=False)
     leverage = (u[:, s > 1e-8 * s[0]] ** 2).sum(axis=1).reshape(point.residual.shape)

@@ -1,0 +1,106 @@
+"""Readings that belong to nothing: a broken beam, a reflector mistaken for another, a wrong row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats
+from postproc.identification.fit import Fit, fit, lengths, spread_of
+
+CHANCE = 0.01
+"""Probability that among all readings of a campaign without outliers any is told as one."""
+
+CLEARLY = 0.2
+"""An explanation leaves at most this share of what there is without it."""
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """A reading ``distance`` [m] from where it should be, ``sigmas`` of its scatter; ``what`` it may be, in words."""
+
+    row: int
+    file: str
+    line: int
+    distance: float
+    sigmas: float
+    what: str
+
+
+def outliers(fitted: Fit, rows: Bools) -> tuple[tuple[Outlier, ...], Fit]:
+    """The outliers among ``rows`` (R,) of a campaign, worst first, and the fit that tells them: a robust one where the
+    least squares look as if there were any, else ``fitted``.
+
+    The scatter is that of most readings (by the median), so that a model that lacks something does not make outliers of
+    all that it does not explain.
+    """
+    limit = _limit(int(rows.sum()))
+    if not _far(fitted, rows, 0.7 * limit).any():
+        return (), fitted
+    campaign = fitted.campaign
+    robust = fit(campaign, fitted.start, fitted.asked, rows, robust=True)
+    length, level = _lengths(robust, rows)
+    found = []
+    for row in np.flatnonzero(rows & (length > limit * level)):
+        file, line = campaign.readings.where(int(row))
+        distance = float(np.linalg.norm(np.nan_to_num(robust.point.residual[row, :3])))
+        what = _explained(robust, int(row), limit * level)
+        found.append(Outlier(int(row), file, line, distance, float(length[row] / level), what))
+    return tuple(sorted(found, key=lambda o: -o.sigmas)), robust
+
+
+def _limit(count: int) -> float:
+    """Length of a residual [its standard deviation] that one of ``count`` normal ones in space exceeds by chance."""
+    from scipy.stats import chi
+
+    return float(chi.ppf((1.0 - CHANCE) ** (1.0 / max(count, 1)), 3))
+
+
+def _lengths(fitted: Fit, rows: Bools) -> tuple[Floats, float]:
+    length = lengths(fitted.point.residual, fitted.plain_weights)
+    return length, spread_of(length[rows])
+
+
+def _far(fitted: Fit, rows: Bools, limit: float) -> Bools:
+    length, level = _lengths(fitted, rows)
+    return np.asarray(rows & (length > limit * level))
+
+
+def _explained(fitted: Fit, row: int, limit: float) -> str:
+    """What the reading ``row`` fits better, in words."""
+    campaign, readings = fitted.campaign, fitted.campaign.readings
+    sigma = float(fitted.noise.sigma[row])
+    expected, _ = campaign.expected(fitted.point.seen, fitted.point.given)
+    measured = readings.value[row]
+    here = float(np.linalg.norm(measured - expected[row]))
+    close = max(limit * sigma, CLEARLY * here * 0.1)
+    same = (campaign.at == campaign.at[row]) & (np.arange(len(campaign)) != row)
+    away = np.linalg.norm(measured - expected, axis=1)
+    names = campaign.targets
+    others = np.flatnonzero(same & (readings.target != readings.target[row]) & (away < close))
+    if len(others):
+        other = others[np.argmin(away[others])]
+        return (
+            f"fits target {names[readings.target[other]]} (line {readings.where(int(other))[1]}) instead of"
+            f" {names[readings.target[row]]}: mistaken for each other?"
+        )
+    rest = ~same & (np.arange(len(campaign)) != row) & (campaign.pose != campaign.pose[row]) & (away < close)
+    if rest.any() and _distinct(expected, close):
+        other = int(np.argmin(np.where(rest, away, np.inf)))
+        return f"fits the state of line {readings.where(other)[1]}: a row in the wrong place?"
+    if readings.deflection and np.linalg.norm(measured + expected[row]) < close:
+        return "fits with the opposite sign: unloaded minus loaded?"
+    for a, b in ((0, 1), (0, 2), (1, 2)):
+        turned = measured.copy()
+        turned[[a, b]] = turned[[b, a]]
+        if np.linalg.norm(turned - expected[row]) < close:
+            return f"fits with {'XYZ'[a]} and {'XYZ'[b]} exchanged"
+    return "fits nothing here: a broken beam, or a joint that did not stand where the row says?"
+
+
+def _distinct(expected: Floats, close: float) -> bool:
+    """Whether places are far enough apart for a coincidence to say something: few pairs are as close as ``close``."""
+    some = expected[np.linspace(0, len(expected) - 1, min(len(expected), 200)).astype(int)]
+    apart = np.linalg.norm(some[:, None] - some[None], axis=2)
+    return bool((apart < close).mean() < 0.05)
