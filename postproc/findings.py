@@ -356,6 +356,31 @@ CODES: dict[str, Code] = {
         "error", "files do not belong together", "Files that are read as one must agree in what they say."
     ),
     "MEA009": Code("info", "frame is not used", "Deflections stand in the axes of the robot base."),
+    # plan
+    "PLN001": Code("error", "no pose can be measured", "Limits, room and sight to the tracker leave no pose."),
+    "PLN002": Code("error", "nothing can be seen", "No pose and load on offer shows what is asked for."),
+    "PLN003": Code("error", "no stable rest", "The deflected robot has no equilibrium under these loads."),
+    "PLN004": Code("error", "not enough distinct poses", "Ask for fewer poses, or for a smaller --spacing."),
+    "PLN005": Code("error", "no load", "A deflection is what a load does; name the weights that can be hung."),
+    "PLN006": Code("error", "plan can not be made so", "Two options do not go together."),
+    "PLN007": Code(
+        "warning",
+        "parameter can not be seen",
+        "Whatever the pose, these loads and readings do not show it; `identify` will leave it as it is.",
+    ),
+    "PLN008": Code(
+        "warning",
+        "parameter is left out",
+        "These poses together show too little of it; `identify` will leave it as it is. More poses may show it.",
+    ),
+    "PLN009": Code(
+        "info", "interval wider than wanted", "More poses, a larger load or lever, or another room for the poses."
+    ),
+    "PLN010": Code(
+        "warning",
+        "effects can not be told apart",
+        "Even at these poses either explains what the other would show, within the scatter.",
+    ),
     # map
     "MAP001": Code(
         "error",

@@ -144,6 +144,8 @@ class StiffnessModel:
 
     def changed(self, values: Mapping[tuple[int, str], float]) -> StiffnessModel:
         """The model with other values (SI) of some parameters: (index of the effect in ``terms``, name) -> value."""
+        if not values:
+            return self
         terms = list(self.terms)
         for (term, parameter), value in values.items():
             terms[term] = replace(terms[term], values={**terms[term].values, parameter: value})
@@ -171,10 +173,11 @@ class StiffnessModel:
         deviation = np.array([stated.get(name) or 0.0 for name in names])
         return _part((names, relation * np.outer(deviation, deviation)), stated)
 
-    def added(self, effect: Effect, values: Values | None = None) -> StiffnessModel:
-        """The model with one more effect, at its null values where ``values`` says nothing."""
-        nulls = {parameter.name: parameter.null for parameter in effect.parameters}
-        return replace(self, terms=(*self.terms, Term(effect, {**nulls, **(values or {})}, {})))
+    def added(self, effect: Effect, stated: Mapping[str, Value] | None = None) -> StiffnessModel:
+        """The model with one more effect, at its null values where ``stated`` says nothing."""
+        known = dict(stated or {})
+        values = {p.name: known[p.name].value if p.name in known else p.null for p in effect.parameters}
+        return replace(self, terms=(*self.terms, Term(effect, values, known)))
 
     @cached_property
     def chain(self) -> Chain:

@@ -29,6 +29,7 @@ class Section:
     """A mapping of a YAML file.  Getters raise Refusal with the line of the key they were asked for."""
 
     def __init__(self, node: yaml.MappingNode, file: Path, where: str) -> None:
+        self.node = node
         self.file = file
         self.where = where
         self.line = node.start_mark.line + 1
@@ -148,6 +149,14 @@ class Section:
             )
         return value
 
+    def texts(self, key: str) -> list[str]:
+        """The words of the list under ``key``."""
+        node = self._get(key, _REQUIRED)
+        words = node.value if isinstance(node, yaml.SequenceNode) else None
+        if words is None or not all(isinstance(word, yaml.ScalarNode) for word in words):
+            raise self.error("YML004", "must be a list of words", key)
+        return [str(word.value) for word in words]
+
     def flag(self, key: str, default: bool) -> bool:
         node = self._get(key, default)
         if node is None:
@@ -186,15 +195,24 @@ class Section:
 
 
 def load(path: Path) -> Section:
-    """The top mapping of a YAML file.
+    """The top mapping of a YAML file.  Raises Refusal as ``read`` and ``parsed`` do."""
+    return parsed(read(path), path)
 
-    Raises Refusal: FIL001 (not readable), FIL002 (empty), YML001 (no YAML, no mapping, aliases, tags, too deep).
-    """
+
+def read(path: Path) -> bytes:
+    """The bytes of a YAML file.  Raises Refusal FIL001 where they can not be read."""
     try:
         with path.open("rb") as stream:
-            raw = stream.read(MAX_BYTES + 1)
+            return stream.read(MAX_BYTES + 1)
     except OSError as error:
         raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
+
+
+def parsed(raw: bytes, path: Path) -> Section:
+    """The top mapping of the YAML text ``raw``, as that of the file ``path``.
+
+    Raises Refusal: FIL002 (empty), YML001 (no YAML, no mapping, too large, aliases, tags, too deep).
+    """
     if len(raw) > MAX_BYTES:
         raise Refusal(Finding("YML001", f"larger than {MAX_BYTES} bytes", str(path)))
     try:

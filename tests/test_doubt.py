@@ -214,14 +214,16 @@ def test_correlated_parameters_spread_as_drawn_robots():
     sizes = np.diag([2e-7, 3e-7, 3e-7])
     relation = np.array([[1.0, -0.8, 0.3], [-0.8, 1.0, 0.1], [0.3, 0.1, 1.0]])
     matrix = sizes @ relation @ sizes
-    known = spreads(task.model, covariance=(names, matrix))
+    known = spreads(replace(task.model, covariance=(names, matrix)))
     assert "joint_compliance.c1" in [entry.name for entry in known.entries]
     assert not known.without_interval
     assert "joint_compliance.c4" not in known.level_unstated
     # only those three: what the file says of the others is taken out
     known = spreads(
-        restated(task.model, **dict.fromkeys([n.split(".")[1] for n in INTERVALS], 0.0)),
-        covariance=(names, matrix),
+        replace(
+            restated(task.model, **dict.fromkeys([n.split(".")[1] for n in INTERVALS], 0.0)),
+            covariance=(names, matrix),
+        )
     )
     spread = spread_of(task, task.wanted, known)[1]
     seen = covariance_of(drawn(task, task.wanted, names, np.linalg.cholesky(matrix))[0])
@@ -232,7 +234,7 @@ def test_correlated_parameters_spread_as_drawn_robots():
 
 def test_a_covariance_of_an_unknown_parameter_is_refused():
     with pytest.raises(ValueError, match="c9"):
-        spreads(paper(), covariance=(["joint_compliance.c9"], np.eye(1)))
+        spreads(replace(paper(), covariance=(("joint_compliance.c9",), np.eye(1))))
 
 
 @pytest.mark.parametrize(
@@ -307,7 +309,10 @@ def test_a_tenth_of_what_has_no_interval():
     tenths = dict(told.tenth)
     row = np.array([told.worst])
     softer = _real(
-        task, task.model.changed({(0, "c1"): 1.1 * task.model.terms[0].values["c1"]}), task.wanted, task.wrench
+        task,
+        task.model.changed({(0, "c1"): 1.1 * task.model.terms[0].values["c1"]}),
+        task.wanted,
+        task.wrench,
     )
     more = np.linalg.norm(softer - _real(task, task.model, task.wanted, task.wrench), axis=1)
     assert tenths["joint_compliance.c1"] == pytest.approx(more[row][0], rel=0.01)

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from statistics import NormalDist
 
 import numpy as np
 
@@ -24,9 +23,7 @@ from postproc.compensation.mirror import predict
 from postproc.effects import Conditions
 from postproc.geometry import Poses
 from postproc.model import NOTHING, StiffnessModel
-
-COVERAGE = 1.96
-"""Half width of a 95 % interval over the standard deviation (normal distribution)."""
+from postproc.robot.description import COVERAGE
 
 STEP = 0.1
 """Step of the differences, in standard deviations."""
@@ -83,35 +80,29 @@ class Spreads:
         return bool(self.without_interval)
 
 
-def spreads(
-    model: StiffnessModel,
-    force_ci95: float | None = None,
-    forced: bool = False,
-    covariance: tuple[Sequence[str], Floats] | None = None,
-) -> Spreads:
+def spreads(model: StiffnessModel, force_ci95: float | None = None, forced: bool = False) -> Spreads:
     """What is known of the figures that predictions of ``model`` hang on.
 
-    ``force_ci95``: share of the force, 95 %; without it a force that acts (``forced``) has no interval.
-    ``covariance``: names and their covariance matrix (SI); it stands for what the robot file says of these; other
-    parameters are taken as independent.  Raises ValueError for a name that the model does not have.
+    ``force_ci95``: share of the force, 95 %; without it a force that acts (``forced``) has no interval.  The model's
+    covariance stands for what the robot file says of its parameters; others are taken as independent.  Raises
+    ValueError where it has a name that the model does not have.
     """
-    names, block = (tuple(covariance[0]), np.asarray(covariance[1])) if covariance else ((), np.zeros((0, 0)))
+    names, block = model.covariance or ((), np.zeros((0, 0)))
     known: list[Unsure] = []
     without: list[Unsure] = []
     unstated: list[str] = []
     seen: set[str] = set()
     for index, term in enumerate(model.terms):
-        twins = [i for i, other in enumerate(model.terms) if other.effect.name == term.effect.name]
-        effect = term.effect.name if len(twins) == 1 else f"{term.effect.name}#{twins.index(index) + 1}"
+        label = model.label(index)
         for parameter in term.effect.parameters:
-            name, value = f"{effect}.{parameter.name}", float(term.values[parameter.name])
+            name, value = f"{label}.{parameter.name}", float(term.values[parameter.name])
             stated = term.stated.get(parameter.name)
             deviation = None
             if name in names:
                 at = names.index(name)
                 deviation = float(np.sqrt(block[at, at]))
             elif stated is not None and stated.interval is not None:
-                deviation = stated.interval / _coverage(stated.level)
+                deviation = stated.deviation
                 if stated.level is None:
                     unstated.append(name)
             seen.add(name)
@@ -129,11 +120,6 @@ def spreads(
     place = [[entry.name for entry in known].index(name) for name in names]
     matrix[np.ix_(place, place)] = block
     return Spreads(tuple(known), matrix, tuple(without), tuple(unstated))
-
-
-def _coverage(level: float | None) -> float:
-    """Half width over standard deviation; a level that is not stated is taken for 95 %."""
-    return COVERAGE if level in (None, 0.95) else NormalDist().inv_cdf(0.5 * (1.0 + float(level or 0.0)))
 
 
 def sensitivities(
@@ -248,12 +234,7 @@ class Doubt:
         return bool(self.tenth) or self.unstable > 0
 
 
-def doubt_of(
-    task: Task,
-    result: Result,
-    force_ci95: float | None = None,
-    covariance: tuple[Sequence[str], Floats] | None = None,
-) -> Doubt:
+def doubt_of(task: Task, result: Result, force_ci95: float | None = None) -> Doubt:
     """The doubt of a prediction, and of what remains after its correction; ``spreads`` says what the others are.
 
     Evaluated are all motions up to ``WORST + EVEN``; of more, those with the largest errors before and after and
@@ -261,7 +242,7 @@ def doubt_of(
     """
     rows = _evaluated(result)
     forced = bool(task.wrench[rows].any())
-    known = spreads(task.model, force_ci95, forced, covariance)
+    known = spreads(task.model, force_ci95, forced)
     tenth = tuple((entry.name, np.nan) for entry in known.without_interval)
     told = Doubt(rows, len(known.entries), known.level_unstated, tenth=tenth)
     if not len(rows):

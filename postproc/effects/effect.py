@@ -129,6 +129,16 @@ class Effect:
     def __init__(self, joints: Sequence[Joint]) -> None:
         """The effect without options, on an arm with ``joints``."""
 
+    @classmethod
+    def of_mechanism(cls, joints: Sequence[Joint], joint: str | None, quantities: Values) -> Self:
+        """The effect of hardware that a robot file describes under ``mechanisms:`` with ``quantities`` (SI)."""
+        return cls(joints)
+
+    @classmethod
+    def variants(cls, joints: Sequence[Joint]) -> tuple[Self, ...]:
+        """The forms in which the effect is looked for where nothing is known of it."""
+        return (cls(joints),)
+
     def described(self) -> dict[str, object]:
         """The options, for reports."""
         return {}

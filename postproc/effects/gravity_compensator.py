@@ -86,6 +86,11 @@ class GravityCompensator(EnergyLoad):
             options.number("zero_deg", 0.0, -360.0, 360.0) * DEG,
         )
 
+    @classmethod
+    def of_mechanism(cls, joints: Sequence[Joint], joint: str | None, quantities: Values) -> Self:
+        names = [one.name for one in joints]
+        return cls(joints, 1 if joint is None else names.index(joint), zero=quantities.get("zero", 0.0))
+
     def described(self) -> dict[str, object]:
         return {
             "joint": self.joint_name,

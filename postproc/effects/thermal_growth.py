@@ -38,6 +38,10 @@ class ThermalGrowth(Offset):
         options.only("variable")
         return cls(joints, options.text("variable", "temperature", ("temperature", "time")))
 
+    @classmethod
+    def variants(cls, joints: Sequence[Joint]) -> tuple[Self, ...]:
+        return cls(joints, "temperature"), cls(joints, "time")
+
     def described(self) -> dict[str, object]:
         return {"variable": self.variable}
 

@@ -47,6 +47,10 @@ class TransmissionError(Offset):
             raise options.error("YML004", "harmonics must be positive, each once", "harmonics")
         return cls(joints, harmonics)
 
+    @classmethod
+    def variants(cls, joints: Sequence[Joint]) -> tuple[Self, ...]:
+        return cls(joints, (1.0,)), cls(joints, (2.0,))
+
     def described(self) -> dict[str, object]:
         return {"harmonics": list(self.harmonics)}
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats
 from postproc.findings import Finding, Refusal
-from postproc.identification.campaign import Campaign
+from postproc.identification.campaign import Campaign, Nuisances
 from postproc.identification.identifiable import Dropped, Insight, insight
 from postproc.identification.noise import Noise, Weighting, noise_of, shared_error, weighting
 from postproc.identification.registration import registered
@@ -124,7 +124,9 @@ def fit(
     point = replace(point, given=given, residual=campaign.residual(point.seen, given))
     weights = plain = weighting(campaign, noise, point.residual).times(rows.astype(float))
     _enough(campaign, weights, unknowns)
-    point = _awake(campaign, point, unknowns)
+    woken = awake(campaign, point.model, given, unknowns)
+    if woken is not point.model:
+        point = at(campaign, woken, given)
     begin = point
     free, dropped = list(unknowns), list[Dropped]()
     stage("fitting")
@@ -170,15 +172,20 @@ def _enough(campaign: Campaign, weights: Weighting, unknowns: Sequence[Unknown])
         )
 
 
-def _awake(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Point:
-    """The point, with the effects that move nothing at all where they stand begun at the sizes of their parameters."""
-    point = with_columns(campaign, point, unknowns)
+def awake(
+    campaign: Campaign, model: StiffnessModel, given: Nuisances, unknowns: Sequence[Unknown]
+) -> StiffnessModel:
+    """The model, with the effects that move nothing at all where they stand put to the sizes of their parameters."""
+    point = with_columns(campaign, at(campaign, model, given), unknowns)
     moves = np.abs(np.nan_to_num(point.taken[0])).max(axis=(0, 1), initial=0.0) > 0
-    awake = {u.term for u, moved in zip(unknowns, moves, strict=True) if moved}
-    asleep = {
-        u.key: u.parameter.scale for u in unknowns if u.term not in awake and u.value == u.parameter.null
-    }
-    return at(campaign, point.model.changed(asleep), point.given) if asleep else point
+    moving = {u.term for u, moved in zip(unknowns, moves, strict=True) if moved}
+    return model.changed(
+        {
+            u.key: u.parameter.scale
+            for u in unknowns
+            if u.term not in moving and u.value == u.parameter.null
+        }
+    )
 
 
 def _robust(

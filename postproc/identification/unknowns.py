@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from postproc.effects import EFFECTS, Parameter
+from postproc.effects import EFFECTS, Effect, Parameter
 from postproc.findings import Finding, Refusal, nearest
 from postproc.model import StiffnessModel
 from postproc.robot.description import Value
@@ -15,7 +15,7 @@ from postproc.robot.description import Value
 class Unknown:
     """A parameter to be found: ``name`` as effect.parameter; ``term``: its effect in the model; ``value`` (SI) to begin
     with; ``stated``: what the robot file says of it; ``prior``: its standard deviation there, where that counts as a
-    reading of ``value``."""
+    reading of ``value``; ``held``: a dimension that is taken as it stands."""
 
     name: str
     term: int
@@ -23,6 +23,7 @@ class Unknown:
     value: float
     stated: Value | None = None
     prior: float | None = None
+    held: bool = False
 
     @property
     def key(self) -> tuple[int, str]:
@@ -48,57 +49,66 @@ def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False)
 
     Raises Refusal IDN001 for a name that is not known.
     """
-    unknowns: list[Unknown] = []
-    held: list[str] = []
+    unknowns: dict[str, Unknown] = {}
+    held: dict[str, None] = {}
     for word in words:
         effect, _, single = word.partition(".")
         if effect not in EFFECTS:
             raise _unknown_name(f"{effect!r} is no effect{nearest(effect, EFFECTS)}", ", ".join(EFFECTS))
         if all(term.effect.name != effect for term in model.terms):
-            model = _with_effect(model, effect)
-        found = False
-        for index, term in enumerate(model.terms):
-            if term.effect.name != effect:
-                continue
-            label = model.label(index)
-            for parameter in term.effect.parameters:
-                if single not in ("", parameter.name):
-                    continue
-                found = True
-                name = f"{label}.{parameter.name}"
-                if any(unknown.name == name for unknown in unknowns):
-                    continue
-                stated = term.stated.get(parameter.name)
-                prior = None
-                if stated is not None and stated.interval and (priors or parameter.hardware):
-                    prior = stated.deviation
-                if parameter.hardware and prior is None and not single:
-                    held.append(name)
-                    continue
-                unknowns.append(Unknown(name, index, parameter, term.values[parameter.name], stated, prior))
-        if not found:
-            known = [
-                p.name for term in model.terms if term.effect.name == effect for p in term.effect.parameters
-            ]
+            model = with_mechanism(model, EFFECTS[effect])
+        terms = [index for index, term in enumerate(model.terms) if term.effect.name == effect]
+        known = [p.name for index in terms for p in model.terms[index].effect.parameters]
+        if single and single not in known:
             raise _unknown_name(
                 f"{effect} has no parameter {single!r}{nearest(single, known)}", ", ".join(known)
             )
-    return Asked(model, tuple(unknowns), tuple(held))
+        for index in terms:
+            for unknown in unknowns_of(model, index, priors):
+                if single in ("", unknown.parameter.name):
+                    if unknown.held and not single:
+                        held[unknown.name] = None
+                    else:
+                        unknowns[unknown.name] = unknown
+    return Asked(model, tuple(unknowns.values()), tuple(held))
+
+
+def unknowns_of(model: StiffnessModel, term: int, priors: bool = False) -> tuple[Unknown, ...]:
+    """All parameters of the ``term``-th effect as unknowns.
+
+    Dimensions of hardware count with their interval as a prior; without one they are held, unless nothing at all is
+    known of the effect's hardware.  ``priors``: every stated interval counts as a prior.
+    """
+    of, label = model.terms[term], model.label(term)
+    built = any(parameter.hardware and parameter.name in of.stated for parameter in of.effect.parameters)
+    found = []
+    for parameter in of.effect.parameters:
+        stated = of.stated.get(parameter.name)
+        prior = None
+        if stated is not None and stated.interval and (priors or parameter.hardware):
+            prior = stated.deviation
+        held = parameter.hardware and built and prior is None
+        value = of.values[parameter.name]
+        found.append(Unknown(f"{label}.{parameter.name}", term, parameter, value, stated, prior, held))
+    return tuple(found)
+
+
+def with_mechanism(model: StiffnessModel, kind: type[Effect]) -> StiffnessModel:
+    """The model with one more effect at its null; what the robot file's mechanism of that kind states is in it."""
+    for mechanism in model.robot.mechanisms:
+        if mechanism.kind == kind.name:
+            stated = {
+                key: Value(float(quantity.values[0]), None, None, quantity.source or mechanism.source)
+                for key, quantity in mechanism.quantities.items()
+                if quantity.values.size == 1
+            }
+            effect = kind.of_mechanism(
+                model.robot.joints, mechanism.joint, {key: value.value for key, value in stated.items()}
+            )
+            own = {p.name: stated[p.name] for p in effect.parameters if p.name in stated}
+            return model.added(effect, own)
+    return model.added(kind(model.robot.joints))
 
 
 def _unknown_name(message: str, known: str) -> Refusal:
     return Refusal(Finding("IDN001", message, help=f"known: {known}"))
-
-
-def _with_effect(model: StiffnessModel, name: str) -> StiffnessModel:
-    effect = EFFECTS[name](model.robot.joints)
-    known = {parameter.name: parameter for parameter in effect.parameters}
-    values, stated = {}, {}
-    for mechanism in model.robot.mechanisms:
-        if mechanism.kind == name:
-            for key, quantity in mechanism.quantities.items():
-                if key in known and quantity.unit == known[key].unit and quantity.values.size == 1:
-                    values[key] = float(quantity.values[0])
-                    stated[key] = Value(values[key], None, None, quantity.source or mechanism.source)
-    model = model.added(effect, values)
-    return replace(model, terms=(*model.terms[:-1], replace(model.terms[-1], stated=stated)))

@@ -15,7 +15,16 @@ from postproc.geometry import Poses
 from postproc.model import StiffnessModel
 from postproc.robot.description import Robot, Value
 from postproc.robot.geometries import KukaLengths, KukaVariant
+from postproc.robot.provenance import Identification
 from postproc.units import DEG, MM
+
+_GAP_WORDS = {
+    "before_rms_mm": "before",
+    "after_rms_mm": "after",
+    "noise_mm": "noise",
+    "heldout_before_rms_mm": "held out: before",
+    "heldout_after_rms_mm": "held out: after",
+}
 
 
 def list_robots(console: Console, models: Sequence[StiffnessModel]) -> None:
@@ -47,6 +56,8 @@ def show_robot(console: Console, models: Sequence[StiffnessModel]) -> None:
     for mechanism in robot.mechanisms:
         at = f" at {mechanism.joint}" if mechanism.joint else ""
         console.print(Text(f"mechanism  {mechanism.name} ({mechanism.kind}){at}\n  {mechanism.source}"))
+    for run in robot.identified:
+        console.print(Text(_identified_words(run)))
     console.print()
     for term in model.terms:
         options = ", ".join(f"{key} {value}" for key, value in term.effect.described().items())
@@ -90,8 +101,23 @@ def robot_json(model: StiffnessModel) -> dict[str, object]:
             }
             for mechanism in robot.mechanisms
         ],
+        "identified": [
+            {
+                "command": run.command,
+                "version": run.version,
+                "date": run.date,
+                "data": [{"file": name, "sha256": digest} for name, digest in run.data],
+                "robot_digest": run.robot_digest,
+                "effects": list(run.effects),
+                "poses": run.poses,
+                "readings": run.readings,
+                "gap": dict(run.gap),
+                "correlation": {"parameters": list(run.names), "rows": run.correlation.tolist()},
+            }
+            for run in robot.identified
+        ],
         "effects": {
-            term.effect.name: {
+            model.label(index): {
                 **term.effect.described(),
                 "parameters": {
                     parameter.name: {**asdict(term.stated[parameter.name]), "unit": parameter.unit}
@@ -99,9 +125,20 @@ def robot_json(model: StiffnessModel) -> dict[str, object]:
                     if parameter.name in term.stated
                 },
             }
-            for term in model.terms
+            for index, term in enumerate(model.terms)
         },
     }
+
+
+def _identified_words(run: Identification) -> str:
+    """When, from what, what, and what came of it."""
+    data = ", ".join(f"{name} (sha256 {digest[:12]})" for name, digest in run.data) or "no file"
+    gap = "  ".join(f"{_GAP_WORDS[key]} {value:.3g}" for key, value in run.gap.items())
+    return (
+        f"identified  {run.date} by {run.command} {run.version}: {', '.join(run.effects) or 'nothing'}\n"
+        f"  {run.readings} readings at {run.poses} poses, {data}\n"
+        f"  gap [mm, 3-D rms]  {gap or 'not stated'}"
+    )
 
 
 def _lengths(robot: Robot) -> KukaLengths | None:

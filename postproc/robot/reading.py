@@ -59,7 +59,7 @@ def read_geometry(
     if kind == "urdf":
         given = section.section("urdf")
         given.only("file", "base", "tip")
-        path = _beside(given)
+        path = beside(given)
         found = read_urdf(path, *(given.text(key) if key in given else None for key in ("base", "tip")))
         read, tip = [path], found.tip
         links: Sequence[Link] = found.links
@@ -139,8 +139,8 @@ def _frame(section: Section, key: str) -> Poses:
     return Poses(turn_about("z", a) @ turn_about("y", b) @ turn_about("x", c), place)
 
 
-def _beside(section: Section) -> Path:
-    """The URDF file: below the folder of the robot file, nowhere else."""
+def beside(section: Section) -> Path:
+    """The file of a ``urdf:`` section: below the folder of the robot file, nowhere else."""
     name = section.text("file")
     folder = section.file.resolve().parent
     path = (folder / name).resolve()

@@ -237,7 +237,7 @@ def _report(
 def _model(ready: Prepared) -> dict[str, object]:
     """Effects, options, values with interval and source, as they were used."""
     return {
-        term.effect.name: {
+        ready.model.label(index): {
             **term.effect.described(),
             "parameters": {
                 name: {
@@ -249,7 +249,7 @@ def _model(ready: Prepared) -> dict[str, object]:
                 for name, value in term.stated.items()
             },
         }
-        for term in ready.model.terms
+        for index, term in enumerate(ready.model.terms)
     }
 
 
