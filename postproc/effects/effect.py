@@ -111,12 +111,13 @@ class Effect:
 
     ``family``: what a controller may already correct (``geometric``, ``weight``), or ``elastic``, ``gear``.
     ``coordinates``: extra coordinates of the chain that it needs.  ``by_direction``: it asks how joints came to their
-    place.
+    place.  ``whole``: an arm that was never calibrated has it in all of its joints.
     """
 
     name: ClassVar[str]
     family: ClassVar[str]
     by_direction: ClassVar[bool] = False
+    whole: ClassVar[bool] = False
     parameters: tuple[Parameter, ...]
     coordinates: tuple[str, ...] = ()
 

@@ -18,6 +18,7 @@ class JointCompliance(LinearCompliance):
 
     name = "joint_compliance"
     family = "elastic"
+    whole = True
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         source = "virtual joint model: Klimchik et al., Sec. 3"

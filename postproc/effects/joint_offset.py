@@ -15,6 +15,7 @@ class JointOffset(Offset):
 
     name = "joint_offset"
     family = "geometric"
+    whole = True
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         self.parameters = per_joint(

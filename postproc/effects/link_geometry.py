@@ -28,6 +28,7 @@ class LinkGeometry(Offset):
 
     name = "link_geometry"
     family = "geometric"
+    whole = True
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         names = [f"{joint.name}.{axis}" for joint in joints[1:] for axis in ("x", "y", "rx", "ry")]

@@ -1,0 +1,145 @@
+"""The header row: what the columns are called, and that none is missing, unknown or one too many."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+
+from postproc.findings import Refusal, nearest
+from postproc.tables import Table
+
+WRENCH = ("FX", "FY", "FZ", "MX", "MY", "MZ")
+PLACE, ANGLES = ("X", "Y", "Z"), ("A", "B", "C")
+SHIFT, TURN = ("DX", "DY", "DZ"), ("DA", "DB", "DC")
+OPTIONAL = ("TARGET", "T", "TEMP", "SIGMA", "REPEAT", "SESSION")
+
+RESERVED = frozenset(name.lower() for name in (*WRENCH, *PLACE, *ANGLES, *SHIFT, *TURN, *OPTIONAL))
+"""What is more than a joint, in lower case."""
+
+# unit -> (how people write it, what is expected in words)
+_UNITS = {
+    "deg": (("deg", "degree", "degrees", "°"), "degrees are expected"),
+    "mm": (("mm",), "millimetres are expected"),
+    "N": (("n",), "newtons are expected"),
+    "N m": (("n m", "nm", "n*m", "n·m"), "newton metres are expected"),
+    "s": (("s",), "seconds are expected"),
+    "degC": (("degc", "°c", "c"), "degrees Celsius are expected"),
+    "": ((), "this column has no unit"),
+}
+_WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))")
+_JOINT_LIKE = re.compile(r"[aej][0-9]+")
+
+
+def value_columns(deflection: bool) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the coordinates and of the angles of what was measured."""
+    return (SHIFT, TURN) if deflection else (PLACE, ANGLES)
+
+
+def direction_columns(count: int) -> list[str]:
+    return [f"DIR{index}" for index in range(1, count + 1)]
+
+
+def expected_joints(names: Sequence[str], joints: Sequence[tuple[str, bool]]) -> str:
+    """In words, which columns the ``joints`` have under these ``names``."""
+    units = ("mm" if slides else "deg" for _, slides in joints)
+    listed = ", ".join(f"{name} ({unit})" for name, unit in zip(names, units, strict=True))
+    return f"one column a joint, as commanded: {listed}"
+
+
+def split_columns(table: Table, joints: Sequence[tuple[str, bool]]) -> tuple[Table, Table, bool]:
+    """The columns of the joints in their order, the others under their own names, and whether they hold deflections.
+
+    Refusal: a column that is missing, unknown, of another unit, or one too many.
+    """
+    heads = _heads(table, joints)
+    own = _joint_columns(table, heads, joints)
+    others = heads.keys() - {name.lower() for name in own}
+    deflection = _is_deflection(table, others)
+    values, angles = value_columns(deflection)
+    units = {
+        **dict.fromkeys(("TARGET", "REPEAT", "SESSION", *direction_columns(len(joints))), ""),
+        **dict.fromkeys(WRENCH[:3], "N"),
+        **dict.fromkeys(WRENCH[3:], "N m"),
+        **dict.fromkeys((*values, "SIGMA"), "mm"),
+        **dict.fromkeys(angles, "deg"),
+        "T": "s",
+        "TEMP": "degC",
+        # a joint may be called T
+        **{name: "mm" if slides else "deg" for name, (_, slides) in zip(own, joints, strict=True)},
+    }
+    spelled = {name.lower(): name for name in units}
+    for name, (head, unit) in heads.items():
+        if name not in spelled:
+            raise _unknown(table, head, own, joints, spelled)
+        words, expected = _UNITS[units[spelled[name]]]
+        if unit and unit not in words:
+            raise table.header_error(f"column {head!r}: {expected}", "convert the column and its header")
+    axes = {name: table.columns[heads[name.lower()][0]] for name in own}
+    rest = {spelled[name]: table.columns[heads[name][0]] for name in others}
+    return replace(table, columns=axes), replace(table, columns=rest), deflection
+
+
+def _heads(table: Table, joints: Sequence[tuple[str, bool]]) -> Mapping[str, tuple[str, str]]:
+    """Name of a column without its unit -> name as it stands, unit or ""."""
+    own = [name.lower() for name, _ in joints]
+    heads: dict[str, tuple[str, str]] = {}
+    for head in table.columns:
+        match = None if head in own else _WITH_UNIT.fullmatch(head)
+        name, unit = (match[1], match[2] or match[3] or "") if match else (head, "")
+        if name in heads:
+            raise table.header_error(f"columns {heads[name][0]!r} and {head!r} are the same")
+        heads[name] = head, " ".join(unit.split())
+    return heads
+
+
+def _joint_columns(table: Table, heads: Collection[str], joints: Sequence[tuple[str, bool]]) -> list[str]:
+    """The robot's own names of its joints where the header has them, else A1..An or J1..Jn."""
+    own = [name for name, _ in joints]
+    count = len(own)
+    # T or B may be a joint as well as a time or an angle: alone it says nothing
+    schemes = [(own, [name for name in own if name.lower() not in RESERVED])]
+    schemes += [(names, names) for names in ([f"{letter}{i + 1}" for i in range(count)] for letter in "AJ")]
+    for names, telling in schemes:
+        if any(name.lower() in heads for name in telling):
+            for name in names:
+                if name.lower() not in heads:
+                    raise table.header_error(f"column {name!r} is missing", expected_joints(names, joints))
+            return names
+    message = "the columns of the joints are missing"
+    raise table.header_error(message, f"{expected_joints(own, joints)}; or A1..A{count}, or J1..J{count}")
+
+
+def _is_deflection(table: Table, heads: Collection[str]) -> bool:
+    """Whether values are DX,DY,DZ; Refusal unless they are all of one kind."""
+    here: dict[tuple[str, ...], list[str]] = {
+        names: [name for name in names if name.lower() in heads] for names in (PLACE, SHIFT, ANGLES, TURN)
+    }
+    forms = "X,Y,Z (measured place) or DX,DY,DZ (loaded minus unloaded)"
+    if here[PLACE] and here[SHIFT]:
+        raise table.header_error(f"columns {here[PLACE][0]!r} and {here[SHIFT][0]!r} stand together", forms)
+    deflection = bool(here[SHIFT])
+    values, angles = value_columns(deflection)
+    others = value_columns(not deflection)[1]
+    if not here[values]:
+        raise table.header_error("the columns of what was measured are missing", forms)
+    if here[others]:
+        message = f"column {here[others][0]!r} does not belong to {','.join(values)}"
+        raise table.header_error(message, f"the angles are {','.join(angles)} here")
+    for names in (values, angles):
+        if here[names] and len(here[names]) < 3:
+            missing = next(name for name in names if name not in here[names])
+            message = f"column {missing!r} is missing beside {here[names][0]!r}"
+            raise table.header_error(message, f"{','.join(names)}; leave cells empty where there is no value")
+    return deflection
+
+
+def _unknown(
+    table: Table, head: str, own: Sequence[str], joints: Sequence[tuple[str, bool]], known: Collection[str]
+) -> Refusal:
+    if _JOINT_LIKE.match(head):
+        message = f"column {head!r} is none of the robot's {len(joints)} joints"
+        return table.header_error(message, expected_joints(own, joints))
+    names = (*own, *WRENCH, *PLACE, *ANGLES, *SHIFT, *TURN, *OPTIONAL, f"DIR1..DIR{len(joints)}")
+    message = f"unknown column {head!r}{nearest(head, known)}"
+    return table.header_error(message, "columns: " + ", ".join(names))
