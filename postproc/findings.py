@@ -374,12 +374,19 @@ CODES: dict[str, Code] = {
         "These poses together show too little of it; `identify` will leave it as it is. More poses may show it.",
     ),
     "PLN009": Code(
-        "info", "interval wider than wanted", "More poses, a larger load or lever, or another room for the poses."
+        "info",
+        "intervals wider than wanted",
+        "More poses, a larger load or lever, reflectors further out or more room for the arm make them smaller.",
     ),
     "PLN010": Code(
         "warning",
         "effects can not be told apart",
-        "Even at these poses either explains what the other would show, within the scatter.",
+        "Even at these poses one of them explains what the other would show, within the scatter.",
+    ),
+    "PLN011": Code(
+        "info",
+        "parameter is part of the registration",
+        "A place of the tracker or of its target does the same; `identify` finds that instead.",
     ),
     # map
     "MAP001": Code(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from postproc.cli.main import run
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is there
+
+from postproc.cli.main import run  # noqa: E402
 
 CELL = """\
 robot: kuka_kr270

@@ -44,6 +44,7 @@ ROOMS = {
 
 ONE_FLOOR = {
     ("forces", "cell"),
+    ("experiments", "identification"),
     ("toolpath", "geometry"),
     ("measurements", "tables"),
     ("measurements", "geometry"),

@@ -11,13 +11,23 @@ import click
 
 from postproc import __version__
 from postproc.cli.check import check
+from postproc.cli.identify import identify
 from postproc.cli.map import map_
+from postproc.cli.plan import plan
 from postproc.cli.predict import predict
 from postproc.cli.program import program
 from postproc.cli.robots import robots
 from postproc.findings import nearest
 
-COMMANDS = {"program": program, "check": check, "predict": predict, "map": map_, "robots": robots}
+COMMANDS = {
+    "program": program,
+    "check": check,
+    "predict": predict,
+    "map": map_,
+    "identify": identify,
+    "plan": plan,
+    "robots": robots,
+}
 
 
 @click.group(commands=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
@@ -34,12 +44,16 @@ def main() -> None:
       compensate check panel.src                      only read it, say what is not understood
       compensate predict panel.src --force            the deflection at every pose
       compensate map --robot kuka_kr270 ...           where in the workspace the robot is stiff
+      compensate identify loads.csv --effects ...     the robot's parameters from measurements
+      compensate plan --effects ... --poses 15 ...    the poses and loads worth measuring
     """
 
 
 def run(argv: Sequence[str] | None = None) -> None:
     """Entry point of the console script."""
     words = list(sys.argv[1:] if argv is None else argv)
+    # the matrices here are small: threads for them cost more than they give, and runs beside each other fight
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for stream in (sys.stdout, sys.stderr):
         # A name or a comment that the terminal can not show is no reason to stop.
         if isinstance(stream, io.TextIOWrapper):

@@ -175,12 +175,17 @@ class Campaign:
         return np.concatenate([left, away], axis=1)
 
     def in_base(self, residual: Floats, given: Nuisances) -> Floats:
-        """A residual (R, 3 or 6) in axes of the robot base; NaN coordinates count as no residual there."""
+        """A residual (R, 3 or 6) in axes of the robot base.  A coordinate that was not measured counts as none left; a
+        place or turn of which nothing is known stays NaN."""
         if not self.tracked:
             return residual
         back = np.swapaxes(given.frames.rotation, 1, 2)[self.readings.session]
-        halves = [np.nan_to_num(residual[:, k : k + 3]) for k in range(0, residual.shape[1], 3)]
-        return np.concatenate([(back @ half[:, :, None])[:, :, 0] for half in halves], axis=1)
+        halves = []
+        for half in (residual[:, k : k + 3] for k in range(0, residual.shape[1], 3)):
+            turned = (back @ np.nan_to_num(half)[:, :, None])[:, :, 0]
+            known = np.isfinite(half).any(axis=1, keepdims=True)
+            halves.append(np.where(known, turned, np.nan))
+        return np.concatenate(halves, axis=1)
 
     # Nuisances as columns of a fit.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,19 +21,19 @@ from postproc.model import StiffnessModel
 UNLIKELY = 0.01
 """Probability below which the residuals are taken to be more than the stated scatter."""
 
+ROUNDING = 1e-3
+"""Standard deviations below which residuals are no scatter, but rounding."""
+
+PRIOR_ROUNDS, SAME_FACTOR = 5, 0.1
+"""How often the variance of the readings is looked at again, because priors count against it, and the logarithm of its
+change from which on."""
+
 AT_BOUND = 1e-9
 """Of a parameter's size."""
 
 HUBER = 2.795
 """Length of a residual [its standard deviation] from which a robust fit weighs it down: 95 % of a normal one in space
 are shorter."""
-
-Stage = Callable[[str], None]
-
-
-def silent(_stage: str) -> None:
-    pass
-
 
 @dataclass(frozen=True)
 class Estimate:
@@ -81,6 +81,11 @@ class Fit:
         """(R, 3) [m] what is left of each position, axes of the robot base."""
         return self.campaign.in_base(self.point.residual, self.point.given)[:, :3]
 
+    @property
+    def shared_error(self) -> float:
+        """[m] one sigma of what readings of one pose have in common in each coordinate; 0 where nothing is seen."""
+        return self.weights.shared * float(np.sqrt(self.factor))
+
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
         deviation = np.sqrt(np.diag(self.covariance))
@@ -99,13 +104,14 @@ def fit(
     unknowns: Sequence[Unknown],
     rows: Bools | None = None,
     robust: bool = False,
-    stage: Stage = silent,
+    given: Nuisances | None = None,
 ) -> Fit:
     """The weighted least squares of the readings ``rows`` (R,) (all without it) over the unknowns and nuisances.
 
     Unknowns that the readings can not give stay as they are and are named.  Intervals come from the covariance of the
     linearized problem at the solution; where the residuals are clearly larger than the stated scatter, or none is
-    stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).
+    stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).  ``given``:
+    tracker and targets to begin with, where they are about known.
 
     Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to begin with has no rest.
     """
@@ -119,8 +125,8 @@ def fit(
                 "IDN003", f"{lost} of {len(campaign.q)} states have no stable rest", str(model.robot.path)
             )
         )
-    stage("registering")
-    given = registered(campaign, point.seen, rows)
+    if given is None:
+        given = registered(campaign, point.seen, rows)
     point = replace(point, given=given, residual=campaign.residual(point.seen, given))
     weights = plain = weighting(campaign, noise, point.residual).times(rows.astype(float))
     _enough(campaign, weights, unknowns)
@@ -129,19 +135,23 @@ def fit(
         point = at(campaign, woken, given)
     begin = point
     free, dropped = list(unknowns), list[Dropped]()
-    stage("fitting")
+    factor, again = 1.0, PRIOR_ROUNDS if any(u.prior is not None for u in unknowns) else 0
     while True:
-        point = descended(campaign, point, free, plain)
+        point = descended(campaign, point, free, plain, factor=factor)
         told = _with_turns(campaign, point, noise, plain)
-        told = replace(told, shared=shared_error(point.residual, told))
+        together = np.concatenate(point.taken, axis=2)
+        told = replace(told, shared=shared_error(point.residual, told, together, noise.known))
         if told.shared != plain.shared or told.weight is not plain.weight:
-            plain, point = told, descended(campaign, point, free, told)
+            plain, point = told, descended(campaign, point, free, told, factor=factor)
         weights = plain
         if robust:
-            point, weights = _robust(campaign, point, free, plain, rows)
+            point, weights = _robust(campaign, point, free, plain, rows, factor, noise.known)
         point = with_columns(campaign, point, free)
-        found = _insight(campaign, point, free, weights, 1.0)
-        factor, exceeded, freedom, quantile = _variance(campaign, point, free, weights, noise, found)
+        found, before = _insight(campaign, point, free, weights, factor), factor
+        factor, exceeded, freedom, quantile = _variance(campaign, point, free, weights, plain, noise, found)
+        if again and abs(np.log(factor / before)) > SAME_FACTOR:
+            again -= 1
+            continue
         found = _insight(campaign, point, free, weights, factor)
         if not found.dropped:
             break
@@ -189,21 +199,21 @@ def awake(
 
 
 def _robust(
-    campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, rows: Bools
+    campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, rows: Bools, factor: float, known: bool
 ) -> tuple[Point, Weighting]:
     """Reweighted until the weights stand: those of Huber for the length of a reading's residual."""
     plain = weights
     share = np.ones(len(rows))
     for _ in range(20):
         length = lengths(point.residual, plain)
-        level = spread_of(length[rows])
+        level = spread_of(length[rows], known)
         now = np.minimum(1.0, HUBER * level / np.maximum(length, 1e-300))
         if np.abs(now - share).max() < 1e-3:
             break
         share = now
         # squares of residuals count by the weight: its root goes to the row
         weights = plain.times(np.sqrt(share))
-        point = descended(campaign, point, free, weights)
+        point = descended(campaign, point, free, weights, factor=factor)
     return point, weights
 
 
@@ -214,10 +224,10 @@ def lengths(residual: Floats, weights: Weighting) -> Floats:
     return np.sqrt(3.0 * square.sum(axis=1) / np.maximum(on.sum(axis=1), 1))
 
 
-def spread_of(length: Floats) -> float:
-    """One standard deviation of a coordinate by the median of lengths in space, at least 1 (1.538: the median of
-    chi with 3 degrees of freedom)."""
-    return max(1.0, float(np.median(length)) / 1.538)
+def spread_of(length: Floats, known: bool) -> float:
+    """One standard deviation of a coordinate by the median of lengths in space (1.538: the median of chi with 3 degrees
+    of freedom); at least the assumed one where that is ``known``."""
+    return max(1.0 if known else ROUNDING, float(np.median(length)) / 1.538)
 
 
 def _with_turns(campaign: Campaign, point: Point, noise: Noise, weights: Weighting) -> Weighting:
@@ -241,7 +251,7 @@ def _insight(
     campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, factor: float
 ) -> Insight:
     columns, nuisance = (np.nan_to_num(weights(part)) for part in point.taken)
-    prior, values = prior_rows(free), point.values(free)
+    prior, values = prior_rows(free) * np.sqrt(factor), point.values(free)
     return insight(free, columns, nuisance, campaign.nuisance_names, prior, values, factor)
 
 
@@ -250,21 +260,29 @@ def _variance(
     point: Point,
     free: Sequence[Unknown],
     weights: Weighting,
+    plain: Weighting,
     noise: Noise,
     found: Insight,
 ) -> tuple[float, bool, int, float]:
     """Variance of the readings over the assumed one, whether that is clearly more, degrees of freedom, and the 97.5 %
-    quantile that goes with them."""
+    quantile that goes with them.
+
+    A residual that a robust fit weighs down counts with as much as it pulls, and its reading as a part of one (Huber,
+    Robust Statistics, Sec. 7.6).
+    """
     from scipy.stats import chi2, norm, t
 
-    left = weights(point.residual)
+    counts = plain.weight > 0
+    share = np.where(counts, weights.weight / np.where(counts, plain.weight, 1.0), 0.0) ** 2
+    left = weights(point.residual * np.sqrt(share))
     squares = float(left @ left)
     nuisances = int(np.linalg.matrix_rank(weights(point.taken[1]))) if campaign.nuisance_names else 0
     without_prior = sum(free[i].prior is None for i in found.kept)
-    freedom = max(0, weights.counts - nuisances - without_prior)
+    freedom = max(0, round(share.sum()) - nuisances - without_prior)
     if freedom == 0:
         return 1.0, False, 0, float(norm.ppf(0.975))
     exceeded = noise.known and squares > chi2.ppf(1.0 - UNLIKELY, freedom)
     if noise.known and not exceeded:
-        return 1.0, False, freedom, float(norm.ppf(0.975))
+        least = 1.0 if weights is plain else max(1.0, squares / freedom)
+        return least, False, freedom, float(norm.ppf(0.975))
     return squares / freedom, exceeded, freedom, float(t.ppf(0.975, freedom))

@@ -62,8 +62,8 @@ def insight(
     imitate is left out.  Then the least certain is, as long as one says nothing: its 95 % interval is wider than its
     value, and than the stated one or, where none is stated, ``FAR`` times the parameter's usual size.
     """
-    basis = _basis(nuisance)
-    outside = np.concatenate([columns - basis @ (basis.T @ columns), prior])
+    frames = basis(nuisance)
+    outside = np.concatenate([columns - frames @ (frames.T @ columns), prior])
     whole = np.concatenate([columns, prior])
     kept: list[int] = []
     dropped: list[Dropped] = []
@@ -105,7 +105,7 @@ def _limit(unknown: Unknown, value: float) -> float:
     return max(abs(value - null), usual or FAR * unknown.parameter.scale)
 
 
-def _basis(columns: Floats) -> Floats:
+def basis(columns: Floats) -> Floats:
     """Orthonormal columns that span ``columns`` (n, U), as far as they are independent."""
     length = np.linalg.norm(columns, axis=0)
     used = columns[:, length > 0] / length[length > 0]

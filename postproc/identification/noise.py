@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.identification.campaign import Campaign
+from postproc.identification.identifiable import basis
 from postproc.measurements import Readings
 
 NOMINAL = 1e-5
@@ -18,6 +19,9 @@ LEVER = 0.3
 
 CLEARLY_SHARED = 3.3
 """Standard deviations by which readings of one pose must go together before that counts."""
+
+SMALLEST = 0.01
+"""Share of the assumed variance that readings have each for itself at least, beside what they share."""
 
 
 @dataclass(frozen=True)
@@ -112,20 +116,50 @@ def weighting(campaign: Campaign, noise: Noise, measured: Floats) -> Weighting:
     return Weighting(np.where(np.isfinite(measured), 1.0 / sigma, 0.0), campaign.pose)
 
 
-def shared_error(residual: Floats, weights: Weighting) -> float:
-    """[m] one sigma of what readings of one pose have in common, by moments; 0 where they do not clearly."""
+def shared_error(residual: Floats, weights: Weighting, columns: Floats, known: bool) -> float:
+    """[m] ``shared`` of a weighting: one sigma of what readings of one pose have in common; 0 where that is not clear.
+
+    Two moments of the residuals z [standard deviations] tell it from what each reading has for itself, phi: z'z, and
+    z'Vz of the pairs of one pose.  A fit with ``columns`` (R, 3 or 6, k), Q of which is a basis, leaves M = 1 - Q Q' of
+    what was there, and their means are
+
+        E z'z  = phi tr M   + shared^2 tr M U        U = V + D: u_i u_j within a pose, D its diagonal
+        E z'Vz = phi tr V M + shared^2 tr V M U M
+
+    ``shared`` stands beside the sigma that ``weights`` assume.  Where that is not ``known``, or clearly too small, both
+    are to be made larger alike, so that their ratio is the one that is seen.
+    """
     u = weights.weight[:, :3]
-    e = np.where(u > 0, residual[:, :3], 0.0)
-    on = (u > 0).astype(float)
-    both = _by_pose(weights.pose, e) ** 2 - _by_pose(weights.pose, e * e)
-    pairs = _by_pose(weights.pose, on) ** 2 - _by_pose(weights.pose, on)
-    if pairs.sum() == 0:
+    z = np.where(u > 0, residual[:, :3] * u, 0.0)
+    square = u * u
+    pairs = float((_by_pose(weights.pose, square) ** 2 - _by_pose(weights.pose, square**2)).sum())
+    count = float((u > 0).sum())
+    q = basis(np.where(u[..., None] > 0, columns[:, :3] * u[..., None], 0.0).reshape(z.size, -1))
+    if pairs == 0 or count <= q.shape[1]:
         return 0.0
-    variance = _by_pose(weights.pose, e * e).sum() / on.sum()
-    share = both.sum() / pairs.sum()
-    if both.sum() < CLEARLY_SHARED * variance * np.sqrt(2.0 * pairs.sum()):
+    q = q.reshape(*z.shape, -1)
+    uz, uq = (_together(weights.pose, u, x) for x in (z[..., None], q))
+    vz, vq = uz - square[..., None] * z[..., None], uq - square[..., None] * q
+    qvq, quq = np.tensordot(q, vq, ((0, 1), (0, 1))), np.tensordot(q, uq, ((0, 1), (0, 1)))
+    means = np.array(
+        [
+            [count - q.shape[-1], square.sum() - np.trace(quq)],
+            [-np.trace(qvq), pairs - 2.0 * (uq * vq).sum() + (qvq * quq.T).sum()],
+        ]
+    )
+    squares, together = float((z * z).sum()), float((z[..., None] * vz).sum())
+    alone = squares / means[0, 0]
+    if together - alone * means[1, 0] < CLEARLY_SHARED * alone * np.sqrt(2.0 * pairs):
         return 0.0
-    return float(np.sqrt(share))
+    own, share = np.linalg.solve(means, [squares, together])
+    if known and own < 1.0 + CLEARLY_SHARED * np.sqrt(2.0 / count):
+        own = 1.0
+    return float(np.sqrt(max(share, 0.0) / max(own, SMALLEST)))
+
+
+def _together(pose: Ints, u: Floats, values: Floats) -> Floats:
+    """u_i times the sum of u_j values_j (R, 3, k) of its pose."""
+    return np.asarray(u[..., None] * _by_pose(pose, u[..., None] * values)[pose])
 
 
 def _by_pose(pose: Ints, values: Floats) -> Floats:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
+from postproc.arrays import Bools, Floats, Ints
 from postproc.identification.fit import Fit, fit, lengths, spread_of
 
 CHANCE = 0.01
@@ -35,17 +35,17 @@ def outliers(fitted: Fit, rows: Bools) -> tuple[tuple[Outlier, ...], Fit]:
     The scatter is that of most readings (by the median), so that a model that lacks something does not make outliers of
     all that it does not explain.
     """
-    limit = _limit(int(rows.sum()))
-    if not _far(fitted, rows, 0.7 * limit).any():
+    length, _, limit = _lengths(fitted, rows)
+    if not np.any(rows & (length > 0.7 * limit)):
         return (), fitted
     campaign = fitted.campaign
-    robust = fit(campaign, fitted.start, fitted.asked, rows, robust=True)
-    length, level = _lengths(robust, rows)
+    robust = fit(campaign, fitted.start, fitted.asked, rows, robust=True, given=fitted.point.given)
+    length, level, limit = _lengths(robust, rows)
     found = []
-    for row in np.flatnonzero(rows & (length > limit * level)):
+    for row in np.flatnonzero(rows & (length > limit)):
         file, line = campaign.readings.where(int(row))
         distance = float(np.linalg.norm(np.nan_to_num(robust.point.residual[row, :3])))
-        what = _explained(robust, int(row), limit * level)
+        what = _explained(robust, int(row), limit)
         found.append(Outlier(int(row), file, line, distance, float(length[row] / level), what))
     return tuple(sorted(found, key=lambda o: -o.sigmas)), robust
 
@@ -57,14 +57,17 @@ def _limit(count: int) -> float:
     return float(chi.ppf((1.0 - CHANCE) ** (1.0 / max(count, 1)), 3))
 
 
-def _lengths(fitted: Fit, rows: Bools) -> tuple[Floats, float]:
+def _lengths(fitted: Fit, rows: Bools) -> tuple[Floats, float, float]:
+    """Length of each residual [assumed standard deviations] (R,), one standard deviation of most, and the length from
+    which on a reading is an outlier."""
     length = lengths(fitted.point.residual, fitted.plain_weights)
-    return length, spread_of(length[rows])
-
-
-def _far(fitted: Fit, rows: Bools, limit: float) -> Bools:
-    length, level = _lengths(fitted, rows)
-    return np.asarray(rows & (length > limit * level))
+    level, limit = spread_of(length[rows], fitted.noise.known), _limit(int(rows.sum()))
+    if level == 1.0:
+        return length, level, limit
+    # a median of n lengths has a relative deviation of 0.56 / sqrt(n), by which tails beyond the limit are heavier
+    pose = fitted.campaign.pose[rows]
+    count = len(pose) if fitted.plain_weights.shared == 0 else len(np.unique(pose))
+    return length, level, limit * level * (1.0 + 0.5 * (0.56 * limit) ** 2 / count)
 
 
 def _explained(fitted: Fit, row: int, limit: float) -> str:
@@ -86,7 +89,7 @@ def _explained(fitted: Fit, row: int, limit: float) -> str:
             f" {names[readings.target[row]]}: mistaken for each other?"
         )
     rest = ~same & (np.arange(len(campaign)) != row) & (campaign.pose != campaign.pose[row]) & (away < close)
-    if rest.any() and _distinct(expected, close):
+    if rest.any() and _distinct(expected, campaign.pose, close):
         other = int(np.argmin(np.where(rest, away, np.inf)))
         return f"fits the state of line {readings.where(other)[1]}: a row in the wrong place?"
     if readings.deflection and np.linalg.norm(measured + expected[row]) < close:
@@ -99,8 +102,10 @@ def _explained(fitted: Fit, row: int, limit: float) -> str:
     return "fits nothing here: a broken beam, or a joint that did not stand where the row says?"
 
 
-def _distinct(expected: Floats, close: float) -> bool:
-    """Whether places are far enough apart for a coincidence to say something: few pairs are as close as ``close``."""
-    some = expected[np.linspace(0, len(expected) - 1, min(len(expected), 200)).astype(int)]
-    apart = np.linalg.norm(some[:, None] - some[None], axis=2)
-    return bool((apart < close).mean() < 0.05)
+def _distinct(expected: Floats, pose: Ints, close: float) -> bool:
+    """Whether places are far enough apart for a coincidence to say something: few pairs of poses are as close as
+    ``close``."""
+    some = np.linspace(0, len(expected) - 1, min(len(expected), 200)).astype(int)
+    apart = np.linalg.norm(expected[some][:, None] - expected[some][None], axis=2)
+    others = pose[some][:, None] != pose[some][None]
+    return bool((apart[others] < close).mean() < 0.05)

@@ -59,7 +59,8 @@ def _descended(
             break
         last = size
         columns = campaign.nuisance_columns(seen, given)[rows, :3]
-        step = np.linalg.lstsq(columns.reshape(left.size, -1), left.reshape(-1), rcond=1e-9)[0]
+        matrix = columns.reshape(left.size, -1)
+        step = np.linalg.lstsq(matrix.T @ matrix, matrix.T @ left.reshape(-1), rcond=1e-13)[0]
         given = campaign.moved(given, np.asarray(step, float))
     return given, last
 

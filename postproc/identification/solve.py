@@ -83,15 +83,17 @@ def descended(
     weights: Weighting,
     keep_columns: bool = False,
     max_steps: int = MAX_STEPS,
+    factor: float = 1.0,
 ) -> Point:
     """The least squares of ``weights(residual)`` and the priors, from ``point``.
 
-    ``keep_columns``: those of ``point`` serve all through, for fits that end close by.  Each linear problem is solved
+    ``keep_columns``: those of ``point`` serve all through, for fits that end close by.  ``factor``: variance of the
+    readings over the one of ``weights``; priors count the more against it.  Each linear problem is solved
     within the bounds (scipy's lsq_linear); steps are halved until the squares fall.
     """
     from scipy.optimize import lsq_linear
 
-    scale, prior = scales(unknowns), prior_rows(unknowns)
+    scale, prior = scales(unknowns), prior_rows(unknowns) * np.sqrt(factor)
     lower = np.array([u.parameter.lower for u in unknowns]) / scale
     upper = np.array([u.parameter.upper for u in unknowns]) / scale
     wanted = np.array([u.value for u in unknowns]) / scale
@@ -115,9 +117,13 @@ def descended(
         if matrix.shape[1] == 0:
             return replace(point, settled=True)
         length = np.linalg.norm(matrix, axis=0)
-        length[length == 0] = 1.0
-        system = np.concatenate([matrix / length, DAMPING * np.eye(len(length))])
-        right = np.concatenate([left, np.zeros(len(length))])
+        # a column of nothing may grow with the others, however straight their way is
+        awake = length > 0
+        length[~awake] = 1.0
+        # many rows to as many as there are columns, which say the same
+        tall = np.concatenate([np.column_stack([matrix / length, left]), DAMPING * np.eye(len(length) + 1)[:-1]])
+        reduced = np.asarray(np.linalg.qr(tall, mode="r"))
+        system, right = reduced[:-1, :-1], reduced[:-1, -1]
         low, high = np.concatenate([lower - x, -loose]) * length, np.concatenate([upper - x, loose]) * length
         whole = np.linalg.lstsq(system, right, rcond=None)[0]
         if np.any(whole < low) or np.any(whole > high):
@@ -135,7 +141,7 @@ def descended(
         foreseen = matrix @ (share * whole)
         size = float(np.linalg.norm(foreseen))
         astray = float(np.linalg.norm(left - foreseen - after))
-        fresh = keep_columns or (share == 1.0 and astray < STRAIGHT * size)
+        fresh = keep_columns or (share == 1.0 and astray < STRAIGHT * size and bool(awake[: len(x)].all()))
         scatter = np.sqrt(after @ after / max(1, len(after) - len(length)))
         point, left, lost = moved, after, gone
         if share == 1.0 and (size < CLOSE * scatter or size <= 1e-9):

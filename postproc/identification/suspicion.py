@@ -38,6 +38,9 @@ FAR = 3.0 * MM
 POOR = 0.3
 """Share of the deflections that a fit leaves, root mean square, from which on they are looked at."""
 
+SCATTER = 2.0
+"""Times the stated scatter: what is left below that is no cause to look."""
+
 MUCH_BETTER = 1.0 / 3.0
 """A change to the data is named if it leaves at most this share."""
 
@@ -141,8 +144,7 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
     if campaign.readings.rotation is not None:
         campaign = Campaign(replace(campaign.readings, rotation=None, sigma_turn=None), campaign.stated_tool)
     left, signal = _left(campaign, model, unknowns)
-    badly = left > POOR * signal if campaign.readings.deflection else left > FAR
-    if not badly:
+    if not _badly(campaign, left, signal):
         return ()
     some = np.unique(np.linspace(0, len(campaign) - 1, LOOKED_AT).round().astype(int))
     if len(campaign) <= LOOKED_AT:
@@ -165,6 +167,9 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
                 help="mend the file if that is so; it is never changed silently",
             )
         )
+    left, _ = _left(campaign, model, unknowns, True)
+    if not _badly(campaign, left, signal):
+        return ()
     what = f"{left / MM:.3g} mm are left, root mean square"
     if campaign.readings.deflection:
         what = f"{100 * left / signal:.0f} % of the deflections are left"
@@ -178,14 +183,22 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
     )
 
 
-def _left(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unknown]) -> tuple[float, float]:
-    """[m] root mean square of what a fit leaves (of absolute readings a registration alone), and of what was
-    measured."""
+def _badly(campaign: Campaign, left: float, signal: float) -> bool:
+    if left < SCATTER * noise_of(campaign.readings).rms:
+        return False
+    return left > (POOR * signal if campaign.readings.deflection else FAR)
+
+
+def _left(
+    campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unknown], fitted: bool = False
+) -> tuple[float, float]:
+    """[m] root mean square of what a fit leaves (of absolute readings, unless ``fitted``, a registration alone), and of
+    what was measured."""
     rows = np.ones(len(campaign), bool)
     point = at(campaign, model, campaign.start())
     given = registered(campaign, point.seen, rows)
     point = replace(point, given=given, residual=campaign.residual(point.seen, given))
-    if campaign.readings.deflection:
+    if campaign.readings.deflection or fitted:
         weights = weighting(campaign, noise_of(campaign.readings), point.residual)
         point = descended(campaign, point, unknowns, weights, max_steps=3)
     return _rms(point.residual), _rms(campaign.readings.value)

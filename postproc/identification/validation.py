@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
+from postproc.arrays import Bools, Floats, Ints
 from postproc.geometry import Poses
 from postproc.identification.campaign import Campaign, Nuisances
 from postproc.identification.fit import Fit
@@ -19,6 +19,9 @@ SEED = 20260101
 OTHER_STATION = 3.0
 """A registration that leaves so many times more than one of its own does not hold for other readings."""
 
+WIDER = 1.4
+"""Ratio of a bootstrap's interval to the one by covariance from which on it is worth telling."""
+
 Progress = Callable[[int, int], None]
 
 
@@ -26,7 +29,7 @@ def nothing(_done: int, _all: int) -> None:
     pass
 
 
-def folds_of(campaign: Campaign, folds: int, seed: int = SEED) -> Floats:
+def folds_of(campaign: Campaign, folds: int, seed: int = SEED) -> Ints:
     """(R,) the fold of each reading: poses are dealt out at random, all readings of one into one fold."""
     dealt = np.random.default_rng(seed).permutation(campaign.poses) % folds
     return np.asarray(dealt[campaign.pose])
@@ -43,7 +46,7 @@ def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
     for k in range(folds):
         rows = fold == k
         weights = fitted.weights.times((~rows).astype(float))
-        point = descended(campaign, fitted.point, fitted.unknowns, weights, keep_columns=True)
+        point = descended(campaign, fitted.point, fitted.unknowns, weights, True, factor=fitted.factor)
         left[rows] = campaign.in_base(point.residual, point.given)[rows, :3]
         progress(k + 1, folds)
     left[~counted(fitted)] = np.nan
@@ -131,7 +134,7 @@ def bootstrap(fitted: Fit, draws: int, progress: Progress = nothing) -> Bootstra
             u if u.prior is None else replace(u, value=float(rng.normal(value, u.prior)))
             for u, value in zip(fitted.unknowns, values, strict=True)
         ]
-        ends = descended(drawn, begin, unknowns, fitted.weights, keep_columns=True, max_steps=6)
+        ends = descended(drawn, begin, unknowns, fitted.weights, True, 6, fitted.factor)
         found[draw] = ends.values(unknowns)
         progress(draw + 1, draws)
     return Bootstrap(found.std(axis=0, ddof=1), draws)

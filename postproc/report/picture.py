@@ -7,6 +7,7 @@ print without colour.  What the arm does not reach is grey and hatched.
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from typing import Any
 
 import matplotlib as mpl
@@ -30,10 +31,15 @@ _SETTINGS: dict[Any, Any] = {"hatch.linewidth": 0.6, "svg.hashsalt": "compensate
 
 def picture(mapped: Mapped, kind: str) -> bytes:
     """The map as ``png`` or ``svg``; the same bytes for the same map."""
+    ranged = [axis for axis, count in enumerate(mapped.survey.grid.shape) if count > 1]
+    draw = (_curve, _curve, _plane, _slices)[len(ranged)]
+    return rendered(lambda: draw(mapped, ranged), kind)
+
+
+def rendered(draw: Callable[[], Figure], kind: str) -> bytes:
+    """The figure that ``draw`` makes, as ``png`` or ``svg``; the same bytes for the same figure."""
     with mpl.rc_context(_SETTINGS):
-        ranged = [axis for axis, count in enumerate(mapped.survey.grid.shape) if count > 1]
-        figure = (_curve, _curve, _plane, _slices)[len(ranged)](mapped, ranged)
-        canvas = FigureCanvasAgg(figure)
+        canvas = FigureCanvasAgg(draw())
         stream = io.BytesIO()
         smaller: dict[str, Any] = {"pil_kwargs": {"optimize": True}} if kind == "png" else {}
         stamp = {"Software": None} if kind == "png" else {"Date": None}

@@ -1,0 +1,177 @@
+"""``compensate identify``: parameters of effects from measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from postproc.cli.common import Out, result_options
+from postproc.cli.map import Numbers, _ending, _list
+
+FEWEST_DRAWS = 20
+"""Fewer say nothing of a spread."""
+
+
+def _words(_context: click.Context, _option: click.Parameter, text: str) -> tuple[str, ...]:
+    """``a,b.c`` as its words."""
+    words = tuple(word.strip() for word in text.split(","))
+    if not all(words):
+        raise click.BadParameter(f"{text[:40]!r} has an empty name; write effect,effect.parameter")
+    if len(set(words)) < len(words):
+        raise click.BadParameter(f"{text[:40]!r} names an effect twice")
+    return words
+
+
+def _tool(context: click.Context, option: click.Parameter, text: str | None) -> Numbers | None:
+    """``x,y,z[,a,b,c]``, mm and deg; None where it is not given."""
+    if text is None:
+        return None
+    place = _list((3, 6), "x,y,z or x,y,z,a,b,c")(context, option, text)
+    return (*place, 0.0, 0.0, 0.0)[:6]
+
+
+def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None], int | None]:
+    """A number that is 0 or not below ``least``."""
+
+    def check(_context: click.Context, _option: click.Parameter, number: int | None) -> int | None:
+        if number is not None and 0 < number < least:
+            raise click.BadParameter(f"{number} is too few: {least} or more, or 0 for none")
+        return number
+
+    return check
+
+
+@click.command()
+@click.argument("data", type=click.Path(path_type=Path), nargs=-1, required=True)
+@click.option(
+    "--effects",
+    required=True,
+    metavar="EFFECT[.PARAMETER],...",
+    callback=_words,
+    help="What to look for: effects, or single parameters of them. One that the robot file does not have is added.",
+)
+@click.option("--robot", metavar="NAME|FILE", help="The robot [the one that the data name: # robot: NAME].")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="NEW.yaml",
+    callback=_ending(".yaml", ".yml"),
+    help="Write the robot file with what was found; without it there is only the report.",
+)
+@click.option(
+    "--tool",
+    metavar="X,Y,Z[,A,B,C]",
+    callback=_tool,
+    help="TCP on the flange, mm and deg, where the data do not state it (# tool: x y z) [the flange].",
+)
+@click.option(
+    "--priors",
+    is_flag=True,
+    help="Every interval of the robot file counts as a reading, not only those of dimensions of hardware.",
+)
+@click.option("--robust", is_flag=True, help="Readings far off are weighed down (Huber).")
+@click.option("--drop-outliers", is_flag=True, help="Leave out the readings that are told as outliers.")
+@click.option(
+    "--validate",
+    type=click.Path(path_type=Path),
+    metavar="OTHER.csv",
+    multiple=True,
+    help="Readings that are predicted and not fitted; may be given several times.",
+)
+@click.option(
+    "--folds",
+    type=click.IntRange(0, 1000),
+    default=5,
+    show_default=True,
+    callback=_none_or(2),
+    help="Poses are left out in so many turns, and predicted by a fit of the others; 0 is not at all.",
+)
+@click.option(
+    "--bootstrap",
+    type=click.IntRange(0, 100_000),
+    metavar="N",
+    callback=_none_or(FEWEST_DRAWS),
+    help="Check the intervals by so many draws; 0 is not at all [200 where poses are few].",
+)
+@click.option(
+    "--picture",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.png|svg",
+    callback=_ending(".png", ".svg"),
+    help="Draw the residuals by joint, direction, load and order.",
+)
+@click.option(
+    "--csv",
+    "csv_to",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.csv",
+    callback=_ending(".csv"),
+    help="What is left of every reading, one row each.",
+)
+@click.option("--strict", is_flag=True, help="Warnings count as errors: then nothing is written.")
+@result_options
+def identify(
+    data: tuple[Path, ...],
+    effects: tuple[str, ...],
+    robot: str | None,
+    output: Path | None,
+    tool: Numbers | None,
+    priors: bool,
+    robust: bool,
+    drop_outliers: bool,
+    validate: tuple[Path, ...],
+    folds: int,
+    bootstrap: int | None,
+    picture: Path | None,
+    csv_to: Path | None,
+    strict: bool,
+    json_to: str | None,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Find parameters of effects from the measurements in DATA (CSV), with 95 % intervals.
+
+    What the readings can not tell is left as it is and named: parameters that no reading moves with, that only show
+    as a sum, or that the place of the tracker imitates. Where the tracker and its targets stand is found with every
+    fit. What is left is told of the readings fitted, and of poses that were not.
+
+    \b
+    Examples:
+      compensate identify loads.csv --effects joint_compliance,gravity_compensator -o kr270_shop.yaml
+      compensate identify poses.csv --robot ur5 --effects joint_offset,link_geometry --validate later.csv
+      compensate identify loads.csv --effects gravity_compensator.K_c --picture left.png --csv left.csv --json -
+
+    Exit codes: 0 all found, nothing to look at; 3 done, but something was not found or deserves a look (outliers,
+    bounds, no gain on other poses); 1 could not, nothing was written; 2 command line.
+    """
+    from postproc.report.identified_terminal import show_identified
+    from postproc.workflows.identify import IdentifyRequest
+    from postproc.workflows.identify import identify as run
+
+    out = Out(json_to, quiet, verbose)
+    request = IdentifyRequest(
+        data=data,
+        robot=robot,
+        effects=effects,
+        output=output,
+        priors=priors,
+        robust=robust,
+        drop_outliers=drop_outliers,
+        validate=validate,
+        folds=folds,
+        bootstrap=bootstrap,
+        tool_mm_deg=tool,
+        picture=picture,
+        csv=csv_to,
+        json=out.json_file,
+        strict=strict,
+    )
+    with out.refusals("identify"), out.stages() as stage:
+        done = run(request, stage, lambda name, at, of: stage(f"{name} {at} of {of}"))
+    out.result(done.as_json(), written=True)
+    if not out.quiet:
+        show_identified(out.console(), done, verbose)
+    raise SystemExit(done.exit)

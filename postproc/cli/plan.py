@@ -1,0 +1,324 @@
+"""``compensate plan``: the poses and loads worth measuring."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import click
+
+from postproc.cli.common import Out, result_options
+from postproc.cli.identify import _tool, _words
+from postproc.cli.map import _FAR, Numbers, _ending, _list, _number
+
+MOST = 200
+"""Poses that somebody may want to set up."""
+
+Range = tuple[float, float]
+
+
+def _loads(_context: click.Context, _option: click.Parameter, text: str | None) -> Numbers:
+    """``kg,kg``, none below zero."""
+    loads = tuple(_number(word.strip(), _FAR) for word in text.split(",")) if text else ()
+    if any(load < 0 for load in loads):
+        raise click.BadParameter("a weight can not be below zero")
+    return loads
+
+
+def _targets(
+    context: click.Context, option: click.Parameter, texts: tuple[str, ...]
+) -> tuple[tuple[str, Numbers], ...]:
+    """``NAME=x,y,z``, each name once."""
+    found: dict[str, Numbers] = {}
+    for text in texts:
+        name, equals, place = (part.strip() for part in text.partition("="))
+        if not equals or not name or any(sign in name for sign in ',;"#:'):
+            raise click.BadParameter(f"{text[:40]!r} is not NAME=x,y,z")
+        if name.casefold() in map(str.casefold, found):
+            raise click.BadParameter(f"{name!r} is named twice")
+        found[name] = _list((3,), "x,y,z")(context, option, place)
+    return tuple(found.items())
+
+
+def _place(context: click.Context, option: click.Parameter, text: str | None) -> Numbers | None:
+    return None if text is None else _list((3,), "x,y,z")(context, option, text)
+
+
+def _ends(text: str) -> Range:
+    """``a:b``, either end may be left open."""
+    low, colon, high = (part.strip() for part in text.partition(":"))
+    ends = (_number(low, _FAR) if low else -math.inf), (_number(high, _FAR) if high else math.inf)
+    if not colon or not ends[0] < ends[1]:
+        raise click.BadParameter(f"{text[:40]!r} is not a range a:b that rises")
+    return ends
+
+
+def _box(_context: click.Context, _option: click.Parameter, text: str) -> tuple[Range, ...]:
+    ranges = tuple(_ends(part) for part in text.split(","))
+    if len(ranges) != 3:
+        raise click.BadParameter(
+            f"{len(ranges)} ranges where x0:x1,y0:y1,z0:z1 is needed; leave an end open as in :,:,0:"
+        )
+    return ranges
+
+
+def _limits(
+    _context: click.Context, _option: click.Parameter, texts: tuple[str, ...]
+) -> tuple[tuple[str, Range], ...]:
+    """``A2=-140:-20``, each joint once."""
+    found: dict[str, Range] = {}
+    for text in texts:
+        name, equals, ends = (part.strip() for part in text.partition("="))
+        if not equals or not name:
+            raise click.BadParameter(f"{text[:40]!r} is not JOINT=a:b")
+        if name.casefold() in map(str.casefold, found):
+            raise click.BadParameter(f"{name!r} is named twice")
+        found[name] = _ends(ends)
+    return tuple(found.items())
+
+
+def _pair(context: click.Context, option: click.Parameter, text: str | None) -> tuple[str, ...] | None:
+    """Two different names."""
+    if text is None:
+        return None
+    words = _words(context, option, text)
+    if len(words) != 2:
+        raise click.BadParameter(f"{text[:40]!r} is not two effects: a,b")
+    return words
+
+
+@click.command()
+@click.option("--robot", required=True, metavar="NAME|FILE", help="The robot.")
+@click.option(
+    "--effects",
+    required=True,
+    metavar="EFFECT[.PARAMETER],...",
+    callback=_words,
+    help="What is to be identified: effects, or single parameters of them.",
+)
+@click.option("--poses", required=True, type=click.IntRange(1, MOST), help="How many poses are to be set up.")
+@click.option(
+    "-o",
+    "--output",
+    required=True,
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="PLAN.csv",
+    callback=_ending(".csv"),
+    help="The plan: a file to fill in with readings, and to give to `identify` then.",
+)
+@click.option(
+    "--loads",
+    metavar="KG,KG",
+    callback=_loads,
+    help="Weights that can be hung at the TCP; all of them at every pose [absolute: none].",
+)
+@click.option(
+    "--one-load", is_flag=True, help="At each pose one of the loads, the one that tells most there."
+)
+@click.option(
+    "--tool",
+    metavar="X,Y,Z[,A,B,C]",
+    default="0,0,0",
+    callback=_tool,
+    help="TCP on the flange, mm and deg: where the load hangs; beside the last axis, or that is not seen [the flange].",
+)
+@click.option(
+    "--target",
+    "targets",
+    metavar="NAME=X,Y,Z",
+    multiple=True,
+    callback=_targets,
+    help="A reflector and its place on the flange, mm; may be given several times [the TCP is measured].",
+)
+@click.option(
+    "--rough-targets", is_flag=True, help="The reflectors' places are rough; `identify` is to find them."
+)
+@click.option(
+    "--kind",
+    type=click.Choice(["deflection", "absolute"]),
+    help="What is measured: loaded minus unloaded, or places by a tracker [deflection for what a load shows].",
+)
+@click.option(
+    "--sigma",
+    type=click.FloatRange(0.0, 100.0, min_open=True),
+    default=0.03,
+    show_default=True,
+    metavar="MM",
+    help="Scatter of each coordinate of what is measured (of the difference, for deflections), one sigma.",
+)
+@click.option(
+    "--criterion",
+    type=click.Choice(["minimax", "d", "test"]),
+    help="Worst ratio of an interval to the wanted one; D-optimal; error at the cuts of --test [test with --test, else "
+    "minimax].",
+)
+@click.option(
+    "--wanted",
+    metavar="[NAME=]VALUE",
+    multiple=True,
+    help="Wanted 95 % interval, half width: c2=1%, s0=20mm, or 2% for all [those of the robot file].",
+)
+@click.option(
+    "--test",
+    "test_program",
+    type=click.Path(path_type=Path),
+    metavar="PROGRAM",
+    help="A program: the error at its cuts is to be small. With its cell and its forces, as in the main job.",
+)
+@click.option("--force", metavar="[SPEC]", help="Machining force of --test [the forces that belong to it].")
+@click.option(
+    "--cell", type=click.Path(path_type=Path), help="Cell of --test instead of the nearest cell.yaml."
+)
+@click.option(
+    "--tracker",
+    metavar="X,Y,Z",
+    callback=_place,
+    help="Place of the tracker in the robot base, mm; only reflectors that it sees are planned [all are seen].",
+)
+@click.option(
+    "--cone",
+    type=click.FloatRange(0.0, 180.0, min_open=True),
+    default=60.0,
+    show_default=True,
+    metavar="DEG",
+    help="A reflector is seen within this angle of where it faces: straight away from the flange's axis.",
+)
+@click.option(
+    "--box",
+    metavar="X0:X1,Y0:Y1,Z0:Z1",
+    default=":,:,0:",
+    show_default=True,
+    callback=_box,
+    help="Where TCP, flange and reflectors may be, mm, robot base; ends may be left open.",
+)
+@click.option(
+    "--limits",
+    metavar="JOINT=A:B",
+    multiple=True,
+    callback=_limits,
+    help="Narrower range of an axis, deg or mm; may be given several times [the robot file's, less 1 deg].",
+)
+@click.option(
+    "--spacing",
+    type=click.FloatRange(0.0, 90.0),
+    default=5.0,
+    show_default=True,
+    metavar="DEG",
+    help="Two poses differ by this in one axis at least.",
+)
+@click.option(
+    "--measured",
+    type=click.Path(path_type=Path),
+    metavar="DATA.csv",
+    multiple=True,
+    help="Readings that exist already and count; without their own `# tool:` with that of --tool. May be given several "
+    "times.",
+)
+@click.option(
+    "--discriminate",
+    metavar="A,B",
+    callback=_pair,
+    help="Poses that tell these two effects apart, each fitted together with --effects.",
+)
+@click.option(
+    "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Of the random poses."
+)
+@result_options
+def plan(
+    robot: str,
+    effects: tuple[str, ...],
+    poses: int,
+    output: Path,
+    loads: Numbers,
+    one_load: bool,
+    tool: Numbers,
+    targets: tuple[tuple[str, Numbers], ...],
+    rough_targets: bool,
+    kind: str | None,
+    sigma: float,
+    criterion: str | None,
+    wanted: tuple[str, ...],
+    test_program: Path | None,
+    force: str | None,
+    cell: Path | None,
+    tracker: Numbers | None,
+    cone: float,
+    box: tuple[Range, ...],
+    limits: tuple[tuple[str, Range], ...],
+    spacing: float,
+    measured: tuple[Path, ...],
+    discriminate: tuple[str, str] | None,
+    seed: int,
+    json_to: str | None,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Plan which poses and loads to measure, so that `identify` finds the parameters of EFFECTS as well as it can.
+
+    Poses lie within the limits of the axes, the room and the sight of the tracker. Predicted are the 95 % intervals
+    that `identify` will state, for 10, 15, 20, 30 and the wanted number of poses, beside random poses; and what can not
+    be seen, and why. Collisions are not looked at.
+
+    \b
+    Examples:
+      compensate plan --robot kuka_kr270 --effects joint_compliance,gravity_compensator --poses 15 --loads 265
+          --tool 0,500,300 --target M1=300,0,100 --target M2=-150,260,100 --target M3=-150,-260,100 -o plan.csv
+      compensate plan --robot ur5 --effects joint_offset,link_geometry --poses 40 --target T=0,60,80 --rough-targets
+          --tracker 2500,0,800 -o poses.csv
+      compensate plan --robot kuka_kr270 --effects joint_compliance --discriminate gravity_compensator,link_compliance
+          --poses 6 --loads 265 --tool 0,500,300 -o which.csv
+
+    Exit codes: 0 done; 3 done, but something that was asked for can not be seen; 1 could not; 2 command line.
+    """
+    from postproc.report.plan import show_plan
+    from postproc.workflows.plan import PlanRequest
+    from postproc.workflows.plan import plan as run
+
+    if criterion == "test" and test_program is None:
+        raise click.BadParameter("needs a program: --test PROGRAM", param_hint="--criterion test")
+    if test_program is None and (force is not None or cell is not None):
+        option = "--cell" if force is None else "--force"
+        raise click.BadParameter("belongs to a program: --test PROGRAM", param_hint=option)
+    if rough_targets and not targets:
+        raise click.BadParameter("needs --target NAME=x,y,z, at least roughly", param_hint="--rough-targets")
+    if one_load and len(loads) < 2:
+        raise click.BadParameter("needs several --loads to choose from", param_hint="--one-load")
+    if discriminate is not None and (criterion or test_program or measured):
+        raise click.BadParameter(
+            "goes with no --criterion, --test and --measured", param_hint="--discriminate"
+        )
+
+    out = Out(json_to, quiet, verbose)
+    request = PlanRequest(
+        robot=robot,
+        effects=effects,
+        poses=poses,
+        output=output,
+        loads=loads,
+        one_load=one_load,
+        tool_mm_deg=tool,
+        targets=targets,
+        rough_targets=rough_targets,
+        kind=kind,
+        sigma_mm=sigma,
+        criterion=criterion,
+        wanted=wanted,
+        program=test_program,
+        force=force or "",
+        cell=cell,
+        tracker_mm=tracker,
+        cone_deg=cone,
+        box_mm=box,
+        limits=limits,
+        spacing_deg=spacing,
+        measured=measured,
+        discriminate=discriminate,
+        seed=seed,
+        json=out.json_file,
+    )
+    with out.refusals("plan"), out.stages() as stage:
+        done = run(request, stage)
+    out.result(done.as_json(), written=True)
+    if not out.quiet:
+        show_plan(out.console(), done, verbose)
+    raise SystemExit(done.exit)

@@ -1,0 +1,1 @@
+"""Which poses and loads are worth measuring: what can be set up, what it would show, and the best choice of it."""

@@ -1,0 +1,276 @@
+"""Designs for precise parameters: the choice of setups, and the intervals that a fit to them will state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats
+from postproc.experiments.criteria import AtTestPoses, Criterion, Determinant, Minimax
+from postproc.experiments.exchange import Choices, exchanged, grown, random_choice
+from postproc.experiments.offer import Offer, Setups, drawn, spacings
+from postproc.experiments.pool import (
+    CANDIDATES,
+    Choice,
+    Pool,
+    Stage,
+    enough,
+    pooled,
+    refined,
+    rested,
+    silent,
+)
+from postproc.experiments.seen import Shown, awake, judged, shown
+from postproc.experiments.unseen import reason
+from postproc.findings import Finding, Refusal
+from postproc.identification.identifiable import COVERAGE, UNSEEN, Dropped, basis
+from postproc.identification.solve import prior_rows, scales
+from postproc.identification.unknowns import Unknown
+from postproc.model import StiffnessModel
+from postproc.units import MM
+
+FEW = 300
+"""Of them, to see whether an effect is asleep."""
+
+STARTS = 3
+"""Random designs that the exchange also begins with."""
+
+RANDOM = 20
+"""Random designs to compare with."""
+
+LOOSE = 1e-6
+"""Information of what nothing is known of: an interval of 1,000 times the wanted one, 1 m of a nuisance."""
+
+HOPELESS = 10.0
+"""What stays so many times as wide as wanted is given up, and the others are not spoiled for it."""
+
+CRITERIA = ("minimax", "d", "test")
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is asked for.
+
+    wanted (P,) [SI]: half widths of the 95 % intervals; counts (P,): whether an unknown is to be made precise.  before:
+    readings that exist.  tests (k, P) [m per SI unit]: R of R^T R, the mean of S^T S over the poses that matter, S what
+    the unknowns do there; None without.
+    """
+
+    model: StiffnessModel
+    unknowns: tuple[Unknown, ...]
+    offer: Offer
+    wanted: Floats
+    counts: Bools
+    criterion: str = "minimax"
+    before: Shown | None = None
+    tests: Floats | None = None
+
+
+@dataclass(frozen=True)
+class Design:
+    """A choice of setups.  ci95 (P,) [SI]: what a fit will state, NaN of what it must leave out (``dropped``); worst:
+    largest ratio to the wanted ones, infinite where one that counts is left out; test [m]: root mean square of the
+    standard deviation at the poses that matter, NaN without."""
+
+    setups: Setups
+    ci95: Floats
+    worst: float
+    dropped: tuple[Dropped, ...]
+    test: float
+
+
+@dataclass(frozen=True)
+class Lost:
+    """A parameter that can not be seen, or not well enough, and why in words.  imitated: a place of the tracker or of
+    its targets does the same, which is no loss."""
+
+    name: str
+    why: str
+    imitated: bool = False
+
+
+@dataclass(frozen=True)
+class Designs:
+    """Designs by number of poses.
+
+    model: with effects that were asleep at the sizes of their parameters; candidates: that there were to choose from;
+    at_random: medians over random designs of the intervals (P,) and of their worst ratio; before: intervals (P,) by the
+    readings that exist, None without; unseen: what no pose can show; left_out, weak: what the design of the wanted
+    number of poses does not show, or less precisely than wanted, weakest first.
+    """
+
+    model: StiffnessModel
+    candidates: Setups
+    chosen: dict[int, Design]
+    at_random: dict[int, tuple[Floats, float]]
+    before: Floats | None
+    unseen: tuple[Lost, ...]
+    left_out: tuple[Lost, ...]
+    weak: tuple[Lost, ...]
+
+
+def designs(
+    task: Task,
+    poses: int,
+    others: Iterable[int] = (),
+    seed: int = 1,
+    candidates: int = CANDIDATES,
+    stage: Stage = silent,
+) -> Designs:
+    """The best design found of ``poses`` setups, and of ``others`` beside it: a larger one is never worse.
+
+    Others for which there are not enough distinct poses are left out.  Raises Refusal PLN001 (no pose can be measured),
+    PLN002 (nothing that is asked for can be seen), PLN003 (no rest), PLN004 (not enough distinct poses).
+    """
+    rng, offer, unknowns = np.random.default_rng(seed), task.offer, task.unknowns
+    stage("looking for poses")
+    setups = drawn(task.model, offer, candidates, rng)
+    model = awake(task.model, unknowns, offer, setups[:FEW])
+
+    def evaluated(some: Setups) -> Pool:
+        return pooled(some, shown(model, unknowns, offer, some))
+
+    stage("computing what poses show")
+    start = rested(model, setups, evaluated)
+    whole = judged(model, unknowns, start.shown, task.before)[1]
+    unseen = tuple(_lost(task, model, start, dropped) for dropped in whole.dropped)
+    if not whole.kept:
+        lost = "; ".join(f"{one.name}: {one.why}" for one in unseen)
+        message = f"no pose shows anything of what is asked for: {lost}"
+        raise Refusal(Finding("PLN002", message, str(model.robot.path)))
+    kept = list(whole.kept)
+    sizes = sorted({poses, *others})
+    task = replace(task, counts=task.counts & np.isin(range(len(unknowns)), kept))
+    hopeful = task
+    while True:
+        criterion = _criterion(hopeful, kept, len(start.shown.names))
+
+        def chosen_from(pool: Pool, begun: Choice, criterion: Criterion = criterion) -> Choice:
+            return _by_size(choices_of(task, kept, pool), criterion, sizes, begun, rng)
+
+        pool, chosen = refined(model, offer, start, evaluated, chosen_from, rng, stage)
+        enough(model, offer, poses, poses if poses in chosen else max(chosen, default=0))
+        wide = ~(_design(task, model, pool[chosen[poses]]).ci95 < HOPELESS * task.wanted)
+        if not (hopeful.counts & wide).any() or not (hopeful.counts & ~wide).any():
+            break
+        hopeful = replace(hopeful, counts=hopeful.counts & ~wide)
+        if task.criterion == "test":
+            break
+    stage("comparing with random poses")
+    some = choices_of(task, kept, start)
+    best = {size: _design(hopeful, model, pool[rows]) for size, rows in chosen.items()}
+    never = {lost.name for lost in unseen}
+    missed = [dropped for dropped in best[poses].dropped if dropped.name not in never]
+    before = None if task.before is None else judged(model, unknowns, start.shown[:0], task.before)[0]
+    return Designs(
+        model=model,
+        candidates=start.setups,
+        chosen=best,
+        at_random={size: _at_random(hopeful, model, start, some, size, rng) for size in chosen},
+        before=before,
+        unseen=unseen,
+        left_out=tuple(_lost(task, model, start, dropped) for dropped in missed),
+        weak=_weak(task, model, start, best[poses]),
+    )
+
+
+def predicted(task: Task, model: StiffnessModel, setups: Setups) -> Design:
+    """What any setups will show."""
+    return _design(task, model, Pool(setups, shown(model, task.unknowns, task.offer, setups)))
+
+
+def choices_of(task: Task, kept: Sequence[int], pool: Pool) -> Choices:
+    """The pool for the exchange: the unknowns ``kept`` in wanted standard deviations, and nuisances [mm, mrad]."""
+    unit = task.wanted[list(kept)] / COVERAGE
+    per_scale = unit / scales(task.unknowns)[list(kept)]
+    rows = np.concatenate(
+        [pool.shown.columns[:, :, list(kept)] * per_scale, pool.shown.nuisance * MM], axis=2
+    )
+    base = LOOSE * np.eye(rows.shape[2])
+    known = prior_rows(task.unknowns)[np.ix_(kept, kept)] * per_scale
+    block = known.T @ known
+    if task.before is not None:
+        own, frames = task.before.columns[0][:, list(kept)] * per_scale, basis(task.before.nuisance[0])
+        own = own - frames @ (frames.T @ own)
+        block = block + own.T @ own
+    base[: len(kept), : len(kept)] += block
+    return Choices(rows, pool.setups.q, spacings(task.model.robot, task.offer.spacing), base)
+
+
+def _criterion(task: Task, kept: Sequence[int], nuisances: int) -> Criterion:
+    counts = task.counts[list(kept)]
+    counts = np.concatenate([counts if counts.any() else np.ones(len(kept), bool), np.zeros(nuisances, bool)])
+    if task.criterion == "minimax":
+        return Minimax(counts)
+    if task.criterion == "d":
+        return Determinant(counts)
+    assert task.tests is not None
+    root = task.tests[:, list(kept)] * (task.wanted[list(kept)] / COVERAGE)
+    return AtTestPoses(np.concatenate([root, np.zeros((len(root), nuisances))], axis=1))
+
+
+def _by_size(
+    choices: Choices, criterion: Criterion, sizes: Sequence[int], begun: Choice, rng: np.random.Generator
+) -> Choice:
+    """The best choice of each size: begun with the given ones, or with the best next setups and at random; and with the
+    next smaller choice."""
+    found: dict[int, Sequence[int]] = {}
+    last: Sequence[int] = ()
+    for size in sizes:
+        tried = [grown(choices, criterion, last, size)]
+        if begun:
+            tried += [list(begun[size])] if size in begun else []
+        else:
+            tried += [grown(choices, criterion, (), size)] if last else []
+            tried += [random_choice(choices, size, rng) for _ in range(STARTS)]
+        done = [exchanged(choices, criterion, choice) for choice in tried if len(choice) == size]
+        if not done:
+            break
+        found[size] = last = min(done, key=lambda pair: pair[1])[0]
+    return found
+
+
+def _design(task: Task, model: StiffnessModel, pool: Pool) -> Design:
+    ci95, found = judged(model, task.unknowns, pool.shown, task.before)
+    ratio = np.where(np.isnan(ci95), np.inf, ci95) / task.wanted
+    test = np.nan
+    if task.tests is not None and found.kept:
+        kept = list(found.kept)
+        root = task.tests[:, kept] * scales(task.unknowns)[kept]
+        test = float(np.sqrt(np.einsum("ki,ij,kj->", root, found.covariance, root)))
+    return Design(pool.setups, ci95, float(ratio[task.counts].max(initial=0.0)), found.dropped, test)
+
+
+def _at_random(
+    task: Task, model: StiffnessModel, pool: Pool, choices: Choices, size: int, rng: np.random.Generator
+) -> tuple[Floats, float]:
+    """Medians over random designs of the intervals (P,), infinite where one is left out, and of the worst ratio."""
+    tried = [_design(task, model, pool[random_choice(choices, size, rng)]) for _ in range(RANDOM)]
+    wide = [np.where(np.isnan(one.ci95), np.inf, one.ci95) for one in tried]
+    return np.median(wide, axis=0), float(np.median([one.worst for one in tried]))
+
+
+def _lost(task: Task, model: StiffnessModel, pool: Pool, dropped: Dropped) -> Lost:
+    """Why an unknown is left out, with what the offered loads and poses have to do with it."""
+    at = [unknown.name for unknown in task.unknowns].index(dropped.name)
+    redundant = dropped.why.startswith("only seen together")
+    if redundant:
+        return Lost(dropped.name, dropped.why, imitated=not dropped.together)
+    still = bool(np.linalg.norm(pool.shown.columns[:, :, at]) < UNSEEN)
+    more = reason(model, task.unknowns[at], task.offer, pool.setups, still)
+    return Lost(dropped.name, f"{dropped.why}; {more}" if more else dropped.why)
+
+
+def _weak(task: Task, model: StiffnessModel, pool: Pool, design: Design) -> tuple[Lost, ...]:
+    """What a design shows less precisely than wanted."""
+    ratio = np.where(task.counts, np.nan_to_num(design.ci95 / task.wanted), 0.0)
+    told = []
+    for at in np.argsort(-ratio, kind="stable"):
+        if ratio[at] <= 1.0:
+            break
+        more = reason(model, task.unknowns[at], task.offer, pool.setups, still=False)
+        what = f"{ratio[at]:.2g} times the wanted interval"
+        told.append(Lost(task.unknowns[at].name, f"{what}; {more}" if more else what))
+    return tuple(told)

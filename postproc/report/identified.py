@@ -1,0 +1,426 @@
+"""What ``compensate identify`` found: parameters with intervals, and what they leave; as JSON and CSV.
+
+All residuals are measured minus expected, in axes of the robot base.  The size of one is its length in space; where
+fewer than three coordinates were measured, the length that three like them would have.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.findings import Finding
+from postproc.identification.fit import Estimate, Fit
+from postproc.identification.identifiable import strong_correlations
+from postproc.identification.outliers import Outlier
+from postproc.identification.validation import Bootstrap, Validation
+from postproc.report.report import exit_code
+from postproc.report.workspace import _texts
+from postproc.robot.chain import generalized_force
+from postproc.robot.provenance import GAP
+from postproc.units import DEG, MM
+
+STRONG = 0.9
+"""Correlations above are told."""
+
+PARTS, EACH = 8, 10
+"""Into how many parts of about as many readings the range of a joint or load is cut at most, each of ``EACH`` or more.
+"""
+
+SAME_FORCE = 0.01
+"""Share by which forces must differ before readings are sorted by them."""
+
+
+class Sizes(NamedTuple):
+    """Root mean square, mean and maximum [m] of the lengths of residuals, and of how many."""
+
+    rms: float
+    mean: float
+    max: float
+    readings: int
+
+    @classmethod
+    def of(cls, lengths: Floats) -> Sizes | None:
+        """None where there is no length; NaN are left out."""
+        seen = lengths[np.isfinite(lengths)]
+        if not len(seen):
+            return None
+        return cls(float(np.sqrt(np.mean(seen**2))), float(seen.mean()), float(seen.max()), len(seen))
+
+
+@dataclass(frozen=True)
+class Sum:
+    """Parameters that only show together: ``of`` name -> weight, of which the first was found and the others held;
+    ``value`` and ``ci95`` (SI) of their sum."""
+
+    of: Mapping[str, float]
+    value: float
+    ci95: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A quantity of each reading, (R,) in ``unit``, that residuals are looked at by."""
+
+    name: str
+    unit: str
+    values: Floats
+
+    def parts(self) -> list[Ints]:
+        """The rows of readings that are alike: of each value where there are few, or of ranges."""
+        distinct, of = np.unique(np.round(self.values, 6), return_inverse=True)
+        if len(distinct) > PARTS:
+            count = int(np.clip(len(self.values) // EACH, 2, PARTS))
+            edges = np.quantile(self.values, np.arange(1, count) / count)
+            of = np.searchsorted(edges, self.values, side="right")
+        return [np.flatnonzero(of == k) for k in np.unique(of)]
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What ``identify`` found.
+
+    data: name and SHA-256 of each file; effects: the words asked for; before, after: without and with the unknowns;
+    held: dimensions of hardware taken as they stand; heldout_before, heldout_after (R, 3) [m]: what fits without the
+    pose leave of it; outliers: rows of the campaign, left out of both fits or not.
+    """
+
+    robot: str
+    robot_file: Path
+    robot_digest: str
+    data: tuple[tuple[str, str], ...]
+    effects: tuple[str, ...]
+    before: Fit
+    after: Fit
+    held: tuple[str, ...]
+    heldout_before: Floats | None
+    heldout_after: Floats | None
+    folds: int
+    validation: Validation | None
+    outliers: tuple[Outlier, ...]
+    outliers_left_out: bool
+    bootstrap: Bootstrap | None
+    findings: tuple[Finding, ...] = ()
+    outputs: tuple[str, ...] = ()
+    strict: bool = False
+
+    @property
+    def exit(self) -> int:
+        return exit_code(self.findings, self.strict)
+
+    # Residuals.
+
+    @cached_property
+    def counts(self) -> Bools:
+        """(R,) readings that were fitted."""
+        return np.asarray((self.after.plain_weights.weight[:, :3] > 0).any(axis=1))
+
+    @cached_property
+    def residuals(self) -> dict[str, Floats]:
+        """(R, 3) [m] of all readings, under the names that ``gap`` begins with; NaN where nothing was measured."""
+        known = {"before": self.before.residual, "after": self.after.residual}
+        held = {"heldout_before": self.heldout_before, "heldout_after": self.heldout_after}
+        return known | {name: values for name, values in held.items() if values is not None}
+
+    @cached_property
+    def lengths(self) -> dict[str, Floats]:
+        """(R,) [m] of ``residuals``, NaN for readings that were not fitted."""
+        measured = np.isfinite(self.after.campaign.readings.value)
+        return {
+            name: np.where(self.counts, lengths_of(values, measured), np.nan)
+            for name, values in self.residuals.items()
+        }
+
+    @cached_property
+    def validation_lengths(self) -> dict[str, Floats]:
+        """(V,) [m] of the readings to validate with, before and after."""
+        if self.validation is None:
+            return {}
+        measured = np.isfinite(self.validation.campaign.readings.value)
+        residuals = {"before": self.validation.before, "after": self.validation.after}
+        return {name: lengths_of(values, measured) for name, values in residuals.items()}
+
+    def gap_mm(self) -> dict[str, float]:
+        """Root mean squares of residuals, and the scatter of the readings; what is not known is left out."""
+        sizes = {name: Sizes.of(lengths) for name, lengths in self.lengths.items()}
+        known = {f"{name}_rms_mm": size.rms / MM for name, size in sizes.items() if size}
+        if self.after.noise.known:
+            known["noise_mm"] = self.after.noise.rms / MM
+        return {key: round(value, 7) for key, value in known.items()}
+
+    @property
+    def sigma(self) -> float:
+        """[m] one sigma of a coordinate: as stated or as repeats show, or else as the residuals do."""
+        noise = self.after.noise
+        return float(np.sqrt(np.mean(noise.sigma**2) * (1.0 if noise.known else self.after.factor)))
+
+    @cached_property
+    def joints(self) -> tuple[Variable, ...]:
+        """Where each joint stood."""
+        readings = self.after.campaign.readings
+        return tuple(
+            Variable(name, "mm" if slides else "deg", column / (MM if slides else DEG))
+            for (name, slides), column in zip(readings.joints, readings.q.T, strict=True)
+        )
+
+    @cached_property
+    def load(self) -> Variable | None:
+        """The force, or where that is always the same the largest torque on a joint; None where nothing acts."""
+        campaign, model = self.after.campaign, self.after.model
+        force = np.linalg.norm(campaign.readings.wrench[:, :3], axis=1)
+        if np.ptp(force) > SAME_FORCE * force.max():
+            return Variable("force", "N", force)
+        if not campaign.readings.wrench.any():
+            return None
+        swept = model.state(campaign.q, campaign.wrench, campaign.tool, campaign.conditions).swept
+        torque = generalized_force(swept, swept.position, campaign.wrench.T)[model.chain.motor_rows]
+        turning = [not slides for _, slides in campaign.readings.joints]
+        return Variable(
+            "largest joint torque", "N m", np.abs(torque[turning]).max(axis=0, initial=0.0)[campaign.at]
+        )
+
+    @property
+    def order(self) -> Variable:
+        """The number of each reading, in the order of time."""
+        return Variable("reading", "", np.arange(1.0, len(self.after.campaign) + 1.0))
+
+    # Parameters.
+
+    @cached_property
+    def sums(self) -> tuple[Sum, ...]:
+        """What is known of parameters that were left out because they only show together with others.
+
+        The columns of a dropped parameter d being the sum of w_i times those of parameters p_i that were found, the
+        model depends on each p_i + w_i d only.
+        """
+        after = self.after
+        held = {u.name: after.model.terms[u.term].values[u.parameter.name] for u in after.asked}
+        found = []
+        for estimate in after.estimates:
+            name = estimate.unknown.name
+            others = {
+                dropped.name: weight
+                for dropped in after.dropped
+                for kept, weight in dropped.together
+                if kept == name
+            }
+            if others:
+                value = estimate.value + sum(weight * held[other] for other, weight in others.items())
+                unit = estimate.unknown.parameter.unit
+                found.append(Sum({name: 1.0, **others}, value, estimate.ci95, unit))
+        return tuple(found)
+
+    @cached_property
+    def correlations(self) -> tuple[tuple[str, str, float], ...]:
+        """Pairs of parameters above ``STRONG``, strongest first."""
+        names = [unknown.name for unknown in self.after.unknowns]
+        return strong_correlations(names, self.after.covariance, STRONG)
+
+    @cached_property
+    def bootstrap_ci95(self) -> dict[str, float]:
+        """(SI) half widths by the bootstrap, as the others are made of their deviations; {} without."""
+        if self.bootstrap is None:
+            return {}
+        wide = self.after.quantile * self.bootstrap.deviation
+        return {u.name: w for u, w in zip(self.after.unknowns, wide.tolist(), strict=True)}
+
+    def as_json(self) -> dict[str, object]:
+        """The machine-readable result; the keys are public."""
+        after, readings = self.after, self.after.campaign.readings
+        effects: dict[str, dict[str, object]] = {}
+        for estimate in after.estimates:
+            effect, _, parameter = estimate.unknown.name.partition(".")
+            effects.setdefault(effect, {})[parameter] = self._parameter(estimate)
+        units = {unknown.name: unknown.parameter.unit for unknown in after.asked}
+        values = {u.name: after.model.terms[u.term].values[u.parameter.name] for u in after.asked}
+        return {
+            "robot": self.robot,
+            "robot_file": str(self.robot_file),
+            "robot_digest": self.robot_digest,
+            "data": [{"file": name, "sha256": digest} for name, digest in self.data],
+            "asked": list(self.effects),
+            "measured": "deflection" if readings.deflection else "position",
+            "readings": len(readings),
+            "fitted_readings": int(self.counts.sum()),
+            "poses": after.campaign.poses,
+            "targets": len(after.campaign.targets),
+            "sessions": len(readings.sessions),
+            "effects": effects,
+            "sums": [
+                {
+                    "of": [list(part) for part in one.of.items()],
+                    "value": one.value,
+                    "ci95": one.ci95,
+                    "unit": one.unit,
+                }
+                for one in self.sums
+            ],
+            "gap": self._gap(),
+            "folds": self.folds,
+            "validation": self._validation(),
+            "condition": float(after.condition),
+            "rank": len(after.unknowns),
+            "dropped": [
+                {"name": one.name, "why": one.why, "value": values[one.name], "unit": units[one.name]}
+                for one in after.dropped
+            ],
+            "held": list(self.held),
+            "at_bound": [estimate.unknown.name for estimate in after.estimates if estimate.at_bound],
+            "correlations": [[a, b, round(size, 6)] for a, b, size in self.correlations],
+            "bootstrap": None if self.bootstrap is None else {"draws": self.bootstrap.draws},
+            "noise": {
+                "sigma_mm": _mm(self.sigma),
+                "source": after.noise.source,
+                "exceeded": bool(after.scatter_exceeded),
+                "shared_mm": _mm(after.shared_error),
+            },
+            "residuals": self._residuals(),
+            "outliers": [
+                {
+                    "file": one.file,
+                    "line": one.line,
+                    "distance_mm": _mm(one.distance),
+                    "sigmas": round(one.sigmas, 2),
+                    "what": one.what,
+                }
+                for one in self.outliers
+            ],
+            "outliers_left_out": self.outliers_left_out,
+            "findings": [finding.as_json() for finding in self.findings],
+            "outputs": list(self.outputs),
+            "exit": self.exit,
+        }
+
+    def _parameter(self, estimate: Estimate) -> dict[str, object]:
+        unknown = estimate.unknown
+        told: dict[str, object] = {
+            "value": estimate.value,
+            "ci95": estimate.ci95,
+            "unit": unknown.parameter.unit,
+            "before": None if unknown.stated is None else unknown.value,
+        }
+        if unknown.name in self.bootstrap_ci95:
+            told["bootstrap_ci95"] = self.bootstrap_ci95[unknown.name]
+        if estimate.at_bound:
+            told["at_bound"] = True
+        if unknown.prior is not None:
+            told["prior"] = True
+        return told
+
+    def _gap(self) -> dict[str, float | None]:
+        known = self.gap_mm()
+        told: dict[str, float | None] = {key: known.get(key) for key in GAP}
+        for name, lengths in self.lengths.items():
+            size = Sizes.of(lengths)
+            told[f"{name}_mean_mm"] = _mm(size.mean) if size else None
+            told[f"{name}_max_mm"] = _mm(size.max) if size else None
+        return told
+
+    def _validation(self) -> dict[str, object] | None:
+        if self.validation is None:
+            return None
+        told: dict[str, object] = {
+            "data": [path.name for path in self.validation.campaign.readings.files],
+            "readings": len(self.validation.campaign),
+            "registered_anew": self.validation.registered_anew,
+        }
+        for name, lengths in self.validation_lengths.items():
+            size = Sizes.of(lengths)
+            for key in ("rms", "mean", "max"):
+                told[f"{name}_{key}_mm"] = _mm(getattr(size, key)) if size else None
+        return told
+
+    def _residuals(self) -> dict[str, object]:
+        """Root mean squares by direction, and by parts of what the readings differ in."""
+        directions: dict[str, dict[str, float | None]] = {}
+        for k, axis in enumerate("xyz"):
+            told: dict[str, float | None] = {}
+            for name, values in self.residuals.items():
+                column = values[self.counts, k]
+                column = column[np.isfinite(column)]
+                told[f"{name}_rms_mm"] = _mm(np.sqrt(np.mean(column**2))) if len(column) else None
+                told[f"{name}_mean_mm"] = _mm(column.mean()) if len(column) else None
+            directions[axis] = told
+        return {
+            "direction": directions,
+            "joint": {variable.name: self._by(variable) for variable in self.joints},
+            "load": None if self.load is None else {"what": self.load.name, **self._by(self.load)},
+            "order": self._by(self.order),
+        }
+
+    def _by(self, variable: Variable) -> dict[str, object]:
+        parts = []
+        for rows in variable.parts():
+            inside = variable.values[rows]
+            part: dict[str, object] = {
+                "from": round(float(inside.min()), 6),
+                "to": round(float(inside.max()), 6),
+                "readings": len(rows),
+            }
+            for name, lengths in self.lengths.items():
+                size = Sizes.of(lengths[rows])
+                part[f"{name}_rms_mm"] = _mm(size.rms) if size else None
+            parts.append(part)
+        return {"unit": variable.unit, "parts": parts}
+
+
+def lengths_of(residual: Floats, measured: Bools) -> Floats:
+    """(R,) [m] of residuals (R, 3) of which the coordinates ``measured`` (R, 3) count; NaN where none does."""
+    on = np.isfinite(residual)
+    count = np.minimum(on.sum(axis=1), measured.sum(axis=1))
+    square = np.where(on, residual, 0.0) ** 2
+    size = np.sqrt(3.0 * square.sum(axis=1) / np.maximum(count, 1))
+    return np.asarray(np.where(count > 0, size, np.nan))
+
+
+def poses_in_order(pose: Ints) -> Ints:
+    """(R,) the number of the pose of each reading, from 1 in the order in which they were first measured."""
+    _, first, of = np.unique(pose, return_index=True, return_inverse=True)
+    number = np.empty(len(first), np.int64)
+    number[np.argsort(first)] = np.arange(1, len(first) + 1)
+    return np.asarray(number[of.reshape(-1)])
+
+
+def identified_csv(result: Identified) -> bytes:
+    """One row a reading: where it stands, its axes, what is left of it before, after and as one that was not fitted."""
+    campaign, readings = result.after.campaign, result.after.campaign.readings
+    rows = range(len(readings))
+    places = [readings.where(row) for row in rows]
+    outlier = {one.row for one in result.outliers}
+    columns: dict[str, list[str]] = {
+        "file": [file for file, _ in places],
+        "line": [str(line) for _, line in places],
+        "pose": [str(number) for number in poses_in_order(campaign.pose)],
+        "target": [campaign.targets[k] for k in readings.target],
+        "session": [readings.sessions[k] for k in readings.session],
+    }
+    for joint in result.joints:
+        columns[f"{joint.name}_{joint.unit}"] = _texts(joint.values, 6)
+    measured = np.isfinite(readings.value)
+    nothing = np.full((len(readings), 3), np.nan)
+    for name, key in (("before", "before"), ("after", "after"), ("heldout", "heldout_after")):
+        residual = result.residuals.get(key, nothing)
+        for axis, column in zip("xyz", residual.T, strict=True):
+            columns[f"{name}_d{axis}_mm"] = _texts(column / MM, 6)
+        columns[f"{name}_mm"] = _texts(lengths_of(residual, measured) / MM, 6)
+    columns["outlier"] = [str(int(row in outlier)) for row in rows]
+    columns["fitted"] = [str(int(counts)) for counts in result.counts]
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*columns.values(), strict=True))
+    return stream.getvalue().encode()
+
+
+def _mm(length: float) -> float:
+    """[mm] without the last bits that the conversion leaves."""
+    return round(float(length) / MM, 7) + 0.0

@@ -1,0 +1,264 @@
+"""What ``compensate identify`` found, on a terminal: a verdict, the parameters, what they leave, what to look at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from postproc.arrays import Floats
+from postproc.identification.fit import Estimate
+from postproc.identification.validation import WIDER
+from postproc.report.identified import STRONG, Identified, Sizes, Sum
+from postproc.report.terminal import _once, printable, show_findings
+from postproc.units import MM
+
+UNITS = {
+    "m": ("mm", MM),
+    "rad": ("mrad", 1e-3),
+    "rad/(N m)": ("urad/(N m)", 1e-6),
+    "m/N": ("mm/kN", MM / 1e3),
+    "N/m": ("N/mm", 1.0 / MM),
+    "N m/rad": ("kN m/rad", 1e3),
+    "N m/rad3": ("N m/mrad3", 1e9),
+    "N/m3": ("kN/mm3", 1e3 / MM**3),
+    "m/K": ("um/K", MM / 1e3),
+    "m/s": ("mm/h", MM / 3600.0),
+    "1": ("", 1.0),
+}
+"""SI unit -> the unit that people read, and its size; others are read as they are."""
+
+SHOWN = 5
+"""Of long lists, unless ``--verbose`` asks for all."""
+
+IN_TABLES = frozenset({"IDN018", "IDN019", "IDN020", "IDN021", "IDN022", "IDN025", "IDN026"})
+"""Findings that stand in the tables already: told once more, with what to do, by ``--verbose``."""
+
+
+def show_identified(console: Console, result: Identified, verbose: bool = False) -> None:
+    """The verdict, what was fitted to what, the parameters, what could not be found, what is left, and findings."""
+    console.print(Text(verdict(result), style="bold"), soft_wrap=True)
+    head = Table(box=None, show_header=False, pad_edge=False)
+    head.add_column(style="bold")
+    head.add_column()
+    for key, value in _rows(result):
+        head.add_row(key, Text(printable(value)))
+    console.print(head)
+    console.print(_parameters(result))
+    for line in _notes(result, verbose):
+        console.print(Text(printable(line)), soft_wrap=True)
+    console.print(_left(result))
+    for line in _outliers(result, verbose):
+        console.print(Text(printable(line)), soft_wrap=True)
+    show_findings(console, [f for f in result.findings if verbose or f.code not in IN_TABLES], verbose)
+    for path in result.outputs:
+        console.print(Text(printable(f"wrote {path}")), soft_wrap=True)
+
+
+def verdict(result: Identified) -> str:
+    """How many parameters were found, what they bring, and how that stands against the scatter of the readings."""
+    after, gap = result.after, result.gap_mm()
+    found, asked = len(after.unknowns), len(after.asked)
+    told = f"{found} of {asked} parameters found." if found < asked else f"All {asked} parameters found."
+    if asked == 1:
+        told = "The parameter was found."
+    told += f" What is left falls from {gap['before_rms_mm']:.3f} to {gap['after_rms_mm']:.3f} mm RMS"
+    without, held = gap.get("heldout_before_rms_mm"), gap.get("heldout_after_rms_mm")
+    told += "." if held is None else f", to {held:.3f} mm on poses that were not fitted."
+    if held is not None and without is not None and held >= without:
+        return f"{told} There the fit is no better than before: it does not hold."
+    if result.outliers and not result.outliers_left_out:
+        return f"{told} {_count(len(result.outliers), 'outlier')} among the readings: look there first."
+    if after.freedom == 0:
+        return f"{told} There are as many unknowns as measured numbers: that would always be so."
+    if not after.noise.known:
+        return f"{told} How much of it is scatter is not known: no SIGMA is stated and nothing repeats."
+    scatter = f"{gap['noise_mm']:.3f} mm"
+    if after.scatter_exceeded:
+        return f"{told} Readings scatter by {scatter}: the model lacks something, or they scatter by more."
+    return f"{told} Readings scatter by {scatter}: nothing more is to be seen in them."
+
+
+def _rows(result: Identified) -> Iterator[tuple[str, str]]:
+    after, readings = result.after, result.after.campaign.readings
+    campaign = after.campaign
+    kind = "deflections" if readings.deflection else "positions"
+    frame = " in the tracker's frame" if campaign.tracked else ""
+    yield "data", ", ".join(name for name, _ in result.data)
+    yield (
+        "",
+        f"{_count(len(readings), 'reading')} ({kind}{frame}) at {_count(campaign.poses, 'pose')},"
+        f" {_count(len(campaign.targets), 'target')}, {_count(len(readings.sessions), 'session')}",
+    )
+    yield "robot", f"{result.robot} ({result.robot_file})"
+    yield "effects", ", ".join(result.effects)
+    if result.held:
+        yield "held", f"{', '.join(_once(result.held))}: hardware without an interval, as the robot file says"
+    shared = after.shared_error
+    together = f"; readings of one pose share another {shared / MM:.3f} mm" if shared > 0 else ""
+    yield (
+        "scatter",
+        f"{result.sigma / MM:.4f} mm per coordinate (1 sigma), from: {after.noise.source}{together}",
+    )
+    how = "95 %, from the covariance"
+    if not after.noise.known or after.scatter_exceeded:
+        how += ", as wide as the residuals ask for"
+    if result.bootstrap is not None:
+        how += f"; checked by a bootstrap of {result.bootstrap.draws} draws"
+    yield "intervals", how
+
+
+def _parameters(result: Identified) -> Table:
+    """One row a parameter, under the name of its effect."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("parameter")
+    for head in ("before", "value", "+- 95 %", "%"):
+        table.add_column(head, justify="right")
+    table.add_column("unit")
+    table.add_column("")
+    effect = ""
+    for estimate in result.after.estimates:
+        own, _, name = estimate.unknown.name.partition(".")
+        if own != effect:
+            table.add_row(Text(own, style="bold"))
+            effect = own
+        table.add_row(f"  {name}", *_cells(result, estimate))
+    return table
+
+
+def _cells(result: Identified, estimate: Estimate) -> list[str]:
+    unknown = estimate.unknown
+    word, size = shown_unit(unknown.parameter.unit)
+    wide = estimate.ci95 / size
+    notes = []
+    if estimate.at_bound:
+        notes.append("at its bound")
+    if unknown.prior is not None:
+        notes.append("its stated interval counts")
+    drawn = result.bootstrap_ci95.get(unknown.name)
+    if drawn is not None and drawn > WIDER * estimate.ci95:
+        notes.append(f"+- {fixed(drawn / size, wide)} by bootstrap")
+    return [
+        "-" if unknown.stated is None else fixed(unknown.value / size, wide),
+        fixed(estimate.value / size, wide),
+        fixed(wide, wide),
+        _percent(estimate),
+        word,
+        ", ".join(notes),
+    ]
+
+
+def _notes(result: Identified, verbose: bool) -> Iterator[str]:
+    """Condition and correlations, what was left out and why, and the sums that are known instead."""
+    after = result.after
+    pairs = [f"{' / '.join(_once([a, b]))} {size:+.2f}" for a, b, size in result.correlations]
+    strong = "; ".join(_some(pairs, verbose)) or "none"
+    yield f"condition    {after.condition:.3g}; correlations above {STRONG:g}: {strong}"
+    reasons: dict[str, list[str]] = {}
+    for dropped in after.dropped:
+        reasons.setdefault(dropped.why, []).append(dropped.name)
+    lines = [f"{', '.join(_once(names))}: {why}" for why, names in reasons.items()]
+    for line in _some(lines, verbose):
+        yield f"left out     {line}"
+    for line in _some([_sum(one, result) for one in result.sums], verbose):
+        yield f"sum          {line}"
+
+
+def _sum(one: Sum, result: Identified) -> str:
+    """``joint_offset.o2 + 0.98 link_geometry.ry2 = 1.20 +- 0.10 mrad``"""
+    units = {unknown.name: unknown.parameter.unit for unknown in result.after.asked}
+    word, size = shown_unit(one.unit)
+    text = ""
+    for name, weight in one.of.items():
+        by = weight * shown_unit(units[name])[1] / size
+        sign = " - " if by < 0 else " + "
+        times = "" if math.isclose(abs(by), 1.0, rel_tol=1e-3) else f"{abs(by):.3g} "
+        text += f"{sign if text else ''}{times}{name}"
+    wide = one.ci95 / size
+    return f"{text} = {fixed(one.value / size, wide)} +- {fixed(wide, wide)} {word}".rstrip()
+
+
+def _left(result: Identified) -> Table:
+    """Residuals before and after: of what was fitted, of poses that were not, of other data."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column("residuals, mm")
+    for head in ("RMS", "mean", "max", "readings"):
+        table.add_column(head, justify="right")
+    deflection = result.after.campaign.readings.deflection
+    rows = {
+        "before": "the robot file" if deflection else "registration alone",
+        "after": "fitted",
+        "heldout_before": f"poses not fitted ({result.folds}-fold), before",
+        "heldout_after": f"poses not fitted ({result.folds}-fold), after",
+    }
+    _add_sizes(table, {rows[name]: lengths for name, lengths in result.lengths.items()})
+    anew = ", registered anew" if result.validation and result.validation.registered_anew else ""
+    named = {f"validation{anew}, {name}": lengths for name, lengths in result.validation_lengths.items()}
+    _add_sizes(table, named)
+    noise = result.gap_mm().get("noise_mm")
+    if noise is not None:
+        table.add_row("scatter of the readings", f"{noise:.3f}")
+    return table
+
+
+def _add_sizes(table: Table, lengths: Mapping[str, Floats]) -> None:
+    for name, values in lengths.items():
+        size = Sizes.of(values)
+        if size is not None:
+            cells = [f"{value / MM:.3f}" for value in (size.rms, size.mean, size.max)]
+            table.add_row(name, *cells, str(size.readings))
+
+
+def _outliers(result: Identified, verbose: bool) -> Iterator[str]:
+    if result.outliers:
+        how = (
+            "left out"
+            if result.outliers_left_out
+            else "fitted with the others; --drop-outliers leaves them out"
+        )
+        yield f"{_count(len(result.outliers), 'outlier')} ({how})"
+    lines = [
+        f"{one.file}:{one.line} {one.distance / MM:.3g} mm off, {one.sigmas:.0f} sigma: {one.what}"
+        for one in result.outliers
+    ]
+    for line in _some(lines, verbose):
+        yield f"  {line}"
+
+
+def shown_unit(unit: str) -> tuple[str, float]:
+    """The unit that people read and its size in SI ``unit``."""
+    return UNITS.get(unit, (unit, 1.0))
+
+
+def fixed(value: float, interval: float) -> str:
+    """``value`` to two digits of ``interval``, without an exponent where that can be read."""
+    if not math.isfinite(value):
+        return "-"
+    if interval <= 0 or not math.isfinite(interval):
+        return f"{value:.6g}"
+    decimals = 1 - math.floor(math.log10(interval))
+    if decimals > 9 or abs(value) >= 1e9:
+        return f"{value:.3e}"
+    return f"{round(value, decimals) + 0.0:.{max(0, decimals)}f}"
+
+
+def _percent(estimate: Estimate) -> str:
+    """The interval as a share of the value, two digits."""
+    if estimate.value == 0:
+        return "-"
+    share = 100 * estimate.ci95 / abs(estimate.value)
+    return ">999" if share > 999 else fixed(share, share)
+
+
+def _some(lines: Sequence[str], verbose: bool) -> list[str]:
+    """All of them, or the first and how many more."""
+    if verbose or len(lines) <= SHOWN:
+        return list(lines)
+    return [*lines[:SHOWN], f"and {len(lines) - SHOWN} more (-v shows all)"]
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"

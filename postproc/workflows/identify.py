@@ -1,0 +1,351 @@
+"""Identification of a robot's parameters, on paths."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats
+from postproc.findings import Finding, Refusal
+from postproc.geometry import Poses
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import Fit, fit
+from postproc.identification.identifiable import strong_correlations
+from postproc.identification.outliers import Outlier, outliers
+from postproc.identification.suspicion import check_fit, check_numbers
+from postproc.identification.unknowns import Asked, asked_for
+from postproc.identification.validation import WIDER, Bootstrap, Validation, bootstrap, held_out, validated
+from postproc.measurements import Readings, joined, read_measurements, robot_named
+from postproc.model import StiffnessModel
+from postproc.publish import publish
+from postproc.report.identified import STRONG, Identified, identified_csv
+from postproc.report.report import json_bytes
+from postproc.robot.description import Robot, find_robot, load_robot, robot_files
+from postproc.units import DEG, MM
+from postproc.workflows.preparation import Stage, silent
+from postproc.workflows.robot_files import new_robot_file
+
+Progress = Callable[[str, int, int], None]
+"""Is told the name of a stage, how many of its steps are done, and how many there are."""
+
+FEW_POSES = 60
+"""Up to so many poses intervals are checked by a bootstrap, unless it is asked for or not."""
+
+DRAWS = 200
+
+ROUNDS = 5
+"""Of looking for outliers, each without those found before."""
+
+PULLED = 3.0
+"""Standard deviations of its prior by which the readings must move a parameter for that to be told."""
+
+SHOWN = 10
+
+
+def no_progress(_stage: str, _done: int, _all: int) -> None:
+    """Nobody watches."""
+
+
+@dataclass(frozen=True)
+class IdentifyRequest:
+    """What the user asked for.  ``robot``: None takes the one that the data name; ``bootstrap``: number of draws, None
+    where few poses ask for it."""
+
+    data: tuple[Path, ...]
+    robot: str | None
+    effects: tuple[str, ...]
+    output: Path | None = None
+    priors: bool = False
+    robust: bool = False
+    drop_outliers: bool = False
+    validate: tuple[Path, ...] = ()
+    folds: int = 5
+    bootstrap: int | None = None
+    tool_mm_deg: tuple[float, ...] | None = None
+    picture: Path | None = None
+    csv: Path | None = None
+    json: Path | None = None
+    strict: bool = False
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Readings with the robot that they are of."""
+
+    robot: Robot
+    model: StiffnessModel
+    readings: Readings
+    campaign: Campaign
+    findings: tuple[Finding, ...]
+
+
+def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress = no_progress) -> Identified:
+    """Parameters of effects from readings.  Raises Refusal, and has then written nothing."""
+    _spare_inputs(request)
+    stage("reading")
+    measured = measured_of(request.data, request.robot, request.tool_mm_deg)
+    campaign, model = measured.campaign, measured.model
+    asked = asked_for(model, request.effects, request.priors)
+    check_numbers(measured.readings, asked.unknowns, asked.model)
+    stage("comparing")
+    findings = [*measured.findings, *check_fit(campaign, asked.model, asked.unknowns)]
+    every = np.ones(len(campaign), bool)
+    stage("registering")
+    before = fit(campaign, model, (), every)
+    given = before.point.given
+    stage("fitting")
+    after = fit(campaign, asked.model, asked.unknowns, every, request.robust, given=given)
+    stage("looking for outliers")
+    found, rows = _outliers(after, request.drop_outliers)
+    if request.drop_outliers and found:
+        before = fit(campaign, model, (), rows, given=given)
+        after = fit(campaign, asked.model, asked.unknowns, rows, request.robust, given=given)
+    if not after.unknowns:
+        raise Refusal(_nothing_found(measured, after))
+    folds = min(request.folds, campaign.poses)
+    heldout: list[Floats | None] = [None, None]
+    if folds > 1:
+        stage(f"leaving poses out ({folds}-fold)")
+        heldout = [
+            held_out(before, folds),
+            held_out(after, folds, lambda done, of: progress("leaving poses out", done, of)),
+        ]
+    draws = (DRAWS if campaign.poses <= FEW_POSES else 0) if request.bootstrap is None else request.bootstrap
+    drawn = None
+    if draws:
+        stage("bootstrap")
+        drawn = bootstrap(after, draws, lambda done, of: progress("bootstrap", done, of))
+    validation = None
+    if request.validate:
+        stage("validating")
+        validation = _validated(request, measured, before, after)
+    findings += _told(measured, asked, after, found, request.drop_outliers, drawn, validation, heldout)
+    result = Identified(
+        robot=measured.robot.name,
+        robot_file=measured.robot.path,
+        robot_digest=measured.robot.digest,
+        data=tuple(
+            (p.name, d) for p, d in zip(measured.readings.files, measured.readings.digests, strict=True)
+        ),
+        effects=request.effects,
+        before=before,
+        after=after,
+        held=asked.held,
+        heldout_before=heldout[0],
+        heldout_after=heldout[1],
+        folds=folds if folds > 1 else 0,
+        validation=validation,
+        outliers=found,
+        outliers_left_out=request.drop_outliers,
+        bootstrap=drawn,
+        findings=tuple(findings),
+        outputs=(),
+        strict=request.strict,
+    )
+    return _published(request, measured, result, stage)
+
+
+def measured_of(
+    data: Sequence[Path], robot: str | None, tool_mm_deg: Sequence[float] | None = None
+) -> Measured:
+    """Readings of files, and the robot: the one named, or else the one that the first file names.  Raises Refusal."""
+    named = robot_named(data[0])
+    described = load_robot(find_robot(robot or _known(named, data[0])))
+    joints = [(joint.name, joint.kind != "revolute") for joint in described.joints]
+    several = [read_measurements(path, joints) for path in data]
+    readings = several[0] if len(several) == 1 else joined(several)
+    findings = list(readings.findings)
+    if (
+        robot is not None
+        and readings.robot
+        and readings.robot.casefold()
+        not in (
+            described.name.casefold(),
+            described.path.stem.casefold(),
+        )
+    ):
+        findings.append(
+            Finding(
+                "IDN016",
+                f"the readings name the robot {readings.robot!r}, --robot is {described.name!r}",
+                str(data[0]),
+            )
+        )
+    tool = None
+    if tool_mm_deg is not None:
+        six = [*tool_mm_deg, 0.0, 0.0, 0.0][:6]
+        tool = Poses.from_abc(np.array(six[:3]) * MM, np.array(six[3:]) * DEG)
+    campaign = Campaign(readings, tool)
+    return Measured(described, StiffnessModel.from_robot(described), readings, campaign, tuple(findings))
+
+
+def _known(named: str, path: Path) -> str:
+    """The robot file's name that goes with how readings name the robot."""
+    for name in robot_files():
+        if named and name.casefold() == named.casefold():
+            return name
+    if not named:
+        raise Refusal(
+            Finding("CEL003", "the readings name no robot", str(path), help="say --robot NAME or FILE")
+        )
+    return named
+
+
+def _spare_inputs(request: IdentifyRequest) -> None:
+    inputs = {path.resolve() for path in (*request.data, *request.validate)}
+    if request.robot and request.robot.endswith((".yaml", ".yml")):
+        inputs.add(Path(request.robot).resolve())
+    written = [p for p in (request.output, request.json, request.csv, request.picture) if p is not None]
+    for path in written:
+        if path.resolve() in inputs:
+            raise Refusal(Finding("FIL007", "would replace an input", str(path)))
+    if len({path.resolve() for path in written}) < len(written):
+        raise Refusal(Finding("FIL007", "two results have the same name", str(written[0])))
+
+
+def _outliers(after: Fit, leave_out: bool) -> tuple[tuple[Outlier, ...], Bools]:
+    """All outliers, and the rows that count.  Where outliers are left out, those that they hid are looked for too."""
+    rows = np.ones(len(after.campaign), bool)
+    found: tuple[Outlier, ...] = ()
+    for _ in range(ROUNDS if leave_out else 1):
+        new, _robust = outliers(after, rows)
+        if not new:
+            break
+        found += new
+        rest = rows.copy()
+        rest[[outlier.row for outlier in new]] = False
+        if leave_out:
+            rows = rest
+            after = fit(after.campaign, after.start, after.asked, rows, given=after.point.given)
+    return tuple(sorted(found, key=lambda outlier: -outlier.sigmas)), rows
+
+
+def _nothing_found(measured: Measured, after: Fit) -> Finding:
+    reasons = "; ".join(f"{dropped.name}: {dropped.why}" for dropped in after.dropped[:SHOWN])
+    return Finding(
+        "IDN017",
+        f"these readings show none of the parameters asked for ({reasons})",
+        str(measured.readings.files[0]),
+        help="`compensate plan` proposes poses and loads that do",
+    )
+
+
+def _validated(request: IdentifyRequest, measured: Measured, before: Fit, after: Fit) -> Validation:
+    joints = list(measured.readings.joints)
+    several = [read_measurements(path, joints) for path in request.validate]
+    readings = several[0] if len(several) == 1 else joined(several)
+    if readings.deflection != measured.readings.deflection:
+        raise Refusal(
+            Finding("MEA008", "is of another kind than the data that are fitted", str(request.validate[0]))
+        )
+    return validated(before, after, Campaign(readings, measured.campaign.stated_tool))
+
+
+def _told(
+    measured: Measured,
+    asked: Asked,
+    after: Fit,
+    found: Sequence[Outlier],
+    left_out: bool,
+    drawn: Bootstrap | None,
+    validation: Validation | None,
+    heldout: Sequence[Floats | None],
+) -> list[Finding]:
+    """What deserves a look about a fit."""
+    file = str(measured.readings.files[0])
+    told = []
+    for outlier in found[:SHOWN]:
+        what = f"{outlier.distance / MM:.3g} mm off ({outlier.sigmas:.0f} sigma): {outlier.what}"
+        code = "IDN019" if left_out else "IDN018"
+        told.append(Finding(code, what, outlier.file, outlier.line))
+    if len(found) > SHOWN:
+        told.append(
+            Finding("IDN019" if left_out else "IDN018", f"and {len(found) - SHOWN} more readings", file)
+        )
+    for dropped in after.dropped:
+        frame_only = dropped.why.startswith("only seen together") and not dropped.together
+        told.append(Finding("IDN021" if frame_only else "IDN020", f"{dropped.name}: {dropped.why}", file))
+    for estimate in after.estimates:
+        unknown = estimate.unknown
+        if estimate.at_bound:
+            told.append(
+                Finding("IDN022", f"{unknown.name} = {estimate.value:g} {unknown.parameter.unit}", file)
+            )
+        if unknown.prior is not None and abs(estimate.value - unknown.value) > PULLED * unknown.prior:
+            told.append(
+                Finding(
+                    "IDN023",
+                    f"{unknown.name}: the readings say {estimate.value:.4g}, the robot file"
+                    f" {unknown.value:.4g} +- {1.96 * unknown.prior:.2g} {unknown.parameter.unit}",
+                    file,
+                )
+            )
+    if after.scatter_exceeded:
+        told.append(
+            Finding(
+                "IDN024",
+                f"what is left is {np.sqrt(after.factor):.1f} times the scatter that is {after.noise.source};"
+                " the intervals are that much wider",
+                file,
+            )
+        )
+    names = [unknown.name for unknown in after.unknowns]
+    for one, other, size in strong_correlations(names, after.covariance, STRONG)[:SHOWN]:
+        told.append(Finding("IDN025", f"{one} and {other}: {size:+.3f}", file))
+    if drawn is not None:
+        ratio = drawn.deviation / np.sqrt(np.diag(after.covariance))
+        for name, r in zip(names, ratio.tolist(), strict=True):
+            if r > WIDER:
+                told.append(
+                    Finding("IDN026", f"{name}: {r:.2f} times as wide by a bootstrap of {drawn.draws}", file)
+                )
+    if heldout[0] is not None and heldout[1] is not None:
+        without, with_ = (np.sqrt(np.nanmean(h**2)) for h in (heldout[0], heldout[1]))
+        if with_ > without:
+            told.append(
+                Finding(
+                    "IDN027",
+                    f"{np.sqrt(3) * without / MM:.3g} mm without, {np.sqrt(3) * with_ / MM:.3g} mm with them",
+                    file,
+                )
+            )
+    if validation is not None and validation.registered_anew:
+        told.append(
+            Finding("IDN028", "the tracker stood elsewhere", str(validation.campaign.readings.files[0]))
+        )
+    if after.weights.shared > 0:
+        told.append(Finding("IDN029", f"{after.weights.shared / MM:.3g} mm in each coordinate", file))
+    unstated = [u.name for u in asked.unknowns if u.prior is not None and u.stated and u.stated.level is None]
+    if unstated:
+        told.append(Finding("IDN030", ", ".join(unstated), str(measured.robot.path)))
+    return told
+
+
+def _published(request: IdentifyRequest, measured: Measured, result: Identified, stage: Stage) -> Identified:
+    files: dict[Path, bytes] = {}
+    if result.exit == 1:  # a warning counts as an error: nothing is written
+        return result
+    if request.output is not None:
+        stage("writing the robot file")
+        files[request.output] = new_robot_file(
+            "identify", measured.robot, result.after, result.effects, result.gap_mm(), request.output
+        )
+    if request.csv is not None:
+        files[request.csv] = identified_csv(result)
+    if request.picture is not None:
+        from postproc.report.identified_picture import identified_picture
+
+        stage("drawing")
+        files[request.picture] = identified_picture(result, request.picture.suffix.lower().lstrip("."))
+    outputs = [str(path) for path in files]
+    if request.json is not None:
+        outputs.append(str(request.json))
+    result = replace(result, outputs=tuple(outputs))
+    if request.json is not None:
+        files[request.json] = json_bytes(result)
+    if files:
+        publish(files, last=request.output)
+    return result

@@ -1,0 +1,390 @@
+"""The poses and loads worth measuring, on paths."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from postproc import __version__
+from postproc.arrays import Bools, Floats
+from postproc.compensation.doubt import Unsure, sensitivities
+from postproc.effects import ComplianceLaw
+from postproc.experiments.discriminating import apart
+from postproc.experiments.offer import Offer, Setups, readings_of, spacings, usable_limits
+from postproc.experiments.pool import CANDIDATES
+from postproc.experiments.precision import Designs, Task, designs, predicted
+from postproc.experiments.seen import measured
+from postproc.experiments.tour import tour
+from postproc.findings import Finding, Refusal, nearest
+from postproc.geometry import Poses
+from postproc.identification.unknowns import Unknown, asked_for
+from postproc.measurements import Readings, measurements_csv
+from postproc.model import StiffnessModel
+from postproc.publish import publish
+from postproc.report.plan import Planned, told_apart
+from postproc.report.report import exit_code, json_bytes
+from postproc.robot.description import Robot, find_robot, load_robot
+from postproc.tables import finite_number
+from postproc.units import DEG, MM, to_si, words_for
+from postproc.workflows.identify import measured_of
+from postproc.workflows.preparation import Request, Stage, prepare, silent
+
+SIZES = (10, 15, 20, 30)
+"""Numbers of poses that are looked at beside the wanted one."""
+
+FEWEST = 6
+"""Poses at which it is told beside how far apart two effects stay."""
+
+SHARE, SIZE_SHARE = 0.05, 0.2
+"""Wanted where nothing states an interval: of the value, or of the usual size of a parameter without value."""
+
+CUTS = 300
+"""Motions of a program at which the error counts."""
+
+CLEAR = 3.0
+"""Standard deviations that tell two effects apart."""
+
+TOLD = 3
+
+_WANTED = re.compile(r"(?:([\w.#]+)\s*=)?\s*([-+0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(%|[A-Za-z].*)?")
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    """What the user asked for; mm, deg, kg.
+
+    targets: name and place; limits: joint and range; box: three ranges, infinite where open; kind: deflection or
+    absolute, None: as the effects ask for; criterion: minimax, d or test, None: test where there is a program; wanted:
+    texts.  program: with its ``force`` (as of the main job) and ``cell``, what the test poses are taken from.
+    """
+
+    robot: str
+    effects: tuple[str, ...]
+    poses: int
+    output: Path
+    loads: tuple[float, ...] = ()
+    one_load: bool = False
+    tool_mm_deg: tuple[float, ...] = (0.0,) * 6
+    targets: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    rough_targets: bool = False
+    kind: str | None = None
+    sigma_mm: float = 0.03
+    criterion: str | None = None
+    wanted: tuple[str, ...] = ()
+    program: Path | None = None
+    force: str = ""
+    cell: Path | None = None
+    tracker_mm: tuple[float, ...] | None = None
+    cone_deg: float = 60.0
+    box_mm: tuple[tuple[float, float], ...] = ((-np.inf, np.inf), (-np.inf, np.inf), (0.0, np.inf))
+    limits: tuple[tuple[str, tuple[float, float]], ...] = ()
+    spacing_deg: float = 5.0
+    measured: tuple[Path, ...] = ()
+    discriminate: tuple[str, str] | None = None
+    seed: int = 1
+    json: Path | None = None
+
+
+def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
+    """The poses and loads worth measuring.  Raises Refusal, and has then written nothing."""
+    _spare_inputs(request)
+    stage("reading")
+    robot = load_robot(find_robot(request.robot))
+    model = StiffnessModel.from_robot(robot)
+    asked = asked_for(model, request.effects)
+    offer = _offer(request, robot, asked.model, asked.unknowns)
+    if request.discriminate is not None:
+        planned = _to_tell_apart(request, offer, asked.model, asked.unknowns, stage)
+    else:
+        planned = _for_precision(request, offer, asked.model, asked.unknowns, stage)
+    order = tour(planned.setups.q, spacings(robot, DEG))
+    setups = planned.setups[order]
+    readings = _in_sight(offer, planned.model, setups)
+    files = {request.output: measurements_csv(readings, _about(request, planned, len(readings)))}
+    pages = [] if request.json is None else [request.json]
+    planned = replace(
+        planned,
+        setups=setups,
+        readings=len(readings),
+        held=asked.held,
+        outputs=tuple(str(path) for path in (*files, *pages)),
+        exit=exit_code(planned.findings),
+    )
+    publish({**files, **dict.fromkeys(pages, json_bytes(planned))}, last=request.output)
+    return planned
+
+
+def _for_precision(
+    request: PlanRequest, offer: Offer, model: StiffnessModel, unknowns: tuple[Unknown, ...], stage: Stage
+) -> Planned:
+    wanted, named, source = _wanted(request, unknowns)
+    tests = None
+    if request.program is not None:
+        stage("reading the program")
+        model, tests = _tests(request, model, unknowns)
+    before, findings = None, list[Finding]()
+    if request.measured:
+        known = measured_of(request.measured, request.robot, request.tool_mm_deg)
+        before = measured(model, unknowns, known.campaign, offer.sigma)
+        findings += known.findings
+    counts = np.array([unknown.prior is None for unknown in unknowns]) | named
+    criterion = request.criterion or ("test" if tests is not None else "minimax")
+    task = Task(model, unknowns, offer, wanted, counts, criterion, before, tests)
+    found = designs(task, request.poses, SIZES, request.seed, CANDIDATES, stage)
+    return Planned(
+        robot=model.robot.name,
+        digest=model.robot.digest,
+        effects=request.effects,
+        model=found.model,
+        unknowns=unknowns,
+        offer=offer,
+        seed=request.seed,
+        criterion=criterion,
+        wanted=wanted,
+        wanted_source=source,
+        poses=request.poses,
+        setups=found.chosen[request.poses].setups,
+        candidates=len(found.candidates),
+        chosen=found.chosen,
+        at_random=found.at_random,
+        before=found.before,
+        unseen=found.unseen,
+        left_out=found.left_out,
+        weak=found.weak,
+        findings=(*findings, *_findings(model.robot, found)),
+    )
+
+
+def _to_tell_apart(
+    request: PlanRequest, offer: Offer, model: StiffnessModel, unknowns: tuple[Unknown, ...], stage: Stage
+) -> Planned:
+    assert request.discriminate is not None
+    model = asked_for(model, request.discriminate).model
+    first, second = (asked_for(model, [word]).unknowns for word in request.discriminate)
+    keys = [{unknown.key for unknown in own} for own in (first, second)]
+    if keys[0] & keys[1]:
+        both = " and ".join(request.discriminate)
+        raise Refusal(
+            Finding("PLN006", f"--discriminate: {both} have parameters in common", str(model.robot.path))
+        )
+    for word, own in zip(request.discriminate, (first, second), strict=True):
+        if all(unknown.prior is not None for unknown in own):
+            message = f"--discriminate: {word} has nothing to fit, its dimensions are known"
+            raise Refusal(Finding("PLN006", message, str(model.robot.path)))
+    common = tuple(unknown for unknown in unknowns if unknown.key not in keys[0] | keys[1])
+    sizes = {min(FEWEST, request.poses), request.poses}
+    found = apart(model, first, second, common, offer, sizes, request.seed, CANDIDATES, stage)
+    setups = found.chosen[request.poses]
+    wanted, named, source = _wanted(request, unknowns)
+    counts = np.array([unknown.prior is None for unknown in unknowns]) | named
+    task = Task(model, unknowns, offer, wanted, counts)
+    findings = []
+    if min(found.separation[request.poses]) < CLEAR:
+        words = told_apart(request.discriminate, found.separation[request.poses])
+        findings.append(Finding("PLN010", words, str(model.robot.path)))
+    return Planned(
+        robot=model.robot.name,
+        digest=model.robot.digest,
+        effects=request.effects,
+        model=model,
+        unknowns=unknowns,
+        offer=offer,
+        seed=request.seed,
+        criterion="discriminate",
+        wanted=wanted,
+        wanted_source=source,
+        poses=request.poses,
+        setups=setups,
+        candidates=found.candidates,
+        chosen={request.poses: predicted(task, model, setups)},
+        rivals=request.discriminate,
+        separation=found.separation,
+        findings=tuple(findings),
+    )
+
+
+def _findings(robot: Robot, found: Designs) -> list[Finding]:
+    file, findings = str(robot.path), []
+    for lost in found.unseen:
+        findings.append(Finding("PLN011" if lost.imitated else "PLN007", f"{lost.name}: {lost.why}", file))
+    for lost in found.left_out:
+        findings.append(Finding("PLN011" if lost.imitated else "PLN008", f"{lost.name}: {lost.why}", file))
+    if found.weak:
+        told = "; ".join(f"{lost.name}: {lost.why}" for lost in found.weak[:TOLD])
+        more = f"; and {len(found.weak) - TOLD} more" if len(found.weak) > TOLD else ""
+        findings.append(Finding("PLN009", told + more, file))
+    return findings
+
+
+def _spare_inputs(request: PlanRequest) -> None:
+    inputs = {path.resolve() for path in request.measured}
+    inputs |= {path.resolve() for path in (request.program, request.cell) if path is not None}
+    written = [path for path in (request.output, request.json) if path is not None]
+    for path in written:
+        if path.resolve() in inputs:
+            raise Refusal(Finding("FIL007", "would replace an input", str(path)))
+
+
+def _offer(request: PlanRequest, robot: Robot, model: StiffnessModel, unknowns: Sequence[Unknown]) -> Offer:
+    """What the user can set up, in SI.  Raises Refusal PLN001, PLN005, PLN006."""
+    names = [joint.name for joint in robot.joints]
+    limits = {}
+    for name, ends in request.limits:
+        joint = next((joint for joint in robot.joints if joint.name.casefold() == name.casefold()), None)
+        if joint is None:
+            message = f"--limits: {name!r} is no joint of {robot.name}{nearest(name, names)}"
+            raise Refusal(Finding("PLN006", message, str(robot.path), help="joints: " + ", ".join(names)))
+        unit = DEG if joint.kind == "revolute" else MM
+        limits[joint.name] = ends[0] * unit, ends[1] * unit
+    tool = Poses.from_abc(np.array(request.tool_mm_deg[:3]) * MM, np.array(request.tool_mm_deg[3:]) * DEG)
+    places = (
+        np.array([place for _, place in request.targets]) * MM if request.targets else tool.position[None]
+    )
+    deflection = request.kind == "deflection" if request.kind else _by_load(model, unknowns)
+    loads = sorted(set(request.loads) - ({0.0} if deflection else set()))
+    if deflection and not loads:
+        raise Refusal(
+            Finding(
+                "PLN005",
+                "deflections are measured, loaded minus unloaded, and there is no load",
+                help="--loads 100,200: weights in kg that can be hung at the TCP; or measure places: --kind absolute",
+            )
+        )
+    return Offer(
+        tool=tool,
+        targets=tuple(name for name, _ in request.targets),
+        places=places,
+        rough=request.rough_targets,
+        loads=np.array(loads or [0.0]),
+        each_load=not request.one_load,
+        deflection=deflection,
+        sigma=request.sigma_mm * MM,
+        limits=usable_limits(robot, limits),
+        box=np.array(request.box_mm) * MM,
+        tracker=None if request.tracker_mm is None else np.array(request.tracker_mm) * MM,
+        cone=request.cone_deg * DEG,
+        spacing=request.spacing_deg * DEG,
+    )
+
+
+def _by_load(model: StiffnessModel, unknowns: Sequence[Unknown]) -> bool:
+    """Whether a load is what shows any of the effects asked for."""
+    effects = [model.terms[unknown.term].effect for unknown in unknowns]
+    return any(isinstance(e, ComplianceLaw) or e.family in ("elastic", "sensor") for e in effects)
+
+
+def _wanted(request: PlanRequest, unknowns: Sequence[Unknown]) -> tuple[Floats, Bools, str]:
+    """Half widths (P,) [SI] of the wanted 95 % intervals, which of them (P,) the user named, and their source."""
+    wanted = np.zeros(len(unknowns))
+    for i, unknown in enumerate(unknowns):
+        stated = None if unknown.stated is None else unknown.stated.interval
+        wanted[i] = stated or SHARE * abs(unknown.value) or SIZE_SHARE * unknown.parameter.scale
+    named = np.zeros(len(unknowns), bool)
+    for text in sorted(request.wanted, key=lambda text: "=" in text):
+        found = _WANTED.fullmatch(text.strip())
+        number = None if found is None else finite_number(found[2])
+        if found is None or number is None or not number > 0:
+            raise _no_wish(text, "it is not NAME=VALUE with % or a unit, as c2=1% or s0=20mm or 2%")
+        name, unit = found[1] or "", found[3] or ""
+        rows = [i for i, unknown in enumerate(unknowns) if _is_named(unknown, name)]
+        if not rows:
+            names = [unknown.name for unknown in unknowns]
+            raise _no_wish(text, f"{name!r} is not asked for{nearest(name, names)}", ", ".join(names))
+        if len(rows) > 1 and name and len({unknowns[i].name.partition(".")[0] for i in rows}) > 1:
+            raise _no_wish(
+                text, f"{name!r} is several parameters: {', '.join(unknowns[i].name for i in rows)}"
+            )
+        for i in rows:
+            if unit != "%":
+                factor = to_si(unit, unknowns[i].parameter.unit) if unit else None
+                if factor is None:
+                    known = ", ".join(["%", *words_for(unknowns[i].parameter.unit)])
+                    raise _no_wish(text, f"{unit!r} is no unit of {unknowns[i].name}", f"units: {known}")
+                wanted[i] = number * factor
+            elif unknowns[i].value:
+                wanted[i] = number / 100 * abs(unknowns[i].value)
+            elif name:
+                raise _no_wish(
+                    text, f"{unknowns[i].name} is zero, {number:g} % of it is nothing; give a unit"
+                )
+            named[i] |= bool(name)
+    source = (
+        f"intervals of the robot file; where it states none, {100 * SHARE:g} % of the value, or"
+        f" {100 * SIZE_SHARE:g} % of its usual size"
+    )
+    return wanted, named, ("--wanted, else " if request.wanted else "") + source
+
+
+def _is_named(unknown: Unknown, name: str) -> bool:
+    """Whether ``name`` is an unknown's, its parameter's or its effect's; "" is all."""
+    return name in ("", unknown.name, unknown.parameter.name, unknown.name.partition(".")[0])
+
+
+def _no_wish(text: str, message: str, help: str = "") -> Refusal:
+    return Refusal(Finding("PLN006", f"--wanted {text}: {message}", help=help))
+
+
+def _tests(
+    request: PlanRequest, model: StiffnessModel, unknowns: Sequence[Unknown]
+) -> tuple[StiffnessModel, Floats]:
+    """The model as it stands in the cell, and R (k, P) [m per SI unit] of R^T R, the mean of S^T S over the cuts of a
+    program: what the unknowns do there."""
+    assert request.program is not None
+    ready = prepare(Request(request.program, request.force, request.cell, request.robot))
+    task = ready.task
+    rows = np.flatnonzero(ready.wrenches.carries & np.isfinite(task.track.q).all(axis=1))
+    if not len(rows):
+        message = (
+            "no motion of it carries a force: the error at its cuts does not depend on what is asked for"
+        )
+        raise Refusal(Finding("PLN006", message, str(request.program)))
+    rows = rows[np.linspace(0, len(rows) - 1, min(CUTS, len(rows))).astype(int)]
+    model = replace(model, gravity=task.model.gravity)
+    entries = []
+    for unknown in unknowns:
+        p, value = unknown.parameter, model.terms[unknown.term].values[unknown.parameter.name]
+        step = 0.1 * max(p.scale, abs(value))
+        entries.append(Unsure(unknown.name, unknown.term, p.name, value, p.lower, p.upper, step))
+    given = task.conditions.part(rows)
+    q, wrench, tool = task.track.q[rows], task.wrench[rows], task.tool[rows]
+    moves = sensitivities(model, entries, q, wrench, tool, given)
+    if task.process:
+        moves -= sensitivities(model, entries, q, np.zeros_like(wrench), tool, given)
+    moves = moves[np.isfinite(moves).all(axis=(1, 2))]
+    if not moves.any():
+        raise Refusal(Finding("PLN006", "its cuts do not depend on what is asked for", str(request.program)))
+    return model, np.asarray(np.linalg.qr(moves.reshape(-1, len(entries)) / np.sqrt(len(moves)), mode="r"))
+
+
+def _in_sight(offer: Offer, model: StiffnessModel, setups: Setups) -> Readings:
+    """The readings to be taken."""
+    visible = np.repeat(setups.visible[:, None], setups.load.shape[1], axis=1).reshape(-1)
+    return readings_of(model, offer, setups).part(np.flatnonzero(visible))
+
+
+def _about(request: PlanRequest, planned: Planned, readings: int) -> list[str]:
+    """Comments at the head of a plan: what it is, and what to do with it."""
+    offer = planned.offer
+    lines = [
+        f"plan of compensate {__version__}, robot file sha256 {planned.digest[:16]}, seed {planned.seed}",
+        planned.goal,
+        f"{planned.poses} poses, {planned.loads_in_words}, {readings} readings",
+    ]
+    if offer.deflection:
+        lines.append(
+            "fill in DX, DY, DZ in mm, loaded minus unloaded with the axes held, in axes of the robot base"
+        )
+    else:
+        lines.append("fill in X, Y, Z in mm")
+    if offer.rough:
+        for name, place in zip(offer.targets, offer.places / MM, strict=True):
+            lines.append(f"reflector {name} about {place[0]:g} {place[1]:g} {place[2]:g} mm on the flange")
+    lines += [
+        "go through the rows in this order, and measure the first pose once more at the end, where a drift would show",
+        "what stands around the arm was not looked at, drive slowly to every pose for the first time",
+    ]
+    return lines

@@ -1,0 +1,370 @@
+"""``compensate plan`` through the command line: the file it writes, what it says, wrong input."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+
+import numpy as np
+import pytest
+
+from postproc.experiments import pool, precision
+from postproc.identification.campaign import Campaign
+from postproc.measurements import measurements_csv, read_measurements
+from postproc.model import StiffnessModel
+from postproc.report.plan import told_apart
+from postproc.robot.description import find_robot, load_robot
+from postproc.units import DEG, MM
+from postproc.workflows import plan as workflow
+
+ROBOT = ["plan", "--robot", "kuka_kr270"]
+LEVER = ["--tool", "0,500,300", "--loads", "265"]
+TARGETS = ["--target", "M1=300,0,100", "--target", "M2=-150,260,100", "--target", "M3=-150,-260,100"]
+TABLE_1 = ["--effects", "joint_compliance,gravity_compensator"]
+TWO = ["--effects", "joint_compliance.c2,joint_compliance.c3"]
+
+
+@pytest.fixture(autouse=True)
+def _short_search(monkeypatch):
+    monkeypatch.setattr(workflow, "CANDIDATES", 150)
+    monkeypatch.setattr(workflow, "SIZES", (8, 12))
+    monkeypatch.setattr(pool, "NEARBY", 100)
+    monkeypatch.setattr(pool, "SHARES", (0.05, 0.01))
+    monkeypatch.setattr(precision, "RANDOM", 7)
+
+
+@pytest.fixture
+def out(tmp_path):
+    return tmp_path / "plan.csv"
+
+
+def joints(model):
+    return [(joint.name, joint.kind != "revolute") for joint in model.robot.joints]
+
+
+def kr270() -> StiffnessModel:
+    return StiffnessModel.from_robot(load_robot(find_robot("kuka_kr270")))
+
+
+def body(path) -> tuple[list[str], list[dict[str, str]]]:
+    """Comments and rows of a plan."""
+    lines = path.read_text().splitlines()
+    return [line for line in lines if line.startswith("#")], list(
+        csv.DictReader(line for line in lines if not line.startswith("#"))
+    )
+
+
+def filled_in(path, model):
+    """The plan with what the model says, written back as a person would; the readings."""
+    text = path.read_text()
+    tenth = re.sub(r",,,$", ",0,0,0", text, flags=re.MULTILINE)
+    path.write_text(tenth)
+    readings = read_measurements(path, joints(model))
+    campaign = Campaign(readings)
+    value = campaign.expected(campaign.seen(model), campaign.start())[0]
+    measured = path.with_name("measured.csv")
+    measured.write_bytes(measurements_csv(type(readings)(**{**vars(readings), "value": value})))
+    return measured, readings
+
+
+# The way of a campaign: plan, measure, identify
+
+
+def test_plan_is_filled_in_and_identified(compensate, out):
+    page = out.with_suffix(".json")
+    done = compensate(*ROBOT, *TABLE_1, *LEVER, *TARGETS, "--poses", 10, "-o", out, "--json", page)
+    assert (done.code, done.err) == (3, "")  # c1
+    comments, rows = body(out)
+    assert len(rows) == 30
+    assert "# robot: kuka_kr270" in comments
+    assert "# tool: 0 500 300 0 0 0" in comments
+    assert "# sigma_mm: 0.03" in comments
+    assert "# target M2: -150 260 100" in comments
+    assert {row["TARGET"] for row in rows} == {"M1", "M2", "M3"}
+    assert all(row["DX"] == row["DY"] == row["DZ"] == "" for row in rows)
+    assert {row["FZ"] for row in rows} == {"-2598.76"}
+    axes = {tuple(row[f"A{i}"] for i in range(1, 7)) for row in rows}
+    assert len(axes) == 10
+    assert all(re.fullmatch(r"-?[0-9]+\.[0-9]000", axis) for pose in axes for axis in pose)
+
+    result = json.loads(page.read_text())
+    assert (result["poses"], result["readings"], result["criterion"], result["exit"]) == (
+        10,
+        30,
+        "minimax",
+        3,
+    )
+    assert result["outputs"] == [str(out), str(page)]
+    assert list(result["intervals"]) == ["8", "10", "12"]
+    assert [one["name"] for one in result["unseen"]] == ["joint_compliance.c1"]
+    assert "pull sideways" in result["unseen"][0]["why"]
+    assert result["held"] == ["gravity_compensator.h"]
+
+    measured, readings = filled_in(out, kr270())
+    # the comments of a plan are no keys gone wrong
+    assert [finding.code for finding in readings.findings] == []
+    found = compensate("identify", measured, *TABLE_1, "--bootstrap", 0, "--folds", 0, "--json", "-")
+    stated, foreseen = found.json["effects"], result["intervals"]["10"]
+    assert foreseen["joint_compliance"].pop("c1") == {"ci95": None, "unit": "rad/(N m)"}
+    for effect, parameters in foreseen.items():
+        for name, parameter in parameters.items():
+            assert parameter["ci95"] == pytest.approx(stated[effect][name]["ci95"], rel=5e-3)
+            assert parameter["unit"] == stated[effect][name]["unit"]
+
+    # what was measured counts in the next plan
+    more = [
+        *ROBOT,
+        *TABLE_1,
+        *LEVER,
+        *TARGETS,
+        "--poses",
+        8,
+        "--measured",
+        measured,
+        "-o",
+        out,
+        "--json",
+        "-",
+    ]
+    again = compensate(*more).json
+    s0 = [again[key]["gravity_compensator"]["s0"]["ci95"] for key in ("before",)]
+    s0 += [again["intervals"][size]["gravity_compensator"]["s0"]["ci95"] for size in ("8", "12")]
+    assert s0[0] == pytest.approx(foreseen["gravity_compensator"]["s0"]["ci95"], rel=5e-3)
+    assert s0 == sorted(s0, reverse=True)
+
+
+def test_table_of_a_plan(compensate, out):
+    done = compensate(*ROBOT, *TABLE_1, *LEVER, *TARGETS, "--poses", 10, "-o", out)
+    for words in (
+        "10 poses, each with 265 kg: 30 readings",
+        "deflection, loaded minus unloaded, of M1, M2, M3; 0.03 mm per coordinate (1 sigma)",
+        "smallest worst ratio of an interval to the wanted one",
+        "A1 stands upright, a hung load puts 0 N m on it: pull sideways",
+        f"wrote {out}",
+    ):
+        assert words in done.out
+    assert re.search(r"value +wanted +8 poses +10 poses +12 poses +10 random", done.out)
+    assert re.search(r"joint_compliance\.c1 .* 5 % +- +- +- +-", done.out)
+    assert re.search(r"gravity_compensator\.s0 +458 mm +5\.9 %( +[0-9.]+ %){4}", done.out)
+    assert re.search(r"worst / wanted +([0-9.]+ +){3}", done.out)
+    quiet = compensate(*ROBOT, *TABLE_1, *LEVER, "--poses", 10, "-o", out, "-q")
+    assert (quiet.code, quiet.out) == (3, "")
+
+
+def test_same_seed_same_plan(compensate, out):
+    words = [*ROBOT, *TWO, *LEVER, "--poses", 5, "-o", out]
+    plans = []
+    for seed in (4, 4, 5):
+        assert compensate(*words, "--seed", seed).code == 0
+        plans.append(out.read_bytes())
+    assert plans[0] == plans[1] != plans[2]
+
+
+@pytest.mark.parametrize(
+    ("options", "rows", "loads"),
+    [
+        (["--loads", "125,265", "--poses", "6"], 12, {"-1225.83", "-2598.76"}),
+        (["--loads", "0,125,265", "--poses", "6"], 12, {"-1225.83", "-2598.76"}),
+        (["--loads", "125,265", "--one-load", "--poses", "6"], 6, {"-2598.76"}),
+        (["--loads", "265", "--poses", "12"], 12, {"-2598.76"}),
+        (["--loads", "0,265", "--poses", "6", "--kind", "absolute"], 12, {"0", "-2598.76"}),
+    ],
+)
+def test_loads(compensate, out, options, rows, loads):
+    done = compensate(*ROBOT, *TWO, "--tool", "0,500,300", *options, "-o", out)
+    assert done.code == 0
+    _, found = body(out)
+    assert len(found) == rows
+    assert {row["FZ"] for row in found} == loads
+
+
+def test_places_by_a_tracker(compensate, out):
+    """A calibration: no load, the tracker anywhere, the reflectors somewhere on the flange."""
+    words = ["plan", "--robot", "ur5", "--effects", "joint_offset", "--poses", 12, "-o", out, "--json", "-"]
+    done = compensate(*words, *TARGETS[:4], "--rough-targets", "--tracker", "3000,0,500", "--cone", "70")
+    assert done.code == 0
+    comments, rows = body(out)
+    assert "# frame: tracker" in comments
+    assert not any(comment.startswith("# target") for comment in comments)
+    assert "# reflector M1 about 300 0 100 mm on the flange" in comments
+    assert {"X", "Y", "Z", "TARGET"} <= set(rows[0])
+    assert done.json["kind"] == "absolute"
+    # the turn of the first joint is that of the tracker
+    assert [finding["code"] for finding in done.json["findings"]][:1] == ["PLN011"]
+    assert done.json["intervals"]["12"]["joint_offset"]["o1"]["ci95"] is None
+    assert done.json["intervals"]["12"]["joint_offset"]["o2"]["ci95"] > 0
+    _, readings = filled_in(out, StiffnessModel.from_robot(load_robot(find_robot("ur5"))))
+    assert [finding.code for finding in readings.findings] == []
+    assert done.json["readings"] == len(rows) < 24
+
+
+def test_limits_box_and_spacing(compensate, out):
+    options = [
+        "--limits",
+        "A2=-100:-50",
+        "--limits",
+        "a6=-20:20",
+        "--box",
+        "500:2500,-900:900,300:",
+        "--spacing",
+        12,
+    ]
+    assert compensate(*ROBOT, *TWO, *LEVER, "--poses", 6, *options, "-o", out).code == 0
+    _, rows = body(out)
+    q = np.array([[float(row[f"A{i}"]) for i in range(1, 7)] for row in rows])
+    assert (q[:, 1] >= -100).all()
+    assert (q[:, 1] <= -50).all()
+    assert (np.abs(q[:, 5]) <= 20).all()
+    for i in range(6):
+        for k in range(i):
+            assert np.abs(q[i] - q[k]).max() >= 12 - 1e-9
+    flange = kr270().chain.flange(q * DEG)
+    tcp = (flange.position + flange.rotation @ [0.0, 0.5, 0.3]) / MM
+    assert (tcp >= [500, -900, 300]).all()
+    assert (tcp[:, :2] <= [2500, 900]).all()
+
+
+def test_what_is_wanted(compensate, out):
+    words = [*ROBOT, *TWO, *LEVER, "--poses", 6, "-o", out, "--json", "-"]
+    plain = compensate(*words).json["wanted"]["joint_compliance"]
+    assert plain["c2"]["ci95"] == pytest.approx(0.004e-6)
+    wished = compensate(*words, "--wanted", "c2=0.1%", "--wanted", "2%").json["wanted"]["joint_compliance"]
+    assert wished["c2"]["ci95"] == pytest.approx(0.302e-9)
+    assert wished["c3"]["ci95"] == pytest.approx(0.02 * 0.406e-6)
+    strict = compensate(*words, "--wanted", "joint_compliance.c2 = 1e-9 rad/(N m)").json
+    assert strict["wanted"]["joint_compliance"]["c2"]["ci95"] == pytest.approx(1e-9)
+    # c2 gets the poses then
+    loose = compensate(*words, "--wanted", "c2=50%").json
+    c2 = [found["intervals"]["8"]["joint_compliance"]["c2"]["ci95"] for found in (strict, loose)]
+    assert c2[0] < c2[1]
+
+
+def test_poses_for_a_program(compensate, job, out):
+    """The error at the cuts is told, and smaller than with poses for the intervals."""
+    words = [*ROBOT, *TABLE_1, *LEVER, "--poses", 8, "--test", job.program, "-o", out, "--json", "-"]
+    by_test, by_worst = (compensate(*words, *more).json for more in ([], ["--criterion", "minimax"]))
+    assert (by_test["criterion"], by_worst["criterion"]) == ("test", "minimax")
+    assert 0 < by_test["test_rms_mm"]["8"] < by_worst["test_rms_mm"]["8"]
+    stronger = compensate(*words, "--force=-3600,500,5600").json
+    assert stronger["test_rms_mm"]["8"] > 5 * by_test["test_rms_mm"]["8"]
+    assert "error at the cuts, rms" in compensate(*words[:-2]).out
+
+
+def test_poses_that_tell_effects_apart(compensate, out):
+    words = [*ROBOT, "--effects", "joint_compliance", *LEVER, *TARGETS, "--poses", 8, "-o", out]
+    words += ["--discriminate", "gravity_compensator,link_compliance"]
+    done = compensate(*words, "--json", "-")
+    assert done.code == 0
+    assert list(done.json["separation"]) == ["6", "8"]
+    assert min(done.json["separation"]["8"]) > min(done.json["separation"]["6"]) > 3
+    assert done.json["discriminate"] == ["gravity_compensator", "link_compliance"]
+    shown = compensate(*words).out
+    assert re.search(r"gravity_compensator is no link_compliance +[0-9.]+ +[0-9.]+", shown)
+    assert re.search(r"6 poses +8 poses", shown)
+    # ten times the scatter: nothing is told apart any more
+    blunt = compensate(*words, "--sigma", 3, "--json", "-")
+    assert blunt.code == 3
+    assert [finding["code"] for finding in blunt.json["findings"]] == ["PLN010"]
+
+
+def test_the_harder_one_is_named():
+    assert told_apart(("a", "b"), (1.0, 9.0)) == "a passes for b: 1.0 standard deviations are left of it"
+    assert told_apart(("a", "b"), (9.0, 1.0)) == "b passes for a: 1.0 standard deviations are left of it"
+
+
+# Wrong input
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ([], "Missing option"),
+        (["--poses", "0"], "0"),
+        (["--poses", "5", "--loads", "-3"], "below zero"),
+        (["--poses", "5", "--loads", "a"], "not a number"),
+        (["--poses", "5", "--target", "M1"], "not NAME=x,y,z"),
+        (["--poses", "5", "--target", "M1=1,2"], "x,y,z is needed"),
+        (["--poses", "5", "--target", "a=1,2,3", "--target", "A=1,2,4"], "named twice"),
+        (["--poses", "5", "--box", "0:1,0:1"], "2 ranges"),
+        (["--poses", "5", "--box", "5:1,:,:"], "rises"),
+        (["--poses", "5", "--limits", "A2"], "not JOINT=a:b"),
+        (["--poses", "5", "--criterion", "test"], "--test PROGRAM"),
+        (["--poses", "5", "--force"], "--test PROGRAM"),
+        (["--poses", "5", "--rough-targets"], "--target"),
+        (["--poses", "5", "--loads", "5", "--one-load"], "several --loads"),
+        (["--poses", "5", "--discriminate", "backlash"], "two effects"),
+        (["--poses", "5", "--discriminate", "backlash,hysteresis", "--criterion", "d"], "goes with no"),
+        (["--poses", "5", "--sigma", "0"], "0"),
+        (["--poses", "5", "-o", "plan.txt"], "must end in .csv"),
+        (["--poses", "5", "--effects", "a,,b"], "empty name"),
+    ],
+)
+def test_wrong_command_line(compensate, out, options, words):
+    done = compensate(*ROBOT, *TWO, "-o", out, *options)
+    assert done.code == 2
+    assert words in done.err
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (
+            ["--effects", "joint_complianze"],
+            "IDN001 'joint_complianze' is no effect; did you mean 'joint_compliance'?",
+        ),
+        ([*TWO], "PLN005 deflections are measured, loaded minus unloaded, and there is no load"),
+        ([*TWO, "--loads", "0"], "PLN005"),
+        ([*TWO, *LEVER, "--limits", "A9=0:1"], "PLN006 --limits: 'A9' is no joint"),
+        ([*TWO, *LEVER, "--limits", "A2=10:20"], "PLN001 A2 can not move within 10 .. 20 deg"),
+        ([*TWO, *LEVER, "--wanted", "c9=1%"], "PLN006 --wanted c9=1%: 'c9' is not asked for"),
+        (
+            [*TWO, *LEVER, "--wanted", "c2=1mm"],
+            "PLN006 --wanted c2=1mm: 'mm' is no unit of joint_compliance.c2",
+        ),
+        ([*TWO, *LEVER, "--wanted", "c2"], "PLN006 --wanted c2: it is not NAME=VALUE"),
+        ([*TWO, *LEVER, "--wanted", "c2=-1%"], "PLN006"),
+        (["--effects", "joint_offset", "--wanted", "o2=1%"], "o2 is zero, 1 % of it is nothing"),
+        (["--effects", "joint_compliance.c1", *LEVER], "PLN002 no pose shows anything of what is asked for"),
+        ([*TWO, *LEVER, "--test", "nowhere.src"], "FIL001"),
+        ([*TWO, *LEVER, "--measured", "nowhere.csv"], "FIL001"),
+        (
+            [*TWO, *LEVER, "--discriminate", "backlash,backlash.b2"],
+            "PLN006 --discriminate: backlash and backlash.b2",
+        ),
+        ([*TWO, *LEVER, "--discriminate", "gravity_compensator.L,backlash"], "its dimensions are known"),
+        ([*TWO, *LEVER, "--robot", "kr271"], "CEL003"),
+    ],
+)
+def test_refusals(compensate, out, options, words):
+    done = compensate(*ROBOT, "--poses", 5, "-o", out, *options)
+    assert done.code == 1
+    assert words in done.err.replace("\n", " ")
+    assert "nothing was written" in done.err
+    assert not out.exists()
+
+
+def test_names_of_two_effects_are_told(compensate, out):
+    words = [*ROBOT, "--effects", "payload,tool_offset", "--poses", 5, "-o", out]
+    done = compensate(*words, "--wanted", "x=1mm")
+    assert done.code == 1
+    assert "PLN006 --wanted x=1mm: 'x' is several parameters: payload.x, tool_offset.x" in done.err
+
+
+def test_inputs_are_not_replaced(compensate, job, out):
+    done = compensate(*ROBOT, *TWO, *LEVER, "--poses", 5, "--measured", out, "-o", out)
+    assert (done.code, "FIL007" in done.err) == (1, True)
+
+
+def test_program_without_force_tests_nothing(compensate, job, out):
+    done = compensate(*ROBOT, *TWO, *LEVER, "--poses", 5, "--test", job.program, "--force=0,0,0", "-o", out)
+    assert done.code == 1
+    assert "no motion of it carries a force" in done.err
+
+
+def test_help_names_the_contract(compensate):
+    done = compensate("plan", "--help")
+    assert done.code == 0
+    for option in ("--effects", "--poses", "--discriminate", "--loads", "-o"):
+        assert option in done.out
