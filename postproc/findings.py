@@ -249,7 +249,6 @@ CODES: dict[str, Code] = {
         "no equilibrium",
         "The deflected robot has no stable state under this force; the cut is left as it was.",
     ),
-    # measurements
     # identification
     "IDN001": Code(
         "error",
@@ -335,6 +334,9 @@ CODES: dict[str, Code] = {
     "IDN030": Code(
         "info", "level of an interval is not stated", "A prior with such an interval counts as one of 95 %."
     ),
+    # diagnosis
+    "DIA001": Code("error", "too few poses for a verdict", "Of so few poses any explanation would fit."),
+    # measurements
     "MEA001": Code(
         "error", "measurements are wrong", "A comment, the header or a row of the CSV can not be used."
     ),

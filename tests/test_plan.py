@@ -27,11 +27,12 @@ TWO = ["--effects", "joint_compliance.c2,joint_compliance.c3"]
 
 @pytest.fixture(autouse=True)
 def _short_search(monkeypatch):
-    monkeypatch.setattr(workflow, "CANDIDATES", 150)
+    monkeypatch.setattr(workflow, "CANDIDATES", 100)
     monkeypatch.setattr(workflow, "SIZES", (8, 12))
-    monkeypatch.setattr(pool, "NEARBY", 100)
+    monkeypatch.setattr(pool, "NEARBY", 60)
     monkeypatch.setattr(pool, "SHARES", (0.05, 0.01))
-    monkeypatch.setattr(precision, "RANDOM", 7)
+    monkeypatch.setattr(precision, "RANDOM", 5)
+    monkeypatch.setattr(precision, "STARTS", 1)
 
 
 @pytest.fixture
@@ -179,6 +180,19 @@ def test_loads(compensate, out, options, rows, loads):
     assert {row["FZ"] for row in found} == loads
 
 
+def test_rows_are_a_short_way(compensate, out):
+    compensate(*ROBOT, *TWO, *LEVER, *TARGETS, "--poses", 12, "-o", out)
+    _, rows = body(out)
+    q = np.array([[float(row[f"A{i}"]) for i in range(1, 7)] for row in rows])
+    assert (q[::3] == q[1::3]).all()
+
+    def way(order):
+        return np.abs(np.diff(q[::3][order], axis=0)).max(axis=1).sum()
+
+    rng = np.random.default_rng(0)
+    assert way(range(12)) < 0.9 * np.median([way(rng.permutation(12)) for _ in range(50)])
+
+
 def test_places_by_a_tracker(compensate, out):
     """A calibration: no load, the tracker anywhere, the reflectors somewhere on the flange."""
     words = ["plan", "--robot", "ur5", "--effects", "joint_offset", "--poses", 12, "-o", out, "--json", "-"]
@@ -197,6 +211,19 @@ def test_places_by_a_tracker(compensate, out):
     _, readings = filled_in(out, StiffnessModel.from_robot(load_robot(find_robot("ur5"))))
     assert [finding.code for finding in readings.findings] == []
     assert done.json["readings"] == len(rows) < 24
+
+
+def test_sense_of_approach_is_stated(compensate, out):
+    done = compensate(
+        *ROBOT, "--effects", "hysteresis", "--kind", "absolute", "--poses", 8, "-o", out, "--sigma", 0.01
+    )
+    assert done.code in (0, 3)
+    comments, rows = body(out)
+    assert any("in the sense of its DIR" in comment for comment in comments)
+    assert {row[f"DIR{i}"] for row in rows for i in range(1, 7)} == {"-1", "1"}
+    _, readings = filled_in(out, kr270())
+    assert readings.direction is not None
+    assert [finding.code for finding in readings.findings] == []
 
 
 def test_limits_box_and_spacing(compensate, out):
@@ -251,6 +278,26 @@ def test_poses_for_a_program(compensate, job, out):
     assert "error at the cuts, rms" in compensate(*words[:-2]).out
 
 
+def test_what_a_touched_off_base_holds_is_no_error_at_the_cuts(compensate, job, out):
+    """Offsets of the joints are in a base that was touched off with them; other programs have all of their error."""
+    words = [
+        "plan",
+        "--robot",
+        "kuka_kr270",
+        "--effects",
+        "joint_offset",
+        "--poses",
+        8,
+        "--test",
+        job.program,
+    ]
+    words += ["-o", out, "--json", "-"]
+    process = compensate(*words).json["test_rms_mm"]["8"]
+    cell = job.folder / "cell.yaml"
+    cell.write_text(cell.read_text() + "correct: absolute\n")
+    assert compensate(*words).json["test_rms_mm"]["8"] > 20 * process
+
+
 def test_poses_that_tell_effects_apart(compensate, out):
     words = [*ROBOT, "--effects", "joint_compliance", *LEVER, *TARGETS, "--poses", 8, "-o", out]
     words += ["--discriminate", "gravity_compensator,link_compliance"]
@@ -262,6 +309,12 @@ def test_poses_that_tell_effects_apart(compensate, out):
     shown = compensate(*words).out
     assert re.search(r"gravity_compensator is no link_compliance +[0-9.]+ +[0-9.]+", shown)
     assert re.search(r"6 poses +8 poses", shown)
+    # what is fitted beside explains some of it
+    words[words.index("--effects") + 1] = "joint_compliance.c1"
+    assert min(compensate(*words, "--json", "-").json["separation"]["8"]) > 1.05 * min(
+        done.json["separation"]["8"]
+    )
+    words[words.index("--effects") + 1] = "joint_compliance"
     # ten times the scatter: nothing is told apart any more
     blunt = compensate(*words, "--sigma", 3, "--json", "-")
     assert blunt.code == 3

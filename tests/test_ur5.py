@@ -11,7 +11,8 @@ import pytest
 import yaml
 
 ROOT = Path(os.environ.get("POSTPROC_DATA", ""))
-FOLDER = next((path for path in (ROOT, ROOT / "ur5", ROOT / "measured" / "ur5") if (path / "train.csv").is_file()), None)
+PLACES = ROOT, ROOT / "ur5", ROOT / "measured" / "ur5"
+FOLDER = next((path for path in PLACES if (path / "train.csv").is_file()), None)
 
 pytestmark = pytest.mark.skipif(
     "POSTPROC_DATA" not in os.environ or FOLDER is None,

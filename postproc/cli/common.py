@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
+import re
 import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -15,6 +17,53 @@ import click
 from postproc.findings import Finding, Refusal
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
+
+_NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
+
+FAR = 100_000.0
+"""[mm] No arm is longer."""
+
+Numbers = tuple[float, ...]
+
+
+def number(word: str, limit: float) -> float:
+    """The number that ``word`` is, at most ``limit`` in size."""
+    if not _NUMBER.match(word) or not math.isfinite(float(word)):
+        raise click.BadParameter(f"{word[:40]!r} is not a number")
+    if abs(float(word)) > limit:
+        raise click.BadParameter(f"{word[:40]} is beyond {limit:g}")
+    return float(word)
+
+
+def numbers(counts: tuple[int, ...], names: str) -> Callable[[click.Context, click.Parameter, str], Numbers]:
+    """Numbers between commas, as many as one of ``counts``."""
+
+    def parse(_context: click.Context, _option: click.Parameter, text: str) -> Numbers:
+        values = tuple(number(word.strip(), FAR) for word in text.split(","))
+        if len(values) not in counts:
+            raise click.BadParameter(f"{len(values)} numbers where {names} is needed")
+        return values
+
+    return parse
+
+
+def tool_place(context: click.Context, option: click.Parameter, text: str | None) -> Numbers | None:
+    """``x,y,z[,a,b,c]``, mm and deg; None where it is not given."""
+    if text is None:
+        return None
+    place = numbers((3, 6), "x,y,z or x,y,z,a,b,c")(context, option, text)
+    return (*place, 0.0, 0.0, 0.0)[:6]
+
+
+def ending(*endings: str) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:
+    """A file of another kind is never overwritten by a result."""
+
+    def check(_context: click.Context, _option: click.Parameter, path: Path | None) -> Path | None:
+        if path is not None and path.suffix.lower() not in endings:
+            raise click.BadParameter(f"{str(path)!r} must end in {' or '.join(endings)}")
+        return path
+
+    return check
 
 
 def _json_name(_context: click.Context, _option: click.Parameter, value: str | None) -> str | None:
@@ -45,6 +94,34 @@ def program_options(command: _Command) -> _Command:
     ):
         command = decorate(command)
     return result_options(command)
+
+
+def readings_options(command: _Command) -> _Command:
+    """DATA, of which robot and tool they are, and the robot file that comes out."""
+    for decorate in reversed(
+        (
+            click.argument("data", type=click.Path(path_type=Path), nargs=-1, required=True),
+            click.option(
+                "--robot", metavar="NAME|FILE", help="The robot [the one that the data name: # robot: NAME]."
+            ),
+            click.option(
+                "-o",
+                "--output",
+                type=click.Path(path_type=Path, dir_okay=False),
+                metavar="NEW.yaml",
+                callback=ending(".yaml", ".yml"),
+                help="Write the robot file with what was found; without it there is only the report.",
+            ),
+            click.option(
+                "--tool",
+                metavar="X,Y,Z[,A,B,C]",
+                callback=tool_place,
+                help="TCP on the flange, mm and deg, where the data do not state it (# tool: x y z) [the flange].",
+            ),
+        )
+    ):
+        command = decorate(command)
+    return command
 
 
 def result_options(command: _Command) -> _Command:

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Out, result_options
-from postproc.cli.map import Numbers, _ending, _list
+from postproc.cli.common import Numbers, Out, ending, readings_options, result_options
 
 FEWEST_DRAWS = 20
 """Fewer say nothing of a spread."""
@@ -24,14 +23,6 @@ def _words(_context: click.Context, _option: click.Parameter, text: str) -> tupl
     return words
 
 
-def _tool(context: click.Context, option: click.Parameter, text: str | None) -> Numbers | None:
-    """``x,y,z[,a,b,c]``, mm and deg; None where it is not given."""
-    if text is None:
-        return None
-    place = _list((3, 6), "x,y,z or x,y,z,a,b,c")(context, option, text)
-    return (*place, 0.0, 0.0, 0.0)[:6]
-
-
 def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None], int | None]:
     """A number that is 0 or not below ``least``."""
 
@@ -44,7 +35,6 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
 
 
 @click.command()
-@click.argument("data", type=click.Path(path_type=Path), nargs=-1, required=True)
 @click.option(
     "--effects",
     required=True,
@@ -52,21 +42,7 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     callback=_words,
     help="What to look for: effects, or single parameters of them. One that the robot file does not have is added.",
 )
-@click.option("--robot", metavar="NAME|FILE", help="The robot [the one that the data name: # robot: NAME].")
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="NEW.yaml",
-    callback=_ending(".yaml", ".yml"),
-    help="Write the robot file with what was found; without it there is only the report.",
-)
-@click.option(
-    "--tool",
-    metavar="X,Y,Z[,A,B,C]",
-    callback=_tool,
-    help="TCP on the flange, mm and deg, where the data do not state it (# tool: x y z) [the flange].",
-)
+@readings_options
 @click.option(
     "--priors",
     is_flag=True,
@@ -100,7 +76,7 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     "--picture",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.png|svg",
-    callback=_ending(".png", ".svg"),
+    callback=ending(".png", ".svg"),
     help="Draw the residuals by joint, direction, load and order.",
 )
 @click.option(
@@ -108,7 +84,7 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     "csv_to",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.csv",
-    callback=_ending(".csv"),
+    callback=ending(".csv"),
     help="What is left of every reading, one row each.",
 )
 @click.option("--strict", is_flag=True, help="Warnings count as errors: then nothing is written.")

@@ -11,6 +11,7 @@ import click
 
 from postproc import __version__
 from postproc.cli.check import check
+from postproc.cli.diagnose import diagnose
 from postproc.cli.identify import identify
 from postproc.cli.map import map_
 from postproc.cli.plan import plan
@@ -26,6 +27,7 @@ COMMANDS = {
     "map": map_,
     "identify": identify,
     "plan": plan,
+    "diagnose": diagnose,
     "robots": robots,
 }
 
@@ -46,6 +48,7 @@ def main() -> None:
       compensate map --robot kuka_kr270 ...           where in the workspace the robot is stiff
       compensate identify loads.csv --effects ...     the robot's parameters from measurements
       compensate plan --effects ... --poses 15 ...    the poses and loads worth measuring
+      compensate diagnose loads.csv                   what the robot file misses, by its name
     """
 
 

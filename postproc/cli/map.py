@@ -2,61 +2,21 @@
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Callable
 from pathlib import Path
 
 import click
 
-from postproc.cli.common import Out, result_options
-
-_NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
-_FAR = 100_000.0  # mm; no arm is longer
-
-Numbers = tuple[float, ...]
-Callback = Callable[[click.Context, click.Parameter, str], Numbers]
-
-
-def _number(word: str, limit: float) -> float:
-    if not _NUMBER.match(word) or not math.isfinite(float(word)):
-        raise click.BadParameter(f"{word[:40]!r} is not a number")
-    if abs(float(word)) > limit:
-        raise click.BadParameter(f"{word[:40]} is beyond {limit:g}")
-    return float(word)
+from postproc.cli.common import FAR, Numbers, Out, ending, number, numbers, result_options
 
 
 def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numbers:
     """``a:b`` or one value, mm."""
-    values = tuple(_number(word.strip(), _FAR) for word in text.split(":"))
+    values = tuple(number(word.strip(), FAR) for word in text.split(":"))
     if len(values) > 2:
         raise click.BadParameter(f"{text[:40]!r} is neither one value nor a range a:b")
     if len(values) == 2 and not values[0] < values[1]:
         raise click.BadParameter(f"range {text[:40]!r} must rise: {values[0]:g} is not below {values[1]:g}")
     return values
-
-
-def _list(counts: tuple[int, ...], names: str) -> Callback:
-    """Numbers between commas, as many as one of ``counts``."""
-
-    def parse(_context: click.Context, _option: click.Parameter, text: str) -> Numbers:
-        values = tuple(_number(word.strip(), _FAR) for word in text.split(","))
-        if len(values) not in counts:
-            raise click.BadParameter(f"{len(values)} numbers where {names} is needed")
-        return values
-
-    return parse
-
-
-def _ending(*endings: str) -> Callable[[click.Context, click.Parameter, Path | None], Path | None]:
-    """A file of another kind is never overwritten by a result."""
-
-    def check(_context: click.Context, _option: click.Parameter, path: Path | None) -> Path | None:
-        if path is not None and path.suffix.lower() not in endings:
-            raise click.BadParameter(f"{str(path)!r} must end in {' or '.join(endings)}")
-        return path
-
-    return check
 
 
 @click.command("map")
@@ -77,7 +37,7 @@ def _ending(*endings: str) -> Callable[[click.Context, click.Parameter, Path | N
     "--tool",
     metavar="X,Y,Z[,A,B,C]",
     default="0,0,0",
-    callback=_list((3, 6), "x,y,z or x,y,z,a,b,c"),
+    callback=numbers((3, 6), "x,y,z or x,y,z,a,b,c"),
     help="TCP on the flange, mm and deg [the flange].",
 )
 @click.option(
@@ -85,7 +45,7 @@ def _ending(*endings: str) -> Callable[[click.Context, click.Parameter, Path | N
     metavar="A,B,C",
     default="0,0,180",
     show_default=True,
-    callback=_list((3,), "A,B,C"),
+    callback=numbers((3,), "A,B,C"),
     help="Orientation of the tool in the robot base, deg.",
 )
 @click.option(
@@ -113,7 +73,7 @@ def _ending(*endings: str) -> Callable[[click.Context, click.Parameter, Path | N
     "--picture",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.png|svg",
-    callback=_ending(".png", ".svg"),
+    callback=ending(".png", ".svg"),
     help="Draw the map; of a box, slices along z.",
 )
 @click.option(
@@ -121,7 +81,7 @@ def _ending(*endings: str) -> Callable[[click.Context, click.Parameter, Path | N
     "csv_to",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.csv",
-    callback=_ending(".csv"),
+    callback=ending(".csv"),
     help="One row a cell.",
 )
 @result_options

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Out, result_options
-from postproc.cli.identify import _tool, _words
-from postproc.cli.map import _FAR, Numbers, _ending, _list, _number
+from postproc.cli.common import FAR, Numbers, Out, ending, number, numbers, result_options, tool_place
+from postproc.cli.identify import _words
 
 MOST = 200
 """Poses that somebody may want to set up."""
@@ -19,7 +18,7 @@ Range = tuple[float, float]
 
 def _loads(_context: click.Context, _option: click.Parameter, text: str | None) -> Numbers:
     """``kg,kg``, none below zero."""
-    loads = tuple(_number(word.strip(), _FAR) for word in text.split(",")) if text else ()
+    loads = tuple(number(word.strip(), FAR) for word in text.split(",")) if text else ()
     if any(load < 0 for load in loads):
         raise click.BadParameter("a weight can not be below zero")
     return loads
@@ -36,18 +35,18 @@ def _targets(
             raise click.BadParameter(f"{text[:40]!r} is not NAME=x,y,z")
         if name.casefold() in map(str.casefold, found):
             raise click.BadParameter(f"{name!r} is named twice")
-        found[name] = _list((3,), "x,y,z")(context, option, place)
+        found[name] = numbers((3,), "x,y,z")(context, option, place)
     return tuple(found.items())
 
 
 def _place(context: click.Context, option: click.Parameter, text: str | None) -> Numbers | None:
-    return None if text is None else _list((3,), "x,y,z")(context, option, text)
+    return None if text is None else numbers((3,), "x,y,z")(context, option, text)
 
 
 def _ends(text: str) -> Range:
     """``a:b``, either end may be left open."""
     low, colon, high = (part.strip() for part in text.partition(":"))
-    ends = (_number(low, _FAR) if low else -math.inf), (_number(high, _FAR) if high else math.inf)
+    ends = (number(low, FAR) if low else -math.inf), (number(high, FAR) if high else math.inf)
     if not colon or not ends[0] < ends[1]:
         raise click.BadParameter(f"{text[:40]!r} is not a range a:b that rises")
     return ends
@@ -103,7 +102,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     required=True,
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="PLAN.csv",
-    callback=_ending(".csv"),
+    callback=ending(".csv"),
     help="The plan: a file to fill in with readings, and to give to `identify` then.",
 )
 @click.option(
@@ -119,7 +118,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     "--tool",
     metavar="X,Y,Z[,A,B,C]",
     default="0,0,0",
-    callback=_tool,
+    callback=tool_place,
     help="TCP on the flange, mm and deg: where the load hangs; beside the last axis, or that is not seen [the flange].",
 )
 @click.option(

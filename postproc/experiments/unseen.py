@@ -44,15 +44,18 @@ def reason(model: StiffnessModel, unknown: Unknown, offer: Offer, setups: Setups
         warm = replace(given, temperature=warming, time=60.0 * warming)
         if _size(model, unknown, warm) > UNSEEN * offer.sigma:
             return "shows while the robot warms up: measure one pose again and again, with TEMP or T"
+    effect = model.terms[unknown.term].effect
+    by_load = isinstance(effect, ComplianceLaw) or effect.family == "elastic"
+    if still and by_load and not offer.loads.any():
+        return "only a load shows it (--loads)"
     names = [joint.name for joint in model.robot.joints]
     if unknown.parameter.joint not in names:
-        return ""
+        return "hung loads do not act on it" if still and by_load else ""
     joint = names.index(unknown.parameter.joint)
     name, unit = names[joint], MM if model.robot.joints[joint].kind == "prismatic" else DEG
     angle = some.q[:, joint] / unit
     moves = f"{name} moves within {angle.min():.0f} .. {angle.max():.0f} {'deg' if unit == DEG else 'mm'}"
-    effect = model.terms[unknown.term].effect
-    if not (isinstance(effect, ComplianceLaw) or effect.family == "elastic") or not offer.loads.any():
+    if not by_load or not offer.loads.any():
         return moves
     torque, upright = _torques(model, offer, some, joint)
     if torque < NO_LEVER * offer.loads.max() * np.linalg.norm(model.gravity):

@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats
 from postproc.findings import Finding, Refusal
 from postproc.identification.campaign import Campaign, Nuisances
-from postproc.identification.identifiable import Dropped, Insight, insight
+from postproc.identification.identifiable import Dropped, Insight, basis, insight
 from postproc.identification.noise import Noise, Weighting, noise_of, shared_error, weighting
 from postproc.identification.registration import registered
 from postproc.identification.solve import Point, at, descended, prior_rows, scales, with_columns
@@ -34,6 +34,7 @@ AT_BOUND = 1e-9
 HUBER = 2.795
 """Length of a residual [its standard deviation] from which a robust fit weighs it down: 95 % of a normal one in space
 are shorter."""
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -110,8 +111,8 @@ def fit(
 
     Unknowns that the readings can not give stay as they are and are named.  Intervals come from the covariance of the
     linearized problem at the solution; where the residuals are clearly larger than the stated scatter, or none is
-    stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).  ``given``:
-    tracker and targets to begin with, where they are about known.
+    stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).
+    ``given``: tracker and targets to begin with, where they are about known.
 
     Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to begin with has no rest.
     """
@@ -190,16 +191,18 @@ def awake(
     moves = np.abs(np.nan_to_num(point.taken[0])).max(axis=(0, 1), initial=0.0) > 0
     moving = {u.term for u, moved in zip(unknowns, moves, strict=True) if moved}
     return model.changed(
-        {
-            u.key: u.parameter.scale
-            for u in unknowns
-            if u.term not in moving and u.value == u.parameter.null
-        }
+        {u.key: u.parameter.scale for u in unknowns if u.term not in moving and u.value == u.parameter.null}
     )
 
 
 def _robust(
-    campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, rows: Bools, factor: float, known: bool
+    campaign: Campaign,
+    point: Point,
+    free: Sequence[Unknown],
+    weights: Weighting,
+    rows: Bools,
+    factor: float,
+    known: bool,
 ) -> tuple[Point, Weighting]:
     """Reweighted until the weights stand: those of Huber for the length of a reading's residual."""
     plain = weights
@@ -267,18 +270,20 @@ def _variance(
     """Variance of the readings over the assumed one, whether that is clearly more, degrees of freedom, and the 97.5 %
     quantile that goes with them.
 
-    A residual that a robust fit weighs down counts with as much as it pulls, and its reading as a part of one (Huber,
-    Robust Statistics, Sec. 7.6).
+    It is that of what no values of the unknowns would take away, so that a prior that contradicts the readings does
+    not make them worse.  A residual that a robust fit weighs down counts with as much as it pulls, and its reading as a
+    part of one (Huber, Robust Statistics, Sec. 7.6).
     """
     from scipy.stats import chi2, norm, t
 
     counts = plain.weight > 0
     share = np.where(counts, weights.weight / np.where(counts, plain.weight, 1.0), 0.0) ** 2
-    left = weights(point.residual * np.sqrt(share))
+    columns, nuisance = point.taken
+    q = basis(np.nan_to_num(weights(np.concatenate([columns[:, :, list(found.kept)], nuisance], axis=2))))
+    left = weights(point.residual)
+    left = (left - q @ (q.T @ left)) * np.sqrt(share).reshape(-1)
     squares = float(left @ left)
-    nuisances = int(np.linalg.matrix_rank(weights(point.taken[1]))) if campaign.nuisance_names else 0
-    without_prior = sum(free[i].prior is None for i in found.kept)
-    freedom = max(0, round(share.sum()) - nuisances - without_prior)
+    freedom = max(0, round(share.sum()) - q.shape[1])
     if freedom == 0:
         return 1.0, False, 0, float(norm.ppf(0.975))
     exceeded = noise.known and squares > chi2.ppf(1.0 - UNLIKELY, freedom)

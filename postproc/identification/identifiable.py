@@ -11,7 +11,8 @@ from postproc.arrays import Floats
 from postproc.identification.unknowns import Unknown
 
 UNSEEN = 1e-4
-"""Standard deviations of all readings together by which a parameter of its usual size must move them."""
+"""Standard deviations of all readings together by which a parameter of its usual size must move them, also beside the
+others: columns are no better."""
 
 REDUNDANT = 1e-5
 """A column whose part outside of the others is smaller than this share of it adds nothing."""
@@ -76,7 +77,7 @@ def insight(
         rest = outside[:, k] - frame @ (frame.T @ outside[:, k])
         rest -= frame @ (frame.T @ rest)
         length = float(np.linalg.norm(rest))
-        if length < REDUNDANT * size:
+        if length < max(REDUNDANT * size, UNSEEN):
             dropped.append(_explained(k, unknowns, kept, whole, nuisance, nuisance_names))
             continue
         frame = np.column_stack([frame, rest / length])

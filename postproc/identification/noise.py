@@ -137,6 +137,8 @@ def shared_error(residual: Floats, weights: Weighting, columns: Floats, known: b
     q = basis(np.where(u[..., None] > 0, columns[:, :3] * u[..., None], 0.0).reshape(z.size, -1))
     if pairs == 0 or count <= q.shape[1]:
         return 0.0
+    # what a prior pulled is no scatter
+    z = z - (q @ (q.T @ z.reshape(-1))).reshape(z.shape)
     q = q.reshape(*z.shape, -1)
     uz, uq = (_together(weights.pose, u, x) for x in (z[..., None], q))
     vz, vq = uz - square[..., None] * z[..., None], uq - square[..., None] * q

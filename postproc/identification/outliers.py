@@ -88,10 +88,6 @@ def _explained(fitted: Fit, row: int, limit: float) -> str:
             f"fits target {names[readings.target[other]]} (line {readings.where(int(other))[1]}) instead of"
             f" {names[readings.target[row]]}: mistaken for each other?"
         )
-    rest = ~same & (np.arange(len(campaign)) != row) & (campaign.pose != campaign.pose[row]) & (away < close)
-    if rest.any() and _distinct(expected, campaign.pose, close):
-        other = int(np.argmin(np.where(rest, away, np.inf)))
-        return f"fits the state of line {readings.where(other)[1]}: a row in the wrong place?"
     if readings.deflection and np.linalg.norm(measured + expected[row]) < close:
         return "fits with the opposite sign: unloaded minus loaded?"
     for a, b in ((0, 1), (0, 2), (1, 2)):
@@ -99,6 +95,11 @@ def _explained(fitted: Fit, row: int, limit: float) -> str:
         turned[[a, b]] = turned[[b, a]]
         if np.linalg.norm(turned - expected[row]) < close:
             return f"fits with {'XYZ'[a]} and {'XYZ'[b]} exchanged"
+    # last, because of so many one may fit by chance
+    rest = ~same & (np.arange(len(campaign)) != row) & (campaign.pose != campaign.pose[row]) & (away < close)
+    if rest.any() and _distinct(expected, campaign.pose, close):
+        other = int(np.argmin(np.where(rest, away, np.inf)))
+        return f"fits the state of line {readings.where(other)[1]}: a row in the wrong place?"
     return "fits nothing here: a broken beam, or a joint that did not stand where the row says?"
 
 

@@ -14,12 +14,15 @@ MAX_STEPS = 60
 SAMPLE = 300
 """Readings looked at while the tracker's turn is searched for."""
 
+FOLLOWED = 4
+"""Starts that are followed after their first steps."""
+
 
 def registered(campaign: Campaign, seen: Seen, rows: Bools) -> Nuisances:
     """Nuisances with the least squares of ``rows`` (R,), every session by itself, the largest first.
 
     The turn of a tracker may be any, and the place of a target on the flange enters together with it: Gauss-Newton
-    from the 24 turns of a cube, the best of which is refined.
+    from the 24 turns of a cube, the best of which are followed, and the best of these refined.
     """
     given = campaign.start()
     session = campaign.readings.session
@@ -36,28 +39,31 @@ def registered(campaign: Campaign, seen: Seen, rows: Bools) -> Nuisances:
 
 def _session(campaign: Campaign, seen: Seen, given: Nuisances, k: int, own: Ints) -> Nuisances:
     some = own[np.linspace(0, len(own) - 1, min(len(own), SAMPLE)).round().astype(int)]
-    best, least = given, np.inf
+    tries = []
     for turn in _cube_turns():
         rotation = given.frames.rotation.copy()
         rotation[k] = turn
-        tried = replace(given, frames=Poses(rotation, given.frames.position))
-        tried, size = _descended(campaign, seen, tried, some, 12)
-        if size < least:
-            best, least = tried, size
-    return _descended(campaign, seen, best, own, MAX_STEPS)[0]
+        start = replace(given, frames=Poses(rotation, given.frames.position))
+        tries.append(_descended(campaign, seen, start, some, 3))
+    tries = [_descended(campaign, seen, tried, some, 12) for tried, _ in sorted(tries, key=_size)[:FOLLOWED]]
+    return _descended(campaign, seen, min(tries, key=_size)[0], own, MAX_STEPS)[0]
+
+
+def _size(tried: tuple[Nuisances, float]) -> float:
+    return tried[1]
 
 
 def _descended(
     campaign: Campaign, seen: Seen, given: Nuisances, rows: Ints, steps: int
 ) -> tuple[Nuisances, float]:
     """Gauss-Newton on positions: the nuisances, and the mean square that is left [m2]."""
-    last = np.inf
+    last, before = np.inf, given
     for _ in range(steps):
         left = campaign.residual(seen, given)[rows, :3]
         size = float(np.mean(left**2))
         if not size < last * (1 - 1e-9):
-            break
-        last = size
+            return before, last
+        last, before = size, given
         columns = campaign.nuisance_columns(seen, given)[rows, :3]
         matrix = columns.reshape(left.size, -1)
         step = np.linalg.lstsq(matrix.T @ matrix, matrix.T @ left.reshape(-1), rcond=1e-13)[0]

@@ -22,8 +22,8 @@ CLOSE = 1e-3
 STRAIGHT = 0.01
 """Where a step's effect was foreseen to this share, the columns are kept."""
 
-DAMPING = 1e-7
-"""Of a column's length: what no reading sees stays where it is."""
+DAMPING, LOOSE = 1e-5, 1e-7
+"""Of a column's length: what no reading sees stays where it is, parameters rather than tracker and targets."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,8 @@ def descended(
         awake = length > 0
         length[~awake] = 1.0
         # many rows to as many as there are columns, which say the same
-        tall = np.concatenate([np.column_stack([matrix / length, left]), DAMPING * np.eye(len(length) + 1)[:-1]])
+        damping = np.repeat([DAMPING, LOOSE], [len(x), len(loose)])
+        tall = np.block([[matrix / length, left[:, None]], [np.diag(damping), np.zeros((len(length), 1))]])
         reduced = np.asarray(np.linalg.qr(tall, mode="r"))
         system, right = reduced[:-1, :-1], reduced[:-1, -1]
         low, high = np.concatenate([lower - x, -loose]) * length, np.concatenate([upper - x, loose]) * length

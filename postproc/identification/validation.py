@@ -81,18 +81,18 @@ def validated(before: Fit, after: Fit, campaign: Campaign) -> Validation:
         point = at(known, fitted.model, known.start())
         given = registered(known, point.seen, np.ones(len(known), bool))
         if known.tracked:
-            kept = _stations(fitted, known, given)
+            kept, others = _stations(fitted, known, given)
             own, there = (np.nanmean(known.residual(point.seen, g)[:, :3] ** 2) for g in (given, kept))
             if there <= OTHER_STATION**2 * own:
-                given = kept
+                given, anew = kept, anew or others
             else:
                 anew = True
         left.append(known.in_base(known.residual(point.seen, given), given)[:, :3])
     return Validation(campaign, left[0], left[1], anew)
 
 
-def _stations(fitted: Fit, campaign: Campaign, given: Nuisances) -> Nuisances:
-    """``given``, with the tracker of the fit for sessions that it knows."""
+def _stations(fitted: Fit, campaign: Campaign, given: Nuisances) -> tuple[Nuisances, bool]:
+    """``given``, with the tracker of the fit for sessions that it knows, and whether there are others."""
     names, known = campaign.readings.sessions, fitted.campaign.readings.sessions
     pairs = [(k, known.index(name)) for k, name in enumerate(names) if name in known]
     if len(names) == len(known) == 1:
@@ -103,7 +103,7 @@ def _stations(fitted: Fit, campaign: Campaign, given: Nuisances) -> Nuisances:
             fitted.point.given.frames.rotation[other],
             fitted.point.given.frames.position[other],
         )
-    return replace(given, frames=Poses(rotation, position))
+    return replace(given, frames=Poses(rotation, position)), len(pairs) < len(names)
 
 
 @dataclass(frozen=True)

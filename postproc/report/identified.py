@@ -1,59 +1,30 @@
-"""What ``compensate identify`` found: parameters with intervals, and what they leave; as JSON and CSV.
-
-All residuals are measured minus expected, in axes of the robot base.  The size of one is its length in space; where
-fewer than three coordinates were measured, the length that three like them would have.
-"""
+"""What ``compensate identify`` found: parameters with intervals, and what they leave; as JSON and CSV."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats
 from postproc.findings import Finding
 from postproc.identification.fit import Estimate, Fit
 from postproc.identification.identifiable import strong_correlations
 from postproc.identification.outliers import Outlier
 from postproc.identification.validation import Bootstrap, Validation
 from postproc.report.report import exit_code
-from postproc.report.workspace import _texts
+from postproc.report.residuals import Sizes, Variable, gap_of, joint_variables, lengths_of, mm, residuals_csv
 from postproc.robot.chain import generalized_force
 from postproc.robot.provenance import GAP
-from postproc.units import DEG, MM
 
 STRONG = 0.9
 """Correlations above are told."""
 
-PARTS, EACH = 8, 10
-"""Into how many parts of about as many readings the range of a joint or load is cut at most, each of ``EACH`` or more.
-"""
-
 SAME_FORCE = 0.01
 """Share by which forces must differ before readings are sorted by them."""
-
-
-class Sizes(NamedTuple):
-    """Root mean square, mean and maximum [m] of the lengths of residuals, and of how many."""
-
-    rms: float
-    mean: float
-    max: float
-    readings: int
-
-    @classmethod
-    def of(cls, lengths: Floats) -> Sizes | None:
-        """None where there is no length; NaN are left out."""
-        seen = lengths[np.isfinite(lengths)]
-        if not len(seen):
-            return None
-        return cls(float(np.sqrt(np.mean(seen**2))), float(seen.mean()), float(seen.max()), len(seen))
 
 
 @dataclass(frozen=True)
@@ -65,24 +36,6 @@ class Sum:
     value: float
     ci95: float
     unit: str
-
-
-@dataclass(frozen=True)
-class Variable:
-    """A quantity of each reading, (R,) in ``unit``, that residuals are looked at by."""
-
-    name: str
-    unit: str
-    values: Floats
-
-    def parts(self) -> list[Ints]:
-        """The rows of readings that are alike: of each value where there are few, or of ranges."""
-        distinct, of = np.unique(np.round(self.values, 6), return_inverse=True)
-        if len(distinct) > PARTS:
-            count = int(np.clip(len(self.values) // EACH, 2, PARTS))
-            edges = np.quantile(self.values, np.arange(1, count) / count)
-            of = np.searchsorted(edges, self.values, side="right")
-        return [np.flatnonzero(of == k) for k in np.unique(of)]
 
 
 @dataclass(frozen=True)
@@ -151,11 +104,7 @@ class Identified:
 
     def gap_mm(self) -> dict[str, float]:
         """Root mean squares of residuals, and the scatter of the readings; what is not known is left out."""
-        sizes = {name: Sizes.of(lengths) for name, lengths in self.lengths.items()}
-        known = {f"{name}_rms_mm": size.rms / MM for name, size in sizes.items() if size}
-        if self.after.noise.known:
-            known["noise_mm"] = self.after.noise.rms / MM
-        return {key: round(value, 7) for key, value in known.items()}
+        return gap_of(self.lengths, self.after.noise)
 
     @property
     def sigma(self) -> float:
@@ -166,11 +115,7 @@ class Identified:
     @cached_property
     def joints(self) -> tuple[Variable, ...]:
         """Where each joint stood."""
-        readings = self.after.campaign.readings
-        return tuple(
-            Variable(name, "mm" if slides else "deg", column / (MM if slides else DEG))
-            for (name, slides), column in zip(readings.joints, readings.q.T, strict=True)
-        )
+        return joint_variables(self.after.campaign.readings)
 
     @cached_property
     def load(self) -> Variable | None:
@@ -278,17 +223,17 @@ class Identified:
             "correlations": [[a, b, round(size, 6)] for a, b, size in self.correlations],
             "bootstrap": None if self.bootstrap is None else {"draws": self.bootstrap.draws},
             "noise": {
-                "sigma_mm": _mm(self.sigma),
+                "sigma_mm": mm(self.sigma),
                 "source": after.noise.source,
                 "exceeded": bool(after.scatter_exceeded),
-                "shared_mm": _mm(after.shared_error),
+                "shared_mm": mm(after.shared_error),
             },
             "residuals": self._residuals(),
             "outliers": [
                 {
                     "file": one.file,
                     "line": one.line,
-                    "distance_mm": _mm(one.distance),
+                    "distance_mm": mm(one.distance),
                     "sigmas": round(one.sigmas, 2),
                     "what": one.what,
                 }
@@ -321,8 +266,8 @@ class Identified:
         told: dict[str, float | None] = {key: known.get(key) for key in GAP}
         for name, lengths in self.lengths.items():
             size = Sizes.of(lengths)
-            told[f"{name}_mean_mm"] = _mm(size.mean) if size else None
-            told[f"{name}_max_mm"] = _mm(size.max) if size else None
+            told[f"{name}_mean_mm"] = mm(size.mean) if size else None
+            told[f"{name}_max_mm"] = mm(size.max) if size else None
         return told
 
     def _validation(self) -> dict[str, object] | None:
@@ -336,7 +281,7 @@ class Identified:
         for name, lengths in self.validation_lengths.items():
             size = Sizes.of(lengths)
             for key in ("rms", "mean", "max"):
-                told[f"{name}_{key}_mm"] = _mm(getattr(size, key)) if size else None
+                told[f"{name}_{key}_mm"] = mm(getattr(size, key)) if size else None
         return told
 
     def _residuals(self) -> dict[str, object]:
@@ -347,8 +292,8 @@ class Identified:
             for name, values in self.residuals.items():
                 column = values[self.counts, k]
                 column = column[np.isfinite(column)]
-                told[f"{name}_rms_mm"] = _mm(np.sqrt(np.mean(column**2))) if len(column) else None
-                told[f"{name}_mean_mm"] = _mm(column.mean()) if len(column) else None
+                told[f"{name}_rms_mm"] = mm(np.sqrt(np.mean(column**2))) if len(column) else None
+                told[f"{name}_mean_mm"] = mm(column.mean()) if len(column) else None
             directions[axis] = told
         return {
             "direction": directions,
@@ -368,59 +313,21 @@ class Identified:
             }
             for name, lengths in self.lengths.items():
                 size = Sizes.of(lengths[rows])
-                part[f"{name}_rms_mm"] = _mm(size.rms) if size else None
+                part[f"{name}_rms_mm"] = mm(size.rms) if size else None
             parts.append(part)
         return {"unit": variable.unit, "parts": parts}
 
 
-def lengths_of(residual: Floats, measured: Bools) -> Floats:
-    """(R,) [m] of residuals (R, 3) of which the coordinates ``measured`` (R, 3) count; NaN where none does."""
-    on = np.isfinite(residual)
-    count = np.minimum(on.sum(axis=1), measured.sum(axis=1))
-    square = np.where(on, residual, 0.0) ** 2
-    size = np.sqrt(3.0 * square.sum(axis=1) / np.maximum(count, 1))
-    return np.asarray(np.where(count > 0, size, np.nan))
-
-
-def poses_in_order(pose: Ints) -> Ints:
-    """(R,) the number of the pose of each reading, from 1 in the order in which they were first measured."""
-    _, first, of = np.unique(pose, return_index=True, return_inverse=True)
-    number = np.empty(len(first), np.int64)
-    number[np.argsort(first)] = np.arange(1, len(first) + 1)
-    return np.asarray(number[of.reshape(-1)])
-
-
 def identified_csv(result: Identified) -> bytes:
     """One row a reading: where it stands, its axes, what is left of it before, after and as one that was not fitted."""
-    campaign, readings = result.after.campaign, result.after.campaign.readings
-    rows = range(len(readings))
-    places = [readings.where(row) for row in rows]
-    outlier = {one.row for one in result.outliers}
-    columns: dict[str, list[str]] = {
-        "file": [file for file, _ in places],
-        "line": [str(line) for _, line in places],
-        "pose": [str(number) for number in poses_in_order(campaign.pose)],
-        "target": [campaign.targets[k] for k in readings.target],
-        "session": [readings.sessions[k] for k in readings.session],
+    residuals = {
+        "before": result.before.residual,
+        "after": result.after.residual,
+        "heldout": result.heldout_after,
     }
-    for joint in result.joints:
-        columns[f"{joint.name}_{joint.unit}"] = _texts(joint.values, 6)
-    measured = np.isfinite(readings.value)
-    nothing = np.full((len(readings), 3), np.nan)
-    for name, key in (("before", "before"), ("after", "after"), ("heldout", "heldout_after")):
-        residual = result.residuals.get(key, nothing)
-        for axis, column in zip("xyz", residual.T, strict=True):
-            columns[f"{name}_d{axis}_mm"] = _texts(column / MM, 6)
-        columns[f"{name}_mm"] = _texts(lengths_of(residual, measured) / MM, 6)
-    columns["outlier"] = [str(int(row in outlier)) for row in rows]
-    columns["fitted"] = [str(int(counts)) for counts in result.counts]
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*columns.values(), strict=True))
-    return stream.getvalue().encode()
-
-
-def _mm(length: float) -> float:
-    """[mm] without the last bits that the conversion leaves."""
-    return round(float(length) / MM, 7) + 0.0
+    outlier = {one.row for one in result.outliers}
+    more = {
+        "outlier": [str(int(row in outlier)) for row in range(len(result.counts))],
+        "fitted": [str(int(counts)) for counts in result.counts],
+    }
+    return residuals_csv(result.after.campaign, residuals, more)

@@ -15,8 +15,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from postproc.arrays import Floats, Ints
-from postproc.report.identified import Identified, Sizes, Variable
+from postproc.report.identified import Identified
 from postproc.report.picture import rendered
+from postproc.report.residuals import Sizes, Variable
 from postproc.units import MM
 
 COLUMNS = 3

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 from rich.console import Console
 from rich.table import Table
@@ -12,27 +12,11 @@ from rich.text import Text
 from postproc.arrays import Floats
 from postproc.identification.fit import Estimate
 from postproc.identification.validation import WIDER
-from postproc.report.identified import STRONG, Identified, Sizes, Sum
+from postproc.report.identified import STRONG, Identified, Sum
+from postproc.report.residuals import Sizes
 from postproc.report.terminal import _once, printable, show_findings
+from postproc.report.words import campaign_in_words, count, fixed, shown_unit, some
 from postproc.units import MM
-
-UNITS = {
-    "m": ("mm", MM),
-    "rad": ("mrad", 1e-3),
-    "rad/(N m)": ("urad/(N m)", 1e-6),
-    "m/N": ("mm/kN", MM / 1e3),
-    "N/m": ("N/mm", 1.0 / MM),
-    "N m/rad": ("kN m/rad", 1e3),
-    "N m/rad3": ("N m/mrad3", 1e9),
-    "N/m3": ("kN/mm3", 1e3 / MM**3),
-    "m/K": ("um/K", MM / 1e3),
-    "m/s": ("mm/h", MM / 3600.0),
-    "1": ("", 1.0),
-}
-"""SI unit -> the unit that people read, and its size; others are read as they are."""
-
-SHOWN = 5
-"""Of long lists, unless ``--verbose`` asks for all."""
 
 IN_TABLES = frozenset({"IDN018", "IDN019", "IDN020", "IDN021", "IDN022", "IDN025", "IDN026"})
 """Findings that stand in the tables already: told once more, with what to do, by ``--verbose``."""
@@ -71,7 +55,7 @@ def verdict(result: Identified) -> str:
     if held is not None and without is not None and held >= without:
         return f"{told} There the fit is no better than before: it does not hold."
     if result.outliers and not result.outliers_left_out:
-        return f"{told} {_count(len(result.outliers), 'outlier')} among the readings: look there first."
+        return f"{told} {count(len(result.outliers), 'outlier')} among the readings: look there first."
     if after.freedom == 0:
         return f"{told} There are as many unknowns as measured numbers: that would always be so."
     if not after.noise.known:
@@ -83,16 +67,9 @@ def verdict(result: Identified) -> str:
 
 
 def _rows(result: Identified) -> Iterator[tuple[str, str]]:
-    after, readings = result.after, result.after.campaign.readings
-    campaign = after.campaign
-    kind = "deflections" if readings.deflection else "positions"
-    frame = " in the tracker's frame" if campaign.tracked else ""
+    after = result.after
     yield "data", ", ".join(name for name, _ in result.data)
-    yield (
-        "",
-        f"{_count(len(readings), 'reading')} ({kind}{frame}) at {_count(campaign.poses, 'pose')},"
-        f" {_count(len(campaign.targets), 'target')}, {_count(len(readings.sessions), 'session')}",
-    )
+    yield "", campaign_in_words(after.campaign)
     yield "robot", f"{result.robot} ({result.robot_file})"
     yield "effects", ", ".join(result.effects)
     if result.held:
@@ -155,15 +132,15 @@ def _notes(result: Identified, verbose: bool) -> Iterator[str]:
     """Condition and correlations, what was left out and why, and the sums that are known instead."""
     after = result.after
     pairs = [f"{' / '.join(_once([a, b]))} {size:+.2f}" for a, b, size in result.correlations]
-    strong = "; ".join(_some(pairs, verbose)) or "none"
+    strong = "; ".join(some(pairs, verbose)) or "none"
     yield f"condition    {after.condition:.3g}; correlations above {STRONG:g}: {strong}"
     reasons: dict[str, list[str]] = {}
     for dropped in after.dropped:
         reasons.setdefault(dropped.why, []).append(dropped.name)
     lines = [f"{', '.join(_once(names))}: {why}" for why, names in reasons.items()]
-    for line in _some(lines, verbose):
+    for line in some(lines, verbose):
         yield f"left out     {line}"
-    for line in _some([_sum(one, result) for one in result.sums], verbose):
+    for line in some([_sum(one, result) for one in result.sums], verbose):
         yield f"sum          {line}"
 
 
@@ -194,17 +171,18 @@ def _left(result: Identified) -> Table:
         "heldout_before": f"poses not fitted ({result.folds}-fold), before",
         "heldout_after": f"poses not fitted ({result.folds}-fold), after",
     }
-    _add_sizes(table, {rows[name]: lengths for name, lengths in result.lengths.items()})
+    add_sizes(table, {rows[name]: lengths for name, lengths in result.lengths.items()})
     anew = ", registered anew" if result.validation and result.validation.registered_anew else ""
     named = {f"validation{anew}, {name}": lengths for name, lengths in result.validation_lengths.items()}
-    _add_sizes(table, named)
+    add_sizes(table, named)
     noise = result.gap_mm().get("noise_mm")
     if noise is not None:
         table.add_row("scatter of the readings", f"{noise:.3f}")
     return table
 
 
-def _add_sizes(table: Table, lengths: Mapping[str, Floats]) -> None:
+def add_sizes(table: Table, lengths: Mapping[str, Floats]) -> None:
+    """A row of RMS, mean, maximum and number for each of ``lengths`` (R,) [m], under its name."""
     for name, values in lengths.items():
         size = Sizes.of(values)
         if size is not None:
@@ -219,30 +197,13 @@ def _outliers(result: Identified, verbose: bool) -> Iterator[str]:
             if result.outliers_left_out
             else "fitted with the others; --drop-outliers leaves them out"
         )
-        yield f"{_count(len(result.outliers), 'outlier')} ({how})"
+        yield f"{count(len(result.outliers), 'outlier')} ({how})"
     lines = [
         f"{one.file}:{one.line} {one.distance / MM:.3g} mm off, {one.sigmas:.0f} sigma: {one.what}"
         for one in result.outliers
     ]
-    for line in _some(lines, verbose):
+    for line in some(lines, verbose):
         yield f"  {line}"
-
-
-def shown_unit(unit: str) -> tuple[str, float]:
-    """The unit that people read and its size in SI ``unit``."""
-    return UNITS.get(unit, (unit, 1.0))
-
-
-def fixed(value: float, interval: float) -> str:
-    """``value`` to two digits of ``interval``, without an exponent where that can be read."""
-    if not math.isfinite(value):
-        return "-"
-    if interval <= 0 or not math.isfinite(interval):
-        return f"{value:.6g}"
-    decimals = 1 - math.floor(math.log10(interval))
-    if decimals > 9 or abs(value) >= 1e9:
-        return f"{value:.3e}"
-    return f"{round(value, decimals) + 0.0:.{max(0, decimals)}f}"
 
 
 def _percent(estimate: Estimate) -> str:
@@ -251,14 +212,3 @@ def _percent(estimate: Estimate) -> str:
         return "-"
     share = 100 * estimate.ci95 / abs(estimate.value)
     return ">999" if share > 999 else fixed(share, share)
-
-
-def _some(lines: Sequence[str], verbose: bool) -> list[str]:
-    """All of them, or the first and how many more."""
-    if verbose or len(lines) <= SHOWN:
-        return list(lines)
-    return [*lines[:SHOWN], f"and {len(lines) - SHOWN} more (-v shows all)"]
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -17,8 +17,8 @@ from postproc.findings import Finding
 from postproc.geometry import abc_from_rotation
 from postproc.identification.unknowns import Unknown
 from postproc.model import StiffnessModel
-from postproc.report.identified_terminal import fixed, shown_unit
 from postproc.report.terminal import _once, show_findings
+from postproc.report.words import fixed, shown_unit
 from postproc.units import DEG, MM
 
 GOALS = {

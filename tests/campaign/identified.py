@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,12 @@ from . import rig
 
 PART = 25
 """Campaigns that a process takes at a time."""
+
+Stage = Callable[[str], None]
+
+
+def silent(_stage: str) -> None:
+    """Nobody watches."""
 
 
 @dataclass(frozen=True)
@@ -60,13 +67,15 @@ def fitted(trial: Trial, seed: int, campaign: int) -> Fit:
     return fit(Campaign(readings), asked.model, asked.unknowns)
 
 
-def found(trial: Trial, campaigns: int, seed: int, jobs: int) -> Found:
+def found(trial: Trial, campaigns: int, seed: int, jobs: int = 1, stage: Stage = silent) -> Found:
+    """What ``campaigns`` find, in so many processes."""
     parts = [range(start, min(start + PART, campaigns)) for start in range(0, campaigns, PART)]
-    if jobs == 1:
-        done = [_some(trial, seed, part) for part in parts]
-    else:
-        with ProcessPoolExecutor(jobs) as pool:
-            done = list(pool.map(_some, [trial] * len(parts), [seed] * len(parts), parts))
+    repeated = ([trial] * len(parts), [seed] * len(parts), parts)
+    done = []
+    with ProcessPoolExecutor(jobs) if jobs > 1 else nullcontext() as pool:
+        for part in (pool.map if pool else map)(_some, *repeated):
+            done.append(part)
+            stage(f"{trial.name}: {min(PART * len(done), campaigns)} of {campaigns}")
     value, ci95, seconds = (np.concatenate(columns) for columns in zip(*done, strict=True))
     return Found(value, ci95, float(seconds.mean()))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -66,7 +67,7 @@ def told(trial: Trial, done: Found, wanted: float) -> bool:
         cells = (
             f"{true[i] / scale:.4f}",
             f"{value.mean():.4f}",
-            f"{value.std() / np.sqrt(count):.4f}",
+            f"{value.std() / np.sqrt(count):.1g}",
             f"{middle[i]:.2f} %",
             f"{middle[i] / table[i]:.3f}",
             f"{100 * inside / count:.1f} %",
@@ -124,6 +125,11 @@ def compensation(trial: Trial, campaigns: int, seed: int) -> bool:
     return good
 
 
+def _stage(text: str) -> None:
+    """A line that the next one takes the place of."""
+    print(f"\r{text} ", end="", file=sys.stderr, flush=True)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.campaign", description=__doc__)
     parser.add_argument("--campaigns", type=int, default=1000, help="of each design [1000]")
@@ -138,7 +144,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     print(f"planned and read off in {time.monotonic() - begun:.0f} s", flush=True)
     good = True
     for number, (trial, wanted) in enumerate(tried):
-        good &= told(trial, found(trial, given.campaigns, 100 * given.seed + number, given.jobs), wanted)
+        done = found(trial, given.campaigns, 100 * given.seed + number, given.jobs, _stage)
+        good &= told(trial, done, wanted)
     good &= compensation(tried[0][0], given.compensated, given.seed)
     print(f"\n{'all reached' if good else 'NOT all reached'}, {time.monotonic() - begun:.0f} s")
     return 0 if good else 1

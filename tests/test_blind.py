@@ -1,0 +1,145 @@
+"""A small fixed part of ``python -m tests.blind``, and what the benchmark itself must hold."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from blind import cases, command, gap, measured, table, verdicts, worker
+from blind.cases import Case, made
+from blind.hidden import EVERY, OUTSIDE
+from blind.oracle import Rival, joined
+
+from postproc.effects import EFFECTS
+from postproc.identification.campaign import Campaign
+
+SEED = 1
+
+
+def case(row, effect, snr, poses, number=0):
+    return Case(row, number, SEED, (effect,) if effect else (), snr, poses)
+
+
+def truly(run):
+    """The robot file's model with all that is there, and its true values."""
+    model = run.oracle.model
+    there = {name.split(".")[0] for name in run.true()}
+    for hidden, _ in run.hidden:
+        model = joined(model, hidden.made)
+    for name in sorted(there - {term.effect.name for term in model.terms}):
+        model = model.added(EFFECTS[name](model.robot.joints))
+    return gap.at_truth(run, model)
+
+
+@pytest.mark.parametrize("effect", EVERY)
+def test_truth_is_the_plants(effect):
+    """The model with the true values says what the plant does: else the benchmark would be one of model errors."""
+    run = cases._made(case("single", effect, 2.0, 15), np.random.default_rng(5))
+    design = replace(run.design, jitter=0.0)
+    campaign = Campaign(measured.readings(design, measured.observed(run.scene, design), run.sigma))
+    model = truly(run)
+    left = campaign.residual(campaign.seen(model), run.oracle.given)
+    assert np.abs(left).max() < 1e-10
+    # and what is hidden shows as large as it is said to, or is as large as is plausible
+    (hidden, size), shown = run.hidden[0], run.snr[0]
+    assert shown == pytest.approx(2.0, rel=0.06) or (size == hidden.cap and shown < 2.0)
+
+
+@pytest.mark.parametrize("effect", OUTSIDE)
+def test_outside_is_none_of_the_library(effect):
+    """No effect of the library alone does the same."""
+    run = made(case("outside", effect, 5.0, 30))
+    hidden, _size = run.hidden[0]
+    assert effect not in EFFECTS
+    assert hidden.outside
+    signal = measured.observed(run.scene, run.design) - measured.observed(run.bare, run.design)
+    assert run.oracle.beyond(signal) > 0.2 * run.snr[0]
+
+
+def test_a_case_is_always_the_same():
+    one, again = (made(case("single", "backlash", 2.0, 15)) for _ in range(2))
+    other = made(replace(case("single", "backlash", 2.0, 15), seed=2))
+    assert one.robot == again.robot
+    assert np.array_equal(one.readings.value, again.readings.value)
+    assert not np.array_equal(one.readings.q, other.readings.q)
+
+
+def test_cells_come_in_turn():
+    """However few runs there are, they are of all kinds."""
+    first = cases.cases("single", 216, 1)
+    assert len({(c.effects, c.snr, c.poses) for c in first}) == 216
+    assert cases.cases("single", 300, 1)[:216] == first
+
+
+def test_noise_is_as_stated():
+    run = made(case("null_cluttered", "", 0.0, 60, number=1))
+    rng = np.random.default_rng(1)
+    for design in (run.design, replace(run.design, jitter=0.0)):
+        moved = design.jitter * rng.normal(size=design.q.shape)
+        still = measured.observed(run.bare, design)
+        off = measured.observed(run.bare, design, moved) - still + measured.noise(design, rng)
+        assert off.std() == pytest.approx(measured.scatter(design, run.oracle.model), rel=0.12)
+
+
+def test_the_worker_opens_nothing_else(tmp_path, monkeypatch):
+    own, other = (tmp_path / f"{worker.ROOMS}{name}" for name in ("data-1", "truth-1"))
+    monkeypatch.setattr(worker, "_allowed", str(own))
+    worker.guard("open", (str(own / "data.csv"), "r", 0))
+    worker.guard("open", ("/usr/lib/anything", "r", 0))
+    for event in ("open", "os.listdir", "os.scandir"):
+        with pytest.raises(PermissionError):
+            worker.guard(event, (str(other / "truth.json"),))
+
+
+TRUTH = {("backlash", "A2")}
+FAR, NEAR = [[Rival("link_gravity", "", 50.0)]], [[Rival("backlash", "A3", 3.0)]]
+UNSEEN = [[Rival("nothing", "", 1.0)]]
+
+
+@pytest.mark.parametrize(
+    ("word", "names", "sets", "rivals", "outcome"),
+    [
+        ("named", TRUTH, [], FAR, "exact"),
+        ("named", {("backlash", "A3")}, [], FAR, "wrong"),
+        ("named", TRUTH | {("payload", "")}, [], FAR, "wrong"),
+        ("partly_named", TRUTH, [], FAR, "partly"),
+        ("ambiguous", TRUTH, [TRUTH | {("backlash", "A3")}], NEAR, "ambiguous"),
+        ("ambiguous", TRUTH, [TRUTH | {("backlash", "A3")}], FAR, "undecided"),
+        ("ambiguous", {("payload", "")}, [{("payload", ""), ("backlash", "A3")}], NEAR, "wrong"),
+        ("nothing_missing", set(), [], FAR, "missed"),
+        ("nothing_missing", set(), [], UNSEEN, "unseen"),
+        ("unknown", set(), [], FAR, "unknown"),
+    ],
+)
+def test_outcomes(word, names, sets, rivals, outcome):
+    assert verdicts._outcome(word, TRUTH, names, sets, False, rivals) == outcome
+
+
+def test_nulls_and_outsiders():
+    assert verdicts._outcome("nothing_missing", set(), set(), [], False, []) == "exact"
+    assert verdicts._outcome("named", set(), TRUTH, [], False, []) == "wrong"
+    assert verdicts._outcome("named", {("windup", "A2")}, TRUTH, [], True, [[]]) == "wrong"
+    assert verdicts.right("outside", "unknown")
+    assert not verdicts.right("single", "unknown")
+
+
+# The small fixed part.
+
+CLEAR = []
+NULLS = [case("null_clean", "", 0.0, 15), case("null_cluttered", "", 0.0, 30, 4)]
+
+
+@pytest.fixture(scope="module")
+def records():
+    """What the diagnosis says of some runs."""
+    diagnosing = command.Diagnosing()
+    found = {}
+    for one in (*NULLS, *CLEAR):
+        found[one] = command.record_of(one, diagnosing, with_gap=False)
+    diagnosing.close()
+    return found
+
+
+@pytest.mark.parametrize("one", NULLS, ids=lambda c: c.key)
+def test_nothing_is_named_where_nothing_is(records, one):
+    assert records[one]["outcome"] == "exact"
+    assert not table.is_named(records[one])
