@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from effects_at_work import TOOL, conditions, made, nulls, random_arm, sampled, with_terms
-from measured import MARKERS, Straight, arm, on_markers, plan, read, robot, scattered, somewhere, taken, turns
+from measured import MARKERS, Straight, arm, on_markers, plan, read, robot, scattered, somewhere, taken
 
 from postproc.effects import EFFECTS, ComplianceLaw, Offset
 from postproc.findings import Refusal
@@ -48,7 +48,7 @@ KINDS = ("tracker", "robot frame", "deflections")
 def hidden(name, kind, rng):
     """Readings of an arm with an effect, the model with its null, its term, and its values."""
     described = arm(random_arm(rng, "rrr"))
-    joints, count = described.joints, 60
+    joints, count = described.joints, 40
     springs = [made(n, joints) for n, e in EFFECTS.items() if issubclass(e, ComplianceLaw) and n != name]
     springs = [law for law in springs if law.family == "elastic" and not law.coordinates]
     model = with_terms(StiffnessModel(described, ()), *((law, sampled(law, rng)) for law in springs))
@@ -115,6 +115,15 @@ def test_deflections_guess_no_offset(name):
     found = fit(Campaign(replace(readings, sigma=np.full(len(readings), SIGMA))), model, unknowns)
     for estimate in found.estimates:
         assert abs(estimate.value - values[estimate.unknown.parameter.name]) < 2.0 * estimate.ci95
+
+
+def test_growth_counts_from_the_first_reading():
+    """What was there before is geometry."""
+    readings, model, term, values = hidden("thermal_growth", "robot frame", np.random.default_rng(4))
+    campaign = Campaign(readings)
+    grown, still = (campaign.seen(one).tip[campaign.at] for one in (put_to(model, term, values), model))
+    np.testing.assert_array_equal(grown[0], still[0])
+    assert (np.abs(grown - still).max(axis=1)[1:] > 1e-6).all()
 
 
 # Derivatives

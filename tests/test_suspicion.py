@@ -16,10 +16,12 @@ from postproc.identification.suspicion import check_fit, check_numbers
 from postproc.identification.unknowns import Asked, asked_for
 from postproc.measurements import Readings
 from postproc.model import StiffnessModel
-from postproc.units import DEG, MM
+from postproc.units import DEG
 
 SIGMA = 3e-5
 """[m]"""
+
+PAIRS = list(combinations(range(3), 2))
 
 
 class Case(NamedTuple):
@@ -35,14 +37,14 @@ def good(kind):
     model = StiffnessModel(described, ())
     if kind == "deflections":
         asked = asked_for(model, ["joint_compliance"])
-        truth = asked.model.changed({u.key: 5.0 * u.parameter.scale for u in asked.unknowns})
+        truth = asked.model.changed({u.key: 20.0 * u.parameter.scale for u in asked.unknowns})
     else:
         asked = asked_for(model, ["joint_offset"])
         truth = asked.model.changed({u.key: 2e-3 for u in asked.unknowns})
-    wrench = np.zeros((14, 6))
+    wrench = np.zeros((10, 6))
     if kind == "deflections":
-        wrench[:, :3] = 1500.0 * rng.normal(size=(14, 3))
-    q, wrench, words = on_markers(rng.uniform(-2.0, 2.0, (14, 3)), wrench)
+        wrench[:, :3] = 1500.0 * rng.normal(size=(10, 3))
+    q, wrench, words = on_markers(rng.uniform(-2.0, 2.0, (10, 3)), wrench)
     readings = plan(
         described, q, wrench, kind == "deflections", kind == "robot", sigma=SIGMA, tool=TOOL, **words
     )
@@ -50,7 +52,7 @@ def good(kind):
 
 
 def looked_at(readings, asked):
-    """The findings, or those of the refusal."""
+    """The findings on readings, or those of their refusal."""
     try:
         check_numbers(readings, asked.unknowns, asked.model)
         return check_fit(Campaign(readings), asked.model, asked.unknowns)
@@ -60,11 +62,8 @@ def looked_at(readings, asked):
 
 def refused(readings, asked, code):
     """The message of the one finding, which must be an error of ``code``."""
-    with pytest.raises(Refusal) as refusal:
-        check_numbers(readings, asked.unknowns, asked.model)
-        check_fit(Campaign(readings), asked.model, asked.unknowns)
-    (finding,) = refusal.value.findings
-    assert finding.code == code
+    (finding,) = looked_at(readings, asked)
+    assert (finding.code, finding.severity) == (code, "error")
     assert finding.help
     return finding.message
 
@@ -116,7 +115,7 @@ def test_deflections_without_a_load():
 
 def test_a_load_that_never_changes_says_nothing_of_absolute_places():
     """Of deflections it does, and of what no load is needed for."""
-    always = np.tile([0.0, 0.0, -2000.0, 0.0, 0.0, 0.0], (42, 1))
+    always = np.tile([0.0, 0.0, -2000.0, 0.0, 0.0, 0.0], (30, 1))
     readings, asked = good("robot")
     elastic = asked_for(StiffnessModel(asked.model.robot, ()), ["joint_compliance", "joint_offset"])
     loaded = replace(readings, wrench=always)
@@ -130,7 +129,7 @@ def test_a_load_that_never_changes_says_nothing_of_absolute_places():
 def test_loads_that_change_are_fine():
     readings, _ = good("robot")
     elastic = asked_for(StiffnessModel(good("robot").asked.model.robot, ()), ["joint_compliance"])
-    wrench = np.zeros((42, 6))
+    wrench = np.zeros((30, 6))
     wrench[::3, 2] = -2000.0
     check_numbers(replace(readings, wrench=wrench), elastic.unknowns, elastic.model)
 
@@ -138,7 +137,7 @@ def test_loads_that_change_are_fine():
 # What shows in how badly they fit
 
 
-@pytest.mark.parametrize(("a", "b"), combinations(range(3), 2))
+@pytest.mark.parametrize(("a", "b"), PAIRS)
 @pytest.mark.parametrize("kind", ["deflections", "tracker", "robot"])
 def test_exchanged_columns_of_joints(kind, a, b):
     readings, asked = good(kind)
@@ -162,7 +161,7 @@ def test_exchanged_columns_of_what_was_measured(kind, order):
         assert f"with the columns named {', '.join(letters[list(order)])} (" in message
 
 
-@pytest.mark.parametrize(("a", "b"), combinations(range(3), 2))
+@pytest.mark.parametrize(("a", "b"), PAIRS)
 def test_exchanged_columns_of_forces(a, b):
     readings, asked = good("deflections")
     wrench = readings.wrench.copy()
@@ -177,8 +176,7 @@ def test_the_opposite_sign():
     assert "with the opposite sign of all deflections (unloaded minus loaded) (" in message
 
 
-@pytest.mark.parametrize("axis", range(3))
-@pytest.mark.parametrize("kind", ["deflections", "robot"])
+@pytest.mark.parametrize(("kind", "axis"), [("deflections", 0), ("deflections", 1), ("robot", 2)])
 def test_the_opposite_sign_of_one_coordinate(kind, axis):
     readings, asked = good(kind)
     letter = f"{'D' if kind == 'deflections' else ''}{'XYZ'[axis]}"
@@ -232,13 +230,10 @@ def test_readings_of_another_robot_are_told_and_not_explained():
     assert "% of the deflections are left" in finding.message
 
 
-@pytest.mark.parametrize(("a", "b"), [(1, 2), (3, 4), (4, 5)])
-def test_exchanged_columns_of_a_real_robot(a, b):
-    readings, asked = heavy(np.random.default_rng(5))
-    q = readings.q.copy()
-    q[:, [a, b]] = q[:, [b, a]]
-    message = refused(replace(readings, q=q), asked, "IDN014")
-    assert f"the columns of A{a + 1} and A{b + 1} exchanged" in message
+def test_exchanged_columns_of_a_real_robot():
+    readings, asked = campaign("kuka_kr270", "deflections", np.random.default_rng(5))
+    message = refused(replace(readings, q=readings.q[:, [0, 1, 2, 4, 3, 5]]), asked, "IDN014")
+    assert "the columns of A4 and A5 exchanged" in message
 
 
 # No false alarm
@@ -274,10 +269,6 @@ def campaign(name, kind, rng, missing=(), poses=12, hung=True):
     return Case(scattered(read(truth, readings, rng), SIGMA, rng), asked)
 
 
-def heavy(rng):
-    return campaign("kuka_kr270", "deflections", rng)
-
-
 def lacking(names, joints, rng):
     return [(made(name, joints), sampled(made(name, joints), rng)) for name in names]
 
@@ -300,5 +291,4 @@ def test_no_false_alarm(name):
     cases += [campaign(name, "tracker", rng) for _ in range(3)]
     cases += [campaign(name, "tracker", rng, out_of_true(joints, rng)) for _ in range(3)]
     told = [looked_at(*case) for case in cases]
-    print([[f.message for f in t] for t in told if t])
     assert [findings for findings in told if findings] == []

@@ -111,13 +111,15 @@ class Effect:
 
     ``family``: what a controller may already correct (``geometric``, ``weight``), or ``elastic``, ``gear``.
     ``coordinates``: extra coordinates of the chain that it needs.  ``by_direction``: it asks how joints came to their
-    place.  ``whole``: an arm that was never calibrated has it in all of its joints.
+    place.  ``whole``: an arm that was never calibrated has it in all of its joints.  ``apart``: it may be there on one
+    joint and not on another.
     """
 
     name: ClassVar[str]
     family: ClassVar[str]
     by_direction: ClassVar[bool] = False
     whole: ClassVar[bool] = False
+    apart: ClassVar[bool] = True
     parameters: tuple[Parameter, ...]
     coordinates: tuple[str, ...] = ()
 

@@ -24,6 +24,7 @@ class LinkGravity(EnergyLoad):
 
     name = "link_gravity"
     family = "weight"
+    apart = False
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         source = "static balance of a serial arm: first moments of the links"

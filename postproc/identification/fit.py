@@ -131,9 +131,7 @@ def fit(
     point = replace(point, given=given, residual=campaign.residual(point.seen, given))
     weights = plain = weighting(campaign, noise, point.residual).times(rows.astype(float))
     _enough(campaign, weights, unknowns)
-    woken = awake(campaign, point.model, given, unknowns)
-    if woken is not point.model:
-        point = at(campaign, woken, given)
+    point = _awake(campaign, point, unknowns)
     begin = point
     free, dropped = list(unknowns), list[Dropped]()
     factor, again = 1.0, PRIOR_ROUNDS if any(u.prior is not None for u in unknowns) else 0
@@ -147,7 +145,8 @@ def fit(
         weights = plain
         if robust:
             point, weights = _robust(campaign, point, free, plain, rows, factor, noise.known)
-        point = with_columns(campaign, point, free)
+        if not point.settled:
+            point = with_columns(campaign, point, free)
         found, before = _insight(campaign, point, free, weights, factor), factor
         factor, exceeded, freedom, quantile = _variance(campaign, point, free, weights, plain, noise, found)
         if again and abs(np.log(factor / before)) > SAME_FACTOR:
@@ -159,8 +158,11 @@ def fit(
         dropped += found.dropped
         gone = [free[i] for i in range(len(free)) if i not in found.kept]
         free = [free[i] for i in found.kept]
-        model = point.model.changed({u.key: u.value for u in gone})
-        point = at(campaign, model, point.given, begin.seen.displacement)
+        kept, values = list(found.kept), {u.key: u.value for u in gone}
+        if all(point.model.terms[t].values[name] == value for (t, name), value in values.items()):
+            point = replace(point, columns=point.taken[0][:, :, kept])
+        else:
+            point = at(campaign, point.model.changed(values), point.given, begin.seen.displacement)
     scale = scales(free)
     return Fit(
         campaign, start, tuple(unknowns), noise, weights, plain, point, tuple(free), tuple(dropped),
@@ -171,11 +173,16 @@ def fit(
 def _enough(campaign: Campaign, weights: Weighting, unknowns: Sequence[Unknown]) -> None:
     priors = sum(unknown.prior is not None for unknown in unknowns)
     wanted = len(unknowns) - priors + len(campaign.nuisance_names)
-    if weights.counts < wanted:
+    # a state that is read twice says no more about unknowns
+    rows = weights.weight.any(axis=1)
+    state = campaign.at * len(campaign.targets) + campaign.readings.target
+    _, first = np.unique(np.where(rows, state, -1), return_index=True)
+    counts = int((weights.weight[first] > 0).sum())
+    if counts < wanted:
         raise Refusal(
             Finding(
                 "IDN002",
-                f"{weights.counts} measured numbers for {wanted} unknowns: {len(unknowns) - priors} parameters and"
+                f"{counts} different measured numbers for {wanted} unknowns: {len(unknowns) - priors} parameters and"
                 f" {len(campaign.nuisance_names)} of the tracker and its targets",
                 campaign.readings.where(0)[0],
                 help="measure more poses, or ask for fewer effects with --effects",
@@ -183,16 +190,16 @@ def _enough(campaign: Campaign, weights: Weighting, unknowns: Sequence[Unknown])
         )
 
 
-def awake(
-    campaign: Campaign, model: StiffnessModel, given: Nuisances, unknowns: Sequence[Unknown]
-) -> StiffnessModel:
-    """The model, with the effects that move nothing at all where they stand put to the sizes of their parameters."""
-    point = with_columns(campaign, at(campaign, model, given), unknowns)
+def _awake(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Point:
+    """The point with its columns; effects that move nothing at all where they stand are put to the sizes of their
+    parameters first."""
+    point = with_columns(campaign, point, unknowns)
     moves = np.abs(np.nan_to_num(point.taken[0])).max(axis=(0, 1), initial=0.0) > 0
     moving = {u.term for u, moved in zip(unknowns, moves, strict=True) if moved}
-    return model.changed(
-        {u.key: u.parameter.scale for u in unknowns if u.term not in moving and u.value == u.parameter.null}
-    )
+    asleep = {
+        u.key: u.parameter.scale for u in unknowns if u.term not in moving and u.value == u.parameter.null
+    }
+    return at(campaign, point.model.changed(asleep), point.given) if asleep else point
 
 
 def _robust(
@@ -286,7 +293,7 @@ def _variance(
     freedom = max(0, round(share.sum()) - q.shape[1])
     if freedom == 0:
         return 1.0, False, 0, float(norm.ppf(0.975))
-    exceeded = noise.known and squares > chi2.ppf(1.0 - UNLIKELY, freedom)
+    exceeded = bool(noise.known and squares > chi2.ppf(1.0 - UNLIKELY, freedom))
     if noise.known and not exceeded:
         least = 1.0 if weights is plain else max(1.0, squares / freedom)
         return least, False, freedom, float(norm.ppf(0.975))
