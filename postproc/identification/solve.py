@@ -26,6 +26,10 @@ DAMPING, LOOSE = 1e-5, 1e-7
 """Of a column's length: what no reading sees stays where it is, parameters rather than tracker and targets."""
 
 
+BENT, CAREFUL = 0.3, 1e-4
+"""Share of a step's effect that may come otherwise than foreseen, and the damping that the next step begins with then."""
+
+
 @dataclass(frozen=True)
 class Point:
     """A model among the possible ones.  residual (R, 3 or 6) as ``Campaign.residual``; columns (R, 3 or 6, P) of the
@@ -106,7 +110,7 @@ def descended(
         return left, int(lost.sum())
 
     left, lost = residuals(point)
-    fresh = point.columns is not None
+    fresh, careful = point.columns is not None, 0.0
     for _ in range(max_steps):
         if not fresh:
             point, fresh = with_columns(campaign, point, unknowns), True
@@ -121,7 +125,7 @@ def descended(
         awake = length > 0
         length[~awake] = 1.0
         # many rows to as many as there are columns, which say the same
-        damping = np.repeat([DAMPING, LOOSE], [len(x), len(loose)])
+        damping = np.maximum(np.repeat([DAMPING, LOOSE], [len(x), len(loose)]), careful)
         tall = np.block([[matrix / length, left[:, None]], [np.diag(damping), np.zeros((len(length), 1))]])
         reduced = np.asarray(np.linalg.qr(tall, mode="r"))
         system, right = reduced[:-1, :-1], reduced[:-1, -1]
@@ -143,6 +147,9 @@ def descended(
         size = float(np.linalg.norm(foreseen))
         astray = float(np.linalg.norm(left - foreseen - after))
         fresh = keep_columns or (share == 1.0 and astray < STRAIGHT * size and bool(awake[: len(x)].all()))
+        # a step that went astray went too far along what is hardly seen (Levenberg)
+        bent = share < 1.0 or astray > BENT * size
+        careful = min(max(30.0 * careful, CAREFUL), 0.1) if bent else careful / 10.0
         scatter = np.sqrt(after @ after / max(1, len(after) - len(length)))
         point, left, lost = moved, after, gone
         if share == 1.0 and (size < CLOSE * scatter or size <= 1e-9):
