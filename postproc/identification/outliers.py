@@ -39,7 +39,7 @@ def outliers(fitted: Fit, rows: Bools) -> tuple[tuple[Outlier, ...], Fit]:
     if not np.any(rows & (length > 0.7 * limit)):
         return (), fitted
     campaign = fitted.campaign
-    robust = fit(campaign, fitted.model, fitted.unknowns, rows, robust=True, given=fitted.point.given)
+    robust = fit(campaign, fitted.start, fitted.asked, rows, robust=True, given=fitted.point.given)
     length, level, limit = _lengths(robust, rows)
     found = []
     for row in np.flatnonzero(rows & (length > limit)):

@@ -1,0 +1,1 @@
+"""Where model and measurement disagree, and the name of what is missing."""

@@ -1,0 +1,70 @@
+"""The whole way from readings to a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.diagnosis.screens import Where, where
+from postproc.diagnosis.search import Search, own_unknowns, search, with_effects
+from postproc.diagnosis.verdict import Verdict, judged
+from postproc.findings import Finding, Refusal
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import Fit, fit
+from postproc.model import StiffnessModel
+
+FEWEST_POSES = 8
+"""Of fewer nothing can be said."""
+
+AGAIN = 3
+"""Times that the search is done again without what did not hold."""
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """stated: the robot file as it is, tracker and targets found; where: patterns in what it leaves; search, verdict;
+    final: the model to go on with, of what is named, or of its own parameters fitted anew."""
+
+    stated: Fit
+    where: tuple[Where, ...]
+    search: Search
+    verdict: Verdict
+    final: Fit
+
+
+def diagnose(
+    campaign: Campaign, model: StiffnessModel, stage: Callable[[str], None] = lambda name: None
+) -> Diagnosis:
+    """Raises Refusal DIA001 with too few poses for any verdict, and as ``fit`` does."""
+    if campaign.poses < FEWEST_POSES:
+        raise Refusal(
+            Finding(
+                "DIA001",
+                f"{campaign.poses} poses are too few for a verdict, {FEWEST_POSES} are the least",
+                campaign.readings.where(0)[0],
+                help="`compensate plan` proposes poses to measure",
+            )
+        )
+    every = np.ones(len(campaign), bool)
+    stage("comparing")
+    stated = fit(campaign, model, (), every)
+    stage("fitting the model's own parameters")
+    base = fit(campaign, model, own_unknowns(model), every, given=stated.point.given)
+    stage("looking for what is missing")
+    found = search(campaign, base)
+    verdict = judged(found)
+    rejected = list(verdict.rejected)
+    for _ in range(AGAIN):
+        if not verdict.rejected:
+            break
+        found = search(campaign, base, [candidate.key for candidate, _ in rejected])
+        verdict = judged(found)
+        rejected += verdict.rejected
+    verdict = replace(verdict, rejected=tuple(rejected))
+    names = [named.candidate for named in verdict.named]
+    final = found.base
+    if names and verdict.word != "ambiguous":
+        final = found.final if len(names) == len(found.chosen) else with_effects(campaign, found.base, names)
+    return Diagnosis(stated, where(stated), found, verdict, final)

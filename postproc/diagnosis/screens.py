@@ -1,0 +1,144 @@
+"""Where model and measurement disagree: residuals mapped into the joints, against what could betray a cause."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import Fit
+from postproc.robot.chain import generalized_force
+from postproc.units import DEG, MM
+
+BINS = 6
+CHANCE = 0.01
+SHOWN = 8
+
+
+@dataclass(frozen=True)
+class Where:
+    """A pattern: ``variable``, the ``pattern`` in words, and the ``share`` of the squares left that follow it (adjusted
+    for the freedom of the pattern)."""
+
+    variable: str
+    pattern: str
+    share: float
+
+
+def where(fitted: Fit) -> tuple[Where, ...]:
+    """The clear patterns in what ``fitted`` leaves, largest first.
+
+    Tried are a turn of each joint that depends on its own angle, torque or sense of approach, and a shift of the tool
+    that depends on load, order, time, temperature or session; each as a step function in up to ``BINS`` parts.
+    """
+    from scipy.stats import f
+
+    campaign = fitted.campaign
+    residual, weights = fitted.point.residual[:, :3], fitted.weights.weight[:, :3]
+    left = np.where(weights > 0, np.nan_to_num(residual) * weights, 0.0)
+    squares, rows = float((left**2).sum()), int((weights > 0).sum())
+    found = []
+    tried = list(patterns(fitted, campaign))
+    for variable, values, turns, unit in tried:
+        part, parts = _parts(values)
+        columns = _columns(part, len(parts), turns) * weights[:, :, None]
+        matrix = columns.reshape(-1, columns.shape[2])
+        size = np.linalg.norm(matrix, axis=0)
+        matrix = matrix[:, size > 0] / size[size > 0]
+        if not matrix.shape[1]:
+            continue
+        x, _, rank, _ = np.linalg.lstsq(matrix, left.reshape(-1), rcond=1e-9)
+        explained = squares - float(((left.reshape(-1) - matrix @ x) ** 2).sum())
+        freedom = rows - rank
+        if freedom < 3 or squares <= 0:
+            continue
+        chance = f.sf(explained / rank / ((squares - explained) / freedom), rank, freedom)
+        share = 1.0 - (1.0 - explained / squares) * rows / freedom
+        if chance * len(tried) < CHANCE and share > 0:
+            words = _words(residual, part, parts, unit)
+            if variable in ("order", "time") and _goes_with_poses(values, campaign.readings.q):
+                words += "; but the poses were taken in such an order: measure again in random order"
+            found.append(Where(variable, words, float(share)))
+    return tuple(sorted(found, key=lambda one: -one.share)[:SHOWN])
+
+
+def patterns(
+    fitted: Fit, campaign: Campaign
+) -> Iterator[tuple[str, Floats, Floats | None, tuple[str, float]]]:
+    """Name, value (R,), what a turn of a joint does (R, 3), None for shifts, and unit of each variable."""
+    readings, seen = campaign.readings, fitted.point.seen
+    chain = fitted.model.chain
+    coordinates = chain.placed(readings.q)
+    swept = chain.sweep(coordinates, campaign.tool)
+    points = campaign.points(seen, fitted.point.given.places, campaign.at)
+    torque = generalized_force(swept, swept.position, readings.wrench.T)
+    loaded = bool(readings.wrench.any())
+    for i, joint in enumerate(fitted.model.robot.joints):
+        row = chain.motor_rows[i]
+        axis = swept.axes[row].T
+        turn = axis if joint.kind != "revolute" else np.cross(axis, points - swept.origins[row].T)
+        if campaign.tracked:
+            frames = fitted.point.given.frames.rotation[readings.session]
+            turn = (frames @ turn[:, :, None])[:, :, 0]
+        angle = ("deg", DEG) if joint.kind == "revolute" else ("mm", MM)
+        yield f"{joint.name} over its angle", readings.q[:, i], turn, angle
+        if loaded and np.ptp(torque[row]) > 0:
+            yield f"{joint.name} over its torque", torque[row], turn, ("N m", 1.0)
+        sense = campaign.conditions.direction
+        if sense is not None and np.ptp(sense[campaign.at, i]) > 0:
+            yield f"{joint.name} over its approach", sense[campaign.at, i], turn, ("", 1.0)
+    force = np.linalg.norm(readings.wrench[:, :3], axis=1)
+    if np.ptp(force) > 0:
+        yield "load", force, None, ("N", 1.0)
+    yield "order", np.arange(len(readings), dtype=float), None, ("", 1.0)
+    for name, values, unit in (("time", readings.time, "s"), ("temperature", readings.temperature, "degC")):
+        if values is not None and np.ptp(values) > 0:
+            yield name, values, None, (unit, 1.0)
+    if len(readings.sessions) > 1:
+        yield "session", readings.session.astype(float), None, ("", 1.0)
+
+
+def _parts(values: Floats) -> tuple[Ints, Floats]:
+    """The part (R,) each value falls in, and where the parts begin and end (k, 2)."""
+    distinct = np.unique(values)
+    if len(distinct) <= BINS:
+        return np.searchsorted(distinct, values), np.stack([distinct, distinct], axis=1)
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    part = np.clip(np.searchsorted(edges, values, "right") - 1, 0, len(edges) - 2)
+    return part, np.stack([edges[:-1], edges[1:]], axis=1)
+
+
+def _columns(part: Ints, parts: int, turns: Floats | None) -> Floats:
+    """(R, 3, k): a turn, or shifts along three axes, in each part."""
+    on = (part[:, None] == np.arange(parts)).astype(float)
+    if turns is not None:
+        return np.asarray(turns[:, :, None] * on[:, None, :])
+    return np.asarray(np.eye(3)[None, :, :, None] * on[:, None, None, :]).reshape(len(part), 3, -1)
+
+
+def _words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float]) -> str:
+    count = range(len(parts))
+    size = np.array(
+        [np.sqrt(3 * np.nanmean(residual[part == k] ** 2)) if (part == k).any() else np.nan for k in count]
+    )
+    most, least = int(np.nanargmax(size)), int(np.nanargmin(size))
+
+    def span(k: int) -> str:
+        low, high = parts[k] / unit[1]
+        return f"{low:.4g}{f' .. {high:.4g}' if high > low else ''}{f' {unit[0]}' if unit[0] else ''}"
+
+    return f"{size[most] / MM:.3g} mm at {span(most)}, {size[least] / MM:.3g} mm at {span(least)}"
+
+
+def _goes_with_poses(values: Floats, q: Floats) -> bool:
+    """Whether the joints tell most of ``values`` (R,): what depends on one can not be told from the other."""
+    spread = np.where(np.ptp(q, axis=0) > 0, np.ptp(q, axis=0), 1.0)
+    scaled = (q - q.mean(axis=0)) / spread
+    matrix = np.column_stack([np.ones(len(q)), scaled, scaled**2])
+    if len(q) < 3 * matrix.shape[1]:
+        return False
+    left = values - matrix @ np.linalg.lstsq(matrix, values, rcond=None)[0]
+    return bool(left @ left < 0.5 * ((values - values.mean()) ** 2).sum())

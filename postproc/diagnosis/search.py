@@ -1,0 +1,292 @@
+"""The search for what is missing: linear steps over all candidates, non-linear fits of what they choose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.diagnosis.candidates import Candidate, candidates, testable
+from postproc.diagnosis.selection import Explained, Problem, explained, problem, scatter, selected
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import Fit, fit
+from postproc.identification.solve import Point, at, prior_rows, scales
+from postproc.identification.unknowns import Unknown, unknowns_of, with_mechanism
+from postproc.model import StiffnessModel
+
+PASSES = 4
+"""Of choosing and fitting, until the choice stands."""
+
+LOOSE, BESIDE = 0.5, 0.05
+"""Standard deviation of what a robot file states, as shares of the value and of the largest of its kind."""
+
+CLOSE, CLOSE_SHARE, RIVALS = 30.0, 0.05, 3
+"""Rivals are fitted where -2 ln(likelihood) is linearly worse by less than this, or than this share of the gain; so
+many at most."""
+
+CLEARLY = 6.6
+"""-2 ln(likelihood) by which a further parameter must be better for being more than chance (1 %)."""
+
+WILD = 5.0
+"""Standard deviations that a reading counts with at most."""
+
+Key = tuple[str, str]
+"""Label of an effect's form, and its joint."""
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A search's last step.  candidates: what was looked at, group by group of ``problem``; whitened and as they are:
+    residual (n,) without what was chosen, common (n, k) columns that are explained anyway, columns (n, p) of each
+    candidate; the last ``priors`` rows are no readings."""
+
+    candidates: tuple[Candidate, ...]
+    problem: Problem
+    residual: Floats
+    common: Floats
+    columns: tuple[Floats, ...]
+    priors: int
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """A ``candidate`` in the place of the choice ``of``: by how much -2 ln(likelihood) is ``worse``, its parameters
+    ``more`` (negative: fewer), and the ``price`` of one (BIC); ``fitted``, or only linearly so."""
+
+    of: Key
+    candidate: Candidate
+    worse: float
+    more: int
+    price: float
+    fitted: bool
+
+    @property
+    def margin(self) -> float:
+        """By how much it is the lesser explanation; negative: the better one."""
+        return self.worse + self.price * self.more
+
+    @property
+    def needless(self) -> bool:
+        """Whether it has more parameters and explains nothing more: it may contain the simpler one."""
+        return self.more > 0 and self.worse > -CLEARLY * self.more
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What a search came to.
+
+    base: the model as it is, its own parameters fitted anew; final: with what was ``chosen``; untestable: candidates
+    that these readings can not show; linear, explained: the last choice; rivals: those of
+    what was chosen, nearest first.
+    """
+
+    base: Fit
+    final: Fit
+    chosen: tuple[Candidate, ...]
+    untestable: tuple[Candidate, ...]
+    linear: Linear
+    explained: Explained
+    rivals: tuple[Rival, ...]
+
+
+def own_unknowns(model: StiffnessModel) -> tuple[Unknown, ...]:
+    """The parameters that the robot file states: they may have changed since, but a known arm is not any arm.
+
+    Each has a prior as wide as ``LOOSE`` of its value and ``BESIDE`` of the largest of its kind in the effect; none
+    where all of a kind are stated as zero.  Dimensions of hardware keep the interval of the robot file.
+    """
+    found: list[Unknown] = []
+    for term in range(len(model.terms)):
+        own = [u for u in unknowns_of(model, term) if u.stated is not None and not u.held]
+        for unknown in own:
+            parameter = unknown.parameter
+            if parameter.hardware:
+                found.append(unknown)
+                continue
+            like = [abs(u.value - u.parameter.null) for u in own if u.parameter.unit == parameter.unit]
+            wide = LOOSE * abs(unknown.value - parameter.null) + BESIDE * max(like)
+            found.append(replace(unknown, prior=wide or None))
+    return tuple(found)
+
+
+def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
+    """Chooses among all effects of the library those that the readings ask for, beyond ``base``: the model of the robot
+    file with its own parameters fitted anew.  ``banned``: candidates that were found not to hold."""
+    chosen: tuple[Candidate, ...] = ()
+    fitted = base
+    tried: set[frozenset[Key]] = set()
+    every = candidates(campaign, base.model, base.point.given)
+    shown = [c for c in every if testable(c, base.weights) and c.key not in banned]
+    hidden = tuple(c for c in every if not testable(c, base.weights))
+    while True:
+        linear = _linear(campaign, base, fitted, chosen, shown)
+        before = {c.key for c in chosen}
+        begin = [i for i, c in enumerate(linear.candidates) if c.key in before]
+        found = selected(linear.problem, range(len(linear.candidates)), begin)
+        now = tuple(linear.candidates[g] for g in found.groups)
+        keys = frozenset(c.key for c in now)
+        if keys == before or keys in tried or len(tried) >= PASSES:
+            last = explained(linear.problem, begin)
+            against = _rivals(campaign, base, fitted, linear, last)
+            better = next((rival for rival in against if rival.fitted and rival.margin < -1.0), None)
+            done = Search(base, fitted, chosen, hidden, linear, last, against)
+            if better is None or len(tried) >= PASSES:
+                return done
+            now = tuple(better.candidate if c.key == better.of else c for c in chosen)
+            keys = frozenset(c.key for c in now)
+            if keys in tried:
+                return done
+        tried.add(keys)
+        chosen, fitted = now, with_effects(campaign, base, now) if now else base
+
+
+def _linear(
+    campaign: Campaign, base: Fit, fitted: Fit, chosen: Sequence[Candidate], shown: Sequence[Candidate]
+) -> Linear:
+    """The problem that the candidates' columns make of what ``fitted`` leaves without what was chosen; priors of the
+    model's own parameters count as rows."""
+    looked = _as_fitted(fitted, chosen, shown)
+    own, nuisance = base.point.taken
+    whiten, prior = base.weights, prior_rows(base.unknowns)
+    prior = prior[prior.any(axis=1)]
+    bare = _without(campaign, fitted, chosen)
+    away = np.array([u.value for u in base.unknowns]) - _values(bare.model, base.unknowns)
+
+    def tall(columns: Floats, below: Floats) -> Floats:
+        return np.nan_to_num(np.concatenate([whiten(columns), below]))
+
+    none = np.zeros((len(prior), nuisance.shape[2]))
+    common = np.concatenate([tall(own, prior), tall(nuisance, none)], axis=1)
+    residual = tall(bare.residual, prior @ (away / scales(base.unknowns)))
+    columns = tuple(tall(c.columns, np.zeros((len(prior), c.columns.shape[2]))) for c in looked)
+    groups = [(own, _reach(c)) for own, c in zip(columns, looked, strict=True)]
+    made = problem(residual, common, groups, whiten.counts + len(prior), base.noise.known)
+    return Linear(looked, made, residual, common, columns, len(prior))
+
+
+def _values(model: StiffnessModel, unknowns: Sequence[Unknown]) -> Floats:
+    return np.array([model.terms[u.term].values[u.parameter.name] for u in unknowns])
+
+
+def squares_of(fitted: Fit) -> float:
+    """Squares that a fit leaves, of readings [their variance, wild ones cut] and of priors."""
+    left = np.minimum(np.abs(fitted.weights(fitted.point.residual)), WILD)
+    values = fitted.point.values(fitted.unknowns)
+    priors = sum(
+        ((u.value - value) / u.prior) ** 2
+        for u, value in zip(fitted.unknowns, values.tolist(), strict=True)
+        if u.prior is not None
+    )
+    return float(left @ left) + float(priors)
+
+
+def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Explained) -> tuple[Rival, ...]:
+    """Other candidates in the place of each choice that explain at least half of what it does, nearest first; the
+    nearest are fitted: what is linear is only nearly so."""
+    given, chosen = linear.problem, [linear.candidates[g] for g in last.groups]
+    variance, price, here = scatter(given, last), float(np.log(given.freedom)), squares_of(fitted)
+    found: list[Rival] = []
+    for group in last.groups:
+        mine, rest = linear.candidates[group], tuple(g for g in last.groups if g != group)
+        without = explained(given, rest).squares
+        gain = without - last.squares
+        of_mine = []
+        for other, candidate in enumerate(linear.candidates):
+            if other in last.groups or candidate.contains(mine) or mine.contains(candidate):
+                continue
+            instead = explained(given, (*rest, other))
+            if without - instead.squares > 0.5 * gain:
+                worse = float(instead.squares - last.squares) / variance
+                of_mine.append(Rival(mine.key, candidate, worse, instead.rank - last.rank, price, False))
+        of_mine.sort(key=lambda rival: rival.margin)
+        for k, rival in enumerate(of_mine[:RIVALS]):
+            if rival.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
+                there = with_effects(campaign, base, [rival.candidate if c is mine else c for c in chosen])
+                worse = (squares_of(there) - here) / variance
+                more = len(there.unknowns) - len(fitted.unknowns)
+                of_mine[k] = Rival(mine.key, rival.candidate, float(worse), more, price, True)
+        found += of_mine
+    return tuple(sorted(found, key=lambda rival: rival.margin))
+
+
+def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> Fit:
+    """The non-linear fit with the effects ``chosen`` added to ``base``, its own unknowns fitted along."""
+    model, unknowns = composed(base.model, chosen)
+    own = [u for u in base.asked if u.key in {b.key for b in base.unknowns}]
+    return fit(campaign, model, [*own, *unknowns], given=base.point.given)
+
+
+def composed(
+    model: StiffnessModel, chosen: Sequence[Candidate]
+) -> tuple[StiffnessModel, tuple[Unknown, ...]]:
+    """``model`` with the effects of ``chosen``, and their unknowns in it."""
+    unknowns: list[Unknown] = []
+    for candidate in chosen:
+        term = _term_of(model, candidate)
+        if term is None:
+            if any(mechanism.kind == candidate.name for mechanism in model.robot.mechanisms):
+                model = with_mechanism(model, type(candidate.effect))
+            else:
+                model = model.added(candidate.effect)
+            term = len(model.terms) - 1
+        names = {u.parameter.name for u in candidate.unknowns}
+        unknowns += [u for u in unknowns_of(model, term) if u.parameter.name in names]
+    return model, tuple(unknowns)
+
+
+def _term_of(model: StiffnessModel, candidate: Candidate) -> int | None:
+    wanted = (candidate.name, candidate.effect.described())
+    for index, term in enumerate(model.terms):
+        if (term.effect.name, term.effect.described()) == wanted:
+            return index
+    return None
+
+
+def _as_fitted(
+    fitted: Fit, chosen: Sequence[Candidate], looked: Sequence[Candidate]
+) -> tuple[Candidate, ...]:
+    """The candidates, those chosen with their columns at the fit instead of at their null."""
+    own, _ = fitted.point.taken
+    places: dict[Key, list[int]] = {}
+    for candidate in chosen:
+        term = _term_of(fitted.model, candidate)
+        names = {u.parameter.name for u in candidate.unknowns}
+        places[candidate.key] = [
+            i for i, u in enumerate(fitted.unknowns) if u.term == term and u.parameter.name in names
+        ]
+    return tuple(
+        c.fitted(np.nan_to_num(own[:, :, places[c.key]]), [fitted.unknowns[i] for i in places[c.key]])
+        if places.get(c.key)
+        else c
+        for c in looked
+    )
+
+
+def _without(campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate]) -> Point:
+    """The fitted model with what was chosen put back to its null: what there is to explain."""
+    nulls: dict[tuple[int, str], float] = {}
+    for candidate in chosen:
+        term = _term_of(fitted.model, candidate)
+        if term is not None:
+            nulls |= {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
+    if not nulls:
+        return fitted.point
+    return at(campaign, fitted.model.changed(nulls), fitted.point.given)
+
+
+def _reach(candidate: Candidate) -> Floats:
+    """(p, 2) how far each parameter may go from its null, in its scale.  Where the effect was looked at in its usual
+    size, its columns stand for shapes, not for parameters: no bound is known."""
+    if candidate.shapes:
+        return np.tile([-np.inf, np.inf], (candidate.columns.shape[2], 1))
+    return np.array(
+        [
+            [
+                (u.parameter.lower - u.parameter.null) / u.parameter.scale,
+                (u.parameter.upper - u.parameter.null) / u.parameter.scale,
+            ]
+            for u in candidate.shown
+        ]
+    )

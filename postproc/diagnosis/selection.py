@@ -1,0 +1,229 @@
+"""Which of many groups of columns explain a residual: arrays only, nothing of robots.
+
+Everything is whitened (independent readings of unit variance) and stands outside of what is explained anyway: tracker,
+targets, refitted parameters.  A group is in or out as a whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints
+
+WORTH = 0.1
+"""Share of the squares left that an effect must explain where the model leaves more than scatter: what is not
+understood follows the joints as well, and by chance looks a little like any effect."""
+
+CHANCE = 0.01
+"""Probability that among all groups any is taken in although none is there."""
+
+APART = 1e-3
+"""A column whose part outside of the others is smaller than this share of it can not be told from them."""
+
+EXCEEDED = 1.5
+"""Variance left over the stated one from which on the model is taken to leave more than scatter."""
+
+CLIP = 2.5
+"""Residuals count up to this many standard deviations, so that a few wild readings do not decide."""
+
+CLIPPED = 0.9468
+"""Mean square of a normal variable clipped there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Groups of columns and a residual, outside of what is explained anyway, whose rank is ``rank``.
+
+    residual (n,); matrix (n, P): all columns, each as long as 1 before its explained part was taken out; places: the
+    columns of each group; reach (P, 2): how far each coefficient may go down and up from zero; ``known``: the residual
+    is in its standard deviations, else only ratios count.
+    """
+
+    residual: Floats
+    matrix: Floats
+    places: tuple[Ints, ...]
+    reach: Floats
+    rank: int
+    known: bool
+
+    @property
+    def freedom(self) -> int:
+        return len(self.residual) - self.rank
+
+    @cached_property
+    def gram(self) -> Floats:
+        return self.matrix.T @ self.matrix
+
+    @cached_property
+    def aim(self) -> Floats:
+        return self.matrix.T @ self.residual
+
+    @cached_property
+    def squares(self) -> float:
+        return float(self.residual @ self.residual)
+
+
+def problem(
+    residual: Floats, common: Floats, groups: Sequence[tuple[Floats, Floats]], rows: int, known: bool
+) -> Problem:
+    """Of whitened ``residual`` (n,), ``common`` columns (n, k) and (columns (n, p), reach (p, 2)) of the groups.
+    ``rows`` of n count: the others are zero."""
+    length = np.linalg.norm(common, axis=0)
+    u, s, _ = np.linalg.svd(common[:, length > 0] / length[length > 0], full_matrices=False)
+    basis = u[:, s > 1e-8 * s.max(initial=0.0)]
+
+    def outside(columns: Floats) -> Floats:
+        left = columns - basis @ (basis.T @ columns)
+        return np.asarray(left - basis @ (basis.T @ left))
+
+    whole = (
+        np.concatenate([columns for columns, _ in groups], axis=1) if groups else np.zeros((len(residual), 0))
+    )
+    reach = np.concatenate([reach for _, reach in groups]) if groups else np.zeros((0, 2))
+    size = np.linalg.norm(whole, axis=0)
+    size[size == 0] = 1.0
+    ends = np.cumsum([columns.shape[1] for columns, _ in groups])
+    places = tuple(
+        np.arange(end - columns.shape[1], end) for end, (columns, _) in zip(ends, groups, strict=True)
+    )
+    left = outside(residual[:, None])[:, 0]
+    rank = basis.shape[1] + len(residual) - rows
+    return Problem(left, outside(whole / size), places, reach * size[:, None], rank, known)
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """A residual with some ``groups`` taken in: squares left, ``rank`` of what they added, their coefficients."""
+
+    groups: tuple[int, ...]
+    squares: float
+    rank: int
+    columns: Ints
+    coefficients: Floats
+
+
+def explained(given: Problem, groups: Sequence[int]) -> Explained:
+    """The least squares of the residual over ``groups``, each coefficient within its reach."""
+    chosen = tuple(groups)
+    if not chosen:
+        return Explained((), given.squares, 0, np.zeros(0, np.int64), np.zeros(0))
+    at = np.concatenate([given.places[g] for g in chosen])
+    gram, aim = given.gram[np.ix_(at, at)], given.aim[at]
+    value, vector = np.linalg.eigh(gram)
+    on = value > APART**2
+    inverse = vector[:, on] / value[on]
+    coefficients = inverse @ (vector[:, on].T @ aim)
+    low, high = given.reach[at].T
+    if np.any(coefficients < low - 1e-9) or np.any(coefficients > high + 1e-9):
+        coefficients = _bounded(value, vector, aim, low, high)
+    squares = given.squares - float(coefficients @ (2 * aim - gram @ coefficients))
+    return Explained(chosen, max(squares, 0.0), int(on.sum()), at, coefficients)
+
+
+def _bounded(value: Floats, vector: Floats, aim: Floats, low: Floats, high: Floats) -> Floats:
+    """min x^T G x - 2 aim^T x within bounds, of G by its eigenvalues, hardly seen directions held."""
+    from scipy.optimize import lsq_linear
+
+    root = np.sqrt(np.maximum(value, (0.1 * APART) ** 2))
+    matrix, right = root[:, None] * vector.T, (vector.T @ aim) / root
+    return np.asarray(lsq_linear(matrix, right, (np.minimum(low, 0.0), np.maximum(high, 1e-300)), "bvls").x)
+
+
+def left_of(given: Problem, last: Explained) -> Floats:
+    """(n,) what is left of the residual."""
+    return np.asarray(given.residual - given.matrix[:, last.columns] @ last.coefficients)
+
+
+def clipped_squares(given: Problem, last: Explained) -> float:
+    """The squares left, wild readings clipped, as large as those of normal ones would be."""
+    left = left_of(given, last)
+    rows = np.abs(left[left != 0])
+    # the median tells the level at which readings are wild
+    level = float(np.median(rows)) / 0.6745 if len(rows) else 0.0
+    clipped = np.clip(left, -CLIP * level, CLIP * level)
+    return min(last.squares, float(clipped @ clipped) / CLIPPED)
+
+
+def scatter(given: Problem, last: Explained) -> float:
+    """Variance of what is left; at least 1 where that is what was stated."""
+    variance = clipped_squares(given, last) / max(1, given.freedom - last.rank)
+    return max(1.0, variance) if given.known else max(variance, 1e-300)
+
+
+def probability(given: Problem, squares: float, rank: int, variance: float, freedom: int) -> float:
+    """That ``rank`` columns explain ``squares`` by chance."""
+    from scipy.stats import chi2, f
+
+    if rank == 0 or squares <= 0:
+        return 1.0
+    if given.known and variance == 1.0:
+        return float(chi2.sf(squares, rank))
+    return float(f.sf(squares / rank / variance, rank, max(1, freedom)))
+
+
+def selected(
+    given: Problem, candidates: Sequence[int], begin: Sequence[int] = (), limit: int = 12
+) -> Explained:
+    """Groups taken in one by one from ``begin`` on, the one with the best evidence first, exchanged and left out again
+    as long as that is better.  A group stays if by chance, among all ``candidates``, its gain has a probability below
+    ``CHANCE``."""
+    now = _pruned(given, explained(given, begin), len(candidates))
+    penalty = np.log(given.freedom)
+    for _ in range(limit):
+        tried = [(explained(given, (*now.groups, g)), g) for g in candidates if g not in now.groups]
+        if not tried:
+            break
+        best = min(tried, key=lambda pair: pair[0].squares / _least(given, tried) + penalty * pair[0].rank)[0]
+        if not _counts(given, now, best, len(candidates)):
+            break
+        now = _exchanged(given, best, candidates, penalty)
+        now = _pruned(given, now, len(candidates))
+    return now
+
+
+def _least(given: Problem, tried: Sequence[tuple[Explained, int]]) -> float:
+    """The variance in which gains of this round count: that of the best."""
+    return scatter(given, min((e for e, _ in tried), key=lambda e: e.squares))
+
+
+def _counts(given: Problem, without: Explained, with_: Explained, among: int) -> bool:
+    freedom = given.freedom - with_.rank
+    if freedom < 3:
+        return False
+    variance, gain = scatter(given, with_), without.squares - with_.squares
+    if (variance > EXCEEDED or not given.known) and gain < WORTH * without.squares:
+        return False
+    return probability(given, gain, with_.rank - without.rank, variance, freedom) * among < CHANCE
+
+
+def _exchanged(given: Problem, now: Explained, candidates: Sequence[int], penalty: float) -> Explained:
+    """With one group exchanged for another where that explains more."""
+    best = now
+    variance = scatter(given, now)
+    for gone in now.groups[:-1]:
+        rest = tuple(g for g in now.groups if g != gone)
+        for g in candidates:
+            if g in now.groups:
+                continue
+            other = explained(given, (*rest, g))
+            if (
+                other.squares / variance + penalty * other.rank
+                < best.squares / variance + penalty * best.rank - 1.0
+            ):
+                best = other
+    return best
+
+
+def _pruned(given: Problem, now: Explained, among: int) -> Explained:
+    """Without the groups that the others have made needless."""
+    while now.groups:
+        without = [explained(given, tuple(g for g in now.groups if g != gone)) for gone in now.groups]
+        needless = [w for w in without if not _counts(given, w, now, among)]
+        if not needless:
+            return now
+        now = min(needless, key=lambda w: w.squares)
+    return now

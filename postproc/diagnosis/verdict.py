@@ -1,0 +1,263 @@
+"""What may be said of a search: four gates before a name is spoken."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints
+from postproc.diagnosis.candidates import EVERY, Candidate, names_of
+from postproc.diagnosis.search import Search
+from postproc.diagnosis.selection import (
+    Explained,
+    clipped_squares,
+    explained,
+    probability,
+    scatter,
+)
+from postproc.identification.fit import Estimate, Fit
+from postproc.identification.validation import folds_of
+
+VERDICTS = ("nothing_missing", "named", "partly_named", "ambiguous", "unknown")
+
+FOLDS = 15
+"""Parts that poses are left out in; each pose by itself where there are fewer."""
+
+SEEN = 1e-8
+"""Share of a column's squares that readings must show to predict others."""
+
+WILD = 5.0
+
+MARGIN = 10.0
+"""By how much -2 ln(likelihood) of the nearest other explanation must be worse: odds of 150 to 1."""
+
+LACK = 3.0
+"""Standard deviations of its own by which the variance left must exceed the stated one to be a lack of fit."""
+
+TOLERATED = 0.15
+"""Share of the variance that heavier tails than normal may add."""
+
+EXPLAINS = 0.8
+"""Share of the variance beyond scatter that a name must take away where some is left."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """For one candidate.  gain: fall of -2 ln(likelihood) with it; chance: probability of that without it, among all
+    candidates; heldout, regions, sessions: fall of the same for poses, regions and sessions left out (NaN where there
+    are too few); margin: of the nearest other candidate in its place, ``alias``."""
+
+    gain: float
+    chance: float
+    heldout: float
+    regions: float
+    sessions: float
+    margin: float
+    alias: Candidate | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the gain is there on readings that were left out."""
+        gains = (self.heldout, self.regions, self.sessions)
+        return all(gain > 0 for gain in gains if np.isfinite(gain))
+
+
+@dataclass(frozen=True)
+class Named:
+    """A missing effect: its ``joints`` that clearly have it (() where it is of none), parameters with intervals."""
+
+    candidate: Candidate
+    joints: tuple[str, ...]
+    estimates: tuple[Estimate, ...]
+    evidence: Evidence
+
+    @property
+    def effect(self) -> str:
+        return self.candidate.name
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """``word`` of ``VERDICTS``.  named: where the verdict is named, partly_named or ambiguous; alternatives: sets of
+    candidates that explain the same; refitted: own parameters of the model that clearly moved; lack: variance left over
+    the stated one; conditional: nothing states the scatter, so a lack of fit can not be seen."""
+
+    word: str
+    named: tuple[Named, ...]
+    alternatives: tuple[tuple[Candidate, ...], ...]
+    not_testable: tuple[str, ...]
+    refitted: tuple[Estimate, ...]
+    lack: float
+    conditional: bool
+    rejected: tuple[tuple[Candidate, str], ...] = field(default=())
+
+
+def judged(found: Search) -> Verdict:
+    """The verdict on a search."""
+    linear, last = found.linear, found.explained
+    evidence = [_evidence(found, last, g) for g in last.groups]
+    named, rejected = [], []
+    for g, its in zip(last.groups, evidence, strict=True):
+        candidate = linear.candidates[g]
+        estimates = _estimates(found.final, candidate, found)
+        if not its.holds:
+            rejected.append((candidate, "no gain on readings that were left out"))
+        elif not estimates or all(e.at_bound for e in estimates):
+            rejected.append((candidate, "its parameters would have to lie at their bounds"))
+        else:
+            named.append(Named(candidate, _joints(candidate, estimates), estimates, its))
+    aliases = [
+        _alternatives(found, g)
+        for g in last.groups
+        if any(n.candidate is linear.candidates[g] for n in named)
+    ]
+    lack, lacking = lack_of_fit(found, last)
+    bare, _ = lack_of_fit(found, explained(linear.problem, ()))
+    sets = tuple(a for a in aliases if len(a) > 1)
+    enough = lack - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)
+    if not named:
+        word = "unknown" if lacking or rejected else "nothing_missing"
+    elif lacking and not enough:
+        word, named, sets = "unknown", [], ()
+    elif sets:
+        word = "ambiguous"
+    else:
+        word = "partly_named" if lacking or rejected else "named"
+    testable = set(names_of(linear.candidates))
+    hidden = tuple(name for name in names_of(found.untestable) if name not in testable)
+    return Verdict(
+        word,
+        tuple(named),
+        sets,
+        hidden,
+        refitted(found.final),
+        lack,
+        not linear.problem.known,
+        tuple(rejected),
+    )
+
+
+def lack_of_fit(found: Search, last: Explained) -> tuple[float, bool]:
+    """Variance left over the stated one, and whether that is clearly more; where nothing states it, never."""
+    given = found.linear.problem
+    freedom = max(1, given.freedom - last.rank)
+    variance = clipped_squares(given, last) / freedom
+    spread = np.sqrt(2.0 / freedom)
+    repeats = found.base.noise.freedom if found.base.noise.source == "repeats" else 0
+    if repeats:
+        spread = np.sqrt(spread**2 + 2.0 / repeats)
+    return variance, given.known and variance > 1.0 + TOLERATED + LACK * spread
+
+
+def _evidence(found: Search, last: Explained, group: int) -> Evidence:
+    linear, given = found.linear, found.linear.problem
+    without = explained(given, tuple(g for g in last.groups if g != group))
+    variance = scatter(given, last)
+    squares = without.squares - last.squares
+    chance = probability(given, squares, last.rank - without.rank, variance, given.freedom - last.rank)
+    campaign = found.base.campaign
+    heldout, regions, sessions = (
+        _left_out(found, last, group, rows)
+        for rows in (folds_of(campaign, min(FOLDS, campaign.poses)), _regions(found), _sessions(found))
+    )
+    own = linear.candidates[group].key
+    nearest = next((r for r in found.rivals if r.of == own and not r.needless), None)
+    margin, alias = (np.inf, None) if nearest is None else (nearest.margin, nearest.candidate)
+    among = len(linear.candidates)
+    gain = squares / variance
+    return Evidence(gain, min(1.0, chance * among), heldout, regions, sessions, margin, alias)
+
+
+def _alternatives(found: Search, group: int) -> tuple[Candidate, ...]:
+    mine = found.linear.candidates[group]
+    against = [r for r in found.rivals if r.of == mine.key and r.margin < MARGIN and not r.needless]
+    return (mine, *(rival.candidate for rival in against))
+
+
+def _left_out(found: Search, last: Explained, group: int, part: Ints | None) -> float:
+    """Fall of -2 ln(likelihood) of readings left out, part by part, with the group; NaN without parts.
+
+    A reading is predicted with the doubt that the fit of the others leaves: where that has to extrapolate, it says
+    little.  Wild readings count up to 5 standard deviations.
+    """
+    if part is None or len(np.unique(part)) < 2:
+        return np.nan
+    linear = found.linear
+    rows = len(linear.residual) - linear.priors
+    # priors are never left out
+    of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
+    rest = [linear.columns[g] for g in last.groups if g != group]
+    without = np.concatenate([linear.common, *rest], axis=1)
+    with_ = np.concatenate([without, linear.columns[group]], axis=1)
+    variance = scatter(linear.problem, last)
+    return _surprise(without, linear.residual, of, variance) - _surprise(with_, linear.residual, of, variance)
+
+
+def _surprise(matrix: Floats, target: Floats, part: Ints, variance: float) -> float:
+    """-2 ln(likelihood) of ``target`` (n,), each part predicted from the others by ``matrix`` (n, k)."""
+    size = np.linalg.norm(matrix, axis=0)
+    scaled = matrix[:, size > 0] / size[size > 0]
+    whole, aim, total = scaled.T @ scaled, scaled.T @ target, 0.0
+    for k in np.unique(part[part >= 0]):
+        out = scaled[part == k]
+        value, vector = np.linalg.eigh(whole - out.T @ out)
+        root = vector / np.sqrt(np.maximum(value, SEEN))
+        x = root @ (root.T @ (aim - out.T @ target[part == k]))
+        doubt = variance * (1.0 + ((out @ root) ** 2).sum(axis=1))
+        away = (target[part == k] - out @ x) ** 2 / doubt
+        total += float((np.minimum(away, WILD**2) + np.log(doubt)).sum())
+    return total
+
+
+def _regions(found: Search) -> Ints | None:
+    """(R,) a region of the joints' space for each reading; None with too few poses."""
+    from scipy.cluster.vq import kmeans2
+
+    campaign = found.base.campaign
+    if campaign.poses < 24:
+        return None
+    q = campaign.readings.q
+    spread = np.where(np.ptp(q, axis=0) > 1e-9, np.ptp(q, axis=0), 1.0)
+    _, label = kmeans2(q / spread, 4, minit="++", rng=np.random.default_rng(0))
+    return label if min(np.bincount(label, minlength=4)) > 0 else None
+
+
+def _sessions(found: Search) -> Ints | None:
+    session = found.base.campaign.readings.session
+    return session if len(np.unique(session)) > 1 else None
+
+
+def _estimates(final: Fit, candidate: Candidate, found: Search) -> tuple[Estimate, ...]:
+    names = {u.parameter.name for u in candidate.unknowns}
+    base = len(found.base.model.terms)
+    same = candidate.effect.described()
+    return tuple(
+        e
+        for e in final.estimates
+        if e.unknown.parameter.name in names
+        and (term := final.model.terms[e.unknown.term]).effect.name == candidate.name
+        and term.effect.described() == same
+        and (e.unknown.term >= base or e.unknown.stated is None)
+    )
+
+
+def _joints(candidate: Candidate, estimates: Sequence[Estimate]) -> tuple[str, ...]:
+    if candidate.joint != EVERY:
+        return (candidate.joint,) if candidate.joint else ()
+    clear = [e.unknown.parameter.joint for e in estimates if abs(e.value - e.unknown.parameter.null) > e.ci95]
+    return tuple(dict.fromkeys(clear))
+
+
+def refitted(final: Fit) -> tuple[Estimate, ...]:
+    """The model's own parameters that the readings clearly put elsewhere than the robot file does."""
+    moved = []
+    for estimate in final.estimates:
+        stated = estimate.unknown.stated
+        if stated is None or estimate.unknown.prior is not None:
+            continue
+        doubt = np.hypot(estimate.ci95, stated.interval or 0.0)
+        if abs(estimate.value - stated.value) > 1.5 * doubt:
+            moved.append(estimate)
+    return tuple(moved)

@@ -1,0 +1,309 @@
+"""What ``compensate diagnose`` found: a verdict, its evidence, and what is left of the readings; as JSON and CSV."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats
+from postproc.diagnosis.candidates import Candidate, names_of
+from postproc.diagnosis.diagnose import Diagnosis
+from postproc.diagnosis.screens import Where, where
+from postproc.diagnosis.search import Key
+from postproc.diagnosis.sizes import Gains, Smallest, gains, moved, smallest
+from postproc.diagnosis.verdict import Evidence, Named, Verdict, lack_of_fit
+from postproc.findings import Finding
+from postproc.identification.fit import Estimate, Fit
+from postproc.measurements import Readings
+from postproc.model import STANDARD_GRAVITY
+from postproc.report.report import exit_code
+from postproc.report.residuals import Sizes, gap_of, joint_variables, lengths_of, mm, residuals_csv
+from postproc.robot.provenance import GAP
+
+CLEAR = ("named", "nothing_missing")
+"""Verdicts that leave nothing to look at."""
+
+NEARLY_ALL = 0.9
+"""Share of the candidates that would have shown at the size that is told."""
+
+USUAL = 10.0
+"""An effect that only shows beyond so many times its usual size was hardly tested."""
+
+
+@dataclass(frozen=True, eq=False)
+class NextPoses:
+    """Poses worth measuring next: they tell the explanations ``between`` apart.  readings: still to be taken;
+    separation: standard deviations by which they show that the first is no case of the second, and the other way
+    round."""
+
+    readings: Readings
+    between: tuple[Candidate, Candidate]
+    separation: tuple[float, float]
+
+    @property
+    def poses(self) -> list[dict[str, float]]:
+        """Axes [deg, mm] and weight [kg] of each, and the sense in which each axis comes there, where that counts."""
+        readings = self.readings
+        table = {axis.name: axis.values.round(4) for axis in joint_variables(readings)}
+        table["load_kg"] = (np.linalg.norm(readings.wrench[:, :3], axis=1) / STANDARD_GRAVITY).round(4)
+        if readings.direction is not None:
+            table |= {f"DIR{i}": column for i, column in enumerate(readings.direction.T, 1)}
+        rows = np.column_stack(list(table.values())) + 0.0
+        _, first = np.unique(rows, axis=0, return_index=True)
+        return [dict(zip(table, rows[row].tolist(), strict=True)) for row in np.sort(first)]
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """What ``diagnose`` found.
+
+    data: name and SHA-256 of each file; heldout_before, heldout_after (R, 3) [m]: what fits without the pose leave of
+    it, of the robot file as it is and of the model to go on with; robot_file, next_poses_file: as written, None where
+    not; outputs: all files written.
+    """
+
+    robot: str
+    robot_digest: str
+    robot_path: Path
+    data: tuple[tuple[str, str], ...]
+    diagnosis: Diagnosis
+    heldout_before: Floats
+    heldout_after: Floats
+    next_poses: NextPoses | None
+    findings: tuple[Finding, ...] = ()
+    robot_file: str | None = None
+    next_poses_file: str | None = None
+    outputs: tuple[str, ...] = ()
+    strict: bool = False
+
+    @property
+    def verdict(self) -> Verdict:
+        return self.diagnosis.verdict
+
+    @property
+    def final(self) -> Fit:
+        """The model to go on with."""
+        return self.diagnosis.final
+
+    @property
+    def exit(self) -> int:
+        """As of the findings; 3 where the verdict leaves something open."""
+        code = exit_code(self.findings, self.strict)
+        return code if code == 1 or self.verdict.word in CLEAR else 3
+
+    @property
+    def improves(self) -> bool:
+        """Whether a new robot file would say more than the old one."""
+        word = self.verdict.word
+        return word in ("named", "partly_named") or (
+            word == "nothing_missing" and bool(self.verdict.refitted)
+        )
+
+    @cached_property
+    def clear(self) -> tuple[Named, ...]:
+        """The effects that are named beyond doubt: without those that something else explains as well."""
+        doubtful = {alternatives[0].key for alternatives in self.verdict.alternatives}
+        return tuple(named for named in self.verdict.named if named.candidate.key not in doubtful)
+
+    @property
+    def lacking(self) -> bool:
+        """Whether clearly more is left than scatter, of all that was found."""
+        found = self.diagnosis.search
+        return lack_of_fit(found, found.explained)[1]
+
+    # Residuals.
+
+    @cached_property
+    def counts(self) -> Bools:
+        """(R,) readings that were fitted."""
+        return np.asarray((self.final.plain_weights.weight[:, :3] > 0).any(axis=1))
+
+    @cached_property
+    def lengths(self) -> dict[str, Floats]:
+        """(R,) [m] lengths of residuals: under the names that ``gap`` begins with, and of two more fits.  ``refitted``:
+        the robot file's own parameters fitted anew; ``explained``: with all that was chosen, named or not."""
+        search, measured = self.diagnosis.search, np.isfinite(self.final.campaign.readings.value)
+        residuals = {
+            "before": self.diagnosis.stated.residual,
+            "after": self.final.residual,
+            "heldout_before": self.heldout_before,
+            "heldout_after": self.heldout_after,
+            "refitted": search.base.residual,
+            "explained": search.final.residual,
+        }
+        return {
+            name: np.where(self.counts, lengths_of(values, measured), np.nan)
+            for name, values in residuals.items()
+        }
+
+    @cached_property
+    def rms(self) -> dict[str, float]:
+        """[m] Root mean squares of ``lengths``, NaN of nothing."""
+        sizes = {name: Sizes.of(lengths) for name, lengths in self.lengths.items()}
+        return {name: size.rms if size else np.nan for name, size in sizes.items()}
+
+    @property
+    def scatter(self) -> float:
+        """[m] length of the scatter of a position, root mean square: as stated or as repeats show, or else as the final
+        residuals do."""
+        noise = self.final.noise
+        return float(np.sqrt(3 * np.mean(noise.sigma**2) * (1.0 if noise.known else self.final.factor)))
+
+    def gap_mm(self) -> dict[str, float]:
+        """Root mean squares of residuals, and the scatter of the readings; what is not known is left out."""
+        gap = gap_of(self.lengths, self.final.noise)
+        return {key: gap[key] for key in GAP if key in gap}
+
+    # Sizes of effects.
+
+    @cached_property
+    def gains(self) -> Gains:
+        """What each candidate that was tried explains."""
+        return gains(self.diagnosis.search)
+
+    @cached_property
+    def moved(self) -> dict[Key, Sizes | None]:
+        """How much of what was measured each named effect moves, by the key of its candidate."""
+        measured = np.isfinite(self.final.campaign.readings.value)
+        several = {named.candidate.key: moved(self.diagnosis.search, named) for named in self.verdict.named}
+        return {
+            key: Sizes.of(np.where(self.counts, lengths_of(one, measured), np.nan))
+            for key, one in several.items()
+        }
+
+    @cached_property
+    def _smallest(self) -> tuple[Smallest, ...]:
+        return smallest(self.diagnosis.search)
+
+    @property
+    def detectable(self) -> float | None:
+        """[m] Root mean square from which on ``NEARLY_ALL`` candidates that were not found would have been."""
+        shown = sorted(one.rms for one in self._smallest if np.isfinite(one.rms))
+        return float(np.quantile(shown, NEARLY_ALL)) if shown else None
+
+    @property
+    def hardly_tested(self) -> tuple[str, ...]:
+        """Effects that would have to be ``USUAL`` times as large as usual to show, on whatever joint."""
+        best: dict[str, float] = {}
+        for one in self._smallest:
+            best[one.candidate.name] = min(one.usual, best.get(one.candidate.name, np.inf))
+        chosen = names_of(self.diagnosis.search.chosen)
+        return tuple(name for name, usual in best.items() if usual > USUAL and name not in chosen)
+
+    @property
+    def tried(self) -> tuple[str, ...]:
+        """Names of the effects that were looked for."""
+        return names_of(self.diagnosis.search.linear.candidates)
+
+    @cached_property
+    def patterns(self) -> tuple[Where, ...]:
+        """What betrays a missing effect: patterns in what the robot file leaves, its own parameters fitted anew."""
+        return where(self.diagnosis.search.base)
+
+    def as_json(self) -> dict[str, object]:
+        """The machine-readable result; the keys are public."""
+        verdict, campaign = self.verdict, self.final.campaign
+        gap = self.gap_mm()
+        return {
+            "robot": self.robot,
+            "robot_path": str(self.robot_path),
+            "robot_digest": self.robot_digest,
+            "data": [{"file": name, "sha256": digest} for name, digest in self.data],
+            "measured": "deflection" if campaign.readings.deflection else "position",
+            "readings": len(campaign),
+            "poses": campaign.poses,
+            "targets": len(campaign.targets),
+            "sessions": len(campaign.readings.sessions),
+            "verdict": verdict.word,
+            "conditional": verdict.conditional,
+            "named": [self._named(named) for named in self.clear],
+            "ambiguous": _once([list(names_of(one)) for one in verdict.alternatives]),
+            "alternatives": [[_candidate(c) for c in one] for one in verdict.alternatives],
+            "rejected": [{**_candidate(candidate), "why": why} for candidate, why in verdict.rejected],
+            "tried": list(self.tried),
+            "not_testable": list(verdict.not_testable),
+            "hardly_testable": list(self.hardly_tested),
+            "detectable_rms_mm": None if self.detectable is None else mm(self.detectable),
+            "refitted": [_refitted(estimate) for estimate in verdict.refitted],
+            "where": [_where(one) for one in self.diagnosis.where],
+            "where_refitted": [_where(one) for one in self.patterns],
+            "gap": {key: gap.get(key) for key in GAP} | {"refitted_rms_mm": mm(self.rms["refitted"])},
+            "lack": None if verdict.conditional else _finite(verdict.lack),
+            "next_poses": None if self.next_poses is None else self.next_poses.poses,
+            "next_poses_file": self.next_poses_file,
+            "next_poses_between": None
+            if self.next_poses is None
+            else [_candidate(candidate) for candidate in self.next_poses.between],
+            "next_poses_separation": None
+            if self.next_poses is None
+            else [_finite(separation) for separation in self.next_poses.separation],
+            "robot_file": self.robot_file,
+            "findings": [finding.as_json() for finding in self.findings],
+            "outputs": list(self.outputs),
+            "exit": self.exit,
+        }
+
+    def _named(self, named: Named) -> dict[str, object]:
+        size = self.moved[named.candidate.key]
+        return {
+            "effect": named.effect,
+            "joints": list(named.joints),
+            "options": named.candidate.effect.described(),
+            "parameters": {e.unknown.parameter.name: _parameter(e) for e in named.estimates},
+            "moves_rms_mm": mm(size.rms) if size else None,
+            "moves_max_mm": mm(size.max) if size else None,
+            "evidence": _evidence(named.evidence),
+        }
+
+
+def diagnosed_csv(result: Diagnosed) -> bytes:
+    """One row a reading: where it stands, its axes, what is left of it by the robot file, by the model to go on with,
+    and by that as one that was not fitted."""
+    residuals = {
+        "before": result.diagnosis.stated.residual,
+        "after": result.final.residual,
+        "heldout": result.heldout_after,
+    }
+    fitted = [str(int(counts)) for counts in result.counts]
+    return residuals_csv(result.final.campaign, residuals, {"fitted": fitted})
+
+
+def _candidate(candidate: Candidate) -> dict[str, object]:
+    return {"effect": candidate.name, "joint": candidate.joint or None}
+
+
+def _parameter(estimate: Estimate) -> dict[str, object]:
+    told: dict[str, object] = {
+        "value": estimate.value,
+        "ci95": _finite(estimate.ci95),
+        "unit": estimate.unknown.parameter.unit,
+    }
+    return told | ({"at_bound": True} if estimate.at_bound else {})
+
+
+def _refitted(estimate: Estimate) -> dict[str, object]:
+    return {"parameter": estimate.unknown.name, "before": estimate.unknown.value, **_parameter(estimate)}
+
+
+def _evidence(evidence: Evidence) -> dict[str, object]:
+    numbers = {
+        key: _finite(getattr(evidence, key))
+        for key in ("gain", "chance", "heldout", "regions", "sessions", "margin")
+    }
+    return numbers | {"alias": None if evidence.alias is None else _candidate(evidence.alias)}
+
+
+def _where(one: Where) -> dict[str, object]:
+    return {"variable": one.variable, "pattern": one.pattern, "share": round(one.share, 4)}
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _once(lists: list[list[str]]) -> list[list[str]]:
+    """Each list once."""
+    return [one for k, one in enumerate(lists) if one not in lists[:k]]

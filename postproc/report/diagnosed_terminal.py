@@ -1,0 +1,166 @@
+"""What ``compensate diagnose`` found, on a terminal: the verdict in words, then what it stands on, in tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from postproc.report.diagnosed import Diagnosed
+from postproc.report.diagnosed_words import headline, paragraph
+from postproc.report.identified_terminal import add_sizes
+from postproc.report.terminal import printable, show_findings
+from postproc.report.words import campaign_in_words, count, fixed, shown_unit, some
+from postproc.units import MM
+
+WIDE = 110
+"""Columns of the paragraph at most: longer lines are hard to read."""
+
+
+def show_diagnosed(console: Console, result: Diagnosed, verbose: bool = False) -> None:
+    """Verdict, paragraph, parameters, evidence, where it shows, what is left, next poses, findings."""
+    console.print(Text(printable(headline(result)), style="bold"), soft_wrap=True)
+    console.print(Text(printable(paragraph(result))), width=min(WIDE, console.width))
+    head = Table(box=None, show_header=False, pad_edge=False)
+    head.add_column(style="bold")
+    head.add_column()
+    for key, value in _rows(result):
+        head.add_row(key, Text(printable(value)))
+    console.print(head)
+    tables = (_parameters, _evidence, _alternatives, _refitted, _where, _left, _next_poses)
+    for make in tables:
+        table = make(result, verbose)
+        if table.row_count:
+            console.print(table)
+    if result.next_poses is not None and result.next_poses.readings.direction is not None:
+        console.print("each axis comes there in the sense that the columns DIR of the plan say")
+    show_findings(console, result.findings, verbose)
+    for path in result.outputs:
+        console.print(Text(printable(f"wrote {path}")), soft_wrap=True)
+    if result.improves and result.robot_file is None:
+        console.print("-o NEW.yaml writes the robot file with it")
+    if result.next_poses is not None and result.next_poses_file is None:
+        console.print("--next-poses FILE.csv writes the poses to measure next")
+
+
+def _rows(result: Diagnosed) -> Iterator[tuple[str, str]]:
+    final = result.final
+    yield "data", ", ".join(name for name, _ in result.data)
+    yield "", campaign_in_words(final.campaign)
+    yield "robot", f"{result.robot} ({result.robot_path})"
+    yield (
+        "scatter",
+        f"{result.scatter / MM:.4f} mm RMS in space, from: {final.noise.source}",
+    )
+    linear = result.diagnosis.search.linear
+    yield "tried", f"{count(len(linear.candidates), 'candidate')}: {', '.join(result.tried)}"
+
+
+def _table(title: str, *heads: str) -> Table:
+    """A table whose first column is on the left, the others on the right but for one without a head."""
+    table = Table(box=None, pad_edge=False)
+    table.add_column(title)
+    for head in heads:
+        table.add_column(head, justify="right" if head else "left")
+    return table
+
+
+def _parameters(result: Diagnosed, _verbose: bool) -> Table:
+    """One row a parameter, under what it is of."""
+    table = _table("missing", "value", "+- 95 %", "unit", "")
+    for named in result.clear:
+        table.add_row(Text(named.candidate.label, style="bold"))
+        for estimate in named.estimates:
+            word, size = shown_unit(estimate.unknown.parameter.unit)
+            wide = estimate.ci95 / size
+            note = "at its bound" if estimate.at_bound else ""
+            value = fixed(estimate.value / size, wide)
+            table.add_row(f"  {estimate.unknown.parameter.name}", value, fixed(wide, wide), word, note)
+    return table
+
+
+def _evidence(result: Diagnosed, verbose: bool) -> Table:
+    """For each effect that is named or might be: what it gains in -2 ln(likelihood), and where."""
+    table = _table(
+        "evidence, -2 ln(likelihood)", "gain", "by chance", "poses", "regions", "sessions", "margin", ""
+    )
+    for named in result.verdict.named:
+        its = named.evidence
+        numbers = (its.heldout, its.regions, its.sessions, its.margin)
+        nearest = "" if its.alias is None else f"over {its.alias.label}"
+        cells = [_number(its.gain), f"{its.chance:.1g}", *map(_number, numbers)]
+        table.add_row(named.candidate.label, *cells, nearest)
+    for candidate, why in result.verdict.rejected:
+        table.add_row(candidate.label, *[""] * 6, f"rejected: {why}")
+    return table
+
+
+def _alternatives(result: Diagnosed, _verbose: bool) -> Table:
+    """What each explanation of a set gains alone."""
+    table = _table("can not be told apart", "gain alone")
+    keys = [candidate.key for candidate in result.diagnosis.search.linear.candidates]
+    for number, alternatives in enumerate(result.verdict.alternatives):
+        if number:
+            table.add_section()
+        for candidate in alternatives:
+            table.add_row(candidate.label, _number(result.gains.alone[keys.index(candidate.key)]))
+    return table
+
+
+def _refitted(result: Diagnosed, _verbose: bool) -> Table:
+    table = _table("robot file's own, moved", "before", "value", "+- 95 %", "unit")
+    for estimate in result.verdict.refitted:
+        word, size = shown_unit(estimate.unknown.parameter.unit)
+        wide = estimate.ci95 / size
+        before, value = (fixed(v / size, wide) for v in (estimate.unknown.value, estimate.value))
+        table.add_row(estimate.unknown.name, before, value, fixed(wide, wide), word)
+    return table
+
+
+def _where(result: Diagnosed, verbose: bool) -> Table:
+    """Patterns in what the robot file leaves, its own parameters fitted anew."""
+    table = _table("what is missing goes with", "of it", "")
+    rows = {one.variable: one for one in result.patterns}
+    for name in some(list(rows), verbose):
+        one = rows.get(name)
+        if one is None:
+            table.add_row(name)
+        else:
+            table.add_row(name, f"{100 * one.share:.0f} %", one.pattern)
+    return table
+
+
+def _left(result: Diagnosed, _verbose: bool) -> Table:
+    """Residuals before and after: of what was fitted, of poses that were not."""
+    table = _table("residuals, mm", "RMS", "mean", "max", "readings")
+    rows = {
+        "before": "the robot file",
+        "refitted": "its own parameters fitted anew",
+        "after": "the model to go on with",
+        "heldout_before": "poses not fitted, the robot file",
+        "heldout_after": "poses not fitted, the model to go on with",
+    }
+    if not result.diagnosis.search.base.unknowns:
+        del rows["refitted"]
+    add_sizes(table, {words: result.lengths[name] for name, words in rows.items()})
+    if result.final.noise.known:
+        table.add_row("scatter of the readings", f"{result.scatter / MM:.3f}")
+    return table
+
+
+def _next_poses(result: Diagnosed, _verbose: bool) -> Table:
+    planned = result.next_poses
+    if planned is None:
+        return _table("")
+    heads = [name for name in planned.poses[0] if not name.startswith("DIR")]
+    table = _table("measure next", *(name.replace("_", ", ") for name in heads))
+    for number, pose in enumerate(planned.poses, 1):
+        table.add_row(str(number), *(f"{pose[name]:.1f}" for name in heads))
+    return table
+
+
+def _number(value: float) -> str:
+    return f"{value:.0f}" if np.isfinite(value) else "-"

@@ -1,0 +1,228 @@
+"""Diagnosis of a robot, on paths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from postproc import __version__
+from postproc.arrays import Floats
+from postproc.diagnosis.candidates import Candidate
+from postproc.diagnosis.diagnose import Diagnosis, diagnose
+from postproc.diagnosis.search import composed
+from postproc.experiments.discriminating import apart
+from postproc.experiments.offer import Offer, readings_of, spacings, usable_limits
+from postproc.experiments.tour import tour
+from postproc.findings import Finding, Refusal
+from postproc.identification.fit import Fit
+from postproc.identification.suspicion import check_fit, check_numbers
+from postproc.identification.unknowns import Unknown
+from postproc.identification.validation import held_out
+from postproc.measurements import measurements_csv
+from postproc.model import STANDARD_GRAVITY
+from postproc.publish import publish
+from postproc.report.diagnosed import Diagnosed, NextPoses, diagnosed_csv
+from postproc.report.report import json_bytes
+from postproc.units import DEG, MM
+from postproc.workflows.identify import Measured, measured_of
+from postproc.workflows.preparation import Stage, silent
+from postproc.workflows.robot_files import new_robot_file
+
+FOLDS = 5
+
+NEXT = 6
+"""Poses proposed to tell two explanations apart."""
+
+LOADS = 3
+"""Of the weights that were hung, so many different ones are proposed again."""
+
+USUAL_SIGMA = 0.03 * MM
+"""Scatter that poses are proposed for where nothing states one."""
+
+CANDIDATES = 600
+"""Poses to choose from."""
+
+
+@dataclass(frozen=True)
+class DiagnoseRequest:
+    """What the user asked for.  ``robot``: None takes the one that the data name; ``next_poses``: where a plan goes that
+    tells explanations apart, beside ``output`` without it."""
+
+    data: tuple[Path, ...]
+    robot: str | None = None
+    output: Path | None = None
+    next_poses: Path | None = None
+    tool_mm_deg: tuple[float, ...] | None = None
+    picture: Path | None = None
+    csv: Path | None = None
+    json: Path | None = None
+    strict: bool = False
+
+
+def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed:
+    """What is missing in the robot file, by its name.  Raises Refusal, and has then written nothing."""
+    _spare_inputs(request)
+    stage("reading")
+    measured = measured_of(request.data, request.robot, request.tool_mm_deg)
+    campaign, model = measured.campaign, measured.model
+    check_numbers(measured.readings, (), model)
+    findings = [*measured.findings, *check_fit(campaign, model, ())]
+    found = diagnose(campaign, model, stage)
+    stage("leaving poses out")
+    folds = min(FOLDS, campaign.poses)
+    heldout = held_out(found.stated, folds), held_out(found.final, folds)
+    planned = None
+    if found.verdict.word == "ambiguous":
+        stage("looking for poses that settle it")
+        planned = _next_poses(measured, found)
+    result = Diagnosed(
+        robot=measured.robot.name,
+        robot_digest=measured.robot.digest,
+        robot_path=measured.robot.path,
+        data=tuple((p.name, d) for p, d in zip(measured.readings.files, measured.readings.digests, strict=True)),
+        diagnosis=found,
+        heldout_before=heldout[0],
+        heldout_after=heldout[1],
+        next_poses=planned,
+        findings=tuple(findings),
+        robot_file=None,
+        outputs=(),
+        strict=request.strict,
+    )
+    return _published(request, measured, result, stage)
+
+
+def _spare_inputs(request: DiagnoseRequest) -> None:
+    inputs = {path.resolve() for path in request.data}
+    if request.robot and request.robot.endswith((".yaml", ".yml")):
+        inputs.add(Path(request.robot).resolve())
+    ways = (request.output, request.next_poses, request.json, request.csv, request.picture)
+    written = [path for path in ways if path is not None]
+    for path in written:
+        if path.resolve() in inputs:
+            raise Refusal(Finding("FIL007", "would replace an input", str(path)))
+    if len({path.resolve() for path in written}) < len(written):
+        raise Refusal(Finding("FIL007", "two results have the same name", str(written[0])))
+
+
+def _next_poses(measured: Measured, found: Diagnosis) -> NextPoses | None:
+    """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do."""
+    offer = _offer(measured, found.search.base)
+    for alternatives in found.verdict.alternatives:
+        for one, other in combinations(alternatives, 2):
+            # what a new campaign of another kind would show is not proposed
+            planned = _told_apart(measured, found, offer, one, other)
+            if planned is not None:
+                return planned
+    return None
+
+
+def _told_apart(
+    measured: Measured, found: Diagnosis, offer: Offer, one: Candidate, other: Candidate
+) -> NextPoses | None:
+    base = found.search.base
+    model, first = composed(base.model, [one])
+    model, second = composed(model, [other])
+    # the first shows what was found of it; the second what its usual size makes
+    model = model.changed(_values(found.search.final, first, one))
+    common = [u for u in base.unknowns if u.prior is None]
+    try:
+        poses = apart(model, first, second, common, offer, (NEXT,), candidates=CANDIDATES)
+    except Refusal:
+        return None
+    setups = poses.chosen[NEXT]
+    setups = setups[tour(setups.q, spacings(measured.robot, offer.spacing))]
+    return NextPoses(readings_of(model, offer, setups), (one, other), poses.separation[NEXT])
+
+
+def _values(final: Fit, unknowns: Sequence[Unknown], candidate: Candidate) -> dict[tuple[int, str], float]:
+    """What the final fit found of a candidate's parameters, as values of a model in which they are ``unknowns``."""
+    found = {
+        e.unknown.parameter.name: e.value
+        for e in final.estimates
+        if final.model.terms[e.unknown.term].effect.name == candidate.name
+    }
+    return {u.key: found[u.parameter.name] for u in unknowns if u.parameter.name in found}
+
+
+def _offer(measured: Measured, base: Fit) -> Offer:
+    """What was measured with: targets, weights, scatter."""
+    readings, campaign = measured.readings, measured.campaign
+    in_flange = campaign.tool.rotation @ base.point.given.places[:, :, None]
+    loads = np.unique(np.round(np.linalg.norm(readings.wrench[:, :3], axis=1) / STANDARD_GRAVITY, 1))
+    loads = loads[loads > 0] if readings.deflection else loads
+    if len(loads) > LOADS:
+        loads = loads[np.linspace(0, len(loads) - 1, LOADS).round().astype(int)]
+    return Offer(
+        tool=campaign.tool,
+        targets=readings.targets,
+        places=in_flange[:, :, 0] + campaign.tool.position,
+        rough=campaign.tracked,
+        loads=loads if len(loads) else np.zeros(1),
+        each_load=False,
+        deflection=readings.deflection,
+        sigma=float(np.median(base.noise.sigma)) if base.noise.known else USUAL_SIGMA,
+        limits=usable_limits(measured.robot, {}),
+        box=_box(),
+        tracker=None,
+        cone=np.pi,
+        spacing=5 * DEG,
+    )
+
+
+def _box() -> Floats:
+    """Nothing below the floor that the robot stands on."""
+    return np.array([[-np.inf, np.inf], [-np.inf, np.inf], [0.0, np.inf]])
+
+
+def _published(request: DiagnoseRequest, measured: Measured, result: Diagnosed, stage: Stage) -> Diagnosed:
+    if result.exit == 1:  # a warning counts as an error: nothing is written
+        return result
+    files: dict[Path, bytes] = {}
+    if request.output is not None and result.improves:
+        stage("writing the robot file")
+        names = tuple(dict.fromkeys(named.effect for named in result.diagnosis.verdict.named))
+        files[request.output] = new_robot_file(
+            "diagnose", measured.robot, result.diagnosis.final, names, result.gap_mm(), request.output
+        )
+        result = replace(result, robot_file=str(request.output))
+    plan = request.next_poses
+    if plan is None and request.output is not None:
+        plan = request.output.with_name(request.output.stem + ".next_poses.csv")
+    if result.next_poses is not None and plan is not None:
+        if plan.resolve() in {path.resolve() for path in request.data}:  # an earlier plan, filled in
+            raise Refusal(Finding("FIL007", "would replace an input", str(plan), help="say --next-poses FILE.csv"))
+        files[plan] = measurements_csv(result.next_poses.readings, _about(result))
+        result = replace(result, next_poses_file=str(plan))
+    if request.csv is not None:
+        files[request.csv] = diagnosed_csv(result)
+    if request.picture is not None:
+        from postproc.report.diagnosed_picture import diagnosed_picture
+
+        stage("drawing")
+        files[request.picture] = diagnosed_picture(result, request.picture.suffix.lower().lstrip("."))
+    outputs = [str(path) for path in files]
+    if request.json is not None:
+        outputs.append(str(request.json))
+    result = replace(result, outputs=tuple(outputs))
+    if request.json is not None:
+        files[request.json] = json_bytes(result)
+    if files:
+        publish(files, last=request.output)
+    return result
+
+
+def _about(result: Diagnosed) -> list[str]:
+    assert result.next_poses is not None
+    one, other = result.next_poses.between
+    return [
+        f"plan of compensate {__version__}, robot file sha256 {result.robot_digest[:16]}",
+        f"poses that tell {one.label} from {other.label}",
+        "fill in the readings and give them to `compensate diagnose` together with those before",
+        "what stands around the arm was not looked at, drive slowly to every pose for the first time",
+    ]
+

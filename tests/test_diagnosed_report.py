@@ -1,0 +1,749 @@
+"""What a diagnosis says: sizes of effects, JSON, CSV, the paragraph and tables on a terminal, the picture."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from measured import MARKERS, on_markers, plan, scattered, somewhere, taken
+from rich.console import Console
+from scipy.stats import chi2
+
+from postproc.diagnosis.candidates import EVERY
+from postproc.diagnosis.diagnose import diagnose
+from postproc.diagnosis.selection import CHANCE, selected
+from postproc.diagnosis.sizes import SURELY, moved, smallest
+from postproc.diagnosis.verdict import VERDICTS, Evidence, Named
+from postproc.effects import EFFECTS
+from postproc.findings import Finding
+from postproc.geometry import Poses
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import fit
+from postproc.identification.unknowns import asked_for
+from postproc.identification.validation import held_out
+from postproc.measurements import planned
+from postproc.model import StiffnessModel
+from postproc.report import diagnosed_picture as picture_module
+from postproc.report.diagnosed import Diagnosed, NextPoses, diagnosed_csv
+from postproc.report.diagnosed_picture import BARS, betrayals, diagnosed_picture, roles_of, series
+from postproc.report.diagnosed_terminal import show_diagnosed
+from postproc.report.diagnosed_words import NOUNS, headline, paragraph, shown_by
+from postproc.robot.description import Mechanism, Quantity, find_robot, load_robot
+from postproc.robot.provenance import GAP
+
+SIGMA = 2e-5
+TOOL = Poses(np.eye(3), np.array([0.0, 0.5, 0.2]))
+GEARS = {(0, f"c{k}"): c * 1e-6 for k, c in enumerate((3.0, 0.27, 0.45, 2.5, 4.0, 2.1), 1)}
+"""Not as the robot file states them."""
+
+NO_NUMBER = re.compile(r"\b(nan|None|inf)\b")
+
+
+def complete() -> StiffnessModel:
+    """The arm that is measured."""
+    return StiffnessModel.from_robot(load_robot(find_robot("kuka_kr270"))).changed(GEARS)
+
+
+def stated() -> StiffnessModel:
+    """Its robot file: without the compensator, of which a drawing is known."""
+    known = StiffnessModel.from_robot(load_robot(find_robot("kuka_kr270")))
+    drawn = {k: Quantity(np.array([known.terms[1].values[k]]), "m", "") for k in ("L", "a_x", "a_y")}
+    mechanism = Mechanism("spring", "gravity_compensator", "A2", "", "drawing", drawn, 0)
+    bare = known.without(["gravity_compensator"])
+    return replace(bare, robot=replace(bare.robot, mechanisms=(mechanism,)))
+
+
+def readings_of(model, poses=20, seed=0, **words):
+    """Readings of three targets under a weight, of ``model`` and with scatter."""
+    rng = np.random.default_rng(seed)
+    wrench = np.zeros((poses, 6))
+    wrench[:, 2] = -2600.0
+    q, wrench, markers = on_markers(rng.uniform(*model.robot.limits.T, (poses, 6)), wrench)
+    readings = plan(model.robot, q, wrench, tool=TOOL, sigma=SIGMA, **markers, **words)
+    campaign = Campaign(readings)
+    given = somewhere(campaign, rng) if campaign.tracked else None
+    readings = scattered(taken(campaign, model, given), SIGMA, rng)
+    return replace(
+        readings,
+        files=(Path("loads.csv"),),
+        digests=("0" * 64,),
+        file=0 * readings.line,
+        line=np.arange(len(q)) + 9,
+    )
+
+
+def diagnosed(readings, **change) -> Diagnosed:
+    model = stated()
+    found = diagnose(Campaign(readings), model)
+    given = {
+        "robot": "kuka_kr270",
+        "robot_digest": "1" * 64,
+        "robot_path": Path("kuka_kr270.yaml"),
+        "data": (("loads.csv", "0" * 64),),
+        "diagnosis": found,
+        "heldout_before": held_out(found.stated, 5),
+        "heldout_after": held_out(found.final, 5),
+        "next_poses": None,
+    }
+    return Diagnosed(**{**given, **change})
+
+
+@pytest.fixture(scope="module")
+def spring():
+    """Of an arm with a compensator that its robot file does not have; something else comes near."""
+    result = diagnosed(readings_of(complete()))
+    (named,) = result.verdict.named
+    alias = next(c for c in result.diagnosis.search.linear.candidates if c.name == "link_compliance")
+    near = replace(named, evidence=replace(named.evidence, alias=alias, margin=72.4))
+    return judged(result, result.verdict.word, named=(near,), refitted=moved_gears(result))
+
+
+@pytest.fixture(scope="module")
+def stale():
+    """Of an arm whose gears are not as the robot file says."""
+    result = diagnosed(readings_of(complete().without(["gravity_compensator"])))
+    return judged(result, result.verdict.word, refitted=moved_gears(result))
+
+
+def moved_gears(result):
+    return tuple(
+        e
+        for e in result.final.estimates
+        if e.unknown.stated and e.unknown.parameter.name in ("c3", "c4", "c5", "c6")
+    )
+
+
+def judged(result, word, final=None, **change) -> Diagnosed:
+    """The result with another verdict."""
+    verdict = replace(result.verdict, word=word, **change)
+    found = replace(result.diagnosis, verdict=verdict, final=final or result.final)
+    return replace(result, diagnosis=found)
+
+
+def lacking(result, word="unknown", **change) -> Diagnosed:
+    """The result as if readings scattered by a third of what they do."""
+    search = result.diagnosis.search
+    given, last = search.linear.problem, search.explained
+    search = replace(
+        search,
+        linear=replace(search.linear, problem=replace(given, residual=3 * given.residual)),
+        explained=replace(last, squares=9 * last.squares, coefficients=3 * last.coefficients),
+    )
+    found = replace(result, diagnosis=replace(result.diagnosis, search=search))
+    return judged(found, word, search.base, **{"named": (), **change})
+
+
+def doubtful(result) -> Diagnosed:
+    """The compensator, or else what is nearest to it."""
+    (named,) = result.verdict.named
+    sets = ((named.candidate, named.evidence.alias),)
+    return judged(result, "ambiguous", result.diagnosis.search.base, alternatives=sets)
+
+
+def next_poses(result, **change) -> NextPoses:
+    q, wrench, markers = on_markers(
+        np.radians([[0, -90, 90, 0, 45.5, 0], [10, -20, 30, 40, 50, -60]]), np.zeros((2, 6))
+    )
+    wrench[:, 2] = -9.80665 * np.repeat([100.0, 265.0], len(MARKERS))
+    joints = [(joint.name, False) for joint in result.final.model.robot.joints]
+    readings = planned(joints, q, wrench, True, tool=TOOL, **markers, **change)
+    (between,) = doubtful(result).verdict.alternatives
+    return NextPoses(readings, between, (4.2, 5.1))
+
+
+def told(result, verbose=False, width=160) -> str:
+    stream = io.StringIO()
+    show_diagnosed(Console(file=stream, width=width), result, verbose)
+    return stream.getvalue()
+
+
+def every_verdict(spring, stale) -> dict[str, Diagnosed]:
+    few = ((spring.verdict.named[0].candidate, "no gain on readings that were left out"),)
+    return {
+        "named": spring,
+        "nothing_missing": stale,
+        "nothing at all": judged(stale, "nothing_missing", refitted=()),
+        "ambiguous": doubtful(spring),
+        "ambiguous, planned": replace(doubtful(spring), next_poses=next_poses(spring)),
+        "partly_named": judged(spring, "partly_named", rejected=few),
+        "partly_named, lack": lacking(spring, "partly_named", named=spring.verdict.named),
+        "unknown": lacking(spring),
+        "unknown, rejected": judged(stale, "unknown", rejected=few),
+    }
+
+
+# What was found
+
+
+def test_the_diagnoses_are_what_they_are_made_of(spring, stale):
+    assert spring.verdict.word == "named"
+    (named,) = spring.verdict.named
+    assert (named.effect, named.joints) == ("gravity_compensator", ("A2",))
+    assert stale.verdict.word == "nothing_missing"
+    assert stale.verdict.refitted
+    assert not spring.lacking
+    assert not stale.lacking
+    assert lacking(spring).lacking
+
+
+def test_the_gap_is_that_of_the_fits(spring):
+    def rms(values):
+        return 1e3 * np.sqrt(np.mean(np.sum(values**2, axis=1)))
+
+    gap, search = spring.gap_mm(), spring.diagnosis.search
+    assert list(gap) == list(GAP)
+    assert gap["before_rms_mm"] == pytest.approx(rms(spring.diagnosis.stated.residual), abs=1e-6)
+    assert gap["after_rms_mm"] == pytest.approx(rms(spring.final.residual), abs=1e-6)
+    assert gap["heldout_before_rms_mm"] == pytest.approx(rms(spring.heldout_before), abs=1e-6)
+    assert gap["heldout_after_rms_mm"] == pytest.approx(rms(spring.heldout_after), abs=1e-6)
+    assert gap["noise_mm"] == pytest.approx(1e3 * np.sqrt(3) * SIGMA, rel=1e-6)
+    assert 1e3 * spring.rms["refitted"] == pytest.approx(rms(search.base.residual), abs=1e-6)
+    assert 1e3 * spring.rms["explained"] == pytest.approx(rms(search.final.residual), abs=1e-6)
+    assert spring.rms["after"] < spring.rms["heldout_after"] < spring.rms["refitted"] < spring.rms["before"]
+
+
+@pytest.mark.parametrize("word", VERDICTS)
+@pytest.mark.parametrize("code", ["IDN016", "IDN024", None])
+@pytest.mark.parametrize("strict", [False, True])
+def test_exit(stale, word, code, strict):
+    findings = (Finding(code, ""),) if code else ()
+    result = replace(judged(stale, word), findings=findings, strict=strict)
+    warned = code == "IDN016"
+    if warned and strict:
+        assert result.exit == 1
+    else:
+        assert result.exit == (0 if word in ("named", "nothing_missing") and not warned else 3)
+
+
+def test_a_robot_file_is_only_improved_by_what_is_known(stale):
+    improves = [word for word in VERDICTS if judged(stale, word).improves]
+    assert improves == ["nothing_missing", "named", "partly_named"]
+    assert not judged(stale, "nothing_missing", refitted=()).improves
+
+
+# Sizes of effects
+
+
+def test_what_an_effect_moves_is_what_the_model_without_it_would_leave(spring):
+    (named,) = spring.verdict.named
+    model = spring.final.model
+    without = model.without(["gravity_compensator"])
+    campaign = spring.final.campaign
+    start = campaign.start()
+    by = (
+        campaign.expected(campaign.seen(model), start)[0]
+        - campaign.expected(campaign.seen(without), start)[0]
+    )
+    np.testing.assert_allclose(moved(spring.diagnosis.search, named), by, atol=1e-9)
+    size = spring.moved[named.candidate.key]
+    assert size.rms == pytest.approx(np.sqrt(np.mean(np.sum(by**2, axis=1))), rel=1e-6)
+    assert size.max == pytest.approx(np.linalg.norm(by, axis=1).max(), rel=1e-6)
+
+
+def test_what_the_tracker_takes_up_is_not_moved(spring):
+    """A zero of the first axis turns all positions: so does the tracker."""
+    readings = readings_of(complete(), poses=8, deflection=False)
+    campaign, model = Campaign(readings), complete()
+    sizes = {}
+    for number in (1, 2):
+        asked = asked_for(model, [f"joint_offset.o{number}"])
+        fitted = fit(campaign, asked.model, ())
+        shifted = fitted.model.changed({u.key: 1e-3 for u in asked.unknowns})
+        fitted = replace(fit(campaign, shifted, ()), unknowns=asked.unknowns, covariance=np.eye(1))
+        named = Named(
+            spring.verdict.named[0].candidate, (), fitted.estimates, spring.verdict.named[0].evidence
+        )
+        by = moved(replace(spring.diagnosis.search, final=fitted), named)
+        sizes[number] = np.sqrt(np.mean(by**2))
+    assert sizes[1] < 1e-3 * sizes[2]
+    assert sizes[2] > 1e-4
+
+
+def test_gains_of_all_candidates(spring, stale):
+    search, gains = spring.diagnosis.search, spring.gains
+    names = [candidate.name for candidate in search.linear.candidates]
+    (group,) = search.explained.groups
+    assert names[int(np.argmax(gains.alone))] == "gravity_compensator"
+    assert gains.alone[group] == pytest.approx(gains.beside[group]) == pytest.approx(search_gain(spring))
+    others = np.arange(len(names)) != group
+    # what the compensator explains no other has to
+    assert gains.beside[others].max() < 0.6 * gains.alone[others].max()
+    assert (gains.beside < gains.needed)[others].all()
+    assert gains.alone[group] > gains.needed[group]
+    np.testing.assert_array_equal(stale.gains.alone, stale.gains.beside)
+    single = [len(candidate.unknowns) == 1 for candidate in stale.diagnosis.search.linear.candidates]
+    np.testing.assert_allclose(stale.gains.needed[single], chi2.isf(CHANCE / len(single), 1))
+
+
+def search_gain(result) -> float:
+    return result.verdict.named[0].evidence.gain
+
+
+def test_what_would_have_shown_is_found_that_often(stale):
+    """Readings that hold an effect of just that size, with other scatter each time."""
+    search, rng = stale.diagnosis.search, np.random.default_rng(5)
+    linear, given = search.linear, search.linear.problem
+    sizes = {one.candidate.key: one for one in smallest(search)}
+    shares = {1.0: [], 0.5: []}
+    for g, candidate in enumerate(linear.candidates):
+        size = sizes[candidate.key]
+        if len(candidate.unknowns) > 1 or candidate.shapes or not 0 < size.usual < 100:
+            continue
+        (place,) = given.places[g]
+        column = size.usual * given.matrix[:, place] * np.linalg.norm(linear.columns[g])
+        for share, found in shares.items():
+            scatter = rng.normal(size=given.residual.shape)
+            scatter -= (given.residual == 0) * scatter
+            drawn = replace(given, residual=share * column + scatter)
+            found.append(bool(selected(drawn, range(len(linear.candidates))).groups))
+    assert len(shares[1.0]) >= 12
+    assert np.mean(shares[1.0]) > SURELY - 0.15
+    assert np.mean(shares[0.5]) < 0.6
+
+
+def test_the_size_that_would_have_shown_is_that_of_the_effect(stale):
+    final = stale.final
+    campaign, start = final.campaign, final.campaign.start()
+    for name in ("joint_offset.o3", "backlash.b2", "joint_coupling.r54"):
+        asked = asked_for(final.model, [name])
+        (unknown,) = asked.unknowns
+        (one,) = (
+            one
+            for one in smallest(stale.diagnosis.search)
+            if (one.candidate.name, one.candidate.joint) == (name.partition(".")[0], unknown.parameter.joint)
+        )
+        model = asked.model.changed({unknown.key: one.usual * unknown.parameter.scale})
+        before, after = (campaign.expected(campaign.seen(m), start)[0] for m in (final.model, model))
+        assert one.rms == pytest.approx(np.sqrt(np.mean(np.sum((after - before) ** 2, axis=1))), rel=0.05)
+
+
+def test_what_shows_is_told(spring, stale):
+    sizes = np.array([one.rms for one in smallest(stale.diagnosis.search)])
+    assert np.mean(sizes[np.isfinite(sizes)] <= stale.detectable) == pytest.approx(0.9, abs=0.03)
+    # half as large as the scatter of one reading, or more: there are many
+    assert 0.2 * stale.scatter < stale.detectable < 3 * stale.scatter
+    # what changes little under load vanishes from differences
+    assert {"transmission_error", "hysteresis"} <= set(stale.hardly_tested)
+    assert not {"backlash", "joint_stiffening", "link_compliance"} & set(stale.hardly_tested)
+    assert "gravity_compensator" not in spring.hardly_tested
+    assert {"joint_offset", "gravity_compensator"} <= set(stale.tried)
+    assert "thermal_growth" not in stale.tried
+    assert "thermal_growth" in stale.verdict.not_testable
+
+
+# JSON and CSV
+
+KEYS = {
+    "verdict",
+    "named",
+    "ambiguous",
+    "not_testable",
+    "refitted",
+    "where",
+    "gap",
+    "next_poses",
+    "robot_file",
+}
+KEYS |= {"alternatives", "conditional", "lack", "rejected", "robot", "data", "findings", "outputs", "exit"}
+
+
+def test_json_of_a_name(spring):
+    found = json.loads(json.dumps(spring.as_json(), allow_nan=False))
+    assert set(found) >= KEYS
+    assert (found["verdict"], found["exit"], found["ambiguous"], found["next_poses"]) == (
+        "named",
+        0,
+        [],
+        None,
+    )
+    assert {key: found["gap"][key] for key in GAP} == spring.gap_mm()
+    (named,) = found["named"]
+    assert (named["effect"], named["joints"]) == ("gravity_compensator", ["A2"])
+    truth = complete().terms[1].values
+    for name, unit in (("K_c", "N/m"), ("s0", "m")):
+        one = named["parameters"][name]
+        assert one["unit"] == unit
+        assert abs(one["value"] - truth[name]) < 2 * one["ci95"] < truth[name]
+    evidence = named["evidence"]
+    assert evidence["gain"] == search_gain(spring)
+    assert 0 < evidence["chance"] < 1e-8, "a small number is no zero"
+    assert set(evidence) == {"gain", "chance", "heldout", "regions", "sessions", "margin", "alias"}
+    assert evidence["sessions"] is None
+    assert set(evidence["alias"]) == {"effect", "joint"}
+    for one in found["refitted"]:
+        term, name = one["parameter"].split(".")
+        assert term == "joint_compliance"
+        assert abs(one["value"] - GEARS[0, name]) < 2 * one["ci95"] < abs(one["value"] - one["before"])
+    assert all(0 < one["share"] <= 1 for one in found["where"] + found["where_refitted"])
+
+
+def test_json_of_what_can_not_be_told_apart(spring):
+    result = doubtful(spring)
+    found = result.as_json()
+    (named,) = spring.verdict.named
+    alias = named.evidence.alias
+    assert found["ambiguous"] == [["gravity_compensator", alias.name]]
+    assert found["alternatives"][0][0] == {"effect": "gravity_compensator", "joint": "A2"}
+    assert found["named"] == [], "what may be another is not named"
+    assert found["exit"] == 3
+    # each name once, each set once
+    pair = (named.candidate, alias, replace(alias, joint="A5"))
+    twice = judged(result, "ambiguous", alternatives=(pair, pair[:2]))
+    assert twice.as_json()["ambiguous"] == [["gravity_compensator", alias.name]]
+    planned = replace(result, next_poses=next_poses(spring), next_poses_file="which.csv").as_json()
+    first, second = planned["next_poses"]
+    assert first == pytest.approx(
+        {"A1": 0, "A2": -90, "A3": 90, "A4": 0, "A5": 45.5, "A6": 0, "load_kg": 100}
+    )
+    assert second["load_kg"] == pytest.approx(265)
+    assert planned["next_poses_file"] == "which.csv"
+    assert [one["effect"] for one in planned["next_poses_between"]] == ["gravity_compensator", alias.name]
+    sense = np.tile([1, -1, 0, 1, 1, 1], (2 * len(MARKERS), 1))
+    sensed = replace(result, next_poses=next_poses(spring, direction=sense)).as_json()
+    assert [sensed["next_poses"][0][f"DIR{k}"] for k in (1, 2, 3)] == [1, -1, 0]
+
+
+def test_json_knows_no_numbers_that_are_none(spring, stale):
+    alone = Evidence(5.0, 0.5, np.nan, np.nan, np.nan, np.inf, None)
+    (named,) = spring.verdict.named
+    result = judged(spring, "named", named=(replace(named, evidence=alone),), conditional=True)
+    found = json.loads(json.dumps(result.as_json(), allow_nan=False))
+    assert {found["named"][0]["evidence"][key] for key in ("margin", "heldout", "alias")} == {None}
+    assert found["lack"] is None, "a variance over nothing stated"
+    assert not NO_NUMBER.search(told(result))
+    for one in every_verdict(spring, stale).values():
+        json.dumps(one.as_json(), allow_nan=False)
+
+
+def test_csv_has_a_row_for_each_reading(spring):
+    reader = csv.DictReader(io.StringIO(diagnosed_csv(spring).decode(), newline=""))
+    rows = list(reader)
+    assert len(rows) == len(spring.final.campaign)
+    assert rows[4]["file"] == "loads.csv"
+    assert (rows[4]["line"], rows[4]["pose"], rows[4]["target"], rows[4]["fitted"]) == ("13", "2", "M2", "1")
+    for name, values in (
+        ("before", spring.diagnosis.stated.residual),
+        ("after", spring.final.residual),
+        ("heldout", spring.heldout_after),
+    ):
+        cells = [[float(row[f"{name}_d{axis}_mm"]) for axis in "xyz"] for row in rows]
+        np.testing.assert_allclose(cells, 1e3 * values, atol=1e-6)
+
+
+# Words
+
+
+def test_every_effect_has_words():
+    assert set(NOUNS) == set(EFFECTS)
+    joints = StiffnessModel.from_robot(load_robot(find_robot("kuka_kr270"))).robot.joints
+    for name, words in NOUNS.items():
+        by_joint = {parameter.joint for parameter in EFFECTS[name](joints).parameters} != {""}
+        assert not ("{joints}" in words and not by_joint), name
+
+
+def test_a_paragraph_of_each_verdict(spring, stale):
+    for name, result in every_verdict(spring, stale).items():
+        text = paragraph(result)
+        assert text.endswith("."), name
+        assert not NO_NUMBER.search(text), text
+        assert "  " not in text
+        assert "thermal_growth" in text, "what was not tested is said"
+        assert headline(result).startswith(result.verdict.word.replace("_", " "))
+        conditional = judged(result, result.verdict.word, conditional=True)
+        assert "neither SIGMA nor repeated readings state it" in paragraph(conditional)
+        assert "where readings scatter by" not in paragraph(conditional), "nobody knows that"
+        assert "is the scatter of the readings" not in paragraph(conditional)
+        assert "state it" not in text
+
+
+def millimetres(length) -> str:
+    return f"{1e3 * length:.3f} mm"
+
+
+def test_what_is_said_of_a_name(spring):
+    text = paragraph(spring)
+    (named,) = spring.verdict.named
+    spring_constant = next(e for e in named.estimates if e.unknown.parameter.name == "K_c")
+    value, wide = (float(word) for word in re.search(r"K_c = (\d+) \+- (\d+) N/mm", text).groups())
+    assert 1e3 * value == pytest.approx(spring_constant.value, abs=0.06 * spring_constant.ci95)
+    assert 1e3 * wide == pytest.approx(spring_constant.ci95, rel=0.06)
+    assert text.startswith("What is missing is a gravity compensator across A2")
+    assert f"makes {millimetres(spring.moved[named.candidate.key].rms)} RMS" in text
+    assert (
+        f"leaves {millimetres(spring.rms['before'])} RMS, {millimetres(spring.rms['refitted'])} with its own"
+        in text
+    )
+    assert (
+        f"{millimetres(spring.rms['heldout_before'])} RMS become {1e3 * spring.rms['heldout_after']:.3f}"
+        in text
+    )
+    share = int(re.search(r"(\d+) % of what is more than scatter is closed", text)[1])
+    beyond = spring.rms["heldout_before"] - spring.scatter
+    assert share == pytest.approx(
+        100 * (spring.rms["heldout_before"] - spring.rms["heldout_after"]) / beyond, abs=1.01
+    )
+    assert f"{named.evidence.alias.label}, fits clearly worse: by {named.evidence.margin:.0f} in" in text
+    assert "joint_compliance.c5 from 3.303 to" in text
+    assert "would have shown from" not in text
+    alone = replace(named, evidence=replace(named.evidence, alias=None, margin=np.inf))
+    assert "No other effect that was tried comes near." in paragraph(judged(spring, "named", named=(alone,)))
+
+
+def test_several_names(spring):
+    (named,) = spring.verdict.named
+    nearer = replace(named.evidence, margin=11.0)
+    other = replace(named, evidence=nearer, joints=(), candidate=replace(named.candidate, joint=EVERY))
+    text = paragraph(judged(spring, "named", named=(named, other)))
+    assert text.startswith("2 effects are missing. (1) a gravity compensator across A2:")
+    assert "(2) a gravity compensator across the joints:" in text
+    # the doubt of both is that of the more doubtful one
+    assert (
+        f"to gravity_compensator on {EVERY}, {named.evidence.alias.label}, fits clearly worse: by 11 in"
+        in text
+    )
+
+
+def test_what_does_not_hold_elsewhere_is_told(spring):
+    text = paragraph(replace(spring, heldout_after=2 * spring.heldout_before))
+    assert "on poses that were left out of the fit it brings nothing" in text
+    assert "closed" not in text
+
+
+def test_what_is_said_of_nothing(stale):
+    text = paragraph(stale)
+    moved_ = len(stale.verdict.refitted)
+    assert text.startswith(
+        f"No effect is missing, but {moved_} parameters of the robot file have gone stale: "
+    )
+    assert f"What is left, {millimetres(stale.rms['after'])} RMS, is the scatter of the readings" in text
+    assert f"would have shown from about {millimetres(stale.detectable)} RMS on" in text
+    nothing = paragraph(judged(stale, "nothing_missing", refitted=()))
+    assert nothing.startswith("Nothing is missing. The robot file as it is leaves")
+    good = judged(stale, "nothing_missing", refitted=())
+    good = replace(good, diagnosis=replace(good.diagnosis, stated=stale.final))
+    assert paragraph(good).startswith("Nothing is missing. What is left")
+    assert paragraph(judged(good, "nothing_missing", conditional=True)).startswith(
+        "Nothing is seen to be missing. A missing effect"
+    )
+    assert "clearly less than the scatter that is stated" in paragraph(
+        judged(stale, "nothing_missing", lack=0.3)
+    )
+    wild = np.array(stale.final.residual)
+    wild[0] += 3e-3
+    far = replace(stale)
+    far.__dict__["rms"] = {**stale.rms, "after": 4 * stale.scatter}
+    assert "a few of them lie far off" in paragraph(far)
+
+
+def test_what_is_said_of_doubt(spring):
+    result = doubtful(spring)
+    (named,) = spring.verdict.named
+    alias = named.evidence.alias.label
+    text = paragraph(result)
+    assert f"Whether it is gravity_compensator on A2 or {alias}, these readings can not tell" in text
+    assert "no robot file is made of a guess" in text
+    assert "No pose within the limits" in text
+    assert "K_c" not in text
+    more = lacking(result, "ambiguous", named=result.verdict.named)
+    assert "It would not be all" not in text
+    assert f"It would not be all: {millimetres(result.rms['explained'])} RMS are left" in paragraph(more)
+    planned = replace(result, next_poses=next_poses(spring))
+    assert "Measure these 2 poses: there gravity_compensator on A2" in paragraph(planned)
+    assert "by 4.2 standard deviations" in paragraph(planned)
+    near = replace(planned, next_poses=replace(planned.next_poses, separation=(9.0, 0.4)))
+    assert "would not settle it: there gravity_compensator on A2" in paragraph(near)
+    assert "differ by 0.4 standard deviations, 3.2 are needed" in paragraph(near)
+    assert "Measure these" not in paragraph(near)
+    assert "Measure these 2 poses (which.csv): " in paragraph(replace(planned, next_poses_file="which.csv"))
+
+
+def test_what_is_said_of_the_unknown(spring, stale):
+    result = lacking(spring)
+    text = paragraph(result)
+    assert text.startswith(
+        f"Something is missing: {millimetres(result.rms['after'])} RMS are left where readings scatter"
+    )
+    assert f"none of the {len(result.tried)} effects that were tried" in text
+    assert (
+        f"found is gravity_compensator on A2, and with it still {millimetres(result.rms['explained'])}"
+        in text
+    )
+    assert f"What is left goes with {result.patterns[0].variable} (" in text
+    rejected = (
+        (stale.diagnosis.search.linear.candidates[0], "its parameters would have to lie at their bounds"),
+    )
+    unclear = judged(stale, "unknown", rejected=rejected)
+    assert paragraph(unclear).startswith("Whether something is missing is not clear.")
+    assert "is not named: its parameters would have to lie at their bounds" in paragraph(unclear)
+    assert headline(unclear) == "unknown: not clear whether something is missing"
+    part = lacking(spring, "partly_named", named=spring.verdict.named)
+    assert f"That is not all: {millimetres(part.rms['after'])} RMS are left" in paragraph(part)
+
+
+def test_what_would_show_what_was_not_tested(stale):
+    fitted = stale.final
+    assert shown_by("joint_offset", fitted) == "absolute positions"
+    assert shown_by("thermal_growth", fitted).startswith("a column TEMP")
+    assert shown_by("hysteresis", fitted) == "poses reached from both sides"
+    assert "compensate plan" in shown_by("tool_compliance", fitted)
+    warm = replace(fitted.campaign.readings, temperature=np.linspace(20, 30, len(fitted.campaign)))
+    assert shown_by("thermal_growth", replace(fitted, campaign=Campaign(warm))) == "absolute positions"
+    readings = readings_of(complete(), poses=2, deflection=False)
+    idle = replace(readings, wrench=0 * readings.wrench)
+    there = replace(fitted, campaign=Campaign(idle))
+    assert shown_by("joint_compliance", there) == "readings with and without a weight"
+    unplaced = replace(there, campaign=Campaign(replace(idle, places={})))
+    assert shown_by("tool_offset", unplaced) == "targets whose places are stated"
+    rigid = replace(fitted.point, model=replace(fitted.model, terms=()))
+    assert "give way" in shown_by("payload", replace(there, point=rigid))
+
+
+# Terminal
+
+
+def test_the_tables_tell_what_was_found(spring):
+    text = told(spring)
+    assert text.startswith("named: gravity_compensator on A2\nWhat is missing is")
+    (named,) = spring.verdict.named
+    assert "60 readings (deflections) at 20 poses, 3 targets, 1 session" in text
+    for estimate in named.estimates:
+        (row,) = re.findall(rf"^  {estimate.unknown.parameter.name} +(\d+) +(\d+)", text, re.M)
+        size = {"N/m": 1e3, "m": 1e-3}[estimate.unknown.parameter.unit]
+        assert float(row[0]) * size == pytest.approx(estimate.value, abs=0.06 * estimate.ci95)
+        assert float(row[1]) * size == pytest.approx(estimate.ci95, rel=0.06)
+    evidence = re.search(r"^gravity_compensator on A2 +(\d+) +(\S+) .* over (.+?) *$", text, re.M)
+    assert float(evidence[1]) == pytest.approx(named.evidence.gain, abs=0.51)
+    assert evidence[3] == named.evidence.alias.label
+    for one in spring.verdict.refitted:
+        assert re.search(rf"^{one.unknown.name} +{1e6 * one.unknown.value:.3f}", text, re.M)
+    for name, words in (("before", "the robot file"), ("refitted", "its own parameters fitted anew")):
+        assert re.search(rf"^{words} +{1e3 * spring.rms[name]:.3f} ", text, re.M)
+    first = spring.patterns[0]
+    assert re.search(rf"^{first.variable} +{100 * first.share:.0f} %", text, re.M)
+    assert "-o NEW.yaml writes the robot file" in text
+    assert "-o NEW.yaml" not in told(replace(spring, robot_file="new.yaml", outputs=("new.yaml",)))
+    assert max(len(line.rstrip()) for line in told(spring, width=110).splitlines()[1:]) <= 110
+
+
+def test_the_tables_of_doubt(spring):
+    result = replace(doubtful(spring), next_poses=next_poses(spring))
+    text = told(result)
+    keys = [candidate.key for candidate in spring.diagnosis.search.linear.candidates]
+    for candidate in result.verdict.alternatives[0]:
+        gain = spring.gains.alone[keys.index(candidate.key)]
+        assert re.search(rf"^{re.escape(candidate.label)} +{gain:.0f} *$", text, re.M)
+    assert re.search(r"^1 +0\.0 +-90\.0 +90\.0 +0\.0 +45\.5 +0\.0 +100\.0", text, re.M)
+    assert "--next-poses FILE.csv writes the poses" in text
+    assert "--next-poses" not in told(replace(result, next_poses_file="which.csv"))
+    assert "-o NEW.yaml" not in text
+    assert "DIR" not in text
+    sense = np.ones((2 * len(MARKERS), 6))
+    assert "columns DIR of the plan" in told(replace(result, next_poses=next_poses(spring, direction=sense)))
+
+
+def test_every_verdict_is_shown(spring, stale):
+    for result in every_verdict(spring, stale).values():
+        text = told(result)
+        assert text.startswith(headline(result))
+        assert not NO_NUMBER.search(text)
+    long, short = told(lacking(spring), verbose=True), told(lacking(spring))
+    assert len(long.splitlines()) >= len(short.splitlines())
+
+
+def test_names_do_not_drive_the_terminal(spring):
+    hostile = replace(spring, data=(("a\x1b[2J[red].csv", "0" * 64),), outputs=("out\x1b[2J.yaml",))
+    text = told(hostile)
+    assert "\x1b" not in text
+    assert "a?[2J[red].csv" in text
+
+
+# Picture
+
+
+def drawn(monkeypatch, result):
+    """The panels of the figure that is drawn of ``result``."""
+    figures = []
+    monkeypatch.setattr(picture_module, "rendered", lambda draw, kind: figures.append(draw()))
+    diagnosed_picture(result, "png")
+    return figures[0].axes
+
+
+def test_picture_files(spring):
+    raw = diagnosed_picture(spring, "png")
+    assert raw == diagnosed_picture(spring, "png")
+    assert raw.startswith(b"\x89PNG")
+    shapes = ElementTree.fromstring(diagnosed_picture(spring, "svg")).iter()
+    assert sum(bool(re.fullmatch(r"axes_\d+", node.get("id", ""))) for node in shapes) == 4
+
+
+def test_the_picture_shows_the_gap_of_each_pose(monkeypatch, spring):
+    gap, *_ = drawn(monkeypatch, spring)
+    lines = {line.get_label(): line for line in gap.lines}
+    assert list(lines)[:2] == ["robot file", "its parameters fitted anew"]
+    for label, residual in (
+        ("robot file", spring.diagnosis.stated.residual),
+        ("model to go on with", spring.final.residual),
+        ("the same, poses not fitted", spring.heldout_after),
+    ):
+        mean = np.sqrt(np.mean(np.sum(residual.reshape(20, 3, 3) ** 2, axis=2), axis=1))
+        order = [int(text.get_text()) - 1 for text in gap.get_xticklabels()]
+        np.testing.assert_allclose(lines[label].get_ydata(), 1e3 * mean[order], rtol=1e-9)
+    assert (np.diff(lines["robot file"].get_ydata()) <= 0).all()
+
+
+def test_the_picture_shows_what_betrays_the_effect(monkeypatch, spring, stale):
+    first, second = betrayals(spring)
+    assert {one.variable.name for one in (first, second)} == {"A2 over its torque", "A2 over its angle"}
+    angle = next(one for one in (first, second) if one.variable.unit == "deg")
+    campaign = spring.final.campaign
+    np.testing.assert_allclose(angle.variable.values, np.degrees(campaign.readings.q[:, 1]))
+    # along the way that each target takes when A2 turns
+    model, seen = replace(spring.final.model, terms=()), []
+    for step in (-1e-6, 1e-6):
+        moved_ = replace(campaign.readings, q=campaign.readings.q + step * np.eye(6)[1], deflection=False)
+        there = Campaign(replace(moved_, in_robot_frame=True))
+        seen.append(there.expected(there.seen(model), there.start())[0])
+    way = (seen[1] - seen[0]) / np.linalg.norm(seen[1] - seen[0], axis=1)[:, None]
+    for values, fitted in ((angle.before, spring.diagnosis.search.base), (angle.after, spring.final)):
+        np.testing.assert_allclose(values, 1e3 * np.sum(fitted.residual * way, axis=1), atol=2e-3)
+    assert np.std(angle.after) < 0.3 * np.std(angle.before)
+    panels = drawn(monkeypatch, spring)
+    assert len(panels) == 4
+    assert "of what is left" in panels[1].get_title()
+    # where nothing betrays anything, the order of the readings is shown once
+    calm = replace(stale)
+    calm.__dict__["patterns"] = ()
+    (only,) = betrayals(calm)
+    assert (only.variable.name, only.turning) == ("order", False)
+    np.testing.assert_allclose(only.after, 1e3 * np.linalg.norm(stale.final.residual, axis=1))
+    assert len(drawn(monkeypatch, calm)) == 3
+
+
+def test_the_picture_shows_the_evidence(monkeypatch, spring):
+    *_, bars = drawn(monkeypatch, spring)
+    labels = [text.get_text() for text in bars.get_yticklabels()]
+    assert labels[0] == "gravity_compensator on A2"
+    assert spring.verdict.named[0].evidence.alias.label in labels
+    assert len(labels) == BARS
+    widths = [patch.get_width() for patch in bars.patches[::2]]
+    assert widths == sorted(widths, reverse=True)
+    assert widths[0] == pytest.approx(search_gain(spring))
+    rejected = judged(
+        doubtful(spring), "ambiguous", rejected=((spring.diagnosis.search.linear.candidates[0], ""),)
+    )
+    roles = roles_of(rejected)
+    assert sorted(roles.values()) == ["can not be told apart", "can not be told apart", "rejected"]
+    assert sorted(roles_of(spring).values()) == ["named", "nearest other explanation"]
+
+
+def test_each_fit_is_drawn_once(spring, stale):
+    assert series(spring) == ["before", "refitted", "after", "heldout_after"]
+    assert series(stale) == ["before", "after", "heldout_after"]
+    assert series(doubtful(spring)) == ["before", "explained", "after", "heldout_after"]
