@@ -359,11 +359,15 @@ CODES: dict[str, Code] = {
     ),
     "MEA009": Code("info", "frame is not used", "Deflections stand in the axes of the robot base."),
     # plan
-    "PLN001": Code("error", "no pose can be measured", "Limits, room and sight to the tracker leave no pose."),
+    "PLN001": Code(
+        "error", "no pose can be measured", "Limits, room and sight to the tracker leave no pose."
+    ),
     "PLN002": Code("error", "nothing can be seen", "No pose and load on offer shows what is asked for."),
     "PLN003": Code("error", "no stable rest", "The deflected robot has no equilibrium under these loads."),
     "PLN004": Code("error", "not enough distinct poses", "Ask for fewer poses, or for a smaller --spacing."),
-    "PLN005": Code("error", "no load", "A deflection is what a load does; name the weights that can be hung."),
+    "PLN005": Code(
+        "error", "no load", "A deflection is what a load does; name the weights that can be hung."
+    ),
     "PLN006": Code("error", "plan can not be made so", "Two options do not go together."),
     "PLN007": Code(
         "warning",

@@ -54,8 +54,8 @@ class Term:
 @dataclass(frozen=True)
 class Equilibrium:
     """Loaded states: ``coordinates`` (N, m) [rad, m], of them ``displacement`` (N, m) by load; ``pose`` of the TCP in
-    the robot base, ``mount`` (N, 3) [m] its place without the spindle's own give; ``converged`` (N,): a stable equilibrium
-    was found; ``steps`` iterations of the slowest state."""
+    the robot base, ``mount`` (N, 3) [m] its place without the spindle's own give; ``converged`` (N,): a stable
+    equilibrium was found; ``steps`` iterations of the slowest state."""
 
     coordinates: Floats
     displacement: Floats

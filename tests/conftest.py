@@ -11,7 +11,7 @@ import pytest
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is there
 
-from postproc.cli.main import run  # noqa: E402
+from postproc.cli.main import run
 
 CELL = """\
 robot: kuka_kr270

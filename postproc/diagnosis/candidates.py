@@ -17,7 +17,7 @@ from postproc.model import StiffnessModel
 
 EVERY = "all joints"
 
-UNSEEN = 1e-4
+UNSEEN = 0.1
 """Standard deviations by which a group of its usual size must move all readings together to be testable."""
 
 
@@ -62,10 +62,11 @@ class Candidate:
     @property
     def label(self) -> str:
         """As people say it: effect, its options where they tell two forms apart, and joint."""
-        options = [
-            f"{value}" for key, value in self.effect.described().items() if key in ("harmonics", "variable")
-        ]
-        words = f"{self.name}{' ' + ' '.join(options) if options else ''}"
+        options, words = self.effect.described(), self.name
+        if "harmonics" in options:
+            words += f" (harmonic {str(options['harmonics']).strip('[]').replace('.0', '')})"
+        if "variable" in options:
+            words += f" (by {options['variable']})"
         return f"{words} on {self.joint}" if self.joint else words
 
 

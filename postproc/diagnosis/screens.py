@@ -28,11 +28,12 @@ class Where:
     share: float
 
 
-def where(fitted: Fit) -> tuple[Where, ...]:
+def where(fitted: Fit, chance: float = CHANCE) -> tuple[Where, ...]:
     """The clear patterns in what ``fitted`` leaves, largest first.
 
     Tried are a turn of each joint that depends on its own angle, torque or sense of approach, and a shift of the tool
     that depends on load, order, time, temperature or session; each as a step function in up to ``BINS`` parts.
+    ``chance``: probability that any is told although there is none.
     """
     from scipy.stats import f
 
@@ -55,9 +56,9 @@ def where(fitted: Fit) -> tuple[Where, ...]:
         freedom = rows - rank
         if freedom < 3 or squares <= 0:
             continue
-        chance = f.sf(explained / rank / ((squares - explained) / freedom), rank, freedom)
+        by_chance = f.sf(explained / rank / ((squares - explained) / freedom), rank, freedom)
         share = 1.0 - (1.0 - explained / squares) * rows / freedom
-        if chance * len(tried) < CHANCE and share > 0:
+        if by_chance * len(tried) < chance and share > 0:
             words = _words(residual, part, parts, unit)
             if variable in ("order", "time") and _goes_with_poses(values, campaign.readings.q):
                 words += "; but the poses were taken in such an order: measure again in random order"

@@ -12,6 +12,7 @@ from postproc.diagnosis.candidates import Candidate, candidates, testable
 from postproc.diagnosis.selection import Explained, Problem, explained, problem, scatter, selected
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
+from postproc.identification.noise import Weighting
 from postproc.identification.solve import Point, at, prior_rows, scales
 from postproc.identification.unknowns import Unknown, unknowns_of, with_mechanism
 from postproc.model import StiffnessModel
@@ -120,8 +121,10 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
     every = candidates(campaign, base.model, base.point.given)
     shown = [c for c in every if testable(c, base.weights) and c.key not in banned]
     hidden = tuple(c for c in every if not testable(c, base.weights))
+    # what a missing effect does to all readings of a pose looks like an error that they share
+    weights = replace(base.weights, shared=0.0)
     while True:
-        linear = _linear(campaign, base, fitted, chosen, shown)
+        linear = _linear(campaign, base, weights, fitted, chosen, shown)
         before = {c.key for c in chosen}
         begin = [i for i, c in enumerate(linear.candidates) if c.key in before]
         found = selected(linear.problem, range(len(linear.candidates)), begin)
@@ -140,16 +143,22 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
                 return done
         tried.add(keys)
         chosen, fitted = now, with_effects(campaign, base, now) if now else base
+        weights = replace(base.weights, shared=fitted.weights.shared)
 
 
 def _linear(
-    campaign: Campaign, base: Fit, fitted: Fit, chosen: Sequence[Candidate], shown: Sequence[Candidate]
+    campaign: Campaign,
+    base: Fit,
+    weights: Weighting,
+    fitted: Fit,
+    chosen: Sequence[Candidate],
+    shown: Sequence[Candidate],
 ) -> Linear:
     """The problem that the candidates' columns make of what ``fitted`` leaves without what was chosen; priors of the
     model's own parameters count as rows."""
     looked = _as_fitted(fitted, chosen, shown)
     own, nuisance = base.point.taken
-    whiten, prior = base.weights, prior_rows(base.unknowns)
+    whiten, prior = weights, prior_rows(base.unknowns)
     prior = prior[prior.any(axis=1)]
     bare = _without(campaign, fitted, chosen)
     away = np.array([u.value for u in base.unknowns]) - _values(bare.model, base.unknowns)

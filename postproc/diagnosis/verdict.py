@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.diagnosis.candidates import EVERY, Candidate, names_of
+from postproc.diagnosis.screens import where
 from postproc.diagnosis.search import Search
 from postproc.diagnosis.selection import (
     Explained,
@@ -35,6 +36,9 @@ MARGIN = 10.0
 
 LACK = 3.0
 """Standard deviations of its own by which the variance left must exceed the stated one to be a lack of fit."""
+
+STRUCTURE = 0.001
+"""Probability that what is left shows a pattern by chance: one that follows a joint is no scatter, however small."""
 
 TOLERATED = 0.15
 """Share of the variance that heavier tails than normal may add."""
@@ -114,6 +118,7 @@ def judged(found: Search) -> Verdict:
         if any(n.candidate is linear.candidates[g] for n in named)
     ]
     lack, lacking = lack_of_fit(found, last)
+    lacking = lacking or bool(where(found.final, STRUCTURE))
     bare, _ = lack_of_fit(found, explained(linear.problem, ()))
     sets = tuple(a for a in aliases if len(a) > 1)
     enough = lack - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)
@@ -255,7 +260,7 @@ def refitted(final: Fit) -> tuple[Estimate, ...]:
     moved = []
     for estimate in final.estimates:
         stated = estimate.unknown.stated
-        if stated is None or estimate.unknown.prior is not None:
+        if stated is None or estimate.unknown.parameter.hardware:
             continue
         doubt = np.hypot(estimate.ci95, stated.interval or 0.0)
         if abs(estimate.value - stated.value) > 1.5 * doubt:

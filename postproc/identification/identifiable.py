@@ -102,7 +102,10 @@ def insight(
 def _limit(unknown: Unknown, value: float) -> float:
     """[SI] An interval wider than this says nothing of the unknown."""
     null = unknown.parameter.null
-    usual = 0.0 if unknown.stated is None else abs(unknown.stated.value - null)
+    stated = unknown.stated
+    usual = 0.0 if stated is None else abs(stated.value - null)
+    if stated is not None and stated.interval and stated.interval > usual:
+        usual = 0.0  # hardly another value than the null
     return max(abs(value - null), usual or FAR * unknown.parameter.scale)
 
 

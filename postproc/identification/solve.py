@@ -27,7 +27,8 @@ DAMPING, LOOSE = 1e-5, 1e-7
 
 
 BENT, CAREFUL = 0.3, 1e-4
-"""Share of a step's effect that may come otherwise than foreseen, and the damping that the next step begins with then."""
+"""Share of a step's effect that may come otherwise than foreseen, and the damping that the next step begins with
+then."""
 
 
 @dataclass(frozen=True)

@@ -29,14 +29,27 @@ TURN = 6.6
 ALIKE = 1.0 * DEG
 """Joints that all move by less stand in one pose."""
 
-STIFF, SOFT = 2e-9, 2e-4
+STIFF, SOFT = 5e-8, 2e-4
 """[m/N] No robot gives way by less or by more."""
+
+UNITS = (
+    (9.80665, "the forces in kg"),
+    (1.0 / 25.4, "the deflections in inches"),
+    (1e-3, "the deflections in metres"),
+    (1e3, "the deflections in micrometres, or the forces in kN"),
+)
+"""Ratio of deflections to those that the robot file foresees, and the unit that would make it so."""
+
+ABOUT, ALONG = 1.4, 0.9
+"""How far a ratio may be from that of a unit, and the cosine of deflections with those foreseen from which on there is
+a ratio."""
 
 FAR = 3.0 * MM
 """Absolute positions that a registration leaves further away, root mean square, are looked at."""
 
-POOR = 0.3
-"""Share of the deflections that a fit leaves, root mean square, from which on they are looked at."""
+TRIED, POOR = 0.03, 0.3
+"""Shares of the deflections that a fit leaves, root mean square: from the first on changes to the data are tried out,
+from the second on it is told where none helps."""
 
 SCATTER = 2.0
 """Times the stated scatter: what is left below that is no cause to look."""
@@ -144,7 +157,9 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
     if campaign.readings.rotation is not None:
         campaign = Campaign(replace(campaign.readings, rotation=None, sigma_turn=None), campaign.stated_tool)
     left, signal = _left(campaign, model, unknowns)
-    if not _badly(campaign, left, signal):
+    if campaign.readings.deflection:
+        _check_scale(campaign, model)
+    if not _badly(campaign, left, signal, TRIED):
         return ()
     some = np.unique(np.linspace(0, len(campaign) - 1, LOOKED_AT).round().astype(int))
     if len(campaign) <= LOOKED_AT:
@@ -168,7 +183,7 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
             )
         )
     left, _ = _left(campaign, model, unknowns, True)
-    if not _badly(campaign, left, signal):
+    if not _badly(campaign, left, signal, POOR):
         return ()
     what = f"{left / MM:.3g} mm are left, root mean square"
     if campaign.readings.deflection:
@@ -183,10 +198,35 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
     )
 
 
-def _badly(campaign: Campaign, left: float, signal: float) -> bool:
+def _check_scale(campaign: Campaign, model: StiffnessModel) -> None:
+    """Refuses (IDN012) deflections that are those of the robot file times the ratio of two units.  Stiffnesses that it
+    states without an interval may be anything, and foresee nothing."""
+    sure = [t for t in model.terms if t.effect.family == "elastic" and any(v.interval for v in t.stated.values())]
+    if not sure:
+        return
+    expected, _ = campaign.expected(campaign.seen(model), campaign.start())
+    both = np.isfinite(expected) & np.isfinite(campaign.readings.value)
+    foreseen, measured = expected[both], campaign.readings.value[both]
+    size = float(np.linalg.norm(foreseen) * np.linalg.norm(measured))
+    if not foreseen @ measured > ALONG * size:
+        return
+    ratio = float(np.linalg.norm(measured) / np.linalg.norm(foreseen))
+    for factor, unit in UNITS:
+        if 1.0 / ABOUT < ratio / factor < ABOUT:
+            raise Refusal(
+                Finding(
+                    "IDN012",
+                    f"deflections are {ratio:.2g} times those that the robot file foresees: are {unit}?",
+                    str(campaign.readings.files[0]) if campaign.readings.files else "",
+                    help="DX, DY, DZ are in mm, forces in N; if they are, the intervals of the robot file are wrong",
+                )
+            )
+
+
+def _badly(campaign: Campaign, left: float, signal: float, share: float) -> bool:
     if left < SCATTER * noise_of(campaign.readings).rms:
         return False
-    return left > (POOR * signal if campaign.readings.deflection else FAR)
+    return left > (share * signal if campaign.readings.deflection else FAR)
 
 
 def _left(

@@ -1,4 +1,4 @@
-"""A diagnosis in one paragraph, for who has to cut with it: no more than the readings bear."""
+"""A diagnosis in one paragraph, for whoever cuts with it: no more than the readings bear."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ NOUNS = {
     "thermal_growth": "growth of the links before {joints}: they lengthen as the robot warms up",
     "force_sensor": "an error of the stated forces: in their scale or their zero",
 }
-"""What an effect is, to who does not know its name."""
+"""What an effect is, to those who do not know its name."""
 
 SETTLES = MARGIN**0.5
 """Standard deviations by which two explanations must differ for one to be named."""
@@ -138,8 +138,8 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
     if apart < SETTLES:
         yield (
             f"The best {count(len(planned.poses), 'pose')} with what was hung so far would not settle it: there {first}"
-            f" and {second} differ by {apart:.1f} standard deviations, {SETTLES:.1f} are needed. Other loads or targets, or"
-            " less scatter, may."
+            f" and {second} differ by {apart:.1f} standard deviations, {SETTLES:.1f} are needed. Other loads or"
+            " targets, or less scatter, may."
         )
         return
     where = f" ({result.next_poses_file})" if result.next_poses_file else ""

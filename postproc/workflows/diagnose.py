@@ -43,14 +43,17 @@ LOADS = 3
 USUAL_SIGMA = 0.03 * MM
 """Scatter that poses are proposed for where nothing states one."""
 
+TRIED = 3
+"""Explanations of a set that are told apart two by two."""
+
 CANDIDATES = 600
 """Poses to choose from."""
 
 
 @dataclass(frozen=True)
 class DiagnoseRequest:
-    """What the user asked for.  ``robot``: None takes the one that the data name; ``next_poses``: where a plan goes that
-    tells explanations apart, beside ``output`` without it."""
+    """What the user asked for.  ``robot``: None takes the one that the data name; ``next_poses``: where a plan goes
+    that tells explanations apart, beside ``output`` without it."""
 
     data: tuple[Path, ...]
     robot: str | None = None
@@ -83,7 +86,9 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
         robot=measured.robot.name,
         robot_digest=measured.robot.digest,
         robot_path=measured.robot.path,
-        data=tuple((p.name, d) for p, d in zip(measured.readings.files, measured.readings.digests, strict=True)),
+        data=tuple(
+            (p.name, d) for p, d in zip(measured.readings.files, measured.readings.digests, strict=True)
+        ),
         diagnosis=found,
         heldout_before=heldout[0],
         heldout_after=heldout[1],
@@ -112,13 +117,9 @@ def _spare_inputs(request: DiagnoseRequest) -> None:
 def _next_poses(measured: Measured, found: Diagnosis) -> NextPoses | None:
     """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do."""
     offer = _offer(measured, found.search.base)
-    for alternatives in found.verdict.alternatives:
-        for one, other in combinations(alternatives, 2):
-            # what a new campaign of another kind would show is not proposed
-            planned = _told_apart(measured, found, offer, one, other)
-            if planned is not None:
-                return planned
-    return None
+    pairs = [pair for several in found.verdict.alternatives for pair in combinations(several[:TRIED], 2)]
+    plans = [_told_apart(measured, found, offer, one, other) for one, other in pairs]
+    return max((plan for plan in plans if plan), key=lambda plan: min(plan.separation), default=None)
 
 
 def _told_apart(
@@ -195,7 +196,9 @@ def _published(request: DiagnoseRequest, measured: Measured, result: Diagnosed, 
         plan = request.output.with_name(request.output.stem + ".next_poses.csv")
     if result.next_poses is not None and plan is not None:
         if plan.resolve() in {path.resolve() for path in request.data}:  # an earlier plan, filled in
-            raise Refusal(Finding("FIL007", "would replace an input", str(plan), help="say --next-poses FILE.csv"))
+            raise Refusal(
+                Finding("FIL007", "would replace an input", str(plan), help="say --next-poses FILE.csv")
+            )
         files[plan] = measurements_csv(result.next_poses.readings, _about(result))
         result = replace(result, next_poses_file=str(plan))
     if request.csv is not None:
@@ -225,4 +228,3 @@ def _about(result: Diagnosed) -> list[str]:
         "fill in the readings and give them to `compensate diagnose` together with those before",
         "what stands around the arm was not looked at, drive slowly to every pose for the first time",
     ]
-
