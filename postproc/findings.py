@@ -334,6 +334,11 @@ CODES: dict[str, Code] = {
     "IDN030": Code(
         "info", "level of an interval is not stated", "A prior with such an interval counts as one of 95 %."
     ),
+    "IDN031": Code(
+        "warning",
+        "readings count twice",
+        "An interval of the robot file came from the same readings; it is no second source. Start from the file before.",
+    ),
     # diagnosis
     "DIA001": Code("error", "too few poses for a verdict", "Of so few poses any explanation would fit."),
     # measurements

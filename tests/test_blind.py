@@ -47,7 +47,7 @@ def test_truth_is_the_plants(effect):
 @pytest.mark.parametrize("effect", OUTSIDE)
 def test_outside_is_none_of_the_library(effect):
     """No effect of the library alone does the same."""
-    run = made(case("outside", effect, 5.0, 30))
+    run = made(case("outside", effect, 5.0, 15))
     hidden, _size = run.hidden[0]
     assert effect not in EFFECTS
     assert hidden.outside
@@ -124,22 +124,75 @@ def test_nulls_and_outsiders():
 
 # The small fixed part.
 
-CLEAR = []
-NULLS = [case("null_clean", "", 0.0, 15), case("null_cluttered", "", 0.0, 30, 4)]
+NULLS = [
+    case("null_clean", "", 0.0, 15),
+    case("null_clean", "", 0.0, 30, 2),
+    *(case("null_cluttered", "", 0.0, poses, number) for poses, number in ((15, 0), (30, 4), (15, 3))),
+]
+CLEAR = [
+    *(case("single", "gravity_compensator", 5.0, 30, number) for number in (0, 1)),
+    *(case("single", "link_compliance", 5.0, 30, number) for number in (0, 1)),
+    case("single", "tool_compliance", 5.0, 15),
+    case("single", "force_sensor", 5.0, 30),
+    case("single", "joint_compliance", 5.0, 30, 1),
+    case("single", "backlash", 5.0, 30, 1),
+    case("single", "hysteresis", 5.0, 15),
+    case("single", "joint_coupling", 5.0, 15),
+]
+STRANGE = [case("outside", "leaning_stiffness", 5.0, 30)]
+HOPELESS = [case("unidentifiable", "balancer_at_one_angle", 2.0, 15, number) for number in (0, 1)]
 
 
 @pytest.fixture(scope="module")
-def records():
-    """What the diagnosis says of some runs."""
+def said():
+    """``said(case)``: the record of a run."""
     diagnosing = command.Diagnosing()
-    found = {}
-    for one in (*NULLS, *CLEAR):
-        found[one] = command.record_of(one, diagnosing, with_gap=False)
+    yield lambda one: command.record_of(one, diagnosing, with_gap=False)
     diagnosing.close()
-    return found
 
 
-@pytest.mark.parametrize("one", NULLS, ids=lambda c: c.key)
-def test_nothing_is_named_where_nothing_is(records, one):
-    assert records[one]["outcome"] == "exact"
-    assert not table.is_named(records[one])
+def name(one):
+    return f"{one.row} {' '.join(one.effects)} {one.poses} {one.number}"
+
+
+@pytest.mark.parametrize("one", NULLS, ids=name)
+def test_nothing_is_named_where_nothing_is(said, one):
+    record = said(one)
+    assert record["outcome"] == "exact"
+    assert not table.is_named(record)
+
+
+@pytest.mark.parametrize("one", CLEAR, ids=name)
+def test_what_is_hidden_is_named(said, one):
+    assert said(one)["outcome"] == "exact"
+
+
+@pytest.mark.parametrize("one", STRANGE, ids=name)
+def test_what_no_library_has_is_unknown(said, one):
+    record = said(one)
+    assert record["outcome"] == "unknown"
+    assert not table.is_named(record)
+
+
+@pytest.mark.parametrize("one", HOPELESS, ids=name)
+def test_what_can_not_be_told_apart_is_not_claimed(said, one):
+    assert said(one)["right"]
+
+
+def test_tables_count_every_run(tmp_path):
+    answer = {"verdict": "unknown", "seconds": 1.0}
+    common = {"snr": 2.0, "poses": 15, "reached": True, "rivals": [], "covered": None, "answer": answer}
+    records = [
+        {**common, "row": "single", "effects": [effect], "outcome": "unknown", "right": False}
+        for effect in EVERY
+    ]
+    assert table.confusion(records)[2].sum() == len(EVERY)
+    assert any("0 of   18" in line for line in table.matrix(records))
+    table.picture(records, tmp_path / "confusion.png")
+    assert (tmp_path / "confusion.png").stat().st_size > 10_000
+
+
+def test_what_was_run_is_not_run_again(tmp_path):
+    path = tmp_path / "runs.jsonl"
+    path.write_text('{"key": "single/0/1", "x": 1}\n{"key": "other/0/1"}\n{"key": "single/1')
+    assert command._kept(path, {"single/0/1", "single/1/1"}) == [{"key": "single/0/1", "x": 1}]

@@ -87,6 +87,7 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
     _spare_inputs(request)
     stage("reading")
     measured = measured_of(request.data, request.robot, request.tool_mm_deg)
+    _spare(request.output, measured.robot.path)
     campaign, model = measured.campaign, measured.model
     asked = asked_for(model, request.effects, request.priors)
     check_numbers(measured.readings, asked.unknowns, asked.model)
@@ -206,6 +207,12 @@ def _spare_inputs(request: IdentifyRequest) -> None:
         raise Refusal(Finding("FIL007", "two results have the same name", str(written[0])))
 
 
+def _spare(output: Path | None, robot: Path) -> None:
+    """Robots that are named and not given as a path are inputs too."""
+    if output is not None and output.resolve() == robot.resolve():
+        raise Refusal(Finding("FIL007", "would replace the robot file that was read", str(output)))
+
+
 def _outliers(after: Fit, leave_out: bool) -> tuple[tuple[Outlier, ...], Bools]:
     """All outliers, and the rows that count.  Where outliers are left out, those that they hid are looked for too."""
     rows = np.ones(len(after.campaign), bool)
@@ -321,7 +328,18 @@ def _told(
     unstated = [u.name for u in asked.unknowns if u.prior is not None and u.stated and u.stated.level is None]
     if unstated:
         told.append(Finding("IDN030", ", ".join(unstated), str(measured.robot.path)))
+    again = _counted_before(measured, asked)
+    if again:
+        told.append(Finding("IDN031", ", ".join(again), str(measured.robot.path)))
     return told
+
+
+def _counted_before(measured: Measured, asked: Asked) -> list[str]:
+    """Unknowns of which the prior came from some of these readings."""
+    digests = set(measured.readings.digests)
+    runs = [run for run in measured.robot.identified if digests & {digest for _, digest in run.data}]
+    names = {name for run in runs for name in run.names}
+    return [u.name for u in asked.unknowns if u.prior is not None and u.name in names]
 
 
 def _published(request: IdentifyRequest, measured: Measured, result: Identified, stage: Stage) -> Identified:

@@ -10,9 +10,13 @@ import numpy as np
 
 from postproc import __version__
 from postproc.identification.fit import Fit
+from postproc.identification.unknowns import Unknown
 from postproc.robot.description import Robot
 from postproc.robot.provenance import GAP, Identification
 from postproc.robot.writing import WrittenEffect, WrittenParameter, robot_file
+
+SAME_WIDTH, SAME_PLACE = 0.99, 0.01
+"""Share of the deviation of a prior that is left, and of it by which its value moves, where readings say nothing."""
 
 
 def new_robot_file(
@@ -25,12 +29,16 @@ def new_robot_file(
 ) -> bytes:
     """The bytes of ``destination``: the file of ``robot`` with what ``fitted`` found, read back by its writer.
 
-    ``effects``: as they were asked for or named; ``gap``: of it those keys count that provenance knows [mm].
+    A dimension of which the readings say no more than its prior did keeps what the file states of it.  ``effects``: as
+    they were asked for or named; ``gap``: of it those keys count that provenance knows [mm].
     """
+    deviation = np.sqrt(np.diag(fitted.covariance))
     campaign, today = fitted.campaign, datetime.now(UTC).date().isoformat()
     files = [path.name for path in campaign.readings.files]
     source = f"{command}: {', '.join(files)} ({len(campaign)} readings, {campaign.poses} poses), {today}"
-    found = {estimate.unknown.key: estimate for estimate in fitted.estimates}
+    told = [_told_by_readings(e.unknown, e.value, d) for e, d in zip(fitted.estimates, deviation, strict=True)]
+    estimates = [estimate for estimate, by in zip(fitted.estimates, told, strict=True) if by]
+    found = {estimate.unknown.key: estimate for estimate in estimates}
     written = []
     for index, term in enumerate(fitted.model.terms):
         parameters = []
@@ -44,10 +52,10 @@ def new_robot_file(
         if parameters or term.line:
             options = term.effect.described()
             written.append(WrittenEffect(term.effect.name, options, tuple(parameters), term.line))
-    deviation = np.sqrt(np.diag(fitted.covariance))
     size = np.where(deviation > 0, deviation, 1.0)
     correlation = fitted.covariance / np.outer(size, size)
     np.fill_diagonal(correlation, 1.0)
+    correlation = correlation[np.ix_(told, told)]
     run = Identification(
         command=command,
         version=__version__,
@@ -58,7 +66,15 @@ def new_robot_file(
         poses=campaign.poses,
         readings=len(campaign),
         gap={key: value for key, value in gap.items() if key in GAP},
-        names=tuple(estimate.unknown.name for estimate in fitted.estimates),
+        names=tuple(estimate.unknown.name for estimate in estimates),
         correlation=correlation,
     )
     return robot_file(robot, written, run, destination)
+
+
+def _told_by_readings(unknown: Unknown, value: float, deviation: float) -> bool:
+    """Whether readings say more of an unknown than its prior did."""
+    if unknown.prior is None:
+        return True
+    moved = abs(value - unknown.value)
+    return deviation < SAME_WIDTH * unknown.prior or moved > SAME_PLACE * unknown.prior

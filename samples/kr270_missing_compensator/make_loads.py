@@ -46,7 +46,9 @@ def main() -> None:
     wrench = np.tile([0, 0, -WEIGHT * GRAVITY, 0, 0, 0], (len(q), 1))
     places = {name: np.array(place) for name, place in PLACES.items()}
     joints = [(joint.name, False) for joint in kr270().joints]
-    plan = planned(joints, q, wrench, True, tool=TOOL, targets=names, places=places, target=target, sigma=SIGMA)
+    plan = planned(
+        joints, q, wrench, True, tool=TOOL, targets=names, places=places, target=target, sigma=SIGMA
+    )
     into = TOOL.inverse()
     value = np.empty((len(q), 3))
     for row in range(len(q)):

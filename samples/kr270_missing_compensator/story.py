@@ -54,7 +54,16 @@ def main(folder: Path) -> dict[str, np.ndarray]:
     results = {"as posted": cut(PANEL / "panel.src", plant)}
     for name, robot in (("compensated, old robot file", old), ("compensated, new robot file", new)):
         command(
-            *("program", folder / "panel.src", "--force=", "--cell", HERE / "cell.yaml", "--robot", robot, "-q"),
+            *(
+                "program",
+                folder / "panel.src",
+                "--force=",
+                "--cell",
+                HERE / "cell.yaml",
+                "--robot",
+                robot,
+                "-q",
+            ),
             *("-o", folder / robot.stem / "panel.src"),
         )
         results[name] = cut(folder / robot.stem / "panel.src", plant)
