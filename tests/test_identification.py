@@ -16,7 +16,7 @@ from postproc.identification.campaign import Campaign
 from postproc.identification.columns import columns
 from postproc.identification.fit import fit
 from postproc.identification.identifiable import insight
-from postproc.identification.noise import noise_of
+from postproc.identification.noise import Weighting, noise_of, shared_error
 from postproc.identification.unknowns import Unknown, asked_for
 from postproc.model import StiffnessModel
 from postproc.robot.description import Value
@@ -81,7 +81,7 @@ def missed(found, values):
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", EFFECTS)
 def test_what_is_there_is_found_from_its_null(name, kind):
-    rng = np.random.default_rng(KINDS.index(kind))
+    rng = np.random.default_rng(5 + KINDS.index(kind))
     readings, model, term, values = hidden(name, kind, rng)
     truth, unknowns = put_to(model, term, values), unknowns_of(model, term)
     found = fit(Campaign(read(truth, readings, rng)), model, unknowns)
@@ -362,6 +362,48 @@ def test_the_scatter_is_the_stated_one_else_that_of_repeats():
     np.testing.assert_array_equal(noise_of(replace(repeated, sigma=partly)).sigma[:21:20], [7e-5, 2e-5])
 
 
+def test_nothing_more_can_be_taken_off_at_the_solution():
+    """What is left is at right angles to all columns, and has the freedom of the rest."""
+    rng = np.random.default_rng(25)
+    readings, model, term, values = hidden("joint_offset", "tracker", rng)
+    readings = scattered(read(put_to(model, term, values), readings, rng), SIGMA, rng)
+    found = fit(
+        Campaign(replace(readings, sigma=np.full(len(readings), np.nan))), model, unknowns_of(model, term)
+    )
+    matrix = np.concatenate([found.weights(part) for part in found.point.taken], axis=1)
+    left = found.weights(found.point.residual)
+    share = matrix.T @ left / np.linalg.norm(matrix, axis=0)
+    assert np.abs(share).max() < 1e-3 * np.linalg.norm(left) / np.sqrt(len(left))
+    assert found.freedom == 3 * 40 - len(found.unknowns) - len(found.campaign.nuisance_names)
+    assert found.factor * found.freedom == pytest.approx(left @ left, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [1.0, 0.05])
+@pytest.mark.parametrize("known", [True, False])
+def test_what_poses_share_is_told_apart_from_what_a_fit_took(known, size):
+    """Few poses and many columns that move a pose as a whole: the moments are those of what is left.
+
+    Where no scatter is stated the ratio counts, whatever the size.
+    """
+    rng, poses, each = np.random.default_rng(26), 20, 4
+    pose = np.repeat(np.arange(poses), each)
+    weights = Weighting(np.full((poses * each, 3), 1.0 / SIGMA), pose)
+    columns = np.repeat(rng.normal(size=(poses, 3, 30)), each, axis=0) + 0.1 * rng.normal(
+        size=(poses * each, 3, 30)
+    )
+    q = np.linalg.qr(columns.reshape(-1, 30))[0]
+    squares = []
+    for _ in range(300):
+        error = rng.normal(size=(poses * each, 3)) + 1.5 * np.repeat(
+            rng.normal(size=(poses, 3)), each, axis=0
+        )
+        error = error.reshape(-1) * (SIGMA if known else SIGMA * size)
+        left = (error - q @ (q.T @ error)).reshape(-1, 3)
+        squares.append((shared_error(left, weights, columns, known) / SIGMA) ** 2)
+    # 300 of them with 30 of 60 degrees of freedom: the mean is known to 2 %
+    assert np.mean(squares) == pytest.approx(1.5**2, rel=0.12)
+
+
 def with_priors(unknowns, deviation, away=0.0):
     """Each stated ``deviation`` [its scale] wide, and ``away`` from the truth."""
     scale = [u.parameter.scale for u in unknowns]
@@ -392,6 +434,14 @@ def test_a_prior_counts_as_a_reading_of_its_deviation(stated, away):
     at, other = (np.array([e.value for e in f.estimates]) / scale for f in (plain, found))
     expected = posterior @ (know @ at + np.full(3, 5.0 + away) / 0.1**2)
     np.testing.assert_allclose(other, expected, atol=0.02 * deviation.min() + 0.002 * away)
+
+
+def test_a_prior_that_is_wrong_makes_no_scatter():
+    """However much it leaves unexplained, and poses have much of that in common."""
+    drawn, rng = drawable(), np.random.default_rng(27)
+    found = fit(drawn.campaign.shifted(alone(rng)), drawn.model, with_priors(drawn.unknowns, 0.01, 3.0))
+    assert (found.factor, found.scatter_exceeded, found.shared_error) == (1.0, False, 0.0)
+    assert np.sqrt(np.mean(found.residual**2)) > 1.5 * SIGMA
 
 
 @pytest.mark.parametrize("stated", [SIGMA / 3.0, np.nan], ids=["too small", "not stated"])
@@ -519,6 +569,23 @@ def test_a_value_pulled_below_its_bound_stays_there():
             at_bound += estimate.at_bound
     # half of the errors pull down
     assert 0.3 < at_bound / 90 < 0.7
+
+
+def test_beside_a_bound_the_others_are_the_least_squares_without_it():
+    drawn, rng, compared = drawable(), np.random.default_rng(35), 0
+    nothing = stating(drawn.campaign, SIGMA)
+    nothing.readings = replace(nothing.readings, value=np.zeros((READINGS, 3)))
+    for _ in range(12):
+        campaign = nothing.shifted(alone(rng))
+        found = fit(campaign, drawn.model, drawn.unknowns)
+        inside = tuple(e.unknown for e in found.estimates if not e.at_bound)
+        if 0 < len(inside) < 3:
+            others = fit(campaign, drawn.model, inside)
+            values = [e.value for e in found.estimates if not e.at_bound]
+            wide = np.array([e.ci95 for e in others.estimates])
+            np.testing.assert_allclose(values / wide, [e.value for e in others.estimates] / wide, atol=1e-3)
+            compared += 1
+    assert compared > 3
 
 
 def test_fewer_numbers_than_unknowns_are_refused():

@@ -236,6 +236,21 @@ def test_exchanged_columns_of_a_real_robot():
     assert "the columns of A4 and A5 exchanged" in message
 
 
+def test_exchanged_columns_of_a_wrist():
+    """The tracker sees some 20 mm of it."""
+    readings, asked = campaign("ur5", "tracker", np.random.default_rng(7))
+    message = refused(replace(readings, q=readings.q[:, [0, 1, 2, 3, 5, 4]]), asked, "IDN014")
+    assert "with the columns of J5 and J6 exchanged (" in message
+
+
+def test_scatter_that_is_stated_is_no_bad_fit():
+    readings, asked = good("deflections")
+    loud = scattered(readings, 2e-3, np.random.default_rng(8))
+    assert looked_at(replace(loud, sigma=np.full(len(loud), 2e-3)), asked) == ()
+    (finding,) = looked_at(replace(loud, sigma=np.full(len(loud), np.nan)), asked)
+    assert finding.code == "IDN015"
+
+
 # No false alarm
 
 SOFT = {"kuka_kr270": 1.0, "ur5": 30.0, "abb_irb120": 20.0}

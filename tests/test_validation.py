@@ -252,6 +252,25 @@ def test_on_well_posed_data_the_bootstrap_agrees_with_the_covariance():
     assert (ratio < 1.25).all()
 
 
+def test_of_few_readings_the_bootstrap_is_not_too_narrow():
+    """Half of the numbers go into where tracker and target are; what is left of an error is that much smaller."""
+    rng, ratio = np.random.default_rng(15), []
+    described = arm(random_arm(rng, "rrr"))
+    asked = asked_for(StiffnessModel(described, ()), ["joint_offset.o2"])
+    for _ in range(5):
+        readings = plan(
+            described, rng.uniform(-2, 2, (7, 3)), None, False, targets=("M",), tool=TOOL, sigma=SIGMA
+        )
+        campaign = Campaign(scattered(read(asked.model, readings, rng), SIGMA, rng))
+        found = fit(campaign, asked.model, asked.unknowns)
+        assert found.freedom == 21 - 10
+        wide = np.sqrt(
+            np.diag(found.covariance) * np.sum((found.point.residual / SIGMA) ** 2) / found.freedom
+        )
+        ratio.append(bootstrap(found, 150).deviation / wide)
+    assert 0.85 < np.mean(ratio) < 1.2
+
+
 def test_where_the_readings_that_count_most_scatter_most_the_bootstrap_is_wider():
     """Equal weights say too little of them then: with tails, and a scatter that grows with the lever."""
     rng, ratio = np.random.default_rng(12), []

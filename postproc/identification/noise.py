@@ -21,7 +21,7 @@ CLEARLY_SHARED = 3.3
 """Standard deviations by which readings of one pose must go together before that counts."""
 
 SMALLEST = 0.01
-"""Share of the assumed variance that readings have each for itself at least, beside what they share."""
+"""Share of all variance that readings have each for itself at least, beside what they share."""
 
 
 @dataclass(frozen=True)
@@ -154,9 +154,11 @@ def shared_error(residual: Floats, weights: Weighting, columns: Floats, known: b
     if together - alone * means[1, 0] < CLEARLY_SHARED * alone * np.sqrt(2.0 * pairs):
         return 0.0
     own, share = np.linalg.solve(means, [squares, together])
-    if known and own < 1.0 + CLEARLY_SHARED * np.sqrt(2.0 / count):
+    if not known:
+        own = max(own, SMALLEST * alone)
+    elif own < 1.0 + CLEARLY_SHARED * np.sqrt(2.0 / count):
         own = 1.0
-    return float(np.sqrt(max(share, 0.0) / max(own, SMALLEST)))
+    return float(np.sqrt(max(share, 0.0) / own)) if own > 0 else 0.0
 
 
 def _together(pose: Ints, u: Floats, values: Floats) -> Floats:

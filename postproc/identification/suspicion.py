@@ -201,7 +201,9 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
 def _check_scale(campaign: Campaign, model: StiffnessModel) -> None:
     """Refuses (IDN012) deflections that are those of the robot file times the ratio of two units.  Stiffnesses that it
     states without an interval may be anything, and foresee nothing."""
-    sure = [t for t in model.terms if t.effect.family == "elastic" and any(v.interval for v in t.stated.values())]
+    sure = [
+        t for t in model.terms if t.effect.family == "elastic" and any(v.interval for v in t.stated.values())
+    ]
     if not sure:
         return
     expected, _ = campaign.expected(campaign.seen(model), campaign.start())

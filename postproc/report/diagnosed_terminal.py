@@ -14,6 +14,7 @@ from postproc.report.diagnosed_words import headline, paragraph
 from postproc.report.identified_terminal import add_sizes
 from postproc.report.terminal import printable, show_findings
 from postproc.report.words import campaign_in_words, count, fixed, shown_unit, some
+from postproc.robot.description import robot_words
 from postproc.units import MM
 
 WIDE = 110
@@ -50,7 +51,7 @@ def _rows(result: Diagnosed) -> Iterator[tuple[str, str]]:
     final = result.final
     yield "data", ", ".join(name for name, _ in result.data)
     yield "", campaign_in_words(final.campaign)
-    yield "robot", f"{result.robot} ({result.robot_path})"
+    yield "robot", robot_words(result.robot, result.robot_path)
     yield (
         "scatter",
         f"{result.scatter / MM:.4f} mm RMS in space, from: {final.noise.source}",

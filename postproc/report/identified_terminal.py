@@ -16,6 +16,7 @@ from postproc.report.identified import STRONG, Identified, Sum
 from postproc.report.residuals import Sizes
 from postproc.report.terminal import _once, printable, show_findings
 from postproc.report.words import campaign_in_words, count, fixed, shown_unit, some
+from postproc.robot.description import robot_words
 from postproc.units import MM
 
 IN_TABLES = frozenset({"IDN018", "IDN019", "IDN020", "IDN021", "IDN022", "IDN025", "IDN026"})
@@ -70,7 +71,7 @@ def _rows(result: Identified) -> Iterator[tuple[str, str]]:
     after = result.after
     yield "data", ", ".join(name for name, _ in result.data)
     yield "", campaign_in_words(after.campaign)
-    yield "robot", f"{result.robot} ({result.robot_file})"
+    yield "robot", robot_words(result.robot, result.robot_file)
     yield "effects", ", ".join(result.effects)
     if result.held:
         yield "held", f"{', '.join(_once(result.held))}: hardware without an interval, as the robot file says"

@@ -136,6 +136,11 @@ def robot_files() -> dict[str, Path]:
     return {path.stem: path for folder in reversed(folders()) for path in sorted(folder.glob("*.yaml"))}
 
 
+def robot_words(name: str, path: Path) -> str:
+    """A robot as a report names it: with its file, unless that came with the tool."""
+    return name if path.parent in folders() else f"{name} ({path})"
+
+
 def find_robot(name: str, beside: Path | None = None) -> Path:
     """The file of a robot: its name in ``robots/``, or a path, relative to the folder ``beside``.
 

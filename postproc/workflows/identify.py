@@ -327,7 +327,7 @@ def _told(
         told.append(Finding("IDN029", f"{after.weights.shared / MM:.3g} mm in each coordinate", file))
     unstated = [u.name for u in asked.unknowns if u.prior is not None and u.stated and u.stated.level is None]
     if unstated:
-        told.append(Finding("IDN030", ", ".join(unstated), str(measured.robot.path)))
+        told.append(Finding("IDN030", ", ".join(unstated), file))
     again = _counted_before(measured, asked)
     if again:
         told.append(Finding("IDN031", ", ".join(again), str(measured.robot.path)))

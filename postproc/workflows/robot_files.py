@@ -36,7 +36,9 @@ def new_robot_file(
     campaign, today = fitted.campaign, datetime.now(UTC).date().isoformat()
     files = [path.name for path in campaign.readings.files]
     source = f"{command}: {', '.join(files)} ({len(campaign)} readings, {campaign.poses} poses), {today}"
-    told = [_told_by_readings(e.unknown, e.value, d) for e, d in zip(fitted.estimates, deviation, strict=True)]
+    told = [
+        _told_by_readings(e.unknown, e.value, d) for e, d in zip(fitted.estimates, deviation, strict=True)
+    ]
     estimates = [estimate for estimate, by in zip(fitted.estimates, told, strict=True) if by]
     found = {estimate.unknown.key: estimate for estimate in estimates}
     written = []
