@@ -337,7 +337,7 @@ CODES: dict[str, Code] = {
     "IDN031": Code(
         "warning",
         "readings count twice",
-        "An interval of the robot file came from the same readings; it is no second source. Start from the file before.",
+        "Intervals of the robot file came from these readings: no second source. Start from the file before it.",
     ),
     # diagnosis
     "DIA001": Code("error", "too few poses for a verdict", "Of so few poses any explanation would fit."),
