@@ -15,7 +15,9 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 def example(command):
     """The words of a command in the README, and what it is said to print."""
-    found = re.search(rf"```sh\n(compensate {command} [^\n]*)\n```(?:(?!```sh).)*?```\n(.*?)\n```", README, re.DOTALL)
+    found = re.search(
+        rf"```sh\n(compensate {command} [^\n]*)\n```(?:(?!```sh).)*?```\n(.*?)\n```", README, re.DOTALL
+    )
     assert found, command
     return shlex.split(found[1])[1:], found[2].splitlines()
 

@@ -267,7 +267,7 @@ def test_of_few_readings_the_bootstrap_is_not_too_narrow():
         wide = np.sqrt(
             np.diag(found.covariance) * np.sum((found.point.residual / SIGMA) ** 2) / found.freedom
         )
-        ratio.append(bootstrap(found, 150).deviation / wide)
+        ratio.append(bootstrap(found, 80).deviation / wide)
     assert 0.85 < np.mean(ratio) < 1.2
 
 

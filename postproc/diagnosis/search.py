@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.diagnosis.candidates import Candidate, candidates, testable
-from postproc.diagnosis.selection import Explained, Problem, explained, problem, scatter, selected
+from postproc.diagnosis.selection import Explained, Problem, counts, explained, problem, scatter, selected
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
 from postproc.identification.noise import Weighting
@@ -29,6 +29,10 @@ many at most."""
 
 CLEARLY = 6.6
 """-2 ln(likelihood) by which a further parameter must be better for being more than chance (1 %)."""
+
+FORM = 0.01
+"""Share of what another effect explains that one must explain itself: no form in the library is exact, and what a large
+effect does beside its form looks like small ones."""
 
 WILD = 5.0
 """Standard deviations that a reading counts with at most."""
@@ -142,8 +146,34 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
             if keys in tried:
                 return done
         tried.add(keys)
-        chosen, fitted = now, with_effects(campaign, base, now) if now else base
+        chosen, fitted = _confirmed(campaign, base, now, shown)
         weights = replace(base.weights, shared=fitted.weights.shared)
+
+
+def _confirmed(
+    campaign: Campaign, base: Fit, chosen: tuple[Candidate, ...], shown: Sequence[Candidate]
+) -> tuple[tuple[Candidate, ...], Fit]:
+    """Those of ``chosen`` that count as well where what readings of a pose share is taken from a fit without them, and
+    that are not small beside others; the weakest first.  And the fit with them."""
+    fitted = with_effects(campaign, base, chosen) if chosen else base
+    while chosen:
+        linear = _linear(campaign, base, base.weights, fitted, chosen, shown)
+        keys = [candidate.key for candidate in linear.candidates]
+        places = [keys.index(candidate.key) for candidate in chosen]
+        without = [explained(linear.problem, [g for g in places if g != gone]) for gone in places]
+        weakest = int(np.argmin([one.squares for one in without]))
+        rest = tuple(c for k, c in enumerate(chosen) if k != weakest)
+        fit_of_rest = with_effects(campaign, base, rest) if rest else base
+        weights = replace(base.weights, shared=fit_of_rest.weights.shared)
+        given = _linear(campaign, base, weights, fitted, chosen, shown).problem
+        others = [g for k, g in enumerate(places) if k != weakest]
+        gains = [one.squares - explained(linear.problem, places).squares for one in without]
+        if min(gains) >= FORM * max(gains) and counts(
+            given, explained(given, others), explained(given, places), len(keys)
+        ):
+            break
+        chosen, fitted = rest, fit_of_rest
+    return chosen, fitted
 
 
 def _linear(

@@ -178,7 +178,7 @@ def selected(
         if not tried:
             break
         best = min(tried, key=lambda pair: pair[0].squares / _least(given, tried) + penalty * pair[0].rank)[0]
-        if not _counts(given, now, best, len(candidates)):
+        if not counts(given, now, best, len(candidates)):
             break
         now = _exchanged(given, best, candidates, penalty)
         now = _pruned(given, now, len(candidates))
@@ -190,7 +190,8 @@ def _least(given: Problem, tried: Sequence[tuple[Explained, int]]) -> float:
     return scatter(given, min((e for e, _ in tried), key=lambda e: e.squares))
 
 
-def _counts(given: Problem, without: Explained, with_: Explained, among: int) -> bool:
+def counts(given: Problem, without: Explained, with_: Explained, among: int) -> bool:
+    """Whether what ``with_`` has more than ``without`` is no chance, for ``among`` groups tried."""
     freedom = given.freedom - with_.rank
     if freedom < 3:
         return False
@@ -222,7 +223,7 @@ def _pruned(given: Problem, now: Explained, among: int) -> Explained:
     """Without the groups that the others have made needless."""
     while now.groups:
         without = [explained(given, tuple(g for g in now.groups if g != gone)) for gone in now.groups]
-        needless = [w for w in without if not _counts(given, w, now, among)]
+        needless = [w for w in without if not counts(given, w, now, among)]
         if not needless:
             return now
         now = min(needless, key=lambda w: w.squares)

@@ -13,7 +13,7 @@ from postproc import __version__
 from postproc.arrays import Floats
 from postproc.diagnosis.candidates import Candidate
 from postproc.diagnosis.diagnose import Diagnosis, diagnose
-from postproc.diagnosis.search import composed
+from postproc.diagnosis.search import composed, own_unknowns
 from postproc.experiments.discriminating import apart
 from postproc.experiments.offer import Offer, readings_of, spacings, usable_limits
 from postproc.experiments.tour import tour
@@ -72,8 +72,9 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     stage("reading")
     measured = measured_of(request.data, request.robot, request.tool_mm_deg)
     campaign, model = measured.campaign, measured.model
+    own = own_unknowns(model)
     check_numbers(measured.readings, (), model)
-    findings = [*measured.findings, *check_fit(campaign, model, ())]
+    findings = [*measured.findings, *check_fit(campaign, model, own)]
     found = diagnose(campaign, model, stage)
     stage("leaving poses out")
     folds = min(FOLDS, campaign.poses)

@@ -324,7 +324,7 @@ def _told(
             Finding("IDN028", "the tracker stood elsewhere", str(validation.campaign.readings.files[0]))
         )
     if after.weights.shared > 0:
-        told.append(Finding("IDN029", f"{after.weights.shared / MM:.3g} mm in each coordinate", file))
+        told.append(Finding("IDN029", f"{after.shared_error / MM:.3g} mm in each coordinate", file))
     unstated = [u.name for u in asked.unknowns if u.prior is not None and u.stated and u.stated.level is None]
     if unstated:
         told.append(Finding("IDN030", ", ".join(unstated), file))

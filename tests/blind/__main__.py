@@ -1,0 +1,15 @@
+"""The whole benchmark: python -m tests.blind [--runs N] [--rows a,b] [--seed S] [--workers N] [--out FILE]"""
+
+import os
+import sys
+from pathlib import Path
+
+# one thread a process, said before numpy comes; and the helpers of the tests
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+if __name__ == "__main__":
+    from blind.command import main
+
+    raise SystemExit(main())

@@ -1,0 +1,281 @@
+"""The matrix: which run hides what, and the run itself made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from postproc.measurements import Readings
+
+from . import hidden, measured
+from .arm import LIMITS, Scene, as_filed, cluttered, model_of, robot_file
+from .design import Design, drawn
+from .hidden import DEFLECTION, EVERY, OUTSIDE, Hidden
+from .oracle import Oracle
+
+SNRS = (0.5, 1.0, 2.0, 5.0)
+POSES = (15, 30, 60)
+
+ROWS = ("null_clean", "null_cluttered", "single", "decoy", "pair", "triple", "outside", "unidentifiable")
+
+DECOYS = (
+    "joint_stiffening",
+    "backlash",
+    "link_compliance",
+    "joint_compliance",
+    "transmission_error",
+    "hysteresis",
+    "joint_offset",
+)
+
+UNIDENTIFIABLE = ("balancer_at_one_angle", "foot_or_first_bearing", "wave_at_one_angle")
+
+NOT_TOGETHER = (
+    {"joint_compliance", "joint_stiffening"},
+    {"joint_compliance", "backlash"},
+    {"link_gravity", "payload"},
+    {"base_compliance", "link_compliance"},
+    {"tool_compliance", "link_compliance"},
+)
+"""A joint that is not said to give way has no other spring; of the others one is nearly the other."""
+
+CLOSE = 0.05
+"""Within this share of the wanted size."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A cell of the matrix, and the seed of one run of it.  effects: names of what is hidden; snr: 0 where nothing
+    is."""
+
+    row: str
+    number: int
+    seed: int
+    effects: tuple[str, ...]
+    snr: float
+    poses: int
+
+    @property
+    def key(self) -> str:
+        return f"{self.row}/{self.number}/{self.seed}"
+
+
+@dataclass(frozen=True)
+class Run:
+    """A case made: what is hidden and how large it is, without (R, 3) [m] and with it as readings, and the files."""
+
+    case: Case
+    robot: bytes
+    ranges: object
+    scene: Scene
+    bare: Scene
+    design: Design
+    sigma: float
+    hidden: tuple[tuple[Hidden, float], ...]
+    snr: tuple[float, ...]
+    without: np.ndarray
+    readings: Readings
+    oracle: Oracle
+
+    def true(self) -> dict[str, float]:
+        """Parameters (SI) of what is there, hidden or not, as effect.parameter."""
+        found = self.scene.true()
+        for one, size in self.hidden:
+            found |= one.true(size)
+        return found
+
+    @property
+    def reached(self) -> bool:
+        """Whether every effect shows as large as it should."""
+        return all(snr > 0.8 * self.case.snr for snr in self.snr)
+
+
+def cases(row: str, count: int, seed: int) -> list[Case]:
+    """The first ``count`` runs of a row; cells come in turn, in an order of their own."""
+    rng = np.random.default_rng([ROWS.index(row), 2])
+    names: list[tuple[str, ...]]
+    if row in ("null_clean", "null_cluttered"):
+        names, sizes = [()], (0.0,)
+    elif row == "single":
+        names, sizes = [(name,) for name in EVERY], SNRS
+    elif row == "decoy":
+        names, sizes = [(name,) for name in DECOYS], SNRS[1:]
+    elif row == "outside":
+        names, sizes = [(name,) for name in OUTSIDE], SNRS
+    elif row == "unidentifiable":
+        names, sizes = [(name,) for name in UNIDENTIFIABLE], (2.0,)
+    else:
+        names, sizes = _together(2 if row == "pair" else 3, rng), SNRS[1:]
+    cells = list(product(names, sizes, POSES))
+    order = [cells[i] for i in rng.permutation(len(cells))]
+    return [Case(row, k, seed, *order[k % len(order)]) for k in range(count)]
+
+
+def _together(count: int, rng: np.random.Generator) -> list[tuple[str, ...]]:
+    """Sets of effects that may be there at once, of one kind of readings."""
+    found: set[tuple[str, ...]] = set()
+    while len(found) < 60:
+        deflection = rng.random() < 0.5
+        kinds = [name for name in EVERY if (name in DEFLECTION) == deflection and name != "base_offset"]
+        chosen = tuple(sorted(rng.choice(kinds, count, replace=False)))
+        if not any(bad <= set(chosen) for bad in NOT_TOGETHER):
+            found.add(chosen)
+    return sorted(found)
+
+
+def made(case: Case) -> Run:
+    """The run of a case: always the same."""
+    rng = np.random.default_rng([ROWS.index(case.row), case.number, case.seed])
+    if case.row == "unidentifiable":
+        return _unidentifiable(case, rng)
+    best: Run | None = None
+    for _ in range(6):
+        run = _made(case, rng)
+        if best is None or min(run.snr, default=0.0) > min(best.snr, default=0.0):
+            best = run
+        if run.reached:
+            return run
+    assert best is not None
+    return best
+
+
+def _made(case: Case, rng: np.random.Generator) -> Run:
+    row, names = case.row, case.effects
+    if row.startswith("null"):
+        deflection = case.number % 2 == 0
+    elif row == "outside":
+        deflection = OUTSIDE[names[0]]
+    else:
+        deflection = names[0] in DEFLECTION
+    weights = bool(rng.random() < 0.6)
+    if {"link_gravity", "payload"} & set(names):
+        # the file's own weights would be anything that hangs on the arm
+        weights = False
+    if {"backlash", "windup"} & set(names):
+        weights = True
+    clean = row == "null_clean"
+    ranges = planned = None
+    hid = _hidden(names, rng)
+    if row == "decoy":
+        ranges, planned = _alike(hid[0], rng), False
+    lacking = [(h.effect, h.joint) for h in hid if not h.outside]
+    raw = robot_file(not deflection, weights, lacking)
+    design = drawn(
+        model_of(raw),
+        case.poses,
+        deflection,
+        rng,
+        clean=clean,
+        at_tip="tool_compliance" in names,
+        several=bool({"joint_stiffening", "force_sensor", "quadratic_bending", "loose_flange"} & set(names)),
+        warm="thermal_growth" in names,
+        in_robot_frame="base_offset" in names,
+        places=True if "tool_offset" in names else None,
+        ranges=ranges,
+        planned=planned,
+    )
+    bare = as_filed(weights) if clean else cluttered(rng, weights, lacking)
+    return run_of(case, raw, bare, design, hid, rng, ranges)
+
+
+def _hidden(names: tuple[str, ...], rng: np.random.Generator) -> tuple[Hidden, ...]:
+    """One of each name, no two of a joint."""
+    while True:
+        hid = tuple(hidden.drawn(name, rng) for name in names)
+        joints = [h.joint for h in hid if h.joint]
+        if len(set(joints)) == len(joints):
+            return hid
+
+
+def _alike(truth: Hidden, rng: np.random.Generator):
+    """(6, 2) [deg] ranges in which a neighbour of the joint does nearly the same: parallel axes, a wrist almost
+    stretched."""
+    ranges = np.array(LIMITS, float)
+    if truth.joint in ("A4", "A6"):
+        ranges[4] = [-35.0, 35.0]
+    if truth.joint in ("A2", "A3"):
+        ranges[2] = [40.0, 120.0]
+    if truth.joint in ("A1", "A5"):
+        ranges[3] = [-40.0, 40.0]
+    return ranges
+
+
+def run_of(
+    case: Case, raw: bytes, bare: Scene, design: Design, hid: tuple[Hidden, ...], rng, ranges=None, sizes=None
+) -> Run:
+    """The run of what is hidden in ``bare``, each as large as the case wants, or of ``sizes``."""
+    for h in hid:
+        bare = h.absent(bare)
+    model = model_of(raw)
+    sigma = measured.scatter(design, model)
+    moved = design.jitter * rng.normal(size=design.q.shape) if design.jitter else None
+    without = measured.observed(bare, design, moved)
+    exact = measured.readings(design, without, sigma)
+    oracle = Oracle(model, exact, design, sigma)
+    found = []
+    for k, h in enumerate(hid):
+        if sizes is not None:
+            size = sizes[k]
+            signal = measured.observed(h.into(bare, size), design, moved) - without
+        else:
+            size, signal = _sized(h, bare, design, moved, without, oracle, case.snr)
+        found.append((h, size, oracle.shown(signal)))
+    scene = bare
+    for h, size, _ in found:
+        scene = h.into(scene, size)
+    value = measured.observed(scene, design, moved) if found else without
+    value = value + measured.noise(design, rng)
+    return Run(
+        case=case,
+        robot=raw,
+        ranges=ranges,
+        scene=scene,
+        bare=bare,
+        design=design,
+        sigma=sigma,
+        hidden=tuple((h, size) for h, size, _ in found),
+        snr=tuple(snr for *_, snr in found),
+        without=without,
+        readings=replace(exact, value=value),
+        oracle=oracle,
+    )
+
+
+def _sized(h: Hidden, bare, design, moved, without, oracle, wanted: float):
+    """The size at which it shows as wanted, and what it then does (R, 3) [m]; the largest plausible one where that
+    does not do."""
+    size = min(1.0, h.cap)
+    for _ in range(12):
+        signal = measured.observed(h.into(bare, size), design, moved) - without
+        shows = oracle.shown(signal)
+        if abs(shows - wanted) < CLOSE * wanted or (size >= h.cap and shows < wanted):
+            break
+        size = min(h.cap, size * float(np.clip(wanted / max(shows, 1e-9), 0.02, 20.0)))
+    return size, signal
+
+
+def _unidentifiable(case: Case, rng: np.random.Generator) -> Run:
+    """Designs on which nothing can tell the truth from something else."""
+    (name,) = case.effects
+    ranges = np.array(LIMITS, float)
+    sizes = None
+    if name == "balancer_at_one_angle":
+        # where A2 stands still a balancer is a little more or less stiffness of it
+        middle = rng.uniform(-120.0, -40.0)
+        ranges[1] = middle - 0.5, middle + 0.5
+        h = hidden.drawn("gravity_compensator", rng)
+        deflection, lacking, sizes = True, [], (1.5,)
+    elif name == "foot_or_first_bearing":
+        h = hidden.drawn("link_compliance", rng, "A1")
+        deflection, lacking = True, []
+    else:
+        middle = rng.uniform(-60.0, 60.0)
+        ranges[2] = middle - 0.5, middle + 0.5
+        h = hidden.drawn("joint_offset", rng, "A3")
+        deflection, lacking = False, [("joint_offset", "A3")]
+    raw = robot_file(not deflection, True, lacking)
+    design = drawn(model_of(raw), case.poses, deflection, rng, ranges=ranges, planned=False)
+    bare = cluttered(rng, True, lacking)
+    return run_of(case, raw, bare, design, (h,), rng, ranges, sizes)

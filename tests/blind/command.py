@@ -1,0 +1,137 @@
+"""Runs cases, keeps what they came to, prints it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from postproc.measurements.writing import measurements_csv
+
+from . import table
+from .cases import ROWS, Case, cases, made
+from .verdicts import judged
+from .worker import ROOMS
+
+
+class Diagnosing:
+    """A process that diagnoses folders, one after the other."""
+
+    def __init__(self) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-W", "ignore", str(Path(__file__).with_name("worker.py"))],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def __call__(self, folder: Path) -> dict:
+        assert self.process.stdin
+        assert self.process.stdout
+        self.process.stdin.write(f"{folder}\n")
+        self.process.stdin.flush()
+        line = self.process.stdout.readline()
+        if not line:
+            raise RuntimeError(f"the diagnosing process ended with {self.process.wait()}")
+        return json.loads(line)
+
+    def close(self) -> None:
+        assert self.process.stdin
+        assert self.process.stdout
+        self.process.stdin.close()
+        self.process.wait()
+        self.process.stdout.close()
+
+
+_own: list[Diagnosing] = []
+"""The process that diagnoses for this one."""
+
+
+def record_of(case: Case, diagnosing: Diagnosing, with_gap: bool = True) -> dict:
+    """Makes a case, lets it be diagnosed, and judges that."""
+    run = made(case)
+    with (
+        TemporaryDirectory(prefix=f"{ROOMS}data-") as data,
+        TemporaryDirectory(prefix=f"{ROOMS}truth-") as truth,
+    ):
+        Path(data, "data.csv").write_bytes(measurements_csv(run.readings))
+        Path(data, "robot.yaml").write_bytes(run.robot)
+        Path(truth, "truth.json").write_text(
+            json.dumps([[h.effect, h.joint, h.true(s)] for h, s in run.hidden])
+        )
+        answer = diagnosing(Path(data))
+    return judged(run, answer, with_gap)
+
+
+def _record_of(case: Case) -> dict:
+    if not _own:
+        _own.append(Diagnosing())
+    return record_of(case, _own[0])
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m tests.blind", description=__doc__)
+    parser.add_argument("--runs", type=int, default=300, help="of each row [300]")
+    parser.add_argument("--rows", default=",".join(ROWS), help=f"some of {', '.join(ROWS)} [all]")
+    parser.add_argument("--seed", type=int, default=1, help="[1]")
+    parser.add_argument("--workers", type=int, default=2, help="processes [2]")
+    parser.add_argument(
+        "--out", type=Path, help="JSON lines, one a run: appended to, and what is there is not run again"
+    )
+    parser.add_argument("--picture", type=Path, help="the confusion as a PNG")
+    parser.add_argument("--wrong", type=int, default=40, help="runs that were not right to list [40]")
+    parser.add_argument("--only", default="", help="cases with this effect only")
+    given = parser.parse_args(argv)
+    wanted = [case for row in given.rows.split(",") for case in cases(row, given.runs, given.seed)]
+    wanted = [case for case in wanted if given.only in ("", *case.effects)]
+    records = _kept(given.out, {case.key for case in wanted})
+    known = {record["key"] for record in records}
+    left = [case for case in wanted if case.key not in known]
+    begun = time.monotonic()
+    for record in _run(left, given.workers):
+        records.append(record)
+        if given.out:
+            with given.out.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(record) + "\n")
+        if sys.stderr.isatty():
+            print(f"\r{len(records)} of {len(wanted)}", end="", file=sys.stderr)
+    if not records:
+        return 0
+    spent = time.monotonic() - begun
+    print(
+        f"seed {given.seed}, {len(records)} runs; {len(left)} of them now, {spent / max(1, len(left)):.1f} s each\n"
+    )
+    print("\n".join(table.matrix(records)) + "\n")
+    print("\n".join(table.per_effect(records)) + "\n")
+    print("\n".join(table.confusion_text(records)) + "\n")
+    print("\n".join(table.wrong_cases(records, given.wrong)))
+    if given.picture:
+        table.picture(records, given.picture)
+    return 0
+
+
+def _run(left: Sequence[Case], workers: int):
+    if workers <= 1:
+        yield from map(_record_of, left)
+        return
+    with ProcessPoolExecutor(workers) as pool:
+        for done in as_completed([pool.submit(_record_of, case) for case in left]):
+            yield done.result()
+
+
+def _kept(path: Path | None, keys: set[str]) -> list[dict]:
+    """What an earlier call came to; a last line that was cut off does not count."""
+    records: dict[str, dict] = {}
+    if path is not None and path.exists():
+        for line in path.read_text(encoding="utf-8").splitlines():
+            with suppress(json.JSONDecodeError):
+                record = json.loads(line)
+                records[record["key"]] = record
+    return [record for key, record in records.items() if key in keys]

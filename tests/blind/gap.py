@@ -1,0 +1,82 @@
+"""How much of what was missing a diagnosis has found: on poses that were not measured, against an oracle that knows
+which effect it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.effects import EFFECTS
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import fit
+from postproc.identification.registration import registered
+from postproc.identification.unknowns import Unknown
+from postproc.model import StiffnessModel
+
+from . import measured
+from .arm import model_of
+from .cases import Run
+from .design import poses
+from .oracle import joined, own_unknowns, unknowns_in
+
+POSES = 20
+
+
+def closed(run: Run, answer: Mapping) -> float:
+    """Share of what an oracle closes of the gap, root mean square: its own readings fitted without what is hidden, and
+    with it."""
+    rng = np.random.default_rng([run.case.number, run.case.seed, 3])
+    design = _elsewhere(run, rng)
+    value = measured.observed(run.scene, design)
+    seen = Campaign(measured.readings(design, value, run.sigma))
+
+    def left(model: StiffnessModel) -> float:
+        at = seen.seen(model)
+        given = registered(seen, at, np.ones(len(seen), bool))
+        return float(np.sqrt(np.mean(seen.residual(at, given) ** 2)))
+
+    filed = model_of(run.robot)
+    before, after = (left(_model(filed, answer[key])) for key in ("before", "after"))
+    return (before - after) / (before - left(knowing(run)))
+
+
+def knowing(run: Run) -> StiffnessModel:
+    """The model fitted to the readings of a run by who knows which effects are there."""
+    model, free = model_of(run.robot), list[Unknown]()
+    for hidden, _ in run.hidden:
+        model = joined(model, hidden.made)
+    for hidden, _ in run.hidden:
+        free += unknowns_in(hidden, model)
+    asked = [*own_unknowns(model), *free]
+    return fit(Campaign(run.readings), at_truth(run, model), asked).model
+
+
+def at_truth(run: Run, model: StiffnessModel) -> StiffnessModel:
+    """The model with the true values of all that it has."""
+    names = {f"{t.effect.name}.{p}": (i, p) for i, t in enumerate(model.terms) for p in t.values}
+    return model.changed({names[name]: value for name, value in run.true().items() if name in names})
+
+
+def _elsewhere(run: Run, rng: np.random.Generator):
+    """The campaign at other poses, reflectors known."""
+    old = run.design
+    q = poses(model_of(run.robot), POSES, old.tool, rng, run.ranges)
+    rows = np.sort(rng.integers(0, len(old.q), POSES))
+    parts = [None if x is None else x[rows] for x in (old.time, old.temperature)]
+    return replace(old, q=q, wrench=old.wrench[rows], time=parts[0], temperature=parts[1], stated=True)
+
+
+def _model(filed: StiffnessModel, terms: Sequence) -> StiffnessModel:
+    """The robot file's model with the ``terms`` of an answer."""
+    model = filed
+    for k, (name, options, values) in enumerate(terms):
+        if k >= len(filed.terms):
+            forms = [
+                *EFFECTS[name].variants(filed.robot.joints),
+                joined(filed, EFFECTS[name](filed.robot.joints)).terms[-1].effect,
+            ]
+            model = model.added(next(form for form in forms if form.described() == options))
+        model = model.changed({(k, key): value for key, value in values.items()})
+    return model

@@ -1,0 +1,104 @@
+"""Right or wrong: a verdict against the truth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .cases import Run
+from .gap import closed
+from .oracle import MARGIN, Rival
+
+WITHOUT_JOINTS = ("link_gravity",)
+"""Effects of an arm as a whole, whatever joints their parameters stand beside."""
+
+
+def judged(run: Run, answer: dict, with_gap: bool = True) -> dict:
+    """The record of a run: what was hidden, what was said, and whether that is right.
+
+    outcome: exact; ambiguous (with the truth, where an oracle can not tell it from something else), undecided (the
+    same where it can); partly (some of the truth and no more), missed, unknown, wrong, refused.
+    """
+    rest = run.readings.value - run.without
+    rivals = [nearest(run, k, rest) for k in range(len(run.hidden))]
+    truth = {named(h.effect, h.joint) for h, _ in run.hidden}
+    said = [
+        {named(one["effect"], joint) for joint in one["joints"] or [""]} for one in answer.get("named", ())
+    ]
+    names = set().union(*said) if said else set()
+    sets = [{named(*pair) for pair in alternatives} for alternatives in answer.get("ambiguous", ())]
+    # two forms of one effect on one joint are no doubt about its name
+    sets = [alternatives for alternatives in sets if len(alternatives) > 1]
+    outside = any(h.outside for h, _ in run.hidden)
+    outcome = _outcome(answer["verdict"], truth, names, sets, outside, rivals)
+    return {
+        "key": run.case.key,
+        "row": run.case.row,
+        "effects": list(run.case.effects),
+        "truth": sorted([list(pair) for pair in truth]),
+        "snr": run.case.snr,
+        "shown": [round(snr, 3) for snr in run.snr],
+        "poses": run.case.poses,
+        "readings": len(run.readings),
+        "deflection": run.design.deflection,
+        "reached": run.reached or run.case.row == "unidentifiable",
+        "rivals": [[[r.effect, r.joint, round(float(r.margin), 1)] for r in of[:3]] for of in rivals],
+        "outcome": outcome,
+        "right": right(run.case.row, outcome),
+        "covered": covered(run, answer) if outcome == "exact" else None,
+        "closed": closed(run, answer)
+        if with_gap and run.case.row == "single" and "after" in answer
+        else None,
+        "answer": answer,
+    }
+
+
+def named(effect: str, joint: str) -> tuple[str, str]:
+    return effect, "" if effect in WITHOUT_JOINTS else joint
+
+
+def nearest(run: Run, k: int, rest: np.ndarray) -> list[Rival]:
+    """What else might be in the place of the ``k``-th hidden effect, nearest first."""
+    hidden, size = run.hidden[k]
+    if hidden.outside:
+        return []
+    others = [pair for j, pair in enumerate(run.hidden) if j != k]
+    found = run.oracle.rivals(hidden, size, rest, others)
+    same = named(hidden.effect, hidden.joint)
+    return [rival for rival in found if named(rival.effect, rival.joint) != same]
+
+
+def _outcome(
+    word: str, truth: set, names: set, sets: list[set], outside: bool, rivals: list[list[Rival]]
+) -> str:
+    apart = all(of and of[0].margin >= MARGIN for of in rivals if of)
+    unseen = any(r.effect == "nothing" and r.margin < MARGIN for of in rivals for r in of)
+    if word in ("refused", "unknown"):
+        return word
+    if word == "nothing_missing":
+        return "exact" if not truth else "unseen" if unseen else "missed"
+    if outside or not truth:
+        return "wrong"
+    if word == "ambiguous" and sets:
+        if names | set().union(*sets) >= truth:
+            return "undecided" if apart else "ambiguous"
+        return "wrong"
+    if names == truth:
+        return "partly" if word == "partly_named" else "exact"
+    return "partly" if word == "partly_named" and names < truth else "wrong"
+
+
+def right(row: str, outcome: str) -> bool:
+    if row == "outside":
+        return outcome == "unknown"
+    if row == "unidentifiable":
+        return outcome in ("ambiguous", "undecided", "missed", "unseen")
+    return outcome in ("exact", "ambiguous", "unseen")
+
+
+def covered(run: Run, answer: dict) -> dict[str, bool]:
+    """Whether the 95 % intervals hold the true values: of what is hidden, and of what the file states."""
+    return {
+        name: abs(answer["estimates"][name][0] - value) <= answer["estimates"][name][1]
+        for name, value in run.true().items()
+        if name in answer["estimates"]
+    }
