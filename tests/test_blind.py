@@ -105,6 +105,9 @@ UNSEEN = [[Rival("nothing", "", 1.0)]]
         ("ambiguous", TRUTH, [TRUTH | {("backlash", "A3")}], NEAR, "ambiguous"),
         ("ambiguous", TRUTH, [TRUTH | {("backlash", "A3")}], FAR, "undecided"),
         ("ambiguous", {("payload", "")}, [{("payload", ""), ("backlash", "A3")}], NEAR, "wrong"),
+        # the truth is in a set, and something that is not there is claimed beside it
+        ("ambiguous", TRUTH | {("payload", "")}, [{("payload", ""), ("hysteresis", "A4")}], FAR, "wrong"),
+        ("ambiguous", TRUTH | {("payload", "")}, [TRUTH | {("backlash", "A3")}], NEAR, "wrong"),
         ("nothing_missing", set(), [], FAR, "missed"),
         ("nothing_missing", set(), [], UNSEEN, "unseen"),
         ("unknown", set(), [], FAR, "unknown"),

@@ -43,14 +43,15 @@ def closed(run: Run, answer: Mapping) -> float:
 
 
 def knowing(run: Run) -> StiffnessModel:
-    """The model fitted to the readings of a run by who knows which effects are there."""
-    model, free = model_of(run.robot), list[Unknown]()
+    """The model fitted to the readings of a run by who knows which effects are there; what the readings can not give
+    keeps its true value."""
+    model = model_of(run.robot)
     for hidden, _ in run.hidden:
         model = joined(model, hidden.made)
+    model, free = at_truth(run, model), list[Unknown]()
     for hidden, _ in run.hidden:
         free += unknowns_in(hidden, model)
-    asked = [*own_unknowns(model), *free]
-    return fit(Campaign(run.readings), at_truth(run, model), asked).model
+    return fit(Campaign(run.readings), model, [*own_unknowns(model), *free]).model
 
 
 def at_truth(run: Run, model: StiffnessModel) -> StiffnessModel:

@@ -79,7 +79,13 @@ def _outcome(
     if outside or not truth:
         return "wrong"
     if word == "ambiguous" and sets:
-        if names | set().union(*sets) >= truth:
+        # each name must be one that is there, or stand in a set with one
+        meant = truth.union(*(alternatives for alternatives in sets if alternatives & truth))
+        if (
+            names <= meant
+            and all(alternatives & truth for alternatives in sets)
+            and truth <= names.union(*sets)
+        ):
             return "undecided" if apart else "ambiguous"
         return "wrong"
     if names == truth:

@@ -4,7 +4,7 @@ import os
 import sys
 from pathlib import Path
 
-# one thread a process, said before numpy comes; and the helpers of the tests
+# one thread a process, said before numpy comes; and what tests share
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
