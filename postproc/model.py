@@ -192,11 +192,13 @@ class StiffnessModel:
         tool: Poses,
         conditions: Conditions = NOTHING,
         start: Floats | None = None,
+        tolerance: float = STEP_TOLERANCE,
     ) -> Equilibrium:
         """Where the robot comes to rest with its motors at ``q`` (N, n) [rad, m] under ``wrench`` (N, 6) [N, N m] at
         the TCP, robot base axes; ``tool``: TCP on the flange, one pose or N.
 
         ``start`` (N, m): displacement to begin with, that of a state nearby; the result does not depend on it.
+        ``tolerance`` [rad, m]: largest last step.
 
         Solves theta = C(J^T w + loads) at coordinates rest + theta, the balance on the deflected pose, by a Newton
         iteration with the diagonal of the loads' and laws' derivatives.  What the diagonal leaves out (the lever of
@@ -217,6 +219,7 @@ class StiffnessModel:
                 np.repeat(NUDGE * np.cos(np.arange(m))[:, None], len(q[rows]), axis=1)
                 if start is None
                 else np.array(start[rows].T, order="C"),
+                tolerance,
             )
             coordinates[rows], theta[rows], converged[rows] = (
                 part.coordinates,
@@ -228,7 +231,13 @@ class StiffnessModel:
         return Equilibrium(coordinates, theta, Poses(rotation, position), mount, converged, steps)
 
     def _equilibrium(
-        self, motors: Floats, wrench: Floats, tool: Poses, conditions: Conditions, theta: Floats
+        self,
+        motors: Floats,
+        wrench: Floats,
+        tool: Poses,
+        conditions: Conditions,
+        theta: Floats,
+        tolerance: float,
     ) -> Equilibrium:
         rest = self._rest(motors, conditions)
         if not self._laws:
@@ -245,7 +254,7 @@ class StiffnessModel:
             size = np.abs(step).max(axis=0)
             last[rows] = size
             stable[rows] &= holds
-            moving = size > STEP_TOLERANCE
+            moving = size > tolerance
             if not moving.any():
                 break
             if 4 * moving.sum() < 3 * len(rows):
@@ -254,7 +263,7 @@ class StiffnessModel:
                 problems = problems.part(moving)
         theta[:, rows] = bent
         swept = self.chain.sweep(rest + theta, tool, conditions.spindle)
-        rested = stable & (last < 1e-11) & np.isfinite(swept.position).all(axis=0)
+        rested = stable & (last < max(1e-11, tolerance)) & np.isfinite(swept.position).all(axis=0)
         return Equilibrium((rest + theta).T, theta.T, swept.pose, swept.mount.T, rested, steps)
 
     def _step(self, given: _Problems, theta: Floats) -> tuple[Floats, Bools]:

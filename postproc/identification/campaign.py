@@ -20,7 +20,7 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.effects import Conditions
 from postproc.geometry import Poses, rotation_from_vector, skew, vector_from_rotation
 from postproc.measurements import Readings
-from postproc.model import StiffnessModel, approach
+from postproc.model import STEP_TOLERANCE, StiffnessModel, approach
 
 ONE_POSE = 1e-6
 """[rad, m] Motors that differ by less stand in one pose."""
@@ -132,9 +132,12 @@ class Campaign:
         self.pose: Ints = pose.reshape(-1)
         self.poses = int(self.pose.max()) + 1
 
-    def seen(self, model: StiffnessModel, start: Floats | None = None) -> Seen:
-        """All states at rest under ``model``; ``start`` (S, m): displacement of a model nearby."""
-        rest = model.equilibrium(self.q, self.wrench, self.tool, self.conditions, start)
+    def seen(
+        self, model: StiffnessModel, start: Floats | None = None, tolerance: float = STEP_TOLERANCE
+    ) -> Seen:
+        """All states at rest under ``model``; ``start`` (S, m): displacement of a model nearby; ``tolerance`` as of the
+        equilibrium."""
+        rest = model.equilibrium(self.q, self.wrench, self.tool, self.conditions, start, tolerance)
         return Seen(rest.pose.rotation, rest.mount, rest.pose.position, rest.displacement, rest.converged)
 
     def points(self, seen: Seen, places: Floats, at: Ints) -> Floats:

@@ -16,6 +16,10 @@ STEP = 0.01
 """Step of the differences, in sizes of the parameter (or values, where those are larger)."""
 
 
+REST = 1e-10
+"""[rad, m] Last step of the equilibria that are subtracted: a thousandth of a per cent of what a step moves."""
+
+
 def columns(
     campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unknown], seen: Seen, given: Nuisances
 ) -> Floats:
@@ -30,7 +34,9 @@ def columns(
         step = STEP * max(parameter.scale, abs(value))
         low, high = max(value - step, parameter.lower), min(value + step, parameter.upper)
         ends = [
-            campaign.expected(campaign.seen(model.changed({unknown.key: end}), seen.displacement), given)
+            campaign.expected(
+                campaign.seen(model.changed({unknown.key: end}), seen.displacement, REST), given
+            )
             for end in (low, high)
         ]
         per = parameter.scale / (high - low)

@@ -36,7 +36,9 @@ def outliers(fitted: Fit, rows: Bools) -> tuple[tuple[Outlier, ...], Fit]:
     all that it does not explain.
     """
     length, _, limit = _lengths(fitted, rows)
-    if not np.any(rows & (length > 0.7 * limit)):
+    # a fit pulls an outlier towards it by its leverage, in the mean the share of unknowns in the readings
+    share = (len(fitted.unknowns) + len(fitted.campaign.nuisance_names)) / max(fitted.weights.counts, 1)
+    if not np.any(rows & (length > max(0.7, 1.0 - 5.0 * share) * limit)):
         return (), fitted
     campaign = fitted.campaign
     robust = fit(campaign, fitted.start, fitted.asked, rows, robust=True, given=fitted.point.given)
