@@ -106,7 +106,7 @@ class Straight(Campaign):
             ]
             self.slopes[unknown.key] = slope
 
-    def seen(self, model, start=None):
+    def seen(self, model, start=None, tolerance=0.0):
         parts = [part.copy() for part in _moving(self.base)]
         for (term, name), slope in self.slopes.items():
             step = model.terms[term].values[name] - self.about.terms[term].values[name]

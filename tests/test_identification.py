@@ -215,7 +215,7 @@ def test_columns_stop_at_bounds():
     p = unknowns[0].parameter
 
     class Watched(Campaign):
-        def seen(self, model, start=None):
+        def seen(self, model, start=None, tolerance=0.0):
             tried.append(model.terms[0].values[p.name])
             return super().seen(model, start)
 
