@@ -402,18 +402,73 @@ class StiffnessModel:
         """
         return np.asarray(np.linalg.inv(self.cartesian_compliance(q, wrench, tool, conditions)))
 
-    def _curvature(self, state: State, tool: Poses) -> Floats:
-        """H (N, m, m): derivative of the generalized forces by the coordinates, central differences."""
-        size, step = self.chain.size, 1e-6
-        h = np.empty((state.motors.shape[1], size, size))
-        for k in range(size):
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = state.coordinates.copy()
-                moved[k] += sign * step
-                swept = self.chain.sweep(moved, tool, state.conditions.spindle)
-                ends.append(self._forces(replace(state, coordinates=moved, swept=swept))[0])
-            h[:, :, k] = ((ends[0] - ends[1]) / (2 * step)).T
+    def sensitivity(
+        self,
+        q: Floats,
+        wrench: Floats,
+        tool: Poses,
+        conditions: Conditions,
+        displacement: Floats,
+        spans: Mapping[tuple[int, str], tuple[float, float]],
+    ) -> Floats:
+        """(N, m, P) derivative of the coordinates at rest by parameters (SI), at an equilibrium whose ``displacement``
+        (N, m) is known; ``spans``: as for ``changed``, the two values of a parameter whose difference stands for it.
+
+        By the implicit function of theta = D(F(z, rest)), z = rest + theta, with C = dD/dF:
+
+            dz/dp = (1 - C dF/dz)^-1 (d rest/dp + C (dF/dp + dF/d rest d rest/dp) + dD/dp)
+
+        The derivatives of F by coordinates are central differences of all states at once; nothing is solved anew.
+        """
+        state = self.state(q, wrench, tool, conditions, displacement)
+        force, _ = self._forces(state)
+        _, gives = self._displacement(state, force)
+        c = gives.T[:, :, None]
+        own = np.empty((*displacement.shape, len(spans)))
+        by_rest: Floats | None = None
+        for k, ((term, name), ends) in enumerate(spans.items()):
+            effect, values = self.terms[term].effect, self.terms[term].values
+            low, high = (
+                self._alone(effect, {**values, name: value}, state, force) for value in ends
+            )
+            moved = ((high - low) / (ends[1] - ends[0])).T
+            if isinstance(effect, Load):
+                moved = c[:, :, 0] * moved
+            elif isinstance(effect, Offset):
+                if by_rest is None:
+                    by_rest = c * self._curvature(state, tool, of_rest=True)
+                moved = moved + (by_rest @ moved[:, :, None])[:, :, 0]
+            own[:, :, k] = moved
+        return np.asarray(np.linalg.solve(np.eye(self.chain.size) - c * self._curvature(state, tool), own))
+
+    def _alone(self, effect: Effect, values: Values, state: State, force: Floats) -> Floats:
+        """(m, N) what one effect adds: a force, an offset, or a displacement under ``force``."""
+        found, slope = np.zeros_like(force), np.zeros_like(force)
+        if isinstance(effect, Load):
+            effect.add_force(values, state, found, slope)
+        elif isinstance(effect, Offset):
+            effect.add_offset(values, self.chain, state.motors, state.conditions, found)
+        elif isinstance(effect, ComplianceLaw):
+            effect.add_displacement(values, state, force, found, slope)
+        return found
+
+    def _curvature(self, state: State, tool: Poses, of_rest: bool = False) -> Floats:
+        """H (N, m, m): derivative of the generalized forces by the coordinates, or by the coordinates without load
+        where those stay; central differences, many at once."""
+        size, count, step = self.chain.size, state.motors.shape[1], 1e-6
+        h = np.empty((count, size, size))
+        at_once = max(1, CHUNK // max(1, 2 * count))
+        for begin in range(0, size, at_once):
+            part = np.arange(begin, min(begin + at_once, size))
+            rows = np.tile(np.arange(count), 2 * len(part))
+            many = state.part(rows)
+            moved = (many.rest if of_rest else many.coordinates).reshape(size, len(part), 2, count)
+            moved[part, np.arange(len(part)), 0] += step
+            moved[part, np.arange(len(part)), 1] -= step
+            at = tool if tool.position.ndim == 1 else tool[rows]
+            swept = self.chain.sweep(many.coordinates, at, many.conditions.spindle)
+            force = self._forces(replace(many, swept=swept))[0].reshape(size, len(part), 2, count)
+            h[:, :, part] = np.moveaxis((force[:, :, 0] - force[:, :, 1]) / (2 * step), 2, 0)
         return h
 
     @property

@@ -15,7 +15,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, Ints
 from postproc.robot.chain import Chain, Sweep
 from postproc.robot.geometries import Joint
 from postproc.yamlfile import Section
@@ -104,6 +104,17 @@ class State:
     swept: Sweep
     wrench: Floats
     conditions: Conditions
+
+    def part(self, rows: Ints) -> State:
+        """Copies of some of the states; ``swept`` is still that of all."""
+        return replace(
+            self,
+            motors=self.motors[:, rows],
+            rest=self.rest[:, rows],
+            coordinates=self.coordinates[:, rows],
+            wrench=self.wrench[:, rows],
+            conditions=self.conditions.part(rows),
+        )
 
 
 class Effect:

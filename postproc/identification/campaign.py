@@ -21,6 +21,7 @@ from postproc.effects import Conditions
 from postproc.geometry import Poses, rotation_from_vector, skew, vector_from_rotation
 from postproc.measurements import Readings
 from postproc.model import STEP_TOLERANCE, StiffnessModel, approach
+from postproc.robot.chain import jacobian
 
 ONE_POSE = 1e-6
 """[rad, m] Motors that differ by less stand in one pose."""
@@ -242,6 +243,42 @@ class Campaign:
             rows = slice(0, 3) if kind == "place" else slice(3, 6)
             found[of, rows, columns] = axes[of] @ rotation if self.tracked else rotation
         return found if self.posed else found[:, :3]
+
+    def columns(self, model: StiffnessModel, seen: Seen, given: Nuisances, moved: Floats) -> Floats:
+        """(R, 3 or 6, P) what moves in ``expected`` where the coordinates of the states move by ``moved`` (S, m, P);
+        NaN where the model has no rest."""
+        state = model.state(self.q, self.wrench, self.tool, self.conditions, seen.displacement)
+        chain = model.chain
+        # a target is on the body, which does not move with what the spindle gives
+        on = np.array([self.at_tip or not name.startswith("spindle.") for name in chain.names])
+        j = jacobian(state.swept)
+        found = np.zeros((len(self), 6 if self.posed else 3, moved.shape[2]))
+        turn, tip = j[:, 3:] @ moved, (j[:, :3] * on) @ moved
+        origin = seen.tip if self.at_tip else seen.body
+
+        def at(states: Ints, target: int) -> Floats:
+            lever = origin[states] + seen.rotation[states] @ given.places[target] - seen.tip[states]
+            return np.asarray(tip[states] - np.cross(lever[:, :, None], turn[states], axis=1))
+
+        for target in range(len(self.targets)):
+            rows = np.flatnonzero(self.readings.target == target)
+            found[rows, :3] = at(self.at[rows], target)
+            if self.still is not None:
+                found[rows, :3] -= at(self.still[rows], target)
+        if self.posed:
+            found[:, 3:] = turn[self.at]
+            if self.still is not None:
+                relative = seen.rotation[self.at] @ np.swapaxes(seen.rotation[self.still], 1, 2)
+                found[:, 3:] -= relative @ turn[self.still]
+        if self.tracked:
+            axes = given.frames.rotation[self.readings.session]
+            for half in range(0, found.shape[1], 3):
+                found[:, half : half + 3] = axes @ found[:, half : half + 3]
+        lost = ~seen.converged[self.at]
+        if self.still is not None:
+            lost |= ~seen.converged[self.still]
+        found[lost] = np.nan
+        return found
 
     def moved(self, given: Nuisances, step: Floats) -> Nuisances:
         """The nuisances after a step (U,) [m, rad]: frames T (exp(turn) p + shift), targets c + place and

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from postproc.measurements import Readings
 from . import hidden, measured
 from .arm import LIMITS, Scene, as_filed, cluttered, model_of, robot_file
 from .design import Design, drawn
-from .hidden import DEFLECTION, EVERY, OUTSIDE, Hidden
+from .hidden import ABSOLUTE, DEFLECTION, EVERY, OUTSIDE, Hidden
 from .oracle import Oracle
 
 SNRS = (0.5, 1.0, 2.0, 5.0)
@@ -40,6 +40,9 @@ NOT_TOGETHER = (
     {"tool_compliance", "link_compliance"},
 )
 """A joint that is not said to give way has no other spring; of the others one is nearly the other."""
+
+TOGETHER = 60
+"""Sets of effects of which each is run, of pairs and of triples."""
 
 CLOSE = 0.05
 """Within this share of the wanted size."""
@@ -115,14 +118,10 @@ def cases(row: str, count: int, seed: int) -> list[Case]:
 
 def _together(count: int, rng: np.random.Generator) -> list[tuple[str, ...]]:
     """Sets of effects that may be there at once, of one kind of readings."""
-    found: set[tuple[str, ...]] = set()
-    while len(found) < 60:
-        deflection = rng.random() < 0.5
-        kinds = [name for name in EVERY if (name in DEFLECTION) == deflection and name != "base_offset"]
-        chosen = tuple(sorted(rng.choice(kinds, count, replace=False)))
-        if not any(bad <= set(chosen) for bad in NOT_TOGETHER):
-            found.add(chosen)
-    return sorted(found)
+    kinds = DEFLECTION, tuple(name for name in ABSOLUTE if name != "base_offset")
+    sets = [chosen for names in kinds for chosen in combinations(names, count)]
+    sets = [chosen for chosen in sets if not any(bad <= set(chosen) for bad in NOT_TOGETHER)]
+    return [tuple(sets[i]) for i in rng.permutation(len(sets))[:TOGETHER]]
 
 
 def made(case: Case) -> Run:
