@@ -17,8 +17,12 @@ from postproc.model import StiffnessModel
 
 EVERY = "all joints"
 
-UNSEEN = 0.1
-"""Standard deviations by which a group of its usual size must move all readings together to be testable."""
+UNSEEN = 1.5
+"""Standard deviations by which a group of its usual size must move all readings together to be testable: of less, only
+a size that is implausible would show."""
+
+STRAIGHT = 0.02
+"""Share of what an effect of its usual size does that its columns may not foresee."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +30,8 @@ class Candidate:
     """An effect on one joint ("" where it has none, or ``EVERY``) that the model may lack.
 
     ``unknowns``: its parameters in ``model``, the model with the effect added at its null; columns (R, 3 or 6, p) what
-    they move, per scale; ``shapes``: taken at their usual size, since nothing moves at the null.
+    they move, per scale; ``bent``: in its usual size it does not do what its columns at the null say; ``upto``: of an
+    effect that is there on no joint alone, the last joint whose parameters it has.
     """
 
     effect: Effect
@@ -34,7 +39,8 @@ class Candidate:
     model: StiffnessModel
     unknowns: tuple[Unknown, ...]
     columns: Floats
-    shapes: bool = False
+    bent: bool = False
+    upto: str = ""
     only: tuple[Unknown, ...] = ()
 
     @property
@@ -47,13 +53,15 @@ class Candidate:
         return replace(self, columns=columns, only=tuple(unknowns))
 
     def contains(self, other: Candidate) -> bool:
-        """Whether ``other`` is the same effect on one of these joints."""
-        return self.key[0] == other.key[0] and self.joint == EVERY
+        """Whether ``other`` is the same effect with some of these parameters."""
+        return self.key[0] == other.key[0] and {u.parameter.name for u in other.unknowns} <= {
+            u.parameter.name for u in self.unknowns
+        }
 
     @property
     def key(self) -> tuple[str, str]:
         """The form of the effect, and its joint."""
-        return f"{self.name} {self.effect.described()}", self.joint
+        return f"{self.name} {self.effect.described()}", self.joint or self.upto
 
     @property
     def name(self) -> str:
@@ -67,6 +75,8 @@ class Candidate:
             words += f" (harmonic {str(options['harmonics']).strip('[]').replace('.0', '')})"
         if "variable" in options:
             words += f" (by {options['variable']})"
+        if self.upto:
+            words += f" (up to {self.upto})"
         return f"{words} on {self.joint}" if self.joint else words
 
 
@@ -103,25 +113,43 @@ def _by_joint(
     if not unknowns:
         return []
     effect = model.terms[unknowns[0].term].effect
-    shown = model
-    moves = np.nan_to_num(columns(campaign, shown, unknowns, campaign.seen(shown), given))
+    here = campaign.seen(model)
+    moves = np.nan_to_num(columns(campaign, model, unknowns, here, given))
+    sized = model.changed({u.key: u.parameter.null + u.parameter.scale for u in unknowns})
+    there = campaign.seen(sized, here.displacement)
     still = ~moves.any(axis=(0, 1))
-    if still.any():
+    bent = _bent(campaign.residual(here, given) - campaign.residual(there, given), moves.sum(axis=2))
+    if still.any() and bent:
         # a parameter may show only where others have a size: a length where the spring has a stiffness
-        sized = model.changed({u.key: u.parameter.scale for u in unknowns})
-        there = np.nan_to_num(columns(campaign, sized, unknowns, campaign.seen(sized), given))
-        if there[:, :, still].any():
-            shown, moves = sized, there
-    found = []
+        moves[:, :, still] = np.nan_to_num(columns(campaign, sized, unknowns, there, given))[:, :, still]
+    named = dict.fromkeys(u.parameter.joint for u in unknowns)
     if not effect.apart:
-        return [Candidate(effect, "", model, tuple(unknowns), moves, shown is not model)]
-    joints = list(dict.fromkeys(u.parameter.joint for u in unknowns))
+        return _in_steps(Candidate(effect, "", model, tuple(unknowns), moves, bent), [j for j in named if j])
+    found = []
     # a whole arm may be off at once, as a geometry that was never calibrated
-    for joint in [*joints, EVERY] if effect.whole and len(joints) > 1 else joints:
+    for joint in [*named, EVERY] if effect.whole and len(named) > 1 else named:
         own = [i for i, u in enumerate(unknowns) if joint in (EVERY, u.parameter.joint)]
         mine = tuple(unknowns[i] for i in own)
-        found.append(Candidate(effect, joint, model, mine, moves[:, :, own], shown is not model))
+        found.append(Candidate(effect, joint, model, mine, moves[:, :, own], bent))
     return found
+
+
+def _bent(does: Floats, foreseen: Floats) -> bool:
+    """Whether what an effect does (R, 3 or 6) is clearly not what was foreseen."""
+    does = np.nan_to_num(does)
+    return bool(np.linalg.norm(does - foreseen) > STRAIGHT * np.linalg.norm(does))
+
+
+def _in_steps(whole: Candidate, joints: Sequence[str]) -> list[Candidate]:
+    """The candidate with the parameters of its joints up to each one that adds something, and the whole."""
+    found: list[Candidate] = []
+    for last in range(len(joints) - 1):
+        own = [i for i, u in enumerate(whole.unknowns) if u.parameter.joint in joints[: last + 1]]
+        if not whole.columns[:, :, own].any():
+            continue
+        some = tuple(whole.unknowns[i] for i in own)
+        found.append(replace(whole, unknowns=some, columns=whole.columns[:, :, own], upto=joints[last]))
+    return [*found, whole]
 
 
 def testable(candidate: Candidate, weights: Weighting) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Floats, Ints
+from postproc.diagnosis.selection import basis_of, outside
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit
 from postproc.robot.chain import generalized_force
@@ -16,6 +17,9 @@ from postproc.units import DEG, MM
 BINS = 6
 CHANCE = 0.01
 SHOWN = 8
+
+FLIPS = 4000
+"""Times that chance is asked."""
 
 
 @dataclass(frozen=True)
@@ -32,38 +36,67 @@ def where(fitted: Fit, chance: float = CHANCE) -> tuple[Where, ...]:
     """The clear patterns in what ``fitted`` leaves, largest first.
 
     Tried are a turn of each joint that depends on its own angle, torque or sense of approach, and a shift of the tool
-    that depends on load, order, time, temperature or session; each as a step function in up to ``BINS`` parts.
-    ``chance``: probability that any is told although there is none.
+    that depends on load, order, time, temperature or session; each as a step function in up to ``BINS`` parts, without
+    what the fit could have made of it.  ``chance``: probability that any is told although there is none.  Readings of
+    one pose may share errors, and a few may be wild: what chance makes is seen where the residuals of each pose get a
+    random sign (wild bootstrap by clusters; Cameron, Gelbach and Miller, Rev. Econ. Stat. 90 (2008)).
     """
-    from scipy.stats import f
-
-    campaign = fitted.campaign
-    residual, weights = fitted.point.residual[:, :3], fitted.weights.weight[:, :3]
-    left = np.where(weights > 0, np.nan_to_num(residual) * weights, 0.0)
-    squares, rows = float((left**2).sum()), int((weights > 0).sum())
+    campaign, weights = fitted.campaign, fitted.weights
+    left = weights(np.nan_to_num(fitted.point.residual))
+    taken = np.nan_to_num(np.concatenate([weights(part) for part in fitted.point.taken], axis=1))
+    explained_by_fit = basis_of(taken)
+    left = outside(explained_by_fit, left[:, None])[:, 0]
+    squares, rows = float(left @ left), weights.counts
+    if squares <= 0:
+        return ()
+    width = fitted.point.residual.shape[1]
+    # a residual is smaller than the scatter by what the fit took up
+    lever = 1.0 - explained_by_fit.shape[1] / rows
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (FLIPS, campaign.poses))
     found = []
     tried = list(patterns(fitted, campaign))
     for variable, values, turns, unit in tried:
         part, parts = _parts(values)
-        columns = _columns(part, len(parts), turns) * weights[:, :, None]
-        matrix = columns.reshape(-1, columns.shape[2])
-        size = np.linalg.norm(matrix, axis=0)
-        matrix = matrix[:, size > 0] / size[size > 0]
-        if not matrix.shape[1]:
+        columns = np.zeros((len(campaign), width, len(parts) if turns is not None else 3 * len(parts)))
+        columns[:, :3] = _columns(part, len(parts), turns)
+        basis = _clear(outside(explained_by_fit, weights(columns)))
+        rank = basis.shape[1]
+        if rank == 0 or rows - rank < 3:
             continue
-        x, _, rank, _ = np.linalg.lstsq(matrix, left.reshape(-1), rcond=1e-9)
-        explained = squares - float(((left.reshape(-1) - matrix @ x) ** 2).sum())
-        freedom = rows - rank
-        if freedom < 3 or squares <= 0:
-            continue
-        by_chance = f.sf(explained / rank / ((squares - explained) / freedom), rank, freedom)
-        share = 1.0 - (1.0 - explained / squares) * rows / freedom
+        of_reading = (basis * left[:, None]).reshape(len(campaign), width, rank).sum(axis=1)
+        of_pose = np.zeros((campaign.poses, rank))
+        np.add.at(of_pose, campaign.pose, of_reading)
+        explained = float((of_pose.sum(axis=0) ** 2).sum())
+        by_chance = _probability(explained, ((signs @ of_pose) ** 2).sum(axis=1) / max(lever, 0.1))
+        share = 1.0 - (1.0 - explained / squares) * rows / (rows - rank)
         if by_chance * len(tried) < chance and share > 0:
-            words = _words(residual, part, parts, unit)
+            words = _words(fitted.point.residual[:, :3], part, parts, unit)
             if variable in ("order", "time") and _goes_with_poses(values, campaign.readings.q):
                 words += "; but the poses were taken in such an order: measure again in random order"
             found.append(Where(variable, words, float(share)))
     return tuple(sorted(found, key=lambda one: -one.share)[:SHOWN])
+
+
+def _clear(columns: Floats) -> Floats:
+    """Orthonormal columns (n, r) of those that are more than rounding."""
+    if not columns.shape[1]:
+        return columns
+    u, s, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(u[:, s > max(1e-6 * s[0], 1e-6)])
+
+
+def _probability(seen: float, by_chance: Floats) -> float:
+    """That chance makes as much as ``seen``, of what it made: beyond the largest of that by the gamma distribution of
+    their mean and variance."""
+    from scipy.stats import gamma
+
+    count = int((by_chance >= seen).sum())
+    if count >= 10:
+        return (count + 1) / (len(by_chance) + 1)
+    mean, variance = float(by_chance.mean()), float(by_chance.var())
+    if variance <= 0:
+        return 1.0 if seen <= mean else 0.0
+    return float(gamma.sf(seen, mean * mean / variance, scale=variance / mean))
 
 
 def patterns(

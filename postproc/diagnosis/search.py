@@ -9,7 +9,19 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.diagnosis.candidates import Candidate, candidates, testable
-from postproc.diagnosis.selection import Explained, Problem, counts, explained, problem, scatter, selected
+from postproc.diagnosis.growth import Outside, grown, whole
+from postproc.diagnosis.selection import (
+    Explained,
+    Problem,
+    basis_of,
+    counts,
+    explained,
+    outside,
+    price,
+    problem,
+    scatter,
+    selected,
+)
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
 from postproc.identification.noise import Weighting
@@ -26,9 +38,6 @@ LOOSE, BESIDE = 0.5, 0.05
 CLOSE, CLOSE_SHARE, RIVALS = 30.0, 0.05, 3
 """Rivals are fitted where -2 ln(likelihood) is linearly worse by less than this, or than this share of the gain; so
 many at most."""
-
-CLEARLY = 6.6
-"""-2 ln(likelihood) by which a further parameter must be better for being more than chance (1 %)."""
 
 FORM = 0.01
 """Share of what another effect explains that one must explain itself: no form in the library is exact, and what a large
@@ -57,25 +66,19 @@ class Linear:
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """A ``candidate`` in the place of the choice ``of``: by how much -2 ln(likelihood) is ``worse``, its parameters
-    ``more`` (negative: fewer), and the ``price`` of one (BIC); ``fitted``, or only linearly so."""
+    """A ``candidate`` in the place of the choice ``of``: by how much -2 ln(likelihood) is ``worse``, and what it pays
+    ``more`` for its parameters (negative: less); ``fitted``, or only linearly so."""
 
     of: Key
     candidate: Candidate
     worse: float
-    more: int
-    price: float
+    more: float
     fitted: bool
 
     @property
     def margin(self) -> float:
         """By how much it is the lesser explanation; negative: the better one."""
-        return self.worse + self.price * self.more
-
-    @property
-    def needless(self) -> bool:
-        """Whether it has more parameters and explains nothing more: it may contain the simpler one."""
-        return self.more > 0 and self.worse > -CLEARLY * self.more
+        return self.worse + self.more
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,23 +189,46 @@ def _linear(
 ) -> Linear:
     """The problem that the candidates' columns make of what ``fitted`` leaves without what was chosen; priors of the
     model's own parameters count as rows."""
-    looked = _as_fitted(fitted, chosen, shown)
     own, nuisance = base.point.taken
-    whiten, prior = weights, prior_rows(base.unknowns)
+    prior = prior_rows(base.unknowns)
     prior = prior[prior.any(axis=1)]
     bare = _without(campaign, fitted, chosen)
     away = np.array([u.value for u in base.unknowns]) - _values(bare.model, base.unknowns)
 
     def tall(columns: Floats, below: Floats) -> Floats:
-        return np.nan_to_num(np.concatenate([whiten(columns), below]))
+        return np.nan_to_num(np.concatenate([weights(columns), below]))
 
-    none = np.zeros((len(prior), nuisance.shape[2]))
-    common = np.concatenate([tall(own, prior), tall(nuisance, none)], axis=1)
+    def readings(columns: Floats) -> Floats:
+        return tall(columns, np.zeros((len(prior), columns.shape[2])))
+
+    common = np.concatenate([tall(own, prior), readings(nuisance)], axis=1)
+    basis = basis_of(common)
+    looked = _as_fitted(campaign, fitted, chosen, shown)
+    with_chosen = [readings(c.columns) for c in looked if c.only]
+    beyond = basis_of(np.concatenate([common, *with_chosen], axis=1)) if with_chosen else basis
+    looked = tuple(
+        _as_grown(campaign, fitted, c, lambda columns: outside(beyond, readings(columns)))
+        if c.bent and not c.only
+        else c
+        for c in looked
+    )
     residual = tall(bare.residual, prior @ (away / scales(base.unknowns)))
-    columns = tuple(tall(c.columns, np.zeros((len(prior), c.columns.shape[2]))) for c in looked)
+    columns = tuple(readings(c.columns) for c in looked)
     groups = [(own, _reach(c)) for own, c in zip(columns, looked, strict=True)]
-    made = problem(residual, common, groups, whiten.counts + len(prior), base.noise.known)
+    made = problem(residual, basis, groups, weights.counts + len(prior), base.noise.known)
     return Linear(looked, made, residual, common, columns, len(prior))
+
+
+def _as_grown(campaign: Campaign, fitted: Fit, candidate: Candidate, beyond: Outside) -> Candidate:
+    """The candidate with its columns at the size that explains the most of what ``fitted`` leaves."""
+    model, unknowns = composed(fitted.model, [candidate])
+    columns = grown(campaign, fitted.point, model, unknowns, beyond)
+    return replace(candidate, columns=columns)
+
+
+def nulls_of(unknowns: Sequence[Unknown]) -> Floats:
+    """(P,) [SI]"""
+    return np.array([u.parameter.null for u in unknowns])
 
 
 def _values(model: StiffnessModel, unknowns: Sequence[Unknown]) -> Floats:
@@ -225,27 +251,27 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
     """Other candidates in the place of each choice that explain at least half of what it does, nearest first; the
     nearest are fitted: what is linear is only nearly so."""
     given, chosen = linear.problem, [linear.candidates[g] for g in last.groups]
-    variance, price, here = scatter(given, last), float(np.log(given.freedom)), squares_of(fitted)
+    variance, here = scatter(given, last), squares_of(fitted)
     found: list[Rival] = []
     for group in last.groups:
-        mine, rest = linear.candidates[group], tuple(g for g in last.groups if g != group)
-        without = explained(given, rest).squares
-        gain = without - last.squares
+        mine = linear.candidates[group]
+        rest = explained(given, tuple(g for g in last.groups if g != group))
+        gain, paid = rest.squares - last.squares, price(given, rest, group, variance)
         of_mine = []
         for other, candidate in enumerate(linear.candidates):
             if other in last.groups or candidate.contains(mine) or mine.contains(candidate):
                 continue
-            instead = explained(given, (*rest, other))
-            if without - instead.squares > 0.5 * gain:
+            instead = explained(given, (*rest.groups, other))
+            if rest.squares - instead.squares > 0.5 * gain:
                 worse = float(instead.squares - last.squares) / variance
-                of_mine.append(Rival(mine.key, candidate, worse, instead.rank - last.rank, price, False))
+                more = price(given, rest, other, variance) - paid
+                of_mine.append(Rival(mine.key, candidate, worse, more, False))
         of_mine.sort(key=lambda rival: rival.margin)
         for k, rival in enumerate(of_mine[:RIVALS]):
             if rival.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
                 there = with_effects(campaign, base, [rival.candidate if c is mine else c for c in chosen])
-                worse = (squares_of(there) - here) / variance
-                more = len(there.unknowns) - len(fitted.unknowns)
-                of_mine[k] = Rival(mine.key, rival.candidate, float(worse), more, price, True)
+                worse = float(squares_of(there) - here) / variance
+                of_mine[k] = replace(rival, worse=worse, fitted=True)
         found += of_mine
     return tuple(sorted(found, key=lambda rival: rival.margin))
 
@@ -284,23 +310,24 @@ def _term_of(model: StiffnessModel, candidate: Candidate) -> int | None:
 
 
 def _as_fitted(
-    fitted: Fit, chosen: Sequence[Candidate], looked: Sequence[Candidate]
+    campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate], looked: Sequence[Candidate]
 ) -> tuple[Candidate, ...]:
     """The candidates, those chosen with their columns at the fit instead of at their null."""
     own, _ = fitted.point.taken
-    places: dict[Key, list[int]] = {}
+    values = (fitted.point.values(fitted.unknowns) - nulls_of(fitted.unknowns)) / scales(fitted.unknowns)
+    there: dict[Key, Candidate] = {}
     for candidate in chosen:
         term = _term_of(fitted.model, candidate)
         names = {u.parameter.name for u in candidate.unknowns}
-        places[candidate.key] = [
-            i for i, u in enumerate(fitted.unknowns) if u.term == term and u.parameter.name in names
-        ]
-    return tuple(
-        c.fitted(np.nan_to_num(own[:, :, places[c.key]]), [fitted.unknowns[i] for i in places[c.key]])
-        if places.get(c.key)
-        else c
-        for c in looked
-    )
+        at = [i for i, u in enumerate(fitted.unknowns) if u.term == term and u.parameter.name in names]
+        if not at:
+            continue
+        columns = np.nan_to_num(own[:, :, at])
+        if candidate.bent:
+            does = _without(campaign, fitted, [candidate]).residual - fitted.point.residual
+            columns = whole(columns, np.nan_to_num(does), values[at])
+        there[candidate.key] = candidate.fitted(columns, [fitted.unknowns[i] for i in at])
+    return tuple(there.get(c.key, c) for c in looked)
 
 
 def _without(campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate]) -> Point:
@@ -316,10 +343,7 @@ def _without(campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate]) -> Po
 
 
 def _reach(candidate: Candidate) -> Floats:
-    """(p, 2) how far each parameter may go from its null, in its scale.  Where the effect was looked at in its usual
-    size, its columns stand for shapes, not for parameters: no bound is known."""
-    if candidate.shapes:
-        return np.tile([-np.inf, np.inf], (candidate.columns.shape[2], 1))
+    """(p, 2) how far each parameter may go from its null, in its scale."""
     return np.array(
         [
             [

@@ -18,7 +18,7 @@ WORTH = 0.1
 """Share of the squares left that an effect must explain where the model leaves more than scatter: what is not
 understood follows the joints as well, and by chance looks a little like any effect."""
 
-CHANCE = 0.01
+CHANCE = 0.001
 """Probability that among all groups any is taken in although none is there."""
 
 APART = 1e-3
@@ -39,14 +39,15 @@ class Problem:
     """Groups of columns and a residual, outside of what is explained anyway, whose rank is ``rank``.
 
     residual (n,); matrix (n, P): all columns, each as long as 1 before its explained part was taken out; places: the
-    columns of each group; reach (P, 2): how far each coefficient may go down and up from zero; ``known``: the residual
-    is in its standard deviations, else only ratios count.
+    columns of each group; reach (P, 2): how far each coefficient may go down and up from zero; size (P,): coefficient
+    over parameter in its scale; ``known``: the residual is in its standard deviations, else only ratios count.
     """
 
     residual: Floats
     matrix: Floats
     places: tuple[Ints, ...]
     reach: Floats
+    size: Floats
     rank: int
     known: bool
 
@@ -67,32 +68,37 @@ class Problem:
         return float(self.residual @ self.residual)
 
 
-def problem(
-    residual: Floats, common: Floats, groups: Sequence[tuple[Floats, Floats]], rows: int, known: bool
-) -> Problem:
-    """Of whitened ``residual`` (n,), ``common`` columns (n, k) and (columns (n, p), reach (p, 2)) of the groups.
-    ``rows`` of n count: the others are zero."""
+def basis_of(common: Floats) -> Floats:
+    """(n, r) orthonormal columns of ``common`` (n, k), however long those are."""
     length = np.linalg.norm(common, axis=0)
     u, s, _ = np.linalg.svd(common[:, length > 0] / length[length > 0], full_matrices=False)
-    basis = u[:, s > 1e-8 * s.max(initial=0.0)]
+    return np.asarray(u[:, s > 1e-8 * s.max(initial=0.0)])
 
-    def outside(columns: Floats) -> Floats:
-        left = columns - basis @ (basis.T @ columns)
-        return np.asarray(left - basis @ (basis.T @ left))
 
-    whole = (
+def outside(basis: Floats, columns: Floats) -> Floats:
+    """``columns`` (n, p) without what lies in ``basis`` (n, r)."""
+    left = columns - basis @ (basis.T @ columns)
+    return np.asarray(left - basis @ (basis.T @ left))
+
+
+def problem(
+    residual: Floats, basis: Floats, groups: Sequence[tuple[Floats, Floats]], rows: int, known: bool
+) -> Problem:
+    """Of whitened ``residual`` (n,), a ``basis`` (n, r) of what is explained anyway, and (columns (n, p), reach (p, 2))
+    of the groups.  ``rows`` of n count: the others are zero."""
+    columns = (
         np.concatenate([columns for columns, _ in groups], axis=1) if groups else np.zeros((len(residual), 0))
     )
     reach = np.concatenate([reach for _, reach in groups]) if groups else np.zeros((0, 2))
-    size = np.linalg.norm(whole, axis=0)
+    size = np.linalg.norm(columns, axis=0)
     size[size == 0] = 1.0
     ends = np.cumsum([columns.shape[1] for columns, _ in groups])
     places = tuple(
         np.arange(end - columns.shape[1], end) for end, (columns, _) in zip(ends, groups, strict=True)
     )
-    left = outside(residual[:, None])[:, 0]
+    left = outside(basis, residual[:, None])[:, 0]
     rank = basis.shape[1] + len(residual) - rows
-    return Problem(left, outside(whole / size), places, reach * size[:, None], rank, known)
+    return Problem(left, outside(basis, columns / size), places, reach * size[:, None], size, rank, known)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +137,34 @@ def _bounded(value: Floats, vector: Floats, aim: Floats, low: Floats, high: Floa
     root = np.sqrt(np.maximum(value, (0.1 * APART) ** 2))
     matrix, right = root[:, None] * vector.T, (vector.T @ aim) / root
     return np.asarray(lsq_linear(matrix, right, (np.minimum(low, 0.0), np.maximum(high, 1e-300)), "bvls").x)
+
+
+def price(given: Problem, rest: Explained, group: int, variance: float) -> float:
+    """What ``group`` has to pay beside ``rest`` for the parameters that it fits: by how much -2 ln(likelihood) falls
+    more in the fit than it does on the average over all that its parameters might have been.
+
+    They might have been of any size u, all alike in their scales.  With l the eigenvalues of the information that the
+    readings give of them, and b the gradients along its axes, that average is
+
+        max over u of  sum b^2 u^2 / (1 + u^2 l) - ln(1 + u^2 l)
+
+    A parameter that the readings do not show costs nothing, and one that they would have shown, but is not there, does.
+    """
+    at, others = given.places[group], rest.columns
+    scaled = given.matrix[:, at] * given.size[at]
+    if len(others):
+        scaled = outside(basis_of(given.matrix[:, others]), scaled)
+    value, vector = np.linalg.eigh(scaled.T @ scaled / variance)
+    on = value > 1e-12 * max(1.0, float(value.max(initial=0.0)))
+    if not on.any():
+        return 0.0
+    information = value[on]
+    gradient = (vector[:, on].T @ (scaled.T @ left_of(given, rest))) / variance
+    # from sizes that nobody would see to those that nobody could miss
+    u = np.geomspace(1e-3 / np.sqrt(information.max()), 1e3 * (1.0 + np.abs(gradient / information).max()), 200)
+    spread = 1.0 + np.outer(u * u, information)
+    average = (gradient**2 * (u * u)[:, None] / spread - np.log(spread)).sum(axis=1).max()
+    return float((gradient**2 / information).sum() - average)
 
 
 def left_of(given: Problem, last: Explained) -> Floats:

@@ -168,7 +168,7 @@ def _evidence(found: Search, last: Explained, group: int) -> Evidence:
         for rows in (folds_of(campaign, min(FOLDS, campaign.poses)), _regions(found), _sessions(found))
     )
     own = linear.candidates[group].key
-    nearest = next((r for r in found.rivals if r.of == own and not r.needless), None)
+    nearest = next((r for r in found.rivals if r.of == own), None)
     margin, alias = (np.inf, None) if nearest is None else (nearest.margin, nearest.candidate)
     among = len(linear.candidates)
     gain = squares / variance
@@ -177,7 +177,7 @@ def _evidence(found: Search, last: Explained, group: int) -> Evidence:
 
 def _alternatives(found: Search, group: int) -> tuple[Candidate, ...]:
     mine = found.linear.candidates[group]
-    against = [r for r in found.rivals if r.of == mine.key and r.margin < MARGIN and not r.needless]
+    against = [r for r in found.rivals if r.of == mine.key and r.margin < MARGIN]
     return (mine, *(rival.candidate for rival in against))
 
 

@@ -22,8 +22,8 @@ from postproc.identification.fit import Fit
 from postproc.identification.suspicion import check_fit, check_numbers
 from postproc.identification.unknowns import Unknown
 from postproc.identification.validation import held_out
-from postproc.measurements import measurements_csv
-from postproc.model import STANDARD_GRAVITY
+from postproc.measurements import Readings, measurements_csv
+from postproc.model import STANDARD_GRAVITY, approach
 from postproc.publish import publish
 from postproc.report.diagnosed import Diagnosed, NextPoses, diagnosed_csv
 from postproc.report.report import json_bytes
@@ -138,7 +138,27 @@ def _told_apart(
         return None
     setups = poses.chosen[NEXT]
     setups = setups[tour(setups.q, spacings(measured.robot, offer.spacing))]
-    return NextPoses(readings_of(model, offer, setups), (one, other), poses.separation[NEXT])
+    return NextPoses(_like(measured, readings_of(model, offer, setups)), (one, other), poses.separation[NEXT])
+
+
+def _like(measured: Measured, planned: Readings) -> Readings:
+    """The plan with the columns that the readings so far have, so that both can be read as one: time and temperature
+    are to be filled in, senses of approach follow from the order."""
+    before, empty = measured.readings, np.full(len(planned), np.nan)
+    direction = planned.direction
+    if before.direction is None:
+        direction = None
+    elif direction is None:
+        direction = approach(planned.q)
+    return replace(
+        planned,
+        in_robot_frame=before.in_robot_frame,
+        tool=before.tool,
+        places=dict(before.places),
+        time=None if before.time is None else empty,
+        temperature=None if before.temperature is None else empty,
+        direction=direction,
+    )
 
 
 def _values(final: Fit, unknowns: Sequence[Unknown], candidate: Candidate) -> dict[tuple[int, str], float]:

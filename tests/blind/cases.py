@@ -220,7 +220,7 @@ def run_of(
             signal = measured.observed(h.into(bare, size), design, moved) - without
         else:
             size, signal = _sized(h, bare, design, moved, without, oracle, case.snr)
-        found.append((h, size, oracle.shown(signal)))
+        found.append((h, size, showing(oracle, h)(signal)))
     scene = bare
     for h, size, _ in found:
         scene = h.into(scene, size)
@@ -242,13 +242,18 @@ def run_of(
     )
 
 
+def showing(oracle: Oracle, h: Hidden):
+    """How large what is hidden counts: of what no library has, only what no effect of one can imitate."""
+    return oracle.beyond if h.outside else oracle.shown
+
+
 def _sized(h: Hidden, bare, design, moved, without, oracle, wanted: float):
     """The size at which it shows as wanted, and what it then does (R, 3) [m]; the largest plausible one where that
     does not do."""
     size = min(1.0, h.cap)
     for _ in range(12):
         signal = measured.observed(h.into(bare, size), design, moved) - without
-        shows = oracle.shown(signal)
+        shows = showing(oracle, h)(signal)
         if abs(shows - wanted) < CLOSE * wanted or (size >= h.cap and shows < wanted):
             break
         size = min(h.cap, size * float(np.clip(wanted / max(shows, 1e-9), 0.02, 20.0)))

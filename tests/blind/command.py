@@ -13,16 +13,20 @@ from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from postproc.measurements.writing import measurements_csv
+import numpy as np
 
-from . import table
+from postproc.measurements.writing import measurements_csv
+from postproc.model import StiffnessModel
+from postproc.robot.description import load_robot
+
+from . import measured, table
 from .cases import ROWS, Case, cases, made
-from .verdicts import judged
+from .verdicts import judged, outcome_of
 from .worker import ROOMS
 
 
 class Diagnosing:
-    """A process that diagnoses folders, one after the other."""
+    """A process that runs ``compensate diagnose``, time and again."""
 
     def __init__(self) -> None:
         self.process = subprocess.Popen(
@@ -32,15 +36,20 @@ class Diagnosing:
             text=True,
         )
 
-    def __call__(self, folder: Path) -> dict:
+    def __call__(self, folder: Path, data: Sequence[str], robot: str, new: str) -> dict:
+        """What it says, in ``folder``, of the readings ``data`` and a ``robot`` file, ``new``.yaml beside it."""
+        words = ["diagnose", *data, "--robot", robot, "-o", f"{new}.yaml", "--json", f"{new}.json", "--quiet"]
         assert self.process.stdin
         assert self.process.stdout
-        self.process.stdin.write(f"{folder}\n")
+        self.process.stdin.write(json.dumps([str(folder), words]) + "\n")
         self.process.stdin.flush()
         line = self.process.stdout.readline()
         if not line:
             raise RuntimeError(f"the diagnosing process ended with {self.process.wait()}")
-        return json.loads(line)
+        ended = json.loads(line)
+        told = folder / f"{new}.json"
+        answer = json.loads(told.read_text(encoding="utf-8")) if told.exists() else {"verdict": "refused"}
+        return {**answer, "seconds": ended["seconds"], "told": ended["told"]}
 
     def close(self) -> None:
         assert self.process.stdin
@@ -54,20 +63,38 @@ _own: list[Diagnosing] = []
 """The process that diagnoses for this one."""
 
 
-def record_of(case: Case, diagnosing: Diagnosing, with_gap: bool = True) -> dict:
-    """Makes a case, lets it be diagnosed, and judges that."""
+def record_of(case: Case, diagnosing: Diagnosing, more: bool = True) -> dict:
+    """Makes a case, lets it be diagnosed, and judges that.
+
+    ``more``: also the gap that is closed, what is said of the same readings with the new robot file, and of what was
+    ambiguous when the poses are measured that were proposed.
+    """
     run = made(case)
     with (
         TemporaryDirectory(prefix=f"{ROOMS}data-") as data,
         TemporaryDirectory(prefix=f"{ROOMS}truth-") as truth,
     ):
-        Path(data, "data.csv").write_bytes(measurements_csv(run.readings))
-        Path(data, "robot.yaml").write_bytes(run.robot)
+        folder = Path(data)
+        (folder / "data.csv").write_bytes(measurements_csv(run.readings))
+        (folder / "robot.yaml").write_bytes(run.robot)
         Path(truth, "truth.json").write_text(
             json.dumps([[h.effect, h.joint, h.true(s)] for h, s in run.hidden])
         )
-        answer = diagnosing(Path(data))
-    return judged(run, answer, with_gap)
+        answer = diagnosing(folder, ["data.csv"], "robot.yaml", "new")
+        new = folder / "new.yaml"
+        found = StiffnessModel.from_robot(load_robot(new)) if new.exists() else None
+        record = judged(run, answer, found, more and case.row == "single")
+        if more and found and answer["verdict"] == "named":
+            record["again"] = diagnosing(folder, ["data.csv"], "new.yaml", "again")["verdict"]
+        plan = folder / "new.next_poses.csv"
+        if more and plan.exists():
+            rng = np.random.default_rng([case.number, case.seed, 4])
+            text = measured.filled(run.scene, run.design, plan.read_text(encoding="utf-8"), rng)
+            (folder / "next.csv").write_text(text, encoding="utf-8")
+            later = diagnosing(folder, ["data.csv", "next.csv"], "robot.yaml", "later")
+            record["later"] = {key: later.get(key) for key in ("verdict", "named", "alternatives", "told")}
+            record["later"]["outcome"] = outcome_of(run, later, [[] for _ in run.hidden])
+    return record
 
 
 def _record_of(case: Case) -> dict:

@@ -34,7 +34,7 @@ class Design:
 
     time (V,) [s], temperature (V,) [degC], None where not in the file.  sigma [m]: scatter of one coordinate of a
     tracker's reading; jitter [rad]: of where each joint comes to stand; tails: share of readings with three times the
-    scatter.
+    scatter; senses (V, 6): of approach, where another order than that of time was asked for.
     """
 
     q: np.ndarray
@@ -50,6 +50,7 @@ class Design:
     sigma: float
     jitter: float
     tails: float
+    senses: np.ndarray | None = None
 
     @property
     def points(self) -> int:
@@ -58,7 +59,9 @@ class Design:
 
     @property
     def came(self) -> np.ndarray:
-        """(V, 6) sense -1, 0, 1 in which each joint came to its place; 0 at first."""
+        """(V, 6) sense -1, 0, 1 in which each joint came to its place; 0 at first; ``senses`` where they are given."""
+        if self.senses is not None:
+            return self.senses
         sense = np.zeros_like(self.q)
         for visit in range(1, len(self.q)):
             way = np.sign(self.q[visit] - self.q[visit - 1])

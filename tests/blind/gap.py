@@ -3,12 +3,11 @@ which effect it is."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from postproc.effects import EFFECTS
+from postproc.diagnosis import search
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit
 from postproc.identification.registration import registered
@@ -24,9 +23,9 @@ from .oracle import joined, own_unknowns, unknowns_in
 POSES = 20
 
 
-def closed(run: Run, answer: Mapping) -> float:
+def closed(run: Run, found: StiffnessModel) -> float:
     """Share of what an oracle closes of the gap, root mean square: its own readings fitted without what is hidden, and
-    with it."""
+    with it.  ``found``: the model that the diagnosis has written."""
     rng = np.random.default_rng([run.case.number, run.case.seed, 3])
     design = _elsewhere(run, rng)
     value = measured.observed(run.scene, design)
@@ -38,8 +37,8 @@ def closed(run: Run, answer: Mapping) -> float:
         return float(np.sqrt(np.mean(seen.residual(at, given) ** 2)))
 
     filed = model_of(run.robot)
-    before, after = (left(_model(filed, answer[key])) for key in ("before", "after"))
-    return (before - after) / (before - left(knowing(run)))
+    before = left(fit(Campaign(run.readings), filed, search.own_unknowns(filed)).model)
+    return (before - left(found)) / (before - left(knowing(run)))
 
 
 def knowing(run: Run) -> StiffnessModel:
@@ -67,17 +66,3 @@ def _elsewhere(run: Run, rng: np.random.Generator):
     rows = np.sort(rng.integers(0, len(old.q), POSES))
     parts = [None if x is None else x[rows] for x in (old.time, old.temperature)]
     return replace(old, q=q, wrench=old.wrench[rows], time=parts[0], temperature=parts[1], stated=True)
-
-
-def _model(filed: StiffnessModel, terms: Sequence) -> StiffnessModel:
-    """The robot file's model with the ``terms`` of an answer."""
-    model = filed
-    for k, (name, options, values) in enumerate(terms):
-        if k >= len(filed.terms):
-            forms = [
-                *EFFECTS[name].variants(filed.robot.joints),
-                joined(filed, EFFECTS[name](filed.robot.joints)).terms[-1].effect,
-            ]
-            model = model.added(next(form for form in forms if form.described() == options))
-        model = model.changed({(k, key): value for key, value in values.items()})
-    return model

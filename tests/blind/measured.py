@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +12,7 @@ from postproc.geometry import Poses
 from postproc.measurements import Readings
 from postproc.measurements.readings import alike, planned
 from postproc.model import StiffnessModel
+from postproc.units import DEG, MM
 
 from .arm import Scene
 from .design import Design
@@ -114,3 +117,42 @@ def readings(design: Design, value: np.ndarray, sigma: float) -> Readings:
         temperature=temperature,
         repeat=alike(made.q, made.wrench, made.target, direction, temperature),
     )
+
+
+def filled(scene: Scene, design: Design, plan: str, rng: np.random.Generator) -> str:
+    """A plan of poses (CSV) with what a ``design`` of that order reads on a scene, as somebody fills it in."""
+    comments = [line for line in plan.splitlines() if line.startswith("#")]
+    rows = list(csv.DictReader(line for line in plan.splitlines() if not line.startswith("#")))
+
+    def numbers(names) -> np.ndarray:
+        return np.array([[float(row.get(name) or 0.0) for name in names] for row in rows])
+
+    axes = [f"A{i}" for i in range(1, 7)]
+    q, wrench = numbers(axes) * DEG, numbers(("FX", "FY", "FZ", "MX", "MY", "MZ"))
+    visits = np.flatnonzero(np.append(True, (np.diff(q, axis=0) != 0).any(axis=1)))
+    loads = len(rows) // len(visits) // design.points
+    later = replace(
+        design,
+        q=q[visits],
+        wrench=wrench[:: design.points].reshape(len(visits), loads, 6),
+        senses=numbers([f"DIR{i}" for i in range(1, 7)])[visits] if "DIR1" in rows[0] else None,
+        time=None if design.time is None else design.time[-1] + 3600.0 + 120.0 * np.arange(len(visits)),
+        temperature=None if design.temperature is None else np.full(len(visits), design.temperature[-1]),
+    )
+    order = np.arange(len(rows)) % design.points
+    if design.points > 1 and [row["TARGET"] for row in rows] != [f"M{k + 1}" for k in order]:
+        raise ValueError("a plan of other targets, or in another order")
+    moved = later.jitter * rng.normal(size=later.q.shape) if later.jitter else None
+    value = observed(scene, later, moved) + noise(later, rng)
+    names = ("DX", "DY", "DZ") if design.deflection else ("X", "Y", "Z")
+    each = loads * design.points
+    for k, row in enumerate(rows):
+        row.update((name, f"{x / MM:.4f}") for name, x in zip(names, value[k].tolist(), strict=True))
+        for name, given in (("T", later.time), ("TEMP", later.temperature)):
+            if name in row and given is not None:
+                row[name] = f"{given[k // each]:.3f}"
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, rows[0], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return "\n".join([*comments, stream.getvalue()])

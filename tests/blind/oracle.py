@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from postproc.effects import EFFECTS, Effect
 from postproc.geometry import Poses
@@ -25,8 +26,8 @@ PLAUSIBLE = 10.0
 """Usual sizes by which a stated parameter may be off."""
 
 MARGIN = 10.0
-"""By how much -2 ln(likelihood), with the price of parameters (BIC), of anything else must be worse than the truth's
-for an oracle to tell them apart."""
+"""By how much -2 ln(likelihood), on the average over what parameters may be, of anything else must be worse than the
+truth's for an oracle to tell them apart."""
 
 SEEN = 1e-3
 """Share of a column that must stand outside of what is explained anyway."""
@@ -87,20 +88,17 @@ class Oracle:
         beside = [self.outside(self._flat(self._of(hidden, s))) for hidden, s in others]
         fixed = np.column_stack([np.empty((len(y), 0)), *beside])
 
-        def left(own: np.ndarray) -> tuple[float, int]:
-            basis = _basis(np.column_stack([fixed, own]))
-            return float(y @ y - ((basis.T @ y) ** 2).sum()), basis.shape[1]
+        basis = _basis(np.column_stack([np.empty((len(y), 0)), *beside]))
 
-        best, rank = left(self.outside(self._flat(self._of(truth, size))))
-        price, found = np.log(self.freedom), []
+        def gain(moves: np.ndarray) -> float:
+            own = self.outside(self._flat(moves))
+            return likelihood_gain(own - basis @ (basis.T @ own), y - basis @ (basis.T @ y))
+
+        best, found = gain(self._of(truth, size)), []
         for effect, joint, moves in self._library():
-            if (effect, joint) == (truth.effect, truth.joint):
-                continue
-            squares, p = left(self.outside(self._flat(moves)))
-            found.append(Rival(effect, joint, squares - best + price * (p - rank)))
-        squares, p = left(np.empty((len(y), 0)))
-        found.append(Rival("nothing", "", squares - best + price * (p - rank)))
-        return sorted(found, key=lambda rival: rival.margin)
+            if (effect, joint) != (truth.effect, truth.joint):
+                found.append(Rival(effect, joint, best - gain(moves)))
+        return sorted([*found, Rival("nothing", "", best)], key=lambda rival: rival.margin)
 
     def beyond(self, signal: np.ndarray) -> float:
         """SNR of what of a ``signal`` no single effect of the library can imitate either."""
@@ -151,6 +149,23 @@ class Oracle:
                     own = [i for i, u in enumerate(unknowns) if u.parameter.joint == joint]
                     if np.linalg.norm(moves[:, :, own]) / self.sigma > SEEN:
                         yield name, joint, moves[:, :, own]
+
+
+def likelihood_gain(columns: np.ndarray, y: np.ndarray) -> float:
+    """Fall of -2 ln(likelihood) of ``y`` (n,) with ``columns`` (n, p) whose coefficients are normal with one deviation,
+    the likeliest; p(y) is normal with the covariance 1 + u^2 C C'."""
+    u, s, _ = np.linalg.svd(columns, full_matrices=False)
+    s, along = s[s > 0], (u.T @ y)[s > 0]
+
+    def less(log_u: float) -> float:
+        variance = 1.0 + (np.exp(log_u) * s) ** 2
+        return float((along**2 / variance + np.log(variance) - along**2).sum())
+
+    if not len(s):
+        return 0.0
+    grid = np.linspace(np.log(1e-3 / s.max()), np.log(1e5 / s.max()), 60)
+    start = grid[np.argmin([less(x) for x in grid])]
+    return -float(min(0.0, minimize_scalar(less, bounds=(start - 1, start + 1), method="bounded").fun))
 
 
 def joined(model: StiffnessModel, effect: Effect) -> StiffnessModel:

@@ -14,6 +14,9 @@ from .hidden import EVERY, OUTSIDE
 
 Records = Sequence[dict]
 
+SEPARATE = 3.2
+"""Standard deviations between two explanations from which on a plan is said to tell them apart."""
+
 
 def share(records: Records, holds: Callable[[dict], bool]) -> str:
     """Count, share and its 95 % interval (Wilson)."""
@@ -32,6 +35,11 @@ def is_right(record: dict) -> bool:
 def is_named(record: dict) -> bool:
     """Whether any effect was said to be there."""
     return bool(record["answer"].get("named"))
+
+
+def is_settled(record: dict) -> bool:
+    """Whether the truth was named after more poses had been measured."""
+    return record["later"]["outcome"] == "exact"
 
 
 def is_wrong(record: dict) -> bool:
@@ -68,17 +76,22 @@ def matrix(records: Records) -> list[str]:
             is_right,
         ),
     ]
-    covers = [value for r in records if r["covered"] for value in r["covered"].values()]
     told = [f"{name:46} {share(chosen, holds)}" for name, chosen, holds in lines]
-    if covers:
-        told.append(
-            f"{'95 % intervals that hold the truth':46} {share([{'c': c} for c in covers], lambda r: r['c'])}"
-        )
-    closed = [r["closed"] for r in records if r.get("closed") is not None and r["snr"] >= 2]
+    covers = [{"holds": value} for r in records if r["covered"] for value in r["covered"].values()]
+    told.append(f"{'95 % intervals that hold the truth':46} {share(covers, lambda r: r['holds'])}")
+    again = [r for r in records if "again" in r]
+    told.append(
+        f"{'named, then nothing missing with the new file':46} {share(again, lambda r: r['again'] == 'nothing_missing')}"
+    )
+    later = [r for r in records if "later" in r and r["outcome"] in ("ambiguous", "undecided")]
+    told.append(f"{'ambiguous, right after the 6 proposed poses':46} {share(later, is_settled)}")
+    hopeful = [r for r in later if all((s or 0) >= SEPARATE for s in r["answer"]["next_poses_separation"])]
+    told.append(f"{'  of these, where the plan says that they do':46} {share(hopeful, is_settled)}")
+    closed = [r["closed"] for r in records if r.get("closed") is not None and r["snr"] >= 2 and r["reached"]]
     if closed:
         told.append(
             f"{'gap closed of what an oracle closes, SNR >= 2':46} {100 * np.median(closed):.1f} % in the median,"
-            f" {100 * np.mean(np.clip(closed, 0, 1)):.1f} % in the mean"
+            f" {100 * np.mean(np.clip(closed, 0, 1)):.1f} % in the mean of {len(closed)}"
         )
     unreached = Counter(tuple(r["effects"]) for r in records if not r["reached"])
     if unreached:
@@ -195,17 +208,24 @@ def wrong_cases(records: Records, limit: int) -> list[str]:
         answer = r["answer"]
         truth = " + ".join(" ".join(pair).strip() for pair in r["truth"]) or "nothing"
         names = "; ".join(
-            f"{' '.join([one['effect'], *one['joints']])} (margin {one['margin']:.0f} to {one['alias']})"
+            f"{' '.join([one['effect'], *one['joints']])}{_evidence(one['evidence'])}"
             for one in answer.get("named", [])
         )
         kind = "deflection" if r["deflection"] else "absolute"
         sets = " | ".join(
-            " = ".join(" ".join(pair).strip() for pair in one) for one in answer.get("ambiguous", [])
+            " = ".join(f"{c['effect']} {c['joint'] or ''}".strip() for c in one)
+            for one in answer.get("alternatives", [])
         )
         lines.append(
             f"{r['key']:22} {truth}, SNR {r['snr']:g}, {r['poses']} poses, {kind}: {r['outcome']}: {answer['verdict']}"
-            f" [{names}]{' alternatives ' + sets if sets else ''} lack {answer.get('lack', 0):.2f}"
+            f" [{names}]{' alternatives ' + sets if sets else ''} lack {answer.get('lack') or 0:.2f}"
             + (f" rejected {answer['rejected']}" if answer.get("rejected") else "")
             + (f" oracle's nearest {r['rivals'][0][0]}" if r["rivals"] and r["rivals"][0] else "")
         )
     return lines
+
+
+def _evidence(evidence: dict) -> str:
+    if evidence["alias"] is None:
+        return ""
+    return f" (margin {evidence['margin']:.0f} to {evidence['alias']['effect']} {evidence['alias']['joint'] or ''})"

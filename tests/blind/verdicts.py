@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
+from postproc.model import StiffnessModel
 
 from .cases import Run
 from .gap import closed
@@ -12,29 +12,21 @@ WITHOUT_JOINTS = ("link_gravity",)
 """Effects of an arm as a whole, whatever joints their parameters stand beside."""
 
 
-def judged(run: Run, answer: dict, with_gap: bool = True) -> dict:
-    """The record of a run: what was hidden, what was said, and whether that is right.
+def judged(run: Run, answer: dict, found: StiffnessModel | None = None, with_gap: bool = False) -> dict:
+    """The record of a run: what was hidden, what was said (``compensate diagnose --json``), and whether that is right.
+    ``found``: the model of the robot file that was written.
 
     outcome: exact; ambiguous (with the truth, where an oracle can not tell it from something else), undecided (the
     same where it can); partly (some of the truth and no more), missed, unknown, wrong, refused.
     """
     rest = run.readings.value - run.without
     rivals = [nearest(run, k, rest) for k in range(len(run.hidden))]
-    truth = {named(h.effect, h.joint) for h, _ in run.hidden}
-    said = [
-        {named(one["effect"], joint) for joint in one["joints"] or [""]} for one in answer.get("named", ())
-    ]
-    names = set().union(*said) if said else set()
-    sets = [{named(*pair) for pair in alternatives} for alternatives in answer.get("ambiguous", ())]
-    # two forms of one effect on one joint are no doubt about its name
-    sets = [alternatives for alternatives in sets if len(alternatives) > 1]
-    outside = any(h.outside for h, _ in run.hidden)
-    outcome = _outcome(answer["verdict"], truth, names, sets, outside, rivals)
+    outcome = outcome_of(run, answer, rivals)
     return {
         "key": run.case.key,
         "row": run.case.row,
         "effects": list(run.case.effects),
-        "truth": sorted([list(pair) for pair in truth]),
+        "truth": sorted([list(pair) for pair in truth_of(run)]),
         "snr": run.case.snr,
         "shown": [round(snr, 3) for snr in run.snr],
         "poses": run.case.poses,
@@ -44,12 +36,32 @@ def judged(run: Run, answer: dict, with_gap: bool = True) -> dict:
         "rivals": [[[r.effect, r.joint, round(float(r.margin), 1)] for r in of[:3]] for of in rivals],
         "outcome": outcome,
         "right": right(run.case.row, outcome),
-        "covered": covered(run, answer) if outcome == "exact" else None,
-        "closed": closed(run, answer)
-        if with_gap and run.case.row == "single" and "after" in answer
-        else None,
-        "answer": answer,
+        "covered": covered(run, found) if outcome == "exact" and found else None,
+        "closed": closed(run, found) if with_gap and found else None,
+        "answer": {key: value for key, value in answer.items() if key in TOLD},
     }
+
+
+TOLD = ("verdict", "named", "alternatives", "rejected", "lack", "next_poses_separation", "seconds", "told")
+"""What a record keeps of an answer."""
+
+
+def truth_of(run: Run) -> set[tuple[str, str]]:
+    return {named(h.effect, h.joint) for h, _ in run.hidden}
+
+
+def outcome_of(run: Run, answer: dict, rivals: list[list[Rival]]) -> str:
+    """Of an answer on ``run``, ``rivals`` of each effect as the oracle has them."""
+    names = {named(one["effect"], joint) for one in answer.get("named", ()) for joint in one["joints"] or [""]}
+    sets = [
+        {named(one["effect"], one["joint"] or "") for one in alternatives}
+        for alternatives in answer.get("alternatives", ())
+    ]
+    # two forms of one effect on one joint are no doubt about its name
+    names = names.union(*(one for one in sets if len(one) == 1))
+    sets = [one for one in sets if len(one) > 1]
+    outside = any(h.outside for h, _ in run.hidden)
+    return _outcome(answer["verdict"], truth_of(run), names, sets, outside, rivals)
 
 
 def named(effect: str, joint: str) -> tuple[str, str]:
@@ -101,10 +113,14 @@ def right(row: str, outcome: str) -> bool:
     return outcome in ("exact", "ambiguous", "unseen")
 
 
-def covered(run: Run, answer: dict) -> dict[str, bool]:
-    """Whether the 95 % intervals hold the true values: of what is hidden, and of what the file states."""
-    return {
-        name: abs(answer["estimates"][name][0] - value) <= answer["estimates"][name][1]
-        for name, value in run.true().items()
-        if name in answer["estimates"]
-    }
+def covered(run: Run, found: StiffnessModel) -> dict[str, bool]:
+    """Whether the 95 % intervals of the robot file that was written hold the true values: of what is hidden, and of
+    what the file before stated."""
+    holds = {}
+    for name, value in run.true().items():
+        effect, _, parameter = name.partition(".")
+        for term in found.terms:
+            stated = term.stated.get(parameter) if term.effect.name == effect else None
+            if stated is not None and stated.source.startswith("diagnose:") and stated.interval:
+                holds[name] = bool(abs(stated.value - value) <= stated.interval)
+    return holds

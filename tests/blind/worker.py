@@ -1,6 +1,7 @@
-"""The process that diagnoses: is told folders, one a line, and answers each with what it found, as JSON.
+"""The process that diagnoses: is told command lines of ``compensate``, one a line as JSON with the folder to work in,
+and answers each with its exit code and how long it took.
 
-It may open nothing of a run but the folder that it was told, which holds ``data.csv`` and ``robot.yaml``.
+It may open nothing of a run but that folder, which holds readings and a robot file, and gets what is written.
 """
 
 from __future__ import annotations
@@ -9,16 +10,12 @@ import json
 import os
 import sys
 import time
-from pathlib import Path
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from postproc.diagnosis.diagnose import diagnose
-from postproc.findings import Refusal
-from postproc.identification.campaign import Campaign
-from postproc.measurements import read_measurements
-from postproc.model import StiffnessModel
-from postproc.robot.description import load_robot
+from postproc.cli.main import run as compensate
 
 ROOMS = "blind-"
 """How the folders of all runs begin, by ``tempfile``."""
@@ -34,56 +31,30 @@ def guard(event: str, arguments: tuple) -> None:
         and isinstance(arguments[0], str | bytes | os.PathLike)
     ):
         path = os.path.abspath(os.fsdecode(arguments[0]))
-        if f"{os.sep}{ROOMS}" in path and not path.startswith(_allowed + os.sep):
+        inside = path == _allowed or path.startswith(_allowed + os.sep)
+        if f"{os.sep}{ROOMS}" in path and not inside:
             raise PermissionError(f"{path} is none of the diagnosis's business")
 
 
-def diagnosed(folder: Path) -> dict:
-    """What the diagnosis says of ``data.csv`` and ``robot.yaml``."""
-    begun = time.perf_counter()
-    robot = load_robot(folder / "robot.yaml")
-    readings = read_measurements(folder / "data.csv", [(joint.name, False) for joint in robot.joints])
+def ran(folder: str, words: list[str]) -> dict:
+    """What one command line came to, in ``folder``."""
+    global _allowed
+    _allowed = os.path.abspath(folder)
+    os.chdir(folder)
+    begun, told = time.perf_counter(), StringIO()
     try:
-        found = diagnose(Campaign(readings), StiffnessModel.from_robot(robot))
-    except Refusal as refusal:
-        return {"verdict": "refused", "why": str(refusal), "seconds": time.perf_counter() - begun}
-    verdict, final = found.verdict, found.final
-    return {
-        "verdict": verdict.word,
-        "named": [
-            {
-                "effect": one.effect,
-                "joints": list(one.joints),
-                "margin": one.evidence.margin,
-                "alias": None if one.evidence.alias is None else one.evidence.alias.label,
-                "heldout": one.evidence.heldout,
-                "regions": one.evidence.regions,
-            }
-            for one in verdict.named
-        ],
-        "ambiguous": [[[c.name, c.joint] for c in alternatives] for alternatives in verdict.alternatives],
-        "rejected": [[c.label, why] for c, why in verdict.rejected],
-        "chosen": [c.label for c in found.search.chosen],
-        "not_testable": list(verdict.not_testable),
-        "lack": verdict.lack,
-        "estimates": {e.unknown.name: [e.value, e.ci95] for e in final.estimates},
-        "before": terms_of(found.search.base.model),
-        "after": terms_of(final.model),
-        "seconds": time.perf_counter() - begun,
-    }
-
-
-def terms_of(model: StiffnessModel) -> list:
-    """Effects, their options and values (SI)."""
-    return [[term.effect.name, term.effect.described(), dict(term.values)] for term in model.terms]
+        with redirect_stdout(told), redirect_stderr(told):
+            compensate(words)
+        code = 0
+    except SystemExit as ended:
+        code = ended.code
+    return {"exit": code, "told": told.getvalue(), "seconds": time.perf_counter() - begun}
 
 
 def main() -> None:
-    global _allowed
     sys.addaudithook(guard)
     for line in sys.stdin:
-        _allowed = os.path.abspath(line.strip())
-        print(json.dumps(diagnosed(Path(_allowed))), flush=True)
+        print(json.dumps(ran(*json.loads(line))), flush=True)
 
 
 if __name__ == "__main__":
