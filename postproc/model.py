@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, frozen
+from postproc.arrays import Bools, Floats, Ints, frozen
 from postproc.effects import EFFECTS, ComplianceLaw, Conditions, Effect, Load, Offset, State, Values
 from postproc.findings import Finding, nearest
 from postproc.geometry import Poses
@@ -390,7 +390,8 @@ class StiffnessModel:
         force, _ = self._forces(state)
         _, gives = self._displacement(state, force)
         c = gives.T[:, :, None] * np.eye(self.chain.size)
-        inner = np.linalg.solve(np.eye(self.chain.size) - c @ self._curvature(state, tool), c)
+        every = np.arange(self.chain.size)
+        inner = np.linalg.solve(np.eye(self.chain.size) - c @ self._curvature(state, tool, every), c)
         return np.asarray(j @ inner @ np.swapaxes(j, 1, 2))
 
     def cartesian_stiffness(
@@ -425,21 +426,24 @@ class StiffnessModel:
         _, gives = self._displacement(state, force)
         c = gives.T[:, :, None]
         own = np.empty((*displacement.shape, len(spans)))
+        every = np.arange(self.chain.size)
         by_rest: Floats | None = None
         for k, ((term, name), ends) in enumerate(spans.items()):
             effect, values = self.terms[term].effect, self.terms[term].values
-            low, high = (
-                self._alone(effect, {**values, name: value}, state, force) for value in ends
-            )
+            low, high = (self._alone(effect, {**values, name: value}, state, force) for value in ends)
             moved = ((high - low) / (ends[1] - ends[0])).T
             if isinstance(effect, Load):
-                moved = c[:, :, 0] * moved
+                moved = gives.T * moved
             elif isinstance(effect, Offset):
                 if by_rest is None:
-                    by_rest = c * self._curvature(state, tool, of_rest=True)
+                    by_rest = gives.T[:, :, None] * self._curvature(state, tool, every, of_rest=True)
                 moved = moved + (by_rest @ moved[:, :, None])[:, :, 0]
             own[:, :, k] = moved
-        return np.asarray(np.linalg.solve(np.eye(self.chain.size) - c * self._curvature(state, tool), own))
+        # what neither gives way nor is moved by a parameter stays where it is
+        free = np.flatnonzero(gives.any(axis=1) | own.any(axis=(0, 2)))
+        inner = np.eye(len(free)) - (gives.T[:, :, None] * self._curvature(state, tool, free))[:, free]
+        own[:, free] = np.linalg.solve(inner, own[:, free])
+        return own
 
     def _alone(self, effect: Effect, values: Values, state: State, force: Floats) -> Floats:
         """(m, N) what one effect adds: a force, an offset, or a displacement under ``force``."""
@@ -452,14 +456,14 @@ class StiffnessModel:
             effect.add_displacement(values, state, force, found, slope)
         return found
 
-    def _curvature(self, state: State, tool: Poses, of_rest: bool = False) -> Floats:
-        """H (N, m, m): derivative of the generalized forces by the coordinates, or by the coordinates without load
+    def _curvature(self, state: State, tool: Poses, columns: Ints, of_rest: bool = False) -> Floats:
+        """H (N, m, k): derivative of the generalized forces by k of the coordinates, or by the coordinates without load
         where those stay; central differences, many at once."""
         size, count, step = self.chain.size, state.motors.shape[1], 1e-6
-        h = np.empty((count, size, size))
+        h = np.empty((count, size, len(columns)))
         at_once = max(1, CHUNK // max(1, 2 * count))
-        for begin in range(0, size, at_once):
-            part = np.arange(begin, min(begin + at_once, size))
+        for begin in range(0, len(columns), at_once):
+            part = columns[begin : begin + at_once]
             rows = np.tile(np.arange(count), 2 * len(part))
             many = state.part(rows)
             moved = (many.rest if of_rest else many.coordinates).reshape(size, len(part), 2, count)
@@ -468,7 +472,7 @@ class StiffnessModel:
             at = tool if tool.position.ndim == 1 else tool[rows]
             swept = self.chain.sweep(many.coordinates, at, many.conditions.spindle)
             force = self._forces(replace(many, swept=swept))[0].reshape(size, len(part), 2, count)
-            h[:, :, part] = np.moveaxis((force[:, :, 0] - force[:, :, 1]) / (2 * step), 2, 0)
+            h[:, :, begin : begin + len(part)] = np.moveaxis((force[:, :, 0] - force[:, :, 1]) / (2 * step), 2, 0)
         return h
 
     @property

@@ -143,7 +143,7 @@ def rate_in_theory(model, q, wrench, tool, given):
     for law, values in model._laws:
         law.add_displacement(values, state, force, target, gives)
     diagonal = slope.T[:, :, None] * np.eye(model.chain.size)
-    left = model._curvature(state, tool) - diagonal
+    left = model._curvature(state, tool, np.arange(model.chain.size)) - diagonal
     factor = (gives / (1 - gives * slope)).T
     return np.abs(np.linalg.eigvals(factor[:, :, None] * left)).max(axis=1)
 
@@ -297,7 +297,7 @@ def test_a_soft_elbow_pushed_into_a_fold_is_told(factor):
     force = model._forces(state)[0]
     compliance = np.array([model.terms[0].values[f"c{i}"] for i in range(1, 7)])
     assert np.abs(rest.displacement - compliance * force.T)[good].max() < 1e-10
-    stiffness = np.diag(1 / compliance) - model._curvature(state, TOOL)
+    stiffness = np.diag(1 / compliance) - model._curvature(state, TOOL, np.arange(model.chain.size))
     symmetric = 0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))
     assert (np.linalg.eigvalsh(symmetric)[good] > 0).all()
 
@@ -350,6 +350,6 @@ def test_pushed_beyond_all_measure_nothing_is_called_a_rest():
         compliance = np.array([model.terms[0].values[f"c{i}"] for i in range(1, 7)])
         miss = np.abs(rest.displacement[good] - compliance * force.T)
         assert miss.max() < 1e-10 + 1e-12 * np.abs(force).max()
-        stiffness = np.diag(1 / compliance) - model._curvature(state, tool[good])
+        stiffness = np.diag(1 / compliance) - model._curvature(state, tool[good], np.arange(model.chain.size))
         assert (np.linalg.eigvalsh(0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))) > 0).all()
     assert not rest.converged.all()

@@ -21,7 +21,7 @@ UNSEEN = 1.5
 """Standard deviations by which a group of its usual size must move all readings together to be testable: of less, only
 a size that is implausible would show."""
 
-STRAIGHT = 0.02
+STRAIGHT = 0.05
 """Share of what an effect of its usual size does that its columns may not foresee."""
 
 
@@ -31,7 +31,8 @@ class Candidate:
 
     ``unknowns``: its parameters in ``model``, the model with the effect added at its null; columns (R, 3 or 6, p) what
     they move, per scale; ``bent``: in its usual size it does not do what its columns at the null say; ``upto``: of an
-    effect that is there on no joint alone, the last joint whose parameters it has.
+    effect that is there on no joint alone, the last joint whose parameters it has; begin (p,) [SI]: values that a fit
+    may begin with, () at the null.
     """
 
     effect: Effect
@@ -41,6 +42,7 @@ class Candidate:
     columns: Floats
     bent: bool = False
     upto: str = ""
+    begin: tuple[float, ...] = ()
     only: tuple[Unknown, ...] = ()
 
     @property

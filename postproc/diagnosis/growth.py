@@ -30,9 +30,9 @@ def grown(
     model: StiffnessModel,
     unknowns: Sequence[Unknown],
     outside: Outside,
-) -> Floats:
-    """(R, 3 or 6, P) columns of ``unknowns`` in ``model`` (that of ``point`` with an effect at its null) where they
-    explain the most of what ``point`` leaves, per scale.
+) -> tuple[Floats, Floats]:
+    """Values (P,) [SI] of ``unknowns`` in ``model`` (that of ``point`` with an effect at its null) that explain the
+    most of what ``point`` leaves, and columns (R, 3 or 6, P) there, per scale.
 
     Gauss-Newton from the usual size within the bounds, on what is outside of what is explained anyway; then
     ``whole``, so that columns times values are what the effect does.
@@ -44,14 +44,15 @@ def grown(
     high = (np.array([u.parameter.upper for u in unknowns]) - null) / scale
     target = outside(point.residual[:, :, None])[:, 0]
 
-    def taken(x: Floats) -> tuple[Point, Floats]:
+    def taken(x: Floats, start: Floats | None) -> tuple[Point, Floats]:
         values = {u.key: v for u, v in zip(unknowns, (null + x * scale).tolist(), strict=True)}
-        there = at(campaign, model.changed(values), point.given)
+        there = at(campaign, model.changed(values), point.given, start)
         does = np.nan_to_num(point.residual - there.residual)
         return there, does
 
     x = np.clip(np.ones(len(unknowns)), low, high)
-    there, does = taken(x)
+    near = point.seen.displacement
+    there, does = taken(x, near if near.shape[1] == model.chain.size else None)
     left = target - outside(does[:, :, None])[:, 0]
     for _ in range(STEPS):
         there = with_columns(campaign, there, unknowns)
@@ -62,7 +63,7 @@ def grown(
         step, before = lsq_linear(tall, aim, bounds, "bvls").x, left @ left
         for _ in range(6):
             trial = np.clip(x + step, low, high)
-            moved, did = taken(trial)
+            moved, did = taken(trial, there.seen.displacement)
             rest = target - outside(did[:, :, None])[:, 0]
             if rest @ rest < before:
                 break
@@ -74,7 +75,7 @@ def grown(
             break
     if there.columns is None:
         there = with_columns(campaign, there, unknowns)
-    return whole(np.nan_to_num(there.taken[0]), does, x)
+    return null + x * scale, whole(np.nan_to_num(there.taken[0]), does, x)
 
 
 def whole(columns: Floats, does: Floats, values: Floats) -> Floats:

@@ -158,21 +158,20 @@ def _confirmed(
 ) -> tuple[tuple[Candidate, ...], Fit]:
     """Those of ``chosen`` that count as well where what readings of a pose share is taken from a fit without them, and
     that are not small beside others; the weakest first.  And the fit with them."""
-    fitted = with_effects(campaign, base, chosen) if chosen else base
+    fitted, among = with_effects(campaign, base, chosen) if chosen else base, len(shown)
     while chosen:
-        linear = _linear(campaign, base, base.weights, fitted, chosen, shown)
-        keys = [candidate.key for candidate in linear.candidates]
-        places = [keys.index(candidate.key) for candidate in chosen]
+        linear = _linear(campaign, base, base.weights, fitted, chosen, chosen)
+        places = range(len(chosen))
         without = [explained(linear.problem, [g for g in places if g != gone]) for gone in places]
         weakest = int(np.argmin([one.squares for one in without]))
         rest = tuple(c for k, c in enumerate(chosen) if k != weakest)
         fit_of_rest = with_effects(campaign, base, rest) if rest else base
         weights = replace(base.weights, shared=fit_of_rest.weights.shared)
-        given = _linear(campaign, base, weights, fitted, chosen, shown).problem
-        others = [g for k, g in enumerate(places) if k != weakest]
+        given = _linear(campaign, base, weights, fitted, chosen, chosen).problem
+        others = [g for g in places if g != weakest]
         gains = [one.squares - explained(linear.problem, places).squares for one in without]
         if min(gains) >= FORM * max(gains) and counts(
-            given, explained(given, others), explained(given, places), len(keys)
+            given, explained(given, others), explained(given, places), among
         ):
             break
         chosen, fitted = rest, fit_of_rest
@@ -222,8 +221,8 @@ def _linear(
 def _as_grown(campaign: Campaign, fitted: Fit, candidate: Candidate, beyond: Outside) -> Candidate:
     """The candidate with its columns at the size that explains the most of what ``fitted`` leaves."""
     model, unknowns = composed(fitted.model, [candidate])
-    columns = grown(campaign, fitted.point, model, unknowns, beyond)
-    return replace(candidate, columns=columns)
+    values, columns = grown(campaign, fitted.point, model, unknowns, beyond)
+    return replace(candidate, columns=columns, begin=tuple(values.tolist()))
 
 
 def nulls_of(unknowns: Sequence[Unknown]) -> Floats:
@@ -279,8 +278,13 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
 def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> Fit:
     """The non-linear fit with the effects ``chosen`` added to ``base``, its own unknowns fitted along."""
     model, unknowns = composed(base.model, chosen)
+    begin = {
+        (_term_of(model, c), u.parameter.name): value
+        for c in chosen
+        for u, value in zip(c.unknowns, c.begin, strict=bool(c.begin))
+    }
     own = [u for u in base.asked if u.key in {b.key for b in base.unknowns}]
-    return fit(campaign, model, [*own, *unknowns], given=base.point.given)
+    return fit(campaign, model.changed(begin), [*own, *unknowns], given=base.point.given)
 
 
 def composed(

@@ -185,9 +185,14 @@ def _left_out(found: Search, last: Explained, group: int, part: Ints | None) -> 
     """Fall of -2 ln(likelihood) of readings left out, part by part, with the group; NaN without parts.
 
     A reading is predicted with the doubt that the fit of the others leaves: where that has to extrapolate, it says
-    little.  Wild readings count up to 5 standard deviations.
+    little.  Wild readings count up to 5 standard deviations.  A part that is more than half of all is never left out:
+    a few poses measured later do not foretell a whole campaign.
     """
-    if part is None or len(np.unique(part)) < 2:
+    if part is None:
+        return np.nan
+    large = np.flatnonzero(2 * np.bincount(part) > len(part))
+    part = np.where(np.isin(part, large), -1, part)
+    if not (part >= 0).any() or (len(large) == 0 and len(np.unique(part)) < 2):
         return np.nan
     linear = found.linear
     rows = len(linear.residual) - linear.priors

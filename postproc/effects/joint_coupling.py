@@ -21,7 +21,14 @@ class JointCoupling(Offset):
         self._pairs = [(i, k) for i in last for k in last if k < i]
         self.parameters = tuple(
             Parameter(
-                f"r{i + 1}{k + 1}", "1", 0.0, -0.1, 0.1, "coupling ratio of a wrist's gears", joints[i].name
+                f"r{i + 1}{k + 1}",
+                "1",
+                0.0,
+                -0.1,
+                0.1,
+                "coupling ratio of a wrist's gears",
+                joints[i].name,
+                size=3e-4,
             )
             for i, k in self._pairs
         )

@@ -26,7 +26,7 @@ class Payload(EnergyLoad):
         source = "a point mass on the flange"
         self.parameters = (
             Parameter("mass", "kg", 0.0, 0.0, 5000.0, source),
-            *(Parameter(axis, "m", 0.0, -5.0, 5.0, source) for axis in "xyz"),
+            *(Parameter(axis, "m", 0.0, -5.0, 5.0, source, size=0.1) for axis in "xyz"),
         )
 
     def _weights(self, values: Values, state: State) -> list[tuple[Floats, Floats]]:

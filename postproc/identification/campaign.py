@@ -20,11 +20,15 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.effects import Conditions
 from postproc.geometry import Poses, rotation_from_vector, skew, vector_from_rotation
 from postproc.measurements import Readings
-from postproc.model import STEP_TOLERANCE, StiffnessModel, approach
+from postproc.model import StiffnessModel, approach
 from postproc.robot.chain import jacobian
 
 ONE_POSE = 1e-6
 """[rad, m] Motors that differ by less stand in one pose."""
+
+
+REST = 1e-10
+"""[rad, m] Last step of an equilibrium, whose error is smaller by a hundred: nothing that a tracker sees."""
 
 
 @dataclass(frozen=True)
@@ -134,7 +138,7 @@ class Campaign:
         self.poses = int(self.pose.max()) + 1
 
     def seen(
-        self, model: StiffnessModel, start: Floats | None = None, tolerance: float = STEP_TOLERANCE
+        self, model: StiffnessModel, start: Floats | None = None, tolerance: float = REST
     ) -> Seen:
         """All states at rest under ``model``; ``start`` (S, m): displacement of a model nearby; ``tolerance`` as of the
         equilibrium."""
