@@ -67,4 +67,4 @@ def diagnose(
     final = found.base
     if names and verdict.word != "ambiguous":
         final = found.final if len(names) == len(found.chosen) else with_effects(campaign, found.base, names)
-    return Diagnosis(stated, where(stated), found, verdict, final)
+    return Diagnosis(stated, where(stated, found.final), found, verdict, final)

@@ -14,7 +14,9 @@ from postproc.identification.fit import Fit
 from postproc.robot.chain import generalized_force
 from postproc.units import DEG, MM
 
-BINS = 6
+BINS, POSES = 6, 6
+"""Parts that a variable is divided into at most, and poses in each at least."""
+
 CHANCE = 0.01
 SHOWN = 8
 
@@ -32,16 +34,20 @@ class Where:
     share: float
 
 
-def where(fitted: Fit, chance: float = CHANCE) -> tuple[Where, ...]:
+def where(fitted: Fit, against: Fit | None = None, chance: float = CHANCE) -> tuple[Where, ...]:
     """The clear patterns in what ``fitted`` leaves, largest first.
 
     Tried are a turn of each joint that depends on its own angle, torque or sense of approach, and a shift of the tool
     that depends on load, order, time, temperature or session; each as a step function in up to ``BINS`` parts, without
-    what the fit could have made of it.  ``chance``: probability that any is told although there is none.  Readings of
-    one pose may share errors, and a few may be wild: what chance makes is seen where the residuals of each pose get a
-    random sign (wild bootstrap by clusters; Cameron, Gelbach and Miller, Rev. Econ. Stat. 90 (2008)).
+    what the fit could have made of it.  ``chance``: probability that any is told although there is none.
+
+    What is chance is said by the scatter that ``against`` leaves, as far as that is a better model.  Without it only
+    the residuals themselves say it: readings of one pose may share errors, and a few may be wild, so the residuals of
+    each pose get a random sign (wild bootstrap by clusters; Cameron, Gelbach and Miller, Rev. Econ. Stat. 90 (2008)).
     """
-    campaign, weights = fitted.campaign, fitted.weights
+    from scipy.stats import f
+
+    campaign, weights = fitted.campaign, (against or fitted).weights
     left = weights(np.nan_to_num(fitted.point.residual))
     taken = np.nan_to_num(np.concatenate([weights(part) for part in fitted.point.taken], axis=1))
     explained_by_fit = basis_of(taken)
@@ -56,7 +62,7 @@ def where(fitted: Fit, chance: float = CHANCE) -> tuple[Where, ...]:
     found = []
     tried = list(patterns(fitted, campaign))
     for variable, values, turns, unit in tried:
-        part, parts = _parts(values)
+        part, parts = _parts(values, max(2, min(BINS, campaign.poses // POSES)))
         columns = np.zeros((len(campaign), width, len(parts) if turns is not None else 3 * len(parts)))
         columns[:, :3] = _columns(part, len(parts), turns)
         basis = _clear(outside(explained_by_fit, weights(columns)))
@@ -67,7 +73,10 @@ def where(fitted: Fit, chance: float = CHANCE) -> tuple[Where, ...]:
         of_pose = np.zeros((campaign.poses, rank))
         np.add.at(of_pose, campaign.pose, of_reading)
         explained = float((of_pose.sum(axis=0) ** 2).sum())
-        by_chance = _probability(explained, ((signs @ of_pose) ** 2).sum(axis=1) / max(lever, 0.1))
+        if against is None:
+            by_chance = _probability(explained, ((signs @ of_pose) ** 2).sum(axis=1) / max(lever, 0.1))
+        else:
+            by_chance = float(f.sf(explained / rank / against.factor, rank, max(1, against.freedom)))
         share = 1.0 - (1.0 - explained / squares) * rows / (rows - rank)
         if by_chance * len(tried) < chance and share > 0:
             words = _words(fitted.point.residual[:, :3], part, parts, unit)
@@ -135,12 +144,12 @@ def patterns(
         yield "session", readings.session.astype(float), None, ("", 1.0)
 
 
-def _parts(values: Floats) -> tuple[Ints, Floats]:
-    """The part (R,) each value falls in, and where the parts begin and end (k, 2)."""
+def _parts(values: Floats, count: int) -> tuple[Ints, Floats]:
+    """The part (R,) of ``count`` or less each value falls in, and where the parts begin and end (k, 2)."""
     distinct = np.unique(values)
-    if len(distinct) <= BINS:
+    if len(distinct) <= count:
         return np.searchsorted(distinct, values), np.stack([distinct, distinct], axis=1)
-    edges = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, count + 1)))
     part = np.clip(np.searchsorted(edges, values, "right") - 1, 0, len(edges) - 2)
     return part, np.stack([edges[:-1], edges[1:]], axis=1)
 

@@ -43,6 +43,10 @@ FORM = 0.01
 """Share of what another effect explains that one must explain itself: no form in the library is exact, and what a large
 effect does beside its form looks like small ones."""
 
+SHARED = 2.0
+"""Stated standard deviations that readings of a pose may share: of a robot that does not quite come back, of one
+unloaded reading.  What they share beyond that is no scatter."""
+
 WILD = 5.0
 """Standard deviations that a reading counts with at most."""
 
@@ -150,7 +154,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
                 return done
         tried.add(keys)
         chosen, fitted = _confirmed(campaign, base, now, shown)
-        weights = replace(base.weights, shared=fitted.weights.shared)
+        weights = _sharing(base, fitted)
 
 
 def _confirmed(
@@ -160,13 +164,13 @@ def _confirmed(
     that are not small beside others; the weakest first.  And the fit with them."""
     fitted, among = with_effects(campaign, base, chosen) if chosen else base, len(shown)
     while chosen:
-        linear = _linear(campaign, base, base.weights, fitted, chosen, chosen)
+        linear = _linear(campaign, base, _sharing(base, base), fitted, chosen, chosen)
         places = range(len(chosen))
         without = [explained(linear.problem, [g for g in places if g != gone]) for gone in places]
         weakest = int(np.argmin([one.squares for one in without]))
         rest = tuple(c for k, c in enumerate(chosen) if k != weakest)
         fit_of_rest = with_effects(campaign, base, rest) if rest else base
-        weights = replace(base.weights, shared=fit_of_rest.weights.shared)
+        weights = _sharing(base, fit_of_rest)
         given = _linear(campaign, base, weights, fitted, chosen, chosen).problem
         others = [g for g in places if g != weakest]
         gains = [one.squares - explained(linear.problem, places).squares for one in without]
@@ -176,6 +180,14 @@ def _confirmed(
             break
         chosen, fitted = rest, fit_of_rest
     return chosen, fitted
+
+
+def _sharing(base: Fit, fitted: Fit) -> Weighting:
+    """The weights of ``base``, readings of a pose sharing what they do in ``fitted``; no more than scatter can be."""
+    shared = fitted.weights.shared
+    if base.noise.known:
+        shared = min(shared, SHARED * float(np.median(base.noise.sigma)))
+    return replace(base.weights, shared=shared)
 
 
 def _linear(
@@ -301,7 +313,10 @@ def composed(
                 model = model.added(candidate.effect)
             term = len(model.terms) - 1
         names = {u.parameter.name for u in candidate.unknowns}
-        unknowns += [u for u in unknowns_of(model, term) if u.parameter.name in names]
+        known = {u.key for u in unknowns}
+        unknowns += [
+            u for u in unknowns_of(model, term) if u.parameter.name in names and u.key not in known
+        ]
     return model, tuple(unknowns)
 
 

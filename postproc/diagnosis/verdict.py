@@ -43,7 +43,7 @@ STRUCTURE = 0.001
 TOLERATED = 0.15
 """Share of the variance that heavier tails than normal may add."""
 
-EXPLAINS = 0.8
+EXPLAINS = 0.9
 """Share of the variance beyond scatter that a name must take away where some is left."""
 
 
@@ -118,7 +118,7 @@ def judged(found: Search) -> Verdict:
         if any(n.candidate is linear.candidates[g] for n in named)
     ]
     lack, lacking = lack_of_fit(found, last)
-    lacking = lacking or bool(where(found.final, STRUCTURE))
+    lacking = lacking or bool(where(found.final, chance=STRUCTURE))
     bare, _ = lack_of_fit(found, explained(linear.problem, ()))
     sets = tuple(a for a in aliases if len(a) > 1)
     enough = lack - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)

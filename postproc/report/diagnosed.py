@@ -201,7 +201,7 @@ class Diagnosed:
     @cached_property
     def patterns(self) -> tuple[Where, ...]:
         """What betrays a missing effect: patterns in what the robot file leaves, its own parameters fitted anew."""
-        return where(self.diagnosis.search.base)
+        return where(self.diagnosis.search.base, self.diagnosis.search.final)
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public."""
