@@ -21,6 +21,9 @@ UNSEEN = 1.5
 """Standard deviations by which a group of its usual size must move all readings together to be testable: of less, only
 a size that is implausible would show."""
 
+UNCERTAIN = 0.1
+"""Share of that for an effect that does not grow in proportion: what a usual size does depends on the arm."""
+
 STRAIGHT = 0.05
 """Share of what an effect of its usual size does that its columns may not foresee."""
 
@@ -53,6 +56,11 @@ class Candidate:
     def fitted(self, columns: Floats, unknowns: Sequence[Unknown]) -> Candidate:
         """The candidate with the columns of those ``unknowns`` that a fit found."""
         return replace(self, columns=columns, only=tuple(unknowns))
+
+    @property
+    def least(self) -> float:
+        """Standard deviations by which it must move all readings together in its usual size."""
+        return UNSEEN * (UNCERTAIN if self.bent else 1.0)
 
     def contains(self, other: Candidate) -> bool:
         """Whether ``other`` is the same effect with some of these parameters."""
@@ -156,7 +164,7 @@ def _in_steps(whole: Candidate, joints: Sequence[str]) -> list[Candidate]:
 
 def testable(candidate: Candidate, weights: Weighting) -> bool:
     """Whether the readings would show the effect at all."""
-    return bool(np.linalg.norm(weights(candidate.columns)) > UNSEEN)
+    return bool(np.linalg.norm(weights(candidate.columns)) > candidate.least)
 
 
 def names_of(found: Sequence[Candidate]) -> tuple[str, ...]:

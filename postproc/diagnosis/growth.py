@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,15 +25,25 @@ Outside = Callable[[Floats], Floats]
 """Columns (R, 3 or 6, p), whitened, without what is explained anyway (n, p)."""
 
 
+class Grown(NamedTuple):
+    """values (P,) [SI]; columns (R, 3 or 6, P) there, per scale; target (n,), left (n,): what there is to explain,
+    outside of what is explained anyway, without the effect and with it."""
+
+    values: Floats
+    columns: Floats
+    target: Floats
+    left: Floats
+
+
 def grown(
     campaign: Campaign,
     point: Point,
     model: StiffnessModel,
     unknowns: Sequence[Unknown],
     outside: Outside,
-) -> tuple[Floats, Floats]:
-    """Values (P,) [SI] of ``unknowns`` in ``model`` (that of ``point`` with an effect at its null) that explain the
-    most of what ``point`` leaves, and columns (R, 3 or 6, P) there, per scale.
+) -> Grown:
+    """``unknowns`` of ``model`` (that of ``point`` with an effect at its null) as large as explains the most of what
+    ``point`` leaves.
 
     Gauss-Newton from the usual size within the bounds, on what is outside of what is explained anyway; then
     ``whole``, so that columns times values are what the effect does.
@@ -75,7 +86,7 @@ def grown(
             break
     if there.columns is None:
         there = with_columns(campaign, there, unknowns)
-    return null + x * scale, whole(np.nan_to_num(there.taken[0]), does, x)
+    return Grown(null + x * scale, whole(np.nan_to_num(there.taken[0]), does, x), target, left)
 
 
 def whole(columns: Floats, does: Floats, values: Floats) -> Floats:

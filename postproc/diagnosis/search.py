@@ -14,8 +14,10 @@ from postproc.diagnosis.selection import (
     Explained,
     Problem,
     basis_of,
+    beside,
     counts,
     explained,
+    left_of,
     outside,
     price,
     problem,
@@ -34,6 +36,9 @@ PASSES = 4
 
 LOOSE, BESIDE = 0.5, 0.05
 """Standard deviation of what a robot file states, as shares of the value and of the largest of its kind."""
+
+IMITATED = 1e-3
+"""Share of a column that must lie outside of what the robot file's own parameters do."""
 
 CLOSE, CLOSE_SHARE, RIVALS = 30.0, 0.05, 3
 """Rivals are fitted where -2 ln(likelihood) is linearly worse by less than this, or than this share of the gain; so
@@ -58,7 +63,7 @@ Key = tuple[str, str]
 class Linear:
     """A search's last step.  candidates: what was looked at, group by group of ``problem``; whitened and as they are:
     residual (n,) without what was chosen, common (n, k) columns that are explained anyway, columns (n, p) of each
-    candidate; the last ``priors`` rows are no readings."""
+    candidate; the last ``priors`` rows are no readings; ``weights`` that it was whitened with."""
 
     candidates: tuple[Candidate, ...]
     problem: Problem
@@ -66,6 +71,7 @@ class Linear:
     common: Floats
     columns: tuple[Floats, ...]
     priors: int
+    weights: Weighting
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +135,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
     chosen: tuple[Candidate, ...] = ()
     fitted = base
     tried: set[frozenset[Key]] = set()
-    every = candidates(campaign, base.model, base.point.given)
+    every = _not_imitated(base, candidates(campaign, base.model, base.point.given))
     shown = [c for c in every if testable(c, base.weights) and c.key not in banned]
     hidden = tuple(c for c in every if not testable(c, base.weights))
     # what a missing effect does to all readings of a pose looks like an error that they share
@@ -155,6 +161,26 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
         tried.add(keys)
         chosen, fitted = _confirmed(campaign, base, now, shown)
         weights = _sharing(base, fitted)
+
+
+def _not_imitated(base: Fit, every: Sequence[Candidate]) -> list[Candidate]:
+    """The candidates without those parameters that, in their usual size, do nothing to be seen but what parameters of
+    the robot file, or tracker and targets, do as well: a gain of the force is a softer arm."""
+    weights = replace(base.weights, shared=0.0)
+    basis = basis_of(np.nan_to_num(np.concatenate([weights(part) for part in base.point.taken], axis=1)))
+    found = []
+    for c in every:
+        columns = np.nan_to_num(weights(c.columns))
+        size = np.linalg.norm(columns, axis=0)
+        own = np.linalg.norm(outside(basis, columns), axis=0) > np.maximum(IMITATED * size, c.least)
+        if own.any() and not own.all():
+            c = replace(
+                c,
+                unknowns=tuple(u for u, alone in zip(c.unknowns, own.tolist(), strict=True) if alone),
+                columns=c.columns[:, :, own],
+            )
+        found.append(c if own.any() else replace(c, columns=np.zeros_like(c.columns)))
+    return found
 
 
 def _confirmed(
@@ -227,14 +253,14 @@ def _linear(
     columns = tuple(readings(c.columns) for c in looked)
     groups = [(own, _reach(c)) for own, c in zip(columns, looked, strict=True)]
     made = problem(residual, basis, groups, weights.counts + len(prior), base.noise.known)
-    return Linear(looked, made, residual, common, columns, len(prior))
+    return Linear(looked, made, residual, common, columns, len(prior), weights)
 
 
 def _as_grown(campaign: Campaign, fitted: Fit, candidate: Candidate, beyond: Outside) -> Candidate:
     """The candidate with its columns at the size that explains the most of what ``fitted`` leaves."""
     model, unknowns = composed(fitted.model, [candidate])
-    values, columns = grown(campaign, fitted.point, model, unknowns, beyond)
-    return replace(candidate, columns=columns, begin=tuple(values.tolist()))
+    large = grown(campaign, fitted.point, model, unknowns, beyond)
+    return replace(candidate, columns=large.columns, begin=tuple(large.values.tolist()))
 
 
 def nulls_of(unknowns: Sequence[Unknown]) -> Floats:
@@ -267,16 +293,26 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
     for group in last.groups:
         mine = linear.candidates[group]
         rest = explained(given, tuple(g for g in last.groups if g != group))
-        gain, paid = rest.squares - last.squares, price(given, rest, group, variance)
-        of_mine = []
+        gain, left = rest.squares - last.squares, left_of(given, rest)
+
+        def paid(columns: Floats, rest: Explained = rest, left: Floats = left) -> float:
+            return price(beside(given, rest, columns), left, variance)
+
+        def scaled(g: int) -> Floats:
+            return given.matrix[:, given.places[g]] * given.size[given.places[g]]
+
+        own, of_mine = paid(scaled(group)), []
         for other, candidate in enumerate(linear.candidates):
             if other in last.groups or candidate.contains(mine) or mine.contains(candidate):
                 continue
-            instead = explained(given, (*rest.groups, other))
-            if rest.squares - instead.squares > 0.5 * gain:
-                worse = float(instead.squares - last.squares) / variance
-                more = price(given, rest, other, variance) - paid
-                of_mine.append(Rival(mine.key, candidate, worse, more, False))
+            if candidate.bent:
+                rival, squares, columns = _instead(campaign, fitted, linear, rest, mine, candidate)
+            else:
+                rival, squares = candidate, explained(given, (*rest.groups, other)).squares
+                columns = scaled(other)
+            if rest.squares - squares > 0.5 * gain:
+                worse = float(squares - last.squares) / variance
+                of_mine.append(Rival(mine.key, rival, worse, paid(columns) - own, False))
         of_mine.sort(key=lambda rival: rival.margin)
         for k, rival in enumerate(of_mine[:RIVALS]):
             if rival.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
@@ -285,6 +321,26 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
                 of_mine[k] = replace(rival, worse=worse, fitted=True)
         found += of_mine
     return tuple(sorted(found, key=lambda rival: rival.margin))
+
+
+def _instead(
+    campaign: Campaign, fitted: Fit, linear: Linear, rest: Explained, mine: Candidate, other: Candidate
+) -> tuple[Candidate, float, Floats]:
+    """``other``, that is not linear in its size, as large as explains the most in the place of ``mine`` beside ``rest``;
+    the squares that are left then, and its columns outside of what is explained anyway."""
+    without = _without(campaign, fitted, [mine])
+    model, unknowns = composed(without.model, [other])
+    basis = basis_of(linear.common)
+    beyond = basis_of(np.concatenate([linear.common, *(linear.columns[g] for g in rest.groups)], axis=1))
+
+    def readings(columns: Floats) -> Floats:
+        below = np.zeros((linear.priors, columns.shape[2]))
+        return np.nan_to_num(np.concatenate([linear.weights(columns), below]))
+
+    large = grown(campaign, without, model, unknowns, lambda columns: outside(beyond, readings(columns)))
+    gain = float(large.target @ large.target - large.left @ large.left)
+    rival = replace(other, columns=large.columns, begin=tuple(large.values.tolist()))
+    return rival, rest.squares - gain, outside(basis, readings(large.columns))
 
 
 def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> Fit:

@@ -139,29 +139,33 @@ def _bounded(value: Floats, vector: Floats, aim: Floats, low: Floats, high: Floa
     return np.asarray(lsq_linear(matrix, right, (np.minimum(low, 0.0), np.maximum(high, 1e-300)), "bvls").x)
 
 
-def price(given: Problem, rest: Explained, group: int, variance: float) -> float:
-    """What ``group`` has to pay beside ``rest`` for the parameters that it fits: by how much -2 ln(likelihood) falls
-    more in the fit than it does on the average over all that its parameters might have been.
+def beside(given: Problem, rest: Explained, columns: Floats) -> Floats:
+    """``columns`` (n, p) without what the groups of ``rest`` do as well."""
+    return outside(basis_of(given.matrix[:, rest.columns]), columns) if len(rest.columns) else columns
 
-    They might have been of any size u, all alike in their scales.  With l the eigenvalues of the information that the
-    readings give of them, and b the gradients along its axes, that average is
+
+def price(columns: Floats, left: Floats, variance: float) -> float:
+    """What an effect has to pay for the parameters that it fits: by how much -2 ln(likelihood) falls more in the fit
+    than it does on the average over all that its parameters might have been.  ``columns`` (n, p) per scale, ``left``
+    (n,): outside of what is explained anyway.
+
+    The parameters might have been of any size u, all alike in their scales.  With l the eigenvalues of the information
+    that the readings give of them, and b the gradients along its axes, that average is
 
         max over u of  sum b^2 u^2 / (1 + u^2 l) - ln(1 + u^2 l)
 
     A parameter that the readings do not show costs nothing, and one that they would have shown, but is not there, does.
     """
-    at, others = given.places[group], rest.columns
-    scaled = given.matrix[:, at] * given.size[at]
-    if len(others):
-        scaled = outside(basis_of(given.matrix[:, others]), scaled)
-    value, vector = np.linalg.eigh(scaled.T @ scaled / variance)
+    value, vector = np.linalg.eigh(columns.T @ columns / variance)
     on = value > 1e-12 * max(1.0, float(value.max(initial=0.0)))
     if not on.any():
         return 0.0
     information = value[on]
-    gradient = (vector[:, on].T @ (scaled.T @ left_of(given, rest))) / variance
+    gradient = (vector[:, on].T @ (columns.T @ left)) / variance
     # from sizes that nobody would see to those that nobody could miss
-    u = np.geomspace(1e-3 / np.sqrt(information.max()), 1e3 * (1.0 + np.abs(gradient / information).max()), 200)
+    u = np.geomspace(
+        1e-3 / np.sqrt(information.max()), 1e3 * (1.0 + np.abs(gradient / information).max()), 200
+    )
     spread = 1.0 + np.outer(u * u, information)
     average = (gradient**2 * (u * u)[:, None] / spread - np.log(spread)).sum(axis=1).max()
     return float((gradient**2 / information).sum() - average)

@@ -13,6 +13,7 @@ from postproc.diagnosis.screens import where
 from postproc.diagnosis.search import Search
 from postproc.diagnosis.selection import (
     Explained,
+    Problem,
     clipped_squares,
     explained,
     probability,
@@ -30,6 +31,9 @@ SEEN = 1e-8
 """Share of a column's squares that readings must show to predict others."""
 
 WILD = 5.0
+
+USUAL = 3.0
+"""Times what was found of an effect that it is expected to be, of readings that were left out."""
 
 MARGIN = 10.0
 """By how much -2 ln(likelihood) of the nearest other explanation must be worse: odds of 150 to 1."""
@@ -194,15 +198,30 @@ def _left_out(found: Search, last: Explained, group: int, part: Ints | None) -> 
     part = np.where(np.isin(part, large), -1, part)
     if not (part >= 0).any() or (len(large) == 0 and len(np.unique(part)) < 2):
         return np.nan
-    linear = found.linear
+    linear, given = found.linear, found.linear.problem
     rows = len(linear.residual) - linear.priors
     # priors are never left out
     of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
-    rest = [linear.columns[g] for g in last.groups if g != group]
-    without = np.concatenate([linear.common, *rest], axis=1)
-    with_ = np.concatenate([without, linear.columns[group]], axis=1)
-    variance = scatter(linear.problem, last)
-    return _surprise(without, linear.residual, of, variance) - _surprise(with_, linear.residual, of, variance)
+    variance = scatter(given, last)
+
+    def surprise(groups: Sequence[int]) -> float:
+        columns = [linear.common, *(linear.columns[g] for g in groups)]
+        matrix = np.concatenate(columns, axis=1)
+        own = np.concatenate([np.zeros(linear.common.shape[1]), *(_expected(given, last, g) for g in groups)])
+        matrix = np.concatenate([matrix, np.diag(own)[own > 0]])
+        more = len(matrix) - len(of)
+        target = np.append(linear.residual, np.zeros(more))
+        return _surprise(matrix, target, np.append(of, np.full(more, -1)), variance)
+
+    return surprise([g for g in last.groups if g != group]) - surprise(last.groups)
+
+
+def _expected(given: Problem, last: Explained, group: int) -> Floats:
+    """(p,) one over the deviation that is expected of each parameter of a chosen group, in its scale: ``USUAL`` times
+    the largest that was found of it."""
+    on = np.isin(last.columns, given.places[group])
+    found = np.abs(last.coefficients[on] / given.size[given.places[group]]).max(initial=0.0)
+    return np.full(len(given.places[group]), 1.0 / (USUAL * found) if found > 0 else 0.0)
 
 
 def _surprise(matrix: Floats, target: Floats, part: Ints, variance: float) -> float:

@@ -34,7 +34,7 @@ SIZES = {
     "m/N": 2e-8,
     "N m/rad": 1e6,
     "rad/(N m)": 1e-7,
-    "N m/rad3": 3e10,
+    "N m/rad3": 1e11,
     "N/m3": 1e15,
     "m/K": 1e-5,
     "m/s": 1e-7,

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from postproc.diagnosis.search import own_unknowns
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import fit
+from postproc.identification.unknowns import unknowns_of
 from postproc.model import StiffnessModel
 
+from . import measured
+from .arm import model_of
 from .cases import Run
 from .gap import closed
 from .oracle import MARGIN, Rival
@@ -113,14 +121,27 @@ def right(row: str, outcome: str) -> bool:
     return outcome in ("exact", "ambiguous", "unseen")
 
 
-def covered(run: Run, found: StiffnessModel) -> dict[str, bool]:
-    """Whether the 95 % intervals of the robot file that was written hold the true values: of what is hidden, and of
-    what the file before stated."""
-    holds = {}
-    for name, value in run.true().items():
-        effect, _, parameter = name.partition(".")
-        for term in found.terms:
-            stated = term.stated.get(parameter) if term.effect.name == effect else None
-            if stated is not None and stated.source.startswith("diagnose:") and stated.interval:
-                holds[name] = bool(abs(stated.value - value) <= stated.interval)
+def covered(run: Run, found: StiffnessModel) -> dict[str, list[bool | None]]:
+    """Whether the 95 % intervals of the robot file that was written hold the values that its parameters take where the
+    readings have no scatter; and the true values themselves (None of what has none).
+
+    The two differ by what stays as the robot file before stated it: a zero of the last joint that no reading tells from
+    a turn of the tool is in that turn.
+    """
+    told = {
+        (term, name): value
+        for term, of in enumerate(found.terms)
+        for name, value in of.stated.items()
+        if value.source.startswith("diagnose:") and value.interval
+    }
+    own = {u.key: u for u in own_unknowns(model_of(run.robot))}
+    new = {u.key: u for term in range(len(found.terms)) for u in unknowns_of(found, term)}
+    exact = replace(run.readings, value=measured.observed(run.scene, run.design))
+    fitted = fit(Campaign(exact), found, [own.get(key, replace(new[key], prior=None)) for key in told])
+    true, holds = run.true(), {}
+    for (term, name), value in told.items():
+        there = [fitted.model.terms[term].values[name], true.get(f"{found.terms[term].effect.name}.{name}")]
+        holds[f"{found.label(term)}.{name}"] = [
+            None if one is None else bool(abs(value.value - one) <= value.interval) for one in there
+        ]
     return holds
