@@ -85,6 +85,8 @@ class Candidate:
             words += f" (harmonic {str(options['harmonics']).strip('[]').replace('.0', '')})"
         if "variable" in options:
             words += f" (by {options['variable']})"
+        if "varies" in options:
+            words += f" varying {options['varies']}"
         if self.upto:
             words += f" (up to {self.upto})"
         return f"{words} on {self.joint}" if self.joint else words

@@ -9,6 +9,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.diagnosis.candidates import Candidate, candidates, testable
+from postproc.diagnosis.foils import VaryingCompliance, foils
 from postproc.diagnosis.growth import Outside, grown, whole
 from postproc.diagnosis.selection import (
     Explained,
@@ -90,6 +91,11 @@ class Rival:
         """By how much it is the lesser explanation; negative: the better one."""
         return self.worse + self.more
 
+    @property
+    def foil(self) -> bool:
+        """Whether it is never named itself."""
+        return isinstance(self.candidate.effect, VaryingCompliance)
+
 
 @dataclass(frozen=True, eq=False)
 class Search:
@@ -150,7 +156,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
         if keys == before or keys in tried or len(tried) >= PASSES:
             last = explained(linear.problem, begin)
             against = _rivals(campaign, base, fitted, linear, last)
-            better = next((rival for rival in against if rival.fitted and rival.margin < -1.0), None)
+            better = next((r for r in against if r.fitted and not r.foil and r.margin < -1.0), None)
             done = Search(base, fitted, chosen, hidden, linear, last, against)
             if better is None or len(tried) >= PASSES:
                 return done
@@ -272,9 +278,9 @@ def _values(model: StiffnessModel, unknowns: Sequence[Unknown]) -> Floats:
     return np.array([model.terms[u.term].values[u.parameter.name] for u in unknowns])
 
 
-def squares_of(fitted: Fit) -> float:
-    """Squares that a fit leaves, of readings [their variance, wild ones cut] and of priors."""
-    left = np.minimum(np.abs(fitted.weights(fitted.point.residual)), WILD)
+def squares_of(fitted: Fit, weights: Weighting) -> float:
+    """Squares that a fit leaves, of readings [their variance by ``weights``, wild ones cut] and of priors."""
+    left = np.minimum(np.abs(weights(fitted.point.residual)), WILD)
     values = fitted.point.values(fitted.unknowns)
     priors = sum(
         ((u.value - value) / u.prior) ** 2
@@ -288,7 +294,7 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
     """Other candidates in the place of each choice that explain at least half of what it does, nearest first; the
     nearest are fitted: what is linear is only nearly so."""
     given, chosen = linear.problem, [linear.candidates[g] for g in last.groups]
-    variance, here = scatter(given, last), squares_of(fitted)
+    variance, here = scatter(given, last), squares_of(fitted, fitted.weights)
     found: list[Rival] = []
     for group in last.groups:
         mine = linear.candidates[group]
@@ -302,7 +308,8 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
             return given.matrix[:, given.places[g]] * given.size[given.places[g]]
 
         own, of_mine = paid(scaled(group)), []
-        for other, candidate in enumerate(linear.candidates):
+        against = [*enumerate(linear.candidates), *((-1, foil) for foil in foils(base.model, campaign.readings.q, mine))]
+        for other, candidate in against:
             if other in last.groups or candidate.contains(mine) or mine.contains(candidate):
                 continue
             if candidate.bent:
@@ -317,7 +324,7 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
         for k, rival in enumerate(of_mine[:RIVALS]):
             if rival.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
                 there = with_effects(campaign, base, [rival.candidate if c is mine else c for c in chosen])
-                worse = float(squares_of(there) - here) / variance
+                worse = float(squares_of(there, fitted.weights) - here) / variance
                 of_mine[k] = replace(rival, worse=worse, fitted=True)
         found += of_mine
     return tuple(sorted(found, key=lambda rival: rival.margin))

@@ -180,9 +180,13 @@ def _evidence(found: Search, last: Explained, group: int) -> Evidence:
 
 
 def _alternatives(found: Search, group: int) -> tuple[Candidate, ...]:
+    """The candidate, and what explains the same.  Hardware that the robot file describes is taken to be there, as long
+    as what is no such thing explains no more."""
     mine = found.linear.candidates[group]
-    against = [r for r in found.rivals if r.of == mine.key and r.margin < MARGIN]
-    return (mine, *(rival.candidate for rival in against))
+    built = any(mechanism.kind == mine.name for mechanism in found.base.model.robot.mechanisms)
+    against = [r for r in found.rivals if r.of == mine.key]
+    near = [r.candidate for r in against if r.margin < (0.0 if built and r.foil else MARGIN)]
+    return (mine, *near)
 
 
 def _left_out(found: Search, last: Explained, group: int, part: Ints | None) -> float:

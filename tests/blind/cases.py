@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
+from plant import GRAVITY
 
 from postproc.measurements import Readings
 
@@ -13,12 +14,28 @@ from . import hidden, measured
 from .arm import LIMITS, Scene, as_filed, cluttered, model_of, robot_file
 from .design import Design, drawn
 from .hidden import ABSOLUTE, DEFLECTION, EVERY, OUTSIDE, Hidden
+from .measured import TAIL
 from .oracle import Oracle
 
 SNRS = (0.5, 1.0, 2.0, 5.0)
 POSES = (15, 30, 60)
 
-ROWS = ("null_clean", "null_cluttered", "single", "decoy", "pair", "triple", "outside", "unidentifiable")
+ROWS = (
+    "null_clean",
+    "null_cluttered",
+    "single",
+    "decoy",
+    "pair",
+    "triple",
+    "outside",
+    "unidentifiable",
+    "compensator",
+    "compensator_null",
+    "compensator_narrow",
+)
+
+COMPENSATOR = {15: 5e-5, 40: 1e-4}
+"""Poses of a campaign of the companion experiments' kind -> scatter [m] of a deflection in each coordinate."""
 
 DECOYS = (
     "joint_stiffening",
@@ -109,6 +126,9 @@ def cases(row: str, count: int, seed: int) -> list[Case]:
         names, sizes = [(name,) for name in OUTSIDE], SNRS
     elif row == "unidentifiable":
         names, sizes = [(name,) for name in UNIDENTIFIABLE], (2.0,)
+    elif row.startswith("compensator"):
+        names = [()] if row.endswith("null") else [("gravity_compensator",)]
+        return [Case(row, k, seed, names[0], 0.0, list(COMPENSATOR)[k % 2]) for k in range(count)]
     else:
         names, sizes = _together(2 if row == "pair" else 3, rng), SNRS[1:]
     cells = list(product(names, sizes, POSES))
@@ -129,6 +149,8 @@ def made(case: Case) -> Run:
     rng = np.random.default_rng([ROWS.index(case.row), case.number, case.seed])
     if case.row == "unidentifiable":
         return _unidentifiable(case, rng)
+    if case.row.startswith("compensator"):
+        return _compensator(case, rng)
     best: Run | None = None
     for _ in range(6):
         run = _made(case, rng)
@@ -283,3 +305,23 @@ def _unidentifiable(case: Case, rng: np.random.Generator) -> Run:
     design = drawn(model_of(raw), case.poses, deflection, rng, ranges=ranges, planned=False)
     bare = cluttered(rng, True, lacking)
     return run_of(case, raw, bare, design, (h,), rng, ranges, sizes)
+
+
+def _compensator(case: Case, rng: np.random.Generator) -> Run:
+    """Weights of 250 to 280 kg hung at random poses, three reflectors, and a balancer about as stiff as that of the
+    companion experiments; of the narrow ones A2 moves by 20 degrees only."""
+    ranges = np.array(LIMITS, float)
+    if case.row.endswith("narrow"):
+        middle = rng.uniform(-120.0, -30.0)
+        ranges[1] = middle - 10.0, middle + 10.0
+    hid = tuple(hidden.drawn(name, rng) for name in case.effects)
+    raw = robot_file(False, False)
+    design = drawn(model_of(raw), case.poses, True, rng, ranges=ranges, planned=False)
+    wrench = np.zeros((case.poses, 1, 6))
+    wrench[:, 0, 2] = -np.round(GRAVITY * rng.uniform(250.0, 280.0), 2)
+    around = 2 * np.pi / 3 * np.arange(3)
+    targets = np.round(np.column_stack([0.3 * np.cos(around), 0.3 * np.sin(around), [0.0, 0.1, 0.2]]), 6)
+    sigma = COMPENSATOR[case.poses] / np.sqrt(2 * (1 + design.tails * (TAIL**2 - 1)))
+    design = replace(design, wrench=wrench, targets=targets, stated=True, sigma=sigma)
+    sizes = tuple(rng.uniform(5.5, 8.0, len(hid)).tolist())
+    return run_of(case, raw, cluttered(rng, False), design, hid, rng, ranges, sizes)

@@ -1,0 +1,58 @@
+"""What an effect has to be told from, although it is never looked for by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.diagnosis.candidates import Candidate
+from postproc.effects import ComplianceLaw, Parameter, State, Values
+from postproc.identification.unknowns import unknowns_of
+from postproc.model import StiffnessModel
+from postproc.robot.geometries import Joint
+
+FOILED = ("gravity_compensator",)
+"""Effects that stiffen one joint, more at one angle than at another."""
+
+
+class VaryingCompliance(ComplianceLaw):
+    """theta_i = (v1 x + v2 x^2) tau_i beside the joint's own spring, x = q_i - ``middle`` [rad]: a gear that gives way
+    more at one end of its range than at the other."""
+
+    name = "joint_compliance"
+    family = "elastic"
+
+    def __init__(self, joints: Sequence[Joint], joint: int = 0, middle: float = 0.0) -> None:
+        self.joint, self.middle = joint, middle
+        at, source = joints[joint].name, "the first terms of any smooth dependence"
+        # over a radian as much as is felt of a joint's own
+        self.parameters = (
+            Parameter("v1", "rad/(N m)", 0.0, source=source, joint=at),
+            Parameter("v2", "rad/(N m)", 0.0, source=source, joint=at),
+        )
+
+    def described(self) -> dict[str, object]:
+        return {"varies": "with its angle"}
+
+    def add_displacement(
+        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
+    ) -> None:
+        row = state.chain.motor_rows[self.joint]
+        x = state.motors[self.joint] - self.middle
+        compliance = (values["v1"] + values["v2"] * x) * x
+        displacement[row] += compliance * force[row]
+        slope[row] += compliance
+
+
+def foils(model: StiffnessModel, q: Floats, mine: Candidate) -> list[Candidate]:
+    """What ``mine`` has to be told from, in a ``model`` measured at ``q`` (R, n); begun with at the null."""
+    if mine.name not in FOILED:
+        return []
+    joints = model.robot.joints
+    joint = next(i for i, one in enumerate(joints) if one.name == mine.joint)
+    middle = float(np.mean([q[:, joint].min(), q[:, joint].max()]))
+    wider = model.added(VaryingCompliance(joints, joint, middle))
+    unknowns = unknowns_of(wider, len(model.terms))
+    return [Candidate(wider.terms[-1].effect, mine.joint, wider, unknowns, np.zeros((len(q), 3, 2)), True)]
