@@ -472,7 +472,8 @@ class StiffnessModel:
             at = tool if tool.position.ndim == 1 else tool[rows]
             swept = self.chain.sweep(many.coordinates, at, many.conditions.spindle)
             force = self._forces(replace(many, swept=swept))[0].reshape(size, len(part), 2, count)
-            h[:, :, begin : begin + len(part)] = np.moveaxis((force[:, :, 0] - force[:, :, 1]) / (2 * step), 2, 0)
+            slope = (force[:, :, 0] - force[:, :, 1]) / (2 * step)
+            h[:, :, begin : begin + len(part)] = np.moveaxis(slope, 2, 0)
         return h
 
     @property

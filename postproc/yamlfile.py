@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import yaml
+from yaml.composer import Composer
+from yaml.resolver import Resolver
 
 from postproc.findings import Finding, Refusal, nearest
 
@@ -220,8 +222,7 @@ def parsed(raw: bytes, path: Path) -> Section:
     except UnicodeDecodeError as error:
         raise Refusal(Finding("YML001", f"not UTF-8 text (byte {error.start})", str(path))) from None
     try:
-        _check_events(path, text)
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node = _Composed(_checked(path, yaml.parse(text, Loader=yaml.SafeLoader))).get_single_node()
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line, column = (mark.line + 1, mark.column + 1) if mark else (0, 0)
@@ -242,13 +243,32 @@ def parsed(raw: bytes, path: Path) -> Section:
     return Section(node, path, "")
 
 
-def _check_events(path: Path, text: str) -> None:
-    """Refuses what is not for this house, before a node is built.
+class _Composed(Composer, Resolver):
+    """Builds nodes of events, as PyYAML does of its parser's."""
+
+    def __init__(self, events: Iterator[yaml.Event]) -> None:
+        Composer.__init__(self)
+        Resolver.__init__(self)
+        self._events, self._next = events, next(events)
+
+    def check_event(self, *kinds: type[yaml.Event]) -> bool:
+        return isinstance(self._next, kinds)
+
+    def peek_event(self) -> yaml.Event:
+        return self._next
+
+    def get_event(self) -> yaml.Event:
+        event, self._next = self._next, next(self._events, yaml.StreamEndEvent())
+        return event
+
+
+def _checked(path: Path, events: Iterable[yaml.Event]) -> Iterator[yaml.Event]:
+    """The events; refuses what is not for this house before a node is built of it.
 
     The depth is counted here because PyYAML's scanner takes time by its square, and the composer the stack.
     """
     depth = 0
-    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+    for event in events:
         if isinstance(event, yaml.AliasEvent):
             raise Refusal(_finding(path, event, "YML001", "aliases (*name) are not allowed"))
         if getattr(event, "tag", None) is not None:
@@ -258,6 +278,7 @@ def _check_events(path: Path, text: str) -> None:
         depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if depth > MAX_DEPTH:
             raise Refusal(_finding(path, event, "YML001", f"nested deeper than {MAX_DEPTH} levels"))
+        yield event
 
 
 def _finding(path: Path, node: yaml.Node | yaml.Event, code: str, message: str) -> Finding:

@@ -148,6 +148,8 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
     weights = replace(base.weights, shared=0.0)
     while True:
         linear = _linear(campaign, base, weights, fitted, chosen, shown)
+        if not chosen:
+            shown = list(linear.candidates)
         before = {c.key for c in chosen}
         begin = [i for i, c in enumerate(linear.candidates) if c.key in before]
         found = selected(linear.problem, range(len(linear.candidates)), begin)
@@ -251,7 +253,7 @@ def _linear(
     beyond = basis_of(np.concatenate([common, *with_chosen], axis=1)) if with_chosen else basis
     looked = tuple(
         _as_grown(campaign, fitted, c, lambda columns: outside(beyond, readings(columns)))
-        if c.bent and not c.only
+        if c.bent and not c.only and not (c.begin and chosen)
         else c
         for c in looked
     )

@@ -27,8 +27,8 @@ ONE_POSE = 1e-6
 """[rad, m] Motors that differ by less stand in one pose."""
 
 
-REST = 1e-10
-"""[rad, m] Last step of an equilibrium, whose error is smaller by a hundred: nothing that a tracker sees."""
+REST = 1e-12
+"""[rad, m] Last step of an equilibrium, whose error is smaller by a hundred: differences of two loads are taken."""
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,9 @@ class Diagnosing:
         self.process.stdout.close()
 
 
+SETTLED = ("decoy", "unidentifiable")
+"""Rows of which the proposed poses are measured too, beside the single ones."""
+
 _own: list[Diagnosing] = []
 """The process that diagnoses for this one."""
 
@@ -66,10 +69,10 @@ _own: list[Diagnosing] = []
 def record_of(case: Case, diagnosing: Diagnosing, more: bool = True) -> dict:
     """Makes a case, lets it be diagnosed, and judges that.
 
-    ``more``: also the gap that is closed, what is said of the same readings with the new robot file, and of what was
-    ambiguous when the poses are measured that were proposed.
+    ``more``, of single effects: also the gap that is closed, what is said of the same readings with the new robot file,
+    and, as well of what can not be told apart, what is said when the poses are measured that were proposed.
     """
-    run = made(case)
+    run, alone = made(case), more and case.row == "single"
     with (
         TemporaryDirectory(prefix=f"{ROOMS}data-") as data,
         TemporaryDirectory(prefix=f"{ROOMS}truth-") as truth,
@@ -83,11 +86,11 @@ def record_of(case: Case, diagnosing: Diagnosing, more: bool = True) -> dict:
         answer = diagnosing(folder, ["data.csv"], "robot.yaml", "new")
         new = folder / "new.yaml"
         found = StiffnessModel.from_robot(load_robot(new)) if new.exists() else None
-        record = judged(run, answer, found, more and case.row == "single")
-        if more and found and answer["verdict"] == "named":
+        record = judged(run, answer, found, alone)
+        if alone and found and answer["verdict"] == "named":
             record["again"] = diagnosing(folder, ["data.csv"], "new.yaml", "again")["verdict"]
         plan = folder / "new.next_poses.csv"
-        if more and plan.exists():
+        if (alone or (more and case.row in SETTLED)) and plan.exists():
             rng = np.random.default_rng([case.number, case.seed, 4])
             text = measured.filled(run.scene, run.design, plan.read_text(encoding="utf-8"), rng)
             (folder / "next.csv").write_text(text, encoding="utf-8")
