@@ -105,22 +105,19 @@ class Verdict:
 def judged(found: Search) -> Verdict:
     """The verdict on a search."""
     linear, last = found.linear, found.explained
-    evidence = [_evidence(found, last, g) for g in last.groups]
-    named, rejected = [], []
-    for g, its in zip(last.groups, evidence, strict=True):
-        candidate = linear.candidates[g]
+    named, rejected, aliases = [], [], []
+    for g in last.groups:
+        candidate, its = linear.candidates[g], _evidence(found, last, g)
         estimates = _estimates(found.final, candidate, found)
+        seen = bool(estimates) and not all(e.at_bound for e in estimates)
+        several = _alternatives(found, g, seen)
         if not its.holds:
             rejected.append((candidate, "no gain on readings that were left out"))
-        elif not estimates or all(e.at_bound for e in estimates):
+        elif not seen and len(several) == 1:
             rejected.append((candidate, "its parameters would have to lie at their bounds"))
         else:
             named.append(Named(candidate, _joints(candidate, estimates), estimates, its))
-    aliases = [
-        _alternatives(found, g)
-        for g in last.groups
-        if any(n.candidate is linear.candidates[g] for n in named)
-    ]
+            aliases.append(several)
     lack, lacking = lack_of_fit(found, last)
     lacking = lacking or bool(where(found.final, chance=STRUCTURE))
     bare, _ = lack_of_fit(found, explained(linear.problem, ()))
@@ -179,13 +176,13 @@ def _evidence(found: Search, last: Explained, group: int) -> Evidence:
     return Evidence(gain, min(1.0, chance * among), heldout, regions, sessions, margin, alias)
 
 
-def _alternatives(found: Search, group: int) -> tuple[Candidate, ...]:
-    """The candidate, and what explains the same.  Hardware that the robot file describes is taken to be there, as long
-    as what is no such thing explains no more."""
+def _alternatives(found: Search, group: int, seen: bool) -> tuple[Candidate, ...]:
+    """The candidate, and what explains the same.  Hardware that the robot file describes is taken to be there where its
+    parameters are ``seen``, as long as what is no such thing explains no more."""
     mine = found.linear.candidates[group]
     built = any(mechanism.kind == mine.name for mechanism in found.base.model.robot.mechanisms)
     against = [r for r in found.rivals if r.of == mine.key]
-    near = [r.candidate for r in against if r.margin < (0.0 if built and r.foil else MARGIN)]
+    near = [r.candidate for r in against if r.margin < (0.0 if built and seen and r.foil else MARGIN)]
     return (mine, *near)
 
 

@@ -103,11 +103,15 @@ def _alternatives(result: Diagnosed, _verbose: bool) -> Table:
     """What each explanation of a set gains alone."""
     table = _table("can not be told apart", "gain alone")
     keys = [candidate.key for candidate in result.diagnosis.search.linear.candidates]
+    alone = dict(zip(keys, result.gains.alone.tolist(), strict=True))
+    for rival in result.diagnosis.search.rivals:
+        # what is never looked for by itself gains as much less than the first as it fits worse
+        alone.setdefault(rival.candidate.key, alone.get(rival.of, np.nan) - rival.worse)
     for number, alternatives in enumerate(result.verdict.alternatives):
         if number:
             table.add_section()
         for candidate in alternatives:
-            table.add_row(candidate.label, _number(result.gains.alone[keys.index(candidate.key)]))
+            table.add_row(candidate.label, _number(alone[candidate.key]))
     return table
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -43,10 +42,10 @@ LOADS = 3
 USUAL_SIGMA = 0.03 * MM
 """Scatter that poses are proposed for where nothing states one."""
 
-TRIED = 3
-"""Explanations of a set that are told apart two by two."""
+TRIED = 2
+"""Explanations of a set that the first is told from."""
 
-CANDIDATES = 600
+CANDIDATES = 300
 """Poses to choose from."""
 
 
@@ -118,7 +117,7 @@ def _spare_inputs(request: DiagnoseRequest) -> None:
 def _next_poses(measured: Measured, found: Diagnosis) -> NextPoses | None:
     """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do."""
     offer = _offer(measured, found.search.base)
-    pairs = [pair for several in found.verdict.alternatives for pair in combinations(several[:TRIED], 2)]
+    pairs = [(first, other) for first, *others in found.verdict.alternatives for other in others[:TRIED]]
     plans = [_told_apart(measured, found, offer, one, other) for one, other in pairs]
     return max((plan for plan in plans if plan), key=lambda plan: min(plan.separation), default=None)
 

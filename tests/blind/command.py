@@ -59,7 +59,7 @@ class Diagnosing:
         self.process.stdout.close()
 
 
-SETTLED = ("decoy", "unidentifiable")
+SETTLED = ("decoy", "compensator_narrow")
 """Rows of which the proposed poses are measured too, beside the single ones."""
 
 _own: list[Diagnosing] = []
@@ -120,7 +120,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--only", default="", help="cases with this effect only")
     given = parser.parse_args(argv)
     wanted = [case for row in given.rows.split(",") for case in cases(row, given.runs, given.seed)]
-    wanted = [case for case in wanted if given.only in ("", *case.effects)]
+    # all rows grow alike, whenever it is stopped
+    wanted = sorted((c for c in wanted if given.only in ("", *c.effects)), key=lambda c: c.number)
     records = _kept(given.out, {case.key for case in wanted})
     known = {record["key"] for record in records}
     left = [case for case in wanted if case.key not in known]
