@@ -424,7 +424,6 @@ class StiffnessModel:
         state = self.state(q, wrench, tool, conditions, displacement)
         force, _ = self._forces(state)
         _, gives = self._displacement(state, force)
-        c = gives.T[:, :, None]
         own = np.empty((*displacement.shape, len(spans)))
         every = np.arange(self.chain.size)
         by_rest: Floats | None = None

@@ -194,12 +194,13 @@ def test_columns_are_the_derivative_of_what_is_expected(name, deflection, at_tip
     described = arm(random_arm(rng, "rrr"))
     beside = ["joint_compliance", "base_compliance", "tool_compliance", "link_gravity", "gravity_compensator"]
     effects = [made(n, described.joints) for n in [*beside, *([] if name in beside else [name])]]
-    model = with_terms(
-        StiffnessModel(described, ()), *((effect, sampled(effect, rng)) for effect in effects)
-    )
+    model = with_terms(StiffnessModel(described, ()), *((effect, sampled(effect, rng)) for effect in effects))
     term = next(k for k, effect in enumerate(effects) if effect.name == name)
     count = 24
-    q, wrench = rng.uniform(-2.0, 2.0, (count, 3)), 3e3 * rng.normal(size=(count, 6)) * [1, 1, 1, 0.1, 0.1, 0.1]
+    q, wrench = (
+        rng.uniform(-2.0, 2.0, (count, 3)),
+        3e3 * rng.normal(size=(count, 6)) * [1, 1, 1, 0.1, 0.1, 0.1],
+    )
     words = {"targets": tuple(MARKERS), "places": {"M1": MARKERS["M1"]}, "target": np.arange(count) % 3}
     readings = plan(described, q, wrench, deflection, tool=TOOL, **({} if at_tip else words))
     readings = replace(

@@ -164,7 +164,7 @@ def _in_steps(whole: Candidate, joints: Sequence[str]) -> list[Candidate]:
     return [*found, whole]
 
 
-def testable(candidate: Candidate, weights: Weighting) -> bool:
+def shows(candidate: Candidate, weights: Weighting) -> bool:
     """Whether the readings would show the effect at all."""
     return bool(np.linalg.norm(weights(candidate.columns)) > candidate.least)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.diagnosis.candidates import Candidate, candidates, testable
+from postproc.diagnosis.candidates import Candidate, candidates, shows
 from postproc.diagnosis.foils import VaryingCompliance, foils
 from postproc.diagnosis.growth import Outside, grown, whole
 from postproc.diagnosis.selection import (
@@ -142,8 +142,8 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
     fitted = base
     tried: set[frozenset[Key]] = set()
     every = _not_imitated(base, candidates(campaign, base.model, base.point.given))
-    shown = [c for c in every if testable(c, base.weights) and c.key not in banned]
-    hidden = tuple(c for c in every if not testable(c, base.weights))
+    shown = [c for c in every if shows(c, base.weights) and c.key not in banned]
+    hidden = tuple(c for c in every if not shows(c, base.weights))
     # what a missing effect does to all readings of a pose looks like an error that they share
     weights = replace(base.weights, shared=0.0)
     while True:
@@ -310,18 +310,21 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
             return given.matrix[:, given.places[g]] * given.size[given.places[g]]
 
         own, of_mine = paid(scaled(group)), []
-        against = [*enumerate(linear.candidates), *((-1, foil) for foil in foils(base.model, campaign.readings.q, mine))]
+        against = [
+            *enumerate(linear.candidates),
+            *((-1, foil) for foil in foils(base.model, campaign.readings.q, mine)),
+        ]
         for other, candidate in against:
             if other in last.groups or candidate.contains(mine) or mine.contains(candidate):
                 continue
             if candidate.bent:
-                rival, squares, columns = _instead(campaign, fitted, linear, rest, mine, candidate)
+                instead, squares, columns = _instead(campaign, fitted, linear, rest, mine, candidate)
             else:
-                rival, squares = candidate, explained(given, (*rest.groups, other)).squares
+                instead, squares = candidate, explained(given, (*rest.groups, other)).squares
                 columns = scaled(other)
             if rest.squares - squares > 0.5 * gain:
                 worse = float(squares - last.squares) / variance
-                of_mine.append(Rival(mine.key, rival, worse, paid(columns) - own, False))
+                of_mine.append(Rival(mine.key, instead, worse, paid(columns) - own, False))
         of_mine.sort(key=lambda rival: rival.margin)
         for k, rival in enumerate(of_mine[:RIVALS]):
             if rival.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
@@ -335,8 +338,8 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
 def _instead(
     campaign: Campaign, fitted: Fit, linear: Linear, rest: Explained, mine: Candidate, other: Candidate
 ) -> tuple[Candidate, float, Floats]:
-    """``other``, that is not linear in its size, as large as explains the most in the place of ``mine`` beside ``rest``;
-    the squares that are left then, and its columns outside of what is explained anyway."""
+    """``other``, that is not linear in its size, as large as explains the most in the place of ``mine`` beside
+    ``rest``; the squares that are left then, and its columns outside of what is explained anyway."""
     without = _without(campaign, fitted, [mine])
     model, unknowns = composed(without.model, [other])
     basis = basis_of(linear.common)
@@ -355,11 +358,12 @@ def _instead(
 def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> Fit:
     """The non-linear fit with the effects ``chosen`` added to ``base``, its own unknowns fitted along."""
     model, unknowns = composed(base.model, chosen)
-    begin = {
-        (_term_of(model, c), u.parameter.name): value
-        for c in chosen
-        for u, value in zip(c.unknowns, c.begin, strict=bool(c.begin))
-    }
+    begin: dict[tuple[int, str], float] = {}
+    for candidate in chosen:
+        term = _term_of(model, candidate)
+        if term is not None and candidate.begin:
+            names = [u.parameter.name for u in candidate.unknowns]
+            begin |= {(term, name): value for name, value in zip(names, candidate.begin, strict=True)}
     own = [u for u in base.asked if u.key in {b.key for b in base.unknowns}]
     return fit(campaign, model.changed(begin), [*own, *unknowns], given=base.point.given)
 
@@ -379,9 +383,7 @@ def composed(
             term = len(model.terms) - 1
         names = {u.parameter.name for u in candidate.unknowns}
         known = {u.key for u in unknowns}
-        unknowns += [
-            u for u in unknowns_of(model, term) if u.parameter.name in names and u.key not in known
-        ]
+        unknowns += [u for u in unknowns_of(model, term) if u.parameter.name in names and u.key not in known]
     return model, tuple(unknowns)
 
 

@@ -137,9 +137,7 @@ class Campaign:
         self.pose: Ints = pose.reshape(-1)
         self.poses = int(self.pose.max()) + 1
 
-    def seen(
-        self, model: StiffnessModel, start: Floats | None = None, tolerance: float = REST
-    ) -> Seen:
+    def seen(self, model: StiffnessModel, start: Floats | None = None, tolerance: float = REST) -> Seen:
         """All states at rest under ``model``; ``start`` (S, m): displacement of a model nearby; ``tolerance`` as of the
         equilibrium."""
         rest = model.equilibrium(self.q, self.wrench, self.tool, self.conditions, start, tolerance)

@@ -59,6 +59,9 @@ class Diagnosing:
         self.process.stdout.close()
 
 
+FURTHER = 150
+"""So many runs of a row are followed further."""
+
 SETTLED = ("decoy", "compensator_narrow")
 """Rows of which the proposed poses are measured too, beside the single ones."""
 
@@ -72,7 +75,8 @@ def record_of(case: Case, diagnosing: Diagnosing, more: bool = True) -> dict:
     ``more``, of single effects: also the gap that is closed, what is said of the same readings with the new robot file,
     and, as well of what can not be told apart, what is said when the poses are measured that were proposed.
     """
-    run, alone = made(case), more and case.row == "single"
+    run, more = made(case), more and case.number < FURTHER
+    alone = more and case.row == "single"
     with (
         TemporaryDirectory(prefix=f"{ROOMS}data-") as data,
         TemporaryDirectory(prefix=f"{ROOMS}truth-") as truth,

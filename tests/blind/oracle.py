@@ -86,8 +86,6 @@ class Oracle:
         that is not hidden, noise included; ``others``: what is hidden beside it."""
         y = self.outside(self._flat(rest[:, :, None]))[:, 0]
         beside = [self.outside(self._flat(self._of(hidden, s))) for hidden, s in others]
-        fixed = np.column_stack([np.empty((len(y), 0)), *beside])
-
         basis = _basis(np.column_stack([np.empty((len(y), 0)), *beside]))
 
         def gain(moves: np.ndarray) -> float:

@@ -81,9 +81,8 @@ def matrix(records: Records) -> list[str]:
         holds = [{"it": both[k]} for r in records if r["covered"] for both in r["covered"].values()]
         told.append(f"{words:46} {share([h for h in holds if h['it'] is not None], lambda h: h['it'])}")
     again = [r for r in records if "again" in r]
-    told.append(
-        f"{'named, then nothing missing with the new file':46} {share(again, lambda r: r['again'] == 'nothing_missing')}"
-    )
+    words = "named, then nothing missing with the new file"
+    told.append(f"{words:46} {share(again, lambda r: r['again'] == 'nothing_missing')}")
     later = [r for r in records if "later" in r and r["outcome"] in ("ambiguous", "undecided")]
     told.append(f"{'ambiguous, right after the 6 proposed poses':46} {share(later, is_settled)}")
     hopeful = [r for r in later if all((s or 0) >= SEPARATE for s in r["answer"]["next_poses_separation"])]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from postproc.diagnosis.search import own_unknowns
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit
@@ -60,7 +62,9 @@ def truth_of(run: Run) -> set[tuple[str, str]]:
 
 def outcome_of(run: Run, answer: dict, rivals: list[list[Rival]]) -> str:
     """Of an answer on ``run``, ``rivals`` of each effect as the oracle has them."""
-    names = {named(one["effect"], joint) for one in answer.get("named", ()) for joint in one["joints"] or [""]}
+    names = {
+        named(one["effect"], joint) for one in answer.get("named", ()) for joint in one["joints"] or [""]
+    }
     sets = [
         {named(one["effect"], one["joint"] or "") for one in alternatives}
         for alternatives in answer.get("alternatives", ())

@@ -1,0 +1,211 @@
+"""The parts of a diagnosis: what parameters cost, what does not grow in proportion, what is chance."""
+
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from measured import MARKERS, on_markers, plan, robot
+
+from postproc.diagnosis.candidates import candidates, shows
+from postproc.diagnosis.foils import foils
+from postproc.diagnosis.growth import grown, whole
+from postproc.diagnosis.screens import where
+from postproc.diagnosis.search import SHARED, _not_imitated, _sharing, own_unknowns, search
+from postproc.diagnosis.selection import price
+from postproc.diagnosis.verdict import _left_out, judged
+from postproc.geometry import Poses
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import fit
+from postproc.identification.unknowns import asked_for
+from postproc.model import StiffnessModel
+
+SIGMA = 2e-5
+TOOL = Poses(np.eye(3), np.array([0.0, 0.5, 0.2]))
+
+
+@cache
+def stated():
+    """The joints' compliance of an arm, c1 not stated: hung weights do not show it."""
+    model = StiffnessModel.from_robot(robot("kuka_kr270")).without(["gravity_compensator"])
+    (term,) = model.terms
+    return replace(model, terms=(replace(term, stated={k: v for k, v in term.stated.items() if k != "c1"}),))
+
+
+def campaign_of(model, poses=20, seed=0, shared=0.0, wild=0.0, loads=(2600.0,)):
+    """Readings of three targets under weights, of ``model``; those of a pose ``shared`` [m] an error, a share ``wild``
+    of them is three times as far off."""
+    rng = np.random.default_rng(seed)
+    q = np.repeat(rng.uniform(*model.robot.limits.T, (poses, 6)), len(loads), axis=0)
+    wrench = np.zeros((len(q), 6))
+    wrench[:, 2] = -np.tile(loads, poses)
+    rows, wrench, words = on_markers(q, wrench)
+    readings = plan(model.robot, rows, wrench, tool=TOOL, sigma=SIGMA, **words)
+    campaign = Campaign(readings)
+    value = campaign.expected(campaign.seen(model), campaign.start())[0]
+    size = np.where(rng.random(len(rows)) < wild, 3.0, 1.0)[:, None]
+    value = value + SIGMA * size * rng.normal(size=value.shape)
+    value += shared * np.repeat(rng.normal(size=(poses, 3)), len(loads) * len(MARKERS), axis=0)
+    return Campaign(replace(readings, value=value))
+
+
+def fitted(campaign, model=None):
+    model = model or stated()
+    return fit(campaign, model, own_unknowns(model))
+
+
+# What parameters cost
+
+
+def test_a_parameter_costs_what_it_would_have_shown():
+    """One that explains the squares g costs 1 + ln g: g - 1 - ln g is the most that a normal prior of any width can
+    average."""
+    rng = np.random.default_rng(1)
+    column = rng.normal(size=(60, 1))
+    column /= np.linalg.norm(column)
+    for gain in (30.0, 500.0):
+        left = np.sqrt(gain) * column[:, 0]
+        for scale in (1e-3, 1.0, 1e4):
+            assert price(scale * column, left, 1.0) == pytest.approx(1 + np.log(gain), rel=0.02)
+
+
+def test_what_can_not_be_seen_costs_nothing():
+    rng = np.random.default_rng(2)
+    basis = np.linalg.qr(rng.normal(size=(60, 3)))[0]
+    left = 20.0 * basis[:, 0]
+    alone = price(basis[:, :1], left, 1.0)
+    # beside it two that would have shown as well, and are not there
+    clear = price(basis, left, 1.0)
+    assert clear > alone + 2 * 0.9 * np.log(20.0**2) - 3
+    unseen = price(basis * [1.0, 1e-4, 1e-4], left, 1.0)
+    assert unseen == pytest.approx(alone, abs=0.01)
+    assert price(0 * basis, left, 1.0) == 0.0
+
+
+# What does not grow in proportion
+
+
+def test_columns_of_a_whole_effect_foresee_it():
+    rng = np.random.default_rng(3)
+    columns, does, values = rng.normal(size=(7, 3, 2)), rng.normal(size=(7, 3)), np.array([0.5, -2.0])
+    np.testing.assert_allclose(whole(columns, does, values) @ values, does, atol=1e-12)
+    np.testing.assert_array_equal(whole(columns, does, 0 * values), columns)
+    # what foresees it already is not changed
+    np.testing.assert_allclose(whole(columns, columns @ values, values), columns, atol=1e-12)
+
+
+@pytest.mark.parametrize("times", [0.2, 10.0])
+def test_an_effect_is_looked_at_as_large_as_it_is(times):
+    """A cubic spring much weaker or stiffer than usual: its columns at the null say little of what it does."""
+    asked = asked_for(stated(), ["joint_stiffening.k3"])
+    (unknown,) = asked.unknowns
+    value = times * unknown.parameter.scale
+    campaign = campaign_of(asked.model.changed({unknown.key: value}), 30, loads=(1200.0, 2600.0))
+    point = fit(campaign, stated(), ()).point
+    large = grown(campaign, point, asked.model, asked.unknowns, lambda c: c.reshape(-1, c.shape[2]) / SIGMA)
+    assert large.values[0] == pytest.approx(value, rel=0.1)
+    assert np.mean(large.left**2) == pytest.approx(1.0, abs=0.2)
+    assert np.mean(large.target**2) > np.mean(large.left**2) + 0.1
+    (column,) = np.moveaxis(large.columns, 2, 0)
+    np.testing.assert_allclose(
+        column * large.values[0] / unknown.parameter.scale,
+        (large.target - large.left).reshape(-1, 3) * SIGMA,
+        atol=1e-9,
+    )
+
+
+# What is looked for
+
+
+def test_a_gain_of_the_force_is_a_softer_arm():
+    campaign = campaign_of(stated(), 20, loads=(1200.0, 2600.0))
+    base = fitted(campaign)
+    every = candidates(campaign, base.model, base.point.given)
+    left = _not_imitated(base, every)
+    names = [
+        {u.parameter.name for u in c.unknowns}
+        for several in (every, left)
+        for c in several
+        if c.name == "force_sensor"
+    ]
+    assert "gain" in names[0]
+    assert names[1]
+    assert "gain" not in names[1]
+
+
+def test_differences_show_no_places():
+    campaign = campaign_of(stated())
+    base = fitted(campaign)
+    every = candidates(campaign, base.model, base.point.given)
+    shown = {c.name for c in every if shows(c, base.weights)}
+    assert {"gravity_compensator", "backlash", "link_compliance", "base_compliance"} <= shown
+    assert not {"joint_offset", "transmission_error", "hysteresis", "thermal_growth"} & shown
+
+
+def test_weights_are_looked_for_up_to_each_joint():
+    model = stated()
+    campaign = campaign_of(model)
+    steps = [c for c in candidates(campaign, model, campaign.start()) if c.name == "link_gravity"]
+    assert [c.upto for c in steps] == ["A2", "A3", "A4", "A5", ""]
+    assert all(later.contains(earlier) for earlier, later in pairwise(steps))
+    assert not steps[0].contains(steps[1])
+    assert len({c.label for c in steps}) == len(steps)
+
+
+def test_a_compensator_is_told_from_a_stiffness_that_varies():
+    model = stated()
+    spring = StiffnessModel.from_robot(robot("kuka_kr270"))
+    campaign = campaign_of(spring, 30, loads=(1200.0, 2600.0))
+    base = fitted(campaign)
+    found = [c for c in candidates(campaign, base.model, base.point.given) if c.name == "gravity_compensator"]
+    (foil,) = foils(base.model, campaign.readings.q, found[0])
+    assert (foil.name, foil.joint) == ("joint_compliance", "A2")
+    assert "varying with its angle" in foil.label
+    other = next(c for c in candidates(campaign, model, campaign.start()) if c.name == "backlash")
+    assert not foils(base.model, campaign.readings.q, other)
+
+
+# What is chance
+
+
+def test_no_pattern_is_seen_in_what_poses_share():
+    """Errors that the readings of a pose share, and wild ones, are no structure."""
+    told = 0
+    for seed in range(30):
+        campaign = campaign_of(stated(), 20, seed, shared=3 * SIGMA, wild=0.1)
+        told += bool(where(fitted(campaign), chance=0.01))
+    assert told <= 2
+
+
+def test_a_pattern_is_seen():
+    spring = StiffnessModel.from_robot(robot("kuka_kr270"))
+    assert any("A2 over" in one.variable for one in where(fitted(campaign_of(spring, 60)), chance=0.001))
+    # in fewer poses against the scatter that is known
+    campaign = campaign_of(spring, 20)
+    first, *_ = where(fitted(campaign), fit(campaign, spring, ()))
+    assert "A2 over" in first.variable
+
+
+def test_what_poses_share_is_no_more_than_scatter_can_be():
+    base = fitted(campaign_of(stated(), 20, shared=20 * SIGMA))
+    assert base.weights.shared > 10 * SIGMA
+    assert _sharing(base, base).shared == pytest.approx(SHARED * SIGMA)
+    little = fitted(campaign_of(stated(), 20, shared=1.5 * SIGMA))
+    assert _sharing(base, little).shared == little.weights.shared
+
+
+def test_a_few_poses_do_not_foretell_a_campaign():
+    """Of two sessions of which one is most of all, only the other is left out."""
+    spring = StiffnessModel.from_robot(robot("kuka_kr270"))
+    campaign = campaign_of(spring, 24, loads=(1200.0, 2600.0))
+    found = search(campaign, fitted(campaign))
+    (group,) = found.explained.groups
+    rows = np.arange(len(campaign))
+    small = _left_out(found, found.explained, group, (rows >= len(rows) - 18).astype(np.int64))
+    swapped = _left_out(found, found.explained, group, (rows < len(rows) - 18).astype(np.int64))
+    assert small == pytest.approx(swapped)
+    both = _left_out(found, found.explained, group, (rows >= len(rows) // 2).astype(np.int64))
+    assert both > small > 0
+    assert np.isnan(_left_out(found, found.explained, group, 0 * rows))
+    assert judged(found).word in ("named", "ambiguous")
