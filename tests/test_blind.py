@@ -183,6 +183,51 @@ def test_what_can_not_be_told_apart_is_not_claimed(said, one):
     assert said(one)["right"]
 
 
+def test_poses_that_settle_it(tmp_path_factory):
+    """Where A2 hardly moves, a balancer is some stiffness of it; the poses that are proposed take it through its range,
+    and with them it is the balancer."""
+    one, kept = cases.cases("compensator_narrow", 1, 11)[0], {}
+
+    def diagnosing(folder, data, robot, new):
+        answer = process(folder, data, robot, new)
+        kept[new] = answer
+        return answer
+
+    process = command.Diagnosing()
+    record = command.record_of(one, diagnosing)
+    process.close()
+    assert kept["new"]["verdict"] == "ambiguous"
+    assert kept["new"]["ambiguous"] == [["gravity_compensator", "joint_compliance"]]
+    angles = [pose["A2"] for pose in kept["new"]["next_poses"]]
+    assert min(angles) < -135
+    assert max(angles) > -20
+    assert any(-125 < angle < -80 for angle in angles)
+    assert record["later"]["outcome"] == "exact"
+
+
+def test_a_plan_is_filled_in_as_asked():
+    """What is read where a plan asks for it is what the plant does there, in the plan's own columns."""
+    run = made(case("single", "thermal_growth", 5.0, 15))
+    design = run.design
+    names = ",".join([*(f"A{i}" for i in range(1, 7)), "TARGET", "X", "Y", "Z", "T", "TEMP"])
+    rows = [
+        f"{','.join(map(str, np.degrees(q)))},M{k + 1},,,,,"
+        for q in design.q[:2]
+        for _ in range(design.wrench.shape[1])
+        for k in range(design.points)
+    ]
+    plan = "\n".join(["# frame: tracker", names, *rows])
+    filled = measured.filled(run.scene, replace(design, sigma=0.0, jitter=0.0), plan, np.random.default_rng(1))
+    again = [line.split(",") for line in filled.splitlines()[2:] if line]
+    assert len(again) == len(rows)
+    for given, row in zip(rows, again, strict=True):
+        assert ",".join(row[:7]) == given.removesuffix(",,,,,")
+        assert all(row[7:])
+    warm = design.temperature[-1] - design.temperature[0]
+    assert float(again[0][-1]) == pytest.approx(design.temperature[-1])
+    assert warm > 1.0
+
+
 def test_tables_count_every_run(tmp_path):
     answer = {"verdict": "unknown", "seconds": 1.0}
     common = {"snr": 2.0, "poses": 15, "reached": True, "rivals": [], "covered": None, "answer": answer}

@@ -19,7 +19,7 @@ from postproc.findings import Finding, Refusal
 from postproc.geometry import Poses
 from postproc.identification.campaign import Campaign
 from postproc.measurements import measurements_csv, planned, read_measurements
-from postproc.model import StiffnessModel
+from postproc.model import StiffnessModel, approach
 from postproc.robot.description import find_robot, load_robot
 from postproc.workflows import diagnose as workflow
 from postproc.workflows.diagnose import DiagnoseRequest
@@ -216,6 +216,36 @@ def test_what_can_not_be_told_apart_is_planned(compensate, shop, tmp_path, undec
         assert not (shop / "new.yaml").exists()
     finally:
         filled.unlink()
+
+
+def test_a_plan_has_the_columns_of_the_readings(compensate, shop, tmp_path, undecided, monkeypatch):
+    """So that both can be given together once it is filled in."""
+    monkeypatch.chdir(tmp_path)
+    joints = [(f"A{k}", False) for k in range(1, 7)]
+    readings = read_measurements(shop / "loads.csv", joints)
+    count = len(readings)
+    warm = replace(
+        readings,
+        direction=approach(readings.q),
+        time=60.0 * np.arange(count),
+        temperature=20.0 + 0.1 * np.arange(count),
+    )
+    (tmp_path / "warm.csv").write_bytes(measurements_csv(warm))
+    done = compensate("diagnose", "warm.csv", "--robot", shop / "shop.yaml", "-o", "new.yaml")
+    assert done.code == 3, done.err
+    lines = (tmp_path / "new.next_poses.csv").read_text().splitlines()
+    header = next(line for line in lines if not line.startswith("#")).split(",")
+    assert {"DIR1", "DIR6", "T", "TEMP", "DX"} <= set(header)
+    rows = [line.split(",") for line in lines if not line.startswith("#")][1:]
+    assert all(row[header.index("T")] == row[header.index("TEMP")] == row[header.index("DX")] == "" for row in rows)
+    for number, row in enumerate(rows):
+        for name in ("T", "TEMP", "DX", "DY", "DZ"):
+            row[header.index(name)] = str(1 + number)
+    comments = [line for line in lines if line.startswith("#")]
+    (tmp_path / "next.csv").write_text("\n".join([*comments, ",".join(header), *map(",".join, rows)]))
+    together = measured_of((tmp_path / "warm.csv", tmp_path / "next.csv"), str(shop / "shop.yaml"), None)
+    assert len(together.readings) == count + len(rows)
+    np.testing.assert_array_equal(together.readings.direction[count:], approach(together.readings.q[count:]))
 
 
 def test_what_can_not_be_done(compensate, shop, tmp_path, monkeypatch):
