@@ -217,7 +217,9 @@ def test_a_plan_is_filled_in_as_asked():
         for k in range(design.points)
     ]
     plan = "\n".join(["# frame: tracker", names, *rows])
-    filled = measured.filled(run.scene, replace(design, sigma=0.0, jitter=0.0), plan, np.random.default_rng(1))
+    filled = measured.filled(
+        run.scene, replace(design, sigma=0.0, jitter=0.0), plan, np.random.default_rng(1)
+    )
     again = [line.split(",") for line in filled.splitlines()[2:] if line]
     assert len(again) == len(rows)
     for given, row in zip(rows, again, strict=True):

@@ -237,7 +237,9 @@ def test_a_plan_has_the_columns_of_the_readings(compensate, shop, tmp_path, unde
     header = next(line for line in lines if not line.startswith("#")).split(",")
     assert {"DIR1", "DIR6", "T", "TEMP", "DX"} <= set(header)
     rows = [line.split(",") for line in lines if not line.startswith("#")][1:]
-    assert all(row[header.index("T")] == row[header.index("TEMP")] == row[header.index("DX")] == "" for row in rows)
+    assert all(
+        row[header.index("T")] == row[header.index("TEMP")] == row[header.index("DX")] == "" for row in rows
+    )
     for number, row in enumerate(rows):
         for name in ("T", "TEMP", "DX", "DY", "DZ"):
             row[header.index(name)] = str(1 + number)
