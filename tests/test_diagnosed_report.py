@@ -533,7 +533,7 @@ def test_what_is_said_of_nothing(stale):
     assert paragraph(judged(good, "nothing_missing", conditional=True)).startswith(
         "Nothing is seen to be missing. A missing effect"
     )
-    assert "clearly less than the scatter that is stated" in paragraph(
+    assert "clearly less than the scatter (" in paragraph(
         judged(stale, "nothing_missing", lack=0.3)
     )
     wild = np.array(stale.final.residual)
@@ -563,6 +563,15 @@ def test_what_is_said_of_doubt(spring):
     assert "differ by 0.4 standard deviations, 3.2 are needed" in paragraph(near)
     assert "Measure these" not in paragraph(near)
     assert "Measure these 2 poses (which.csv): " in paragraph(replace(planned, next_poses_file="which.csv"))
+
+
+def test_hardware_that_is_known_is_taken(spring):
+    (named,) = spring.verdict.named
+    near = replace(named, evidence=replace(named.evidence, margin=2.4))
+    text = paragraph(judged(spring, "named", named=(near,)))
+    assert "fits worse by 2 in -2 ln(likelihood) only" in text
+    assert "the gravity_compensator is taken because the robot file describes one" in text
+    assert "clearly worse" not in text
 
 
 def test_what_is_said_of_the_unknown(spring, stale):

@@ -249,6 +249,11 @@ def _nearest(several: Sequence[Named]) -> Iterator[str]:
     of = f" to {named.candidate.label}" if len(several) > 1 else ""
     if alias is None:
         yield "No other effect that was tried comes near."
+    elif margin < MARGIN:
+        yield (
+            f"The nearest other explanation{of}, {alias.label}, fits worse by {margin:.0f} in -2 ln(likelihood) only; the"
+            f" {named.effect} is taken because the robot file describes one."
+        )
     else:
         yield (
             f"The nearest other explanation{of}, {alias.label}, fits clearly worse: by {margin:.0f} in"
@@ -263,8 +268,8 @@ def _rest(result: Diagnosed) -> Iterator[str]:
         return
     if result.verdict.lack < OVERSTATED:
         yield (
-            f"What is left, {left} mm RMS, is clearly less than the scatter that is {result.final.noise.source}"
-            f" ({_mm(result.scatter)} mm): if that is stated too large, small effects hide behind it."
+            f"What is left, {left} mm RMS, is clearly less than the scatter ({_mm(result.scatter)} mm, from:"
+            f" {result.final.noise.source}): if that is too large, small effects hide behind it."
         )
     elif result.rms["after"] > FAR_OFF * result.scatter:
         yield (
