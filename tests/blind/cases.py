@@ -34,8 +34,8 @@ ROWS = (
     "compensator_narrow",
 )
 
-NARROW = 60
-"""Runs in which A2 hardly moves."""
+COMPENSATED, NARROW = 200, 60
+"""Runs at most of the compensator's rows, and where A2 hardly moves."""
 
 COMPENSATOR = {15: 5e-5, 40: 1e-4}
 """Poses of a campaign of the companion experiments' kind -> scatter [m] of a deflection in each coordinate."""
@@ -131,7 +131,7 @@ def cases(row: str, count: int, seed: int) -> list[Case]:
         names, sizes = [(name,) for name in UNIDENTIFIABLE], (2.0,)
     elif row.startswith("compensator"):
         names = [()] if row.endswith("null") else [("gravity_compensator",)]
-        count = min(count, NARROW) if row.endswith("narrow") else count
+        count = min(count, NARROW if row.endswith("narrow") else COMPENSATED)
         return [Case(row, k, seed, names[0], 0.0, list(COMPENSATOR)[k % 2]) for k in range(count)]
     else:
         names, sizes = _together(2 if row == "pair" else 3, rng), SNRS[1:]

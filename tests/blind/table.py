@@ -37,6 +37,11 @@ def is_named(record: dict) -> bool:
     return bool(record["answer"].get("named"))
 
 
+def is_careful(record: dict) -> bool:
+    """Whether nothing was named that is not there."""
+    return record["outcome"] in ("exact", "ambiguous", "undecided", "missed", "unseen")
+
+
 def is_settled(record: dict) -> bool:
     """Whether the truth was named after more poses had been measured."""
     return record["later"]["outcome"] == "exact"
@@ -75,6 +80,10 @@ def matrix(records: Records) -> list[str]:
             [r for r in at(["single", "pair", "triple"], 1.0) if inseparable(r)],
             is_right,
         ),
+        ("compensator named, 15 poses, 0.05 mm", [r for r in by["compensator"] if r["poses"] == 15], is_right),
+        ("compensator named, 40 poses, 0.1 mm", [r for r in by["compensator"] if r["poses"] == 40], is_right),
+        ("the same without one: given a name", by["compensator_null"], is_named),
+        ("the same, A2 within 20 deg: nothing else named", by["compensator_narrow"], is_careful),
     ]
     told = [f"{name:46} {share(chosen, holds)}" for name, chosen, holds in lines]
     for k, words in enumerate(("95 % intervals hold what no scatter gives", "  the true values themselves")):
@@ -84,7 +93,10 @@ def matrix(records: Records) -> list[str]:
     words = "named, then nothing missing with the new file"
     told.append(f"{words:46} {share(again, lambda r: r['again'] == 'nothing_missing')}")
     later = [r for r in records if "later" in r and r["outcome"] in ("ambiguous", "undecided")]
-    told.append(f"{'ambiguous, right after the 6 proposed poses':46} {share(later, is_settled)}")
+    narrow = [r for r in later if r["row"] == "compensator_narrow"]
+    told.append(f"{'  of these ambiguous: right after 6 more poses':46} {share(narrow, is_settled)}")
+    later = [r for r in later if r not in narrow]
+    told.append(f"{'single and decoys, ambiguous: right after 6 more':46} {share(later, is_settled)}")
     hopeful = [r for r in later if all((s or 0) >= SEPARATE for s in r["answer"]["next_poses_separation"])]
     told.append(f"{'  of these, where the plan says that they do':46} {share(hopeful, is_settled)}")
     closed = [r["closed"] for r in records if r.get("closed") is not None and r["snr"] >= 2 and r["reached"]]
