@@ -533,9 +533,7 @@ def test_what_is_said_of_nothing(stale):
     assert paragraph(judged(good, "nothing_missing", conditional=True)).startswith(
         "Nothing is seen to be missing. A missing effect"
     )
-    assert "clearly less than the scatter (" in paragraph(
-        judged(stale, "nothing_missing", lack=0.3)
-    )
+    assert "clearly less than the scatter (" in paragraph(judged(stale, "nothing_missing", lack=0.3))
     wild = np.array(stale.final.residual)
     wild[0] += 3e-3
     far = replace(stale)

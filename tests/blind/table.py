@@ -80,7 +80,11 @@ def matrix(records: Records) -> list[str]:
             [r for r in at(["single", "pair", "triple"], 1.0) if inseparable(r)],
             is_right,
         ),
-        ("compensator named, 15 poses, 0.05 mm", [r for r in by["compensator"] if r["poses"] == 15], is_right),
+        (
+            "compensator named, 15 poses, 0.05 mm",
+            [r for r in by["compensator"] if r["poses"] == 15],
+            is_right,
+        ),
         ("compensator named, 40 poses, 0.1 mm", [r for r in by["compensator"] if r["poses"] == 40], is_right),
         ("the same without one: given a name", by["compensator_null"], is_named),
         ("the same, A2 within 20 deg: nothing else named", by["compensator_narrow"], is_careful),
