@@ -18,11 +18,14 @@ from postproc.model import StiffnessModel
 EVERY = "all joints"
 
 UNSEEN = 1.5
-"""Standard deviations by which a group of its usual size must move all readings together to be testable: of less, only
-a size that is implausible would show."""
+"""Standard deviations by which a parameter of its usual size must move all readings together to be testable: of less,
+only a size that is implausible would show."""
+
+ANY_ARM = ("rad", "m", "1", "m/K", "m/s")
+"""Units of what is about as large on any arm: places and angles.  How stiff or heavy an arm is depends on the arm."""
 
 UNCERTAIN = 0.1
-"""Share of that for an effect that does not grow in proportion: what a usual size does depends on the arm."""
+"""Share of ``UNSEEN`` that will do for a parameter with another unit: its usual size is that of a heavy arm."""
 
 STRAIGHT = 0.05
 """Share of what an effect of its usual size does that its columns may not foresee."""
@@ -58,9 +61,10 @@ class Candidate:
         return replace(self, columns=columns, only=tuple(unknowns))
 
     @property
-    def least(self) -> float:
-        """Standard deviations by which it must move all readings together in its usual size."""
-        return UNSEEN * (UNCERTAIN if self.bent else 1.0)
+    def least(self) -> Floats:
+        """(p,) standard deviations by which each parameter must move all readings together in its usual size."""
+        known = np.array([u.parameter.unit in ANY_ARM for u in self.shown])
+        return UNSEEN * np.where(known, 1.0, UNCERTAIN)
 
     def contains(self, other: Candidate) -> bool:
         """Whether ``other`` is the same effect with some of these parameters."""
@@ -166,7 +170,8 @@ def _in_steps(whole: Candidate, joints: Sequence[str]) -> list[Candidate]:
 
 def shows(candidate: Candidate, weights: Weighting) -> bool:
     """Whether the readings would show the effect at all."""
-    return bool(np.linalg.norm(weights(candidate.columns)) > candidate.least)
+    size = np.linalg.norm(weights(candidate.columns), axis=0)
+    return bool((size > candidate.least).any())
 
 
 def names_of(found: Sequence[Candidate]) -> tuple[str, ...]:

@@ -237,8 +237,7 @@ def _linear(
     own, nuisance = base.point.taken
     prior = prior_rows(base.unknowns)
     prior = prior[prior.any(axis=1)]
-    bare = _without(campaign, fitted, chosen)
-    away = np.array([u.value for u in base.unknowns]) - _values(bare.model, base.unknowns)
+    away = np.array([u.value for u in base.unknowns]) - _values(fitted.model, base.unknowns)
 
     def tall(columns: Floats, below: Floats) -> Floats:
         return np.nan_to_num(np.concatenate([weights(columns), below]))
@@ -257,7 +256,9 @@ def _linear(
         else c
         for c in looked
     )
-    residual = tall(bare.residual, prior @ (away / scales(base.unknowns)))
+    # so that with what was found of each nothing else is left than by the fit
+    found = [c.columns @ in_scales(fitted, c.only) for c in looked if c.only]
+    residual = tall(sum(found, fitted.point.residual), prior @ (away / scales(base.unknowns)))
     columns = tuple(readings(c.columns) for c in looked)
     groups = [(own, _reach(c)) for own, c in zip(columns, looked, strict=True)]
     made = problem(residual, basis, groups, weights.counts + len(prior), base.noise.known)
@@ -271,9 +272,10 @@ def _as_grown(campaign: Campaign, fitted: Fit, candidate: Candidate, beyond: Out
     return replace(candidate, columns=large.columns, begin=tuple(large.values.tolist()))
 
 
-def nulls_of(unknowns: Sequence[Unknown]) -> Floats:
-    """(P,) [SI]"""
-    return np.array([u.parameter.null for u in unknowns])
+def in_scales(fitted: Fit, unknowns: Sequence[Unknown]) -> Floats:
+    """(P,) what was found of unknowns, from their nulls, in their scales."""
+    nulls = np.array([u.parameter.null for u in unknowns])
+    return (fitted.point.values(unknowns) - nulls) / scales(unknowns)
 
 
 def _values(model: StiffnessModel, unknowns: Sequence[Unknown]) -> Floats:
@@ -400,7 +402,7 @@ def _as_fitted(
 ) -> tuple[Candidate, ...]:
     """The candidates, those chosen with their columns at the fit instead of at their null."""
     own, _ = fitted.point.taken
-    values = (fitted.point.values(fitted.unknowns) - nulls_of(fitted.unknowns)) / scales(fitted.unknowns)
+    values = in_scales(fitted, fitted.unknowns)
     there: dict[Key, Candidate] = {}
     for candidate in chosen:
         term = _term_of(fitted.model, candidate)

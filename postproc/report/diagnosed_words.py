@@ -251,8 +251,8 @@ def _nearest(several: Sequence[Named]) -> Iterator[str]:
         yield "No other effect that was tried comes near."
     elif margin < MARGIN:
         yield (
-            f"The nearest other explanation{of}, {alias.label}, fits worse by {margin:.0f} in -2 ln(likelihood) only; the"
-            f" {named.effect} is taken because the robot file describes one."
+            f"The nearest other explanation{of}, {alias.label}, fits worse by {margin:.0f} in -2 ln(likelihood) only;"
+            f" the {named.effect} is taken because the robot file describes one."
         )
     else:
         yield (
