@@ -341,6 +341,11 @@ CODES: dict[str, Code] = {
     ),
     # diagnosis
     "DIA001": Code("error", "too few poses for a verdict", "Of so few poses any explanation would fit."),
+    "DIA002": Code(
+        "warning",
+        "reading left out",
+        "It lies far from where all others put it; the verdict is without it. Measure there again.",
+    ),
     # measurements
     "MEA001": Code(
         "error", "measurements are wrong", "A comment, the header or a row of the CSV can not be used."

@@ -377,7 +377,7 @@ def test_json_of_a_name(spring):
     assert 0 < evidence["chance"] < 1e-8, "a small number is no zero"
     assert set(evidence) == {"gain", "chance", "heldout", "regions", "sessions", "margin", "alias"}
     assert evidence["sessions"] is None
-    assert set(evidence["alias"]) == {"effect", "joint"}
+    assert set(evidence["alias"]) == {"effect", "joint", "options", "label"}
     for one in found["refitted"]:
         term, name = one["parameter"].split(".")
         assert term == "joint_compliance"
@@ -391,7 +391,9 @@ def test_json_of_what_can_not_be_told_apart(spring):
     (named,) = spring.verdict.named
     alias = named.evidence.alias
     assert found["ambiguous"] == [["gravity_compensator", alias.name]]
-    assert found["alternatives"][0][0] == {"effect": "gravity_compensator", "joint": "A2"}
+    first = found["alternatives"][0][0]
+    assert (first["effect"], first["joint"]) == ("gravity_compensator", "A2")
+    assert (first["label"], first["options"]["joint"]) == ("gravity_compensator on A2", "A2")
     assert found["named"] == [], "what may be another is not named"
     assert found["exit"] == 3
     # each name once, each set once

@@ -24,7 +24,7 @@ only a size that is implausible would show."""
 ANY_ARM = ("rad", "m", "1", "m/K", "m/s")
 """Units of what is about as large on any arm: places and angles.  How stiff or heavy an arm is depends on the arm."""
 
-UNCERTAIN = 0.1
+UNCERTAIN = 0.01
 """Share of ``UNSEEN`` that will do for a parameter with another unit: its usual size is that of a heavy arm."""
 
 STRAIGHT = 0.05
@@ -38,7 +38,7 @@ class Candidate:
     ``unknowns``: its parameters in ``model``, the model with the effect added at its null; columns (R, 3 or 6, p) what
     they move, per scale; ``bent``: in its usual size it does not do what its columns at the null say; ``upto``: of an
     effect that is there on no joint alone, the last joint whose parameters it has; begin (p,) [SI]: values that a fit
-    may begin with, () at the null.
+    may begin with, () at the null; ``asleep``: names of parameters that move nothing where the others are at the null.
     """
 
     effect: Effect
@@ -49,6 +49,7 @@ class Candidate:
     bent: bool = False
     upto: str = ""
     begin: tuple[float, ...] = ()
+    asleep: frozenset[str] = frozenset()
     only: tuple[Unknown, ...] = ()
 
     @property
@@ -133,20 +134,24 @@ def _by_joint(
     moves = np.nan_to_num(columns(campaign, model, unknowns, here, given))
     sized = model.changed({u.key: u.parameter.null + u.parameter.scale for u in unknowns})
     there = campaign.seen(sized, here.displacement)
-    still = ~moves.any(axis=(0, 1))
+    still = np.asarray(~moves.any(axis=(0, 1)))
     bent = _bent(campaign.residual(here, given) - campaign.residual(there, given), moves.sum(axis=2))
     if still.any() and bent:
         # a parameter may show only where others have a size: a length where the spring has a stiffness
         moves[:, :, still] = np.nan_to_num(columns(campaign, sized, unknowns, there, given))[:, :, still]
+    asleep = frozenset(
+        u.parameter.name for u, rests in zip(unknowns, still.tolist(), strict=True) if rests and bent
+    )
     named = dict.fromkeys(u.parameter.joint for u in unknowns)
     if not effect.apart:
-        return _in_steps(Candidate(effect, "", model, tuple(unknowns), moves, bent), [j for j in named if j])
+        whole = Candidate(effect, "", model, tuple(unknowns), moves, bent, asleep=asleep)
+        return _in_steps(whole, [j for j in named if j])
     found = []
     # a whole arm may be off at once, as a geometry that was never calibrated
     for joint in [*named, EVERY] if effect.whole and len(named) > 1 else named:
         own = [i for i, u in enumerate(unknowns) if joint in (EVERY, u.parameter.joint)]
         mine = tuple(unknowns[i] for i in own)
-        found.append(Candidate(effect, joint, model, mine, moves[:, :, own], bent))
+        found.append(Candidate(effect, joint, model, mine, moves[:, :, own], bent, asleep=asleep))
     return found
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.diagnosis.screens import Where, where
 from postproc.diagnosis.search import Search, own_unknowns, search, with_effects
-from postproc.diagnosis.verdict import Verdict, judged
+from postproc.diagnosis.verdict import Verdict, judged, refitted
 from postproc.findings import Finding, Refusal
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
@@ -62,9 +62,11 @@ def diagnose(
         found = search(campaign, base, [candidate.key for candidate, _ in rejected])
         verdict = judged(found)
         rejected += verdict.rejected
-    verdict = replace(verdict, rejected=tuple(rejected))
     names = [named.candidate for named in verdict.named]
     final = found.base
     if names and verdict.word != "ambiguous":
         final = found.final if len(names) == len(found.chosen) else with_effects(campaign, found.base, names)
+    # of a model that lacks something its own parameters stand for that
+    moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
+    verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
     return Diagnosis(stated, where(stated, found.final), found, verdict, final)

@@ -141,11 +141,11 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
     chosen: tuple[Candidate, ...] = ()
     fitted = base
     tried: set[frozenset[Key]] = set()
-    every = _not_imitated(base, candidates(campaign, base.model, base.point.given))
-    shown = [c for c in every if shows(c, base.weights) and c.key not in banned]
-    hidden = tuple(c for c in every if not shows(c, base.weights))
     # what a missing effect does to all readings of a pose looks like an error that they share
     weights = replace(base.weights, shared=0.0)
+    every = _not_imitated(base, weights, candidates(campaign, base.model, base.point.given))
+    shown = [c for c in every if shows(c, weights) and c.key not in banned]
+    hidden = tuple(c for c in every if not shows(c, weights))
     while True:
         linear = _linear(campaign, base, weights, fitted, chosen, shown)
         if not chosen:
@@ -171,16 +171,18 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
         weights = _sharing(base, fitted)
 
 
-def _not_imitated(base: Fit, every: Sequence[Candidate]) -> list[Candidate]:
+def _not_imitated(base: Fit, weights: Weighting, every: Sequence[Candidate]) -> list[Candidate]:
     """The candidates without those parameters that, in their usual size, do nothing to be seen but what parameters of
     the robot file, or tracker and targets, do as well: a gain of the force is a softer arm."""
-    weights = replace(base.weights, shared=0.0)
     basis = basis_of(np.nan_to_num(np.concatenate([weights(part) for part in base.point.taken], axis=1)))
     found = []
     for c in every:
         columns = np.nan_to_num(weights(c.columns))
         size = np.linalg.norm(columns, axis=0)
         own = np.linalg.norm(outside(basis, columns), axis=0) > np.maximum(IMITATED * size, c.least)
+        if own.any():
+            # of those that only shape what another does nothing is said by themselves
+            own |= np.array([u.parameter.name in c.asleep for u in c.unknowns])
         if own.any() and not own.all():
             c = replace(
                 c,
@@ -217,11 +219,11 @@ def _confirmed(
 
 
 def _sharing(base: Fit, fitted: Fit) -> Weighting:
-    """The weights of ``base``, readings of a pose sharing what they do in ``fitted``; no more than scatter can be."""
+    """The weights of ``fitted`` for what was fitted; readings of a pose share no more than scatter can be."""
     shared = fitted.weights.shared
     if base.noise.known:
         shared = min(shared, SHARED * float(np.median(base.noise.sigma)))
-    return replace(base.weights, shared=shared)
+    return replace(fitted.plain_weights, shared=shared)
 
 
 def _linear(
@@ -235,7 +237,7 @@ def _linear(
     """The problem that the candidates' columns make of what ``fitted`` leaves without what was chosen; priors of the
     model's own parameters count as rows."""
     own, nuisance = base.point.taken
-    prior = prior_rows(base.unknowns)
+    prior = prior_rows(base.unknowns) * np.sqrt(fitted.factor)
     prior = prior[prior.any(axis=1)]
     away = np.array([u.value for u in base.unknowns]) - _values(fitted.model, base.unknowns)
 
@@ -282,12 +284,14 @@ def _values(model: StiffnessModel, unknowns: Sequence[Unknown]) -> Floats:
     return np.array([model.terms[u.term].values[u.parameter.name] for u in unknowns])
 
 
-def squares_of(fitted: Fit, weights: Weighting) -> float:
-    """Squares that a fit leaves, of readings [their variance by ``weights``, wild ones cut] and of priors."""
-    left = np.minimum(np.abs(weights(fitted.point.residual)), WILD)
+def squares_of(fitted: Fit, weights: Weighting, variance: float) -> float:
+    """Squares that a fit leaves, of readings [their variance by ``weights``, wild ones cut] and of priors; ``variance``
+    of the readings as they are seen to scatter."""
+    level = np.sqrt(variance)
+    left = np.minimum(np.abs(weights(fitted.point.residual)), WILD * level)
     values = fitted.point.values(fitted.unknowns)
     priors = sum(
-        ((u.value - value) / u.prior) ** 2
+        (level * (u.value - value) / u.prior) ** 2
         for u, value in zip(fitted.unknowns, values.tolist(), strict=True)
         if u.prior is not None
     )
@@ -298,7 +302,8 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
     """Other candidates in the place of each choice that explain at least half of what it does, nearest first; the
     nearest are fitted: what is linear is only nearly so."""
     given, chosen = linear.problem, [linear.candidates[g] for g in last.groups]
-    variance, here = scatter(given, last), squares_of(fitted, fitted.weights)
+    variance = scatter(given, last)
+    here = squares_of(fitted, fitted.weights, variance)
     found: list[Rival] = []
     for group in last.groups:
         mine = linear.candidates[group]
@@ -331,7 +336,7 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
         for k, rival in enumerate(of_mine[:RIVALS]):
             if rival.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
                 there = with_effects(campaign, base, [rival.candidate if c is mine else c for c in chosen])
-                worse = float(squares_of(there, fitted.weights) - here) / variance
+                worse = float(squares_of(there, fitted.weights, variance) - here) / variance
                 of_mine[k] = replace(rival, worse=worse, fitted=True)
         found += of_mine
     return tuple(sorted(found, key=lambda rival: rival.margin))
@@ -362,12 +367,28 @@ def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> 
     model, unknowns = composed(base.model, chosen)
     begin: dict[tuple[int, str], float] = {}
     for candidate in chosen:
-        term = _term_of(model, candidate)
-        if term is not None and candidate.begin:
-            names = [u.parameter.name for u in candidate.unknowns]
-            begin |= {(term, name): value for name, value in zip(names, candidate.begin, strict=True)}
+        begin |= _begun(campaign, base, model, candidate)
     own = [u for u in base.asked if u.key in {b.key for b in base.unknowns}]
-    return fit(campaign, model.changed(begin), [*own, *unknowns], given=base.point.given)
+    # what turns out not to be seen stays where it is begun with: without a length a spring is none
+    looked = [replace(u, value=begin.get(u.key, u.value)) if u.prior is None else u for u in unknowns]
+    return fit(campaign, model.changed(begin), [*own, *looked], given=base.point.given)
+
+
+def _begun(
+    campaign: Campaign, base: Fit, model: StiffnessModel, candidate: Candidate
+) -> dict[tuple[int, str], float]:
+    """Values to begin a fit of ``candidate`` in ``model`` with; those that no reading sees stay at their null."""
+    term = _term_of(model, candidate)
+    if term is None or not candidate.begin:
+        return {}
+    nulls = {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
+    begin = dict(zip(nulls, candidate.begin, strict=True))
+    there = at(campaign, model.changed(begin), base.point.given)
+    for key, null in nulls.items():
+        without = at(campaign, model.changed({**begin, key: null}), base.point.given, there.seen.displacement)
+        if np.linalg.norm(base.weights(np.nan_to_num(without.residual - there.residual))) < 1.0:
+            begin[key] = null
+    return begin
 
 
 def composed(

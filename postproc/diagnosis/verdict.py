@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.arrays import Floats, Ints
 from postproc.diagnosis.candidates import EVERY, Candidate, names_of
-from postproc.diagnosis.screens import where
+from postproc.diagnosis.foils import FOILED
+from postproc.diagnosis.screens import Where, where
 from postproc.diagnosis.search import Search
 from postproc.diagnosis.selection import (
     Explained,
@@ -74,12 +75,14 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Named:
-    """A missing effect: its ``joints`` that clearly have it (() where it is of none), parameters with intervals."""
+    """A missing effect: its ``joints`` that clearly have it (() where it is of none), parameters with intervals;
+    ``held``: names of those that the readings do not tell, and the values (SI) that the others hold for."""
 
     candidate: Candidate
     joints: tuple[str, ...]
     estimates: tuple[Estimate, ...]
     evidence: Evidence
+    held: tuple[tuple[str, float], ...] = ()
 
     @property
     def effect(self) -> str:
@@ -90,7 +93,8 @@ class Named:
 class Verdict:
     """``word`` of ``VERDICTS``.  named: where the verdict is named, partly_named or ambiguous; alternatives: sets of
     candidates that explain the same; refitted: own parameters of the model that clearly moved; lack: variance left over
-    the stated one; conditional: nothing states the scatter, so a lack of fit can not be seen."""
+    the stated one; conditional: nothing states the scatter, so a lack of fit can not be seen; left: patterns in what
+    all that was chosen leaves."""
 
     word: str
     named: tuple[Named, ...]
@@ -99,7 +103,8 @@ class Verdict:
     refitted: tuple[Estimate, ...]
     lack: float
     conditional: bool
-    rejected: tuple[tuple[Candidate, str], ...] = field(default=())
+    rejected: tuple[tuple[Candidate, str], ...] = ()
+    left: tuple[Where, ...] = ()
 
 
 def judged(found: Search) -> Verdict:
@@ -109,20 +114,23 @@ def judged(found: Search) -> Verdict:
     for g in last.groups:
         candidate, its = linear.candidates[g], _evidence(found, last, g)
         estimates = _estimates(found.final, candidate, found)
-        seen = bool(estimates) and not all(e.at_bound for e in estimates)
-        several = _alternatives(found, g, seen)
+        bounded = all(e.at_bound for e in estimates)
+        several = _alternatives(found, g, not bounded and _told(candidate, estimates))
         if not its.holds:
             rejected.append((candidate, "no gain on readings that were left out"))
-        elif not seen and len(several) == 1:
+        elif bounded and len(several) == 1:
             rejected.append((candidate, "its parameters would have to lie at their bounds"))
         else:
-            named.append(Named(candidate, _joints(candidate, estimates), estimates, its))
+            joints, held = _joints(candidate, estimates), _held(found.final, candidate, estimates)
+            named.append(Named(candidate, joints, estimates, its, held))
             aliases.append(several)
     lack, lacking = lack_of_fit(found, last)
-    lacking = lacking or bool(where(found.final, chance=STRUCTURE))
+    left = where(found.final, chance=STRUCTURE)
+    lacking = lacking or bool(left)
     bare, _ = lack_of_fit(found, explained(linear.problem, ()))
-    sets = tuple(a for a in aliases if len(a) > 1)
-    enough = lack - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)
+    # two forms of one effect on one joint are no doubt about its name
+    sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
+    enough = not linear.problem.known or lack - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)
     if not named:
         word = "unknown" if lacking or rejected else "nothing_missing"
     elif lacking and not enough:
@@ -138,11 +146,38 @@ def judged(found: Search) -> Verdict:
         tuple(named),
         sets,
         hidden,
-        refitted(found.final),
+        (),
         lack,
         not linear.problem.known,
         tuple(rejected),
+        left,
     )
+
+
+def _told(candidate: Candidate, estimates: Sequence[Estimate]) -> bool:
+    """Whether the readings tell all parameters of an effect that something else imitates: found, and not nothing."""
+    if candidate.name not in FOILED:
+        return True
+    clear = {e.unknown.parameter.name for e in estimates if abs(e.value - e.unknown.parameter.null) > e.ci95}
+    return clear >= {p.name for p in candidate.effect.parameters if not p.hardware}
+
+
+def _held(final: Fit, candidate: Candidate, estimates: Sequence[Estimate]) -> tuple[tuple[str, float], ...]:
+    """Names and values (SI) of an effect's parameters that were not found, but are not at their null."""
+    found = {e.unknown.parameter.name for e in estimates}
+    term = next(
+        (
+            t
+            for t in final.model.terms
+            if (t.effect.name, t.effect.described()) == (candidate.name, candidate.effect.described())
+        ),
+        None,
+    )
+    if term is None:
+        return ()
+    names = [u.parameter.name for u in candidate.unknowns if u.parameter.name not in found]
+    nulls = {u.parameter.name: u.parameter.null for u in candidate.unknowns}
+    return tuple((name, float(term.values[name])) for name in names if term.values[name] != nulls[name])
 
 
 def lack_of_fit(found: Search, last: Explained) -> tuple[float, bool]:

@@ -112,7 +112,7 @@ class Diagnosed:
     def lacking(self) -> bool:
         """Whether clearly more is left than scatter, of all that was found."""
         found = self.diagnosis.search
-        return lack_of_fit(found, found.explained)[1]
+        return lack_of_fit(found, found.explained)[1] or bool(self.verdict.left)
 
     # Residuals.
 
@@ -230,6 +230,7 @@ class Diagnosed:
             "refitted": [_refitted(estimate) for estimate in verdict.refitted],
             "where": [_where(one) for one in self.diagnosis.where],
             "where_refitted": [_where(one) for one in self.patterns],
+            "where_left": [_where(one) for one in verdict.left],
             "gap": {key: gap.get(key) for key in GAP} | {"refitted_rms_mm": mm(self.rms["refitted"])},
             "lack": None if verdict.conditional else _finite(verdict.lack),
             "next_poses": None if self.next_poses is None else self.next_poses.poses,
@@ -253,6 +254,7 @@ class Diagnosed:
             "joints": list(named.joints),
             "options": named.candidate.effect.described(),
             "parameters": {e.unknown.parameter.name: _parameter(e) for e in named.estimates},
+            "held": dict(named.held),
             "moves_rms_mm": mm(size.rms) if size else None,
             "moves_max_mm": mm(size.max) if size else None,
             "evidence": _evidence(named.evidence),
@@ -272,7 +274,12 @@ def diagnosed_csv(result: Diagnosed) -> bytes:
 
 
 def _candidate(candidate: Candidate) -> dict[str, object]:
-    return {"effect": candidate.name, "joint": candidate.joint or None}
+    return {
+        "effect": candidate.name,
+        "joint": candidate.joint or None,
+        "options": candidate.effect.described(),
+        "label": candidate.label,
+    }
 
 
 def _parameter(estimate: Estimate) -> dict[str, object]:

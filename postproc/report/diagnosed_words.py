@@ -186,6 +186,15 @@ def _missing(result: Diagnosed, several: Sequence[Named]) -> Iterator[str]:
         if size is not None:
             does = f"; in these readings it makes {_mm(size.rms)} mm RMS, {_mm(size.max)} mm at most"
         yield f"{begin} {noun(named)} ({named.effect}: {_parameters(named)}){does}."
+        if named.held:
+            yield f"The readings do not tell {_held(named)}: what stands above holds for that."
+
+
+def _held(named: Named) -> str:
+    """``s0 (300 mm taken)``"""
+    units = {u.parameter.name: shown_unit(u.parameter.unit) for u in named.candidate.unknowns}
+    told = [f"{name} ({value / units[name][1]:.4g} {units[name][0]} taken)" for name, value in named.held]
+    return _list(told)
 
 
 def noun(named: Named) -> str:
@@ -249,6 +258,8 @@ def _nearest(several: Sequence[Named]) -> Iterator[str]:
     of = f" to {named.candidate.label}" if len(several) > 1 else ""
     if alias is None:
         yield "No other effect that was tried comes near."
+    elif (alias.name, alias.joint) == (named.candidate.name, named.candidate.joint) and margin < MARGIN:
+        yield f"Another form of it, {alias.label}, explains nearly as much (by {margin:.0f} in -2 ln(likelihood) less)."
     elif margin < MARGIN:
         yield (
             f"The nearest other explanation{of}, {alias.label}, fits worse by {margin:.0f} in -2 ln(likelihood) only;"
@@ -287,6 +298,9 @@ def _more(result: Diagnosed, begin: str, fit: str) -> Iterator[str]:
             f"{begin} {_mm(result.rms[fit])} mm RMS are left{_against_scatter(result)}, and none of the"
             f" {len(result.tried)} effects that were tried explains the rest."
         )
+        if result.verdict.left:
+            first = result.verdict.left[0]
+            yield f"It goes with {first.variable} ({first.pattern})."
     yield from _rejected(result)
 
 

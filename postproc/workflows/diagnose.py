@@ -17,7 +17,9 @@ from postproc.experiments.discriminating import apart
 from postproc.experiments.offer import Offer, readings_of, spacings, usable_limits
 from postproc.experiments.tour import tour
 from postproc.findings import Finding, Refusal
-from postproc.identification.fit import Fit
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import Fit, lengths, spread_of
+from postproc.identification.outliers import Outlier, outliers
 from postproc.identification.suspicion import check_fit, check_numbers
 from postproc.identification.unknowns import Unknown
 from postproc.identification.validation import held_out
@@ -36,11 +38,17 @@ FOLDS = 5
 NEXT = 6
 """Poses proposed to tell two explanations apart."""
 
+HARDLY = 0.5
+"""Standard deviations between two explanations below which poses are not worth measuring."""
+
 LOADS = 3
 """Of the weights that were hung, so many different ones are proposed again."""
 
 USUAL_SIGMA = 0.03 * MM
 """Scatter that poses are proposed for where nothing states one."""
+
+WILD, FEW = 10.0, 0.05
+"""Standard deviations from which on a reading is an accident, and the share of all that may be."""
 
 TRIED = 2
 """Explanations of a set that the first is told from."""
@@ -75,6 +83,21 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     check_numbers(measured.readings, (), model)
     findings = [*measured.findings, *check_fit(campaign, model, own)]
     found = diagnose(campaign, model, stage)
+    wild = _wild(found.final)
+    if wild:
+        stage("once more without wild readings")
+        kept = np.setdiff1d(np.arange(len(campaign)), [one.row for one in wild])
+        found = diagnose(Campaign(measured.readings.part(kept), campaign.stated_tool), model)
+        findings += [
+            Finding(
+                "DIA002",
+                f"{one.distance / MM:.3g} mm off ({one.sigmas:.0f} sigma): {one.what}",
+                one.file,
+                one.line,
+            )
+            for one in wild
+        ]
+        campaign = found.final.campaign
     stage("leaving poses out")
     folds = min(FOLDS, campaign.poses)
     heldout = held_out(found.stated, folds), held_out(found.final, folds)
@@ -99,6 +122,16 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
         strict=request.strict,
     )
     return _published(request, measured, result, stage)
+
+
+def _wild(final: Fit) -> tuple[Outlier, ...]:
+    """Readings so far off that they would decide; none where there are so many that they are no accidents."""
+    length = lengths(final.point.residual, final.plain_weights)
+    if length.max(initial=0.0) < 0.5 * WILD * spread_of(length, final.noise.known):
+        return ()
+    told, _ = outliers(final, np.ones(len(length), bool))
+    wild = tuple(one for one in told if one.sigmas > WILD)
+    return wild if len(wild) <= FEW * len(length) else ()
 
 
 def _spare_inputs(request: DiagnoseRequest) -> None:
@@ -135,6 +168,8 @@ def _told_apart(
         poses = apart(model, first, second, common, offer, (NEXT,), candidates=CANDIDATES)
     except Refusal:
         return None
+    if min(poses.separation[NEXT]) < HARDLY:
+        return None
     setups = poses.chosen[NEXT]
     setups = setups[tour(setups.q, spacings(measured.robot, offer.spacing))]
     return NextPoses(_like(measured, readings_of(model, offer, setups)), (one, other), poses.separation[NEXT])
@@ -162,11 +197,8 @@ def _like(measured: Measured, planned: Readings) -> Readings:
 
 def _values(final: Fit, unknowns: Sequence[Unknown], candidate: Candidate) -> dict[tuple[int, str], float]:
     """What the final fit found of a candidate's parameters, as values of a model in which they are ``unknowns``."""
-    found = {
-        e.unknown.parameter.name: e.value
-        for e in final.estimates
-        if final.model.terms[e.unknown.term].effect.name == candidate.name
-    }
+    wanted = (candidate.name, candidate.effect.described())
+    found = next((t.values for t in final.model.terms if (t.effect.name, t.effect.described()) == wanted), {})
     return {u.key: found[u.parameter.name] for u in unknowns if u.parameter.name in found}
 
 
@@ -242,9 +274,12 @@ def _published(request: DiagnoseRequest, measured: Measured, result: Diagnosed, 
 def _about(result: Diagnosed) -> list[str]:
     assert result.next_poses is not None
     one, other = result.next_poses.between
+    planned = result.next_poses.readings
+    asked = [name for name, of in (("T", planned.time), ("TEMP", planned.temperature)) if of is not None]
+    also = f", {' and '.join(asked)}" if asked else ""
     return [
         f"plan of compensate {__version__}, robot file sha256 {result.robot_digest[:16]}",
         f"poses that tell {one.label} from {other.label}",
-        "fill in the readings and give them to `compensate diagnose` together with those before",
+        f"fill in the readings{also} and give them to `compensate diagnose` together with those before",
         "what stands around the arm was not looked at, drive slowly to every pose for the first time",
     ]

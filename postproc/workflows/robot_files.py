@@ -18,6 +18,9 @@ from postproc.robot.writing import WrittenEffect, WrittenParameter, robot_file
 SAME_WIDTH, SAME_PLACE = 0.99, 0.01
 """Share of the deviation of a prior that is left, and of it by which its value moves, where readings say nothing."""
 
+CONTRADICTS = 2.0
+"""Standard deviations of both together by which readings must differ from what a robot file knows better."""
+
 
 def new_robot_file(
     command: str,
@@ -51,6 +54,10 @@ def new_robot_file(
                 parameters.append(WrittenParameter(name, estimate.value, unit, estimate.ci95, source=source))
             elif stated is not None:
                 parameters.append(WrittenParameter.of(name, unit, stated))
+            elif term.values[name] != parameter.null:
+                # the others hold for this value
+                told_by = f"{source}; not told by the readings, what stands beside it holds for this value"
+                parameters.append(WrittenParameter(name, term.values[name], unit, source=told_by))
         if parameters or term.line:
             options = term.effect.described()
             written.append(WrittenEffect(term.effect.name, options, tuple(parameters), term.line))
@@ -78,5 +85,7 @@ def _told_by_readings(unknown: Unknown, value: float, deviation: float) -> bool:
     """Whether readings say more of an unknown than its prior did."""
     if unknown.prior is None:
         return True
-    moved = abs(value - unknown.value)
+    moved, stated = abs(value - unknown.value), unknown.stated
+    if stated is not None and stated.deviation and stated.deviation <= deviation:
+        return bool(moved > CONTRADICTS * np.hypot(deviation, stated.deviation))
     return deviation < SAME_WIDTH * unknown.prior or moved > SAME_PLACE * unknown.prior
