@@ -565,6 +565,18 @@ def test_what_is_said_of_doubt(spring):
     assert "Measure these 2 poses (which.csv): " in paragraph(replace(planned, next_poses_file="which.csv"))
 
 
+def test_a_pose_that_can_not_be_left_out(stale):
+    """One that alone shows something says nothing against the rest."""
+    worse = stale.heldout_after.copy()
+    worse[stale.final.campaign.pose == 3] += 5e-3
+    text = paragraph(replace(stale, heldout_after=worse))
+    kept = np.delete(stale.heldout_after, np.flatnonzero(stale.final.campaign.pose == 3), axis=0)
+    rms = np.sqrt(np.mean(np.sum(kept**2, axis=1)))
+    (told,) = re.findall(r"mm RMS become (\S+), but for 2 poses that can not be left out", text)
+    assert float(told) == pytest.approx(1e3 * rms, rel=0.15)
+    assert "it brings nothing" not in text
+
+
 def test_hardware_that_is_known_is_taken(spring):
     (named,) = spring.verdict.named
     near = replace(named, evidence=replace(named.evidence, margin=2.4))

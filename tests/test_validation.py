@@ -64,7 +64,7 @@ def test_a_held_out_residual_is_that_of_a_fit_from_scratch_without_its_fold():
     fold, left = folds_of(case.campaign, 4), held_out(found, 4)
     for k in range(4):
         alone = fit(*case, rows=fold != k)
-        np.testing.assert_allclose(left[fold == k], alone.residual[fold == k], atol=1e-3 * SIGMA)
+        np.testing.assert_allclose(left[fold == k], alone.residual[fold == k], atol=2e-3 * SIGMA)
     assert np.isfinite(left).all()
 
 

@@ -91,6 +91,12 @@ class GravityCompensator(EnergyLoad):
         names = [one.name for one in joints]
         return cls(joints, 1 if joint is None else names.index(joint), zero=quantities.get("zero", 0.0))
 
+    @classmethod
+    def variants(cls, joints: Sequence[Joint]) -> tuple[Self, ...]:
+        # across the shoulder, whatever carries the arm
+        turning = [index for index, joint in enumerate(joints) if joint.kind == "revolute"]
+        return (cls(joints, turning[1]),) if len(turning) > 1 else ()
+
     def described(self) -> dict[str, object]:
         return {
             "joint": self.joint_name,

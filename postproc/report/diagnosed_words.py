@@ -41,6 +41,9 @@ NOUNS = {
 SETTLES = MARGIN**0.5
 """Standard deviations by which two explanations must differ for one to be named."""
 
+KEY = 10
+"""One of so many poses may show what no other does."""
+
 PARAMETERS = 3
 """So many of an effect stand in the paragraph, all in the table."""
 
@@ -237,6 +240,14 @@ def _closed(result: Diagnosed) -> Iterator[str]:
     if not np.isfinite(before + after):
         return
     if after >= before:
+        kept, others = _most_poses(result)
+        if kept < before:
+            yield (
+                f"On poses that were left out of the fit {_mm(before)} mm RMS become {_mm(kept)}, but for"
+                f" {count(others, 'pose')} that can not be left out: the others do not show what"
+                f" {'it shows' if others == 1 else 'they show'}."
+            )
+            return
         yield (
             f"But on poses that were left out of the fit it brings nothing: {_mm(before)} mm RMS before,"
             f" {_mm(after)} mm after."
@@ -249,6 +260,15 @@ def _closed(result: Diagnosed) -> Iterator[str]:
         f"On poses that were left out of the fit {_mm(before)} mm RMS become {_mm(after)}: {np.floor(share):.0f} %{of}"
         " is closed."
     )
+
+
+def _most_poses(result: Diagnosed) -> tuple[float, int]:
+    """[m] root mean square of what is left of poses not fitted, without the worst of them, and how many those are."""
+    pose, left = result.final.campaign.pose, result.lengths["heldout_after"]
+    squares = np.array([np.nansum(left[pose == k] ** 2) for k in range(result.final.campaign.poses)])
+    worst = np.argsort(-squares)[: max(1, len(squares) // KEY)]
+    rest = left[~np.isin(pose, worst)]
+    return float(np.sqrt(np.nanmean(rest**2))), len(worst)
 
 
 def _nearest(several: Sequence[Named]) -> Iterator[str]:
