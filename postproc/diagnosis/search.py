@@ -384,9 +384,12 @@ def _begun(
     nulls = {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
     begin = dict(zip(nulls, candidate.begin, strict=True))
     there = at(campaign, model.changed(begin), base.point.given)
+    if not there.seen.converged.all():
+        return {}
     for key, null in nulls.items():
         without = at(campaign, model.changed({**begin, key: null}), base.point.given, there.seen.displacement)
-        if np.linalg.norm(base.weights(np.nan_to_num(without.residual - there.residual))) < 1.0:
+        moved = np.linalg.norm(base.weights(np.nan_to_num(without.residual - there.residual)))
+        if without.seen.converged.all() and moved < 1.0:
             begin[key] = null
     return begin
 

@@ -39,6 +39,9 @@ USUAL = 3.0
 MARGIN = 10.0
 """By how much -2 ln(likelihood) of the nearest other explanation must be worse: odds of 150 to 1."""
 
+CLEAR = 1.5
+"""Intervals by which a value must be off to be clearly elsewhere."""
+
 LACK = 3.0
 """Standard deviations of its own by which the variance left must exceed the stated one to be a lack of fit."""
 
@@ -155,11 +158,14 @@ def judged(found: Search) -> Verdict:
 
 
 def _told(candidate: Candidate, estimates: Sequence[Estimate]) -> bool:
-    """Whether the readings tell all parameters of an effect that something else imitates: found, and not nothing."""
+    """Whether the readings tell all parameters of an effect that something else imitates, and that it is there."""
     if candidate.name not in FOILED:
         return True
-    clear = {e.unknown.parameter.name for e in estimates if abs(e.value - e.unknown.parameter.null) > e.ci95}
-    return clear >= {p.name for p in candidate.effect.parameters if not p.hardware}
+    found = {
+        e.unknown.parameter.name: abs(e.value - e.unknown.parameter.null) > CLEAR * e.ci95 for e in estimates
+    }
+    there = all(clear for name, clear in found.items() if name not in candidate.asleep)
+    return there and found.keys() >= {p.name for p in candidate.effect.parameters if not p.hardware}
 
 
 def _held(final: Fit, candidate: Candidate, estimates: Sequence[Estimate]) -> tuple[tuple[str, float], ...]:
@@ -323,6 +329,6 @@ def refitted(final: Fit) -> tuple[Estimate, ...]:
         if stated is None or estimate.unknown.parameter.hardware:
             continue
         doubt = np.hypot(estimate.ci95, stated.interval or 0.0)
-        if abs(estimate.value - stated.value) > 1.5 * doubt:
+        if abs(estimate.value - stated.value) > CLEAR * doubt:
             moved.append(estimate)
     return tuple(moved)
