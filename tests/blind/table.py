@@ -81,6 +81,15 @@ def matrix(records: Records) -> list[str]:
             is_right,
         ),
         (
+            "said to be ambiguous: truth in the set",
+            [
+                r
+                for r in at(["single", "decoy", "pair", "triple"], 0.5)
+                if r["answer"]["verdict"] == "ambiguous"
+            ],
+            lambda r: r["outcome"] in ("ambiguous", "undecided"),
+        ),
+        (
             "compensator named, 15 poses, 0.05 mm",
             [r for r in by["compensator"] if r["poses"] == 15],
             is_right,
