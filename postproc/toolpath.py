@@ -24,8 +24,9 @@ class Kind(IntEnum):
     PTP = 0  # point to point, to a Cartesian target
     AXIS = 1  # point to point, to axis angles
     LIN = 2  # straight line
-    CIRC = 3  # three-point arc
-    OTHER = 4  # a motion that is none of these (spline, ...)
+    CIRC = 3  # circular arc, or a helix
+    OTHER = 4  # a motion that is none of these
+    SPL = 5  # a point of a spline: the way between is the controller's
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,8 @@ class FrameRef:
 
 @dataclass(frozen=True)
 class Annotation:
-    """A comment that speaks to this tool (FORCE, COMPENSATE): it holds for motions from ``row`` on."""
+    """A comment, which stands before the motion ``row``; one that speaks to this tool (FORCE, COMPENSATE) holds from
+    there on."""
 
     row: int
     text: str
@@ -66,6 +68,14 @@ class Toolpath:
     ``refused``: row -> why that motion can not be corrected by an edit of its own (its target is not known, its
     text serves another motion too, ...).  ``pinned``: rows whose end point a later, refused motion builds on:
     moving them would move that one, so they can not be corrected either.
+
+    Arcs (CIRC; NaN elsewhere), in the programmed base: ``centre`` (N, 3) [m], ``normal`` (N, 3) unit vector, ``sweep``
+    (N,) > 0 [rad] counter-clockwise seen from the tip of the normal.  The way at the share t is the begin, turned
+    about the centre by t * sweep, and moved along the normal by its share of what begin and end lie apart there.
+    ``whole``: row -> why no motion can be inserted before it (a spline, a TRIGGER, a line that runs many times).
+    ``blend`` (N,) [m]: the controller may leave the path that far before the end point (approximation); 0 where it
+    stops or passes exactly, NaN where the distance is not known.
+    ``annotations``: comments that speak to this tool; ``comments``: all others that stand on a line of their own.
     """
 
     kind: Ints
@@ -84,13 +94,26 @@ class Toolpath:
     annotations: tuple[Annotation, ...] = ()
     anchor: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     given: Floats = field(default_factory=lambda: np.empty((0, 6)))
+    centre: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    normal: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    sweep: Floats = field(default_factory=lambda: np.empty(0))
+    blend: Floats = field(default_factory=lambda: np.empty(0))
+    whole: Mapping[int, str] = field(default_factory=dict)
+    comments: tuple[Annotation, ...] = ()
 
     def __post_init__(self) -> None:
         n = len(self.kind)
         if not len(self.anchor):
             object.__setattr__(self, "anchor", np.full(n, -1))
             object.__setattr__(self, "given", np.full((n, 6), np.nan))
+        if not len(self.sweep):
+            object.__setattr__(self, "centre", np.full((n, 3), np.nan))
+            object.__setattr__(self, "normal", np.full((n, 3), np.nan))
+            object.__setattr__(self, "sweep", np.full(n, np.nan))
+        if not len(self.blend):
+            object.__setattr__(self, "blend", np.zeros(n))
         shapes = {"position": (n, 3), "rotation": (n, 3, 3), "axes": (n, 6), "feed": (n,), "given": (n, 6)}
+        shapes |= {"centre": (n, 3), "normal": (n, 3), "sweep": (n,), "blend": (n,)}
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(getattr(self, name), shape))
         for name in ("kind", "base", "tool", "status", "turn", "line", "anchor"):
@@ -101,8 +124,10 @@ class Toolpath:
 
     @property
     def known(self) -> Bools:
-        """(N,) the Cartesian target, its base and its tool are known."""
-        return np.asarray(np.isfinite(self.position[:, 0]) & (self.base >= 0) & (self.tool >= 0))
+        """(N,) the Cartesian target, its base and its tool are known; of an arc its way as well."""
+        pose = np.isfinite(self.position).all(axis=1) & np.isfinite(self.rotation[:, 0, 0])
+        way = (self.kind != Kind.CIRC) | np.isfinite(self.sweep)
+        return np.asarray(pose & way & (self.base >= 0) & (self.tool >= 0))
 
     @property
     def target_in_base(self) -> Poses:
@@ -136,7 +161,14 @@ class Toolpath:
                 words.append(f"from line {self.line[self.anchor[row]]}")
             elif np.isfinite(self.position[row, 0]):
                 words += [f"{k} {_number(v / MM)}" for k, v in zip("XYZ", self.position[row], strict=True)]
-                words += [f"{k} {_number(v)}" for k, v in zip("ABC", abc[row], strict=True)]
+                if np.isfinite(self.rotation[row, 0, 0]):
+                    words += [f"{k} {_number(v)}" for k, v in zip("ABC", abc[row], strict=True)]
+                else:
+                    words += ["A ?", "B ?", "C ?"]
+            if np.isfinite(self.sweep[row]):
+                for word, vector in (("centre", self.centre[row] / MM), ("normal", self.normal[row])):
+                    words.append(word + " " + " ".join(_number(value) for value in vector))
+                words.append(f"sweep {_number(self.sweep[row] / DEG)}")
             if self.status[row] >= 0:
                 words.append(f"S {self.status[row]}")
             if self.turn[row] >= 0:

@@ -6,14 +6,14 @@ import hashlib
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from postproc import __version__
 from postproc.cell import Cell
 from postproc.compensation.correct import Result, Task, with_residual
-from postproc.dialects.dialect import Dialect, Program
+from postproc.dialects.dialect import Dialect, Plan, Program, Writing
 from postproc.document import Document, Edit, apply, undone
 from postproc.findings import Finding, Refusal
 from postproc.geometry import Poses, vector_from_rotation
@@ -55,7 +55,8 @@ def write(
         np.where(moves[:, None], commanded.position, path.position),
     )
     decimals = {"mm": _decimals(cell.tolerance / MM), "deg": _decimals(cell.tolerance_angle / DEG)}
-    edits = list(dialect.moved(program, planned.position, planned.rotation, decimals))
+    plan = replace(Plan.of(path), position=planned.position, rotation=planned.rotation)
+    edits = list(dialect.moved(program, plan, Writing(decimals["mm"], decimals["deg"])).edits)
     if edits:
         edits.append(dialect.marked(program, _mark(program, robot)))
     main = program.documents[0].path

@@ -110,7 +110,7 @@ def same(docs: tuple[Document, ...]) -> None:
     for name in ("position", "rotation", "axes", "feed", "base", "tool", "status", "turn", "line"):
         np.testing.assert_array_equal(getattr(quick.toolpath, name), getattr(general.toolpath, name))
     for name in ("start", "stop", "file", "insert"):
-        np.testing.assert_array_equal(getattr(quick.places, name), getattr(general.places, name))
+        np.testing.assert_array_equal(getattr(quick.text, name), getattr(general.text, name))
     assert quick.findings == general.findings
     assert quick.toolpath.refused == general.toolpath.refused
     assert quick.toolpath.pinned == general.toolpath.pinned
@@ -134,7 +134,7 @@ def test_the_two_ways_agree_on_lines_that_are_nearly_common(changes: list[tuple[
 @given(st.binary(max_size=300))
 def test_any_bytes_are_read_without_a_crash(raw: bytes) -> None:
     program = KRL.read((Document(Path("part.src"), raw), Document(Path("part.dat"), raw[::-1])))
-    assert len(program.places.file) == len(program.toolpath)
+    assert len(program.text.file) == len(program.toolpath)
 
 
 @settings(deadline=None, max_examples=150)
@@ -189,7 +189,7 @@ def test_an_axis_motion_is_in_radians_and_has_no_position() -> None:
 
 def test_places_are_those_of_the_literals() -> None:
     program = body("LIN {C 6,Z - 30,A 4,X 'B11',B 5,Y 1.2E-05,E1 7}\n")
-    raw, places = program.documents[0].raw, program.places
+    raw, places = program.documents[0].raw, program.text
     found = [raw[a:b] for a, b in zip(places.start[0], places.stop[0], strict=True)]
     assert found == [b"'B11'", b"1.2E-05", b"- 30", b"4", b"5", b"6"]
     assert raw[places.insert[0] :].startswith(b",E1 7}")
@@ -197,8 +197,8 @@ def test_places_are_those_of_the_literals() -> None:
 
 def test_points_of_the_dat_have_their_places_there() -> None:
     program = body("LIN XP1\n", "DECL E6POS XP1={X 1,Y 2,Z 3,A 4,B 5,C 6,S 2,T 35}\n")
-    assert program.places.file[0] == 1
-    assert program.documents[1].raw[program.places.start[0, 2] : program.places.stop[0, 2]] == b"3"
+    assert program.text.file[0] == 1
+    assert program.documents[1].raw[program.text.start[0, 2] : program.text.stop[0, 2]] == b"3"
     assert program.toolpath.status[0] == 2
     assert not program.findings
 

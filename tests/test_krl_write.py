@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from postproc.arrays import Floats
-from postproc.dialects.dialect import Program
+from postproc.dialects.dialect import Plan, Program, Writing
 from postproc.dialects.krl import KrlDialect
 from postproc.document import Document, Edit, Span, apply, undone
 from postproc.geometry import rotation_from_abc, rotation_from_vector, vector_from_rotation
@@ -20,7 +20,7 @@ from postproc.units import DEG, MM
 
 KRL = KrlDialect()
 CASES = Path(__file__).parent / "programs" / "krl"
-DECIMALS = {"mm": 3, "deg": 3}
+WRITING = Writing(mm=3, deg=3)
 FRAMES = "DEF part()\nBAS(#BASE,1)\nBAS(#TOOL,1)\n"
 HALF_STEP_MM = 0.00050001
 
@@ -44,8 +44,15 @@ def written(program: Program, edits: list[Edit]) -> tuple[Document, ...]:
     return tuple(result)
 
 
+def edits(program: Program, position: Floats, rotation: Floats) -> list[Edit]:
+    plan = dataclasses.replace(Plan.of(program.toolpath), position=position, rotation=rotation)
+    found = KRL.moved(program, plan, WRITING)
+    assert not found.held
+    return list(found.edits)
+
+
 def moved(program: Program, position: Floats, rotation: Floats) -> tuple[Document, ...]:
-    return written(program, KRL.moved(program, position, rotation, DECIMALS))
+    return written(program, edits(program, position, rotation))
 
 
 def line_moved(line: str, by_mm: tuple[float, float, float] = (0, 0, 0), turn_deg: float = 0.0) -> str:
@@ -62,7 +69,7 @@ def line_moved(line: str, by_mm: tuple[float, float, float] = (0, 0, 0), turn_de
 def free(program: Program) -> np.ndarray:
     """(N,) rows that may be moved."""
     path = program.toolpath
-    rows = program.places.file >= 0
+    rows = program.text.file >= 0
     rows[[*path.refused, *path.pinned]] = False
     return rows
 
@@ -85,13 +92,13 @@ def test_the_same_targets_give_no_edit(path: Path, newline: str) -> None:
         Document(p, p.read_bytes().replace(b"\n", newline.encode())) for p in (path, *KRL.companions(path))
     )
     program = KRL.read(docs)
-    assert KRL.moved(program, program.toolpath.position, program.toolpath.rotation, DECIMALS) == []
+    assert edits(program, program.toolpath.position, program.toolpath.rotation) == []
 
 
 @pytest.mark.parametrize("path", sorted(CASES.glob("*.src")), ids=lambda path: path.stem)
 def test_every_literal_replaced_by_itself_is_the_same_file(path: Path) -> None:
     program = KRL.read(tuple(Document(p, p.read_bytes()) for p in (path, *KRL.companions(path))))
-    places = program.places
+    places = program.text
     spans = {
         Span(int(places.file[row]), int(places.start[row, i]), int(places.stop[row, i]))
         for row in range(len(program.toolpath))
@@ -207,7 +214,7 @@ def test_the_angles_stay_on_their_side() -> None:
 def test_another_spelling_of_the_same_rotation_is_no_change() -> None:
     program = read(FRAMES + "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\nEND\n")
     same = rotation_from_abc(np.array([[184, 175, 186]]) * DEG)
-    assert KRL.moved(program, program.toolpath.position, same, DECIMALS) == []
+    assert edits(program, program.toolpath.position, same) == []
 
 
 def test_a_touched_partial_point_is_written_whole() -> None:
@@ -247,13 +254,13 @@ def test_what_can_not_be_written_is_not_taken(line: str) -> None:
     program = read(FRAMES + "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n" + line + "\nEND\n")
     position = np.where(np.isnan(program.toolpath.position), 0.0, program.toolpath.position)
     with pytest.raises(ValueError, match="can not be corrected"):
-        KRL.moved(program, position, program.toolpath.rotation, DECIMALS)
+        edits(program, position, program.toolpath.rotation)
 
 
 def test_a_pinned_point_is_not_moved() -> None:
     program = read(FRAMES + "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\nLIN_REL {X 1}\nEND\n")
     with pytest.raises(ValueError, match="can not be corrected"):
-        KRL.moved(program, program.toolpath.position + 1e-3, program.toolpath.rotation, DECIMALS)
+        edits(program, program.toolpath.position + 1e-3, program.toolpath.rotation)
 
 
 @pytest.mark.parametrize(

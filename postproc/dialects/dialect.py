@@ -3,29 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import IntEnum
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
-from postproc.arrays import Floats, Ints
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints, frozen
 from postproc.document import Document, Edit, Span
 from postproc.findings import Finding
 from postproc.toolpath import Toolpath
-
-
-@dataclass(frozen=True)
-class Places:
-    """Where the numbers of a motion stand in the text.
-
-    start, stop (N, 6): byte range of the literals of X, Y, Z, A, B, C; -1 where the text has none.
-    file (N,): the document that holds them, -1 where the motion has no aggregate of numbers.
-    insert (N,): offset at which missing components are inserted (behind the last component).
-    """
-
-    start: Ints
-    stop: Ints
-    file: Ints
-    insert: Ints
 
 
 @dataclass(frozen=True)
@@ -35,20 +23,124 @@ class Program:
     ``documents``: the main file first, then the files that travel with it.  ``marker``: the comment that says
     the program is compensated, if it has one.  ``marker_at``: where that comment goes (document 0).
     ``names``: spans of the module's own name, per document, to be renamed with another stem.
+    ``text``: what the dialect knows of the text, for its own writer; nobody else reads it.
     """
 
     dialect: str
     documents: tuple[Document, ...]
     toolpath: Toolpath
-    places: Places
+    text: Any
     findings: tuple[Finding, ...]
     marker: Span | None
     marker_at: Span
     names: tuple[Span, ...]
 
 
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """What a program does not say of itself.
+
+    orientation (3,): A, B, C [rad] of the tool in the base where the language programs no orientation, and what the
+    spin about the tool axis is measured from; None where nothing says it.  integer_words: what X10 means where a
+    control counts in increments, "mm" or "um".  references: files that are read and never written ($config.dat).
+    """
+
+    orientation: Floats | None = None
+    integer_words: str = "mm"
+    references: tuple[Document, ...] = ()
+
+
+PLAIN = Settings()
+"""Nothing is said."""
+
+
+class Role(IntEnum):
+    """What a motion of the output is to the motion of the input that it stems from."""
+
+    OWN = 0  # the last of them: it ends where that motion ends, and takes its text
+    PIECE = 1  # an earlier part of its way, inserted before it
+    LINK = 2  # a straight line to where its way begins, inserted before it
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The motions that an output has to make, M >= N, all in the programmed base of their source.
+
+    source (M,): row of the input, ascending; each has one OWN, last of its group.  role (M,) Role.
+    position (M, 3) [m], rotation (M, 3, 3): targets, NaN where the input's is not known.
+    centre, normal (M, 3), sweep (M,): way of arcs, as in a Toolpath; NaN for all others.
+    """
+
+    source: Ints
+    role: Ints
+    position: Floats
+    rotation: Floats
+    centre: Floats
+    normal: Floats
+    sweep: Floats
+
+    def __post_init__(self) -> None:
+        m = len(self.source)
+        shapes = {
+            "position": (m, 3),
+            "rotation": (m, 3, 3),
+            "centre": (m, 3),
+            "normal": (m, 3),
+            "sweep": (m,),
+        }
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, frozen(getattr(self, name), shape))
+        for name in ("source", "role"):
+            object.__setattr__(self, name, frozen(getattr(self, name), (m,), np.int64))
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+    @property
+    def own(self) -> Bools:
+        """(M,) the motions that take the text of their source."""
+        return np.asarray(self.role == Role.OWN)
+
+    @staticmethod
+    def of(path: Toolpath) -> Plan:
+        """The plan that leaves everything as it is."""
+        n = len(path)
+        return Plan(
+            np.arange(n),
+            np.zeros(n, np.int64),
+            path.position,
+            path.rotation,
+            path.centre,
+            path.normal,
+            path.sweep,
+        )
+
+
+@dataclass(frozen=True)
+class Writing:
+    """How numbers are written: the least decimals of lengths (mm) and angles (deg); ``own_points``: what becomes of a
+    named point that serves several motions: each gets its own as an aggregate in its line ("inline"), as a new point
+    in the .dat ("dat"), or the motions are refused ("refuse")."""
+
+    mm: int
+    deg: int
+    own_points: str = "inline"
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A plan as edits; or ``held``: rows of the input that can not move as planned, and why (then without edits)."""
+
+    edits: tuple[Edit, ...]
+    held: Mapping[int, Finding] = field(default_factory=dict)
+
+
 class Dialect(Protocol):
     name: str
+
+    arcs_in_plane: bool
+    """An arc lies in a plane that the program selects (its normal stays, an advance along it is possible); else it is
+    given by three points: any plane, no advance."""
 
     def claims(self, path: Path, raw: bytes) -> bool:
         """Whether a file of this name and content is of this dialect."""
@@ -56,13 +148,15 @@ class Dialect(Protocol):
     def companions(self, path: Path) -> list[Path]:
         """Files beside ``path`` that belong to the program and exist (a KRL module's .dat)."""
 
-    def read(self, documents: tuple[Document, ...]) -> Program:
+    def read(self, documents: tuple[Document, ...], settings: Settings = PLAIN) -> Program:
         """Read a program; never raises on its content: what is not understood becomes a finding."""
 
-    def moved(
-        self, program: Program, position: Floats, rotation: Floats, decimals: Mapping[str, int]
-    ) -> list[Edit]:
-        """Edits that bring the targets to ``position`` (N, 3) [m], ``rotation`` (N, 3, 3) in the programmed base."""
+    def moved(self, program: Program, plan: Plan, writing: Writing) -> Moved:
+        """Edits after which the program makes the motions of ``plan``; rows that are where they were stay as written.
+
+        Raises ValueError if a row is asked to move that ``refused`` or ``pinned`` forbids, or something is inserted
+        before one of ``whole``: a defect of the caller.
+        """
 
     def marked(self, program: Program, text: str) -> Edit:
         """The edit that puts ``text`` as the marker comment into the main file."""

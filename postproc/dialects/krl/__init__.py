@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
 
-from postproc.arrays import Floats
-from postproc.dialects.dialect import Program
+from postproc.dialects.dialect import PLAIN, Moved, Plan, Program, Settings, Writing
 from postproc.dialects.krl import interpreter, writer
 from postproc.document import Document, Edit
 
@@ -22,6 +20,7 @@ class KrlDialect:
     """KRL as a ``Dialect``."""
 
     name = "krl"
+    arcs_in_plane = False
 
     def claims(self, path: Path, raw: bytes) -> bool:
         return path.suffix.lower() == ".src" or _CLAIM.search(raw) is not None
@@ -36,13 +35,12 @@ class KrlDialect:
         # Where several differ by case only, the one spelt as the program is.
         return sorted(matches, key=lambda p: p.stem != path.stem)[:1]
 
-    def read(self, documents: tuple[Document, ...]) -> Program:
+    def read(self, documents: tuple[Document, ...], settings: Settings = PLAIN) -> Program:
         return interpreter.read(documents)
 
-    def moved(
-        self, program: Program, position: Floats, rotation: Floats, decimals: Mapping[str, int]
-    ) -> list[Edit]:
-        return writer.moved(program, position, rotation, decimals)
+    def moved(self, program: Program, plan: Plan, writing: Writing) -> Moved:
+        decimals = {"mm": writing.mm, "deg": writing.deg}
+        return Moved(tuple(writer.moved(program, plan.position, plan.rotation, decimals)))
 
     def marked(self, program: Program, text: str) -> Edit:
         comment = b";COMPENSATED by compensate " + text.encode("latin-1", "replace")

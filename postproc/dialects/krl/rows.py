@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from postproc.arrays import Ints
-from postproc.dialects.dialect import Places
 from postproc.dialects.krl.state import Anchor, Frame, Frames, Numbers, Point, Source, State
 from postproc.dialects.krl.target import NOWHERE, Target, Unclear
 from postproc.document import Document
@@ -16,6 +15,22 @@ from postproc.findings import Finding
 from postproc.geometry import rotation_from_abc
 from postproc.toolpath import Annotation, FrameRef, Kind, Toolpath
 from postproc.units import DEG, MM
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where the numbers of a motion stand in the text.
+
+    start, stop (N, 6): byte range of the literals of X, Y, Z, A, B, C; -1 where the text has none.
+    file (N,): the document that holds them, -1 where the motion has no aggregate of numbers.
+    insert (N,): offset at which missing components are inserted (behind the last component).
+    """
+
+    start: Ints
+    stop: Ints
+    file: Ints
+    insert: Ints
+
 
 NAN6: Numbers = (float("nan"),) * 6
 SHARED = "KRL007"

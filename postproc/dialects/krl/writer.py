@@ -28,7 +28,7 @@ def moved(program: Program, position: Floats, rotation: Floats, decimals: Mappin
     ``decimals``: the least number of decimals of what is written, "mm" and "deg".  Raises ValueError if a row
     is asked to move that can not: a defect of the caller.
     """
-    path, places = program.toolpath, program.places
+    path, places = program.toolpath, program.text
     shifted: Bools = np.any(_differs(position, path.position), axis=1)
     turned: Bools = np.any(_differs(rotation, path.rotation), axis=(1, 2))
     fixed = [row for row in (*path.refused, *path.pinned) if shifted[row] or turned[row]]
@@ -60,7 +60,7 @@ class _Writer:
         self.edited: list[Edit] = []
 
     def edits(self) -> list[Edit]:
-        path, places = self.program.toolpath, self.program.places
+        path, places = self.program.toolpath, self.program.text
         partial = (places.file >= 0) & (places.start < 0).any(axis=1)
         refused = np.zeros(len(path), dtype=bool)
         refused[list(path.refused)] = True
@@ -87,7 +87,7 @@ class _Writer:
 
         The text is the row's own, or that of the row before which gives the component.
         """
-        places, path, source = self.program.places, self.program.toolpath, int(self.given[row, i])
+        places, path, source = self.program.text, self.program.toolpath, int(self.given[row, i])
         start = int(places.start[source, i])
         if start >= 0:
             literal = self.program.documents[int(places.file[source])].raw[
@@ -123,7 +123,7 @@ class _Writer:
         return texts
 
     def _write(self, row: int, texts: dict[int, str], missing: list[int]) -> None:
-        places = self.program.places
+        places = self.program.text
         file = int(places.file[row])
         raw = self.program.documents[file].raw
         present = [i for i in range(6) if places.start[row, i] >= 0]
@@ -149,7 +149,7 @@ class _Writer:
 
 def _given_by(program: Program) -> Ints:
     """(N, 6) the row whose text gives a component: the row itself, or the last one before that writes it."""
-    places = program.places
+    places = program.text
     rows = np.arange(len(places.file))[:, None]
     writes = (places.start >= 0) | (places.file < 0)[:, None]
     return np.maximum.accumulate(np.where(writes, rows, 0), axis=0)
