@@ -83,10 +83,10 @@ class Places:
     operand, behind the code of the line (blanks and comment not included).
     text (N,): rows with the same number take at least one literal from the same place of the text.
 
-    Rows with the same ``toolpath.line`` are one statement that runs several times: an aggregate in that line serves all.
+    Rows with the same ``toolpath.line`` are one statement that runs several times: an aggregate there serves all.
 
     variables: rows whose operand is no plain aggregate in the line.
-    locked: row -> why the literals in place must not be edited (other code reads them, another program may, ...): such a
+    locked: row -> why the literals in place must not be edited (other code reads them, another program may): such a
     motion can only move with a point of its own.
     arcs: auxiliary points.  relative: rows with relative text.
     """
