@@ -137,3 +137,48 @@ def skew(vector: ArrayLike) -> Floats:
     x, y, z = np.moveaxis(v, -1, 0)
     rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def on_arc(
+    begin: Floats, end: Floats, centre: Floats, normal: Floats, sweep: Floats, share: Floats
+) -> Floats:
+    """Points (K, 3) [m] at the shares (K,) of arcs from ``begin`` to ``end`` about ``centre`` (K, 3).
+
+    p(t) = c + R(n, t sweep) (b - c) + t (e - c - R(n, sweep) (b - c)): counter-clockwise about the unit vector n, with
+    what is left to the end (the advance of a helix, radii that differ in the last digit) in proportion.
+    """
+    radius = begin - centre
+    turned = (rotation_from_vector((share * sweep)[:, None] * normal) @ radius[..., None])[..., 0]
+    last = (rotation_from_vector(sweep[:, None] * normal) @ radius[..., None])[..., 0]
+    return np.asarray(centre + turned + share[:, None] * (end - centre - last))
+
+
+def arc_through(begin: Floats, via: Floats, end: Floats) -> tuple[Floats, Floats, Floats]:
+    """Centre (K, 3), normal (K, 3) and sweep (K,) in (0, 2 pi) of the circles through three points (K, 3) each.
+
+    NaN where the three lie on a line: the sine of the angle at ``via`` is below 1e-9.
+    """
+    first, second = via - begin, end - via
+    across = np.cross(first, second)
+    size = np.linalg.norm(across, axis=-1)
+    scale = np.linalg.norm(first, axis=-1) * np.linalg.norm(second, axis=-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        normal = np.where((size > 1e-9 * scale)[:, None], across / size[:, None], np.nan)
+    return arc_in_plane(begin, via, end, normal)
+
+
+def arc_in_plane(begin: Floats, via: Floats, end: Floats, normal: Floats) -> tuple[Floats, Floats, Floats]:
+    """As ``arc_through``, of arcs counter-clockwise about ``normal`` (K, 3): the circle of the points as they are seen
+    along it; the centre lies at the height of ``begin``.  NaN where the points lie on a line or run clockwise."""
+    first, second = via - begin, end - begin
+    first = first - np.sum(first * normal, axis=-1, keepdims=True) * normal
+    second = second - np.sum(second * normal, axis=-1, keepdims=True) * normal
+    area = np.sum(np.cross(first, second) * normal, axis=-1)
+    a2, b2 = np.sum(first**2, axis=-1), np.sum(second**2, axis=-1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        offset = np.cross(a2[:, None] * second - b2[:, None] * first, normal) / (2 * area[:, None])
+        turns = area > 1e-12 * np.sqrt(a2 * b2)
+        centre = np.where(turns[:, None], begin + offset, np.nan)
+        start, stop = begin - centre, begin + second - centre
+        angle = np.arctan2(np.sum(np.cross(start, stop) * normal, axis=-1), np.sum(start * stop, axis=-1))
+    return centre, np.where(turns[:, None], normal, np.nan), np.mod(angle, 2 * np.pi)

@@ -75,6 +75,8 @@ class Toolpath:
     ``whole``: row -> why no motion can be inserted before it (a spline, a TRIGGER, a line that runs many times).
     ``blend`` (N,) [m]: the controller may leave the path that far before the end point (approximation); 0 where it
     stops or passes exactly, NaN where the distance is not known.
+    ``oriented`` (N,): the text programs the orientation and it can be written; else it is given from outside and only
+    the position can be corrected.
     ``annotations``: comments that speak to this tool; ``comments``: all others that stand on a line of their own.
     """
 
@@ -98,6 +100,7 @@ class Toolpath:
     normal: Floats = field(default_factory=lambda: np.empty((0, 3)))
     sweep: Floats = field(default_factory=lambda: np.empty(0))
     blend: Floats = field(default_factory=lambda: np.empty(0))
+    oriented: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     whole: Mapping[int, str] = field(default_factory=dict)
     comments: tuple[Annotation, ...] = ()
 
@@ -112,6 +115,9 @@ class Toolpath:
             object.__setattr__(self, "sweep", np.full(n, np.nan))
         if not len(self.blend):
             object.__setattr__(self, "blend", np.zeros(n))
+        if not len(self.oriented):
+            object.__setattr__(self, "oriented", np.ones(n, np.bool_))
+        object.__setattr__(self, "oriented", frozen(self.oriented, (n,), np.bool_))
         shapes = {"position": (n, 3), "rotation": (n, 3, 3), "axes": (n, 6), "feed": (n,), "given": (n, 6)}
         shapes |= {"centre": (n, 3), "normal": (n, 3), "sweep": (n,), "blend": (n,)}
         for name, shape in shapes.items():
