@@ -196,6 +196,11 @@ CODES: dict[str, Code] = {
         "A force in the feed frame without a feed direction took that of the next motion of its cut.",
     ),
     "FRC009": Code("warning", "force on an air move", "PTP is air by definition; its force was not used."),
+    "FRC010": Code(
+        "info",
+        "direction of the feed kept",
+        "A plunge or a turn on the spot has no feed direction across the spindle; the last one stays.",
+    ),
     # kinematics
     "KIN001": Code(
         "error",

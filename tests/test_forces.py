@@ -125,19 +125,33 @@ def test_shared_vertices_take_the_orientation_at_the_vertex():
 
 def test_force_steps_are_shared_within_a_cut_and_kept_at_its_ends():
     points = [[0.1 * i, 0, 0] for i in range(6)]
-    notes = [(1, "FORCE 10 0 0", 1), (2, "FORCE 30 0 0", 2), (4, "FORCE OFF", 3), (5, "force 5,0,0", 4)]
+    notes = [(1, "FORCE 10 0 0", 1), (2, "FORCE 20 0 0", 2), (4, "FORCE OFF", 3), (5, "force 5,0,0", 4)]
     result = run(path_of(points, PTP_THEN, notes=notes), "")
-    assert np.allclose(result.values[:, 0], [0, 20, 30, 30, 0, 5])
-    assert np.allclose(result.start[:, 0], [0, 10, 20, 30, 0, 5])
+    assert np.allclose(result.values[:, 0], [0, 15, 20, 20, 0, 5])
+    assert np.allclose(result.start[:, 0], [0, 10, 15, 20, 0, 5])
+    assert result.steps.tolist() == [False, True, False, False, False, True]
     assert result.source == "FORCE comments"
 
 
 def test_motions_whose_sides_cancel_still_carry_force():
-    points = [[0.1 * i, 0, 0] for i in range(3)]
-    notes = [(1, "FORCE 10 0 0", 1), (2, "FORCE -10 0 0", 2)]
-    result = run(path_of(points, PTP_THEN[:3], notes=notes), "")
-    assert np.allclose(result.values[1], 0)
+    points = [[0.1 * i, 0, 0] for i in range(4)]
+    notes = [(1, "FORCE 10 0 0", 1), (2, "FORCE -10 0 0", 2), (3, "FORCE 500 0 0", 3)]
+    result = run(path_of(points, PTP_THEN[:4], notes=notes), "")
+    assert np.allclose(result.values[1], 0)  # next to 500 N this is no jump
     assert result.carries[1]
+
+
+@pytest.mark.parametrize(
+    ("second", "jumps"), [(51, False), (47, True), (-100, True), (200, False), (220, True)]
+)
+def test_a_force_that_jumps_is_a_step(second, jumps):
+    """As a turn of 30 deg: by more than 0.518 of the larger force."""
+    points = [[0.1 * i, 0, 0] for i in range(3)]
+    notes = [(1, "FORCE 100 0 0", 1), (2, f"FORCE {second} 0 0", 2)]
+    result = run(path_of(points, PTP_THEN[:3], notes=notes), "")
+    shared = 0.5 * (100 + second)
+    assert np.allclose([result.values[1, 0], result.start[2, 0]], [100, second] if jumps else [shared] * 2)
+    assert result.steps.tolist() == [False, True, jumps]
 
 
 def test_a_plunge_keeps_the_last_direction():
@@ -145,7 +159,9 @@ def test_a_plunge_keeps_the_last_direction():
     result = run(path_of(points, PTP_THEN[:5]), "10,0,30@feed")
     # +y; straight down; 0.3 deg off straight down; +x
     assert np.allclose(result.values[1:, :3], [[0, 10, 30], [0, 10, 30], [0, 10, 30], [10, 0, 30]])
-    assert result.findings == ()
+    (finding,) = result.findings
+    assert (finding.code, finding.severity, finding.line) == ("FRC010", "info", 12)
+    assert finding.message.endswith("keep the last one: 2")
 
 
 def test_a_plunge_before_any_feed_takes_the_next_direction():
@@ -208,7 +224,7 @@ def test_turning_on_the_spot_keeps_the_last_direction_across_the_new_axis():
     x, z = np.array([np.cos(a), 0, -np.sin(a)]), np.array([np.sin(a), 0, np.cos(a)])
     assert np.allclose(result.values[2, :3], 10 * x + 30 * z)
     assert np.allclose(result.values[1, :3], [10, 0, 30])  # no turn: both sides, at the orientation before
-    assert result.findings == ()
+    assert [(finding.code, finding.line) for finding in result.findings] == [("FRC010", 12)]
 
 
 def test_a_turn_on_the_spot_does_not_hide_its_corner():
@@ -264,11 +280,11 @@ def test_directions_go_across_a_change_of_tool():
     }
     frames = (*FRAMES, FrameRef(2, None))
     path = path_of([[0, 0, 0], [0.1, 0, 0], [0.3, -0.1, 0]], PTP_THEN[:3], frames=frames, tool=[1, 1, 2])
-    notes = [(1, "FORCE 10 0 0 @feed", 1), (2, "FORCE 30 0 0 @feed", 1)]
+    notes = [(1, "FORCE 10 0 0 @feed", 1), (2, "FORCE 20 0 0 @feed", 1)]
     path = path_of(path.position, PTP_THEN[:3], frames=frames, tool=[1, 1, 2], notes=notes)
     result = run(path, "", cell_of(tools=tools))
     assert np.allclose(
-        result.values[:, :3], [[0, 0, 0], [10, 0, 0], [30, 0, 0]]
+        result.values[:, :3], [[0, 0, 0], [10, 0, 0], [20, 0, 0]]
     )  # and no sharing between tools
     # the same tool, set again, is no change
     again = path_of(
@@ -278,7 +294,7 @@ def test_directions_go_across_a_change_of_tool():
         tool=[1, 1, 2],
         notes=notes,
     )
-    assert np.allclose(run(again, "").values[:, 0], [0, 20, 30])
+    assert np.allclose(run(again, "").values[:, 0], [0, 15, 20])
 
 
 @settings(max_examples=60, deadline=None)

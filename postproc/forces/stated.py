@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints, frozen
+from postproc.arrays import Bools, Floats, Ints, frozen
 from postproc.findings import nearest
 
 FRAMES = ("base", "world", "tool", "feed")
@@ -22,14 +22,32 @@ _NUMBER_LIKE = re.compile(r"[-+]?([.,]?[0-9]|nan\b|inf(inity)?\b)", re.IGNORECAS
 
 @dataclass(frozen=True, eq=False)
 class Stated:
-    """One wrench a motion: ``values`` (N, 6) [N, N m] in the axes of ``frame`` (N,), an index into FRAMES."""
+    """The wrench of each motion [N, N m] in the axes of ``frame`` (N,), an index into FRAMES.
+
+    ``values`` (N, 6): where the motion ends; ``start`` (N, 6): where it begins (the same where it is not given), linear
+    in between.
+    """
 
     values: Floats
     frame: Ints
+    start: Floats | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", frozen(self.values, (-1, 6)))
-        object.__setattr__(self, "frame", frozen(self.frame, (len(self.values),), np.int64))
+        n = len(self.values)
+        object.__setattr__(self, "values", frozen(self.values, (n, 6)))
+        object.__setattr__(self, "frame", frozen(self.frame, (n,), np.int64))
+        if self.start is not None:
+            object.__setattr__(self, "start", frozen(self.start, (n, 6)))
+
+    @property
+    def begin(self) -> Floats:
+        """(N, 6) the wrench where each motion begins."""
+        return self.values if self.start is None else self.start
+
+    @property
+    def acts(self) -> Bools:
+        """(N,) the motion has a force or a moment at either end."""
+        return np.any(self.values != 0, axis=1) | np.any(self.begin != 0, axis=1)
 
 
 class NotAForce(ValueError):
