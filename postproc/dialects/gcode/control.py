@@ -1,0 +1,114 @@
+"""What differs between controls, as data: which code means what, which words there are, how a line is taken apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import NamedTuple
+
+from postproc.dialects.gcode.words import Note
+
+
+class Group(IntEnum):
+    """Modal groups, of which one code is in force at a time; ONCE holds in its block only."""
+
+    MOTION = 0  # Move
+    PLANE = 1  # 0 XY, 1 ZX, 2 YZ
+    DISTANCE = 2  # 0 absolute, 1 incremental
+    ARCS = 3  # centre: 0 from the begin, 1 absolute
+    UNITS = 4  # 0 mm, 1 inch
+    FEED = 5  # Feed
+    OFFSET = 6  # number of the base
+    PATH = 7  # 0 exact, 1 may be left
+    TCP = 8  # 0 rotary axes are the machine's, 1 they orient the tool
+    RETURN = 9  # of cycles: 0 to where they began, 1 to R
+    LENGTH = 10  # tool length offset: 0 off, 1 on: it lies in the cell's tool, either way
+    RADIUS = 11  # 0 off; else contours: not compensated
+    LENGTHS = 12  # 0; else offsets that the program itself computes (G43.1)
+    TURNED = 13  # 0; else rotated coordinates (G68)
+    SCALED = 14  # 0; else scaled or mirrored coordinates
+    MIRRORED = 15
+    POLAR = 16  # 0; else polar coordinates
+    DIAMETER = 17  # 0; else X is a diameter
+    SPINDLE = 18  # 0 speed, 1 constant surface speed: F per revolution is then unknown
+    MACRO = 19  # 0; else every block calls a macro (G66)
+    ONCE = 20  # Once
+    NONE = 21  # known, says nothing about the path
+
+
+class Move(IntEnum):
+    """What the words of a block do."""
+
+    RAPID = 0
+    LINE = 1
+    CLOCKWISE = 2
+    COUNTER = 3
+    THROUGH = 4  # an arc through a point
+    NOTHING = 5  # G80: no motion is in force
+    CYCLE = 6  # a canned cycle: the motion is hidden in the block
+    SPLINE = 7
+    THREAD = 8
+    OTHER = 9  # a motion of this control that is not read
+
+
+class Feed(IntEnum):
+    PER_MINUTE = 0
+    INVERSE_TIME = 1
+    PER_TURN = 2
+
+
+class Once(IntEnum):
+    """Codes that hold in their block."""
+
+    DWELL = 1  # the words are times
+    HOME = 2  # reference point, perhaps by way of a point
+    MACHINE = 3  # machine coordinates
+    SHIFT = 4  # G92: here is ...
+    LOCAL = 5  # G52: the origin is moved to ...
+    UNSHIFT = 6  # G92.1
+    SUSPEND = 7  # G92.2
+    RESTORE = 8  # G92.3
+    SETTING = 9  # G10
+    CALL = 10  # G65: the words are arguments
+    PROBE = 11
+    OTHER = 12  # its words are no targets of a motion
+    FRAME = 13  # a frame of this control (TRANS, ROT): Control.frame gives it
+
+
+class Code(NamedTuple):
+    group: Group
+    value: int
+
+
+UNKNOWN = -1
+"""Value of a group that can not be told."""
+
+
+class Line(NamedTuple):
+    """A line that is not plain words: its words (address offset, key, number's start and stop or -1, value, How) and
+    what else it says."""
+
+    words: list[tuple[int, int, int, int, float, int]]
+    notes: list[Note]
+    deleted: bool
+
+
+@dataclass(frozen=True)
+class Control:
+    """One dialect of G-code.
+
+    codes: G number times ten -> what it says, M likewise; named: a word that stands alone -> the same;
+    names: addresses of more than a letter -> their key; comment: pattern of comments (and of strings, group 1, which
+    are none); line: takes a line apart that is not plain words.
+    """
+
+    name: str
+    codes: Mapping[int, Code]
+    line: Callable[[bytes, int], Line]
+    comment: bytes
+    named: Mapping[bytes, Code] = field(default_factory=dict)
+    names: Mapping[bytes, int] = field(default_factory=dict)
+    start: Mapping[Group, int] = field(default_factory=dict)
+    increments: bool = False
+    loads: bool = True

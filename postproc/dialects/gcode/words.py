@@ -1,0 +1,95 @@
+"""The words of a G-code program as arrays: which address, which number, where it stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+
+NAMES = 1 << 16
+"""Keys from here on are a control's own names (CR, TURN): its ``Control.names`` numbers them."""
+
+
+def key(letter: str, index: int | None = None) -> int:
+    """The key of an address: of ``X`` or, with an index, of ``A3=`` (an address with digits and an equals sign)."""
+    return ord(letter) if index is None else ord(letter) + 256 * (index + 1)
+
+
+class How(IntEnum):
+    """How the value of a word is written."""
+
+    NUMBER = 0  # X1.5
+    INTEGER = 1  # X1, no decimal point: a control may count it in increments
+    ABSOLUTE = 2  # X=AC(1.5): absolute, whatever G90 or G91
+    INCREMENTAL = 3  # X=IC(1.5): relative
+    UNREAD = 4  # X#1, X[1+2], X=R1: no number; its value is NaN
+
+
+@dataclass(frozen=True, eq=False)
+class Words:
+    """W words in the order of the text.
+
+    at (W,): offset of the address; start, stop (W,): range of the number's bytes alone (sign included, without AC( ));
+    -1 where the word has none.  key (W,): see ``key``; value (W,): the number as written, NaN if UNREAD;
+    how (W,) How; block (W,): row in Blocks.
+    """
+
+    at: Ints
+    start: Ints
+    stop: Ints
+    key: Ints
+    value: Floats
+    how: Ints
+    block: Ints
+
+    def __len__(self) -> int:
+        return len(self.at)
+
+
+class Note(NamedTuple):
+    """What a block says besides its words: ``kind`` of the said, its text, where it stands."""
+
+    block: int
+    kind: str
+    text: str
+    at: int
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """B blocks: the lines that have a word or a note.
+
+    start, stop (B,): bytes of the line, without its ending; line (B,): from 1; code (B,): where its code ends (behind
+    the last word, before a comment); deleted (B,): begins with a slash.
+    """
+
+    start: Ints
+    stop: Ints
+    line: Ints
+    code: Ints
+    deleted: Bools
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """A program taken apart.  ``comments``: (C, 2) byte ranges of what stands inside of comments."""
+
+    words: Words
+    blocks: Blocks
+    notes: tuple[Note, ...]
+    comments: Ints
+
+
+def last_of(words: Words, wanted: int, blocks: int) -> Ints:
+    """(B,) the last word with this key in every block; -1 where there is none."""
+    found = np.full(blocks, -1, dtype=np.int64)
+    rows = np.flatnonzero(words.key == wanted)
+    found[words.block[rows]] = rows
+    return found
