@@ -81,7 +81,9 @@ class Cell:
     start_stated (6,) or (7,): joint values before the first motion, deg, mm for a linear axis;
     tolerance, max_correction, min_segment [m]; tolerance_angle [rad].  ``force`` is the text of the key, a path
     in it is relative to the cell file; ``force_line`` is where it stands.  ``force_ci95``: half width of the 95 %
-    interval of all forces, as a share of them; None where nothing is stated.
+    interval of all forces, as a share of them; None where nothing is stated.  ``dialect``: name of the programs'
+    language, where their names and contents do not tell it; ``config_dat``: the controller's $config.dat, relative to
+    the cell file.
     """
 
     path: Path
@@ -105,6 +107,9 @@ class Cell:
     max_growth: float = 2.0
     controller: Controller = Controller()
     integer_words: str = "mm"
+    dialect: str | None = None
+    dialect_line: int = 0
+    config_dat: str | None = None
 
     @property
     def start(self) -> Floats | None:
@@ -152,7 +157,7 @@ def load_cell(path: Path) -> Cell:
     controller = top.section("controller", None)
     controller.only("absolute_accuracy", "gravity_compensated")
     dialect = top.section("dialect", None)
-    dialect.only("integer_words")
+    dialect.only("integer_words", "name", "config_dat")
     return Cell(
         path=path,
         robot=_word(top, "robot"),
@@ -177,6 +182,9 @@ def load_cell(path: Path) -> Cell:
             controller.flag("absolute_accuracy", False), controller.flag("gravity_compensated", False)
         ),
         integer_words=dialect.text("integer_words", "mm", ("mm", "um")),
+        dialect=_word(dialect, "name") if "name" in dialect else None,
+        dialect_line=dialect.line_of("name") if "name" in dialect else 0,
+        config_dat=_word(dialect, "config_dat") if "config_dat" in dialect else None,
     )
 
 

@@ -201,6 +201,34 @@ CODES: dict[str, Code] = {
         "direction of the feed kept",
         "A plunge or a turn on the spot has no feed direction across the spindle; the last one stays.",
     ),
+    "FRC011": Code(
+        "error",
+        "process for another program",
+        "No operation of the process file has a motion in the program: names, tools and lines all miss.",
+    ),
+    "FRC012": Code(
+        "warning", "operation without motions", "The program has no such name, tool or lines; look at its spelling."
+    ),
+    "FRC013": Code(
+        "error", "feed is not known", "Feed per tooth, or the time of a motion, needs the programmed feed."
+    ),
+    "FRC014": Code(
+        "info",
+        "plunge without a force",
+        "The process model knows side cutting only; motions along the spindle are taken as air.",
+    ),
+    "FRC015": Code("info", "force of an operation", "What the process file came to for this operation."),
+    "FRC016": Code("info", "no axial coefficients", "The source of the coefficients states none; Fz is taken as 0."),
+    "FRC017": Code(
+        "warning",
+        "feed unlike the rest of the operation",
+        "Motions that are much faster than the others may go through air; state `rapid` or mark them FORCE OFF.",
+    ),
+    "FRC018": Code(
+        "info",
+        "comment names no operation",
+        "A cut begins behind comments of which none names an operation; the last named one goes on.",
+    ),
     # kinematics
     "KIN001": Code(
         "error",
@@ -462,9 +490,9 @@ CODES: dict[str, Code] = {
         "The written program does not reach the wanted place within the tolerance.",
     ),
     "COR006": Code(
-        "info",
-        "corrected at the motions",
-        "Between the end points of a motion no points are inserted by this version; what is left there is told.",
+        "warning",
+        "way between points above the tolerance",
+        "Where no motion may be inserted, or none is short enough, the tool leaves the tolerance between two points.",
     ),
     "COR007": Code(
         "info", "part of the correction applied", "--gain below 1 leaves the rest of the error, as asked."
@@ -488,6 +516,21 @@ CODES: dict[str, Code] = {
         "warning",
         "corrected point is out of reach",
         "The correction leads out of reach; its cut is left as it was.",
+    ),
+    "COR012": Code(
+        "info",
+        "motions inserted",
+        "Links, where the correction steps, and points that keep the way between the programmed ones in tolerance.",
+    ),
+    "COR013": Code(
+        "warning",
+        "arc can not be corrected",
+        "The corrected points give no arc that could be written; the cut is left as it was.",
+    ),
+    "COR014": Code(
+        "warning",
+        "limit of growth reached",
+        "max_growth of the cell allows fewer inserted motions than the tolerance asks for; the worst ones got theirs.",
     ),
 }
 

@@ -198,6 +198,68 @@ class Toolpath:
         return "{" + " ".join(_number(value) for value in numbers) + "}"
 
 
+class Role(IntEnum):
+    """What a motion of the output is to the motion of the input that it stems from."""
+
+    OWN = 0  # the last of them: it ends where that motion ends, and takes its text
+    PIECE = 1  # an earlier part of its way, inserted before it
+    LINK = 2  # a straight line to where its way begins, inserted before it
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """The motions that an output has to make, M >= N, all in the programmed base of their source.
+
+    source (M,): row of the input, ascending; each has one OWN, last of its group.  role (M,) Role.
+    position (M, 3) [m], rotation (M, 3, 3): targets, NaN where the input's is not known.
+    centre, normal (M, 3), sweep (M,): way of arcs, as in a Toolpath; NaN for all others.
+    """
+
+    source: Ints
+    role: Ints
+    position: Floats
+    rotation: Floats
+    centre: Floats
+    normal: Floats
+    sweep: Floats
+
+    def __post_init__(self) -> None:
+        m = len(self.source)
+        shapes = {
+            "position": (m, 3),
+            "rotation": (m, 3, 3),
+            "centre": (m, 3),
+            "normal": (m, 3),
+            "sweep": (m,),
+        }
+        for name, shape in shapes.items():
+            object.__setattr__(self, name, frozen(getattr(self, name), shape))
+        for name in ("source", "role"):
+            object.__setattr__(self, name, frozen(getattr(self, name), (m,), np.int64))
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+    @property
+    def own(self) -> Bools:
+        """(M,) the motions that take the text of their source."""
+        return np.asarray(self.role == Role.OWN)
+
+    @staticmethod
+    def of(path: Toolpath) -> Plan:
+        """The plan that leaves everything as it is."""
+        n = len(path)
+        return Plan(
+            np.arange(n),
+            np.zeros(n, np.int64),
+            path.position,
+            path.rotation,
+            path.centre,
+            path.normal,
+            path.sweep,
+        )
+
+
 def _number(value: float) -> str:
     """Six decimals at most, no trailing zeros, no minus zero."""
     text = f"{value:.6f}".rstrip("0").rstrip(".")

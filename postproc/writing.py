@@ -5,31 +5,74 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from postproc import __version__
+from postproc.arrays import Bools, Floats, Ints
 from postproc.cell import Cell
-from postproc.compensation.correct import Result, Task, with_residual
-from postproc.dialects.dialect import Dialect, Plan, Program, Writing
+from postproc.compensation.between import errors_between
+from postproc.compensation.correct import Result, with_residual
+from postproc.compensation.division import Division, made
+from postproc.compensation.task import Task
+from postproc.dialects.dialect import Dialect, Moved, Program, Settings, Writing
 from postproc.document import Document, Edit, apply, undone
 from postproc.findings import Finding, Refusal
-from postproc.geometry import Poses, vector_from_rotation
+from postproc.geometry import Poses, on_arc, vector_from_rotation
 from postproc.robot.description import Robot
-from postproc.toolpath import Toolpath
+from postproc.toolpath import Kind, Plan, Role, Toolpath
 from postproc.units import DEG, MM
+
+FAR = 2.5
+"""Written steps by which the middle of an arc may be elsewhere than meant: its centre is rounded as well."""
 
 
 @dataclass(frozen=True)
 class Written:
     """``edits`` make the output; ``contents`` are its bytes, a document each; ``result`` has the residual predicted
-    from the digits in them."""
+    from the digits in them, ``division`` the commands as they are in them, and ``between`` (M,) [m] the largest
+    distance from the wanted way inside of each corrected motion, NaN for all others.
+    """
 
     edits: tuple[Edit, ...]
     contents: tuple[bytes, ...]
     result: Result
+    division: Division
+    between: Floats
+
+
+def planned(task: Task, division: Division) -> Plan:
+    """A division in the programmed bases: what a dialect is to write."""
+    path, source = task.toolpath, division.source
+    to_base = task.base[source].inverse()
+    command = to_base @ division.command
+    moved = division.moved
+    turned = moved & path.oriented[source]
+    link = division.links
+    arc = np.isfinite(division.sweep)
+    centre = (to_base @ Poses(np.eye(3), division.centre)).position
+    normal = (to_base.rotation @ division.normal[..., None])[..., 0]
+    return Plan(
+        source,
+        division.role,
+        np.where(moved[:, None], command.position, path.position[source]),
+        np.where(turned[:, None, None], command.rotation, path.rotation[source]),
+        np.where(arc[:, None], centre, _kept(path.centre[source], moved | link)),
+        np.where(arc[:, None], normal, _kept(path.normal[source], moved | link)),
+        np.where(arc, division.sweep, _kept(path.sweep[source], moved | link)),
+    )
+
+
+def _kept(values: Floats, gone: Bools) -> Floats:
+    """``values`` (M, ...) with NaN where ``gone`` (M,)."""
+    return np.where(gone.reshape(-1, *[1] * (values.ndim - 1)), np.nan, values)
+
+
+def written_as(cell: Cell, own_points: str) -> Writing:
+    """Decimals whose rounding stays below a twentieth of the tolerances."""
+    return Writing(_decimals(cell.tolerance / MM), _decimals(cell.tolerance_angle / DEG), own_points)
 
 
 def write(
@@ -37,26 +80,21 @@ def write(
     dialect: Dialect,
     task: Task,
     result: Result,
-    cell: Cell,
+    division: Division,
+    plan: Plan,
+    moved: Moved,
+    writing: Writing,
+    settings: Settings,
     robot: Robot,
     stem: str,
     completed: Callable[[Toolpath], Toolpath],
 ) -> Written:
-    """Turn a correction into text, under the module name ``stem``.
+    """Turn a plan's edits into files, under the module name ``stem``, and read them back.
 
     ``completed``: fills in what a target that was read back leaves to the axis motion before it.
     Raises Refusal FIL011 (no module name) and FIL008 (what was read back is not what was meant).
     """
-    path = task.toolpath
-    commanded = task.base.inverse() @ result.command
-    moves = result.corrected
-    planned = Poses(
-        np.where(moves[:, None, None], commanded.rotation, path.rotation),
-        np.where(moves[:, None], commanded.position, path.position),
-    )
-    decimals = {"mm": _decimals(cell.tolerance / MM), "deg": _decimals(cell.tolerance_angle / DEG)}
-    plan = replace(Plan.of(path), position=planned.position, rotation=planned.rotation)
-    edits = list(dialect.moved(program, plan, Writing(decimals["mm"], decimals["deg"])).edits)
+    edits = list(moved.edits)
     if edits:
         edits.append(dialect.marked(program, _mark(program, robot)))
     main = program.documents[0].path
@@ -66,11 +104,43 @@ def write(
         edits += dialect.renamed(program, stem)
     contents = _contents(program, edits)
     documents = zip(program.documents, contents, strict=True)
-    back = completed(
-        dialect.read(tuple(Document(document.path, raw) for document, raw in documents)).toolpath
+    read = dialect.read(tuple(Document(document.path, raw) for document, raw in documents), settings)
+    back = completed(read.toolpath)
+    _hold(program.toolpath, back, plan, writing, main.name)
+    there = _as_written(task, division, back)
+    own = there.command[np.flatnonzero(division.own)]
+    return Written(
+        tuple(edits), contents, with_residual(task, result, own), there, way_errors(task, result, there)
     )
-    _hold(path, back, planned, decimals, main.name)
-    return Written(tuple(edits), contents, with_residual(task, result, task.base @ back.target_in_base))
+
+
+def way_errors(task: Task, result: Result, division: Division) -> Floats:
+    """(M,) [m] the largest distance from the wanted way inside of each corrected motion, NaN for all others."""
+    errors = np.full(len(division), np.nan)
+    source = division.source
+    chosen = np.flatnonzero(result.corrected[source] & task.ways.known[source] & ~division.links)
+    if len(chosen):
+        errors[chosen], _ = errors_between(task, made(task, division)[chosen])
+    return errors
+
+
+def _as_written(task: Task, division: Division, back: Toolpath) -> Division:
+    """The division with what its digits say."""
+    source = division.source
+    base = task.base[source]
+    there = base @ back.target_in_base
+    moved = division.moved
+    arc = np.isfinite(division.sweep)
+    return replace(
+        division,
+        command=Poses(
+            np.where(moved[:, None, None], there.rotation, division.command.rotation),
+            np.where(moved[:, None], there.position, division.command.position),
+        ),
+        centre=np.where(arc[:, None], (base @ Poses(np.eye(3), back.centre)).position, np.nan),
+        normal=np.where(arc[:, None], (base.rotation @ back.normal[..., None])[..., 0], np.nan),
+        sweep=np.where(arc, back.sweep, np.nan),
+    )
 
 
 def _decimals(tolerance: float) -> int:
@@ -97,38 +167,74 @@ def _contents(program: Program, edits: Sequence[Edit]) -> tuple[bytes, ...]:
     return tuple(contents)
 
 
-def _hold(path: Toolpath, back: Toolpath, planned: Poses, decimals: Mapping[str, int], file: str) -> None:
+def _hold(path: Toolpath, back: Toolpath, plan: Plan, writing: Writing, file: str) -> None:
     """The program read back is the one that was meant, motion by motion.  Raises Refusal FIL008."""
-    if len(back) != len(path):
-        raise Refusal(Finding("FIL008", f"{len(path)} motions became {len(back)}", file))
-    if not len(path):
+    source, own = plan.source, plan.own
+    if len(back) != len(plan):
+        raise Refusal(Finding("FIL008", f"{len(plan)} motions became {len(back)}", file))
+    if not len(plan):
         return
-    if back.refused.keys() != path.refused.keys():
+    place = np.flatnonzero(own)
+    if set(back.refused) != {int(place[row]) for row in path.refused}:
         raise Refusal(Finding("FIL008", "other motions than before are not understood", file))
-    for name in ("kind", "base", "tool", "status", "turn", "axes", "feed"):
-        before, after = getattr(path, name).reshape(len(path), -1), getattr(back, name).reshape(len(path), -1)
-        same = ((before == after) | ((before != before) & (after != after))).all(axis=1)
+    link = plan.role == Role.LINK
+    for name, rows in (
+        ("base", ~link | link),
+        ("tool", ~link | link),
+        ("kind", ~link),
+        ("status", own),
+        ("turn", own),
+        ("axes", own),
+        ("feed", path.kind[source] != Kind.PTP),
+    ):
+        before = getattr(path, name)[source].reshape(len(plan), -1)
+        after = getattr(back, name).reshape(len(plan), -1)
+        same = ((before == after) | ((before != before) & (after != after))).all(axis=1) | ~rows
         if not same.all():
             row = int(np.argmin(same))
-            raise Refusal(Finding("FIL008", f"the {name} of a motion changed", file, int(path.line[row])))
-    known = np.isfinite(path.position[:, 0])
+            raise Refusal(
+                Finding("FIL008", f"the {name} of a motion changed", file, int(path.line[source[row]]))
+            )
+    if (back.kind[link] != Kind.LIN).any():
+        raise Refusal(Finding("FIL008", "a link is no straight motion", file))
+    known = np.isfinite(plan.position[:, 0])
     if not np.array_equal(np.isfinite(back.position[:, 0]), known):
         raise Refusal(Finding("FIL008", "targets were lost or appeared", file))
-    off = np.abs(back.position - planned.position).max(axis=1) / MM
-    turned = np.swapaxes(planned.rotation, -1, -2) @ back.rotation
-    angle = (
-        np.linalg.norm(vector_from_rotation(np.where(known[:, None, None], turned, np.eye(3))), axis=1) / DEG
-    )
     # Half a written step a coordinate; three angles add up.
-    step_mm, step_deg = 10.0 ** -decimals["mm"], 10.0 ** -decimals["deg"]
-    wrong = known & ((off > 0.5001 * step_mm) | (angle > 1.5001 * step_deg))
+    step_mm, step_deg = 10.0**-writing.mm, 10.0**-writing.deg
+    off = np.abs(back.position - plan.position).max(axis=1) / MM
+    angle = _angle(plan.rotation, back.rotation) / DEG
+    _close(off > 0.5001 * step_mm, off, path, source, file, "mm from what was meant")
+    _close(angle > 1.5001 * step_deg, angle, path, source, file, "deg from what was meant")
+    _hold_arcs(path, back, plan, step_mm, file)
+
+
+def _hold_arcs(path: Toolpath, back: Toolpath, plan: Plan, step_mm: float, file: str) -> None:
+    arc = np.isfinite(plan.sweep)
+    if not np.array_equal(np.isfinite(back.sweep), arc):
+        raise Refusal(Finding("FIL008", "arcs were lost or appeared", file))
+    rows = np.flatnonzero(arc & np.append(False, np.isfinite(plan.position[:-1, 0])))
+    rows = rows[(plan.source[rows] > 0)]
+    half = np.full(len(rows), 0.5)
+    vias = [
+        on_arc(p.position[rows - 1], p.position[rows], p.centre[rows], p.normal[rows], p.sweep[rows], half)
+        for p in (plan, back)
+    ]
+    off = np.zeros(len(plan))
+    off[rows] = np.abs(vias[1] - vias[0]).max(axis=1, initial=0.0) / MM
+    _close(off > FAR * step_mm, off, path, plan.source, file, "mm from the arc that was meant")
+
+
+def _close(wrong: Bools, off: Floats, path: Toolpath, source: Ints, file: str, words: str) -> None:
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise Refusal(
-            Finding(
-                "FIL008",
-                f"a target is {off[row]:.6f} mm, {angle[row]:.6f} deg from what was meant",
-                file,
-                int(path.line[row]),
-            )
-        )
+        line = int(path.line[int(source[row])])
+        raise Refusal(Finding("FIL008", f"a target is {off[row]:.6f} {words}", file, line))
+
+
+def _angle(one: Floats, other: Floats) -> Floats:
+    """(M,) [rad] between rotations, 0 where one is not known."""
+    turned = np.swapaxes(one, -1, -2) @ other
+    known = np.isfinite(turned[:, 0, 0])
+    vectors = vector_from_rotation(np.where(known[:, None, None], turned, np.eye(3)))
+    return np.asarray(np.linalg.norm(vectors, axis=1))

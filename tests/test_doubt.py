@@ -13,7 +13,7 @@ from plant import SOFTER, kr270, random_tools, random_wrenches, with_compensator
 
 from postproc.cell import load_cell
 from postproc.compensation import doubt
-from postproc.compensation.correct import Task, correct
+from postproc.compensation.correct import correct
 from postproc.compensation.doubt import (
     EVEN,
     FORCE,
@@ -28,7 +28,9 @@ from postproc.compensation.doubt import (
     spreads,
 )
 from postproc.compensation.mirror import predict
+from postproc.compensation.task import Task
 from postproc.findings import Refusal
+from postproc.forces import Wrenches
 from postproc.geometry import Poses, rotation_from_vector
 from postproc.model import NOTHING, StiffnessModel
 from postproc.report.terminal import _doubt
@@ -95,14 +97,13 @@ def job(model, count=10, process=True, wrench=None, gain=1.0, seed=5):
         wanted=wanted,
         base=Poses(np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))),
         tool=tool,
-        wrench=wrench,
-        wrench_start=wrench,
-        carries=np.ones(count, bool),
+        force=Wrenches(wrench, wrench, np.ones(count, bool), "test", (), np.zeros(len(wrench), bool)),
         conditions=NOTHING,
         process=process,
         gain=gain,
         max_correction=0.05,
         tolerance=2e-5,
+        tolerance_angle=2e-4,
     )
 
 

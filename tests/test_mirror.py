@@ -8,10 +8,12 @@ from motions import load_of, milling_angles, motions
 from plant import SOFTER, kr270, random_tools, random_wrenches, with_compensator
 from scipy.optimize import brentq
 
-from postproc.compensation.correct import State, Task, correct
+from postproc.compensation.correct import State, correct
 from postproc.compensation.cuts import cuts_of, spread
 from postproc.compensation.mirror import MAX_ITERATIONS, difference, mirror, partly, predict
+from postproc.compensation.task import Task
 from postproc.findings import Finding, Refusal
+from postproc.forces import Wrenches
 from postproc.geometry import Poses, rotation_from_vector
 from postproc.model import NOTHING, StiffnessModel
 from postproc.robot.chain import generalized_force
@@ -309,14 +311,13 @@ def task(
         wanted=wanted,
         base=world,
         tool=tool,
-        wrench=wrench,
-        wrench_start=wrench,
-        carries=carries,
+        force=Wrenches(wrench, wrench, carries, "test", (), np.zeros(len(wrench), bool)),
         conditions=NOTHING,
         process=process,
         gain=gain,
         max_correction=max_correction,
         tolerance=2e-5,
+        tolerance_angle=2e-4,
     )
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Out, result_options
+from postproc.cli.common import Out, language_options, result_options
 
 
 @click.command()
@@ -14,9 +14,12 @@ from postproc.cli.common import Out, result_options
 @click.option("--dump", is_flag=True, help="Print the canonical list of motions (mm, deg), one a line.")
 @click.option("--list-codes", is_flag=True, help="List the codes of all findings.")
 @click.option("--explain", metavar="CODE", help="Explain one code.")
+@language_options
 @result_options
 def check(
     program: Path | None,
+    cell: Path | None,
+    config_dat: Path | None,
     dump: bool,
     list_codes: bool,
     explain: str | None,
@@ -54,7 +57,7 @@ def check(
 
     out = Out(json_to, quiet, verbose)
     with out.refusals(""):
-        done = run(program)
+        done = run(program, cell, config_dat)
         out.result(done.as_json())
     if dump and json_to != "-":
         click.echo("\n".join(done.toolpath.dump()))

@@ -86,14 +86,31 @@ def program_options(command: _Command) -> _Command:
                 "comes first. With a value: 0,360,560@base (world, tool, feed; six numbers with moments), or a CSV.",
             ),
             click.option("--robot", metavar="NAME|FILE", help="Robot instead of the cell's."),
-            click.option(
-                "--cell", type=click.Path(path_type=Path), help="Cell file instead of the nearest cell.yaml."
-            ),
+            language_options,
             click.option("--strict", is_flag=True, help="Warnings count as errors."),
         )
     ):
         command = decorate(command)
     return result_options(command)
+
+
+def language_options(command: _Command) -> _Command:
+    """What a program does not say of itself."""
+    for decorate in reversed(
+        (
+            click.option(
+                "--cell", type=click.Path(path_type=Path), help="Cell file instead of the nearest cell.yaml."
+            ),
+            click.option(
+                "--config-dat",
+                type=click.Path(path_type=Path),
+                metavar="FILE",
+                help="The controller's $config.dat, for points and frames that stand there [the cell's].",
+            ),
+        )
+    ):
+        command = decorate(command)
+    return command
 
 
 def readings_options(command: _Command) -> _Command:

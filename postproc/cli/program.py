@@ -28,6 +28,15 @@ from postproc.cli.common import Out, program_options
 @click.option(
     "--report", type=click.Path(path_type=Path), metavar="DIR", help="Folder of the reports [beside it]."
 )
+@click.option("--keep-points", is_flag=True, help="Insert no motion; what that leaves on the way is told.")
+@click.option(
+    "--own-points",
+    type=click.Choice(["inline", "dat", "refuse"]),
+    default="inline",
+    show_default=True,
+    help="A named point that serves several motions: each gets its own as numbers in its line, as a new point in the "
+    ".dat, or none of them is moved.",
+)
 @click.option("--dry-run", is_flag=True, help="Do everything but write.")
 @click.option("--again", is_flag=True, help="Compensate a program that is compensated already.")
 def program(
@@ -35,6 +44,7 @@ def program(
     force: str | None,
     robot: str | None,
     cell: Path | None,
+    config_dat: Path | None,
     strict: bool,
     json_to: str | None,
     quiet: bool,
@@ -42,6 +52,8 @@ def program(
     gain: float,
     output: str | None,
     report: Path | None,
+    keep_points: bool,
+    own_points: str,
     dry_run: bool,
     again: bool,
 ) -> None:
@@ -80,6 +92,9 @@ def program(
                 dry_run=dry_run,
                 again=again,
                 json=out.json_file,
+                keep_points=keep_points,
+                own_points=own_points,
+                config_dat=config_dat,
             ),
             stage,
         )

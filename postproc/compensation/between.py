@@ -1,43 +1,117 @@
-"""What a correction of end points leaves over in the middle of straight motions."""
+"""How far the tool is from the wanted way between the points that a controller is sent to."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.compensation.correct import Result, Task
-from postproc.compensation.mirror import partly, predict
-from postproc.toolpath import Kind
+from postproc.arrays import Floats, Ints
+from postproc.compensation.mirror import difference
+from postproc.compensation.task import Task
+from postproc.compensation.ways import between
+from postproc.geometry import Poses, arc_in_plane, arc_through, on_arc
+from postproc.units import DEG, MM
+
+SHARES = (0.25, 0.5, 0.75)
+"""Where the way between two points is looked at; an error that grows from both of them is largest in the middle."""
+
+SHORT, LITTLE = 30 * MM, 3 * DEG
+"""Of a piece that is shorter and turns by less the middle tells enough."""
 
 
-def midway_errors(task: Task, result: Result) -> Floats:
-    """Distance (N,) [m] of the predicted tool from the wanted line, half way along each corrected straight motion.
+@dataclass(frozen=True)
+class Pieces:
+    """K pieces of ways, as a controller makes them.
 
-    The controller runs straight from command to command and turns evenly; the wrench is half way between its values
-    at both ends.  NaN where there is no such middle: other motions, and a start that is not known.
+    rows (K,): the motion each belongs to; first, last (K,): the shares of its way where the piece begins and ends;
+    begin, end: TCP commands in the robot base; centre, normal (K, 3), sweep (K,): of arcs, NaN for straight pieces.
     """
-    path = task.toolpath
-    errors = np.full(len(path), np.nan)
-    rows = np.flatnonzero(result.corrected & (path.kind == Kind.LIN))
-    rows = rows[rows > 0]
-    begins = path.known[rows - 1] & (path.tool[rows] == path.tool[rows - 1])
-    rows = rows[begins & np.isfinite(result.command.position[rows - 1, 0])]
-    along = task.wanted.position[rows] - task.wanted.position[rows - 1]
-    length = np.linalg.norm(along, axis=1)
-    rows, along = rows[length > 0], along[length > 0] / length[length > 0, None]
-    if not len(rows):
-        return errors
-    wanted = partly(task.wanted[rows - 1], task.wanted[rows], 0.5)
-    command = partly(result.command[rows - 1], result.command[rows], 0.5)
-    wrench = 0.5 * (task.wrench_start[rows] + task.wrench[rows])
-    tool, conditions = task.tool[rows], task.conditions.part(rows)
-    status, near = task.track.status[rows], task.track.q[rows]
-    real = predict(task.model, command, tool, wrench, conditions, status, near).pose.position
-    goal = wanted.position
-    if task.process:
-        goal = predict(
-            task.model, wanted, tool, np.zeros_like(wrench), conditions, status, near
-        ).pose.position
-    off = real - goal
-    errors[rows] = np.linalg.norm(off - np.sum(off * along, axis=1, keepdims=True) * along, axis=1)
-    return errors
+
+    rows: Ints
+    first: Floats
+    last: Floats
+    begin: Poses
+    end: Poses
+    centre: Floats
+    normal: Floats
+    sweep: Floats
+
+    @staticmethod
+    def straight(rows: Ints, first: Floats, last: Floats, begin: Poses, end: Poses) -> Pieces:
+        none = np.full((len(rows), 3), np.nan)
+        return Pieces(rows, first, last, begin, end, none, none, none[:, 0])
+
+    @staticmethod
+    def round(
+        rows: Ints, first: Floats, last: Floats, begin: Poses, via: Poses, end: Poses, planar: Floats | None
+    ) -> Pieces:
+        """Arcs through ``via``; ``planar`` (K, 3): about these normals, with what is left along them in proportion."""
+        points = begin.position, via.position, end.position
+        arc = arc_through(*points) if planar is None else arc_in_plane(*points, planar)
+        return Pieces(rows, first, last, begin, end, *arc)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __getitem__(self, chosen: Ints) -> Pieces:
+        return Pieces(
+            self.rows[chosen],
+            self.first[chosen],
+            self.last[chosen],
+            self.begin[chosen],
+            self.end[chosen],
+            self.centre[chosen],
+            self.normal[chosen],
+            self.sweep[chosen],
+        )
+
+    def at(self, share: Floats) -> Poses:
+        """Commands (K) at the shares (K,) of the pieces."""
+        found = between(self.begin, self.end, share)
+        bent = np.flatnonzero(np.isfinite(self.sweep))
+        if len(bent):
+            found.position[bent] = on_arc(
+                self.begin.position[bent],
+                self.end.position[bent],
+                self.centre[bent],
+                self.normal[bent],
+                self.sweep[bent],
+                share[bent],
+            )
+        return found
+
+
+def errors_between(task: Task, pieces: Pieces) -> tuple[Floats, Floats]:
+    """Largest distance (K,) [m] of the predicted tool from the wanted way, and largest angle (K,) [rad] from the wanted
+    orientation, inside of each piece; infinite where the robot can not be there.
+
+    Along the way the tool may be early or late: only what it is beside the way counts.  Of motions whose orientation
+    can not be corrected the angle is 0.
+    """
+    length = np.linalg.norm(pieces.end.position - pieces.begin.position, axis=1)
+    _, turn = difference(pieces.end, pieces.begin)
+    long = (length > SHORT) | (np.linalg.norm(turn, axis=1) > LITTLE) | np.isfinite(pieces.sweep)
+    off, angle = np.zeros(len(pieces)), np.zeros(len(pieces))
+    for share in SHARES:
+        chosen = np.arange(len(pieces)) if share == 0.5 else np.flatnonzero(long)
+        if len(chosen):
+            here = _errors(task, pieces[chosen], share)
+            off[chosen] = np.maximum(off[chosen], here[0])
+            angle[chosen] = np.maximum(angle[chosen], here[1])
+    return off, angle
+
+
+def _errors(task: Task, pieces: Pieces, share: float) -> tuple[Floats, Floats]:
+    """As ``errors_between``, at one share of each piece."""
+    rows = pieces.rows
+    along = pieces.first + share * (pieces.last - pieces.first)
+    wanted = task.ways.at(rows, along)
+    wrench = task.force.along(rows, along)
+    real = task.real(rows, pieces.at(np.full(len(rows), share)), wrench)
+    shift, turn = difference(real.pose, task.goal(rows, wanted))
+    tangent = task.ways.tangent(rows, along)
+    shift = shift - np.sum(shift * tangent, axis=1, keepdims=True) * tangent
+    good = real.reachable & real.settled
+    angle = np.where(task.toolpath.oriented[rows], np.linalg.norm(turn, axis=1), 0.0)
+    return np.where(good, np.linalg.norm(shift, axis=1), np.inf), np.where(good, angle, np.inf)

@@ -9,13 +9,12 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.cuts import cuts_of, left_findings, spread, switch_findings, switched_on
-from postproc.compensation.mirror import difference, mirror, partly, predict
-from postproc.effects import Conditions
+from postproc.compensation.mirror import difference, partly
+from postproc.compensation.task import Task
 from postproc.findings import Finding, Refusal
 from postproc.geometry import Poses
-from postproc.model import StiffnessModel
-from postproc.robot.track import Track, near_singular, sides, singular_words
-from postproc.toolpath import Kind, Toolpath
+from postproc.robot.track import near_singular, sides, singular_words
+from postproc.toolpath import Kind
 from postproc.units import DEG, MM
 
 
@@ -24,34 +23,6 @@ class State(IntEnum):
     CORRECTED = 1
     LEFT = 2  # could not be corrected, told
     OFF = 3  # left alone on the program's own word (COMPENSATE OFF)
-
-
-@dataclass(frozen=True)
-class Task:
-    """All that a correction needs, N motions.  Poses are in the robot base; NaN where a target is not known.
-
-    wanted: TCP targets; base, tool (N): the programmed base in the robot base, the TCP on the flange; wrench (N, 6)
-    at the end of each motion and wrench_start at its begin, robot base axes; carries (N,): the motion has a force;
-    conditions (N): what else is known; ``process``: correct what the force does and leave what the robot does without
-    it (a base that was touched off contains that); else everything is corrected.
-    ``max_correction``, ``tolerance`` [m].
-    """
-
-    file: str
-    toolpath: Toolpath
-    model: StiffnessModel
-    track: Track
-    wanted: Poses
-    base: Poses
-    tool: Poses
-    wrench: Floats
-    wrench_start: Floats
-    carries: Bools
-    conditions: Conditions
-    process: bool
-    gain: float
-    max_correction: float
-    tolerance: float
 
 
 @dataclass(frozen=True)
@@ -103,16 +74,8 @@ def correct(task: Task) -> Result:
     # What the force does, everywhere it can be predicted; then the correction, where it may be made.
     seen = scope & cartesian & (track.status >= 0) & track.reachable
     rows = np.flatnonzero(seen)
-    goal = _goal(task, rows)
-    here = predict(
-        task.model,
-        task.wanted[rows],
-        task.tool[rows],
-        task.wrench[rows],
-        task.conditions.part(rows),
-        track.status[rows],
-        track.q[rows],
-    )
+    goal = task.goal(rows, task.wanted[rows])
+    here = task.real(rows, task.wanted[rows], task.wrench[rows])
     deflection, before, before_angle = np.full((n, 3), np.nan), np.full(n, np.nan), np.full(n, np.nan)
     shift, turn = difference(here.pose, goal)
     shift[~here.settled], turn[~here.settled] = np.nan, np.nan
@@ -122,16 +85,7 @@ def correct(task: Task) -> Result:
     may = seen & on & ~spread(_in(why, n), cut)
     rows_may = np.flatnonzero(may)
     inside = np.searchsorted(rows, rows_may)
-    done = mirror(
-        task.model,
-        task.wanted[rows_may],
-        goal[inside],
-        task.tool[rows_may],
-        task.wrench[rows_may],
-        task.conditions.part(rows_may),
-        track.status[rows_may],
-        track.q[rows_may],
-    )
+    done = task.command(rows_may, task.wanted[rows_may], task.wrench[rows_may], goal[inside])
     _judge(task, done.reachable, done.settled, done.converged, done.q, rows_may, why, findings)
     keeps = may & ~spread(_in(why, n), cut)
     chosen = keeps[rows_may]
@@ -179,16 +133,8 @@ def correct(task: Task) -> Result:
 def with_residual(task: Task, result: Result, command: Poses) -> Result:
     """The result with its residual predicted for ``command``, the poses as they were really written."""
     rows = np.flatnonzero(result.corrected)
-    here = predict(
-        task.model,
-        command[rows],
-        task.tool[rows],
-        task.wrench[rows],
-        task.conditions.part(rows),
-        task.track.status[rows],
-        task.track.q[rows],
-    )
-    shift, turn = difference(here.pose, _goal(task, rows))
+    here = task.real(rows, command[rows], task.wrench[rows])
+    shift, turn = difference(here.pose, task.goal(rows, task.wanted[rows]))
     after, after_angle = result.before.copy(), result.before_angle.copy()
     after[rows] = np.where(here.reachable & here.settled, np.linalg.norm(shift, axis=1), np.inf)
     after_angle[rows] = np.linalg.norm(turn, axis=1)
@@ -245,17 +191,6 @@ def _which_axis(task: Task, q: Floats, mask: Bools) -> str:
         f"{joint.name} at {q[row, axis] / unit:.1f} {word},"
         f" limits {low[axis] / unit:g} .. {high[axis] / unit:g} {word}"
     )
-
-
-def _goal(task: Task, rows: Ints) -> Poses:
-    """Where the tool is to be: the wanted pose, or where the robot without force takes it."""
-    if not task.process:
-        return task.wanted[rows]
-    still = np.zeros((len(rows), 6))
-    status, near = task.track.status[rows], task.track.q[rows]
-    return predict(
-        task.model, task.wanted[rows], task.tool[rows], still, task.conditions.part(rows), status, near
-    ).pose
 
 
 def _judge(

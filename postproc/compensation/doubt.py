@@ -18,8 +18,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.compensation.correct import Result, Task
+from postproc.compensation.correct import Result
 from postproc.compensation.mirror import predict
+from postproc.compensation.task import Task
 from postproc.effects import Conditions
 from postproc.geometry import Poses
 from postproc.model import NOTHING, StiffnessModel

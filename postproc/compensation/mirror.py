@@ -86,8 +86,12 @@ def mirror(
     conditions: Conditions,
     status: Ints,
     near: Floats,
+    oriented: Bools | None = None,
 ) -> Correction:
     """Correct N commands that start at ``wanted`` so that the predicted tool comes to ``goal``.
+
+    ``oriented`` (N,): motions whose orientation is corrected too (all of them without it); of the others only the
+    position is, and judged.
 
     A motion stops when it is within tolerance, out of reach, without equilibrium, or when an iteration does not
     at least halve its error (it would not settle): ``converged`` says which, nothing diverges silently.
@@ -112,6 +116,8 @@ def mirror(
             bent,
         )
         shift, turn = difference(here.pose, goal[active])
+        if oriented is not None:
+            turn[~oriented[active]] = 0.0
         error, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
         good = here.reachable & here.settled
         q[active], reachable[active], settled[active] = here.q, here.reachable, here.settled | ~here.reachable
@@ -140,9 +146,9 @@ def difference(real: Poses, goal: Poses) -> tuple[Floats, Floats]:
     return real.position - goal.position, turn
 
 
-def partly(wanted: Poses, command: Poses, gain: float) -> Poses:
-    """The share ``gain`` (0..1) of the way from ``wanted`` to ``command``."""
-    if gain == 1.0:
+def partly(wanted: Poses, command: Poses, gain: float | Floats) -> Poses:
+    """The share ``gain`` (0..1; one for all, or (N, 1)) of the way from ``wanted`` to ``command``."""
+    if isinstance(gain, float) and gain == 1.0:
         return command
     shift, turn = difference(command, wanted)
     return Poses(rotation_from_vector(gain * turn) @ wanted.rotation, wanted.position + gain * shift)

@@ -48,7 +48,8 @@ class Worst:
 
 @dataclass(frozen=True)
 class Report:
-    """One program.  ``after`` and ``correction`` are None where nothing was corrected (predict)."""
+    """One program.  ``after``, ``between`` (the way between points) and ``correction`` are None where nothing was
+    corrected (predict)."""
 
     program: str
     dialect: str
@@ -58,6 +59,7 @@ class Report:
     cutting: int
     corrected: int
     inserted: int
+    links: int
     left: int
     iterations: int
     gain: float
@@ -66,6 +68,7 @@ class Report:
     force_max_n: float
     before: Spread
     after: Spread | None
+    between: Spread | None
     correction: Spread | None
     angle_before_deg: float
     angle_after_deg: float | None
@@ -89,6 +92,7 @@ class Report:
             "cutting": self.cutting,
             "corrected": self.corrected,
             "inserted": self.inserted,
+            "links": self.links,
             "left": self.left,
             "iterations": self.iterations,
             "gain": self.gain,
@@ -98,6 +102,7 @@ class Report:
             "error_after_mm": {**self.after.as_mm(), "ci95": _finite(self.doubt.after / MM)}
             if self.after
             else None,
+            "way_after_mm": self.between.as_mm() if self.between else None,
             "correction_mm": self.correction.as_mm() if self.correction else None,
             "angle_before_deg": {"max": _finite(self.angle_before_deg)},
             "angle_after_deg": None

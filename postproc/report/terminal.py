@@ -54,12 +54,14 @@ def _rows(report: Report) -> Iterable[tuple[str, str]]:
         share = "" if report.gain == 1.0 else f"; gain {report.gain:g}"
         after = _spread(report.after, _interval(report.doubt, report.doubt.after))
         yield "error after", f"{after}, orientation {_deg(report.angle_after_deg)}"
+        if report.between is not None:
+            yield "on the way", f"{_spread(report.between)}, between the points as written"
         yield "correction", f"{_spread(report.correction)} ({report.iterations} iterations{share})"
         yield (
             "motions",
             (
                 f"{report.corrected} corrected, {report.left} left, {report.motions - report.corrected - report.left}"
-                " with nothing to correct"
+                f" with nothing to correct; {report.inserted} inserted ({report.links} links)"
             ),
         )
     if report.doubt.worst >= 0:

@@ -10,12 +10,12 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.cell import Cell, Frames, find_cell, frames_of, load_cell
-from postproc.compensation.correct import Task
-from postproc.dialects import detect
-from postproc.dialects.dialect import Dialect, Program
+from postproc.compensation.task import Task
+from postproc.dialects import DIALECTS, detect
+from postproc.dialects.dialect import Dialect, Program, Settings
 from postproc.document import Document
 from postproc.effects import Conditions
-from postproc.findings import Finding, Refusal
+from postproc.findings import Finding, Refusal, nearest
 from postproc.forces import Wrenches, is_no_force, wrenches
 from postproc.model import StiffnessModel, approach
 from postproc.robot.description import Robot, find_robot, load_robot
@@ -43,6 +43,9 @@ class Request:
     dry_run: bool = False
     again: bool = False
     json: Path | None = None
+    keep_points: bool = False
+    own_points: str = "inline"
+    config_dat: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,7 @@ class Prepared:
 
     program: Program
     dialect: Dialect
+    settings: Settings
     cell: Cell
     robot: Robot
     model: StiffnessModel
@@ -63,14 +67,51 @@ def silent(_stage: str) -> None:
     """Progress that nobody watches."""
 
 
-def read_program(path: Path) -> tuple[Dialect, Program]:
-    """Read a program and what belongs to it.  Raises Refusal FIL001, FIL002, FIL003."""
+def read_program(
+    path: Path, cell: Cell | None = None, config_dat: Path | None = None
+) -> tuple[Dialect, Program, Settings]:
+    """Read a program and what belongs to it, with what the cell says of its language.
+
+    ``config_dat``: instead of the cell's.  Raises Refusal FIL001, FIL002, FIL003, YML004.
+    """
     main = read_document(path)
     if not main.raw.strip():
         raise Refusal(Finding("FIL002", "the file is empty", str(path)))
-    dialect = detect(path, main.raw)
+    dialect = _dialect(path, main.raw, cell)
     documents = (main, *(read_document(companion) for companion in dialect.companions(path)))
-    return dialect, dialect.read(documents)
+    if config_dat is None and cell is not None and cell.config_dat is not None:
+        config_dat = cell.path.parent / cell.config_dat
+    references = () if config_dat is None else (read_document(config_dat),)
+    settings = Settings(references=references)
+    if cell is not None:
+        settings = Settings(cell.orientation, cell.integer_words, references)
+    return dialect, dialect.read(documents, settings), settings
+
+
+def _dialect(path: Path, raw: bytes, cell: Cell | None) -> Dialect:
+    if cell is None or cell.dialect is None:
+        return detect(path, raw)
+    if cell.dialect not in DIALECTS:
+        known = ", ".join(DIALECTS)
+        raise Refusal(
+            Finding(
+                "YML004",
+                f"dialect.name: {cell.dialect!r} is not one of {known}{nearest(cell.dialect, DIALECTS)}",
+                str(cell.path),
+                cell.dialect_line,
+            )
+        )
+    return DIALECTS[cell.dialect]
+
+
+def near_cell(program: Path) -> Cell | None:
+    """The checked cell of a program; None where there is none."""
+    try:
+        return load_cell(find_cell(program))
+    except Refusal as refusal:
+        if refusal.findings[0].code != "CEL001":
+            raise
+        return None
 
 
 def read_document(path: Path) -> Document:
@@ -86,8 +127,8 @@ def read_document(path: Path) -> Document:
 
 def prepare(request: Request) -> Prepared:
     """Read program, cell and robot, and find force and axes of every motion."""
-    dialect, read = read_program(request.program)
     cell = _cell(request)
+    dialect, read, settings = read_program(request.program, cell, request.config_dat)
     beside = None if request.robot else cell.path.parent
     robot = load_robot(find_robot(cell.robot, beside))
     full = StiffnessModel.from_robot(robot)
@@ -121,14 +162,13 @@ def prepare(request: Request) -> Prepared:
         wanted=wanted,
         base=base,
         tool=tool,
-        wrench=force.values,
-        wrench_start=force.start,
-        carries=force.carries,
+        force=force,
         conditions=_conditions(request, path, cell, frames, model, force, track.q),
         process=process,
         gain=request.gain,
         max_correction=cell.max_correction,
         tolerance=cell.tolerance,
+        tolerance_angle=cell.tolerance_angle,
     )
     findings = [*program.findings, *force.findings, *model.doubts()]
     if force.any and not model.gives_way:
@@ -139,7 +179,7 @@ def prepare(request: Request) -> Prepared:
         )
     if not isinstance(robot.nominal, SerialArm):
         findings += _disagreeing(request.program, path, track)
-    return Prepared(program, dialect, cell, robot, model, force, task, tuple(findings))
+    return Prepared(program, dialect, settings, cell, robot, model, force, task, tuple(findings))
 
 
 def _disagreeing(program: Path, path: Toolpath, track: Track) -> list[Finding]:

@@ -13,17 +13,19 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.compensation.between import midway_errors
 from postproc.compensation.correct import Result, State, correct
+from postproc.compensation.division import Division, Limits, divide
 from postproc.compensation.doubt import doubt_of
-from postproc.dialects.dialect import Program
+from postproc.compensation.task import Task
+from postproc.dialects.dialect import Moved, Program
 from postproc.findings import Finding, Refusal
 from postproc.publish import publish
 from postproc.report.files import corrections_csv, unified_diff
 from postproc.report.report import Report, Spread, Worst, exit_code, in_order_of_place, json_bytes
+from postproc.toolpath import Plan, Role
 from postproc.units import DEG, MM
 from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, read_document, silent
-from postproc.writing import write
+from postproc.writing import Written, planned, write, written_as
 
 WORST_PLACES = 5
 
@@ -34,7 +36,7 @@ def predict(request: Request, stage: Stage = silent) -> Report:
     stage("predicting")
     result = correct(replace(ready.task, gain=0.0))
     findings = in_order_of_place([*ready.findings, *result.findings])
-    report = _report(request, ready, result, findings, corrected=False)
+    report = _report(request, ready, result, findings)
     files: dict[Path, bytes] = {}
     pages = [] if request.json is None else [request.json]
     if request.report:
@@ -66,21 +68,26 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
             )
         )
     stage("correcting")
-    result = correct(ready.task)
+    writing = written_as(ready.cell, request.own_points)
+    task, result, division, plan, moved = _corrected(request, ready)
     stage("writing, and reading back")
     target = _target(request)
     written = write(
         program,
         ready.dialect,
-        ready.task,
+        task,
         result,
-        ready.cell,
+        division,
+        plan,
+        moved,
+        writing,
+        ready.settings,
         ready.robot,
         target.stem,
         lambda path: completed(path, ready.cell, ready.robot, request.program),
     )
     edits, result = written.edits, written.result
-    findings = [*ready.findings, *result.findings, *_closing(request, ready, result)]
+    findings = [*ready.findings, *result.findings, *division.findings, *_closing(request, ready, written)]
     paths = _output_paths(program, target)
     outputs = dict(zip(paths, written.contents, strict=True))
     stem = target.stem
@@ -88,7 +95,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff")]
     names += [] if request.json is None else [request.json]
     stage("reporting")
-    report = _report(request, ready, result, in_order_of_place(findings), corrected=True)
+    report = _report(request, ready, result, in_order_of_place(findings), written)
     if report.exit == 1:
         raise Refusal(*report.findings)
     report = replace(report, outputs=tuple(str(path) for path in (*paths, *names)))
@@ -113,44 +120,77 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     return report
 
 
-def _closing(request: Request, ready: Prepared, result: Result) -> list[Finding]:
+def _corrected(request: Request, ready: Prepared) -> tuple[Task, Result, Division, Plan, Moved]:
+    """The correction and its edits; what can not be divided or written as planned stays, and the rest is made anew."""
+    task, cell = ready.task, ready.cell
+    limits = Limits(request.keep_points, cell.min_segment, cell.max_growth, ready.dialect.arcs_in_plane)
+    writing = written_as(cell, request.own_points)
+    while True:
+        result = correct(task)
+        division = divide(task, result, limits)
+        plan = planned(task, division)
+        moved = Moved((), division.held)
+        if not moved.held:
+            moved = ready.dialect.moved(ready.program, plan, writing)
+        known = task.toolpath.refused
+        held = {row: finding for row, finding in moved.held.items() if row not in known}
+        if not moved.held:
+            return task, result, division, plan, moved
+        if not held:
+            raise ValueError("motions that stay as they are were held again")
+        task = replace(task, toolpath=replace(task.toolpath, refused={**known, **held}))
+
+
+def _closing(request: Request, ready: Prepared, written: Written) -> list[Finding]:
     """What is to be said of the corrected program as a whole."""
     file, findings = str(request.program), []
+    result, division = written.result, written.division
+    path, tolerance = ready.task.toolpath, ready.cell.tolerance
     corrected = result.corrected
     if ready.task.process and not ready.wrenches.any:
         said = "--force was not given" if request.force is None else "no motion carries a force"
         findings.append(Finding("COR010", f"{said}: nothing is corrected", file))
-    above = corrected & (result.after > ready.cell.tolerance)
+    if division.inserted:
+        links = int(division.links.sum())
+        first = int(division.source[np.argmax(division.role != Role.OWN)])
+        findings.append(
+            Finding(
+                "COR012",
+                f"{links} links where the correction steps, and {division.inserted - links} points on the way"
+                f" (here the first one): {len(division) / max(len(path), 1):.3f} times the motions",
+                file,
+                int(path.line[first]),
+            )
+        )
     if request.gain < 1.0:
         findings.append(
             Finding("COR007", f"{request.gain:.0%} of the correction was applied, as asked", file)
         )
-    elif above.any():
+        return findings
+    above = corrected & (result.after > tolerance)
+    if above.any():
         row = int(np.argmax(np.where(corrected, result.after, -1.0)))
         findings.append(
             Finding(
                 "COR005",
-                f"{result.after[row] / MM:.4f} mm remain, tolerance {ready.cell.tolerance / MM:g} mm"
+                f"{result.after[row] / MM:.4f} mm remain, tolerance {tolerance / MM:g} mm"
                 f" ({int(above.sum())} motions)",
                 file,
-                int(ready.task.toolpath.line[row]),
+                int(path.line[row]),
             )
         )
-    if corrected.any():
-        middle = midway_errors(ready.task, result)
-        over = int((middle > ready.cell.tolerance).sum())
-        row = int(np.argmax(np.nan_to_num(middle)))
+    over = np.nan_to_num(written.between) > tolerance
+    if over.any():
+        worst = int(np.argmax(np.nan_to_num(written.between)))
         findings.append(
             Finding(
                 "COR006",
-                f"{int(corrected.sum())} end points are corrected, the way between them is not: half way along straight"
-                f" motions the tool is up to {np.nanmax(middle, initial=0.0) / MM:.4f} mm from the line (worst here),"
-                f" above the tolerance in {over} motions",
+                f"between its points the tool is up to {written.between[worst] / MM:.4f} mm from the wanted way (worst"
+                f" here), tolerance {tolerance / MM:g} mm ({int(over.sum())} motions)",
                 file,
-                int(ready.task.toolpath.line[row]),
-                help="a correction fades in along the first motion of its cut, and along the side behind a corner where"
-                " the force turns; long motions bend differently in their middle: let the CAM system post short"
-                " segments there",
+                int(path.line[division.source[worst]]),
+                help="no point may be inserted there (--keep-points, max_growth, min_segment, a spline, a TRIGGER), or"
+                " the begin of the motion is not known",
             )
         )
     return findings
@@ -184,9 +224,13 @@ def _not_over_inputs(ready: Prepared, outputs: Sequence[str]) -> None:
 
 
 def _report(
-    request: Request, ready: Prepared, result: Result, findings: tuple[Finding, ...], corrected: bool
+    request: Request,
+    ready: Prepared,
+    result: Result,
+    findings: tuple[Finding, ...],
+    written: Written | None = None,
 ) -> Report:
-    task = ready.task
+    task, corrected = ready.task, written is not None
     scope = result.state != State.AIR
     size = np.linalg.norm(result.command.position - task.wanted.position, axis=1)
     force = np.linalg.norm(task.wrench[:, :3], axis=1)
@@ -210,7 +254,8 @@ def _report(
         cuts=int(result.cut.max(initial=-1)) + 1,
         cutting=int(scope.sum()),
         corrected=int(result.corrected.sum()) if corrected else 0,
-        inserted=0,
+        inserted=written.division.inserted if written else 0,
+        links=int(written.division.links.sum()) if written else 0,
         left=int((result.state == State.LEFT).sum()),
         iterations=int(result.iterations.max(initial=0)),
         gain=request.gain,
@@ -219,6 +264,7 @@ def _report(
         force_max_n=ready.wrenches.max_force,
         before=Spread.of(result.before[scope]),
         after=Spread.of(result.after[scope]) if corrected else None,
+        between=Spread.of(written.between) if written else None,
         correction=Spread.of(size[result.corrected]) if corrected else None,
         angle_before_deg=_largest(result.before_angle[scope]) / DEG,
         angle_after_deg=_largest(result.after_angle[scope]) / DEG if corrected else None,

@@ -1,0 +1,91 @@
+"""All that a correction needs of a program: poses, forces, model, and what is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.compensation.mirror import Correction, Prediction, mirror, predict
+from postproc.compensation.ways import Ways
+from postproc.effects import Conditions
+from postproc.forces import Wrenches
+from postproc.geometry import Poses
+from postproc.model import StiffnessModel
+from postproc.robot.track import Track
+from postproc.toolpath import Toolpath
+
+
+@dataclass(frozen=True)
+class Task:
+    """All that a correction needs, N motions.  Poses are in the robot base; NaN where a target is not known.
+
+    wanted: TCP targets; base, tool (N): the programmed base in the robot base, the TCP on the flange; force: the
+    wrench on the way of each motion; conditions (N): what else is known; ``process``: correct what the force does and
+    leave what the robot does without it (a base that was touched off contains that); else everything is corrected.
+    ``max_correction``, ``tolerance`` [m], ``tolerance_angle`` [rad].
+    """
+
+    file: str
+    toolpath: Toolpath
+    model: StiffnessModel
+    track: Track
+    wanted: Poses
+    base: Poses
+    tool: Poses
+    force: Wrenches
+    conditions: Conditions
+    process: bool
+    gain: float
+    max_correction: float
+    tolerance: float
+    tolerance_angle: float
+
+    @property
+    def wrench(self) -> Floats:
+        """(N, 6) at the end of each motion, robot base axes."""
+        return self.force.values
+
+    @property
+    def carries(self) -> Bools:
+        """(N,) the motion has a force."""
+        return self.force.carries
+
+    @cached_property
+    def ways(self) -> Ways:
+        return Ways.of(self.toolpath, self.wanted, self.base, self.tool, self.model.robot, self.track)
+
+    def real(self, rows: Ints, command: Poses, wrench: Floats) -> Prediction:
+        """Where the tool comes when the controller is sent to ``command`` (K) in motions ``rows`` (K,) under
+        ``wrench`` (K, 6)."""
+        return predict(
+            self.model,
+            command,
+            self.tool[rows],
+            wrench,
+            self.conditions.part(rows),
+            self.track.status[rows],
+            self.track.q[rows],
+        )
+
+    def goal(self, rows: Ints, wanted: Poses) -> Poses:
+        """Where the tool is to be: the wanted poses (K), or where the robot without force takes it."""
+        if not self.process:
+            return wanted
+        return self.real(rows, wanted, np.zeros((len(rows), 6))).pose
+
+    def command(self, rows: Ints, wanted: Poses, wrench: Floats, goal: Poses) -> Correction:
+        """The commands (K) that bring the tool to ``goal`` (K) in motions ``rows`` (K,)."""
+        return mirror(
+            self.model,
+            wanted,
+            goal,
+            self.tool[rows],
+            wrench,
+            self.conditions.part(rows),
+            self.track.status[rows],
+            self.track.q[rows],
+            self.toolpath.oriented[rows],
+        )
