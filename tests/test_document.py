@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.document import Document, Edit, Span, apply, in_order, undone
+from postproc.document import BLOCK, Document, Edit, Edits, Span, apply, in_order, undone
 
 
 def document(raw: bytes) -> Document:
@@ -80,6 +81,52 @@ def test_insertions_at_one_place_keep_their_order_and_stand_before_a_replacement
 def test_an_insertion_may_touch_the_end_of_a_replacement() -> None:
     edits = [Edit(Span(0, 1, 1), b","), Edit(Span(0, 0, 1), b"X")]
     assert apply(document(b"ab"), edits) == b"X,b"
+
+
+@given(edited(), edited())
+def test_edits_as_arrays_are_the_same_sequence(
+    one: tuple[bytes, list[Edit]], two: tuple[bytes, list[Edit]]
+) -> None:
+    raw, first = one
+    second = [Edit(Span(1, e.span.start, e.span.stop), e.text) for e in two[1]]
+    both = Edits.joined(second, first)
+    assert list(both) == [*in_order(first), *in_order(second)]
+    assert [both[k] for k in range(len(both))] == both[:] == list(both)
+    assert len(both) == len(first) + len(second)
+    assert both.of(0) == Edits.joined(first) == in_order(first)
+    assert apply(document(raw), both.of(0)) == apply(document(raw), first)
+    assert apply(document(two[0]), both.of(1)) == apply(document(two[0]), two[1])
+    assert not Edits.joined()
+
+
+def test_edits_of_several_documents_are_not_spliced_into_one() -> None:
+    with pytest.raises(ValueError, match="several documents"):
+        apply(document(b"abc"), [Edit(Span(0, 0, 1), b""), Edit(Span(1, 2, 3), b"")])
+
+
+def test_a_million_edits_in_many_blocks() -> None:
+    """Against joining slices one by one; with long stretches that no edit touches, and long texts."""
+    random = np.random.default_rng(5)
+    raw = random.integers(0, 256, 3 * BLOCK, dtype=np.uint8).tobytes()
+    cuts = np.sort(random.choice(2 * BLOCK, 2 * 10**6, replace=False))
+    spans = [*zip(cuts[::2].tolist(), cuts[1::2].tolist(), strict=True), (3 * BLOCK - 1, 3 * BLOCK)]
+    texts = [b"", b"x", b"1234.5", b"-0.001"]
+    edits = [Edit(Span(0, a, b), texts[a % 4]) for a, b in spans]
+    edits.append(Edit(Span(0, spans[5][1], spans[5][1]), bytes(BLOCK + 7)))
+    pieces, at = [], 0
+    for edit in in_order(edits):
+        pieces += [raw[at : edit.span.start], edit.text]
+        at = edit.span.stop
+    expected = b"".join(pieces) + raw[at:]
+    written = apply(document(raw), edits)
+    assert written == expected
+    arrays = Edits.joined(edits)
+    assert undone(written, raw, arrays)
+    kept = int(arrays.stop[7])
+    for at in (0, kept, len(written) - 1, BLOCK, 2 * BLOCK):
+        wrong = bytearray(written)
+        wrong[at] ^= 1
+        assert not undone(bytes(wrong), raw, arrays)
 
 
 @given(st.lists(st.sampled_from([b"LIN", b"\r\n", b"\n", b"\r", b"\xff", b" "]), max_size=30))
