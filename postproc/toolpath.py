@@ -76,7 +76,8 @@ class Toolpath:
     ``blend`` (N,) [m]: the controller may leave the path that far before the end point (approximation); 0 where it
     stops or passes exactly, NaN where the distance is not known.
     ``oriented`` (N,): the text programs the orientation and it can be written; else it is given from outside and only
-    the position can be corrected.
+    the position can be corrected.  ``free_axis`` (N, 3): unit vector in tool axes about which the text does not say how
+    the tool is turned (tool vectors, two rotary axes); NaN where it gives the whole orientation.
     ``annotations``: comments that speak to this tool; ``comments``: all others that stand on a line of their own.
     """
 
@@ -101,6 +102,7 @@ class Toolpath:
     sweep: Floats = field(default_factory=lambda: np.empty(0))
     blend: Floats = field(default_factory=lambda: np.empty(0))
     oriented: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
+    free_axis: Floats = field(default_factory=lambda: np.empty((0, 3)))
     whole: Mapping[int, str] = field(default_factory=dict)
     comments: tuple[Annotation, ...] = ()
 
@@ -117,9 +119,11 @@ class Toolpath:
             object.__setattr__(self, "blend", np.zeros(n))
         if not len(self.oriented):
             object.__setattr__(self, "oriented", np.ones(n, np.bool_))
+        if not len(self.free_axis):
+            object.__setattr__(self, "free_axis", np.full((n, 3), np.nan))
         object.__setattr__(self, "oriented", frozen(self.oriented, (n,), np.bool_))
         shapes = {"position": (n, 3), "rotation": (n, 3, 3), "axes": (n, 6), "feed": (n,), "given": (n, 6)}
-        shapes |= {"centre": (n, 3), "normal": (n, 3), "sweep": (n,), "blend": (n,)}
+        shapes |= {"centre": (n, 3), "normal": (n, 3), "sweep": (n,), "blend": (n,), "free_axis": (n, 3)}
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(getattr(self, name), shape))
         for name in ("kind", "base", "tool", "status", "turn", "line", "anchor"):

@@ -203,7 +203,7 @@ def _hold(path: Toolpath, back: Toolpath, plan: Plan, writing: Writing, file: st
     # Half a written step a coordinate; three angles add up.
     step_mm, step_deg = 10.0**-writing.mm, 10.0**-writing.deg
     off = np.abs(back.position - plan.position).max(axis=1) / MM
-    angle = _angle(plan.rotation, back.rotation) / DEG
+    angle = _angle(plan.rotation, back.rotation, path.free_axis[source]) / DEG
     _close(off > 0.5001 * step_mm, off, path, source, file, "mm from what was meant")
     _close(angle > 1.5001 * step_deg, angle, path, source, file, "deg from what was meant")
     _hold_arcs(path, back, plan, step_mm, file)
@@ -232,9 +232,10 @@ def _close(wrong: Bools, off: Floats, path: Toolpath, source: Ints, file: str, w
         raise Refusal(Finding("FIL008", f"a target is {off[row]:.6f} {words}", file, line))
 
 
-def _angle(one: Floats, other: Floats) -> Floats:
-    """(M,) [rad] between rotations, 0 where one is not known."""
+def _angle(one: Floats, other: Floats, free_axis: Floats) -> Floats:
+    """(M,) [rad] between rotations, where an axis is free between its directions; 0 where one is not known."""
     turned = np.swapaxes(one, -1, -2) @ other
     known = np.isfinite(turned[:, 0, 0])
     vectors = vector_from_rotation(np.where(known[:, None, None], turned, np.eye(3)))
-    return np.asarray(np.linalg.norm(vectors, axis=1))
+    axis = np.nan_to_num(free_axis)
+    return np.asarray(np.linalg.norm(vectors - np.sum(vectors * axis, axis=1, keepdims=True) * axis, axis=1))

@@ -347,7 +347,7 @@ def test_intervals_of_zero_give_zero():
 
 
 def test_nothing_predicted_nothing_doubted():
-    task = replace(job(paper(), 4, wrench=np.zeros((4, 6))), carries=np.zeros(4, bool))
+    task = replace(job(paper(), 4), force=Wrenches.zero(4))
     told = doubt_of(task, correct(task), 0.2)
     assert (told.worst, len(told.rows)) == (-1, 0)
     assert np.isnan(told.before)

@@ -86,8 +86,7 @@ def errors_between(task: Task, pieces: Pieces) -> tuple[Floats, Floats]:
     """Largest distance (K,) [m] of the predicted tool from the wanted way, and largest angle (K,) [rad] from the wanted
     orientation, inside of each piece; infinite where the robot can not be there.
 
-    Along the way the tool may be early or late: only what it is beside the way counts.  Of motions whose orientation
-    can not be corrected the angle is 0.
+    Along the way the tool may be early or late: only what it is beside the way counts.
     """
     length = np.linalg.norm(pieces.end.position - pieces.begin.position, axis=1)
     _, turn = difference(pieces.end, pieces.begin)
@@ -109,9 +108,9 @@ def _errors(task: Task, pieces: Pieces, share: float) -> tuple[Floats, Floats]:
     wanted = task.ways.at(rows, along)
     wrench = task.force.along(rows, along)
     real = task.real(rows, pieces.at(np.full(len(rows), share)), wrench)
-    shift, turn = difference(real.pose, task.goal(rows, wanted))
+    shift, turn = task.off(rows, real.pose, task.goal(rows, wanted))
     tangent = task.ways.tangent(rows, along)
     shift = shift - np.sum(shift * tangent, axis=1, keepdims=True) * tangent
     good = real.reachable & real.settled
-    angle = np.where(task.toolpath.oriented[rows], np.linalg.norm(turn, axis=1), 0.0)
-    return np.where(good, np.linalg.norm(shift, axis=1), np.inf), np.where(good, angle, np.inf)
+    off, angle = (np.where(good, np.linalg.norm(part, axis=1), np.inf) for part in (shift, turn))
+    return off, angle

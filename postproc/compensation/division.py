@@ -11,7 +11,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.between import Pieces, errors_between
 from postproc.compensation.correct import Result, correct
-from postproc.compensation.mirror import difference, partly
+from postproc.compensation.mirror import partly
 from postproc.compensation.task import Task
 from postproc.compensation.ways import begins
 from postproc.findings import Finding
@@ -125,8 +125,7 @@ class _Search:
         """Where the correction steps at the begin of a motion, a link leads to where its own one begins."""
         task, rows = self.task, self.rows
         own = self._own_begins()
-        shift, turn = difference(own, self.entry[rows])
-        turn[~task.toolpath.oriented[rows]] = 0.0
+        shift, turn = task.off(rows, own, self.entry[rows])
         self.step = np.maximum(
             np.linalg.norm(shift, axis=1) / task.tolerance,
             np.linalg.norm(turn, axis=1) / task.tolerance_angle,

@@ -86,12 +86,12 @@ def mirror(
     conditions: Conditions,
     status: Ints,
     near: Floats,
-    oriented: Bools | None = None,
+    turns: Floats | None = None,
 ) -> Correction:
     """Correct N commands that start at ``wanted`` so that the predicted tool comes to ``goal``.
 
-    ``oriented`` (N,): motions whose orientation is corrected too (all of them without it); of the others only the
-    position is, and judged.
+    ``turns`` (N, 3, 3): projection onto the rotation vectors that can be corrected (all of them without it); nothing
+    else of the orientation is corrected, nor judged.
 
     A motion stops when it is within tolerance, out of reach, without equilibrium, or when an iteration does not
     at least halve its error (it would not settle): ``converged`` says which, nothing diverges silently.
@@ -116,8 +116,8 @@ def mirror(
             bent,
         )
         shift, turn = difference(here.pose, goal[active])
-        if oriented is not None:
-            turn[~oriented[active]] = 0.0
+        if turns is not None:
+            turn = (turns[active] @ turn[..., None])[..., 0]
         error, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
         good = here.reachable & here.settled
         q[active], reachable[active], settled[active] = here.q, here.reachable, here.settled | ~here.reachable

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.mirror import Correction, Prediction, mirror, predict
+from postproc.compensation.mirror import Correction, Prediction, difference, mirror, predict
 from postproc.compensation.ways import Ways
 from postproc.effects import Conditions
 from postproc.forces import Wrenches
@@ -87,5 +87,22 @@ class Task:
             self.conditions.part(rows),
             self.track.status[rows],
             self.track.q[rows],
-            self.toolpath.oriented[rows],
+            self.turns(rows, goal.rotation),
         )
+
+    def turns(self, rows: Ints, rotation: Floats) -> Floats | None:
+        """(K, 3, 3) projection onto the rotation vectors, robot base axes, that the texts of motions ``rows`` (K,) at
+        the orientations ``rotation`` (K, 3, 3) can express: none, those across the free axis, all; None if all can."""
+        path = self.toolpath
+        free = np.isfinite(path.free_axis[rows, 0])
+        if path.oriented[rows].all() and not free.any():
+            return None
+        axis = (rotation @ np.nan_to_num(path.free_axis[rows])[..., None])[..., 0]
+        across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
+        return np.where(path.oriented[rows][:, None, None], across, 0.0)
+
+    def off(self, rows: Ints, real: Poses, goal: Poses) -> tuple[Floats, Floats]:
+        """real (-) goal (K, 3) [m], [rad] of motions ``rows`` (K,), without rotations that can not be corrected."""
+        shift, turn = difference(real, goal)
+        turns = self.turns(rows, goal.rotation)
+        return shift, turn if turns is None else (turns @ turn[..., None])[..., 0]
