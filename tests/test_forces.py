@@ -663,18 +663,9 @@ def test_no_force_at_all_shows_all_three_ways():
         assert way in finding.help
 
 
-def test_processes_are_refused_clearly(tmp_path):
-    (finding,) = refused(path_of(HORIZONTAL), "mill.yml")
-    assert finding.code == "FRC002"
-    assert "not supported by this version" in finding.message
-    assert "FORCE comments" in finding.help
-    for cell in (cell_of(process="mill.yaml", process_line=5), cell_of(force="mill.yaml", force_line=5)):
-        (finding,) = refused(path_of(HORIZONTAL), "", cell)
-        assert (finding.code, finding.file, finding.line) == ("FRC002", "/c/cell.yaml", 5)
-
-
 def test_a_missing_force_table():
     assert refused(path_of(HORIZONTAL), "none.csv")[0].code == "FIL001"
+    assert refused(path_of(HORIZONTAL), "none.yml")[0].code == "FIL001"
 
 
 def test_a_cut_without_any_known_place_keeps_its_force(tmp_path):

@@ -5,10 +5,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 
 import numpy as np
 
+from postproc.arrays import Bools
 from postproc.findings import Finding, Refusal
 from postproc.forces.stated import BASE, NotAForce, Stated, is_number_like, parse_force
 from postproc.toolpath import Annotation, Toolpath
@@ -51,6 +53,19 @@ def read_annotations(toolpath: Toolpath, file: str) -> tuple[Stated | None, tupl
     values = np.array([_OFF[0], *(value for value, _ in forces)])
     frames = np.array([_OFF[1], *(frame for _, frame in forces)])
     return Stated(values[chosen], frames[chosen]), tuple(ignored)
+
+
+def marked_air(toolpath: Toolpath) -> Bools:
+    """(N,) motions under FORCE OFF: air, whatever another source says of their force."""
+    rows, off = [-1], [False]
+    for annotation in sorted(toolpath.annotations, key=lambda a: a.row):
+        with contextlib.suppress(NotAForce):
+            force = _parse(annotation)
+            if force is not None:
+                rows.append(annotation.row)
+                off.append(force == _OFF)
+    chosen = np.searchsorted(np.array(rows), np.arange(len(toolpath)), side="right") - 1
+    return np.array(off)[chosen]
 
 
 def _parse(annotation: Annotation) -> tuple[tuple[float, ...], int] | None:

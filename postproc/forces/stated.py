@@ -25,19 +25,23 @@ class Stated:
     """The wrench of each motion [N, N m] in the axes of ``frame`` (N,), an index into FRAMES.
 
     ``values`` (N, 6): where the motion ends; ``start`` (N, 6): where it begins (the same where it is not given), linear
-    in between.
+    in between.  ``ci95`` (N,): half width of the 95 % interval of the force as a share of it; ``peak`` (N,) [N]: the
+    largest force on the way of the motion.  NaN where not known, None where known of no motion.
     """
 
     values: Floats
     frame: Ints
     start: Floats | None = None
+    ci95: Floats | None = None
+    peak: Floats | None = None
 
     def __post_init__(self) -> None:
         n = len(self.values)
         object.__setattr__(self, "values", frozen(self.values, (n, 6)))
         object.__setattr__(self, "frame", frozen(self.frame, (n,), np.int64))
-        if self.start is not None:
-            object.__setattr__(self, "start", frozen(self.start, (n, 6)))
+        for name, shape in (("start", (n, 6)), ("ci95", (n,)), ("peak", (n,))):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(getattr(self, name), shape))
 
     @property
     def begin(self) -> Floats:

@@ -30,6 +30,7 @@ class Wrenches:
     as there, unless the force steps at that vertex); ``along`` says what is between them.  carries (N,): the motion
     was given a force (even where both sides of its end point cancel).  steps (N,): it carries force, and the wrench
     does not go over from the motion before: a cut begins, the path turns by SMOOTH_TURN or more, or the force jumps.
+    ci95, peak (N,): as of ``Stated``.
     """
 
     values: Floats
@@ -39,6 +40,8 @@ class Wrenches:
     findings: tuple[Finding, ...] = ()
     steps: Bools = field(default_factory=lambda: np.zeros(0, bool))
     turning: Turning | None = None
+    ci95: Floats | None = None
+    peak: Floats | None = None
 
     def __post_init__(self) -> None:
         n = len(self.values)
@@ -166,7 +169,9 @@ def turned(
     values[after - 1] = start[after] = shared
     steps = carries.copy()
     steps[after] = False
-    return Wrenches(values, start, carries, source, findings, steps, turn.turning(carries))
+    return Wrenches(
+        values, start, carries, source, findings, steps, turn.turning(carries), stated.ci95, stated.peak
+    )
 
 
 def _jumps(one: Floats, two: Floats, program: Floats) -> Bools:

@@ -1,0 +1,245 @@
+"""The forces of a cutting process: operations joined to the motions of a program, one mean force a motion."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.cell import Frames
+from postproc.findings import Finding, Refusal
+from postproc.forces.annotations import marked_air
+from postproc.forces.feed import ALONG_SPINDLE
+from postproc.forces.milling import mean_force, peak_share
+from postproc.forces.process import Operation, read_process
+from postproc.forces.stated import FEED, Stated
+from postproc.forces.way import Way, shifted
+from postproc.forces.wrench import is_air
+from postproc.toolpath import Annotation, Toolpath
+from postproc.units import MM
+
+UNUSUAL = 2.0
+"""A feed this many times the usual one of its operation is told: it may be a move through air."""
+
+_SHOWN = 5
+
+
+def process_forces(
+    path: Path, toolpath: Toolpath, frames: Frames, program: str
+) -> tuple[Stated, tuple[Finding, ...]]:
+    """The mean milling force of every motion that an operation of the process file ``path`` has, in the feed frame.
+
+    Air, with no force, are: motions of no operation, PTP and G0, those under FORCE OFF, at the operation's ``rapid``
+    and above, and those along the spindle axis (of plunges the model knows nothing).  Refusal: of the file; FRC011
+    where no operation has any motion; FRC013 where a feed is not known.
+    """
+    operations = read_process(path)
+    joined = join(operations, toolpath)
+    findings = _unjoined(operations, joined, toolpath, path, program)
+    cutting = (joined >= 0) & ~is_air(toolpath) & ~marked_air(toolpath)
+    rapid = np.array([operation.rapid for operation in operations])[joined]
+    cutting &= ~(toolpath.feed >= rapid)
+    along = cutting & _along_spindle(toolpath, frames)
+    cutting &= ~along
+    if np.any(along):
+        what = f"plunges and retracts along the spindle, of which the process knows no force: {np.sum(along)}"
+        findings.append(Finding("FRC014", what, program, int(toolpath.line[np.argmax(along)])))
+    _check_feed(operations, joined, cutting, toolpath, program)
+    findings += _passed_over(operations, joined, cutting, toolpath, program)
+
+    n = len(toolpath)
+    values, ci95, peak = np.zeros((n, 6)), np.full(n, np.nan), np.full(n, np.nan)
+    for index, operation in enumerate(operations):
+        rows = np.flatnonzero(cutting & (joined == index))
+        if not len(rows):
+            continue
+        feed = operation.feed_per_tooth(toolpath.feed[rows])
+        values[rows, :3] = mean_force(operation.cut, feed)
+        usual = float(np.median(feed))
+        share = peak_share(operation.cut, usual)
+        peak[rows] = share * np.linalg.norm(values[rows, :3], axis=1)
+        ci95[rows] = np.nan if operation.material.ci95 is None else operation.material.ci95
+        findings += _told(operation, rows, feed, usual, share, toolpath, path, program)
+    return Stated(values, np.full(n, FEED), ci95=ci95, peak=peak), tuple(findings)
+
+
+def join(operations: Sequence[Operation], toolpath: Toolpath) -> Ints:
+    """(N,) the operation of every motion, -1 without one; lines count before names, names before tools.
+
+    A name holds from its comment to the next comment with a name of the process; of two names in one comment the longer
+    counts.  A name has to stand there as whole words; case and blanks do not matter.
+    """
+    n = len(toolpath)
+    found = np.full(n, -1)
+    numbers = np.array([frame.number or 0 for frame in toolpath.frames] + [0])
+    tool = numbers[toolpath.tool]
+    for index, operation in enumerate(operations):
+        if operation.tool:
+            found[tool == operation.tool] = index
+    named = [(name, index) for index, name in enumerate(o.name for o in operations) if name]
+    rows, which = [-1], [-1]
+    for comment in sorted(toolpath.comments, key=lambda c: (c.row, c.line)):
+        match = _longest(comment, named)
+        if match >= 0:
+            rows.append(comment.row)
+            which.append(match)
+    by_name = np.array(which)[np.searchsorted(np.array(rows), np.arange(n), side="right") - 1]
+    found = np.where(by_name >= 0, by_name, found)
+    for index, operation in enumerate(operations):
+        if operation.lines[1]:
+            found[(toolpath.line >= operation.lines[0]) & (toolpath.line <= operation.lines[1])] = index
+    return found
+
+
+def _longest(comment: Annotation, named: Sequence[tuple[str, int]]) -> int:
+    text = " ".join(comment.text.split())
+    matches = [
+        (len(name), index)
+        for name, index in named
+        if re.search(rf"(?<!\w){re.escape(name)}(?!\w)", text, re.IGNORECASE)
+    ]
+    return max(matches)[1] if matches else -1
+
+
+def _along_spindle(toolpath: Toolpath, frames: Frames) -> Bools:
+    """(N,) straight motions along the spindle axis at their end; False where one of them is not known."""
+    way = Way(toolpath, frames)
+    spindle = np.einsum(
+        "nij,njk,nk->ni", frames.base_in_robot.rotation, toolpath.rotation, frames.spindle_in_tool
+    )
+    along = np.abs(np.einsum("ni,ni->n", way.direction[:, 1], spindle))
+    return np.asarray(~way.arc & (along >= np.cos(ALONG_SPINDLE)))
+
+
+def _check_feed(
+    operations: Sequence[Operation], joined: Ints, cutting: Bools, toolpath: Toolpath, program: str
+) -> None:
+    lost = np.flatnonzero(cutting & ~(toolpath.feed > 0))
+    if not len(lost):
+        return
+    operation = operations[joined[lost[0]]]
+    raise Refusal(
+        Finding(
+            "FRC013",
+            f"the feed of {len(lost)} motions of operation {operation.label} is not known, and with it the feed per "
+            "tooth",
+            program,
+            int(toolpath.line[lost[0]]),
+            help="set the feed in the program before the motion ($VEL.CP, F), or mark air with FORCE OFF",
+        )
+    )
+
+
+def _unjoined(
+    operations: Sequence[Operation], joined: Ints, toolpath: Toolpath, path: Path, program: str
+) -> list[Finding]:
+    """Operations without motions, and motions without an operation.  Refusal FRC011 where nothing was joined."""
+    findings = []
+    for index, operation in enumerate(operations):
+        if not np.any(joined == index):
+            what = f"operation {operation.label} has no motion in {Path(program).name}"
+            findings.append(
+                Finding("FRC012", what, str(path), operation.line, help=_offers(operation, toolpath))
+            )
+    if len(findings) == len(operations):
+        lines = f"; lines {toolpath.line[0]} to {toolpath.line[-1]} hold motions" if len(toolpath) else ""
+        raise Refusal(
+            Finding(
+                "FRC011",
+                f"no operation of {path.name} has a motion in {Path(program).name}{lines}",
+                str(path),
+                operations[0].line,
+                help=findings[0].help,
+            )
+        )
+    free = np.flatnonzero((joined < 0) & ~is_air(toolpath) & ~marked_air(toolpath))
+    if len(free):
+        what = f"motions of no operation, taken as air: {len(free)}; the first is in line {toolpath.line[free[0]]}"
+        findings.append(Finding("FRC007", what, program, int(toolpath.line[free[0]])))
+    return findings
+
+
+def _passed_over(
+    operations: Sequence[Operation], joined: Ints, cutting: Bools, toolpath: Toolpath, program: str
+) -> list[Finding]:
+    """Cuts that count to the operation named last although a comment in the air before them names none."""
+    named = [(operation.name, index) for index, operation in enumerate(operations) if operation.name]
+    starts = np.flatnonzero(cutting & ~shifted(cutting))
+    before: dict[int, list[Annotation]] = {}
+    for comment in toolpath.comments:
+        at = int(np.searchsorted(starts, comment.row))
+        # no motion may cut between the comment and the cut
+        if at < len(starts) and not cutting[comment.row : starts[at]].any():
+            before.setdefault(int(starts[at]), []).append(comment)
+    silent = [
+        comments[-1]
+        for start, comments in sorted(before.items())
+        if operations[joined[start]].name and all(_longest(comment, named) < 0 for comment in comments)
+    ]
+    if not silent:
+        return []
+    first = silent[0]
+    message = (
+        f"{len(silent)} cuts begin behind a comment that names no operation of the process, and count to the one "
+        f"named before; the first comment: {' '.join(first.text.split())[:40]!r}"
+    )
+    return [Finding("FRC018", message, program, first.line)]
+
+
+def _offers(operation: Operation, toolpath: Toolpath) -> str:
+    """What the program has of the kind by which an operation is joined."""
+    if operation.name:
+        texts = list(
+            dict.fromkeys(" ".join(c.text.split())[:40] for c in toolpath.comments if c.text.strip())
+        )
+        shown = ", ".join(map(repr, texts[:_SHOWN])) + (", ..." if len(texts) > _SHOWN else "")
+        return (
+            f"comments of the program: {shown}"
+            if texts
+            else "the program has no comments to join a name with"
+        )
+    if operation.tool:
+        used = {toolpath.frames[index].number for index in np.unique(toolpath.tool) if index >= 0}
+        numbers = ", ".join(str(number) for number in sorted(n for n in used if n))
+        return f"tools of the program: {numbers}" if numbers else "no tool of the program has a number"
+    return "the lines of motions in the program, from 1"
+
+
+def _told(
+    operation: Operation,
+    rows: Ints,
+    feed: Floats,
+    usual: float,
+    share: float,
+    toolpath: Toolpath,
+    path: Path,
+    program: str,
+) -> list[Finding]:
+    """What an operation came to, and what of it deserves a look."""
+    x, y, z = mean_force(operation.cut, np.array([usual]))[0]
+    size = float(np.linalg.norm([x, y, z]))
+    first, last = toolpath.line[rows[0]], toolpath.line[rows[-1]]
+    message = (
+        f"operation {operation.label}: {len(rows)} motions in lines {first} to {last}, feed per tooth "
+        f"{usual / MM:.3g} mm, mean force {x:.1f}, {y:.1f}, {z:.1f} N @feed, up to {share * size:.0f} N within a "
+        f"tooth period; {operation.material.name}"
+    )
+    if operation.material.ci95 is not None:
+        message += f", +- {100 * operation.material.ci95:.0f} %"
+    findings = [Finding("FRC015", message, str(path), operation.line)]
+    if not operation.material.axial and operation.cut.helix:
+        what = f"operation {operation.label}: no axial coefficients are known of {operation.material.name}; Fz is 0"
+        findings.append(Finding("FRC016", what, str(path), operation.line))
+    fast = np.flatnonzero(feed > UNUSUAL * usual)
+    if len(fast):
+        what = (
+            f"operation {operation.label}: {len(fast)} motions have more than {UNUSUAL:g} times its usual feed, up to "
+            f"{feed.max() / MM:.3g} mm per tooth, and count as cutting"
+        )
+        slowest = toolpath.feed[rows[fast]].min()
+        help = f"if they go through air: rapid: {slowest:g} (m/s) in the operation, or FORCE OFF"
+        findings.append(Finding("FRC017", what, program, int(toolpath.line[rows[fast[0]]]), help=help))
+    return findings

@@ -1,0 +1,244 @@
+"""The process file: what each operation of a program cuts, read from YAML and checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from postproc.forces.materials import (
+    CUTTING,
+    EDGE,
+    Material,
+    find_material,
+    known_materials,
+    nearest_material,
+    stated_coefficients,
+)
+from postproc.forces.milling import DIRECTIONS, Cut, engagement
+from postproc.units import DEG, MM
+from postproc.yamlfile import Section, load
+
+JOINS = ("lines", "name", "tool")
+"""By what an operation finds its motions, the more particular first."""
+
+_CUT = (
+    "diameter",
+    "teeth",
+    "helix",
+    "axial_depth",
+    "radial_width",
+    "direction",
+    "spindle",
+    "rapid",
+    "material",
+    "coefficients",
+    "ci95",
+)
+_STEEPEST_HELIX = 75.0  # deg; end mills have up to 60
+
+
+@dataclass(frozen=True)
+class Operation:
+    """One operation.  Joined by one of: ``name``, words of a comment; ``tool``, its number; ``lines``, first and last.
+
+    speed [rad/s]; rapid [m/s]: motions at this feed and above are air (infinite: none); line: where it stands in the
+    file.
+    """
+
+    name: str
+    tool: int
+    lines: tuple[int, int]
+    cut: Cut
+    speed: float
+    rapid: float
+    material: Material
+    line: int
+
+    @property
+    def label(self) -> str:
+        """What the operation is called in messages."""
+        if self.name:
+            return repr(self.name)
+        return f"tool {self.tool}" if self.tool else f"lines {self.lines[0]} to {self.lines[1]}"
+
+    def feed_per_tooth(self, feed: float | np.ndarray) -> np.ndarray:
+        """[m] of a feed [m/s]: feed / (turns per second x teeth)."""
+        return np.asarray(feed * 2 * np.pi / (self.speed * self.cut.teeth))
+
+
+def read_process(path: Path) -> tuple[Operation, ...]:
+    """The operations of a process file.  Refusal: FIL..., YML... with file, line and key.
+
+    Lengths in mm, angles in deg, spindle in 1/min, rapid in m/s, coefficients in N/mm2 and N/mm.
+    """
+    top = load(path)
+    top.only("defaults", "operations")
+    defaults = top.section("defaults", None)
+    defaults.only(*_CUT)
+    sections = top.sections("operations")
+    if not sections:
+        message = "no operation stands here" if "operations" in top else "the key 'operations' is missing"
+        raise top.error("YML003", message, help="operations: [{name: ..., diameter: ..., teeth: ...}, ...]")
+    found: list[Operation] = []
+    for section in sections:
+        operation = _operation(section, defaults)
+        _check_apart(section, operation, found)
+        found.append(operation)
+    return tuple(found)
+
+
+def _operation(section: Section, defaults: Section) -> Operation:
+    section.only(*JOINS, *_CUT)
+    by = [key for key in JOINS if key in section]
+    if len(by) != 1:
+        what = "says not which motions it has" if not by else f"stands beside {by[1]!r}"
+        raise section.error(
+            "YML003" if not by else "YML004",
+            what,
+            by[0] if by else None,
+            "one of: name (words of a comment in the program), tool (its number), lines: [first, last]",
+        )
+    own = _Values(section, defaults)
+    diameter = own.positive("diameter", "mm") * MM
+    material = _material(own)
+    entry, leave = _engagement(own, diameter)
+    cut = Cut(
+        diameter=diameter,
+        teeth=_whole(own.place("teeth"), "teeth"),
+        helix=own.place("helix").number("helix", low=-_STEEPEST_HELIX, high=_STEEPEST_HELIX, unit="deg")
+        * DEG,
+        depth=own.positive("axial_depth", "mm") * MM,
+        entry=entry,
+        exit=leave,
+        coefficients=material.coefficients,
+    )
+    return Operation(
+        name=_name(section),
+        tool=_whole(section, "tool") if "tool" in section else 0,
+        lines=_lines(section),
+        cut=cut,
+        speed=own.positive("spindle", "1/min") * 2 * np.pi / 60,
+        rapid=own.positive("rapid", "m/s") if own.has("rapid") else np.inf,
+        material=material,
+        line=section.line,
+    )
+
+
+class _Values:
+    """Keys of an operation, or of the defaults where it does not have them."""
+
+    def __init__(self, section: Section, defaults: Section) -> None:
+        self.section, self.defaults = section, defaults
+
+    def has(self, key: str) -> bool:
+        return key in self.section or key in self.defaults
+
+    def place(self, key: str) -> Section:
+        """The section that holds ``key``; the operation's own where neither does, so that it is told there."""
+        return self.defaults if key in self.defaults and key not in self.section else self.section
+
+    def positive(self, key: str, unit: str) -> float:
+        section = self.place(key)
+        value = section.number(key, unit=unit)
+        if value <= 0:
+            raise section.error("YML004", f"{value:g} is not above 0", key, f"a number in {unit}, above 0")
+        return value
+
+
+def _engagement(own: _Values, diameter: float) -> tuple[float, float]:
+    """Entry and exit angle [rad] of ``direction`` and ``radial_width``."""
+    section = own.place("direction")
+    direction = section.text("direction", choices=DIRECTIONS)
+    if direction == "slot" and not own.has("radial_width"):
+        return engagement(direction, diameter, diameter)
+    width = own.positive("radial_width", "mm") * MM
+    section = own.place("radial_width")
+    if width > diameter * (1 + 1e-9):
+        message = f"{width / MM:g} mm is wider than the cutter, whose diameter is {diameter / MM:g} mm"
+        raise section.error("YML004", message, "radial_width", "the width of material that the cutter takes")
+    if direction == "slot" and width < diameter * (1 - 1e-9):
+        message = f"{width / MM:g} mm is no slot of a cutter with a diameter of {diameter / MM:g} mm"
+        raise section.error(
+            "YML004", message, "radial_width", "direction: up or down for a part of the diameter"
+        )
+    return engagement(direction, width, diameter)
+
+
+def _material(own: _Values) -> Material:
+    """Of ``material`` or ``coefficients``: the operation's own before the defaults'; ``ci95`` before the table's."""
+    for section in (own.section, own.defaults):
+        if "material" in section and "coefficients" in section:
+            raise section.error(
+                "YML004", "stands beside 'material'; only one of them can be meant", "coefficients"
+            )
+        if "coefficients" in section:
+            held = section.section("coefficients")
+            held.only(*CUTTING, *EDGE, "source")
+            return _with_interval(stated_coefficients(held), own)
+        if "material" in section:
+            name = section.text("material")
+            material = find_material(name)
+            if material is None:
+                raise section.error(
+                    "YML004",
+                    f"{name[:60]!r} is not known{nearest_material(name)}",
+                    "material",
+                    f"known: {known_materials()}; or coefficients: {{ktc: ..., krc: ..., kac: ..., kte: ..., "
+                    "kre: ..., kae: ...} in N/mm2 and N/mm",
+                )
+            return _with_interval(material, own)
+    raise own.section.error(
+        "YML003",
+        "the key 'material' is missing",
+        None,
+        f"one of {known_materials()}; or coefficients: {{...}}",
+    )
+
+
+def _with_interval(material: Material, own: _Values) -> Material:
+    if not own.has("ci95"):
+        return material
+    return replace(material, ci95=own.place("ci95").number("ci95", low=0.0, high=1.0))
+
+
+def _name(section: Section) -> str:
+    if "name" not in section:
+        return ""
+    name = " ".join(section.text("name").split())
+    if not name:
+        raise section.error("YML004", "is empty", "name")
+    return name
+
+
+def _lines(section: Section) -> tuple[int, int]:
+    if "lines" not in section:
+        return (0, 0)
+    first, last = section.numbers("lines", 2)
+    if first < 1 or last < first or first != int(first) or last != int(last):
+        raise section.error(
+            "YML004", f"{first:g} to {last:g} is no range of lines", "lines", "[first, last], from 1"
+        )
+    return int(first), int(last)
+
+
+def _whole(section: Section, key: str) -> int:
+    value = section.number(key)
+    if value < 1 or value != int(value) or value > 1e6:
+        raise section.error("YML004", f"{value:g} is not a whole number from 1", key)
+    return int(value)
+
+
+def _check_apart(section: Section, new: Operation, before: list[Operation]) -> None:
+    """Two operations that claim the same motions by the same means contradict each other."""
+    for old in before:
+        if new.name and new.name.lower() == old.name.lower():
+            raise section.error("YML004", f"{new.name!r} stands twice, first in line {old.line}", "name")
+        if new.tool and new.tool == old.tool:
+            raise section.error(
+                "YML004", f"tool {new.tool} has an operation already, in line {old.line}", "tool"
+            )
+        if new.lines[1] and old.lines[1] and new.lines[0] <= old.lines[1] and old.lines[0] <= new.lines[1]:
+            message = f"lines {new.lines[0]} to {new.lines[1]} meet those of the operation in line {old.line}"
+            raise section.error("YML004", message, "lines")
