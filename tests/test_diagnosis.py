@@ -3,25 +3,31 @@
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from measured import MARKERS, on_markers, plan, robot
 
 from postproc.diagnosis.candidates import candidates, shows
-from postproc.diagnosis.foils import foils
+from postproc.diagnosis.diagnose import diagnose
+from postproc.diagnosis.foils import Foil, foils
 from postproc.diagnosis.growth import grown, whole
 from postproc.diagnosis.screens import where
 from postproc.diagnosis.search import SHARED, _not_imitated, _sharing, own_unknowns, search
 from postproc.diagnosis.selection import price
-from postproc.diagnosis.verdict import _left_out, judged
+from postproc.diagnosis.verdict import BUILT, MARGIN, _alternatives, _beyond_telling, _left_out, judged
+from postproc.effects import TransmissionError
 from postproc.geometry import Poses
 from postproc.identification.campaign import Campaign
-from postproc.identification.fit import fit
+from postproc.identification.fit import Estimate, fit
 from postproc.identification.unknowns import asked_for
 from postproc.model import StiffnessModel
+from postproc.robot.description import load_robot
+from postproc.workflows.diagnose import _wild
 
 SIGMA = 2e-5
+SAMPLES = Path(__file__).parent.parent / "samples"
 TOOL = Poses(np.eye(3), np.array([0.0, 0.5, 0.2]))
 
 
@@ -33,15 +39,15 @@ def stated():
     return replace(model, terms=(replace(term, stated={k: v for k, v in term.stated.items() if k != "c1"}),))
 
 
-def campaign_of(model, poses=20, seed=0, shared=0.0, wild=0.0, loads=(2600.0,)):
+def campaign_of(model, poses=20, seed=0, shared=0.0, wild=0.0, loads=(2600.0,), **where):
     """Readings of three targets under weights, of ``model``; those of a pose ``shared`` [m] an error, a share ``wild``
-    of them is three times as far off."""
+    of them is three times as far off.  ``where``: as of ``plan``."""
     rng = np.random.default_rng(seed)
     q = np.repeat(rng.uniform(*model.robot.limits.T, (poses, 6)), len(loads), axis=0)
     wrench = np.zeros((len(q), 6))
     wrench[:, 2] = -np.tile(loads, poses)
     rows, wrench, words = on_markers(q, wrench)
-    readings = plan(model.robot, rows, wrench, tool=TOOL, sigma=SIGMA, **words)
+    readings = plan(model.robot, rows, wrench, tool=TOOL, sigma=SIGMA, **words, **where)
     campaign = Campaign(readings)
     value = campaign.expected(campaign.seen(model), campaign.start())[0]
     size = np.where(rng.random(len(rows)) < wild, 3.0, 1.0)[:, None]
@@ -166,6 +172,58 @@ def test_a_compensator_is_told_from_a_stiffness_that_varies():
     assert not foils(base.model, campaign.readings.q, other)
 
 
+def test_hardware_of_the_file_is_doubted_only_where_something_else_explains_more():
+    spring = StiffnessModel.from_robot(robot("kuka_kr270"))
+    campaign = campaign_of(spring, 30, loads=(1200.0, 2600.0))
+    plain = StiffnessModel.from_robot(load_robot(SAMPLES / "kr270_missing_compensator" / "kr270_plain.yaml"))
+    found = search(campaign, fitted(campaign, plain))
+    (group,) = found.explained.groups
+    foil = next(rival for rival in found.rivals if rival.foil)
+
+    def sets(worse, seen):
+        other = replace(found, rivals=(replace(foil, worse=worse, more=0.0),))
+        return len(_alternatives(other, group, seen))
+
+    assert sets(BUILT, True) == sets(0.0, True) == sets(-0.9 * BUILT, True) == 1
+    assert sets(-1.1 * BUILT, True) == 2
+    # of which the readings do not tell that it is there
+    assert sets(0.9 * MARGIN, False) == 2
+    assert sets(1.1 * MARGIN, False) == 1
+
+
+def wave(model, order):
+    """The arm with an error of A3 over its angle that comes back ``order`` times a turn."""
+    size = dict.fromkeys((f"s3_{order:g}", f"c3_{order:g}"), 2e-4)
+    wider = model.added(TransmissionError(model.robot.joints, (order,)))
+    return wider.changed({(len(model.terms), name): value for name, value in size.items()})
+
+
+def test_a_wave_of_another_order_is_no_harmonic():
+    for order, word in ((1.0, "named"), (2.0, "named"), (0.5, "unknown"), (1.5, "unknown")):
+        campaign = campaign_of(wave(stated(), order), 40, deflection=False, in_robot_frame=True)
+        told = diagnose(campaign, stated()).verdict
+        assert told.word == word, order
+        assert bool(told.named) == (word == "named")
+        if word == "named":
+            assert [(n.effect, n.joints) for n in told.named] == [("transmission_error", ("A3",))]
+            (named,) = told.named
+            assert named.evidence.alias is None or not isinstance(named.evidence.alias.effect, Foil)
+
+
+def test_what_is_large_and_hardly_told_is_not_believed():
+    unknown = asked_for(stated(), ["backlash.b2"]).unknowns[0]
+    scale = unknown.parameter.scale
+
+    def estimates(*of):
+        return [Estimate(unknown, size * scale, share * size * scale, False) for size, share in of]
+
+    assert _beyond_telling(estimates((30.0, 0.9)))
+    assert not _beyond_telling(estimates((30.0, 0.1)))
+    assert not _beyond_telling(estimates((1.0, 0.9)))
+    assert not _beyond_telling(estimates((30.0, 0.9), (30.0, 0.1)))
+    assert not _beyond_telling([])
+
+
 # What is chance
 
 
@@ -187,11 +245,28 @@ def test_a_pattern_is_seen():
     assert "A2 over" in first.variable
 
 
+def test_accidents_strike_one_reading_or_one_pose():
+    """Where several poses are off as a whole the arm was there: what opens under large loads alone looks like that."""
+    good = campaign_of(stated(), 60)
+
+    def struck(*rows):
+        value = good.readings.value.copy()
+        value[list(rows)] += [0.0, 2e-3, 0.0]
+        return sorted(one.row for one in _wild(fitted(Campaign(replace(good.readings, value=value)))))
+
+    assert struck() == []
+    assert struck(7, 70) == [7, 70]
+    assert struck(30, 31, 32, 70) == [30, 31, 32, 70]
+    assert struck(30, 31, 32, 90, 91, 92) == []
+    assert struck(*range(0, 180, 9)) == [], "so many are no accidents"
+
+
 def test_what_poses_share_is_no_more_than_scatter_can_be():
     base = fitted(campaign_of(stated(), 20, shared=20 * SIGMA))
     assert base.weights.shared > 10 * SIGMA
     assert _sharing(base, base).shared == pytest.approx(SHARED * SIGMA)
-    little = fitted(campaign_of(stated(), 20, shared=1.5 * SIGMA))
+    little = fitted(campaign_of(stated(), 20, shared=0.9 * SIGMA))
+    assert 0 < little.weights.shared < SHARED * SIGMA
     assert _sharing(base, little).shared == little.weights.shared
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.diagnosis.screens import Where, where
 from postproc.diagnosis.search import Search, own_unknowns, search, with_effects
-from postproc.diagnosis.verdict import Verdict, judged, refitted
+from postproc.diagnosis.verdict import BEYOND_TELLING, OTHER_COURSE, Verdict, judged, refitted
 from postproc.findings import Finding, Refusal
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
@@ -57,11 +57,14 @@ def diagnose(
     verdict = judged(found)
     rejected = list(verdict.rejected)
     for _ in range(AGAIN):
-        if not verdict.rejected:
+        # of what has no form that is known others would only be imitations
+        if not verdict.rejected or any(why == OTHER_COURSE for _, why in verdict.rejected):
             break
         found = search(campaign, base, [candidate.key for candidate, _ in rejected])
         verdict = judged(found)
         rejected += verdict.rejected
+    if verdict.word == "nothing_missing" and any(why == BEYOND_TELLING for _, why in rejected):
+        verdict = replace(verdict, word="unknown")
     names = [named.candidate for named in verdict.named]
     final = found.base
     if names and verdict.word != "ambiguous":

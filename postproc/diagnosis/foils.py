@@ -1,4 +1,4 @@
-"""What an effect has to be told from, although it is never looked for by itself."""
+"""What an effect has to be told from, although it is never looked for by itself: other courses of the same joint."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.diagnosis.candidates import Candidate
-from postproc.effects import ComplianceLaw, Parameter, State, Values
+from postproc.effects import ComplianceLaw, Effect, Parameter, State, TransmissionError, Values
 from postproc.identification.unknowns import unknowns_of
 from postproc.model import StiffnessModel
 from postproc.robot.geometries import Joint
@@ -16,8 +16,15 @@ from postproc.robot.geometries import Joint
 FOILED = ("gravity_compensator",)
 """Effects that stiffen one joint, more at one angle than at another."""
 
+ORDERS = (0.5, 1.5, 2.5, 3.0, 4.0)
+"""Of waves over a joint's angle that are no harmonics of the library: between them, and beyond."""
 
-class VaryingCompliance(ComplianceLaw):
+
+class Foil(Effect):
+    """A course that has no name."""
+
+
+class VaryingCompliance(Foil, ComplianceLaw):
     """theta_i = (v1 x + v2 x^2) tau_i beside the joint's own spring, x = q_i - ``middle`` [rad]: a gear that gives way
     more at one end of its range than at the other."""
 
@@ -46,13 +53,23 @@ class VaryingCompliance(ComplianceLaw):
         slope[row] += compliance
 
 
+class OtherWave(Foil, TransmissionError):
+    """The error of a gear over its angle, of an order that is no harmonic of the library."""
+
+
 def foils(model: StiffnessModel, q: Floats, mine: Candidate) -> list[Candidate]:
     """What ``mine`` has to be told from, in a ``model`` measured at ``q`` (R, n); begun with at the null."""
+    joints = model.robot.joints
+    if mine.name == TransmissionError.name:
+        return [_foil(model, q, OtherWave(joints, (order,)), mine.joint) for order in ORDERS]
     if mine.name not in FOILED:
         return []
-    joints = model.robot.joints
     joint = next(i for i, one in enumerate(joints) if one.name == mine.joint)
     middle = float(np.mean([q[:, joint].min(), q[:, joint].max()]))
-    wider = model.added(VaryingCompliance(joints, joint, middle))
-    unknowns = unknowns_of(wider, len(model.terms))
-    return [Candidate(wider.terms[-1].effect, mine.joint, wider, unknowns, np.zeros((len(q), 3, 2)), True)]
+    return [_foil(model, q, VaryingCompliance(joints, joint, middle), mine.joint)]
+
+
+def _foil(model: StiffnessModel, q: Floats, effect: Foil, joint: str) -> Candidate:
+    wider = model.added(effect)
+    unknowns = tuple(u for u in unknowns_of(wider, len(model.terms)) if u.parameter.joint == joint)
+    return Candidate(effect, joint, wider, unknowns, np.zeros((len(q), 3, len(unknowns))), True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.diagnosis.candidates import Candidate, candidates, shows
-from postproc.diagnosis.foils import VaryingCompliance, foils
+from postproc.diagnosis.foils import Foil, foils
 from postproc.diagnosis.growth import Outside, grown, whole
 from postproc.diagnosis.selection import (
     Explained,
@@ -49,7 +49,7 @@ FORM = 0.01
 """Share of what another effect explains that one must explain itself: no form in the library is exact, and what a large
 effect does beside its form looks like small ones."""
 
-SHARED = 2.0
+SHARED = 1.0
 """Stated standard deviations that readings of a pose may share: of a robot that does not quite come back, of one
 unloaded reading.  What they share beyond that is no scatter."""
 
@@ -94,7 +94,7 @@ class Rival:
     @property
     def foil(self) -> bool:
         """Whether it is never named itself."""
-        return isinstance(self.candidate.effect, VaryingCompliance)
+        return isinstance(self.candidate.effect, Foil)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from postproc.arrays import Floats, Ints
 from postproc.diagnosis.candidates import EVERY, Candidate, names_of
 from postproc.diagnosis.foils import FOILED
 from postproc.diagnosis.screens import Where, where
-from postproc.diagnosis.search import Search
+from postproc.diagnosis.search import Rival, Search
 from postproc.diagnosis.selection import (
     Explained,
     Problem,
@@ -39,8 +39,15 @@ USUAL = 3.0
 MARGIN = 10.0
 """By how much -2 ln(likelihood) of the nearest other explanation must be worse: odds of 150 to 1."""
 
-CLEAR = 1.5
-"""Intervals by which a value must be off to be clearly elsewhere."""
+CLEAR, THERE = 1.5, 1.0
+"""Intervals by which a value must be off to be clearly elsewhere, and to be there at all."""
+
+BUILT = 4.6
+"""By how much -2 ln(likelihood) of what is no such thing must be better to put in doubt hardware that the robot file
+describes: odds of 10 to 1."""
+
+UNUSUAL = 3.0
+"""Usual sizes from which on a parameter has to be told well to be believed."""
 
 LACK = 3.0
 """Standard deviations of its own by which the variance left must exceed the stated one to be a lack of fit."""
@@ -53,6 +60,10 @@ TOLERATED = 0.15
 
 EXPLAINS = 0.9
 """Share of the variance beyond scatter that a name must take away where some is left."""
+
+
+OTHER_COURSE = "the readings follow its joint in another way"
+BEYOND_TELLING = "it would have to be unusually large, and the readings hardly tell its size"
 
 
 @dataclass(frozen=True)
@@ -119,8 +130,12 @@ def judged(found: Search) -> Verdict:
         estimates = _estimates(found.final, candidate, found)
         bounded = all(e.at_bound for e in estimates)
         several = _alternatives(found, g, not bounded and _told(candidate, estimates))
-        if not its.holds:
+        if _of_another_course(found, candidate):
+            rejected.append((candidate, OTHER_COURSE))
+        elif not its.holds:
             rejected.append((candidate, "no gain on readings that were left out"))
+        elif _beyond_telling(estimates):
+            rejected.append((candidate, BEYOND_TELLING))
         elif bounded and len(several) == 1:
             rejected.append((candidate, "its parameters would have to lie at their bounds"))
         else:
@@ -133,10 +148,11 @@ def judged(found: Search) -> Verdict:
     bare, _ = lack_of_fit(found, explained(linear.problem, ()))
     # two forms of one effect on one joint are no doubt about its name
     sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
+    formless = any(why == OTHER_COURSE for _, why in rejected)
     enough = not linear.problem.known or lack - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)
     if not named:
         word = "unknown" if lacking or rejected else "nothing_missing"
-    elif lacking and not enough:
+    elif formless or (lacking and not enough):
         word, named, sets = "unknown", [], ()
     elif sets:
         word = "ambiguous"
@@ -162,7 +178,7 @@ def _told(candidate: Candidate, estimates: Sequence[Estimate]) -> bool:
     if candidate.name not in FOILED:
         return True
     found = {
-        e.unknown.parameter.name: abs(e.value - e.unknown.parameter.null) > CLEAR * e.ci95 for e in estimates
+        e.unknown.parameter.name: abs(e.value - e.unknown.parameter.null) > THERE * e.ci95 for e in estimates
     }
     there = all(clear for name, clear in found.items() if name not in candidate.asleep)
     return there and found.keys() >= {p.name for p in candidate.effect.parameters if not p.hardware}
@@ -209,8 +225,7 @@ def _evidence(found: Search, last: Explained, group: int) -> Evidence:
         _left_out(found, last, group, rows)
         for rows in (folds_of(campaign, min(FOLDS, campaign.poses)), _regions(found), _sessions(found))
     )
-    own = linear.candidates[group].key
-    nearest = next((r for r in found.rivals if r.of == own), None)
+    nearest = next(iter(_against(found, linear.candidates[group])), None)
     margin, alias = (np.inf, None) if nearest is None else (nearest.margin, nearest.candidate)
     among = len(linear.candidates)
     gain = squares / variance
@@ -222,9 +237,27 @@ def _alternatives(found: Search, group: int, seen: bool) -> tuple[Candidate, ...
     parameters are ``seen``, as long as what is no such thing explains no more."""
     mine = found.linear.candidates[group]
     built = any(mechanism.kind == mine.name for mechanism in found.base.model.robot.mechanisms)
-    against = [r for r in found.rivals if r.of == mine.key]
-    near = [r.candidate for r in against if r.margin < (0.0 if built and seen and r.foil else MARGIN)]
+    against = _against(found, mine)
+    near = [r.candidate for r in against if r.margin < (-BUILT if built and seen and r.foil else MARGIN)]
     return (mine, *near)
+
+
+def _beyond_telling(estimates: Sequence[Estimate]) -> bool:
+    """Whether all that was found is beyond plausible sizes, with intervals of more than half of it: past the load at
+    which a tooth changes sides, say, readings do not tell how wide its gap is."""
+    sizes = [(abs(e.value - e.unknown.parameter.null), e.unknown.parameter.scale, e.ci95) for e in estimates]
+    return bool(sizes) and all(size > UNUSUAL * scale and wide > 0.5 * size for size, scale, wide in sizes)
+
+
+def _of_another_course(found: Search, candidate: Candidate) -> bool:
+    """Whether another course over the same joint, one that no effect has, clearly explains more."""
+    against = [r for r in found.rivals if r.of == candidate.key and r.foil and r.fitted]
+    return any(r.margin < -MARGIN for r in against)
+
+
+def _against(found: Search, mine: Candidate) -> list[Rival]:
+    """What may be taken for ``mine``, nearest first; other courses where they are no mere variants of it."""
+    return [r for r in found.rivals if r.of == mine.key and (mine.name in FOILED or not r.foil)]
 
 
 def _left_out(found: Search, last: Explained, group: int, part: Ints | None) -> float:
