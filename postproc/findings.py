@@ -229,6 +229,37 @@ CODES: dict[str, Code] = {
         "comment names no operation",
         "A cut begins behind comments of which none names an operation; the last named one goes on.",
     ),
+    "FRC019": Code(
+        "error",
+        "log and path do not match",
+        "The log does not cover the path that cuts, or the length of the path is not known.",
+    ),
+    "FRC020": Code(
+        "error", "no offset to take off", "--force-offset needs a log with readings in air moves (PTP, G0, FORCE OFF)."
+    ),
+    "FRC021": Code(
+        "warning", "gauge offset", "In air the log shows a force; --force-offset takes it off, nothing else does."
+    ),
+    "FRC022": Code("info", "gauge offset taken off", "The mean of the readings in air was taken off all readings."),
+    "FRC023": Code(
+        "warning", "channel saturated", "Equal readings in a row at the end of a channel's range: there was more."
+    ),
+    "FRC024": Code("warning", "gap in the log", "Readings are missing; the force there is taken from both sides."),
+    "FRC025": Code(
+        "info", "motions between readings", "Motions shorter than the distance of readings take the log between them."
+    ),
+    "FRC026": Code(
+        "warning",
+        "force changes within a motion",
+        "A motion's force is linear from begin to end; here the log is not. Insert a point where the force changes.",
+    ),
+    "FRC027": Code("warning", "log longer than the path", "The rest of the log was not used; is it of this program?"),
+    "FRC028": Code(
+        "info",
+        "motions that take no part of the log",
+        "Turns on the spot and moves to axis positions have no path length, moves without a feed no known time.",
+    ),
+    "FRC029": Code("info", "log in short", "Readings, and the largest mean and peak force of a motion."),
     # kinematics
     "KIN001": Code(
         "error",
@@ -517,6 +548,26 @@ CODES: dict[str, Code] = {
         "corrected point is out of reach",
         "The correction leads out of reach; its cut is left as it was.",
     ),
+    "VER001": Code(
+        "error",
+        "not the same program",
+        "The second program does not make the motions of the first one, with others between them.",
+    ),
+    "VER002": Code(
+        "warning",
+        "no mark of a compensation",
+        "The second program was not written by this tool, or its mark was taken out.",
+    ),
+    "VER003": Code(
+        "warning",
+        "path error above the tolerance",
+        "The simulated tool is farther beside the wanted path than the cell allows.",
+    ),
+    "VER004": Code(
+        "warning",
+        "not simulated",
+        "The way of these motions is the controller's own, or the robot can not be followed there.",
+    ),
     "COR012": Code(
         "info",
         "motions inserted",
@@ -531,6 +582,42 @@ CODES: dict[str, Code] = {
         "warning",
         "limit of growth reached",
         "max_growth of the cell allows fewer inserted motions than the tolerance asks for; the worst ones got theirs.",
+    ),
+    # batch
+    "BAT001": Code(
+        "error",
+        "no program matched",
+        "A batch names programs by files, folders and patterns; this one names none.",
+    ),
+    "BAT002": Code(
+        "error",
+        "two programs with one output",
+        "One would overwrite the other, or the other's reports; nothing was begun.",
+    ),
+    "BAT003": Code(
+        "error",
+        "path outside of the folder",
+        "Programs and outputs of a job file lie in its folder or below, unless --allow-outside is said.",
+    ),
+    "BAT004": Code(
+        "error",
+        "defect",
+        "A program met a defect of this tool; the other programs went on. Please report it.",
+    ),
+    "BAT005": Code(
+        "error",
+        "process died",
+        "The process that had the program ended before it was done, most often for want of memory.",
+    ),
+    "BAT006": Code(
+        "error",
+        "cluster can not be used",
+        "Scheduler and workers must be there, see the same folders, and have the same version as this machine.",
+    ),
+    "BAT007": Code(
+        "warning",
+        "older output stands",
+        "The program could not be done; what lies in its place was written before, from another input.",
     ),
 }
 

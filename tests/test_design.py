@@ -18,6 +18,7 @@ ROOMS = {
     "report": 7,
     "writing": 7,
     "diagnosis": 6,
+    "verification": 6,
     "identification": 5,
     "experiments": 5,
     "workspace": 5,
