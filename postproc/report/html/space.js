@@ -1,0 +1,447 @@
+// The 3-D view: the wanted path in the robot base, seen in parallel projection.  Colour and width of a motion say the
+// chosen quantity; a thin line beside it is the path that the robot would bend to, magnified.
+
+// Turn about Z and tilt: the front is seen from +X, the side from -Y.
+const VIEWS = { oblique: [0.6, 0.6], top: [0, Math.PI / 2], front: [Math.PI / 2, 0], side: [0, 0] };
+
+const BINS = 24, SLABS = 24, NEAR = 16, WHILE_MOVING = 8000, ARROWS = 90;
+
+class Space {
+  constructor(canvas, tip) {
+    this.sheet = new Sheet(canvas, (pen, wide, high) => this.paint(pen, wide, high));
+    this.canvas = canvas;
+    this.tip = tip;
+    this.quantity = 'before';
+    this.arrows = true;
+    this.bent = false;
+    this.magnify = 0;
+    this.hovered = -1;
+    this.moving = false;
+    this.screen = new Float32Array(2 * count);
+    this.depth = new Float32Array(count);
+    this.known = new Uint8Array(count);
+    this.inside = [];
+    for (let i = 0; i < count; i++) {
+      this.known[i] = Number.isFinite(motions.position[3 * i]) ? 1 : 0;
+      if (motions.state[i] !== AIR) this.inside.push(i);
+    }
+    this.measure();
+    this.look('oblique');
+    this.listen();
+  }
+
+  // The box of the cutting motions (of all, where none cuts): what the view turns about and shows whole.
+  measure() {
+    this.low = [Infinity, Infinity, Infinity];
+    this.high = [-Infinity, -Infinity, -Infinity];
+    for (const cuttingOnly of [true, false]) {
+      for (let i = 0; i < count; i++) {
+        if (!this.known[i] || (cuttingOnly && motions.state[i] === AIR)) continue;
+        for (let k = 0; k < 3; k++) {
+          const value = motions.position[3 * i + k];
+          this.low[k] = Math.min(this.low[k], value);
+          this.high[k] = Math.max(this.high[k], value);
+        }
+      }
+      if (this.low[0] <= this.high[0]) break;
+    }
+    if (!(this.low[0] <= this.high[0])) { this.low = [0, 0, 0]; this.high = [1, 1, 1]; }
+    this.middle = this.low.map((low, k) => 0.5 * (low + this.high[k]));
+    this.size = Math.max(1, Math.hypot(...this.low.map((low, k) => this.high[k] - low)));
+  }
+
+  look(name) {
+    [this.yaw, this.pitch] = VIEWS[name];
+    this.fit();
+  }
+
+  fit() {
+    this.zoom = 1;
+    this.shift = [0, 0];
+    this.sheet.later();
+  }
+
+  // Unit vectors to the right, up, and towards the reader.
+  axes() {
+    const [c, s, cp, sp] = [Math.cos(this.yaw), Math.sin(this.yaw), Math.cos(this.pitch), Math.sin(this.pitch)];
+    return [[c, s, 0], [-s * sp, c * sp, cp], [s * cp, -c * cp, sp]];
+  }
+
+  project(wide, high) {
+    const [right, up, out] = this.axes();
+    // as large as the turned box allows
+    const spans = [right, up].map((axis) => axis.reduce((sum, a, k) => sum + Math.abs(a) * (this.high[k] - this.low[k]), 0));
+    const whole = Math.min((wide - 110) / Math.max(spans[0], 1e-6), (high - 110) / Math.max(spans[1], 1e-6));
+    this.scale = Math.min(whole, 1e4) * this.zoom;
+    const [mx, my, mz] = this.middle;
+    this.centre = [wide / 2 + this.shift[0], high / 2 + this.shift[1]];
+    const p = motions.position;
+    for (let i = 0; i < count; i++) {
+      const x = p[3 * i] - mx, y = p[3 * i + 1] - my, z = p[3 * i + 2] - mz;
+      this.screen[2 * i] = this.centre[0] + this.scale * (right[0] * x + right[1] * y + right[2] * z);
+      this.screen[2 * i + 1] = this.centre[1] - this.scale * (up[0] * x + up[1] * y + up[2] * z);
+      this.depth[i] = out[0] * x + out[1] * y + out[2] * z;
+    }
+    this.right = right;
+    this.up = up;
+  }
+
+  spot(place) {
+    const at = place.map((value, k) => value - this.middle[k]);
+    const dot = (axis) => axis.reduce((sum, a, k) => sum + a * at[k], 0);
+    return [this.centre[0] + this.scale * dot(this.right), this.centre[1] - this.scale * dot(this.up)];
+  }
+
+  along(vectors, i, by) {
+    const [x, y, z] = [vectors[3 * i], vectors[3 * i + 1], vectors[3 * i + 2]];
+    return [by * (this.right[0] * x + this.right[1] * y + this.right[2] * z),
+      -by * (this.up[0] * x + this.up[1] * y + this.up[2] * z)];
+  }
+
+  paint(pen, wide, high) {
+    this.project(wide, high);
+    const { values } = quantities[this.quantity];
+    this.range = extent(values, this.inside);
+    if (this.range[0] > 0 && this.range[0] < 0.5 * this.range[1]) this.range[0] = 0;
+    this.box(pen);
+    const stride = this.moving ? Math.ceil(count / WHILE_MOVING) : 1;
+    this.air(pen, stride);
+    this.path(pen, values, stride);
+    if (this.bent && this.magnify > 0) this.bentPath(pen, stride);
+    if (this.arrows) this.forces(pen);
+    this.marks(pen);
+    this.triad(pen, high);
+    this.key(pen, wide, high);
+  }
+
+  // The edges of the box, with its lengths.
+  box(pen) {
+    const corner = (bits) => this.spot([0, 1, 2].map((k) => ((bits >> k) & 1 ? this.high[k] : this.low[k])));
+    pen.strokeStyle = theme().faint;
+    pen.lineWidth = 0.8;
+    pen.beginPath();
+    for (let bits = 0; bits < 8; bits++) {
+      for (let k = 0; k < 3; k++) {
+        if ((bits >> k) & 1) continue;
+        pen.moveTo(...corner(bits));
+        pen.lineTo(...corner(bits | (1 << k)));
+      }
+    }
+    pen.stroke();
+    pen.fillStyle = theme().soft;
+    pen.font = FONT;
+    pen.textAlign = 'center';
+    for (let k = 0; k < 3; k++) {
+      const [from, to] = [corner(0), corner(1 << k)];
+      const length = this.high[k] - this.low[k];
+      if (Math.hypot(to[0] - from[0], to[1] - from[1]) < 50 || length < 1e-3) continue;
+      pen.fillText(`${'XYZ'[k]} ${length.toFixed(length < 10 ? 1 : 0)} mm`, 0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1]) + 16);
+    }
+  }
+
+  air(pen, stride) {
+    pen.strokeStyle = theme().soft;
+    pen.lineWidth = 0.7;
+    pen.setLineDash([2, 4]);
+    pen.beginPath();
+    for (let i = stride; i < count; i += stride) {
+      if (motions.state[i] !== AIR || !this.known[i] || !this.known[i - stride]) continue;
+      pen.moveTo(this.screen[2 * i - 2 * stride], this.screen[2 * i - 2 * stride + 1]);
+      pen.lineTo(this.screen[2 * i], this.screen[2 * i + 1]);
+    }
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+
+  // Segments by depth and value: far ones first, those of one slab and one value in one stroke.
+  path(pen, values, stride) {
+    const [low, high] = this.range, span = high - low || 1;
+    let [near, far] = [-Infinity, Infinity];
+    for (let i = 0; i < count; i++) {
+      if (!this.known[i] || motions.state[i] === AIR) continue;
+      if (this.depth[i] > near) near = this.depth[i];
+      if (this.depth[i] < far) far = this.depth[i];
+    }
+    const thick = near - far || 1;
+    const heaps = new Array(SLABS * (BINS + 1));
+    for (let i = stride; i < count; i += stride) {
+      if (motions.state[i] === AIR || !this.known[i] || !this.known[i - stride]) continue;
+      const slab = Math.min(SLABS - 1, Math.max(0, Math.floor((SLABS * (this.depth[i] - far)) / thick)));
+      const share = (values[i] - low) / span;
+      // motions that were not corrected, or are not known, have a heap of their own
+      const plain = !Number.isFinite(share) || (given.corrected && motions.state[i] !== CORRECTED);
+      const bin = plain ? BINS : Math.min(BINS - 1, Math.max(0, Math.floor(BINS * share)));
+      (heaps[slab * (BINS + 1) + bin] ||= []).push(i);
+    }
+    const colours = Array.from({ length: BINS }, (_, bin) => colour((bin + 0.5) / BINS));
+    pen.lineCap = 'round';
+    for (let heap = 0; heap < heaps.length; heap++) {
+      if (!heaps[heap]) continue;
+      const bin = heap % (BINS + 1), plain = bin === BINS;
+      pen.strokeStyle = plain ? theme().ink : colours[bin];
+      pen.lineWidth = plain ? 1.4 : 1.3 + (2.7 * bin) / BINS;
+      pen.setLineDash(plain ? [6, 4] : []);
+      pen.beginPath();
+      for (const i of heaps[heap]) {
+        pen.moveTo(this.screen[2 * i - 2 * stride], this.screen[2 * i - 2 * stride + 1]);
+        pen.lineTo(this.screen[2 * i], this.screen[2 * i + 1]);
+      }
+      pen.stroke();
+    }
+    pen.setLineDash([]);
+  }
+
+  bentPath(pen, stride) {
+    const by = this.magnify * this.scale;
+    pen.strokeStyle = theme().before;
+    pen.lineWidth = 0.9;
+    pen.beginPath();
+    let open = false;
+    for (let i = 0; i < count; i += stride) {
+      const bent = this.known[i] && motions.state[i] !== AIR && Number.isFinite(motions.deflection[3 * i]);
+      if (bent) {
+        const [x, y] = this.along(motions.deflection, i, by);
+        if (open) pen.lineTo(this.screen[2 * i] + x, this.screen[2 * i + 1] + y);
+        else pen.moveTo(this.screen[2 * i] + x, this.screen[2 * i + 1] + y);
+      }
+      open = bent;
+    }
+    pen.stroke();
+  }
+
+  // Some motions with their force, as long as it is large; the arrow ends where the force acts.
+  forces(pen) {
+    const rows = this.inside, every = Math.max(1, Math.ceil(rows.length / ARROWS));
+    const largest = extent(quantities.force.values, rows)[1];
+    if (!(largest > 0)) return;
+    pen.strokeStyle = pen.fillStyle = theme().ink;
+    pen.lineWidth = 1;
+    pen.globalAlpha = 0.75;
+    for (let k = every >> 1; k < rows.length; k += every) {
+      const i = rows[k];
+      if (!this.known[i]) continue;
+      const [x, y] = [this.screen[2 * i], this.screen[2 * i + 1]];
+      const [dx, dy] = this.along(motions.force, i, 46 / largest);
+      const long = Math.hypot(dx, dy);
+      if (!(long > 3)) continue;
+      const [ux, uy] = [dx / long, dy / long];
+      pen.beginPath();
+      pen.moveTo(x - dx, y - dy);
+      pen.lineTo(x, y);
+      pen.stroke();
+      pen.beginPath();
+      pen.moveTo(x, y);
+      pen.lineTo(x - 6 * ux + 2.5 * uy, y - 6 * uy - 2.5 * ux);
+      pen.lineTo(x - 6 * ux - 2.5 * uy, y - 6 * uy + 2.5 * ux);
+      pen.fill();
+    }
+    pen.globalAlpha = 1;
+  }
+
+  // The worst place (triangle) and the chosen motion (ring), with their lines.
+  marks(pen) {
+    pen.font = `bold ${FONT}`;
+    pen.textAlign = 'left';
+    const label = (text, x, y) => {
+      pen.lineWidth = 4;
+      pen.strokeStyle = theme().ground;
+      pen.strokeText(text, x, y);
+      pen.fillStyle = theme().ink;
+      pen.fillText(text, x, y);
+    };
+    const worst = given.places.length ? nearest(motions.row, given.places[0]) : -1;
+    if (worst >= 0 && this.known[worst]) {
+      const [x, y] = [this.screen[2 * worst], this.screen[2 * worst + 1]];
+      pen.beginPath();
+      pen.moveTo(x, y - 3);
+      pen.lineTo(x - 6, y - 14);
+      pen.lineTo(x + 6, y - 14);
+      pen.closePath();
+      pen.lineWidth = 2;
+      pen.strokeStyle = theme().ground;
+      pen.stroke();
+      pen.fillStyle = theme().ink;
+      pen.fill();
+      label(`worst, line ${motions.line[worst]}`, x + 10, y - 10);
+    }
+    for (const [i, text] of [[chosen, chosen === worst ? '' : `line ${motions.line[chosen]}`], [this.hovered, '']]) {
+      if (i < 0 || !this.known[i]) continue;
+      const [x, y] = [this.screen[2 * i], this.screen[2 * i + 1]];
+      for (const [width, ink] of [[5, theme().ground], [2, theme().ink]]) {
+        pen.lineWidth = width;
+        pen.strokeStyle = ink;
+        pen.beginPath();
+        pen.arc(x, y, 7, 0, 2 * Math.PI);
+        pen.stroke();
+      }
+      if (text) label(text, x + 12, y + 16);
+    }
+  }
+
+  triad(pen, high) {
+    const [x, y] = [44, high - 44];
+    pen.lineWidth = 1.6;
+    pen.font = FONT;
+    pen.textAlign = 'center';
+    for (let k = 0; k < 3; k++) {
+      const [dx, dy] = [28 * this.right[k], -28 * this.up[k]];
+      pen.strokeStyle = pen.fillStyle = theme().ink;
+      pen.beginPath();
+      pen.moveTo(x, y);
+      pen.lineTo(x + dx, y + dy);
+      pen.stroke();
+      pen.fillText('XYZ'[k], x + 1.32 * dx, y + 1.32 * dy + 4);
+    }
+  }
+
+  // The scale of colour and width, with its numbers.
+  key(pen, wide, high) {
+    const { title, unit, decimals } = quantities[this.quantity];
+    const [low, most] = this.range, [x, top, tall] = [wide - 26, 40, Math.min(200, high - 120)];
+    pen.font = FONT;
+    pen.textAlign = 'right';
+    pen.fillStyle = theme().ink;
+    pen.fillText(`${title}, ${unit}`, wide - 12, 22);
+    for (let k = 0; k < BINS; k++) {
+      const half = 2 + (8 * k) / BINS;
+      pen.fillStyle = colour((k + 0.5) / BINS);
+      pen.fillRect(x - half, top + tall * (1 - (k + 1) / BINS), 2 * half, tall / BINS + 0.6);
+    }
+    pen.fillStyle = theme().soft;
+    for (const value of ticks(low, most, 4)) {
+      const share = most > low ? (value - low) / (most - low) : 0;
+      pen.fillText(number(value, decimals), x - 16, top + tall * (1 - share) + 4);
+    }
+  }
+
+  listen() {
+    const { canvas } = this;
+    const held = new Map();
+    let still = 0, spread = 0;
+    canvas.addEventListener('pointerdown', (event) => {
+      canvas.focus({ preventScroll: true });
+      canvas.setPointerCapture(event.pointerId);
+      held.set(event.pointerId, [event.clientX, event.clientY]);
+      still = 0;
+      canvas.classList.add('held');
+    });
+    canvas.addEventListener('pointermove', (event) => {
+      const before = held.get(event.pointerId);
+      if (!before) return this.hover(...this.sheet.at(event));
+      const [dx, dy] = [event.clientX - before[0], event.clientY - before[1]];
+      held.set(event.pointerId, [event.clientX, event.clientY]);
+      still += Math.abs(dx) + Math.abs(dy);
+      this.hover(-1e9, -1e9);
+      if (held.size === 2) {
+        const [a, b] = [...held.values()], now = Math.hypot(a[0] - b[0], a[1] - b[1]);
+        if (spread) this.zoomAt(now / spread, ...this.sheet.at(event));
+        spread = now;
+      } else if (event.shiftKey || event.buttons & 6) this.move(dx, dy);
+      else this.turn(dx / 150, dy / 150);
+    });
+    const drop = (event) => {
+      held.delete(event.pointerId);
+      spread = 0;
+      canvas.classList.remove('held');
+      if (event.type === 'pointerup' && still < 5) {
+        const at = this.find(...this.sheet.at(event));
+        if (at >= 0) choose(at, false);
+      }
+      this.rest();
+    };
+    canvas.addEventListener('pointerup', drop);
+    canvas.addEventListener('pointercancel', drop);
+    canvas.addEventListener('pointerleave', () => this.hover(-1e9, -1e9));
+    canvas.addEventListener('contextmenu', (event) => event.preventDefault());
+    canvas.addEventListener('dblclick', () => this.fit());
+    canvas.addEventListener('wheel', (event) => {
+      if (document.activeElement !== canvas && !event.ctrlKey) return;
+      event.preventDefault();
+      this.zoomAt(Math.exp(-event.deltaY / 500), ...this.sheet.at(event));
+      this.restSoon();
+    }, { passive: false });
+    canvas.addEventListener('keydown', (event) => {
+      const by = event.shiftKey ? 'move' : 'turn', step = event.shiftKey ? 40 : 0.12;
+      const act = {
+        ArrowLeft: () => this[by](-step, 0), ArrowRight: () => this[by](step, 0),
+        ArrowUp: () => this[by](0, -step), ArrowDown: () => this[by](0, step),
+        '+': () => this.zoomAt(1.25, ...this.centre), '=': () => this.zoomAt(1.25, ...this.centre),
+        '-': () => this.zoomAt(0.8, ...this.centre), 0: () => this.fit(),
+        n: () => choose(chosen + 1, true), p: () => choose(chosen - 1, true),
+      }[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+      if (!act || event.ctrlKey || event.altKey || event.metaKey) return;
+      event.preventDefault();
+      act();
+      this.restSoon();
+    });
+  }
+
+  turn(dx, dy) {
+    this.yaw -= dx;
+    this.pitch = Math.min(Math.PI / 2, Math.max(-Math.PI / 2, this.pitch + dy));
+    this.moving = true;
+    this.sheet.later();
+  }
+
+  move(dx, dy) {
+    this.shift = [this.shift[0] + dx, this.shift[1] + dy];
+    this.moving = true;
+    this.sheet.later();
+  }
+
+  zoomAt(by, x, y) {
+    const next = Math.min(2000, Math.max(0.2, this.zoom * by)), ratio = next / this.zoom;
+    const [wide, high] = [this.canvas.clientWidth / 2, this.canvas.clientHeight / 2];
+    this.shift = [x - wide - ratio * (x - wide - this.shift[0]), y - high - ratio * (y - high - this.shift[1])];
+    this.zoom = next;
+    this.moving = true;
+    this.sheet.later();
+  }
+
+  rest() {
+    this.moving = false;
+    this.sheet.later();
+  }
+
+  restSoon() {
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.rest(), 180);
+  }
+
+  find(x, y) {
+    let best = -1, least = NEAR * NEAR;
+    for (let i = 0; i < count; i++) {
+      if (!this.known[i]) continue;
+      const dx = this.screen[2 * i] - x, dy = this.screen[2 * i + 1] - y, off = dx * dx + dy * dy;
+      if (off < least) { least = off; best = i; }
+    }
+    return best;
+  }
+
+  hover(x, y) {
+    const at = this.find(x, y);
+    if (at === this.hovered) return;
+    this.hovered = at;
+    this.tip.hidden = at < 0;
+    if (at >= 0) {
+      this.tip.textContent = words(at).join('\n');
+      const { clientWidth: wide, clientHeight: high } = this.canvas;
+      const [sx, sy] = [this.screen[2 * at], this.screen[2 * at + 1]];
+      this.tip.style.left = `${Math.max(0, Math.min(sx + 16, wide - this.tip.offsetWidth - 4))}px`;
+      this.tip.style.top = `${Math.max(0, Math.min(sy + 16, high - this.tip.offsetHeight - 4))}px`;
+    }
+    this.sheet.later();
+  }
+
+  // Another motion was chosen; `show`: bring it into the view.
+  chosen(show) {
+    if (show && this.known[chosen] && this.right) {
+      const { clientWidth: wide, clientHeight: high } = this.canvas;
+      const [x, y] = this.spot([0, 1, 2].map((k) => motions.position[3 * chosen + k]));
+      if (x < 30 || y < 30 || x > wide - 30 || y > high - 30) {
+        this.shift = [this.shift[0] + wide / 2 - x, this.shift[1] + high / 2 - y];
+      }
+    }
+    this.sheet.later();
+  }
+}

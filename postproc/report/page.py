@@ -1,0 +1,234 @@
+"""The report of one program as a page: words and tables that need no script, and figures that a script draws.
+
+A page is one file.  It needs no network and asks for none: its policy (Content-Security-Policy) allows this script and
+this style sheet, by their digests, and nothing else.  Everything that comes from a program is escaped: as HTML by the
+templates, as data by ``embedded``.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+
+from postproc import __version__
+from postproc.compensation.correct import State
+from postproc.findings import CODES, Finding
+from postproc.report.page_data import PageData, shown_rows
+from postproc.report.page_words import (
+    badge,
+    left_over,
+    parameter_rows,
+    printed,
+    program_facts,
+    program_tiles,
+    program_verdict,
+)
+from postproc.toolpath import Kind
+
+FOLDER = Path(__file__).parent / "html"
+
+FINDINGS = 300
+"""A page tells so many findings at most; all are in the JSON."""
+
+SCRIPTS = ("figures.js", "space.js", "chart.js", "program.js")
+STYLE = "page.css"
+
+_SEVERITY = {"info": ("i", "note"), "warning": ("!", "look"), "error": ("x", "error")}
+
+
+def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
+    """The page of one program.  links: what is beside it, words -> relative path."""
+    report = data.report
+    shown = shown_rows(data)
+    return rendered(
+        "program.html.j2",
+        script=_script(SCRIPTS),
+        title=Path(report.program).name,
+        what="compensation" if data.corrected else "prediction",
+        verdict=program_verdict(data),
+        badge=badge(report.exit, report.corrected if data.corrected else None),
+        tiles=program_tiles(data),
+        left=left_over(data),
+        facts=program_facts(report),
+        places=_places(data),
+        findings=finding_rows(report.findings),
+        more_findings=max(0, len(report.findings) - FINDINGS),
+        parameters=parameter_rows(report.model),
+        digests=report.digests,
+        links=linked(links),
+        shown=len(shown),
+        motions=len(data),
+        goes=True,
+        corrected=data.corrected,
+        interval=bool(np.isfinite(data.interval).any()),
+        evaluated=data.evaluated,
+        lower_bound=report.doubt.lower_bound,
+        data=embedded(_figures(data, shown)),
+    )
+
+
+def rendered(template: str, script: Markup | None = None, **what: Any) -> bytes:
+    """The bytes of a page, of ``template`` with the style sheet of all pages.
+
+    what: for the base of all pages title, what, verdict, badge, findings (``finding_rows``), more_findings, links
+    (``linked``), and goes: whether a finding's line can be shown in a figure; for the template what else it names.
+    """
+    style = Markup((FOLDER / STYLE).read_text(encoding="utf-8"))
+    sources = f"'sha256-{_digest(script)}'" if script else "'none'"
+    policy = (
+        f"default-src 'none'; script-src {sources}; style-src 'sha256-{_digest(style)}'; img-src data:;"
+        " base-uri 'none'; form-action 'none'"
+    )
+    page = _templates().get_template(template)
+    always = {"style": style, "script": script, "policy": policy, "version": __version__}
+    text = page.render({"goes": False, **what, **always})
+    return text.encode("utf-8", "replace")
+
+
+def embedded(value: object) -> Markup:
+    """JSON that may stand in a script element of a page: no ``<``, ``>``, ``&`` and no line separators in it."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    for letter in "<>&\u2028\u2029":
+        text = text.replace(letter, f"\\u{ord(letter):04x}")
+    return Markup(text)
+
+
+def finding_rows(findings: Sequence[Finding]) -> list[dict[str, object]]:
+    """The first findings as a page tells them, the gravest first."""
+    order = list(_SEVERITY)
+    rows = []
+    for finding in sorted(findings, key=lambda one: -order.index(one.severity))[:FINDINGS]:
+        code = CODES[finding.code]
+        sign, word = _SEVERITY[finding.severity]
+        rows.append(
+            {
+                "sign": sign,
+                "word": word,
+                "severity": finding.severity,
+                "code": finding.code,
+                "title": code.title,
+                "place": printed(finding.place),
+                "line": finding.line,
+                "message": printed(finding.message),
+                "help": printed(finding.help or code.explanation),
+            }
+        )
+    return rows
+
+
+def beside(page: Path, files: Mapping[str, Path]) -> dict[str, str]:
+    """Words -> path of each of ``files`` as seen from the folder of ``page``."""
+    return {word: os.path.relpath(path, page.parent) for word, path in files.items()}
+
+
+def linked(links: Mapping[str, str]) -> list[tuple[str, str, str]]:
+    """Words -> path as (word, what is shown, address); a colon or a percent sign in a name is no part of an address."""
+    told = []
+    for word, path in links.items():
+        parts = Path(path).as_posix()
+        told.append((word, printed(parts), "./" + quote(os.fsencode(parts))))
+    return told
+
+
+def _places(data: PageData) -> list[dict[str, object]]:
+    """Rows of the table of the worst places."""
+    size = np.linalg.norm(data.correction, axis=1)
+    force = np.linalg.norm(data.force, axis=1)
+    return [
+        {
+            "row": place.row,
+            "line": int(data.line[place.row]),
+            "cut": int(data.cut[place.row]) + 1,
+            "why": place.why,
+            "before": _number(data.before[place.row], 3),
+            "correction": _number(size[place.row], 3),
+            "after": _number(data.after[place.row], 4),
+            "between": _number(data.between[place.row], 4),
+            "force": f"{force[place.row]:.0f}",
+            "source": printed(place.source),
+            "written": [printed(line) for line in place.written],
+            "same": place.written == (place.source,),
+            "state": State(data.state[place.row]).name.lower(),
+        }
+        for place in data.places
+    ]
+
+
+def _number(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if np.isfinite(value) else "–"
+
+
+def _figures(data: PageData, rows: np.ndarray) -> dict[str, object]:
+    """What the script draws: columns of the rows shown."""
+    columns = {
+        "row": (rows, "i4"),
+        "line": (data.line[rows], "i4"),
+        "cut": (data.cut[rows], "i4"),
+        "kind": (data.kind[rows], "u1"),
+        "state": (data.state[rows], "u1"),
+        "way": (data.way[rows], "f4"),
+        "position": (data.position[rows], "f4"),
+        "force": (data.force[rows], "f4"),
+        "deflection": (data.deflection[rows], "f4"),
+        "correction": (data.correction[rows], "f4"),
+        "before": (data.before[rows], "f4"),
+        "after": (data.after[rows], "f4"),
+        "between": (data.between[rows], "f4"),
+        "inserted": (data.inserted[rows], "i4"),
+        "interval": (data.interval[rows], "f4"),
+    }
+    return {
+        "count": len(rows),
+        "motions": len(data),
+        "corrected": data.corrected,
+        "kinds": [kind.name for kind in Kind],
+        "states": [_STATES[state] for state in State],
+        "places": [place.row for place in data.places],
+        "columns": {name: _column(values, form) for name, (values, form) in columns.items()},
+    }
+
+
+_STATES = {
+    State.AIR: "nothing to correct",
+    State.CORRECTED: "corrected",
+    State.LEFT: "left as it was",
+    State.OFF: "left on the program's word",
+}
+
+
+def _column(values: np.ndarray, form: str) -> dict[str, object]:
+    """Numbers as base64 of little-endian bytes, row by row."""
+    raw = np.ascontiguousarray(values, dtype=f"<{form}").tobytes()
+    wide = values.shape[1] if values.ndim > 1 else 1
+    return {"form": form, "wide": wide, "base64": base64.b64encode(raw).decode("ascii")}
+
+
+def _script(names: Iterable[str]) -> Markup:
+    parts = "\n".join((FOLDER / name).read_text(encoding="utf-8") for name in names)
+    return Markup("(() => {\n'use strict';\n" + parts + "})();\n")
+
+
+def _digest(text: str) -> str:
+    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
+
+
+@cache
+def _templates() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(FOLDER),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
