@@ -74,7 +74,8 @@ def test_points_are_inserted_where_the_ends_are_not_enough(build, planar, capsys
     with capsys.disabled():
         print(
             f"\n{build.__name__}, arcs {'in their plane' if planar else 'free'}: end points alone"
-            f" {ends_only / MM:.4f} mm; pieces: {ours} (smallest number), {halved} (halving), {stepped} (every {fixed} mm)"
+            f" {ends_only / MM:.4f} mm; pieces: {ours} (smallest number), {halved} (halving),"
+            f" {stepped} (every {fixed} mm)"
         )
     assert ours <= halved
     assert ours <= stepped
@@ -89,7 +90,7 @@ def test_error_falls_with_the_square_of_the_length_on_lines():
 
 
 def test_a_loose_tolerance_inserts_nothing():
-    task = line(tolerance=10e-3)
+    task = replace(line(tolerance=10e-3), tolerance_angle=0.1)
     _, division = divided(task)
     assert division.inserted == 0
     assert np.array_equal(division.source, np.arange(4))
