@@ -297,6 +297,16 @@ CODES: dict[str, Code] = {
         "The program states an S or T that this robot does not have at that pose.",
     ),
     # model
+    "KIN008": Code(
+        "warning",
+        "axis near its limit",
+        "The correction brings an axis close to its limit; the controller may stop there.",
+    ),
+    "KIN009": Code(
+        "warning",
+        "axis too fast for the feed",
+        "At the programmed feed an axis would have to move faster than it can: the robot slows down there.",
+    ),
     "MOD001": Code(
         "warning",
         "compensator pulls implausibly",
@@ -577,6 +587,11 @@ CODES: dict[str, Code] = {
         "warning",
         "arc can not be corrected",
         "The corrected points give no arc that could be written; the cut is left as it was.",
+    ),
+    "COR015": Code(
+        "info",
+        "approximation larger than the correction",
+        "The controller does not reach points that it approximates; at corners it rounds off more than is corrected.",
     ),
     "COR014": Code(
         "warning",

@@ -594,13 +594,8 @@ def test_a_force_on_an_air_move_is_told(tmp_path):
         ("line,fx,fy,fz,mx\n11,1,2,3,4\n", "FRC003", 1, "column 'my' is missing"),
         ("line,fx,fy,fz,fram\n11,1,2,3,base\n", "FRC003", 1, "unknown column 'fram'; did you mean 'frame'"),
         ("line,fx,fy,fz,frame\n11,1,2,3,bas\n", "FRC003", 2, "column frame: no frame 'bas'"),
-        (
-            "s_mm,fx,fy,fz\n11,1,2,3\n",
-            "FRC002",
-            1,
-            "'s_mm' is not supported by this version, which reads 'line'",
-        ),
-        ("t_s,fx,fy,fz\n11,1,2,3\n", "FRC002", 1, "'t_s' is not supported by this version"),
+        ("fx,fy,fz\n1,2,3\n", "FRC003", 1, "no column says where: one of line, s_mm, t_s is missing"),
+        ("line,s_mm,fx,fy,fz\n11,0,1,2,3\n", "FRC003", 1, "columns line and s_mm both say where"),
     ],
 )
 def test_mistakes_in_force_tables(tmp_path, text, code, line, words):

@@ -82,8 +82,12 @@ def program_options(command: _Command) -> _Command:
                 "--force",
                 metavar="[SPEC]",
                 default=None,
-                help="Machining force. Alone: FORCE comments, <stem>.force.csv, or `force:` of the cell, whichever "
-                "comes first. With a value: 0,360,560@base (world, tool, feed; six numbers with moments), or a CSV.",
+                help="Machining force. Alone: FORCE comments, <stem>.force.csv, or `force:` or `process:` of the cell, "
+                "whichever comes first. With a value: 0,360,560@base (world, tool, feed; six numbers with moments), a "
+                "CSV (by line, s_mm or t_s), or the YAML of a cutting process.",
+            ),
+            click.option(
+                "--force-offset", is_flag=True, help="Take the mean of the force CSV in air off all its readings."
             ),
             click.option("--robot", metavar="NAME|FILE", help="Robot instead of the cell's."),
             language_options,

@@ -20,6 +20,7 @@ from postproc.cli.common import Out, program_options
 def predict(
     program: Path,
     force: str | None,
+    force_offset: bool,
     robot: str | None,
     cell: Path | None,
     config_dat: Path | None,
@@ -44,6 +45,7 @@ def predict(
     request = Request(
         program=program,
         force=force,
+        force_offset=force_offset,
         cell=cell,
         config_dat=config_dat,
         robot=robot,

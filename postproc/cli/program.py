@@ -42,6 +42,7 @@ from postproc.cli.common import Out, program_options
 def program(
     program: Path,
     force: str | None,
+    force_offset: bool,
     robot: str | None,
     cell: Path | None,
     config_dat: Path | None,
@@ -67,6 +68,7 @@ def program(
       compensate panel.src --force
       compensate panel.src --force 0,360,560@base --cell cell.yaml -o out/panel.src
       compensate panel.src --force panel.force.csv --gain 0.5 --json -
+      compensate panel.src --force milling.yaml
 
     Exit codes: 0 done; 3 written, but something was left or deserves a look; 1 nothing written; 2 command line.
     """
@@ -83,6 +85,7 @@ def program(
             Request(
                 program=program,
                 force=force,
+                force_offset=force_offset,
                 cell=cell,
                 robot=robot,
                 gain=gain,

@@ -7,7 +7,7 @@ A command is fixed and the true parameters differ by dp from those of the model:
 by central differences of the solved equilibrium, and its covariance is S C S^T (GUM, JCGM 100:2008, eq. 13).  This is
 as true of the deflection before as of the residual after a correction: what the model does not know of the robot, the
 correction leaves in.  A parameter is one and the same in all motions, so these errors do not average out over a
-program; nor does the force's, which is taken as one scale common to all motions.
+program; nor does the force's, which is taken as one scale common to all motions, or to all of an operation.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ STEP = 0.1
 """Step of the differences, in standard deviations."""
 
 FORCE = "force"
-"""The scale of all wrenches, as a parameter."""
+"""The scale of the wrenches, as a parameter."""
 
 WORST, EVEN = 500, 1500
 """Motions evaluated at most: those with the largest errors, and others evenly along the program."""
@@ -215,7 +215,7 @@ class Doubt:
     worst: row of the largest error before, -1 without any; there: ``blame`` (name, share of the variance), and
     ``tenth`` (name, [m] that 10 % of it would move the tool) of the figures without an interval, largest first.
     intervals: figures with one.  unstable: motions evaluated that have no stable rest within the intervals; they are
-    not in ``after``.
+    not in ``after``.  force_differs: the interval of the force is not the same share in all motions.
     """
 
     rows: Ints
@@ -228,6 +228,7 @@ class Doubt:
     blame: tuple[tuple[str, float], ...] = ()
     tenth: tuple[tuple[str, float], ...] = ()
     unstable: int = 0
+    force_differs: bool = False
 
     @property
     def lower_bound(self) -> bool:
@@ -238,14 +239,19 @@ class Doubt:
 def doubt_of(task: Task, result: Result, force_ci95: float | None = None) -> Doubt:
     """The doubt of a prediction, and of what remains after its correction; ``spreads`` says what the others are.
 
+    ``force_ci95``: share of the force, 95 %; without it what the source of the forces knows of each motion.
     Evaluated are all motions up to ``WORST + EVEN``; of more, those with the largest errors before and after and
     others evenly along the program: the cost of a program of a million motions is that of 2,000.
     """
     rows = _evaluated(result)
     forced = bool(task.wrench[rows].any())
-    known = spreads(task.model, force_ci95, forced)
+    force = _ForceShare.of(task, rows, force_ci95)
+    known = spreads(task.model, force.largest, forced)
+    if force.partly:
+        lost = spreads(task.model, None, True).without_interval
+        known = replace(known, without_interval=(*known.without_interval, lost[-1]))
     tenth = tuple((entry.name, np.nan) for entry in known.without_interval)
-    told = Doubt(rows, len(known.entries), known.level_unstated, tenth=tenth)
+    told = Doubt(rows, len(known.entries), known.level_unstated, tenth=tenth, force_differs=force.differs)
     if not len(rows):
         return told
     worst = int(np.nanargmax(result.before))
@@ -260,11 +266,13 @@ def doubt_of(task: Task, result: Result, force_ci95: float | None = None) -> Dou
         return told
 
     error, moves = _errors(task, known.entries, place, task.wanted[place])
+    moves = force.scaled(moves, known.entries, place)
     before = half_widths(error, covariances(moves, known.covariance))
     share = shares(moves[0], known.covariance)
     blame = tuple((known.entries[i].name, float(share[i])) for i in np.argsort(-share, kind="stable"))
 
     error, moves = _errors(task, known.entries, rows, result.command[rows])
+    moves = force.scaled(moves, known.entries, rows)
     spread = covariances(moves, known.covariance)
     size = np.linalg.norm(error, axis=1)
     upper = size + half_widths(error, spread)
@@ -277,6 +285,40 @@ def doubt_of(task: Task, result: Result, force_ci95: float | None = None) -> Dou
         blame=blame if share.any() else (),
         unstable=int((~sound).sum()),
     )
+
+
+@dataclass(frozen=True)
+class _ForceShare:
+    """The interval of the force as a share of it: ``largest`` of all motions, None where none has one; ``scale`` (N,):
+    that of each motion over the largest, 0 where not known; ``partly``: it is not known of some that carry force;
+    ``differs``: it is not the same in all that do."""
+
+    largest: float | None
+    scale: Floats
+    partly: bool
+    differs: bool
+
+    @staticmethod
+    def of(task: Task, rows: Ints, stated: float | None) -> _ForceShare:
+        n = len(task.wrench)
+        each = np.full(n, np.nan) if task.force.ci95 is None else task.force.ci95
+        if stated is not None:
+            each = np.full(n, stated)
+        here = each[rows[task.carries[rows]]]
+        found = here[np.isfinite(here)]
+        if not len(found):
+            return _ForceShare(stated, np.ones(n), False, False)
+        largest = float(found.max())
+        scale = np.nan_to_num(each) / largest if largest > 0 else np.ones(n)
+        return _ForceShare(largest, scale, len(found) < len(here), bool(found.min() < largest))
+
+    def scaled(self, moves: Floats, entries: Sequence[Unsure], rows: Ints) -> Floats:
+        """Sensitivities (M, 3, P) of ``rows`` in which the force's counts with the interval of each motion."""
+        weight = np.ones((len(rows), len(entries)))
+        for column, entry in enumerate(entries):
+            if entry.term < 0:
+                weight[:, column] = self.scale[rows]
+        return moves * weight[:, None]
 
 
 def _evaluated(result: Result) -> Ints:

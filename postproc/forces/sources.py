@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,87 +10,119 @@ import numpy as np
 from postproc.cell import Cell, Frames
 from postproc.findings import Finding, Refusal
 from postproc.forces.annotations import read_annotations
+from postproc.forces.logs import read_log
 from postproc.forces.operations import process_forces
 from postproc.forces.stated import FORM, NotAForce, Stated, parse_force
-from postproc.forces.table import read_force_table
+from postproc.forces.table import place_column, read_force_table
 from postproc.forces.wrench import Wrenches, turned
+from postproc.tables import read_table
 from postproc.toolpath import Toolpath
 
+LOG = ".csv"
 PROCESS = (".yaml", ".yml")
 
+Told = tuple[Stated, tuple[Finding, ...], str]
+"""Forces, what there is to say of them, and the name of their source."""
 
-def wrenches(program: Path, toolpath: Toolpath, frames: Frames, cell: Cell, spec: str | None) -> Wrenches:
+
+def wrenches(
+    program: Path, toolpath: Toolpath, frames: Frames, cell: Cell, spec: str | None, offset: bool = False
+) -> Wrenches:
     """The wrench of every motion of ``toolpath``.
 
     spec: None = no --force (zero); '' = --force alone (the program's own: FORCE comments, then
     ``<stem>.force.csv`` beside it, then the cell's ``force`` or ``process``); else the value of --force, a path
-    in it relative to the working folder.  Refusal FRC001 to FRC005, and those of a process file.
+    in it relative to the working folder.  ``offset``: a log's mean in air is taken off.  Refusal FRC001 to FRC005,
+    FRC020, and those of a force CSV or a process file.
     """
+    given = _Given(program, toolpath, frames, offset)
     if spec is None:
+        given.no_offset("there is no --force")
         return Wrenches.zero(len(toolpath))
     if spec.strip():
-        stated, findings = _explicit(
-            spec.strip(), Path(), toolpath, frames, program, "", 0, f"--force {spec.strip()}"
-        )
-        is_file = spec.strip().lower().endswith((".csv", *PROCESS))
-        source = Path(spec.strip()).name if is_file else spec.strip()
+        stated, findings, source = given.explicit(spec.strip(), Path(), "", 0, f"--force {spec.strip()}")
     else:
-        stated, findings, source = _belonging(program, toolpath, frames, cell)
+        stated, findings, source = _belonging(given, cell)
     return turned(stated, toolpath, frames, cell, str(program), source, findings)
 
 
-def _belonging(
-    program: Path, toolpath: Toolpath, frames: Frames, cell: Cell
-) -> tuple[Stated, tuple[Finding, ...], str]:
+@dataclass(frozen=True)
+class _Given:
+    """A program whose forces are sought."""
+
+    program: Path
+    toolpath: Toolpath
+    frames: Frames
+    offset: bool
+
+    def explicit(self, spec: str, folder: Path, file: str, line: int, name: str) -> Told:
+        """A force given as text: a CSV or process file (relative to ``folder``), or one wrench for all motions."""
+        if spec.lower().endswith(PROCESS):
+            return self.process(folder / spec)
+        if spec.lower().endswith(LOG):
+            return self.table(folder / spec)
+        self.no_offset(f"the force is {spec}")
+        try:
+            values, frame = parse_force(spec)
+        except NotAForce as error:
+            message = f"{name}: {error}" if spec in name else f"{name}: {spec[:60]!r}: {error}"
+            help = f"{FORM}; or a CSV or YAML file"
+            raise Refusal(Finding("FRC002", message, file, line, help=help)) from None
+        n = len(self.toolpath)
+        return Stated(np.tile(values, (n, 1)), np.full(n, frame)), (), spec
+
+    def table(self, path: Path) -> Told:
+        table = read_table(path, "FRC003")
+        column, program = place_column(table), str(self.program)
+        if column == "line":
+            stated, findings = read_force_table(table, self.toolpath, program, self.offset)
+        else:
+            stated, findings = read_log(table, column, self.toolpath, self.frames, program, self.offset)
+        return stated, findings, path.name
+
+    def process(self, path: Path) -> Told:
+        self.no_offset("the force is computed from a process")
+        stated, findings = process_forces(path, self.toolpath, self.frames, str(self.program))
+        return stated, findings, path.name
+
+    def no_offset(self, why: str) -> None:
+        """Refusal FRC020 where the offset of a log is to be taken off and there is no log."""
+        if self.offset:
+            message = f"--force-offset takes off the offset of a log, and {why}"
+            raise Refusal(
+                Finding("FRC020", message, str(self.program), help="--force LOG.csv --force-offset")
+            )
+
+
+def _belonging(given: _Given, cell: Cell) -> Told:
     """The force that belongs to the program, from the first source that exists."""
-    stated, findings = read_annotations(toolpath, str(program))
+    program = given.program
+    stated, findings = read_annotations(given.toolpath, str(program))
     if stated is not None:
+        given.no_offset("the force comes from FORCE comments")
         return stated, findings, "FORCE comments"
     beside = program.with_name(program.stem + ".force.csv")
     if beside.is_file():
-        stated, more = read_force_table(beside, toolpath, str(program))
-        return stated, (*findings, *more), beside.name
-    if cell.process is not None:
-        stated, more = process_forces(cell.path.parent / cell.process, toolpath, frames, str(program))
-        return stated, (*findings, *more), f"cell: {cell.process}"
-    if cell.force is not None:
-        stated, more = _explicit(
-            cell.force, cell.path.parent, toolpath, frames, program, str(cell.path), cell.force_line, "force"
+        stated, more, source = given.table(beside)
+    elif cell.process is not None:
+        stated, more, _ = given.process(cell.path.parent / cell.process)
+        source = f"cell: {cell.process}"
+    elif cell.force is not None:
+        stated, more, _ = given.explicit(
+            cell.force, cell.path.parent, str(cell.path), cell.force_line, "force"
         )
-        return stated, (*findings, *more), f"cell: {cell.force}"
-    raise Refusal(
-        Finding(
-            "FRC001",
-            "--force stands alone, and no force belongs to this program",
-            str(program),
-            help="one of: (1) a comment in the program, ;FORCE 0 360 560 @base, in G-code (FORCE 0 360 560 @BASE); "
-            f"(2) {beside.name} beside it, with the header line,fx,fy,fz and rows such as 12,0,360,560; "
-            f"(3) force: 0,360,560@base, or process: milling.yaml, in {cell.path}; "
-            "or give it here: --force 0,360,560@base",
-        ),
-        *findings,
-    )
-
-
-def _explicit(
-    spec: str,
-    folder: Path,
-    toolpath: Toolpath,
-    frames: Frames,
-    program: Path,
-    file: str,
-    line: int,
-    name: str,
-) -> tuple[Stated, tuple[Finding, ...]]:
-    """A force given as text: a CSV or process file (relative to ``folder``), or one wrench for all motions."""
-    if spec.lower().endswith(PROCESS):
-        return process_forces(folder / spec, toolpath, frames, str(program))
-    if spec.lower().endswith(".csv"):
-        return read_force_table(folder / spec, toolpath, str(program))
-    try:
-        values, frame = parse_force(spec)
-    except NotAForce as error:
-        message = f"{name}: {error}" if spec in name else f"{name}: {spec[:60]!r}: {error}"
-        raise Refusal(Finding("FRC002", message, file, line, help=f"{FORM}; or a CSV or YAML file")) from None
-    n = len(toolpath)
-    return Stated(np.tile(values, (n, 1)), np.full(n, frame)), ()
+        source = f"cell: {cell.force}"
+    else:
+        raise Refusal(
+            Finding(
+                "FRC001",
+                "--force stands alone, and no force belongs to this program",
+                str(program),
+                help="one of: (1) a comment in the program, ;FORCE 0 360 560 @base, in G-code (FORCE 0 360 560 @BASE); "
+                f"(2) {beside.name} beside it, with the header line,fx,fy,fz and rows such as 12,0,360,560; "
+                f"(3) force: 0,360,560@base, or process: milling.yaml, in {cell.path}; "
+                "or give it here: --force 0,360,560@base",
+            ),
+            *findings,
+        )
+    return stated, (*findings, *more), source

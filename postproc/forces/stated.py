@@ -13,6 +13,7 @@ from postproc.findings import nearest
 
 FRAMES = ("base", "world", "tool", "feed")
 BASE, WORLD, TOOL, FEED = range(4)
+CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
 
 FORM = "fx,fy,fz[,mx,my,mz][@base|world|tool|feed] in N and N m, for example 0,360,560@base"
 _SEPARATOR = re.compile(r"\s*,\s*|\s+")

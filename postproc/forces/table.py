@@ -1,36 +1,64 @@
-"""The force CSV: one row a motion, by the line of the program that holds it."""
+"""The force CSV by line: one row a motion, by the line of the program that holds it."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
-from postproc.arrays import Ints
+from postproc.arrays import Floats, Ints
 from postproc.findings import Finding, Refusal
-from postproc.forces.stated import BASE, NotAForce, Stated, parse_frame
+from postproc.forces.annotations import marked_air
+from postproc.forces.gauge import checked_gauge
+from postproc.forces.stated import BASE, CHANNELS, NotAForce, Stated, parse_frame
 from postproc.forces.wrench import is_air
-from postproc.tables import Table, read_table
+from postproc.tables import Table
 from postproc.toolpath import Toolpath
 
-COLUMNS = ("line", "fx", "fy", "fz", "mx", "my", "mz", "frame")
-FORM = "line,fx,fy,fz[,mx,my,mz][,frame] in N and N m; line is the motion's in the program, from 1"
+PLACES = ("line", "s_mm", "t_s")
+FORM = (
+    "line (of the motion, from 1) or s_mm (path length) or t_s (time at programmed feed), then fx,fy,fz[,mx,my,mz]"
+    "[,frame] in N and N m"
+)
 _SHOWN = 10
 
 
-def read_force_table(path: Path, toolpath: Toolpath, program: str) -> tuple[Stated, tuple[Finding, ...]]:
-    """What the CSV states for every motion; zero for those it does not name (told as FRC007).
+def place_column(table: Table) -> str:
+    """Which of PLACES the table has; Refusal where it has none or several, or columns are wrong or missing."""
+    table.only(*PLACES, *CHANNELS, "frame")
+    places = [name for name in PLACES if name in table]
+    if not places:
+        raise table.header_error(f"no column says where: one of {', '.join(PLACES)} is missing", FORM)
+    if len(places) > 1:
+        raise table.header_error(
+            f"columns {' and '.join(places)} both say where; only one can be meant", FORM
+        )
+    needed = CHANNELS if any(name in table for name in CHANNELS[3:]) else CHANNELS[:3]
+    for name in needed:
+        if name not in table:
+            raise table.header_error(f"column {name!r} is missing", FORM)
+    return places[0]
 
-    Refusal FRC002 (a column of another version), FRC003 (header or cells), FRC004 (a line without a motion).
-    """
-    table = read_table(path, "FRC003")
-    _check_columns(table)
-    lines = _lines(table)
+
+def read_channels(table: Table) -> Floats:
+    """(rows, 6) [N, N m]; moments that are not there are 0."""
     values = np.zeros((len(table), 6))
-    for index, name in enumerate(COLUMNS[1:7]):
+    for index, name in enumerate(CHANNELS):
         if name in table:
             values[:, index] = table.numbers(name)
-    frame = _frames(table)
+    return values
+
+
+def read_force_table(
+    table: Table, toolpath: Toolpath, program: str, offset: bool
+) -> tuple[Stated, tuple[Finding, ...]]:
+    """What the CSV states for every motion; zero for those it does not name (told as FRC007).
+
+    ``offset``: the mean of the rows of air moves is taken off all rows.  Refusal FRC003 (header or cells), FRC004 (a
+    line without a motion), FRC020 (no row of an air move).
+    """
+    findings: list[Finding] = []
+    lines = _lines(table)
+    values = read_channels(table)
+    frame = read_frames(table)
 
     # every motion of the program finds its row: a line may hold several motions where a dialect allows it
     order = np.argsort(lines, kind="stable")
@@ -42,40 +70,25 @@ def read_force_table(path: Path, toolpath: Toolpath, program: str) -> tuple[Stat
     if not np.all(used):
         raise Refusal(*_no_motion(table, lines, np.flatnonzero(~used), toolpath, program))
 
-    stated = Stated(np.where(found[:, None], values[row], 0.0), np.where(found, frame[row], BASE))
-    findings = []
-    air = is_air(toolpath)
-    lost = np.flatnonzero(air & np.any(stated.values != 0, axis=1))
-    if len(lost):
+    air = is_air(toolpath) | marked_air(toolpath)
+    in_air = np.zeros(len(table), bool)
+    in_air[row[found & air]] = True
+    if offset:
+        values = checked_gauge(table, values, in_air, offset, findings)
+    cut = found & ~air
+    stated = Stated(np.where(cut[:, None], values[row], 0.0), np.where(cut, frame[row], BASE))
+    lost = np.flatnonzero(found & air & np.any(values[row] != 0, axis=1))
+    if len(lost) and not offset:
         first = lost[0]
-        what = f"line {toolpath.line[first]} of {program} is an air move (PTP or G0); its force was not used"
+        what = f"line {toolpath.line[first]} of {program} is an air move (PTP, G0 or FORCE OFF); its force was not used"
         more = f" (and {len(lost) - 1} more)" if len(lost) > 1 else ""
-        findings.append(Finding("FRC009", what + more, str(path), int(table.lines[row[first]])))
+        findings.append(Finding("FRC009", what + more, str(table.path), int(table.lines[row[first]])))
     without = np.flatnonzero(~found & ~air)
     if len(without):
         first_line = f"the first is in line {toolpath.line[without[0]]} of {program}"
         what = f"motions without a row, taken as air: {len(without)}; {first_line}"
-        findings.append(Finding("FRC007", what, str(path)))
+        findings.append(Finding("FRC007", what, str(table.path)))
     return stated, tuple(findings)
-
-
-def _check_columns(table: Table) -> None:
-    for name in ("s_mm", "t_s"):
-        if name in table:
-            raise Refusal(
-                Finding(
-                    "FRC002",
-                    f"column {name!r} is not supported by this version, which reads 'line'",
-                    str(table.path),
-                    table.header_line,
-                    help=FORM,
-                )
-            )
-    table.only(*COLUMNS)
-    needed = COLUMNS[:7] if any(name in table for name in COLUMNS[4:7]) else COLUMNS[:4]
-    for name in needed:
-        if name not in table:
-            raise table.header_error(f"column {name!r} is missing", FORM)
 
 
 def _lines(table: Table) -> Ints:
@@ -94,7 +107,8 @@ def _lines(table: Table) -> Ints:
     return lines
 
 
-def _frames(table: Table) -> Ints:
+def read_frames(table: Table) -> Ints:
+    """(rows,) the frame of each row, an index into FRAMES; Refusal FRC003 where it is none."""
     if "frame" not in table:
         return np.full(len(table), BASE)
     texts = table.texts("frame")

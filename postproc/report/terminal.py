@@ -114,7 +114,8 @@ def _doubt(doubt: Doubt) -> str:
         return "not known, nothing has an interval"
     seen, told = 0.0, []
     for name, share in doubt.blame[:NAMED]:
-        name = f"{FORCE}, one scale for all motions" if name == FORCE else name
+        if name == FORCE:
+            name += ", each operation with its own" if doubt.force_differs else ", one scale for all motions"
         told.append(f"{name} ({100 * share:.0f} %)")
         seen += share
         if seen > 0.95:

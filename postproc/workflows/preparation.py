@@ -30,7 +30,8 @@ Stage = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Request:
-    """What the user asked for.  ``force``: None without ``--force``, "" for a bare one, else its value."""
+    """What the user asked for.  ``force``: None without ``--force``, "" for a bare one, else its value;
+    ``force_offset``: the mean of a force log in air is taken off."""
 
     program: Path
     force: str | None = None
@@ -46,6 +47,7 @@ class Request:
     keep_points: bool = False
     own_points: str = "inline"
     config_dat: Path | None = None
+    force_offset: bool = False
 
 
 @dataclass(frozen=True)
@@ -149,7 +151,7 @@ def prepare(request: Request) -> Prepared:
             *program.findings,
         )
     frames = frames_of(cell, path, request.program)
-    force = wrenches(request.program, path, frames, cell, request.force)
+    force = wrenches(request.program, path, frames, cell, request.force, request.force_offset)
     _missing_points(program, force)
     base, tool = frames.base_in_robot, frames.tool_in_flange
     wanted = base @ path.target_in_base
