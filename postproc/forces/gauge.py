@@ -12,8 +12,9 @@ from postproc.tables import Table
 SEEN = 0.02
 """An offset above this share of the largest reading is told, where it stands clear of the scatter."""
 
-RUN = 3
-"""Equal readings in a row, at the largest or smallest of all, that make a rail."""
+RUN = 4
+"""Equal readings in a row, at the largest or smallest of all, that make a rail: this many times as many as the channel
+has anywhere else (coarse steps stand still for a while at every crest)."""
 
 VALUES = 10
 """A channel with fewer different readings says nothing of rails: it is no measured one."""
@@ -69,7 +70,7 @@ def _rails(table: Table, channels: Floats) -> list[Finding]:
         elsewhere = length[(level != low) & (level != high)].max(initial=1)
         for rail in (low, high):
             # readings that rest at 0 are no rail, nor are they where the channel rests at other values as well
-            hit = (level == rail) & (length >= max(RUN, 2 * elsewhere)) & (rail != 0)
+            hit = (level == rail) & (length >= RUN * elsewhere) & (rail != 0)
             if np.any(hit):
                 first = edge[np.argmax(hit)]
                 what = (

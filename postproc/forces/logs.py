@@ -65,6 +65,8 @@ def read_log(
     Refusal: FRC003 (cells, order, frame), FRC013 (feed), FRC019 (log and path do not match), FRC020 (no air).
     """
     findings: list[Finding] = []
+    if not len(toolpath):
+        return Stated(np.zeros((0, 6)), np.zeros(0, np.int64)), ()
     scale = _scale(column, toolpath, frames, program, findings)
     place = table.numbers(column) * UNITS[column]
     _check_order(table, column, place)
@@ -180,7 +182,7 @@ def _check_extent(table: Table, place: Floats, scale: Scale, findings: list[Find
             )
         )
     if place[-1] > whole + max(2 * spacing, 0.01 * whole):
-        row = int(np.argmax(place > whole))
+        row = int(np.argmax(place > whole + 1e-6 * spacing))
         what = f"the log goes on to {scale.show(place[-1])}, the path ends at {scale.show(whole)}"
         findings.append(Finding("FRC027", what, str(table.path), int(table.lines[row])))
     return spacing
