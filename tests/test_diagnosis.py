@@ -16,8 +16,18 @@ from postproc.diagnosis.growth import grown, whole
 from postproc.diagnosis.screens import where
 from postproc.diagnosis.search import SHARED, _not_imitated, _sharing, own_unknowns, search
 from postproc.diagnosis.selection import price
-from postproc.diagnosis.verdict import BUILT, MARGIN, _alternatives, _beyond_telling, _left_out, judged
-from postproc.effects import TransmissionError
+from postproc.diagnosis.verdict import (
+    BUILT,
+    MARGIN,
+    OTHER_COURSE,
+    _alternatives,
+    _beyond_telling,
+    _left_out,
+    judged,
+)
+from postproc.effects import Conditions
+from postproc.effects.thermal_growth import ThermalGrowth
+from postproc.effects.transmission_error import TransmissionError
 from postproc.geometry import Poses
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Estimate, fit
@@ -208,6 +218,23 @@ def test_a_wave_of_another_order_is_no_harmonic():
             assert [(n.effect, n.joints) for n in told.named] == [("transmission_error", ("A3",))]
             (named,) = told.named
             assert named.evidence.alias is None or not isinstance(named.evidence.alias.effect, Foil)
+
+
+def test_a_stand_that_creeps_is_no_link_that_grows():
+    model, hours = stated(), np.repeat(np.linspace(0.0, 3600.0, 40), len(MARKERS))
+    growth = ThermalGrowth(model.robot.joints, "time")
+    grown_arm = model.added(growth).changed({(len(model.terms), "g3"): 4e-8})
+
+    def told(arm, creep):
+        campaign = campaign_of(arm, 40, deflection=False, conditions=Conditions(None, time=hours))
+        value = campaign.readings.value + creep * hours[:, None] * np.array([0.3, 0.4, 0.8])
+        return diagnose(Campaign(replace(campaign.readings, value=value)), model).verdict
+
+    named = told(grown_arm, 0.0)
+    assert [(n.effect, n.joints) for n in named.named] == [("thermal_growth", ("A3",))]
+    creeping = told(model, 3e-8)
+    assert (creeping.word, creeping.named) == ("unknown", ())
+    assert OTHER_COURSE in [why for _, why in creeping.rejected]
 
 
 def test_what_is_large_and_hardly_told_is_not_believed():

@@ -1,4 +1,5 @@
-"""What an effect has to be told from, although it is never looked for by itself: other courses of the same joint."""
+"""What an effect has to be told from, although it is never looked for by itself: other courses over the same joint,
+or over the same time."""
 
 from __future__ import annotations
 
@@ -8,9 +9,21 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.diagnosis.candidates import Candidate
-from postproc.effects import ComplianceLaw, Effect, Parameter, State, TransmissionError, Values
+from postproc.effects import (
+    ComplianceLaw,
+    Conditions,
+    Effect,
+    Offset,
+    Parameter,
+    State,
+    Values,
+)
+from postproc.effects.effect import column
+from postproc.effects.thermal_growth import ThermalGrowth
+from postproc.effects.transmission_error import TransmissionError
 from postproc.identification.unknowns import unknowns_of
 from postproc.model import StiffnessModel
+from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
 FOILED = ("gravity_compensator",)
@@ -57,11 +70,38 @@ class OtherWave(Foil, TransmissionError):
     """The error of a gear over its angle, of an order that is no harmonic of the library."""
 
 
+class DriftingBase(Foil, Offset):
+    """Robot and tracker that move apart, by x, y, z [m/K, m/s] times the temperature over that of the beginning or the
+    time since then: a stand that creeps, a foundation that warms up."""
+
+    name = "base_offset"
+    family = "geometric"
+
+    def __init__(self, joints: Sequence[Joint], variable: str = "time") -> None:
+        self.variable = variable
+        unit = "m/K" if variable == "temperature" else "m/s"
+        self.coordinates = ("base.x", "base.y", "base.z")
+        self.parameters = tuple(Parameter(axis, unit, 0.0, source="drift of a stand") for axis in "xyz")
+
+    def described(self) -> dict[str, object]:
+        return {"variable": self.variable}
+
+    def add_offset(
+        self, values: Values, chain: Chain, motors: Floats, conditions: Conditions, offset: Floats
+    ) -> None:
+        amount = conditions.temperature if self.variable == "temperature" else conditions.time
+        if amount is not None:
+            rows = [chain.index[name] for name in self.coordinates]
+            offset[rows] += column(values, self.parameters) * amount
+
+
 def foils(model: StiffnessModel, q: Floats, mine: Candidate) -> list[Candidate]:
     """What ``mine`` has to be told from, in a ``model`` measured at ``q`` (R, n); begun with at the null."""
     joints = model.robot.joints
     if mine.name == TransmissionError.name:
         return [_foil(model, q, OtherWave(joints, (order,)), mine.joint) for order in ORDERS]
+    if mine.name == ThermalGrowth.name:
+        return [_foil(model, q, DriftingBase(joints, str(mine.effect.described()["variable"])), "")]
     if mine.name not in FOILED:
         return []
     joint = next(i for i, one in enumerate(joints) if one.name == mine.joint)

@@ -62,7 +62,7 @@ EXPLAINS = 0.9
 """Share of the variance beyond scatter that a name must take away where some is left."""
 
 
-OTHER_COURSE = "the readings follow its joint in another way"
+OTHER_COURSE = "the readings follow another course than that of this effect"
 BEYOND_TELLING = "it would have to be unusually large, and the readings hardly tell its size"
 
 
@@ -250,7 +250,7 @@ def _beyond_telling(estimates: Sequence[Estimate]) -> bool:
 
 
 def _of_another_course(found: Search, candidate: Candidate) -> bool:
-    """Whether another course over the same joint, one that no effect has, clearly explains more."""
+    """Whether another course over the same joint or time, one that no effect has, clearly explains more."""
     against = [r for r in found.rivals if r.of == candidate.key and r.foil and r.fitted]
     return any(r.margin < -MARGIN for r in against)
 
