@@ -115,6 +115,12 @@ class Robot:
         return np.array([(joint.lower, joint.upper) for joint in self.joints])
 
     @property
+    def speeds(self) -> Floats:
+        """(n,) [rad/s, m/s] the fastest that each joint moves, NaN where the file does not say it."""
+        stated = [np.nan if axis.speed is None else axis.speed for axis in self.axes]
+        return np.array(stated or [np.nan] * len(self.joints))
+
+    @property
     def programmed(self) -> Ints:
         """(6,) columns of the joints that a program's six axis values are: all but the external one."""
         return np.array([i for i in range(len(self.joints)) if i != self.external])

@@ -35,7 +35,8 @@ class Joint:
 
 @dataclass(frozen=True)
 class Axis:
-    """A joint as its controller counts it: sign * value + offset is the angle or the way of the geometry [rad, m]."""
+    """A joint as its controller counts it: sign * value + offset is the angle or the way of the geometry [rad, m].
+    ``speed`` [rad/s, m/s]: the fastest that it moves, None where the file does not say it."""
 
     name: str
     lower: float
@@ -43,6 +44,7 @@ class Axis:
     kind: str = "revolute"
     sign: float = 1.0
     offset: float = 0.0
+    speed: float | None = None
 
 
 @dataclass(frozen=True)

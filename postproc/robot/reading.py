@@ -152,7 +152,7 @@ def beside(section: Section) -> Path:
 
 
 def read_axes(section: Section) -> tuple[Axis, ...]:
-    """The joints in the order of the chain: [lower, upper], or {limits, kind, unit, sign, offset}."""
+    """The joints in the order of the chain: [lower, upper], or {limits, kind, unit, sign, offset, speed}."""
     section.text("source")
     factor = unit_factor(section, "rad")
     axes = []
@@ -169,9 +169,10 @@ def read_axes(section: Section) -> tuple[Axis, ...]:
 def _axis(section: Section, name: str, factor: float) -> Axis:
     if section.is_list(name):
         given, key, kind, sign, offset = section, name, "revolute", 1.0, 0.0
+        speed = None
     else:
         given, key = section.section(name), "limits"
-        given.only("limits", "kind", "unit", "sign", "offset")
+        given.only("limits", "kind", "unit", "sign", "offset", "speed")
         kind = given.text("kind", "revolute", ("revolute", "prismatic"))
         if kind == "prismatic" or "unit" in given:
             factor = unit_factor(given, "m" if kind == "prismatic" else "rad")
@@ -179,6 +180,9 @@ def _axis(section: Section, name: str, factor: float) -> Axis:
         if sign not in (1.0, -1.0):
             raise given.error("YML004", "must be 1 or -1", "sign")
         offset = given.number("offset", 0.0) * factor
+        speed = given.number("speed") * factor if "speed" in given else None
+        if speed is not None and speed <= 0:
+            raise given.error("YML004", "must be above 0", "speed")
     lower, upper = given.numbers(key, 2)
     if not lower < upper:
         raise given.error("YML004", "the lower limit must be below the upper one", key)
@@ -188,7 +192,7 @@ def _axis(section: Section, name: str, factor: float) -> Axis:
         raise given.error("YML004", "axis limits or offset of more than 1000 deg; is it the right unit?", at)
     if kind == "prismatic" and max(largest, abs(offset)) > MAX_WAY:
         raise given.error("YML004", "axis limits or offset of more than 200 m; is it the right unit?", at)
-    return Axis(name, lower * factor, upper * factor, kind, sign, offset)
+    return Axis(name, lower * factor, upper * factor, kind, sign, offset, speed)
 
 
 def _check_order(section: Section, names: list[str]) -> None:

@@ -16,6 +16,7 @@ from postproc.arrays import Floats
 from postproc.compensation.correct import Result, State, correct
 from postproc.compensation.division import Division, Limits, divide
 from postproc.compensation.doubt import doubt_of
+from postproc.compensation.limits import limits
 from postproc.compensation.task import Task
 from postproc.dialects.dialect import Moved, Program
 from postproc.findings import Finding, Refusal
@@ -123,13 +124,15 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
 def _corrected(request: Request, ready: Prepared) -> tuple[Task, Result, Division, Plan, Moved]:
     """The correction and its edits; what can not be divided or written as planned stays, and the rest is made anew."""
     task, cell = ready.task, ready.cell
-    limits = Limits(request.keep_points, cell.min_segment, cell.max_growth, ready.dialect.arcs_in_plane)
+    allowed = Limits(request.keep_points, cell.min_segment, cell.max_growth, ready.dialect.arcs_in_plane)
     writing = written_as(cell, request.own_points)
     while True:
         result = correct(task)
-        division = divide(task, result, limits)
+        division = divide(task, result, allowed)
+        told, beyond = limits(task, result, division)
+        division = replace(division, findings=(*division.findings, *told))
         plan = planned(task, division)
-        moved = Moved((), division.held)
+        moved = Moved((), {**beyond, **division.held})
         if not moved.held:
             moved = ready.dialect.moved(ready.program, plan, writing)
         known = task.toolpath.refused

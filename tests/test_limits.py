@@ -1,0 +1,107 @@
+"""What is told of a correction that comes near to what the robot can do, and what is held."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ways_at_work import START, TOOL, corner, line
+
+from postproc.compensation.correct import correct
+from postproc.compensation.division import Limits, divide
+from postproc.compensation.limits import limits
+from postproc.robot.description import find_robot, load_robot
+from postproc.robot.track import follow, near_singular
+
+
+def judged(task):
+    result = correct(task)
+    return limits(task, result, divide(task, result, Limits(max_growth=100.0)))
+
+
+def codes(task):
+    found, held = judged(task)
+    return [finding.code for finding in found], {finding.code for finding in held.values()}
+
+
+def with_limits(task, low, high):
+    """The same task on a robot whose axes end at ``low`` and ``high`` (6,) [rad]."""
+    robot = task.model.robot
+    joints = tuple(
+        replace(joint, lower=a, upper=b) for joint, a, b in zip(robot.joints, low, high, strict=True)
+    )
+    return replace(task, model=replace(task.model, robot=replace(robot, joints=joints)))
+
+
+def test_nothing_is_told_where_nothing_is_near():
+    assert codes(line()) == ([], set())
+
+
+def test_an_axis_that_the_correction_brings_near_to_its_limit():
+    task = line()
+    turned = {}
+    for side in (0, 1):  # a wall 1.05 deg away, on either side of A1 where the cut ends
+        bounds = [limit.copy() for limit in task.model.robot.limits.T]
+        bounds[side][0] = task.track.q[2, 0] + (-1, 1)[side] * np.radians(1.05)
+        bounds[1 - side][0] = (1, -1)[side] * np.pi
+        turned[side] = "KIN008" in codes(with_limits(task, *bounds))[0]
+    # the correction turns A1 to one side: only the wall there comes nearer
+    assert sorted(turned.values()) == [False, True]
+
+
+def test_an_inserted_motion_beyond_a_limit_is_held():
+    task = line()
+    low, high = task.model.robot.limits.T.copy()
+    high[0] = task.track.q[1, 0] - 5e-3  # where the cut begins A1 stands beyond it
+    assert "COR008" in codes(with_limits(task, low, high))[1]
+
+
+def test_axes_that_are_too_slow_for_the_feed():
+    task = line()
+    robot = task.model.robot
+    axes = tuple(replace(axis, speed=np.radians(0.5)) for axis in robot.axes)
+    slow = replace(task, model=replace(task.model, robot=replace(robot, axes=axes)))
+    found, _ = judged(slow)
+    assert [finding.code for finding in found] == ["KIN009"]
+    assert "it can 0.5 deg/s" in found[0].message
+    quick = replace(task, toolpath=replace(task.toolpath, feed=np.full(4, 1e-3)))
+    quick = replace(quick, model=slow.model)
+    assert codes(quick)[0] == []
+
+
+@pytest.mark.parametrize(("blend", "told"), [(0.0, False), (1e-4, False), (1e-2, True), (np.nan, True)])
+def test_roundings_that_are_larger_than_the_correction(blend, told):
+    task = corner(blend=np.full(5, blend))
+    assert ("COR015" in codes(task)[0]) is told
+
+
+def test_a_posture_that_only_the_correction_makes_singular():
+    """A5 stands just outside of what counts as singular; one sense of the force leads it in, the other one away."""
+    task = line()
+    model = task.model
+    q = np.radians([[a1, -60.0, 90.0, 0.0, 0.0, 0.0] for a1 in (-1.0, -1.0, 0.0, 0.0)])
+    q[:, 4] = np.arcsin(0.02) + 1e-5
+    wanted = model.chain.flange(q) @ TOOL
+    path = replace(task.toolpath, position=wanted.position, rotation=wanted.rotation)
+    track = follow(model.robot, path, wanted @ TOOL.inverse(), START)
+    assert not near_singular(model.robot, track.q).any()
+    found = {}
+    for sense in (1, -1):
+        force = replace(task.force, values=sense * task.force.values, start=sense * task.force.start)
+        near = replace(task, wanted=wanted, toolpath=path, track=track, force=force)
+        found[sense] = "KIN003" in codes(near)[0]
+    assert sorted(found.values()) == [False, True]
+
+
+def test_speeds_are_read_from_the_robot_file(tmp_path):
+    text = (
+        find_robot("kuka_kr270")
+        .read_text()
+        .replace("A1: [-185, 185]", "A1: {limits: [-185, 185], speed: 105}")
+    )
+    path = tmp_path / "fast.yaml"
+    path.write_text(text)
+    speeds = load_robot(path).speeds
+    assert speeds[0] == pytest.approx(np.radians(105))
+    assert np.isnan(speeds[1:]).all()
