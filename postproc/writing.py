@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ from postproc.compensation.correct import Result, with_residual
 from postproc.compensation.division import Division, made
 from postproc.compensation.task import Task
 from postproc.dialects.dialect import Dialect, Moved, Program, Settings, Writing
-from postproc.document import Document, Edit, apply, undone
+from postproc.document import Document, Edits, apply, undone
 from postproc.findings import Finding, Refusal
 from postproc.geometry import Poses, on_arc, vector_from_rotation
 from postproc.robot.description import Robot
@@ -36,7 +36,7 @@ class Written:
     distance from the wanted way inside of each corrected motion, NaN for all others.
     """
 
-    edits: tuple[Edit, ...]
+    edits: Edits
     contents: tuple[bytes, ...]
     result: Result
     division: Division
@@ -94,14 +94,14 @@ def write(
     ``completed``: fills in what a target that was read back leaves to the axis motion before it.
     Raises Refusal FIL011 (no module name) and FIL008 (what was read back is not what was meant).
     """
-    edits = list(moved.edits)
-    if edits:
-        edits.append(dialect.marked(program, _mark(program, robot)))
+    edits = Edits.joined(moved.edits)
+    if len(edits):
+        edits = Edits.joined(edits, [dialect.marked(program, _mark(program, robot))])
     main = program.documents[0].path
     if stem != main.stem:
         if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,23}", stem):
             raise Refusal(Finding("FIL011", f"{stem!r} can not name a module", str(main)))
-        edits += dialect.renamed(program, stem)
+        edits = Edits.joined(edits, dialect.renamed(program, stem))
     contents = _contents(program, edits)
     documents = zip(program.documents, contents, strict=True)
     read = dialect.read(tuple(Document(document.path, raw) for document, raw in documents), settings)
@@ -109,9 +109,7 @@ def write(
     _hold(program.toolpath, back, plan, writing, main.name)
     there = _as_written(task, division, back)
     own = there.command[np.flatnonzero(division.own)]
-    return Written(
-        tuple(edits), contents, with_residual(task, result, own), there, way_errors(task, result, there)
-    )
+    return Written(edits, contents, with_residual(task, result, own), there, way_errors(task, result, there))
 
 
 def way_errors(task: Task, result: Result, division: Division) -> Floats:
@@ -155,11 +153,11 @@ def _mark(program: Program, robot: Robot) -> str:
     return f"{__version__}, robot {robot.name} sha256:{robot.digest[:16]}, source sha256:{source[:16]}"
 
 
-def _contents(program: Program, edits: Sequence[Edit]) -> tuple[bytes, ...]:
+def _contents(program: Program, edits: Edits) -> tuple[bytes, ...]:
     """The bytes of every document with its edits.  Raises Refusal FIL008 if another byte changed."""
     contents = []
     for index, document in enumerate(program.documents):
-        own = [edit for edit in edits if edit.span.file == index]
+        own = edits.of(index)
         raw = apply(document, own)
         if not undone(raw, document.raw, own):
             raise Refusal(Finding("FIL008", "bytes outside of the corrections changed", document.path.name))

@@ -10,18 +10,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.arrays import Floats
-from postproc.compensation.correct import Result, State, Task
+from postproc.compensation.correct import Result, State
+from postproc.compensation.division import Division
+from postproc.compensation.task import Task
 from postproc.document import Document, Edit, Span, apply, in_order
 from postproc.geometry import abc_from_rotation, vector_from_rotation
-from postproc.toolpath import Kind
+from postproc.toolpath import Kind, Role
 from postproc.units import DEG, MM
 
 CONTEXT = 3
 """Lines shown around a change in the diff, as diff -u does."""
 
 
-def corrections_csv(task: Task, result: Result) -> bytes:
-    """One row a motion: wanted pose (programmed base), force, deflection before, correction, residual, history."""
+def corrections_csv(
+    task: Task, result: Result, division: Division | None = None, way: Floats | None = None
+) -> bytes:
+    """One row a motion of the input: wanted pose (programmed base), force, deflection before, correction, residual,
+    what was inserted before it, the largest error on its way (``way`` (M,) [m] of ``division``), history."""
     path = task.toolpath
     to_base = task.base.inverse()
     moved = to_base @ result.command
@@ -53,6 +58,16 @@ def corrections_csv(task: Task, result: Result) -> bytes:
         for name, column in zip(names.split(), values.T, strict=True):
             heads.append(name)
             columns.append(_texts(column, decimals))
+    if division is not None and way is not None:
+        counts = [
+            np.bincount(division.source[division.role == role], minlength=len(path))
+            for role in (Role.LINK, Role.PIECE)
+        ]
+        on_way = np.full(len(path), -1.0)
+        np.maximum.at(on_way, division.source, np.nan_to_num(way / MM, nan=-1.0))
+        heads += ["links", "points", "error_way_mm"]
+        columns += [[str(value) for value in count] for count in counts]
+        columns.append(_texts(np.where(on_way < 0, np.nan, on_way), 6))
     heads.append("iterations")
     columns.append([str(value) for value in result.iterations])
     for step, column in enumerate(result.history / MM):

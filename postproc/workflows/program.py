@@ -104,13 +104,13 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     if request.dry_run:
         return replace(report, outputs=())
     diff = b"".join(
-        unified_diff(document, path.name, [edit for edit in edits if edit.span.file == index])
+        unified_diff(document, path.name, edits.of(index))
         for index, (document, path) in enumerate(zip(program.documents, outputs, strict=True))
     )
     files = {
         **outputs,
         names[0]: json_bytes(report),
-        names[1]: corrections_csv(ready.task, result),
+        names[1]: corrections_csv(task, result, written.division, written.between),
         names[2]: diff,
         **dict.fromkeys(names[3:], json_bytes(report)),
     }
