@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import click
 
 from postproc import __version__
+from postproc.cli.batch import batch
 from postproc.cli.check import check
 from postproc.cli.diagnose import diagnose
 from postproc.cli.identify import identify
@@ -18,16 +19,19 @@ from postproc.cli.plan import plan
 from postproc.cli.predict import predict
 from postproc.cli.program import program
 from postproc.cli.robots import robots
+from postproc.cli.verify import verify
 from postproc.findings import nearest
 
 COMMANDS = {
     "program": program,
     "check": check,
     "predict": predict,
+    "verify": verify,
     "map": map_,
     "identify": identify,
     "plan": plan,
     "diagnose": diagnose,
+    "batch": batch,
     "robots": robots,
 }
 
@@ -45,10 +49,12 @@ def main() -> None:
       compensate panel.src --force --gain 0.5         a first cut with half the correction
       compensate check panel.src                      only read it, say what is not understood
       compensate predict panel.src --force            the deflection at every pose
+      compensate verify panel.src compensated/panel.src --force     is the tool on the path, all along it
       compensate map --robot kuka_kr270 ...           where in the workspace the robot is stiff
       compensate identify loads.csv --effects ...     the robot's parameters from measurements
       compensate plan --effects ... --poses 15 ...    the poses and loads worth measuring
       compensate diagnose loads.csv                   what the robot file misses, by its name
+      compensate batch parts --force                  many programs, beside each other
     """
 
 

@@ -1,0 +1,103 @@
+"""The same tasks on a Dask cluster, whose workers see the same folders under the same paths."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Generator, Sequence
+from concurrent.futures import CancelledError
+from typing import Any
+
+from postproc.batch.reading import code_digest
+from postproc.batch.running import Stages, died
+from postproc.batch.work import Task, work
+from postproc.findings import Finding, Refusal
+from postproc.report.batched import Outcome
+
+PATIENCE = 30.0
+"""[s] How long a cluster may be without a worker, and how long it takes to answer at first."""
+
+EXTRA = "pip install 'postproc[cluster]'"
+
+
+def run_on_cluster(
+    tasks: Sequence[Task], address: str, stages: Stages
+) -> Generator[tuple[int, Outcome], None, None]:
+    """Do the tasks on the cluster whose scheduler is at ``address``; yields (number, outcome) as they are done.
+
+    The scheduler gives the tasks of a worker that died to another one.  Raises Refusal BAT006 where the cluster is
+    not there, has no workers, or workers of another version.
+    """
+    distributed = _distributed()
+    try:
+        client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise _unusable(f"no scheduler answers at {address}: {_line(error)}") from None
+    try:
+        _check(client, address)
+        name = uuid.uuid4().hex
+        pending = {
+            client.submit(work, task, key=f"compensate-{name}-{number}", pure=False): number
+            for number, task in enumerate(tasks)
+        }
+        try:
+            while pending:
+                try:
+                    ready = distributed.wait(
+                        list(pending), timeout=PATIENCE, return_when="FIRST_COMPLETED"
+                    ).done
+                except TimeoutError:
+                    if client.scheduler_info()["workers"]:
+                        continue
+                    raise _unusable(f"the cluster at {address} has lost all of its workers") from None
+                except CancelledError:
+                    raise _unusable(f"the connection to {address} is lost") from None
+                for future in sorted(ready, key=pending.__getitem__):
+                    number = pending.pop(future)
+                    yield number, _outcome(distributed, tasks[number], future)
+        finally:
+            client.cancel(list(pending))
+    finally:
+        client.close()
+
+
+def _outcome(distributed: Any, task: Task, future: Any) -> Outcome:
+    try:
+        outcome: Outcome = future.result()
+    except distributed.KilledWorker as error:
+        return died(task, f"the workers that had it died: {_line(error)}")
+    except (Exception, CancelledError) as error:
+        return died(task, f"{type(error).__name__}: {_line(error)}")
+    return outcome
+
+
+def _check(client: Any, address: str) -> None:
+    """Every worker has this package, in the same version."""
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except TimeoutError:
+        raise _unusable(f"the cluster at {address} has no workers") from None
+    try:
+        found = client.run(code_digest)
+    except Exception as error:  # whatever keeps a worker from importing this package
+        raise _unusable(f"a worker can not run this package: {_line(error)}") from None
+    others = sorted(worker for worker, digest in found.items() if digest != code_digest())
+    if others:
+        raise _unusable(
+            f"workers with another version of this package, of Python or of numpy: {', '.join(others)}"
+        )
+
+
+def _distributed() -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise _unusable("the package dask.distributed is not installed", EXTRA) from None
+    return distributed
+
+
+def _unusable(message: str, help: str = "") -> Refusal:
+    return Refusal(Finding("BAT006", message, help=help))
+
+
+def _line(error: BaseException) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]

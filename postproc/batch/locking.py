@@ -1,0 +1,63 @@
+"""One at a time: a lock that the system takes back when its holder dies, whatever it died of."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from postproc.findings import Finding, Refusal
+
+
+@contextlib.contextmanager
+def locked(path: Path, waits: Callable[[], None] = lambda: None) -> Iterator[None]:
+    """Hold the lock file ``path``; while another process has it, wait, and call ``waits`` once.
+
+    The file is there only while somebody holds it or was killed with it; left behind, it is free to take.  Raises
+    Refusal FIL004 where the folder takes no file, or its file system no locks.
+    """
+    try:
+        handle = _acquired(path, waits)
+    except OSError as error:
+        message = f"can not be locked: {error.strerror or error}"
+        help = "the results' folder must be writable, on a file system with locks (flock)"
+        raise Refusal(Finding("FIL004", message, str(path), help=help)) from None
+    try:
+        yield
+    finally:
+        with contextlib.suppress(OSError):
+            path.unlink()
+        os.close(handle)
+        with contextlib.suppress(OSError):  # where nothing came to be
+            path.parent.rmdir()
+            path.parent.parent.rmdir()
+
+
+def _acquired(path: Path, waits: Callable[[], None]) -> int:
+    while True:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        except FileNotFoundError:  # the last holder took the folders away
+            continue
+        try:
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                waits()
+                waits = _silent
+                fcntl.flock(handle, fcntl.LOCK_EX)
+            # Who held it took its name away: a lock on a file without a name keeps nobody out.
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(handle), os.stat(path)):
+                    return handle
+        except BaseException:
+            os.close(handle)
+            raise
+        os.close(handle)
+
+
+def _silent() -> None:
+    pass

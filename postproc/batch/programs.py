@@ -1,0 +1,87 @@
+"""Which programs a word names: a file, a folder, or a pattern with * ? [ ] **."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+from postproc.dialects import DIALECTS
+from postproc.findings import Finding
+
+HEAD = 1 << 16
+"""Bytes of a file by which its language is looked for."""
+
+RESULTS = "compensated"
+"""Folders of this name hold results of the main job; a pattern enters them only where it names them."""
+
+_MAGIC = frozenset("*?[")
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a word names.  ``anchor``: the folder below which it was looked for; ``passed_over``: files that match and
+    are of no known language.  Paths are absolute and in order."""
+
+    anchor: Path
+    programs: tuple[Path, ...]
+    passed_over: tuple[Path, ...] = ()
+
+    def nothing(self, word: str) -> Finding:
+        """Why there is no program."""
+        if self.passed_over:
+            known = ", ".join(DIALECTS)
+            message = f"{word!r}: {len(self.passed_over)} files, but none is a program ({known})"
+        else:
+            message = f"{word!r} matches nothing in {self.anchor}"
+        return Finding(
+            "BAT001", message, help="`**/` in a pattern looks into folders below; a folder alone does not"
+        )
+
+
+def is_inside(path: Path, folder: Path) -> bool:
+    """Whether ``path`` lies in ``folder`` or below, links followed."""
+    return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
+
+
+def find_programs(word: str, folder: Path) -> Found:
+    """The programs that ``word`` names, relative to ``folder``.
+
+    A file counts whatever it holds; of a folder or a pattern those that a dialect claims.
+    """
+    path = Path(os.path.abspath(folder / word))
+    if path.is_file():
+        return Found(path.parent, (path,))
+    if path.is_dir():
+        return _claimed(path, [entry for entry in path.iterdir() if not entry.name.startswith(".")])
+    fixed = next((i for i, part in enumerate(path.parts) if _MAGIC & set(part)), len(path.parts) - 1)
+    anchor, pattern = Path(*path.parts[:fixed]), path.parts[fixed:]
+    try:
+        matches = list(anchor.glob("/".join(pattern))) if anchor.is_dir() else []
+    except ValueError:  # ** beside other characters
+        matches = []
+    return _claimed(anchor, [match for match in matches if not _hidden(match.relative_to(anchor), pattern)])
+
+
+def _hidden(match: Path, pattern: tuple[str, ...]) -> bool:
+    """Whether a match lies in a folder that has to be named to be meant."""
+    parts = set(match.parts[:-1]) - set(pattern)
+    return any(part.startswith(".") or part == RESULTS for part in parts) or match.name.startswith(".")
+
+
+def _claimed(anchor: Path, paths: list[Path]) -> Found:
+    programs: list[Path] = []
+    others: list[Path] = []
+    for path in sorted(paths):
+        if path.is_file():
+            (programs if _is_program(path) else others).append(path)
+    return Found(anchor, tuple(programs), tuple(others))
+
+
+def _is_program(path: Path) -> bool:
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(HEAD)
+    except OSError:
+        return True  # whoever compensates it says what is wrong
+    return any(dialect.claims(path, head) for dialect in DIALECTS.values())

@@ -1,0 +1,116 @@
+"""What was done, beside the results: so that it is done once, and again when anything of it changed.
+
+``<folder of the output>/.compensate/<name of the output>.json``, written after the outputs and atomically: a run that
+was killed has no record, and is done again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from postproc.batch.jobs import Job
+from postproc.batch.reading import ABSENT, code_digest, digest_of
+from postproc.cell import find_cell
+from postproc.findings import Refusal
+from postproc.publish import publish
+
+STATE = ".compensate"
+"""Folder of records and locks, in each folder of results."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """A run that ended well.
+
+    code: digest of what computed; options: of the request; around: what lies about the program and would be read if
+    it were there; inputs, outputs: path -> SHA-256; result: the machine-readable report.
+    """
+
+    code: str
+    options: dict[str, str]
+    around: list[str]
+    inputs: dict[str, str]
+    outputs: dict[str, str]
+    result: dict[str, object]
+
+    @staticmethod
+    def of(job: Job, inputs: dict[str, str], result: dict[str, object]) -> Record | None:
+        """The record of a run that has just ended; None where an input is no longer what was read."""
+        outputs = [str(path) for path in result["outputs"]]  # type: ignore[attr-defined]
+        inputs = {path: digest for path, digest in inputs.items() if path not in outputs}
+        digests = {path: digest_of(path) for path in outputs}
+        if ABSENT in digests.values() or not _still(inputs):
+            return None
+        return Record(code_digest(), _options(job), _around(job), inputs, digests, result)
+
+    def holds(self, job: Job) -> bool:
+        """Whether doing the job again would give what is there."""
+        return (
+            (self.code, self.options, self.around) == (code_digest(), _options(job), _around(job))
+            and _still(self.inputs)
+            and _still(self.outputs)
+        )
+
+
+def lock_path(target: Path) -> Path:
+    """The lock of an output, or of a summary."""
+    return target.parent / STATE / f"{target.name}.lock"
+
+
+def load_record(job: Job) -> Record | None:
+    """The record of a job; None where there is none that can be read."""
+    try:
+        return Record(**json.loads(_path(job).read_bytes()))
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def save_record(job: Job, record: Record) -> None:
+    text = json.dumps(asdict(record), indent=1, allow_nan=False) + "\n"
+    publish({_path(job): text.encode()})
+
+
+def sweep(job: Job, outputs: Iterable[str] = ()) -> None:
+    """Take away what a run that was killed left half-written: temporary files of the job's own outputs.
+
+    Only under the job's lock, and only names that begin with its stem: what programs share may be in work elsewhere.
+    """
+    own = {Path(path) for path in outputs if Path(path).name.startswith(f"{job.target.stem}.")}
+    for path in {job.target, _path(job), *own}:
+        temporary = re.compile(rf"\.{re.escape(path.name)}\.[a-z0-9_]{{8}}\.tmp(\.old)?")
+        with contextlib.suppress(OSError):
+            for entry in list(os.scandir(path.parent)):
+                if temporary.fullmatch(entry.name):
+                    os.unlink(entry.path)
+
+
+def _path(job: Job) -> Path:
+    return job.target.parent / STATE / f"{job.target.name}.json"
+
+
+def _still(digests: dict[str, str]) -> bool:
+    return all(digest_of(path) == digest for path, digest in digests.items())
+
+
+def _options(job: Job) -> dict[str, str]:
+    return {name: repr(str(v) if isinstance(v, Path) else v) for name, v in asdict(job.request).items()}
+
+
+def _around(job: Job) -> list[str]:
+    """Files beside the program that carry its stem, and the cell that it would find."""
+    program = job.request.program
+    stem = f"{program.stem}.".casefold()
+    try:
+        names = [entry.name for entry in os.scandir(program.parent) if entry.name.casefold().startswith(stem)]
+    except OSError:
+        names = []
+    if job.request.cell is None:
+        with contextlib.suppress(Refusal):
+            names.append(str(find_cell(program)))
+    return sorted(names)

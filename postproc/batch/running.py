@@ -1,0 +1,156 @@
+"""Tasks on the processes of this machine.  A process that dies takes one attempt of one task with it, nothing else."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from types import FrameType
+
+from postproc.batch.work import Task, failed, work
+from postproc.findings import Finding
+from postproc.report.batched import Outcome
+
+ATTEMPTS = 2
+"""A task whose process dies is tried once more: most were killed for want of memory, beside others."""
+
+SERIAL = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""One thread a process: matrices are small here, and processes beside each other already use all cores."""
+
+Stages = Callable[[int, str], None]
+"""Is told the number of a task and the name of the stage that it is at."""
+
+_SPAWN = multiprocessing.get_context("spawn")
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def run_here(
+    tasks: Sequence[Task], workers: int, stages: Stages
+) -> Generator[tuple[int, Outcome], None, None]:
+    """Do the tasks in ``workers`` processes; yields (number, outcome) as they are done.
+
+    Large programs begin first, so that none of them is alone at the end.  Closed early, what is in work is given up.
+    """
+    for name in SERIAL:
+        os.environ.setdefault(name, "1")
+    waiting = deque(sorted(range(len(tasks)), key=lambda number: (-_size(tasks[number]), number)))
+    attempts = [0] * len(tasks)
+    pool = [_Worker() for _ in range(min(workers, len(tasks)))]
+    try:
+        while True:
+            for worker in pool:
+                if worker.number is None and waiting:
+                    worker.begin(waiting.popleft(), tasks)
+            busy = {worker.pipe: worker for worker in pool if worker.number is not None}
+            if not busy:
+                return
+            for pipe in wait(list(busy)):
+                worker = busy[pipe]  # type: ignore[index]
+                number = worker.number
+                assert number is not None
+                answer = worker.answer()
+                if isinstance(answer, str):
+                    stages(number, answer)
+                    continue
+                if answer is None:
+                    attempts[number] += 1
+                    pool[pool.index(worker)] = _Worker()
+                    if attempts[number] < ATTEMPTS:
+                        waiting.append(number)
+                        continue
+                    answer = died(
+                        tasks[number], f"its process ended with {worker.ending()}, {ATTEMPTS} times"
+                    )
+                worker.number = None
+                yield number, answer
+    finally:
+        for worker in pool:
+            worker.end()
+
+
+def died(task: Task, how: str) -> Outcome:
+    """The outcome of a task whose process is gone."""
+    return failed(task.job, Finding("BAT005", how, str(task.job.request.program)))
+
+
+def _size(task: Task) -> int:
+    try:
+        return task.job.request.program.stat().st_size
+    except OSError:
+        return 0
+
+
+class _Worker:
+    """A process that takes one task after another; ``number``: of the one in work."""
+
+    def __init__(self) -> None:
+        self.pipe, other = _SPAWN.Pipe()
+        self.process: BaseProcess = _SPAWN.Process(target=_serve, args=(other,), daemon=True)
+        self.process.start()
+        other.close()
+        self.number: int | None = None
+
+    def begin(self, number: int, tasks: Sequence[Task]) -> None:
+        self.number = number
+        with contextlib.suppress(OSError):  # it died while idle: its pipe is at its end, and `answer` says so
+            self.pipe.send(tasks[number])
+
+    def answer(self) -> Outcome | str | None:
+        """What the process says next: a stage, or an outcome; None if it is gone."""
+        try:
+            said: Outcome | str = self.pipe.recv()
+        except (EOFError, OSError):
+            return None
+        return said
+
+    def ending(self) -> str:
+        self.process.join()
+        code = self.process.exitcode or 0
+        return signal.Signals(-code).name if code < 0 else f"code {code}"
+
+    def end(self) -> None:
+        """Idle ones see the end of their pipe; one at work is told to leave, and takes its half-written files along."""
+        self.pipe.close()
+        if self.number is not None:
+            self.process.terminate()
+        self.process.join()
+
+
+def _serve(pipe: Connection) -> None:
+    """The life of a worker process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # a Ctrl-C is the business of the process that began it all
+    signal.signal(signal.SIGTERM, _leave)
+    threading.Thread(target=_follow, daemon=True).start()
+    with contextlib.closing(pipe):
+        while True:
+            try:
+                task = pipe.recv()
+            except (EOFError, OSError):
+                return
+            try:
+                pipe.send(work(task, pipe.send))
+            except OSError:
+                return
+
+
+def _follow() -> None:
+    """Die with the parent: a worker whose batch was killed must not write any more."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)
+
+
+def _leave(_number: int, _frame: FrameType | None) -> None:
+    sys.exit(128 + signal.SIGTERM)

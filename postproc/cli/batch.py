@@ -1,0 +1,209 @@
+"""``compensate batch``: many programs."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from postproc.cli.common import Out, result_options
+
+if TYPE_CHECKING:
+    from postproc.batch.jobs import Jobs
+    from postproc.batch.run import Watch
+    from postproc.report.batched import Outcome
+
+
+@click.command()
+@click.argument("jobs", nargs=-1, metavar="JOBS...")
+@click.option(
+    "--force",
+    metavar="[SPEC]",
+    default=None,
+    help="Machining force of every program. Alone: the forces that belong to each program; with a value: 0,360,560@base"
+    " or a CSV, as in the main job.",
+)
+@click.option("--robot", metavar="NAME|FILE", help="Robot instead of the cells'.")
+@click.option(
+    "--cell",
+    type=click.Path(path_type=Path),
+    help="Cell file instead of the nearest cell.yaml of each program.",
+)
+@click.option("--gain", type=click.FloatRange(0.0, 1.0), help="Share of the correction that is applied [1].")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="DIR",
+    help="Folder of the results; those of folders below lie in folders below [compensated/ where JOBS are].",
+)
+@click.option("--strict", is_flag=True, help="Warnings count as errors.")
+@click.option("--again", is_flag=True, help="Compensate programs that are compensated already.")
+@click.option("--dry-run", is_flag=True, help="Do everything but write.")
+@click.option(
+    "-j",
+    "--workers",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes beside each other [all cores].",
+)
+@click.option(
+    "--dask", metavar="ADDRESS", help="Run on the Dask cluster whose scheduler is there: tcp://host:8786."
+)
+@click.option("--fail-fast", is_flag=True, help="Stop at the first program that fails.")
+@click.option("--force-rerun", is_flag=True, help="Do again what is done and unchanged.")
+@click.option(
+    "--allow-outside", is_flag=True, help="A job file may name programs and outputs beyond its folder."
+)
+@result_options
+def batch(
+    jobs: tuple[str, ...],
+    force: str | None,
+    robot: str | None,
+    cell: Path | None,
+    gain: float | None,
+    output: Path | None,
+    strict: bool,
+    again: bool,
+    dry_run: bool,
+    workers: int | None,
+    dask: str | None,
+    fail_fast: bool,
+    force_rerun: bool,
+    allow_outside: bool,
+    json_to: str | None,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Compensate many programs: JOBS are a job file (YAML), or folders, files and patterns.
+
+    Programs are done beside each other; one that fails stops no other. Run again, what is done and unchanged (program,
+    cell, robot, forces, options, version, and the results themselves) is left as it is: a batch that was interrupted,
+    or killed, goes on where it was. summary.html and summary.json lie with the results. What the command line says
+    wins over the job file.
+
+    \b
+    A job file (`compensate schema job` describes it):
+      programs: [parts/*.src, "**/*.nc"]
+      force: true                         # the forces that belong to each program
+      output: out
+      overrides:
+        parts/door.src: {gain: 0.5, force: "0,360,560@base"}
+
+    \b
+    Examples:
+      compensate batch night.yaml
+      compensate batch parts --force -o out
+      compensate batch "parts/**/*.src" --force=-60,0,120@feed -j 4
+      compensate batch night.yaml --dask tcp://127.0.0.1:8786
+
+    Exit codes, as for the worst program: 0 done; 3 written, but something was left or deserves a look; 1 one could not
+    be done, or was not run; 2 command line.
+    """
+    import os
+
+    if not jobs:
+        lost = force is not None and force.lower().endswith((".yaml", ".yml"))
+        hint = f"; {force} was taken as the value of --force: put it first" if lost else ""
+        raise click.UsageError(f"name a job file, a folder, or programs{hint}")
+    if dask is not None and workers is not None:
+        raise click.UsageError("--workers is for this machine; a Dask cluster has its own")
+
+    from postproc.batch.run import BatchRequest, run_batch
+    from postproc.report.batched_terminal import show_batched
+
+    if force is not None and force.lower().endswith((".csv", ".yaml", ".yml")):
+        force = os.path.abspath(force)
+    if robot is not None and robot.lower().endswith((".yaml", ".yml")):
+        robot = os.path.abspath(robot)
+    said = {
+        "force": force,
+        "robot": robot,
+        "cell": None if cell is None else Path(os.path.abspath(cell)),
+        "gain": gain,
+        "strict": strict or None,
+        "again": again or None,
+        "dry_run": dry_run or None,
+    }
+    out = Out(json_to, quiet, verbose)
+    request = BatchRequest(
+        words=jobs,
+        said={key: value for key, value in said.items() if value is not None},
+        output=output,
+        workers=workers,
+        dask=dask,
+        fail_fast=fail_fast,
+        rerun=force_rerun,
+        allow_outside=allow_outside,
+        json=out.json_file,
+    )
+    try:
+        with out.refusals("batch"), _watched(out) as watch:
+            done = run_batch(request, watch)
+    except KeyboardInterrupt:
+        click.echo("interrupted; what is done is done: the same command goes on from there", err=True)
+        raise SystemExit(130) from None
+    out.result(done.as_json(), written=not dry_run)
+    if not out.quiet:
+        show_batched(out.console(), done, verbose)
+        if dry_run:
+            click.echo("dry run: nothing was written")
+    raise SystemExit(done.exit)
+
+
+@contextlib.contextmanager
+def _watched(out: Out) -> Iterator[Watch | None]:
+    """Progress on a terminal: how many, which are in work, how fast."""
+    if out.quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.markup import escape
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from postproc.batch.run import Watch
+    from postproc.report.terminal import printable
+
+    columns = (
+        BarColumn(bar_width=24),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        TextColumn("{task.description}"),
+    )
+    progress = Progress(*columns, console=out.console(error=True), transient=True)
+
+    class Shown(Watch):
+        """A bar with the names of what is in work."""
+
+        def __init__(self) -> None:
+            self.at: dict[str, str] = {}
+            self.motions, self.began = 0, time.monotonic()
+            self.task = progress.add_task("", total=None, rate="")
+
+        def begun(self, jobs: Jobs) -> None:
+            progress.update(self.task, total=len(jobs.jobs))
+
+        def stage(self, name: str, stage: str) -> None:
+            self.at[name] = stage
+            self._tell()
+
+        def ended(self, outcome: Outcome) -> None:
+            self.at.pop(outcome.name, None)
+            self.motions += int(outcome.result.get("motions", 0)) if outcome.state == "done" else 0
+            progress.advance(self.task)
+            self._tell()
+
+        def _tell(self) -> None:
+            words = ", ".join(f"{escape(printable(name))}: {stage}" for name, stage in self.at.items())
+            rate = self.motions / max(time.monotonic() - self.began, 1e-3)
+            progress.update(
+                self.task, description=words, rate=f"{rate:.0f} motions/s" if self.motions else ""
+            )
+
+    with progress:
+        yield Shown()

@@ -1,0 +1,131 @@
+"""What a batch came to: one outcome a program, and the worst of them."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from postproc.findings import SEVERITIES, Finding
+
+DONE, UNCHANGED, FAILED, NOT_RUN = "done", "unchanged", "failed", "not run"
+STATES = (DONE, UNCHANGED, FAILED, NOT_RUN)
+"""``unchanged``: done by an earlier run, and nothing of it has changed since; ``not run``: the batch was stopped."""
+
+RANKS = (0, 3, 1)
+"""Exit codes from the best to the worst."""
+
+_TOLD = (
+    "program",
+    "dialect",
+    "robot",
+    "motions",
+    "corrected",
+    "inserted",
+    "left",
+    "force",
+    "error_before_mm",
+    "error_after_mm",
+    "correction_mm",
+    "findings",
+    "outputs",
+    "exit",
+)
+"""Keys of a program's own result that the summary repeats; all else stands in its report."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One program of a batch.  ``result``: its machine-readable result; ``seconds``: what it took here, this time."""
+
+    name: str
+    state: str
+    result: Mapping[str, Any]
+    seconds: float = 0.0
+
+    @property
+    def exit(self) -> int:
+        return int(self.result["exit"])
+
+    @property
+    def outputs(self) -> tuple[Path, ...]:
+        return tuple(Path(path) for path in self.result["outputs"])
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        return tuple(
+            Finding(**{key: value for key, value in one.items() if key != "severity"})
+            for one in self.result["findings"]
+        )
+
+    @property
+    def gravest(self) -> Finding | None:
+        """The first finding of the gravest severity that needs a look."""
+        order = [finding for finding in self.findings if finding.severity != SEVERITIES[0]]
+        return max(order, key=lambda one: SEVERITIES.index(one.severity), default=None)
+
+    def figure(self, key: str, of: str = "max") -> float | None:
+        """A figure of ``error_before_mm`` and its like; None where there is none."""
+        spread = self.result.get(key)
+        return spread.get(of) if spread else None
+
+    def output_ending(self, *endings: str) -> Path | None:
+        """The output with the first of ``endings`` that there is."""
+        for ending in endings:
+            for path in self.outputs:
+                if path.name.endswith(ending):
+                    return path
+        return None
+
+    def as_json(self) -> dict[str, object]:
+        return {
+            "name": self.name,
+            "state": self.state,
+            **{key: self.result[key] for key in _TOLD if key in self.result},
+        }
+
+
+@dataclass(frozen=True)
+class Batched:
+    """A batch.  ``root``: the folder of its results; ``outputs``: the files of its summary; ``seconds``: of the run."""
+
+    root: Path
+    outcomes: tuple[Outcome, ...]
+    outputs: tuple[str, ...] = ()
+    passed_over: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+    @property
+    def exit(self) -> int:
+        """As for the worst of its programs: 1 over 3 over 0."""
+        return max((outcome.exit for outcome in self.outcomes), key=RANKS.index, default=0)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """State -> programs, of all states."""
+        found = Counter(outcome.state for outcome in self.outcomes)
+        return {state: found[state] for state in STATES}
+
+    def as_json(self) -> dict[str, object]:
+        """The machine-readable result; the keys are public.  It says nothing of time: the same run gives the same."""
+        counts = {state.replace(" ", "_"): count for state, count in self.counts.items()}
+        return {
+            **counts,
+            "programs": [outcome.as_json() for outcome in self.outcomes],
+            "passed_over": list(self.passed_over),
+            "outputs": list(self.outputs),
+            "exit": self.exit,
+        }
+
+
+def not_run(name: str, program: str) -> Outcome:
+    """The outcome of a program that was not begun, or not brought to its end."""
+    return Outcome(name, NOT_RUN, {"program": program, "findings": [], "outputs": [], "exit": 1})
+
+
+def summary_json(batched: Batched) -> bytes:
+    return (json.dumps(batched.as_json(), indent=2, allow_nan=False) + "\n").encode()

@@ -1,0 +1,107 @@
+"""The summary of a batch as a page: one row a program, with a link to its report."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from urllib.parse import quote
+
+from postproc.report.batched import DONE, FAILED, NOT_RUN, UNCHANGED, Batched, Outcome
+from postproc.report.page import FINDINGS, finding_rows, rendered
+from postproc.report.page_words import printed
+from postproc.report.words import count
+
+_SIGNS = {
+    DONE: ("", "✓", "done"),
+    UNCHANGED: ("", "=", "unchanged"),
+    FAILED: ("error", "x", "failed"),
+    NOT_RUN: ("warning", "–", "not run"),
+}
+
+
+def batch_page(batched: Batched) -> bytes:
+    """The page of a batch that lies in its root.  It says nothing of time: the same run gives the same bytes."""
+    failures = [finding for outcome in batched.outcomes if outcome.exit == 1 for finding in outcome.findings]
+    return rendered(
+        "batch.html.j2",
+        title=printed(batched.root.name),
+        what="batch",
+        verdict=_verdict(batched),
+        badge=_badge(batched),
+        rows=[_row(outcome, batched.root) for outcome in batched.outcomes],
+        findings=finding_rows(failures),
+        more_findings=max(0, len(failures) - FINDINGS),
+        goes=False,
+        passed_over=[printed(path) for path in batched.passed_over],
+        links=[("the same for scripts", "summary.json", "./summary.json")],
+    )
+
+
+def _badge(batched: Batched) -> tuple[str, str, str]:
+    if batched.exit == 1:
+        return "bad", "✗", "not all done"
+    return ("look", "!", "deserves a look") if batched.exit else ("good", "✓", "done")
+
+
+def _verdict(batched: Batched) -> str:
+    """One sentence: how many, how they ended, the worst before and after."""
+    counts = batched.counts
+    whole = count(len(batched.outcomes), "program")
+    well = counts[DONE] + counts[UNCHANGED]
+    words = (
+        f"All of {whole} are compensated"
+        if well == len(batched.outcomes)
+        else f"{well} of {whole} are compensated"
+    )
+    parts = [
+        f"{counts[state]} {word}"
+        for state, word in ((FAILED, "failed"), (NOT_RUN, "not run"))
+        if counts[state]
+    ]
+    look = sum(outcome.exit == 3 for outcome in batched.outcomes)
+    if look:
+        parts.append(f"{look} with something that deserves a look")
+    text = "; ".join([words, *parts]) + "."
+    if counts[UNCHANGED]:
+        text += f" {counts[UNCHANGED]} of them by an earlier run; nothing of theirs has changed."
+    before, after = (
+        max(
+            (value for outcome in batched.outcomes if (value := outcome.figure(key)) is not None),
+            default=None,
+        )
+        for key in ("error_before_mm", "error_after_mm")
+    )
+    if before is not None and after is not None:
+        text += f" The largest predicted error of all is {before:.3f} mm before and {after:.4f} mm after."
+    return text
+
+
+def _row(outcome: Outcome, root: Path) -> dict[str, object]:
+    gravest = outcome.gravest
+    state = _SIGNS[outcome.state]
+    if outcome.exit == 3:
+        state = ("warning", "!", f"{state[2]}, deserves a look")
+    report = outcome.output_ending(".report.html", ".report.json")
+    diff = outcome.output_ending(".diff")
+    return {
+        "name": printed(outcome.name),
+        "state": state,
+        "report": _address(report, root),
+        "diff": _address(diff, root),
+        **{key: outcome.result.get(key, "–") for key in ("motions", "corrected", "left")},
+        "before": _mm(outcome.figure("error_before_mm"), 3),
+        "after": _mm(outcome.figure("error_after_mm"), 4),
+        "correction": _mm(outcome.figure("correction_mm"), 3),
+        "finding": "" if gravest is None else f"{gravest.code} {printed(gravest.message)}",
+    }
+
+
+def _address(path: Path | None, root: Path) -> str:
+    """A relative address; a colon or a percent sign in a name is no part of it."""
+    if path is None:
+        return ""
+    return "./" + quote(os.fsencode(Path(os.path.relpath(path, root)).as_posix()))
+
+
+def _mm(value: float | None, digits: int) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"

@@ -1,0 +1,465 @@
+"""A batch at work: every program once, none stops another, the same bytes however it is run."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from conftest import CELL, LINES
+
+from postproc.batch import reading
+from postproc.batch.jobs import Job, jobs_of
+from postproc.batch.locking import locked
+from postproc.batch.reading import code_digest, digest_of, readings
+from postproc.batch.running import run_here
+from postproc.batch.work import Task, work
+from postproc.report.batched import Outcome
+from postproc.workflows.preparation import Request
+
+ROBOT = Path(__file__).resolve().parent.parent / "robots" / "kuka_kr270.yaml"
+
+WRONG = [line.replace("LIN {X 100.000", "LIN {X 99999.000") for line in LINES]
+
+
+def program(path: Path, number: int = 0, lines=LINES) -> Path:
+    """A program of its own: its cut lies ``number`` mm elsewhere."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    text = (
+        "\r\n".join(lines)
+        .replace("X 200.000", f"X {200 + number}.000")
+        .replace("DEF part", f"DEF {path.stem}")
+    )
+    path.write_text(text + "\r\n")
+    return path
+
+
+@pytest.fixture
+def parts(tmp_path):
+    """A folder of four programs in a cell."""
+    folder = tmp_path / "parts"
+    for number in range(4):
+        program(folder / f"p{number}.src", number)
+    (folder / "cell.yaml").write_text(CELL)
+    return folder
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every result below a folder; not records, which say when what was read."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and ".compensate" not in path.parts
+    }
+
+
+def states(done) -> dict[str, str]:
+    return {one["name"]: one["state"] for one in done.json["programs"]}
+
+
+def test_every_program_is_what_the_main_job_makes_of_it(compensate, parts, tmp_path):
+    done = compensate("batch", parts, "--force", "--json", "-", "-j", "2")
+    assert done.code == 0, done.err
+    assert done.err == ""
+    summary = done.json
+    assert (summary["done"], summary["failed"], summary["exit"]) == (4, 0, 0)
+    assert [one["name"] for one in summary["programs"]] == ["p0.src", "p1.src", "p2.src", "p3.src"]
+    assert json.loads((parts / "compensated" / "summary.json").read_bytes()) == summary
+    for number in range(4):
+        single = tmp_path / "single" / f"p{number}.src"
+        alone = compensate(parts / f"p{number}.src", "--force", "-o", single, "--json", "-")
+        assert alone.code == 0
+        assert single.read_bytes() == (parts / "compensated" / f"p{number}.src").read_bytes()
+        entry = summary["programs"][number]
+        for key in ("motions", "corrected", "left", "error_before_mm", "error_after_mm", "findings"):
+            assert entry[key] == alone.json[key]
+    assert not list((parts / "compensated").rglob("*.lock"))
+    assert not list(parts.rglob("*.tmp*"))
+
+
+def test_the_same_bytes_on_one_and_on_many_processes(compensate, parts):
+    compensate("batch", parts, "--force", "-j", "1")
+    one = contents(parts / "compensated")
+    shutil.rmtree(parts / "compensated")
+    compensate("batch", parts, "--force", "-j", "3")
+    assert contents(parts / "compensated") == one
+    assert "p3.report.json" in one
+
+
+def test_the_page_links_every_report_and_shows_hostile_names_as_text(compensate, parts):
+    odd = "a<script>alert(1)<script>%20&b.src"
+    program(parts / odd)
+    program(parts / "bad.src", 0, WRONG)
+    done = compensate("batch", parts, "--force", "--json", "-")
+    assert done.code == 1
+    page = (parts / "compensated" / "summary.html").read_text()
+    links = set(re.findall(r'href="(\./[^"]*)"', page))
+    there = {unquote(link)[2:] for link in links}
+    for one in done.json["programs"]:
+        report = [path for path in one["outputs"] if path.endswith((".report.html", ".report.json"))]
+        assert not report or any(Path(path).name in there for path in report)
+    assert all((parts / "compensated" / name).is_file() for name in there)
+    assert "<script>alert" not in page
+    assert "&lt;script&gt;alert" in page
+    assert "KIN001" in page
+
+
+def test_one_that_fails_stops_no_other(compensate, parts):
+    program(parts / "bad.src", 0, WRONG)
+    program(parts / "p9.src").write_bytes(b"")
+    done = compensate("batch", parts, "--force", "--json", "-")
+    assert done.code == 1
+    ended = states(done)
+    assert (ended.pop("bad.src"), ended.pop("p9.src")) == ("failed", "failed")
+    assert set(ended.values()) == {"done"}
+    by_name = {one["name"]: one for one in done.json["programs"]}
+    assert by_name["bad.src"]["findings"][0]["code"] == "KIN001"
+    assert by_name["p9.src"]["findings"][0]["code"] == "FIL002"
+    shown = compensate("batch", parts, "--force").out
+    assert "KIN001" in shown
+    assert "2 failed" in shown
+
+
+def test_the_exit_code_is_that_of_the_worst(compensate, parts):
+    assert compensate("batch", parts, "--force").code == 0
+    lines = [*LINES[:10], "LIN_REL {X 5}", *LINES[10:]]
+    program(parts / "look.src", 0, lines)
+    assert compensate("batch", parts, "--force").code == 3
+    assert compensate("batch", parts, "--force", "--strict").code == 1
+
+
+def test_fail_fast_stops(compensate, parts):
+    program(parts / "bad.src", 0, ["; the largest begins first" + " " * 5000, *WRONG])
+    done = compensate("batch", parts, "--force", "--fail-fast", "-j", "1", "--json", "-")
+    assert done.code == 1
+    ended = states(done)
+    assert ended.pop("bad.src") == "failed"
+    assert set(ended.values()) == {"not run"}
+    assert not (parts / "compensated" / "p0.src").exists()
+
+
+def test_a_dry_run_writes_nothing(compensate, parts):
+    before = sorted(parts.rglob("*"))
+    done = compensate("batch", parts, "--force", "--dry-run", "--json", "-")
+    assert (done.code, done.json["done"]) == (0, 4)
+    assert sorted(parts.rglob("*")) == before
+
+
+# ----------------------------------------------------------------------------------------------- done once
+
+
+def run(*words: object, rerun: bool = False, **said: object) -> dict[str, Outcome]:
+    """The outcomes of a batch that is done in this process, by name."""
+    jobs = jobs_of([str(word) for word in words], {"force": "", **said})
+    return {job.name: work(Task(job, code_digest(), rerun)) for job in jobs.jobs}
+
+
+def done(outcomes: dict[str, Outcome]) -> list[str]:
+    """The names of what was done this time; all else is unchanged."""
+    assert {outcome.state for outcome in outcomes.values()} <= {"done", "unchanged"}
+    return [name for name, outcome in outcomes.items() if outcome.state == "done"]
+
+
+def test_what_is_unchanged_is_not_done_again(parts):
+    first = run(parts)
+    assert len(done(first)) == 4
+    stamps = {path: path.stat().st_mtime_ns for path in (parts / "compensated").glob("p*")}
+    again = run(parts)
+    assert done(again) == []
+    assert {path: path.stat().st_mtime_ns for path in stamps} == stamps
+    assert {name: one.result for name, one in again.items()} == {
+        name: one.result for name, one in first.items()
+    }
+    assert len(done(run(parts, rerun=True))) == 4
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_bytes()
+    assert old.encode() in text
+    path.write_bytes(text.replace(old.encode(), new.encode()))
+
+
+@pytest.mark.parametrize(
+    ("change", "same"),
+    [
+        (lambda parts: edit(parts / "p1.src", "X 100.000", "X 100.001"), False),
+        (lambda parts: (parts / "p1.dat").write_text("DEFDAT p1\nENDDAT\n"), False),
+        (lambda parts: (parts / "compensated" / "p1.src").unlink(), True),
+        (lambda parts: edit(parts / "compensated" / "p1.src", "; slot", "; Slot"), True),
+        (lambda parts: (parts / "compensated" / "p1.corrections.csv").write_text("mine"), True),
+        (lambda parts: (parts / "compensated" / "p1.report.json").unlink(), True),
+        (lambda parts: (parts / "compensated" / ".compensate" / "p1.src.json").write_text('{"half": '), True),
+        (lambda parts: (parts / "compensated" / ".compensate" / "p1.src.json").unlink(), True),
+    ],
+    ids=[
+        "program",
+        "companion",
+        "gone",
+        "altered",
+        "report altered",
+        "report gone",
+        "record half",
+        "record gone",
+    ],
+)
+def test_what_changed_is_done_again_and_nothing_else(parts, change, same):
+    run(parts)
+    want = contents(parts / "compensated")
+    change(parts)
+    assert done(run(parts)) == ["p1.src"]
+    assert (contents(parts / "compensated") == want) == same
+    assert done(run(parts)) == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda parts: edit(parts / "cell.yaml", "x: 1500", "x: 1501"),
+        lambda parts: edit(parts / "arm.yaml", "value: 3.774e-6", "value: 3.775e-6"),
+        lambda parts: edit(parts / "f.csv", "10,0,200,0", "10,0,201,0"),
+    ],
+    ids=["cell", "robot", "force"],
+)
+def test_what_all_share_is_watched(parts, change):
+    shutil.copy(ROBOT, parts / "arm.yaml")
+    (parts / "cell.yaml").write_text(CELL.replace("kuka_kr270", "arm.yaml"))
+    (parts / "f.csv").write_text("line,fx,fy,fz\n10,0,200,0\n11,0,200,0\n12,0,200,0\n")
+    assert len(done(run(parts, force=str(parts / "f.csv")))) == 4
+    assert done(run(parts, force=str(parts / "f.csv"))) == []
+    change(parts)
+    assert len(done(run(parts, force=str(parts / "f.csv")))) == 4
+
+
+def test_options_and_a_nearer_cell_are_watched(parts):
+    run(parts)
+    assert len(done(run(parts, gain=0.5))) == 4
+    assert done(run(parts, gain=0.5)) == []
+    (parts / "sub").mkdir()
+    shutil.move(parts / "p0.src", parts / "sub" / "p0.src")
+    run(parts / "**/*.src")
+    (parts / "sub" / "cell.yaml").write_text(CELL)
+    assert done(run(parts / "**/*.src")) == ["sub/p0.src"]
+    assert done(run(parts / "**/*.src")) == []
+
+
+def test_a_force_beside_the_program_is_watched(parts):
+    program(parts / "p1.src", 0, [line for line in LINES if "FORCE" not in line])
+    (parts / "cell.yaml").write_text(CELL + "force: 0,100,0@base\n")
+    run(parts)
+    (parts / "p1.force.csv").write_text("line,fx,fy,fz\n10,0,200,0\n")
+    assert done(run(parts)) == ["p1.src"]
+
+
+def test_an_output_of_an_earlier_run_is_told(parts):
+    run(parts)
+    program(parts / "p1.src", 0, WRONG)
+    outcome = run(parts)["p1.src"]
+    assert outcome.exit == 1
+    assert [finding.code for finding in outcome.findings][-1] == "BAT007"
+
+
+def test_the_command_says_what_is_unchanged(compensate, parts):
+    compensate("batch", parts, "--force")
+    again = compensate("batch", parts, "--force", "--json", "-")
+    assert set(states(again).values()) == {"unchanged"}
+    assert set(states(compensate("batch", parts, "--force", "--force-rerun", "--json", "-")).values()) == {
+        "done"
+    }
+
+
+# ---------------------------------------------------------------------------------- what is read, who is at work
+
+
+def test_readings_see_what_is_opened(tmp_path):
+    read, other, written = tmp_path / "read", tmp_path / "other", tmp_path / "written"
+    read.write_text("a")
+    other.write_text("b")
+    other.read_text()
+    with readings() as seen:
+        read.read_text()
+        assert digest_of(read) == seen[str(read)]
+        written.write_text("c")
+        with pytest.raises(FileNotFoundError):
+            (tmp_path / "absent").read_text()
+        Path(reading.__file__).read_text()
+    other.read_text()
+    assert seen == {str(read): digest_of(read), str(tmp_path / "absent"): "absent"}
+
+
+def a_job(folder: Path, name: str, **options) -> Job:
+    target = folder / "compensated" / name
+    return Job(name, target, Request(program=folder / name, output=target, force="", **options))
+
+
+def test_an_input_that_changes_under_way_leaves_no_record(parts, monkeypatch):
+    job = a_job(parts, "p0.src")
+
+    def meddled(stage: str) -> None:
+        (parts / "cell.yaml").write_text(CELL + "# another\n")
+
+    assert work(Task(job, code_digest()), meddled).state == "done"
+    assert not (parts / "compensated" / ".compensate").exists()
+    assert work(Task(job, code_digest())).state == "done"
+    assert work(Task(job, code_digest())).state == "unchanged"
+
+
+def test_code_of_another_version_is_refused(parts):
+    outcome = work(Task(a_job(parts, "p0.src"), "0" * 64))
+    assert (outcome.state, outcome.findings[0].code) == ("failed", "BAT006")
+
+
+def test_a_defect_is_an_outcome(parts, monkeypatch):
+    from postproc.workflows import program as workflow
+
+    monkeypatch.setattr(workflow, "compensate", lambda request, stage: 1 // 0)
+    outcome = work(Task(a_job(parts, "p0.src"), code_digest()))
+    assert (outcome.state, outcome.exit, outcome.findings[0].code) == ("failed", 1, "BAT004")
+    assert "ZeroDivisionError" in outcome.findings[0].message
+    assert not (parts / "compensated").exists()
+
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from postproc.batch.locking import locked
+with locked(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(float(sys.argv[2]))
+"""
+
+
+def holder(path: Path, seconds: float) -> subprocess.Popen:
+    process = subprocess.Popen([sys.executable, "-c", HOLD, str(path), str(seconds)], stdout=subprocess.PIPE)
+    assert process.stdout.readline() == b"held\n"
+    return process
+
+
+def test_a_lock_waits_for_its_holder_and_survives_its_death(tmp_path):
+    path = tmp_path / "state" / "x.lock"
+    waited: list[int] = []
+    process = holder(path, 0.5)
+    with locked(path, lambda: waited.append(1)):
+        assert process.wait() == 0
+    assert waited == [1]
+    assert not path.parent.exists()
+    process = holder(path, 60.0)
+    process.kill()
+    process.wait()
+    assert path.exists()
+    with locked(path, lambda: waited.append(2)):
+        pass
+    assert waited == [1]
+    assert not path.exists()
+
+
+def test_two_batches_in_one_folder_share_the_work(parts):
+    words = [sys.executable, "-m", "postproc", "batch", str(parts), "--force", "-j", "2", "--json", "-"]
+    both = [subprocess.Popen(words, stdout=subprocess.PIPE) for _ in range(2)]
+    results = [json.loads(process.communicate()[0]) for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    ended = [[one["state"] for one in result["programs"]] for result in results]
+    for pair in zip(*ended, strict=True):
+        assert sorted(pair) == ["done", "unchanged"]
+    assert not list(parts.rglob("*.tmp*")) + list(parts.rglob("*.lock"))
+
+
+# ------------------------------------------------------------------------------------------ processes that die
+
+
+def worker_ids(parent: int) -> list[int]:
+    """Children of a process that are workers of a batch."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                words = (entry / "cmdline").read_bytes().split(b"\0")
+                status = (entry / "status").read_text()
+            except OSError:
+                continue
+            if f"PPid:\t{parent}\n" in status and any(b"spawn_main" in word for word in words):
+                found.append(int(entry.name))
+    return found
+
+
+class Deadly(Task):
+    """A task whose process is killed as it takes it, the first ``times`` times: counted in a file."""
+
+    def __reduce__(self):
+        return _deadly, (self.job, self.code)
+
+
+def _deadly(job, code):
+    import multiprocessing
+
+    if multiprocessing.parent_process() is not None:
+        counter = job.request.program.with_suffix(".deaths")
+        left = int(counter.read_text())
+        if left:
+            counter.write_text(str(left - 1))
+            os.kill(os.getpid(), signal.SIGKILL)
+    return Task(job, code)
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
+@pytest.mark.parametrize(("deaths", "state"), [(1, "done"), (2, "failed")])
+def test_a_worker_that_dies_takes_nothing_with_it(parts, deaths, state):
+    (parts / "p1.deaths").write_text(str(deaths))
+    tasks = [Task(a_job(parts, f"p{number}.src"), code_digest()) for number in range(4)]
+    tasks[1] = Deadly(tasks[1].job, code_digest())
+    outcomes: dict[int, Outcome] = dict(run_here(tasks, 2, lambda number, stage: None))
+    assert sorted(outcomes) == [0, 1, 2, 3]
+    assert outcomes.pop(1).state == state
+    assert {outcome.state for outcome in outcomes.values()} == {"done"}
+
+
+def test_what_died_twice_is_told(parts):
+    (parts / "p1.deaths").write_text("9")
+    ((number, outcome),) = run_here(
+        [Deadly(a_job(parts, "p1.src"), code_digest())], 4, lambda number, stage: None
+    )
+    assert (number, outcome.findings[0].code) == (0, "BAT005")
+    assert "SIGKILL" in outcome.findings[0].message
+    assert (parts / "p1.deaths").read_text() == "7"
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
+def test_workers_die_with_their_batch(parts, tmp_path):
+    for number in range(4, 40):
+        program(parts / f"p{number}.src", number)
+    words = [sys.executable, "-m", "postproc", "batch", str(parts), "--force", "-j", "2", "-q"]
+    process = subprocess.Popen(words)
+    deadline = time.monotonic() + 60
+    while not (parts / "compensated" / "p1.src").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    workers = worker_ids(process.pid)
+    assert workers
+    process.kill()
+    process.wait()
+    while any(Path(f"/proc/{worker}").exists() for worker in workers) and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert not any(Path(f"/proc/{worker}").exists() for worker in workers)
+
+
+def test_an_interrupted_batch_ends_in_words(parts):
+    for number in range(4, 60):
+        program(parts / f"p{number}.src", number)
+    words = [sys.executable, "-m", "postproc", "batch", str(parts), "--force", "-j", "2"]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
+    deadline = time.monotonic() + 60
+    while not (parts / "compensated" / "p1.src").exists() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    os.killpg(process.pid, signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert out == b""
+    assert b"goes on from there" in err
+    assert b"Traceback" not in err
+    assert not list(parts.rglob("*.tmp*"))
