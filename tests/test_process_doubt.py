@@ -1,0 +1,73 @@
+"""What a process knows of its forces, carried into the doubt of the prediction, operation by operation."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_doubt import job, paper, restated
+
+from postproc.compensation.correct import correct
+from postproc.compensation.doubt import FORCE, doubt_of
+from postproc.report.terminal import _doubt
+
+
+def with_shares(task, ci95):
+    return replace(task, force=replace(task.force, ci95=np.asarray(ci95, float)))
+
+
+def known(**intervals):
+    return restated(paper(), c1=1e-7, **intervals)
+
+
+def test_the_same_share_in_all_motions_is_one_share():
+    task = job(known(), 8)
+    result = correct(task)
+    one, each = doubt_of(task, result, 0.3), doubt_of(with_shares(task, [0.3] * 8), result)
+    assert (each.before, each.after) == (pytest.approx(one.before), pytest.approx(one.after))
+    assert np.allclose(each.deviation, one.deviation)
+    assert each.tenth == one.tenth == ()
+    assert not each.force_differs
+    assert "force, one scale for all motions" in _doubt(each)
+
+
+def test_every_operation_has_its_own_share():
+    task = job(known(), 8)
+    result = correct(task)
+    told = doubt_of(with_shares(task, [0.5] * 4 + [0.1] * 4), result)
+    rough, fine = (doubt_of(task, result, share).deviation for share in (0.5, 0.1))
+    assert np.allclose(told.deviation[:4], rough[:4])
+    assert np.allclose(told.deviation[4:], fine[4:])
+    assert told.force_differs
+    share = 0.5 if told.worst < 4 else 0.1
+    assert told.before == pytest.approx(doubt_of(task, result, share).before)
+    assert "force, each operation with its own" in _doubt(told)
+
+
+def test_the_cell_counts_before_the_process():
+    task = job(known(), 5)
+    result = correct(task)
+    told = doubt_of(with_shares(task, [0.5] * 5), result, 0.1)
+    assert told.before == pytest.approx(doubt_of(task, result, 0.1).before)
+
+
+def test_an_operation_without_an_interval_makes_a_lower_bound():
+    task = job(known(), 8)
+    result = correct(task)
+    told = doubt_of(with_shares(task, [0.5] * 4 + [np.nan] * 4), result)
+    assert told.lower_bound
+    assert [name for name, _ in told.tenth] == [FORCE]
+    assert np.allclose(told.deviation[:4], doubt_of(task, result, 0.5).deviation[:4])
+    assert np.allclose(told.deviation[4:], doubt_of(task, result, 0.0).deviation[4:])
+    nothing = doubt_of(with_shares(task, [np.nan] * 8), result)
+    assert [name for name, _ in nothing.tenth] == [FORCE]
+
+
+def test_air_needs_no_interval():
+    task = job(known(), 6)
+    wrench = task.force.values.copy()
+    wrench[3] = 0
+    carries = np.arange(6) != 3
+    task = replace(task, force=replace(task.force, values=wrench, start=wrench, carries=carries))
+    told = doubt_of(with_shares(task, np.where(carries, 0.3, np.nan)), correct(task))
+    assert told.tenth == ()
+    assert not told.force_differs
