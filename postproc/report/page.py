@@ -41,7 +41,7 @@ FOLDER = Path(__file__).parent / "html"
 FINDINGS = 300
 """A page tells so many findings at most; all are in the JSON."""
 
-SCRIPTS = ("figures.js", "space.js", "chart.js", "program.js")
+SCRIPTS = ("figures.js", "space.js", "hands.js", "chart.js", "program.js")
 STYLE = "page.css"
 
 _SEVERITY = {"info": ("i", "note"), "warning": ("!", "look"), "error": ("x", "error")}
@@ -170,7 +170,11 @@ def _number(value: float, decimals: int) -> str:
 
 
 def _figures(data: PageData, rows: np.ndarray) -> dict[str, object]:
-    """What the script draws: columns of the rows shown."""
+    """What the script draws: columns of the rows shown, and of the arcs whose begin is shown as well."""
+    place = np.searchsorted(rows, data.arcs)
+    place[place == len(rows)] = 0
+    whole = (rows[place] == data.arcs) & (rows[place - 1] == data.arcs - 1)
+    bends = data.bends[whole]
     columns = {
         "row": (rows, "i4"),
         "line": (data.line[rows], "i4"),
@@ -187,9 +191,12 @@ def _figures(data: PageData, rows: np.ndarray) -> dict[str, object]:
         "between": (data.between[rows], "f4"),
         "inserted": (data.inserted[rows], "i4"),
         "interval": (data.interval[rows], "f4"),
+        "arc": (place[whole], "i4"),
+        "bends": (bends.reshape(-1, 3), "f4"),
     }
     return {
         "count": len(rows),
+        "each": bends.shape[1],
         "motions": len(data),
         "corrected": data.corrected,
         "kinds": [kind.name for kind in Kind],

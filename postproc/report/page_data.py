@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -13,7 +12,7 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.correct import Result, State
 from postproc.compensation.division import Division
 from postproc.compensation.task import Task
-from postproc.document import Document, Edit, Span, apply, in_order
+from postproc.document import Document, Edit, Edits, Span, apply
 from postproc.report.report import Report
 from postproc.report.terminal import printable
 from postproc.robot.description import COVERAGE
@@ -22,8 +21,11 @@ from postproc.units import MM
 PLACES = 12
 """Worst places that the page tells, with their text."""
 
-SHOWN = 40_000
+SHOWN = 50_000
 """Motions that the figures of a page show at most."""
+
+BENDS, EACH = 60_000, (3, 23)
+"""Points that draw arcs, in all about so many; of each arc no fewer and no more."""
 
 LINES = 5
 """Lines of the text behind a motion at most; a motion that was divided has as many as it has parts."""
@@ -57,10 +59,11 @@ class PageData:
     """N motions of one program, mm and N.
 
     report: figures, findings, model and digests.  line, kind, state, cut (N,): as in Toolpath and Result; cut -1 in
-    air.  way (N,) [mm]: length of the cutting path to the end of each motion.  position (N, 3): wanted end point,
-    robot base.  force (N, 3) [N] and deflection (N, 3) before, robot base.  correction (N, 3): command minus wanted,
-    in the axes of the programmed base.  before, after (N,): predicted error at the end points; between (N,): the
-    largest on the way there after the correction.  inserted (N,): motions of the output before this one.
+    air.  way (N,) [mm]: length of the cutting path to the end of each motion.  position (N, 3): wanted end point;
+    arcs (K,): rows of arcs, and bends (K, B, 3) points on their way; force (N, 3) [N]; deflection (N, 3) before: all in
+    the robot base.  correction (N, 3): command minus wanted, in the axes of the programmed base.  before, after (N,):
+    predicted error at the end points; between (N,): the largest on the way there after the correction.
+    inserted (N,): motions of the output before this one.
     interval (N,): half width of the 95 % interval of a coordinate of the predicted place, in the direction in which it
     is largest; evaluated: motions at which it was computed, between them it is interpolated.  NaN wherever a figure is
     not known.
@@ -74,6 +77,8 @@ class PageData:
     cut: Ints
     way: Floats
     position: Floats
+    arcs: Ints
+    bends: Floats
     force: Floats
     deflection: Floats
     correction: Floats
@@ -102,8 +107,6 @@ def page_data(
     path, wanted, n = task.toolpath, task.wanted.position, len(task.toolpath)
     scope = result.state != State.AIR
     shift = (task.base.inverse() @ result.command).position - path.position
-    step = np.linalg.norm(np.diff(wanted, axis=0, prepend=wanted[:1]), axis=1)
-    inside = scope & np.concatenate([[False], result.cut[1:] == result.cut[:-1]])[:n]
     between, inserted = np.full(n, np.nan), np.zeros(n, np.int64)
     if output is not None:
         source = output.division.source
@@ -119,8 +122,10 @@ def page_data(
         kind=path.kind,
         state=result.state,
         cut=result.cut,
-        way=np.cumsum(np.where(inside, np.nan_to_num(step), 0.0)) / MM,
+        way=np.cumsum(np.where(scope, task.ways.length, 0.0)) / MM,
         position=wanted / MM,
+        arcs=(arcs := np.flatnonzero(task.ways.known & task.ways.arc)),
+        bends=_bends(task, arcs),
         force=task.wrench[:, :3],
         deflection=result.deflection / MM,
         correction=shift / MM,
@@ -137,12 +142,20 @@ def page_data(
     )
 
 
-def shown_rows(data: PageData, limit: int = SHOWN) -> Ints:
-    """Rows that figures show: all, or at most ``limit`` evenly along the program with every extreme among them.
+def _bends(task: Task, arcs: Ints) -> Floats:
+    """(K, B, 3) [mm] points evenly inside of the wanted arcs; few of each where there are many arcs."""
+    each = int(np.clip(BENDS // max(len(arcs), 1), *EACH))
+    share = np.tile(np.arange(1, each + 1) / (each + 1), len(arcs))
+    points = task.ways.at(np.repeat(arcs, each), share).position / MM
+    return np.asarray(points.reshape(len(arcs), each, 3))
 
-    Of many motions, each stretch of as many gives its first, those with the largest and smallest error before and
-    after, the largest on the way and the largest correction.  The worst places are kept, and the begin and end of cuts
-    as long as there is room.
+
+def shown_rows(data: PageData, limit: int = SHOWN) -> Ints:
+    """Rows that figures show: all, or at most ``limit`` of many.
+
+    Half of them lie evenly along the program, for its shape.  Of each of many stretches of the program those with the
+    largest and smallest error before and after, the largest on the way and the largest correction are shown, so that
+    no extreme is lost; the worst places are, and the begin and end of cuts as long as there is room.
     """
     n = len(data)
     if n <= limit:
@@ -152,14 +165,16 @@ def shown_rows(data: PageData, limit: int = SHOWN) -> Ints:
     if 2 * len(turn) <= limit // 4:
         must.append(np.concatenate([turn, turn + 1]))
     kept = np.unique(np.concatenate(must))
-    stretches = (limit - len(kept)) // 7
-    edges = np.linspace(0, n, stretches + 1).astype(np.int64)[:-1]
-    of = np.searchsorted(edges, np.arange(n), side="right")
     size = np.linalg.norm(data.correction, axis=1)
-    chosen = [kept, edges]
-    for values in (data.before, -data.before, data.after, -data.after, data.between, size):
+    quantities = (data.before, -data.before, data.after, -data.after, data.between, size)
+    room = limit - len(kept)
+    stretches = room // 2 // len(quantities)
+    of = np.arange(n) * stretches // n
+    last = np.append(np.flatnonzero(np.diff(of)), n - 1)
+    chosen = [kept, np.linspace(0, n - 1, room // 2).astype(np.int64)]
+    for values in quantities:
         order = np.lexsort((np.nan_to_num(values, nan=-np.inf), of))
-        chosen.append(order[np.append(np.flatnonzero(np.diff(of[order])), n - 1)])
+        chosen.append(order[last])
     return np.unique(np.concatenate(chosen))
 
 
@@ -167,23 +182,27 @@ def source_texts(
     document: Document, lines: Sequence[int], edits: Iterable[Edit]
 ) -> list[tuple[str, tuple[str, ...]]]:
     """The text of each of ``lines`` (from 1) before, and what the edits make of it; "" of a line that is not there."""
-    last = len(document.line_starts)
-    starts = sorted({document.line_starts[line - 1] for line in lines if 0 < line <= last})
-    stops = {start: document.raw.find(b"\n", start) + 1 or len(document.raw) for start in starts}
-    own: dict[int, list[Edit]] = {start: [] for start in starts}
-    for edit in edits:
-        at = bisect_right(starts, edit.span.start) - 1
-        if edit.span.file == 0 and at >= 0 and edit.span.start < stops[starts[at]]:
-            start = starts[at]
+    every = Edits.joined(edits)
+    there = [0 < line <= len(document.line_starts) for line in lines]
+    starts = np.unique(
+        [document.line_starts[line - 1] for line, is_ in zip(lines, there, strict=True) if is_]
+    )
+    stops = {int(start): document.raw.find(b"\n", start) + 1 or len(document.raw) for start in starts}
+    own: dict[int, list[Edit]] = {start: [] for start in stops}
+    if len(starts):
+        at = starts[np.maximum(np.searchsorted(starts, every.start, side="right") - 1, 0)]
+        end = np.array(list(stops.values()))[np.searchsorted(starts, at)]
+        for k in np.flatnonzero((every.file == 0) & (every.start >= at) & (every.start < end)):
+            edit, start = every[int(k)], int(at[k])
             own[start].append(Edit(Span(0, edit.span.start - start, edit.span.stop - start), edit.text))
     told: list[tuple[str, tuple[str, ...]]] = []
-    for line in lines:
-        if not 0 < line <= last:
+    for line, is_ in zip(lines, there, strict=True):
+        if not is_:
             told.append(("", ()))
             continue
         start = document.line_starts[line - 1]
         piece = Document(document.path, document.raw[start : stops[start]])
-        after = apply(piece, in_order(own[start])).splitlines()
+        after = apply(piece, own[start]).splitlines()
         more = [f"and {len(after) - LINES} more lines"] if len(after) > LINES else []
         told.append((_text(piece.raw.rstrip(b"\r\n")), tuple([_text(row) for row in after[-LINES:]] + more)))
     return told

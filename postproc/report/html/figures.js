@@ -124,10 +124,20 @@ function nearest(values, wanted) {
   return best;
 }
 
+// Text that can be read above lines.
+function halo(pen, text, x, y, ink) {
+  pen.lineWidth = 4;
+  pen.strokeStyle = theme().ground;
+  pen.strokeText(text, x, y);
+  pen.fillStyle = ink;
+  pen.fillText(text, x, y);
+}
+
 // A canvas as sharp as the screen, drawn once a frame at most.
 class Sheet {
-  constructor(canvas, draw) {
+  constructor(canvas, draw, clear = false) {
     this.canvas = canvas;
+    this.clear = clear;
     this.pen = canvas.getContext('2d');
     this.draw = draw;
     this.waiting = false;
@@ -149,8 +159,11 @@ class Sheet {
     if (this.canvas.width !== w) this.canvas.width = w;
     if (this.canvas.height !== h) this.canvas.height = h;
     this.pen.setTransform(sharp, 0, 0, sharp, 0, 0);
-    this.pen.fillStyle = theme().ground;
-    this.pen.fillRect(0, 0, wide, high);
+    this.pen.clearRect(0, 0, wide, high);
+    if (!this.clear) {
+      this.pen.fillStyle = theme().ground;
+      this.pen.fillRect(0, 0, wide, high);
+    }
     this.draw(this.pen, wide, high);
   }
 

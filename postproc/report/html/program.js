@@ -9,7 +9,8 @@ function start() {
   stretch.seen = [...stretch.all];
   if (given.places.length) chosen = nearest(motions.row, given.places[0]);
 
-  const space = new Space(byId('space'), byId('tip'));
+  const space = new Space(byId('space'), byId('marks'), byId('tip'));
+  hands(space);
   figures.push(space);
   const errors = [{ name: 'before', values: motions.before, band: motions.interval, colour: (t) => t.before, dash: [7, 4], width: 1.7 }];
   if (given.corrected) {

@@ -4,11 +4,13 @@
 // Turn about Z and tilt: the front is seen from +X, the side from -Y.
 const VIEWS = { oblique: [0.6, 0.6], top: [0, Math.PI / 2], front: [Math.PI / 2, 0], side: [0, 0] };
 
-const BINS = 24, SLABS = 24, NEAR = 16, WHILE_MOVING = 8000, ARROWS = 90;
+const BINS = 24, SLABS = 24, NEAR = 16, WHILE_MOVING = 15000, ARROWS = 90;
 
 class Space {
-  constructor(canvas, tip) {
+  // marks: a clear canvas above the other, for what changes while the view stays.
+  constructor(canvas, marks, tip) {
     this.sheet = new Sheet(canvas, (pen, wide, high) => this.paint(pen, wide, high));
+    this.above = new Sheet(marks, (pen) => this.marks(pen), true);
     this.canvas = canvas;
     this.tip = tip;
     this.quantity = 'before';
@@ -21,13 +23,15 @@ class Space {
     this.depth = new Float32Array(count);
     this.known = new Uint8Array(count);
     this.inside = [];
+    this.bends = new Map();
+    motions.arc.forEach((i, k) => this.bends.set(i, k * given.each));
+    this.curve = new Float32Array(2 * (motions.bends.length / 3));
     for (let i = 0; i < count; i++) {
       this.known[i] = Number.isFinite(motions.position[3 * i]) ? 1 : 0;
       if (motions.state[i] !== AIR) this.inside.push(i);
     }
     this.measure();
     this.look('oblique');
-    this.listen();
   }
 
   // The box of the cutting motions (of all, where none cuts): what the view turns about and shows whole.
@@ -84,6 +88,19 @@ class Space {
     }
     this.right = right;
     this.up = up;
+    for (let k = 0; k < this.curve.length / 2; k++) {
+      [this.curve[2 * k], this.curve[2 * k + 1]] = this.spot([0, 1, 2].map((axis) => motions.bends[3 * k + axis]));
+    }
+  }
+
+  // From the motion before to this one; an arc goes by the points on it.
+  segment(pen, i, stride) {
+    pen.moveTo(this.screen[2 * (i - stride)], this.screen[2 * (i - stride) + 1]);
+    const first = stride === 1 ? this.bends.get(i) : undefined;
+    if (first !== undefined) {
+      for (let k = first; k < first + given.each; k++) pen.lineTo(this.curve[2 * k], this.curve[2 * k + 1]);
+    }
+    pen.lineTo(this.screen[2 * i], this.screen[2 * i + 1]);
   }
 
   spot(place) {
@@ -109,33 +126,41 @@ class Space {
     this.path(pen, values, stride);
     if (this.bent && this.magnify > 0) this.bentPath(pen, stride);
     if (this.arrows) this.forces(pen);
-    this.marks(pen);
+    this.sizes(pen);
     this.triad(pen, high);
     this.key(pen, wide, high);
+    this.above.now();
   }
 
-  // The edges of the box, with its lengths.
+  corner(bits) {
+    return this.spot([0, 1, 2].map((k) => ((bits >> k) & 1 ? this.high[k] : this.low[k])));
+  }
+
+  // The edges of the box.
   box(pen) {
-    const corner = (bits) => this.spot([0, 1, 2].map((k) => ((bits >> k) & 1 ? this.high[k] : this.low[k])));
     pen.strokeStyle = theme().faint;
     pen.lineWidth = 0.8;
     pen.beginPath();
     for (let bits = 0; bits < 8; bits++) {
       for (let k = 0; k < 3; k++) {
         if ((bits >> k) & 1) continue;
-        pen.moveTo(...corner(bits));
-        pen.lineTo(...corner(bits | (1 << k)));
+        pen.moveTo(...this.corner(bits));
+        pen.lineTo(...this.corner(bits | (1 << k)));
       }
     }
     pen.stroke();
-    pen.fillStyle = theme().soft;
+  }
+
+  // Its lengths.
+  sizes(pen) {
     pen.font = FONT;
     pen.textAlign = 'center';
     for (let k = 0; k < 3; k++) {
-      const [from, to] = [corner(0), corner(1 << k)];
+      const [from, to] = [this.corner(0), this.corner(1 << k)];
       const length = this.high[k] - this.low[k];
       if (Math.hypot(to[0] - from[0], to[1] - from[1]) < 50 || length < 1e-3) continue;
-      pen.fillText(`${'XYZ'[k]} ${length.toFixed(length < 10 ? 1 : 0)} mm`, 0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1]) + 16);
+      const text = `${'XYZ'[k]} ${length.toFixed(length < 10 ? 1 : 0)} mm`;
+      halo(pen, text, 0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1]) + 16, theme().soft);
     }
   }
 
@@ -146,8 +171,7 @@ class Space {
     pen.beginPath();
     for (let i = stride; i < count; i += stride) {
       if (motions.state[i] !== AIR || !this.known[i] || !this.known[i - stride]) continue;
-      pen.moveTo(this.screen[2 * i - 2 * stride], this.screen[2 * i - 2 * stride + 1]);
-      pen.lineTo(this.screen[2 * i], this.screen[2 * i + 1]);
+      this.segment(pen, i, stride);
     }
     pen.stroke();
     pen.setLineDash([]);
@@ -182,10 +206,7 @@ class Space {
       pen.lineWidth = plain ? 1.4 : 1.3 + (2.7 * bin) / BINS;
       pen.setLineDash(plain ? [6, 4] : []);
       pen.beginPath();
-      for (const i of heaps[heap]) {
-        pen.moveTo(this.screen[2 * i - 2 * stride], this.screen[2 * i - 2 * stride + 1]);
-        pen.lineTo(this.screen[2 * i], this.screen[2 * i + 1]);
-      }
+      for (const i of heaps[heap]) this.segment(pen, i, stride);
       pen.stroke();
     }
     pen.setLineDash([]);
@@ -240,15 +261,9 @@ class Space {
 
   // The worst place (triangle) and the chosen motion (ring), with their lines.
   marks(pen) {
+    if (!this.right) return;
     pen.font = `bold ${FONT}`;
     pen.textAlign = 'left';
-    const label = (text, x, y) => {
-      pen.lineWidth = 4;
-      pen.strokeStyle = theme().ground;
-      pen.strokeText(text, x, y);
-      pen.fillStyle = theme().ink;
-      pen.fillText(text, x, y);
-    };
     const worst = given.places.length ? nearest(motions.row, given.places[0]) : -1;
     if (worst >= 0 && this.known[worst]) {
       const [x, y] = [this.screen[2 * worst], this.screen[2 * worst + 1]];
@@ -262,7 +277,7 @@ class Space {
       pen.stroke();
       pen.fillStyle = theme().ink;
       pen.fill();
-      label(`worst, line ${motions.line[worst]}`, x + 10, y - 10);
+      halo(pen, `worst, line ${motions.line[worst]}`, x + 10, y - 10, theme().ink);
     }
     for (const [i, text] of [[chosen, chosen === worst ? '' : `line ${motions.line[chosen]}`], [this.hovered, '']]) {
       if (i < 0 || !this.known[i]) continue;
@@ -274,7 +289,7 @@ class Space {
         pen.arc(x, y, 7, 0, 2 * Math.PI);
         pen.stroke();
       }
-      if (text) label(text, x + 12, y + 16);
+      if (text) halo(pen, text, x + 12, y + 16, theme().ink);
     }
   }
 
@@ -312,68 +327,6 @@ class Space {
       const share = most > low ? (value - low) / (most - low) : 0;
       pen.fillText(number(value, decimals), x - 16, top + tall * (1 - share) + 4);
     }
-  }
-
-  listen() {
-    const { canvas } = this;
-    const held = new Map();
-    let still = 0, spread = 0;
-    canvas.addEventListener('pointerdown', (event) => {
-      canvas.focus({ preventScroll: true });
-      canvas.setPointerCapture(event.pointerId);
-      held.set(event.pointerId, [event.clientX, event.clientY]);
-      still = 0;
-      canvas.classList.add('held');
-    });
-    canvas.addEventListener('pointermove', (event) => {
-      const before = held.get(event.pointerId);
-      if (!before) return this.hover(...this.sheet.at(event));
-      const [dx, dy] = [event.clientX - before[0], event.clientY - before[1]];
-      held.set(event.pointerId, [event.clientX, event.clientY]);
-      still += Math.abs(dx) + Math.abs(dy);
-      this.hover(-1e9, -1e9);
-      if (held.size === 2) {
-        const [a, b] = [...held.values()], now = Math.hypot(a[0] - b[0], a[1] - b[1]);
-        if (spread) this.zoomAt(now / spread, ...this.sheet.at(event));
-        spread = now;
-      } else if (event.shiftKey || event.buttons & 6) this.move(dx, dy);
-      else this.turn(dx / 150, dy / 150);
-    });
-    const drop = (event) => {
-      held.delete(event.pointerId);
-      spread = 0;
-      canvas.classList.remove('held');
-      if (event.type === 'pointerup' && still < 5) {
-        const at = this.find(...this.sheet.at(event));
-        if (at >= 0) choose(at, false);
-      }
-      this.rest();
-    };
-    canvas.addEventListener('pointerup', drop);
-    canvas.addEventListener('pointercancel', drop);
-    canvas.addEventListener('pointerleave', () => this.hover(-1e9, -1e9));
-    canvas.addEventListener('contextmenu', (event) => event.preventDefault());
-    canvas.addEventListener('dblclick', () => this.fit());
-    canvas.addEventListener('wheel', (event) => {
-      if (document.activeElement !== canvas && !event.ctrlKey) return;
-      event.preventDefault();
-      this.zoomAt(Math.exp(-event.deltaY / 500), ...this.sheet.at(event));
-      this.restSoon();
-    }, { passive: false });
-    canvas.addEventListener('keydown', (event) => {
-      const by = event.shiftKey ? 'move' : 'turn', step = event.shiftKey ? 40 : 0.12;
-      const act = {
-        ArrowLeft: () => this[by](-step, 0), ArrowRight: () => this[by](step, 0),
-        ArrowUp: () => this[by](0, -step), ArrowDown: () => this[by](0, step),
-        '+': () => this.zoomAt(1.25, ...this.centre), '=': () => this.zoomAt(1.25, ...this.centre),
-        '-': () => this.zoomAt(0.8, ...this.centre), 0: () => this.fit(),
-        n: () => choose(chosen + 1, true), p: () => choose(chosen - 1, true),
-      }[event.key.length === 1 ? event.key.toLowerCase() : event.key];
-      if (!act || event.ctrlKey || event.altKey || event.metaKey) return;
-      event.preventDefault();
-      act();
-      this.restSoon();
-    });
   }
 
   turn(dx, dy) {
@@ -430,7 +383,7 @@ class Space {
       this.tip.style.left = `${Math.max(0, Math.min(sx + 16, wide - this.tip.offsetWidth - 4))}px`;
       this.tip.style.top = `${Math.max(0, Math.min(sy + 16, high - this.tip.offsetHeight - 4))}px`;
     }
-    this.sheet.later();
+    this.above.later();
   }
 
   // Another motion was chosen; `show`: bring it into the view.
@@ -439,9 +392,10 @@ class Space {
       const { clientWidth: wide, clientHeight: high } = this.canvas;
       const [x, y] = this.spot([0, 1, 2].map((k) => motions.position[3 * chosen + k]));
       if (x < 30 || y < 30 || x > wide - 30 || y > high - 30) {
-        this.shift = [this.shift[0] + wide / 2 - x, this.shift[1] + high / 2 - y];
+        this.move(wide / 2 - x, high / 2 - y);
+        this.rest();
       }
     }
-    this.sheet.later();
+    this.above.later();
   }
 }

@@ -1,0 +1,63 @@
+// What the pointer, the wheel and the keys do to the 3-D view.
+
+function hands(space) {
+  const { canvas } = space;
+  const held = new Map();
+  let still = 0, spread = 0;
+  canvas.addEventListener('pointerdown', (event) => {
+    canvas.focus({ preventScroll: true });
+    canvas.setPointerCapture(event.pointerId);
+    held.set(event.pointerId, [event.clientX, event.clientY]);
+    still = 0;
+    canvas.classList.add('held');
+  });
+  canvas.addEventListener('pointermove', (event) => {
+    const before = held.get(event.pointerId);
+    if (!before) return space.hover(...space.sheet.at(event));
+    const [dx, dy] = [event.clientX - before[0], event.clientY - before[1]];
+    held.set(event.pointerId, [event.clientX, event.clientY]);
+    still += Math.abs(dx) + Math.abs(dy);
+    space.hover(-1e9, -1e9);
+    if (held.size === 2) {
+      const [a, b] = [...held.values()], now = Math.hypot(a[0] - b[0], a[1] - b[1]);
+      if (spread) space.zoomAt(now / spread, ...space.sheet.at(event));
+      spread = now;
+    } else if (event.shiftKey || event.buttons & 6) space.move(dx, dy);
+    else space.turn(dx / 150, dy / 150);
+  });
+  const drop = (event) => {
+    held.delete(event.pointerId);
+    spread = 0;
+    canvas.classList.remove('held');
+    if (event.type === 'pointerup' && still < 5) {
+      const at = space.find(...space.sheet.at(event));
+      if (at >= 0) choose(at, false);
+    }
+    space.rest();
+  };
+  canvas.addEventListener('pointerup', drop);
+  canvas.addEventListener('pointercancel', drop);
+  canvas.addEventListener('pointerleave', () => space.hover(-1e9, -1e9));
+  canvas.addEventListener('contextmenu', (event) => event.preventDefault());
+  canvas.addEventListener('dblclick', () => space.fit());
+  canvas.addEventListener('wheel', (event) => {
+    if (document.activeElement !== canvas && !event.ctrlKey) return;
+    event.preventDefault();
+    space.zoomAt(Math.exp(-event.deltaY / 500), ...space.sheet.at(event));
+    space.restSoon();
+  }, { passive: false });
+  canvas.addEventListener('keydown', (event) => {
+    const by = event.shiftKey ? 'move' : 'turn', step = event.shiftKey ? 40 : 0.12;
+    const act = {
+      ArrowLeft: () => space[by](-step, 0), ArrowRight: () => space[by](step, 0),
+      ArrowUp: () => space[by](0, -step), ArrowDown: () => space[by](0, step),
+      '+': () => space.zoomAt(1.25, ...space.centre), '=': () => space.zoomAt(1.25, ...space.centre),
+      '-': () => space.zoomAt(0.8, ...space.centre), 0: () => space.fit(),
+      n: () => choose(chosen + 1, true), p: () => choose(chosen - 1, true),
+    }[event.key.length === 1 ? event.key.toLowerCase() : event.key];
+    if (!act || event.ctrlKey || event.altKey || event.metaKey) return;
+    event.preventDefault();
+    act();
+    space.restSoon();
+  });
+}
