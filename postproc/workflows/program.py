@@ -21,7 +21,10 @@ from postproc.compensation.task import Task
 from postproc.dialects.dialect import Moved, Program
 from postproc.findings import Finding, Refusal
 from postproc.publish import publish
-from postproc.report.files import corrections_csv, unified_diff
+from postproc.report.diff import unified_diff
+from postproc.report.files import corrections_csv
+from postproc.report.page import beside, program_page
+from postproc.report.page_data import page_data
 from postproc.report.report import Report, Spread, Worst, exit_code, in_order_of_place, json_bytes
 from postproc.toolpath import Plan, Role
 from postproc.units import DEG, MM
@@ -40,11 +43,17 @@ def predict(request: Request, stage: Stage = silent) -> Report:
     report = _report(request, ready, result, findings)
     files: dict[Path, bytes] = {}
     pages = [] if request.json is None else [request.json]
+    shown: Path | None = None
     if request.report:
         files[request.report / f"{request.program.stem}.deflection.csv"] = corrections_csv(ready.task, result)
         pages.append(request.report / f"{request.program.stem}.prediction.json")
-    report = replace(report, outputs=tuple(str(path) for path in (*files, *pages)))
+        shown = request.report / f"{request.program.stem}.prediction.html"
+    names = [*files, *pages, *([shown] if shown else [])]
+    report = replace(report, outputs=tuple(str(path) for path in names))
     _not_over_inputs(ready, report.outputs)
+    if shown:
+        links = beside(shown, {"deflections (CSV)": names[0], "result (JSON)": pages[-1]})
+        files[shown] = program_page(page_data(ready.task, result, report, ready.program.documents), links)
     publish({**files, **dict.fromkeys(pages, json_bytes(report))})
     return report
 
@@ -93,7 +102,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     outputs = dict(zip(paths, written.contents, strict=True))
     stem = target.stem
     folder = request.report or target.parent
-    names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff")]
+    names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff", "report.html")]
     names += [] if request.json is None else [request.json]
     stage("reporting")
     report = _report(request, ready, result, in_order_of_place(findings), written)
@@ -112,7 +121,19 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         names[0]: json_bytes(report),
         names[1]: corrections_csv(task, result, written.division, written.between),
         names[2]: diff,
-        **dict.fromkeys(names[3:], json_bytes(report)),
+        names[3]: program_page(
+            page_data(task, result, report, program.documents, written),
+            beside(
+                names[3],
+                {
+                    "difference": names[2],
+                    "corrections (CSV)": names[1],
+                    "result (JSON)": names[0],
+                    "compensated program": target,
+                },
+            ),
+        ),
+        **dict.fromkeys(names[4:], json_bytes(report)),
     }
     for document in program.documents:
         if read_document(document.path).digest != document.digest:
@@ -291,6 +312,7 @@ def _model(ready: Prepared) -> dict[str, object]:
             "parameters": {
                 name: {
                     "value": value.value,
+                    "unit": next(p.unit for p in term.effect.parameters if p.name == name),
                     "interval": value.interval,
                     "level": value.level if value.level or value.interval is None else "unstated",
                     "source": value.source,
