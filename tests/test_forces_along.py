@@ -141,3 +141,11 @@ def test_no_force_is_none_anywhere():
     result = run(arc_path(1.0), None)
     assert np.all(at(result, 1, 0, 0.5, 1) == 0)
     assert not result.steps.any()
+
+
+def test_lines_and_arcs_may_be_asked_for_together():
+    result = run(arc_path(90 * DEG, before=[0.1, -0.2, 0]), "10,20,30@feed")
+    rows, fraction = np.array([1, 2, 1, 2, 2]), np.array([0.5, 0.5, 1.0, 1.0, 0.0])
+    alone = [at(result, row, share)[0] for row, share in zip(rows, fraction, strict=True)]
+    assert np.allclose(result.along(rows, fraction), alone)
+    assert np.allclose(alone[1][:3], np.sqrt(0.5) * np.array([-30, -10, 0]) + [0, 0, 30])
