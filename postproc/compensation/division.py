@@ -122,7 +122,7 @@ class _Search:
     # links
 
     def link(self) -> None:
-        """Where the correction steps at the begin of a motion, a link leads to where its own one begins."""
+        """Where the correction steps at the begin of a motion under force, a link leads to where its own one begins."""
         task, rows = self.task, self.rows
         own = self._own_begins()
         shift, turn = task.off(rows, own, self.entry[rows])
@@ -130,7 +130,7 @@ class _Search:
             np.linalg.norm(shift, axis=1) / task.tolerance,
             np.linalg.norm(turn, axis=1) / task.tolerance_angle,
         )
-        self.linked = (self.step > STEP) & self.free[rows]
+        self.linked = (self.step > STEP) & self.free[rows] & task.carries[rows]
         chosen = self.linked[:, None]
         self.start = Poses(
             np.where(chosen[..., None], own.rotation, self.start.rotation),
@@ -182,7 +182,8 @@ class _Search:
         arc, sweep = ways.arc[rows], np.nan_to_num(ways.sweep[rows])
         least = np.where(sweep > WIDEST, np.ceil(sweep / np.pi), 1).astype(np.int64)
         self.least = least
-        can = self.free[rows]
+        # A way that begins beside its place stays beside it, in however many pieces.
+        can = self.free[rows] & (self.linked | (self.step <= STEP))
         if not self.limits.keep:
             self._hold(
                 rows[(least > 1) & ~can], "COR013", "an arc of nearly a full turn can not be divided here"

@@ -47,6 +47,14 @@ class Worst:
 
 
 @dataclass(frozen=True)
+class Link:
+    """A motion that leads from one correction to the next: the line before which it stands, and its length."""
+
+    line: int
+    length_mm: float
+
+
+@dataclass(frozen=True)
 class Report:
     """One program.  ``after``, ``between`` (the way between points) and ``correction`` are None where nothing was
     corrected (predict)."""
@@ -59,7 +67,7 @@ class Report:
     cutting: int
     corrected: int
     inserted: int
-    links: int
+    links: tuple[Link, ...]
     left: int
     iterations: int
     gain: float
@@ -92,7 +100,7 @@ class Report:
             "cutting": self.cutting,
             "corrected": self.corrected,
             "inserted": self.inserted,
-            "links": self.links,
+            "links": [{"line": link.line, "mm": round(link.length_mm, 6)} for link in self.links],
             "left": self.left,
             "iterations": self.iterations,
             "gain": self.gain,

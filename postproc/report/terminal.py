@@ -61,13 +61,22 @@ def _rows(report: Report) -> Iterable[tuple[str, str]]:
             "motions",
             (
                 f"{report.corrected} corrected, {report.left} left, {report.motions - report.corrected - report.left}"
-                f" with nothing to correct; {report.inserted} inserted ({report.links} links)"
+                f" with nothing to correct; {report.inserted} inserted{_links(report)}"
             ),
         )
     if report.doubt.worst >= 0:
         yield "doubt", escape(_doubt(report.doubt))
         if report.doubt.lower_bound:
             yield "", escape(_left_out(report.doubt))
+
+
+def _links(report: Report) -> str:
+    """Links are counted apart: they lead from one correction to the next, mostly at the begin of a cut."""
+    if not report.links:
+        return ""
+    longest = max(report.links, key=lambda link: link.length_mm)
+    count = "1 link" if len(report.links) == 1 else f"{len(report.links)} links"
+    return f", {count} among them, up to {longest.length_mm:.3f} mm (line {longest.line})"
 
 
 def _worst(report: Report) -> Table:

@@ -14,7 +14,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.compensation.correct import Result, State, correct
-from postproc.compensation.division import Division, Limits, divide
+from postproc.compensation.division import Division, Limits, divide, made
 from postproc.compensation.doubt import doubt_of
 from postproc.compensation.limits import limits
 from postproc.compensation.task import Task
@@ -25,7 +25,7 @@ from postproc.report.diff import unified_diff
 from postproc.report.files import corrections_csv
 from postproc.report.page import beside, program_page
 from postproc.report.page_data import page_data
-from postproc.report.report import Report, Spread, Worst, exit_code, in_order_of_place, json_bytes
+from postproc.report.report import Link, Report, Spread, Worst, exit_code, in_order_of_place, json_bytes
 from postproc.toolpath import Plan, Role
 from postproc.units import DEG, MM
 from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, read_document, silent
@@ -279,7 +279,7 @@ def _report(
         cutting=int(scope.sum()),
         corrected=int(result.corrected.sum()) if corrected else 0,
         inserted=written.division.inserted if written else 0,
-        links=int(written.division.links.sum()) if written else 0,
+        links=_links(task, written.division) if written else (),
         left=int((result.state == State.LEFT).sum()),
         iterations=int(result.iterations.max(initial=0)),
         gain=request.gain,
@@ -302,6 +302,14 @@ def _report(
         findings=findings,
         exit=exit_code(findings, request.strict),
     )
+
+
+def _links(task: Task, division: Division) -> tuple[Link, ...]:
+    links = np.flatnonzero(division.links)
+    ways = made(task, division)[links]
+    length = np.linalg.norm(ways.end.position - ways.begin.position, axis=1) / MM
+    lines = task.toolpath.line[division.source[links]]
+    return tuple(Link(int(line), float(mm)) for line, mm in zip(lines, length, strict=True))
 
 
 def _model(ready: Prepared) -> dict[str, object]:
