@@ -42,9 +42,8 @@ def run_on_cluster(
         try:
             while pending:
                 try:
-                    ready = distributed.wait(
-                        list(pending), timeout=PATIENCE, return_when="FIRST_COMPLETED"
-                    ).done
+                    with client.as_current():
+                        ready = distributed.wait(list(pending), PATIENCE, "FIRST_COMPLETED").done
                 except TimeoutError:
                     if client.scheduler_info()["workers"]:
                         continue
