@@ -145,6 +145,90 @@ CODES: dict[str, Code] = {
         "external axes move",
         "One that carries the robot or the workpiece puts both elsewhere than the cell says; make sure that none does.",
     ),
+    # G-code
+    "GCO001": Code(
+        "warning",
+        "block not understood",
+        "It is kept as it is; what it moves is not known, so it is not corrected.",
+    ),
+    "GCO002": Code(
+        "warning",
+        "position is not known",
+        "A coordinate was never set, or something before left it unknown; the motion is kept as it is.",
+    ),
+    "GCO003": Code(
+        "info",
+        "rapid to a place that is not known",
+        "A coordinate is not known yet; an air move, it stays as it is.",
+    ),
+    "GCO004": Code(
+        "info", "machine or reference position", "G28, G30, G53: not a place in the base; it stays as it is."
+    ),
+    "GCO005": Code(
+        "warning", "variable or expression", "Only numbers can be corrected; the motion is kept as it is."
+    ),
+    "GCO006": Code(
+        "warning",
+        "motion in a loop, branch or subprogram",
+        "It may run many times or never; it is kept as it is.",
+    ),
+    "GCO007": Code(
+        "warning",
+        "call of code that was not read",
+        "It may move the machine and change modes; behind it these are not known until they are set again.",
+    ),
+    "GCO008": Code("warning", "canned cycle", "Its motions are the control's; the block is kept as it is."),
+    "GCO009": Code(
+        "warning",
+        "tool radius compensation",
+        "Under G41 and G42 the control computes the tool's path; it is not corrected.",
+    ),
+    "GCO010": Code(
+        "warning",
+        "coordinates are not those of the base",
+        "Turned, scaled, mirrored or polar coordinates, or diameters; such motions are kept as they are.",
+    ),
+    "GCO011": Code("info", "probing", "Where a probing move ends is not known; it stays as it is."),
+    "GCO012": Code("warning", "arc not understood", "Begin, end, centre and plane do not make an arc."),
+    "GCO013": Code(
+        "warning",
+        "rotary axes without a TCP mode",
+        "Where the tool is then depends on the machine's geometry; the motion is kept as it is.",
+    ),
+    "GCO014": Code(
+        "warning",
+        "work offset is not known",
+        "The program writes the offset itself (G10, a variable), or it can not be told which one is in force.",
+    ),
+    "GCO015": Code("warning", "tool is not known", "No tool is loaded, or its number is not known."),
+    "GCO016": Code(
+        "warning", "other motion", "A spline, a thread, a corner or a further axis; it is kept as it is."
+    ),
+    "GCO017": Code(
+        "warning", "words contradict each other", "Controls differ in what they do; it is kept as it is."
+    ),
+    "GCO018": Code("warning", "no motion code is in force", "Axis words stand before any G0, G1, G2 or G3."),
+    "GCO019": Code(
+        "warning",
+        "origin is not known",
+        "G92 set the coordinates of a position that is not known; motions behind it are kept as they are.",
+    ),
+    "GCO020": Code("info", "unit is not stated", "No code says mm or inch; mm is taken."),
+    "GCO021": Code("info", "tool is not stated", "The program names no tool; tool 1 of the cell is taken."),
+    "GCO022": Code(
+        "warning",
+        "words without a decimal point",
+        "The cell counts them in increments, but the control of this dialect does not.",
+    ),
+    "GCO023": Code(
+        "info", "length of another tool", "G43 names an H that is not the tool's; the cell's tool is taken."
+    ),
+    "GCO024": Code(
+        "warning",
+        "program writes offsets",
+        "What the control knows of bases and tools then differs from the cell; motions with that base are kept.",
+    ),
+    "GCO025": Code("info", "motion behind the end", "It stands behind M2, M30 or M99 and does not run."),
     # YAML files
     "YML001": Code("error", "not valid YAML", "It does not parse, or has aliases, tags or odd characters."),
     "YML002": Code("error", "unknown key", "A key that has no meaning here; nothing is ignored silently."),
@@ -207,7 +291,9 @@ CODES: dict[str, Code] = {
         "No operation of the process file has a motion in the program: names, tools and lines all miss.",
     ),
     "FRC012": Code(
-        "warning", "operation without motions", "The program has no such name, tool or lines; look at its spelling."
+        "warning",
+        "operation without motions",
+        "The program has no such name, tool or lines; look at its spelling.",
     ),
     "FRC013": Code(
         "error", "feed is not known", "Feed per tooth, or the time of a motion, needs the programmed feed."
@@ -218,7 +304,9 @@ CODES: dict[str, Code] = {
         "The process model knows side cutting only; motions along the spindle are taken as air.",
     ),
     "FRC015": Code("info", "force of an operation", "What the process file came to for this operation."),
-    "FRC016": Code("info", "no axial coefficients", "The source of the coefficients states none; Fz is taken as 0."),
+    "FRC016": Code(
+        "info", "no axial coefficients", "The source of the coefficients states none; Fz is taken as 0."
+    ),
     "FRC017": Code(
         "warning",
         "feed unlike the rest of the operation",
@@ -235,25 +323,39 @@ CODES: dict[str, Code] = {
         "The log does not cover the path that cuts, or the length of the path is not known.",
     ),
     "FRC020": Code(
-        "error", "no offset to take off", "--force-offset needs a log with readings in air moves (PTP, G0, FORCE OFF)."
+        "error",
+        "no offset to take off",
+        "--force-offset needs a log with readings in air moves (PTP, G0, FORCE OFF).",
     ),
     "FRC021": Code(
-        "warning", "gauge offset", "In air the log shows a force; --force-offset takes it off, nothing else does."
+        "warning",
+        "gauge offset",
+        "In air the log shows a force; --force-offset takes it off, nothing else does.",
     ),
-    "FRC022": Code("info", "gauge offset taken off", "The mean of the readings in air was taken off all readings."),
+    "FRC022": Code(
+        "info", "gauge offset taken off", "The mean of the readings in air was taken off all readings."
+    ),
     "FRC023": Code(
-        "warning", "channel saturated", "Equal readings in a row at the end of a channel's range: there was more."
+        "warning",
+        "channel saturated",
+        "Equal readings in a row at the end of a channel's range: there was more.",
     ),
-    "FRC024": Code("warning", "gap in the log", "Readings are missing; the force there is taken from both sides."),
+    "FRC024": Code(
+        "warning", "gap in the log", "Readings are missing; the force there is taken from both sides."
+    ),
     "FRC025": Code(
-        "info", "motions between readings", "Motions shorter than the distance of readings take the log between them."
+        "info",
+        "motions between readings",
+        "Motions shorter than the distance of readings take the log between them.",
     ),
     "FRC026": Code(
         "warning",
         "force changes within a motion",
         "A motion's force is linear from begin to end; here the log is not. Insert a point where the force changes.",
     ),
-    "FRC027": Code("warning", "log longer than the path", "The rest of the log was not used; is it of this program?"),
+    "FRC027": Code(
+        "warning", "log longer than the path", "The rest of the log was not used; is it of this program?"
+    ),
     "FRC028": Code(
         "info",
         "motions that take no part of the log",

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from postproc.dialects.gcode.words import Note
+import numpy as np
+
+from postproc.arrays import Floats
+from postproc.dialects.gcode.words import Note, key
 
 
 class Group(IntEnum):
@@ -94,13 +97,67 @@ class Line(NamedTuple):
     deleted: bool
 
 
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Programmed coordinates in the base: base = turn @ xyz + shift[:3], and abc + shift[3:] for the rotary axes.
+
+    turn (3, 3); shift (6,) [m, rad], NaN where not known; memory: what the control itself remembers.
+    """
+
+    turn: Floats
+    shift: Floats
+    memory: Any = None
+
+    def to_base(self, programmed: Floats) -> Floats:
+        """Programmed (..., 6) in the base."""
+        return (
+            np.concatenate([self._turned(programmed[..., :3], self.turn), programmed[..., 3:]], -1)
+            + self.shift
+        )
+
+    def from_base(self, position: Floats) -> Floats:
+        """A position (..., 6) in the base as it would be programmed."""
+        moved = position - self.shift
+        return np.concatenate([self._turned(moved[..., :3], self.turn.T), moved[..., 3:]], -1)
+
+    @staticmethod
+    def _turned(vector: Floats, turn: Floats) -> Floats:
+        # Without a rotation an axis that is not known says nothing about the others.
+        return vector if np.array_equal(turn, np.eye(3)) else vector @ turn.T
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """A block that changes the frame: its words (key -> value as written, NaN if UNREAD), its Once bits, its notes.
+
+    scale [m]: one unit of length; frame: before the block; position (6,) [m, rad]: where the tool is, in the base.
+    """
+
+    words: Mapping[int, float]
+    once: int
+    notes: tuple[Note, ...]
+    codes: tuple[float, ...]
+    scale: float
+    frame: Frame
+    position: Floats
+
+
+def kept(event: Event) -> Frame:
+    """The frame as it was: of a control without codes that change it."""
+    return event.frame
+
+
 @dataclass(frozen=True)
 class Control:
     """One dialect of G-code.
 
     codes: G number times ten -> what it says, M likewise; named: a word that stands alone -> the same;
     names: addresses of more than a letter -> their key; comment: pattern of comments (and of strings, group 1, which
-    are none); line: takes a line apart that is not plain words.
+    are none); line: takes a line apart that is not plain words; start: what is in force before anything is said.
+    endings: M codes after which nothing is read; cycle_apart: G80 goes back to the move that was in force before the
+    cycle; increments: a length without a decimal point may count increments; turns: key of the word that gives the
+    turns of an arc, and how many of them an arc without the word has.
+    frame: the frame behind a block with G52, G92 ... or Once.FRAME; columns: keys of further words of motions.
     """
 
     name: str
@@ -110,5 +167,9 @@ class Control:
     named: Mapping[bytes, Code] = field(default_factory=dict)
     names: Mapping[bytes, int] = field(default_factory=dict)
     start: Mapping[Group, int] = field(default_factory=dict)
+    endings: frozenset[int] = frozenset((2, 30))
+    cycle_apart: bool = False
     increments: bool = False
-    loads: bool = True
+    turns: tuple[int, int] = (key("P"), 1)
+    frame: Callable[[Event], Frame] = kept
+    columns: tuple[int, ...] = ()

@@ -1,0 +1,69 @@
+"""Comments of a program: what speaks to this tool, the mark of a compensated program, and where that goes."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.arrays import Ints
+from postproc.dialects.gcode.lexing import BOM
+from postproc.dialects.gcode.words import Text, key
+from postproc.document import Document, Span
+from postproc.toolpath import Annotation
+
+_SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
+MARK = "COMPENSATED by compensate "
+_HEAD = re.compile(
+    rb"[ \t]*(?:%[^\r\n]*|(?:O|:)[ \t]*(?:\d+|<[^>\r\n]*>)[ \t]*(?:\([^)\r\n]*\)|;[^\r\n]*)?[ \t]*)\r?(?:\n|\Z)",
+    re.I,
+)
+_EMPTY = re.compile(rb"[ \t\r]*\n")
+
+
+class Remarks(NamedTuple):
+    annotations: tuple[Annotation, ...]
+    comments: tuple[Annotation, ...]
+    marker: Span | None
+    marker_at: Span
+
+
+def remarks(document: Document, text: Text, line: Ints) -> Remarks:
+    """``line`` (N,): lines of the motions, ascending."""
+    raw, marker = document.raw, None
+    spans = text.comments
+    feeds = np.flatnonzero(np.frombuffer(raw, np.uint8) == 10)
+    lines = np.searchsorted(feeds, spans[:, 0]) + 1
+    rows = np.searchsorted(line, lines)
+    wordy = text.words.block[text.words.key != key("N")]
+    alone = ~np.isin(lines, text.blocks.line[wordy])
+    speaking, others = [], []
+    for (start, stop), number, row, own in zip(
+        spans.tolist(), lines.tolist(), rows.tolist(), alone.tolist(), strict=True
+    ):
+        said = raw[start:stop].decode("latin-1")
+        said = (said[1:-1] if said[0] == "(" and said[-1] == ")" else said[1:]).strip()
+        if marker is None and said.startswith(MARK):
+            marker = Span(0, start, stop)
+        elif _SPEAKS.match(said):
+            speaking.append(Annotation(row, said, number))
+        elif own and said:
+            others.append(Annotation(row, said, number))
+    at = head(raw)
+    return Remarks(tuple(speaking), tuple(others), marker, Span(0, at, at))
+
+
+def head(raw: bytes) -> int:
+    """Where the lines of ``%`` and the program's number, with which a program begins, end."""
+    at = end = len(BOM) if raw.startswith(BOM) else 0
+    while True:
+        found = _HEAD.match(raw, at)
+        if found is not None:
+            at = end = found.end()
+        elif (found := _EMPTY.match(raw, at)) is not None:
+            at = found.end()
+        else:
+            return end
+        if at >= len(raw):
+            return end

@@ -1,0 +1,136 @@
+"""Lines that are not plain words: expressions, variables, flow, program numbers, tape marks, text."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from postproc.dialects.gcode.control import Line
+from postproc.dialects.gcode.words import How, Note
+
+_NUMBER = rb"[-+]?[ \t]*(?:\d[\d \t]*(?:\.[\d \t]*)?|\.[ \t]*\d[\d \t]*)"
+_TOKEN = re.compile(
+    rb"[ \t\x0b\x0c]+"
+    rb"|(?P<name>[A-Za-z_][A-Za-z_]+)"
+    rb"|(?P<letter>[A-Za-z])[ \t]*(?:(?P<number>"
+    + _NUMBER
+    + rb")(?![\d.#\[])|(?P<sign>[-+]?[ \t]*)(?P<open>[#\[]"
+    rb"|[A-Za-z]{2,5}[ \t]*\[))"
+    rb"|(?P<assign>#)"
+    rb"|(?P<corner>,[ \t]*[A-Za-z])"
+    rb"|(?P<check>\*[ \t]*\d+[ \t]*\Z)"
+)
+_HEAD = re.compile(rb"[ \t]*(?:(?P<tape>%)|(?P<deleted>/)[ \t]*\d?|(?P<program>:)[ \t]*(?P<digits>\d+))")
+_FLOW = re.compile(
+    rb"[ \t]*(?:N[ \t]*\d+[ \t]*)?(O[ \t]*(?:\d+|<[^>]*>|#[^ \t]*|\[[^\]]*\]))[ \t]*([A-Za-z]+)", re.I
+)
+_TEXT = re.compile(rb"[ \t]*(?:N[ \t]*\d+[ \t]*)?(M[ \t]*11[78])(?!\d)", re.I)
+_TARGET = re.compile(rb"#[ \t]*(\d+|<[^>]*>)?")
+
+_FLOW_WORDS = {
+    **dict.fromkeys(b"SUB DO IF REPEAT".split(), "open"),
+    **dict.fromkeys(b"ENDSUB ENDWHILE ENDIF ENDREPEAT".split(), "close"),
+    **dict.fromkeys(b"ELSE ELSEIF BREAK CONTINUE RETURN".split(), "between"),
+    b"WHILE": "while",
+    b"CALL": "call",
+}
+"""Words behind an O-word; ``while`` opens a loop, or closes the one that ``do`` with its number has opened."""
+
+_JUMPS = frozenset(b"IF GOTO THEN ELSE ENDIF".split())
+HARMLESS = (b"EXCLUDE_OBJECT", b"SET_", b"TIMELAPSE", b"POPEN", b"PCLOS", b"DPRNT", b"BPRNT", b"MSG")
+"""Names of commands that move nothing."""
+
+
+def line(text: bytes, offset: int) -> Line:
+    """Takes one line apart, comments blanked; ``offset``: where it begins in the file."""
+    words: list[tuple[int, int, int, int, float, int]] = []
+    notes: list[Note] = []
+
+    def note(kind: str, said: bytes, at: int) -> None:
+        notes.append(Note(0, kind, said[:60].decode("latin-1"), offset + at))
+
+    place, deleted = 0, False
+    head = _HEAD.match(text)
+    if head is not None:
+        place = head.end()
+        deleted = head["deleted"] is not None
+        if head["tape"]:
+            note("tape", b"%", head.start("tape"))
+            return Line(words, notes, False)
+        if head["program"]:
+            note("program", head["digits"], head.start("program"))
+    said = _TEXT.match(text, place)
+    if said is not None:
+        words.append((offset + said.start(1), ord("M"), -1, offset + said.end(1), 117.0, How.INTEGER))
+        return Line(words, notes, deleted)
+    flow = _FLOW.match(text, place)
+    if flow is not None:
+        note(_FLOW_WORDS.get(flow[2].upper(), "unknown"), flow[1], flow.start(1))
+        return Line(words, notes, deleted)
+    while place < len(text):
+        found = _TOKEN.match(text, place)
+        if found is None:
+            note("unknown", text[place:].strip(), place)
+            break
+        place = found.end()
+        kind = found.lastgroup or ""
+        if kind == "number":
+            literal = found["number"]
+            start = offset + found.start("number")
+            stop = start + len(literal.rstrip())
+            value = float(literal.translate(None, b" \t"))
+            how = How.NUMBER if b"." in literal else How.INTEGER
+            if not math.isfinite(value):
+                value, how = math.nan, How.UNREAD
+            words.append(
+                (offset + found.start("letter"), ord(found["letter"].upper()), start, stop, value, how)
+            )
+        elif kind == "open":
+            start = found.start("sign")
+            place = _expression(text, found.start("open"))
+            at = offset + found.start("letter")
+            letter = ord(found["letter"].upper())
+            words.append((at, letter, offset + start, offset + place, math.nan, How.UNREAD))
+        elif kind == "assign":
+            target = _TARGET.match(text, found.start())
+            note("assign", (target and target[1]) or b"", found.start())
+            break
+        elif kind == "corner":
+            note("corner", text[found.start() :].strip(), found.start())
+        elif kind == "name":
+            word = found["name"].upper()
+            if word.startswith(HARMLESS):
+                break
+            if word in _JUMPS:
+                note("jump", text[found.start() :].strip(), found.start())
+            elif word in (b"WHILE", b"DO", b"END"):
+                note("close" if word == b"END" else "open", b"", found.start())
+            else:
+                note("unknown", text[found.start() :].strip(), found.start())
+            break
+    return Line(words, notes, deleted)
+
+
+def _expression(text: bytes, at: int) -> int:
+    """Where an expression that begins at ``at`` ends: a variable, or what its brackets hold."""
+    size = len(text)
+    while at < size and text[at] in b"#-+ \t":
+        at += 1
+    if at < size and text[at] in b"<":
+        stop = text.find(b">", at)
+        return size if stop < 0 else stop + 1
+    if at < size and text[at] in b"0123456789":
+        while at < size and text[at] in b"0123456789":
+            at += 1
+        return at
+    while at < size and text[at] != 0x5B:
+        if not (65 <= text[at] & 0xDF <= 90):
+            return at
+        at += 1
+    depth = 0
+    while at < size:
+        depth += (text[at] == 0x5B) - (text[at] == 0x5D)
+        at += 1
+        if depth == 0:
+            break
+    return at

@@ -1,0 +1,181 @@
+"""Which motions can not be corrected, and why; and whose end points those build on."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.arrays import Bools, Ints
+from postproc.dialects.gcode.blocks import AXES, FRAMED, SECOND, Blocks, What
+from postproc.dialects.gcode.control import Group, Move, Once
+from postproc.dialects.gcode.flow import Doubt
+from postproc.dialects.gcode.motions import Motions
+from postproc.dialects.gcode.positions import Course, Positions
+from postproc.dialects.gcode.refusals import Doubts, Refusals
+from postproc.dialects.gcode.words import How, key
+from postproc.document import Document
+from postproc.toolpath import Kind
+
+DOUBTS = {
+    Doubt.DELETED: "the block begins with a slash: it may not run",
+    Doubt.FLOW: "motion in a loop, branch or subprogram: it may run many times or never",
+    Doubt.PROGRAM: "motion of a second program in the file: it runs where that is called",
+    Doubt.ENDED: "motion behind the end of the program",
+}
+ARCS = {
+    2: "the arc has no centre in its plane: I J K of the plane or R",
+    3: "the radii of the arc at its begin and at its end differ",
+    4: "R of the arc is too short, or its end is its begin",
+    5: "the plane of the arc is not known",
+}
+NUMBERS = (*AXES, *(key(letter) for letter in "IJKR"))
+
+
+def judged(
+    given: Blocks,
+    moves: Motions,
+    where: Positions,
+    noted: dict[str, Bools],
+    base: Ints,
+    tool: Ints,
+    reasons: list[str],
+    reason: Ints,
+) -> Doubts:
+    """The motions that are refused.
+
+    base, tool (N,): numbers, -1 where unknown; reasons, reason: of ``course``.
+    """
+    rows = moves.block
+    doubts = Doubts(len(rows))
+    refuse, modal = doubts.refuse, given.modal
+    force = {group: values[rows] for group, values in modal.force.items()}
+    for doubt, message in DOUBTS.items():
+        code = "GCO025" if doubt == Doubt.ENDED else "GCO006"
+        refuse(modal.flow.doubt[rows] == doubt, code, message)
+    refuse(force[Group.MACRO] != 0, "GCO007", "every block calls a macro here (G66)")
+    refuse(modal.has(Once.HOME)[rows], "GCO004", "move to the reference point")
+    refuse(modal.has(Once.MACHINE)[rows], "GCO004", "move in machine coordinates")
+    refuse(modal.has(Once.PROBE)[rows], "GCO011", "probing: where it ends is not known")
+    _codes(given, rows, doubts)
+    refuse(given.twice[rows], "GCO017", "a word stands twice in the block")
+    refuse(modal.twice[rows], "GCO017", "two codes of the block say different motions")
+    for kind, code, message in (
+        ("unknown", "GCO001", "the block is not understood"),
+        ("corner", "GCO016", "a corner that the control rounds or chamfers"),
+        ("assign", "GCO005", "the block sets a variable"),
+    ):
+        if kind in noted:
+            refuse(noted[kind][rows], code, message)
+    refuse(given.has(*SECOND)[rows], "GCO016", "U, V, W: further axes, or steps of a lathe")
+    hows = np.stack([given.how(one)[rows] for one in NUMBERS], axis=1)
+    refuse(np.any(hows == How.UNREAD, axis=1), "GCO005", "a word is an expression or a variable, no number")
+    quiet = np.isin(moves.move, (-1, Move.NOTHING))
+    refuse(quiet, "GCO018", "axis words, but no motion code is in force")
+    refuse(moves.move == Move.CYCLE, "GCO008", "canned cycle: the motion is hidden in the block")
+    refuse(
+        np.isin(moves.move, (Move.SPLINE, Move.THREAD, Move.OTHER)),
+        "GCO016",
+        "a spline, a thread or another motion of the control",
+    )
+    refuse(force[Group.RADIUS] != 0, "GCO009", "tool radius compensation: the contour is not the tool's path")
+    for group, message in FRAMED.items():
+        refuse(force[group] != 0, "GCO010", f"the words are {message}")
+    refuse(base < 0, "GCO014", "the work offset is not known, or the program itself writes it")
+    refuse(tool < 0, "GCO015", "no tool is loaded, or its number is not known")
+    refuse(force[Group.UNITS] < 0, "GCO002", "mm or inch is not known")
+    _positions(given, moves, where, doubts, reasons, reason)
+    for wrong, message in ARCS.items():
+        refuse(moves.arcs.wrong == wrong, "GCO012", message)
+    refuse(moves.arcs.wrong == 1, "GCO012", "where the arc begins is not known")
+    refuse(
+        moves.stand.wrong == 1,
+        "GCO013",
+        "rotary axes away from 0 without a TCP mode: the machine's own geometry",
+    )
+    refuse(moves.stand.wrong == 2, "GCO013", "a rotary axis that the program names was not set yet")
+    return doubts
+
+
+def _codes(given: Blocks, rows: Ints, doubts: Doubts) -> None:
+    """Refuses motions in blocks with a code that is not known, by that code."""
+    word = given.modal.unknown[rows]
+    some = np.flatnonzero(word >= 0)
+    if len(some):
+        values, which = np.unique(
+            np.nan_to_num(given.text.words.value[word[some]], nan=-1.0), return_inverse=True
+        )
+        messages = [(named := code_name(value), f"{named} is not known here") for value in values.tolist()]
+        doubts.refuse_each(some, [("GCO001", message, name) for name, message in messages], which)
+
+
+def code_name(value: float) -> str:
+    return f"G{value:.6g}" if value >= 0 else "the G code"
+
+
+def _positions(
+    given: Blocks, moves: Motions, where: Positions, doubts: Doubts, reasons: list[str], reason: Ints
+) -> None:
+    """Refuses motions whose end is not known, by what left it unknown."""
+    rows = moves.block
+    lost = np.isnan(moves.end[:, :3])
+    frame = np.isnan(moves.place) & ~lost
+    some = np.flatnonzero(lost.any(axis=1) & (doubts.why < 0))
+    if len(some):
+        # The latest of the causes: before it, the coordinate may have been known.
+        causes = np.where(lost[some], where.source[rows[some], :3], -1).max(axis=1)
+        missing = (lost[some] * np.array([4, 2, 1])).sum(axis=1)
+        air = moves.kind[some] == Kind.PTP
+        keys = np.stack([causes, missing, air], axis=1)
+        kinds, which = np.unique(keys, axis=0, return_inverse=True)
+        messages = []
+        for cause, bits, rapid in kinds.tolist():
+            names = ", ".join(name for name, bit in (("X", 4), ("Y", 2), ("Z", 1)) if bits & bit)
+            why = (
+                "was never set before"
+                if cause < 0
+                else f"not known since line {given.text.blocks.line[cause]}"
+            )
+            what = "" if cause < 0 or reason[cause] < 0 else reasons[reason[cause]]
+            if cause >= 0 and not what:
+                what = What.ORIGIN
+            message = f"{names}: {why}{f' ({what})' if what else ''}"
+            messages.append(("GCO003" if rapid else "GCO002", message, what))
+        doubts.refuse_each(some, messages, which.reshape(-1))
+    doubts.refuse(frame.any(axis=1), "GCO019", "the origin was set where the position was not known (G92)")
+
+
+def pinned(
+    document: Document, given: Blocks, moves: Motions, way: Course, doubts: Doubts, noted: dict[str, Bools]
+) -> Refusals:
+    """Motions whose end a refused motion, an origin or other code builds on."""
+    rows, n = moves.block, len(moves.block)
+    pins = Doubts(n)
+    modal = given.modal
+    partial = ~np.all(way.sets[rows, :3], axis=1)
+    reaching = modal.has(Once.HOME, Once.MACHINE)[rows]
+    building = np.flatnonzero((doubts.why >= 0) & partial & ~reaching)
+    building = building[building > 0]
+    pins.refuse(
+        _mask(n, building[doubts.why[building - 1] < 0] - 1),
+        "GCO002",
+        "the motion behind it builds on this end point and is not corrected",
+    )
+    shifting = modal.has(Once.SHIFT) & given.has(*AXES)
+    for at, message in (
+        (np.flatnonzero(shifting), "G92 sets the origin at this end point"),
+        (np.flatnonzero(modal.flow.forget) - 1, "code that was not read may build on this end point"),
+        (
+            np.flatnonzero(noted.get("unknown", np.zeros(len(given), np.bool_))),
+            "a block that is not understood may build on it",
+        ),
+    ):
+        before = np.searchsorted(rows, at, side="right") - 1
+        before = before[before >= 0]
+        pins.refuse(_mask(n, before) & (doubts.why < 0), "GCO002", message)
+    blocks = given.text.blocks
+    return pins.done(document, blocks.line[rows], blocks.start[rows], blocks.start[rows])
+
+
+def _mask(n: int, rows: Ints) -> Bools:
+    mask = np.zeros(n, np.bool_)
+    mask[rows] = True
+    return mask

@@ -1,0 +1,251 @@
+"""A G-code program as a Toolpath: what the blocks ask for, where they end, and why some are not corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.dialects.dialect import PLAIN, Program, Settings
+from postproc.dialects.gcode import offsets
+from postproc.dialects.gcode.arcs import Arcs, arcs
+from postproc.dialects.gcode.blocks import Blocks, blocks, course
+from postproc.dialects.gcode.comments import remarks
+from postproc.dialects.gcode.control import Control, Event, Frame, Group, Move, Once
+from postproc.dialects.gcode.feeds import feeds
+from postproc.dialects.gcode.judging import judged, pinned
+from postproc.dialects.gcode.lexing import lex
+from postproc.dialects.gcode.modal import modal
+from postproc.dialects.gcode.motions import Motions
+from postproc.dialects.gcode.numbered import references, spoiled, tools
+from postproc.dialects.gcode.places import COLUMNS, Places
+from postproc.dialects.gcode.positions import Positions, positions
+from postproc.dialects.gcode.rotary import stand
+from postproc.dialects.gcode.telling import told
+from postproc.dialects.gcode.words import How, Note, Text, key
+from postproc.document import Document
+from postproc.geometry import Poses, rotation_from_abc
+from postproc.toolpath import Kind, Toolpath
+
+
+def read(documents: tuple[Document, ...], control: Control, settings: Settings = PLAIN) -> Program:
+    """Read a program; never raises on its content."""
+    document = documents[0]
+    text = lex(document.raw, control)
+    given = blocks(text, modal(text, control), control, control.increments and settings.integer_words == "um")
+    noted = _noted(text)
+    offset = spoiled(given)
+    way, reasons, reason = course(given, noted, offset.at)
+    where = positions(way, offsets.start(), _events(given), _change(given))
+    tool, named = tools(given)
+
+    rows = np.flatnonzero(given.motion)
+    base = np.where(offset.bad, -1, given.modal.force[Group.OFFSET])[rows]
+    turned = (
+        np.full((3, 3), np.nan) if settings.orientation is None else rotation_from_abc(settings.orientation)
+    )
+    moves = _motions(given, where, rows, turned)
+    doubts = judged(given, moves, where, noted, base, tool[rows], reasons, reason)
+    start = text.blocks.start[rows]
+    refused = doubts.done(document, text.blocks.line[rows], start, _first(text)[rows])
+    frame_of_base, frame_of_tool, frames = references(base, tool[rows], text.blocks.line[rows])
+    said = remarks(document, text, text.blocks.line[rows])
+    place = moves.place.copy()
+    place[given.modal.flow.doubt[rows] != 0] = np.nan
+    path = Toolpath(
+        kind=moves.kind,
+        position=place,
+        rotation=moves.stand.rotation,
+        axes=np.full((len(rows), 6), np.nan),
+        feed=np.where(moves.kind == Kind.PTP, np.nan, feeds(given, rows, moves.length)),
+        base=frame_of_base,
+        tool=frame_of_tool,
+        status=np.full(len(rows), -1),
+        turn=np.full(len(rows), -1),
+        line=text.blocks.line[rows],
+        frames=frames,
+        refused=refused,
+        pinned=pinned(document, given, moves, way, doubts, noted),
+        annotations=said.annotations,
+        centre=moves.centre,
+        normal=moves.normal,
+        sweep=moves.arcs.sweep,
+        blend=_blend(given, rows),
+        whole=_whole(given, rows),
+        comments=said.comments,
+        oriented=moves.stand.oriented,
+    )
+    findings = [*refused.told(), *told(document, given, noted, rows, named, settings)]
+    return Program(
+        control.name,
+        documents,
+        path,
+        _places(given, where, moves, turned),
+        tuple(sorted(findings, key=lambda finding: finding.line)),
+        said.marker,
+        said.marker_at,
+        (),
+    )
+
+
+def _noted(text: Text) -> dict[str, Bools]:
+    """Kind of note -> (B,) blocks that have one."""
+    found: dict[str, Bools] = {}
+    for note in text.notes:
+        found.setdefault(note.kind, np.zeros(len(text.blocks), np.bool_))[note.block] = True
+    return found
+
+
+def _first(text: Text) -> Ints:
+    """(B,) offset of the first word of every block, or of the block."""
+    first = text.blocks.start.copy()
+    first[text.words.block[::-1]] = text.words.at[::-1]
+    return first
+
+
+def _events(given: Blocks) -> Ints:
+    """Blocks that change the frame: G92 and G52 only with coordinates."""
+    mentioned = given.has(*(key(letter) for letter in "XYZABC"))
+    always = given.modal.has(Once.UNSHIFT, Once.SUSPEND, Once.RESTORE, Once.FRAME)
+    return np.flatnonzero(
+        (always | (given.modal.has(Once.SHIFT, Once.LOCAL) & mentioned)) & given.modal.flow.tape
+    )
+
+
+def _change(given: Blocks) -> Callable[[int, Frame, Floats], Frame]:
+    """The frame behind a block that changes it; unknown where the block may not run."""
+    words, change = given.text.words, given.control.frame
+    notes: dict[int, list[Note]] = {}
+    for note in given.text.notes:
+        notes.setdefault(note.block, []).append(note)
+    first = np.searchsorted(words.block, np.arange(len(given) + 1))
+
+    def changed(block: int, frame: Frame, position: Floats) -> Frame:
+        rows = slice(int(first[block]), int(first[block + 1]))
+        keys, values, hows = words.key[rows].tolist(), words.value[rows].tolist(), words.how[rows].tolist()
+        small = given.length_of_integer[block] / given.length[block]
+        values = [
+            value * small if how == How.INTEGER else value for value, how in zip(values, hows, strict=True)
+        ]
+        codes = tuple(
+            value for one, value in zip(keys, words.value[rows].tolist(), strict=True) if one == key("G")
+        )
+        event = Event(
+            dict(zip(keys, values, strict=True)),
+            int(given.modal.once[block]),
+            tuple(notes.get(block, ())),
+            codes,
+            float(given.length[block]),
+            frame,
+            position,
+        )
+        after = change(event)
+        if given.modal.flow.doubt[block]:
+            same = (after.shift == frame.shift) | (np.isnan(after.shift) & np.isnan(frame.shift))
+            return Frame(after.turn, np.where(same, frame.shift, np.nan), after.memory)
+        return after
+
+    return changed
+
+
+def _motions(given: Blocks, where: Positions, rows: Ints, turned: Floats) -> Motions:
+    begin, end = where.begin[rows], where.end[rows]
+    force, move = given.modal.force, given.move[rows]
+    plane = force[Group.PLANE][rows]
+    bent = np.isin(move, (Move.CLOCKWISE, Move.COUNTER)) & ~given.machine[rows]
+    ways = _arcs(given, rows, begin, end, plane, bent)
+    kind = KINDS[move]
+    kind[given.modal.has(Once.HOME)[rows]] = Kind.PTP
+    kind[given.modal.has(Once.PROBE)[rows]] = Kind.LIN
+    kind[given.modal.unknown[rows] >= 0] = Kind.OTHER
+    used = given.text.words.key
+    names = np.array([bool((used == key(letter)).any()) for letter in "ABC"])
+    tcp = force[Group.TCP][rows] == 1
+    pose = stand(begin[:, 3:], end[:, 3:], names, tcp, kind == Kind.PTP, turned)
+    return Motions.of(rows, move, kind, plane, begin, end, where, ways, pose)
+
+
+def _arcs(given: Blocks, rows: Ints, begin: Floats, end: Floats, plane: Ints, bent: Bools) -> Arcs:
+    n = len(rows)
+    result = Arcs(np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan), np.zeros(n, np.int64))
+    some = np.flatnonzero(bent)
+    if not len(some):
+        return result
+    at = rows[some]
+    hows = np.stack([given.how(key(letter))[at] for letter in "IJK"], axis=1)
+    absolute = np.where(hows == How.ABSOLUTE, True, (given.modal.force[Group.ARCS][at] == 1)[:, None])
+    absolute &= hows != How.INCREMENTAL
+    word, usual = given.control.turns
+    turns = np.zeros(len(at))
+    if word in given.columns:
+        turns = np.nan_to_num(given.number(word)[at] - usual)
+    found = arcs(
+        begin[some, :3],
+        end[some, :3],
+        plane[some],
+        given.move[at] == Move.COUNTER,
+        np.stack([given.lengths(key(letter))[at] for letter in "IJK"], axis=1),
+        absolute,
+        given.lengths(key("R"))[at],
+        turns,
+    )
+    for name in ("centre", "normal", "sweep", "wrong"):
+        getattr(result, name)[some] = getattr(found, name)
+    return result
+
+
+def _blend(given: Blocks, rows: Ints) -> Floats:
+    """(N,) [m]: 0 in exact modes, what P of G64 allows, NaN where nothing bounds it."""
+    path = given.modal.force[Group.PATH]
+    code = np.isin(given.text.words.value, (64.0,)) & (given.text.words.key == key("G"))
+    says = np.zeros(len(given), np.bool_)
+    says[given.text.words.block[code]] = True
+    at = np.maximum.accumulate(np.where(says, np.arange(len(given)), -1))
+    allowed = np.where(at >= 0, given.lengths(key("P"))[np.maximum(at, 0)], np.nan)
+    return np.where(path == 0, 0.0, np.where(path == 1, allowed, np.nan))[rows]
+
+
+def _whole(given: Blocks, rows: Ints) -> dict[int, str]:
+    """Motions before which nothing may be inserted."""
+    extruding = np.flatnonzero(given.of(key("E"))[rows] >= 0)
+    return dict.fromkeys(extruding.tolist(), "E would have to be divided as well")
+
+
+def _places(given: Blocks, where: Positions, moves: Motions, turned: Floats) -> Places:
+    rows, force = moves.block, given.modal.force
+    columns = (*COLUMNS, *given.control.columns)
+    return Places(
+        text=given.text,
+        block=rows,
+        columns=columns,
+        word=given.word[rows][:, [given.columns.index(one) for one in columns]],
+        verb=given.modal.verb[rows],
+        insert=given.text.blocks.code[rows],
+        move=moves.move,
+        plane=moves.plane,
+        incremental=force[Group.DISTANCE][rows] == 1,
+        arc_absolute=force[Group.ARCS][rows] == 1,
+        scale=given.length[rows],
+        increment=given.length_of_integer[rows],
+        frame=where.frame[rows],
+        frames=Poses(
+            np.array([frame.turn for frame in where.frames]),
+            np.array([frame.shift[:3] for frame in where.frames]),
+        ),
+        begin=moves.begin[:, :3],
+        rotary=moves.end[:, 3:],
+        turned=turned,
+        feed_mode=force[Group.FEED][rows],
+    )
+
+
+KINDS = np.full(len(Move) + 1, Kind.OTHER)
+KINDS[[Move.RAPID, Move.LINE, Move.CLOCKWISE, Move.COUNTER, Move.THROUGH]] = (
+    Kind.PTP,
+    Kind.LIN,
+    Kind.CIRC,
+    Kind.CIRC,
+    Kind.CIRC,
+)
+"""By Move; the last entry is that of UNKNOWN."""
