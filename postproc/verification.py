@@ -155,11 +155,16 @@ def simulate(original: Task, run: Task, match: Ints, step: float = STEP) -> Simu
     number = np.arange(len(motion)) - np.repeat(np.cumsum(count) - count, count)
     share = number / (np.repeat(count, count) - 1)
     row = owner[motion]
+    # The motions that stand for one of the original share its way, about evenly.
+    begin = np.append(0, match[:-1] + 1)
+    guess = (motion - begin[row] + share) / (match[row] - begin[row] + 1)
 
     error, nearest, force = np.empty((len(motion), 3)), np.empty(len(motion)), np.empty(len(motion))
     for a in range(0, len(motion), CHUNK):
         part = slice(a, a + CHUNK)
-        error[part], nearest[part], force[part] = _beside(original, run, motion[part], row[part], share[part])
+        error[part], nearest[part], force[part] = _beside(
+            original, run, motion[part], row[part], share[part], guess[part]
+        )
     at_end = number + 1 == np.repeat(count, count)
     is_link = _links(original, run, rows, owner, nearest[at_end])
     seen = np.isfinite(error[:, 0])
@@ -190,13 +195,13 @@ def _owners(match: Ints, count: int) -> Ints:
 
 
 def _beside(
-    original: Task, run: Task, motion: Ints, row: Ints, share: Floats
+    original: Task, run: Task, motion: Ints, row: Ints, share: Floats, guess: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """The tool (S, 3) [m] beside the wanted path, the share (S,) of the original's motion ``row`` (S,) where it is
     nearest, and the force (S,) [N] there."""
     command = _sampled(run, motion, share)
     length = np.maximum(original.ways.length[row], 1e-9)
-    at = np.clip(_projected(original, row, command.position), 0.0, 1.0)
+    at = np.clip(_projected(original, row, command.position, guess), 0.0, 1.0)
     error = np.full((len(row), 3), np.nan)
     for step in range(STEPS):
         wrench = original.force.along(row, at)
@@ -233,8 +238,9 @@ def _sampled(task: Task, rows: Ints, share: Floats) -> Poses:
     return Poses(rotation, position)
 
 
-def _projected(task: Task, rows: Ints, place: Floats) -> Floats:
-    """(S,) the share of the ways of ``rows`` that is nearest to ``place`` (S, 3), not bounded."""
+def _projected(task: Task, rows: Ints, place: Floats, guess: Floats) -> Floats:
+    """(S,) the share of the ways of ``rows`` that is nearest to ``place`` (S, 3), not bounded; of the turns of an arc
+    the one nearest to ``guess`` (S,)."""
     ways = task.ways
     begin = ways.begin.position[rows]
     step = ways.end.position[rows] - begin
@@ -248,9 +254,7 @@ def _projected(task: Task, rows: Ints, place: Floats) -> Floats:
         np.sum(np.cross(out, here) * normal, axis=1),
         np.sum(out * (here - np.sum(here * normal, axis=1, keepdims=True) * normal), axis=1),
     )
-    # An angle just before the begin is that, not a full turn behind it.
-    angle = np.mod(angle, 2 * np.pi)
-    angle = np.where(angle > 0.5 * sweep + np.pi, angle - 2 * np.pi, angle)
+    angle += 2 * np.pi * np.round((guess[bent] * sweep - angle) / (2 * np.pi))
     share[bent] = angle / sweep
     return share
 
