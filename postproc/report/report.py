@@ -74,6 +74,7 @@ class Report:
     mode: str
     force_source: str
     force_max_n: float
+    force_peak_n: float
     before: Spread
     after: Spread | None
     between: Spread | None
@@ -105,7 +106,11 @@ class Report:
             "iterations": self.iterations,
             "gain": self.gain,
             "correct": self.mode,
-            "force": {"source": self.force_source, "max_n": round(self.force_max_n, 3)},
+            "force": {
+                "source": self.force_source,
+                "max_n": round(self.force_max_n, 3),
+                "peak_n": _finite(round(self.force_peak_n, 3)),
+            },
             "error_before_mm": {**self.before.as_mm(), "ci95": _finite(self.doubt.before / MM)},
             "error_after_mm": {**self.after.as_mm(), "ci95": _finite(self.doubt.after / MM)}
             if self.after

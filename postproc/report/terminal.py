@@ -46,7 +46,8 @@ def _rows(report: Report) -> Iterable[tuple[str, str]]:
         + f" {report.cutting} cutting in {cuts}",
     )
     yield "robot", escape(report.robot)
-    yield "force", escape(f"{report.force_source}, at most {report.force_max_n:.0f} N")
+    peak = "" if math.isnan(report.force_peak_n) else f", peaks up to {report.force_peak_n:.0f} N"
+    yield "force", escape(f"{report.force_source}, at most {report.force_max_n:.0f} N{peak}")
     yield "errors", "predicted, at the end points of cutting motions"
     before = _spread(report.before, _interval(report.doubt, report.doubt.before))
     yield "error before", f"{before}, orientation {_deg(report.angle_before_deg)}"

@@ -286,6 +286,7 @@ def _report(
         mode=ready.cell.correct,
         force_source=ready.wrenches.source,
         force_max_n=ready.wrenches.max_force,
+        force_peak_n=ready.wrenches.peak_force,
         before=Spread.of(result.before[scope]),
         after=Spread.of(result.after[scope]) if corrected else None,
         between=Spread.of(written.between) if written else None,
