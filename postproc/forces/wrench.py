@@ -69,6 +69,12 @@ class Wrenches:
         forces = np.concatenate([self.values[:, :3], self.start[:, :3]])
         return float(np.sqrt(np.max(np.einsum("ni,ni->n", forces, forces), initial=0.0)))
 
+    @property
+    def peak_force(self) -> float:
+        """The largest force [N] on the way of any motion, of a tooth or of a reading; NaN where none is known."""
+        peak = np.full(1, np.nan) if self.peak is None else self.peak
+        return float(np.nanmax(peak)) if np.any(np.isfinite(peak)) else np.nan
+
     def along(self, rows: Ints, fraction: Floats) -> Floats:
         """(K, 6) the wrench at the shares ``fraction`` (K,), 0 to 1, of the way of the motions ``rows`` (K,).
 
