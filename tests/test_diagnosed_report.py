@@ -18,9 +18,10 @@ from scipy.stats import chi2
 
 from postproc.diagnosis.candidates import EVERY
 from postproc.diagnosis.diagnose import diagnose
+from postproc.diagnosis.foils import foils
 from postproc.diagnosis.selection import CHANCE, selected
 from postproc.diagnosis.sizes import SURELY, moved, smallest
-from postproc.diagnosis.verdict import VERDICTS, Evidence, Named
+from postproc.diagnosis.verdict import MARGIN, OTHER_COURSE, VERDICTS, Evidence, Named
 from postproc.effects import EFFECTS
 from postproc.findings import Finding
 from postproc.geometry import Poses
@@ -607,6 +608,31 @@ def test_what_is_said_of_the_unknown(spring, stale):
     assert headline(unclear) == "unknown: not clear whether something is missing"
     part = lacking(spring, "partly_named", named=spring.verdict.named)
     assert f"That is not all: {millimetres(part.rms['after'])} RMS are left" in paragraph(part)
+
+
+def test_what_the_readings_follow_instead(spring):
+    found = spring.diagnosis.search
+    (named,) = spring.verdict.named
+    (foil,) = (rival for rival in found.rivals if rival.foil)
+    model, q = found.base.model, found.base.campaign.readings.q
+
+    def text(effect, joint, worse):
+        mine = replace(named.candidate, effect=effect, joint=joint)
+        course = foils(model, q, mine)[0]
+        rival = replace(foil, of=mine.key, candidate=course, worse=worse, more=0.0, fitted=True)
+        result = lacking(spring, rejected=((mine, OTHER_COURSE),))
+        search = replace(result.diagnosis.search, rivals=(rival,))
+        return paragraph(replace(result, diagnosis=replace(result.diagnosis, search=search)))
+
+    assert (
+        "is not named: the readings follow another course than that of this effect; a stiffness that varies freely"
+        " with the angle of A2, no effect of the library, fits better by 130 in -2 ln(likelihood)."
+    ) in text(named.candidate.effect, "A2", -130.0)
+    assert "fits better" not in text(named.candidate.effect, "A2", -0.9 * MARGIN)
+    wave = EFFECTS["transmission_error"](model.robot.joints)
+    assert "; an error that comes back 0.5 times a turn of A4, no effect" in text(wave, "A4", -20.0)
+    growth = EFFECTS["thermal_growth"](model.robot.joints)
+    assert "; a drift of the whole arm, no effect" in text(growth, "A3", -20.0)
 
 
 def test_what_would_show_what_was_not_tested(stale):

@@ -34,7 +34,9 @@ ORDERS = (0.5, 1.5, 2.5, 3.0, 4.0)
 
 
 class Foil(Effect):
-    """A course that has no name."""
+    """A course that has no name; ``about``: in words, up to the joint."""
+
+    about: str
 
 
 class VaryingCompliance(Foil, ComplianceLaw):
@@ -43,6 +45,7 @@ class VaryingCompliance(Foil, ComplianceLaw):
 
     name = "joint_compliance"
     family = "elastic"
+    about = "a stiffness that varies freely with the angle of"
 
     def __init__(self, joints: Sequence[Joint], joint: int = 0, middle: float = 0.0) -> None:
         self.joint, self.middle = joint, middle
@@ -69,6 +72,10 @@ class VaryingCompliance(Foil, ComplianceLaw):
 class OtherWave(Foil, TransmissionError):
     """The error of a gear over its angle, of an order that is no harmonic of the library."""
 
+    def __init__(self, joints: Sequence[Joint], harmonics: Sequence[float] = (1.0,)) -> None:
+        super().__init__(joints, harmonics)
+        self.about = f"an error that comes back {' and '.join(f'{h:g}' for h in harmonics)} times a turn of"
+
 
 class DriftingBase(Foil, Offset):
     """Robot and tracker that move apart, by x, y, z [m/K, m/s] times the temperature over that of the beginning or the
@@ -76,6 +83,7 @@ class DriftingBase(Foil, Offset):
 
     name = "base_offset"
     family = "geometric"
+    about = "a drift of the whole arm"
 
     def __init__(self, joints: Sequence[Joint], variable: str = "time") -> None:
         self.variable = variable

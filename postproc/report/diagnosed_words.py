@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from postproc.diagnosis.candidates import EVERY
+from postproc.diagnosis.candidates import EVERY, Candidate
+from postproc.diagnosis.foils import Foil
 from postproc.diagnosis.verdict import MARGIN, Named
 from postproc.effects import EFFECTS, ComplianceLaw
 from postproc.identification.fit import Estimate, Fit
@@ -326,7 +327,19 @@ def _more(result: Diagnosed, begin: str, fit: str) -> Iterator[str]:
 
 def _rejected(result: Diagnosed) -> Iterator[str]:
     for candidate, why in result.verdict.rejected:
-        yield f"{candidate.label} would explain a part, but is not named: {why}."
+        yield f"{candidate.label} would explain a part, but is not named: {why}{_course(result, candidate)}."
+
+
+def _course(result: Diagnosed, candidate: Candidate) -> str:
+    """Which course explains clearly more than an effect; "" where none does."""
+    for rival in result.diagnosis.search.rivals:
+        course = rival.candidate.effect
+        if rival.of == candidate.key and isinstance(course, Foil) and rival.fitted and rival.margin < -MARGIN:
+            what = f"{course.about} {rival.candidate.joint}".strip()
+            return (
+                f"; {what}, no effect of the library, fits better by {-rival.margin:.0f} in -2 ln(likelihood)"
+            )
+    return ""
 
 
 def _moved_too(result: Diagnosed) -> Iterator[str]:
