@@ -1,0 +1,241 @@
+"""What must hold for any bytes: read without a crash and in time, nothing lost, and moved as planned."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats
+from postproc.dialects.dialect import PLAIN, Dialect, Program, Settings, Writing
+from postproc.document import Document, apply, undone
+from postproc.geometry import rotation_from_vector, vector_from_rotation
+from postproc.toolpath import Kind, Plan, Role, Toolpath
+from postproc.units import DEG, MM
+
+WRITING = Writing(mm=3, deg=3)
+HALF_MM = 0.50001e-3
+"""Half of a written step [mm], and what doubles are off by."""
+ANGLES = 3 * 0.50001e-3
+"""[deg] half a step in each of three angles."""
+
+BASE_S, PER_MB_S = 1.0, 2.0
+"""Seconds that reading may take: a constant, and for each 10^6 bytes."""
+
+
+class Broken(Exception):
+    """Something that must hold does not."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Seconds of reading, how many motions there were and how many of them moved."""
+
+    seconds: float
+    motions: int
+    moved: int
+
+
+def examined(
+    dialect: Dialect,
+    documents: tuple[Document, ...],
+    random: np.random.Generator,
+    settings: Settings = PLAIN,
+) -> Seen:
+    """Reads, writes unchanged, moves at random and reads back.  Raises Broken, or what the code raises."""
+    begin = time.process_time()
+    program = dialect.read(documents, settings)
+    seconds = time.process_time() - begin
+    size = sum(len(document.raw) for document in documents)
+    if seconds > BASE_S + PER_MB_S * size / 1e6:
+        raise Broken(f"reading {size} bytes took {seconds:.1f} s")
+    path = program.toolpath
+    for finding in program.findings:
+        if finding.line > len(documents[0].line_starts) and len(documents) == 1:
+            raise Broken(f"a finding in line {finding.line} of {len(documents[0].line_starts)}")
+    for _ in path.dump():
+        pass
+    same = dialect.moved(program, Plan.of(path), WRITING)
+    if len(same.edits) or same.held:
+        raise Broken(
+            f"the plan that leaves all as it is gives {len(same.edits)} edits, {len(same.held)} held"
+        )
+    moved = 0
+    if len(path):
+        moved = _moved(dialect, program, random, settings)
+    return Seen(seconds, len(path), moved)
+
+
+def _moved(dialect: Dialect, program: Program, random: np.random.Generator, settings: Settings) -> int:
+    path = program.toolpath
+    n = len(path)
+    share = random.choice([0.1, 0.6, 1.0])
+    free = movable(path) & (random.random(n) < share)
+    shift = random.normal(0, 0.2 * MM, (n, 3))
+    turn = random.normal(0, 1e-3, (n, 3)) * (random.random() < 0.7)
+    divided = np.flatnonzero(dividable(path) & (random.random(n) < random.choice([0.0, 0.0, 0.2])))
+    writing = replace(WRITING, own_points=str(random.choice(["inline", "inline", "dat", "refuse"])))
+    for _ in range(20):
+        plan = planned(path, free, shift, turn, divided)
+        found = dialect.moved(program, plan, writing)
+        if not found.held:
+            break
+        if len(found.edits):
+            raise Broken("edits besides rows that are held")
+        rows = list(found.held)
+        if not free[rows].any() and not np.isin(divided, rows).any() and not _near(rows, free, n):
+            raise Broken(f"rows {rows[:5]} are held that do not move")
+        free[rows] = False
+        free[[row - 1 for row in rows if row]] = False
+        divided = divided[~np.isin(divided, rows)]
+    else:
+        raise Broken("rows are held again and again")
+    written = []
+    for index, document in enumerate(program.documents):
+        edits = [edit for edit in found.edits if edit.span.file == index]
+        raw = apply(document, edits)
+        if not undone(raw, document.raw, edits):
+            raise Broken("a byte changed that no edit covers")
+        written.append(Document(document.path, raw))
+    _compare(path, plan, dialect.read(tuple(written), settings).toolpath)
+    return int(free.sum())
+
+
+def _near(rows: list[int], free: Bools, n: int) -> bool:
+    """Whether what these rows build on moves."""
+    return any(free[max(row - 2, 0) : row + 1].any() for row in rows)
+
+
+def movable(path: Toolpath) -> Bools:
+    """(N,) the motions that may be planned elsewhere."""
+    free = path.known & (path.kind != Kind.AXIS) & (path.anchor < 0)
+    free[[*path.refused, *path.pinned]] = False
+    return free
+
+
+def dividable(path: Toolpath) -> Bools:
+    """(N,) the straight motions, and plane arcs, that another one may be inserted before."""
+    free = path.known & ((path.kind == Kind.LIN) | (path.kind == Kind.CIRC)) & (path.anchor < 0)
+    free[[*path.refused, *path.whole]] = False
+    arcs = np.flatnonzero(path.kind == Kind.CIRC)
+    before = np.maximum(arcs - 1, 0)
+    advance = np.sum((path.position[arcs] - path.position[before]) * path.normal[arcs], axis=1)
+    free[arcs] &= (np.abs(advance) < 1e-9) & (path.base[arcs] == path.base[before]) & (arcs > 0)
+    return free
+
+
+def planned(path: Toolpath, free: Bools, shift: Floats, turn: Floats, divided: np.ndarray) -> Plan:
+    """A plan in which ``free`` rows are shifted (N, 3) and turned, arcs together with what they begin at, and a
+    piece or a link stands before each of ``divided``; of an arc it is its first half."""
+    n = len(path)
+    shift = _joined(path, np.where(free[:, None], shift, 0.0))
+    turns = free & path.oriented & np.isnan(path.free_axis[:, 0])
+    turned = rotation_from_vector(np.where(turns[:, None], turn, 0.0))
+    rotation = np.where(turns[:, None, None], turned @ path.rotation, path.rotation)
+    moves = (shift != 0).any(axis=1)[:, None]
+    position = np.where(moves, path.position + shift, path.position)
+    centre = np.where(moves, path.centre + shift, path.centre)
+    source = np.sort(np.concatenate([np.arange(n), divided])).astype(np.int64)
+    own = np.append(source[1:] != source[:-1], True) if len(source) else np.empty(0, bool)
+    arcs = path.kind[source] == Kind.CIRC
+    sweep = path.sweep[source] * np.where(np.isin(source, divided), 0.5, 1.0)
+    role = np.where(own, Role.OWN, np.where(arcs | (source % 3 > 0), Role.PIECE, Role.LINK))
+    half = rotation_from_vector(np.nan_to_num(-sweep[:, None] * path.normal[source]))
+    halves = centre[source] + (half @ (position[source] - centre[source])[..., None])[..., 0]
+    aside = position[source] + np.array([1.0, -2.0, 3.0]) * MM
+    there = np.where(own[:, None], position[source], np.where(arcs[:, None], halves, aside))
+    return Plan(source, role, there, rotation[source], centre[source], path.normal[source], sweep)
+
+
+def _joined(path: Toolpath, shift: Floats) -> Floats:
+    """Shifts (N, 3) with which arcs stay as they are: each moves with its begin, or neither moves."""
+    arcs = np.flatnonzero(path.kind == Kind.CIRC)
+    for row in arcs.tolist():
+        shift[row] = shift[row - 1] if row and shift[row].any() else 0.0
+    stiff = arcs[(arcs > 0)]
+    apart = path.base[stiff] != path.base[stiff - 1]
+    while True:
+        apart = apart | (shift[stiff] != shift[stiff - 1]).any(axis=1)
+        wrong = stiff[apart]
+        if not (shift[wrong].any() or shift[wrong - 1].any()):
+            return shift
+        shift[wrong] = shift[wrong - 1] = 0.0
+
+
+def _compare(path: Toolpath, plan: Plan, back: Toolpath) -> None:
+    """What was read back is the plan, motion by motion."""
+    source = plan.source
+    if len(back) != len(plan):
+        raise Broken(f"{len(plan)} motions became {len(back)}")
+    own = plan.own
+    codes = {row: finding.code for row, finding in path.refused.items()}
+    again = {int(source[m]): finding.code for m, finding in back.refused.items()}
+    if codes != again:
+        differ = set(codes.items()) ^ set(again.items())
+        raise Broken(f"other refusals: {sorted(differ)[:3]}")
+    for name in ("kind", "base", "tool", "axes", "feed", "status", "turn"):
+        before, after = getattr(path, name)[source], getattr(back, name)
+        if name in ("base", "tool"):
+            before, after = _frames(path, before), _frames(back, after)
+        same = (before == after) | ((before != before) & (after != after))
+        same = same.all(axis=1) if same.ndim > 1 else same
+        if not same.all():
+            m = int(np.argmin(same))
+            raise Broken(f"the {name} of row {source[m]} (line {path.line[source[m]]}) changed")
+    known = np.isfinite(plan.position)
+    if not np.array_equal(known, np.isfinite(back.position)):
+        raise Broken("targets were lost or appeared")
+    off = np.abs(np.nan_to_num(back.position - plan.position)).max(axis=1) / MM
+    _within(off, HALF_MM, "mm", path, plan)
+    said = np.isfinite(plan.rotation[:, 0, 0])
+    if not np.array_equal(said, np.isfinite(back.rotation[:, 0, 0])):
+        raise Broken("orientations were lost or appeared")
+    turned = np.swapaxes(plan.rotation[said], -1, -2) @ back.rotation[said]
+    angle = np.zeros(len(plan))
+    angle[said] = np.linalg.norm(vector_from_rotation(turned), axis=1) / DEG
+    _within(angle, ANGLES, "deg", path, plan)
+    _compare_ways(path, plan, back)
+    assert own.sum() == len(path)
+
+
+def _compare_ways(path: Toolpath, plan: Plan, back: Toolpath) -> None:
+    """Arcs pass through the same places: half way, within what rounding their three points does."""
+    arcs = np.isfinite(plan.sweep)
+    if not np.array_equal(arcs, np.isfinite(back.sweep)):
+        raise Broken("the way of an arc was lost or appeared")
+    if not arcs.any():
+        return
+    middles = []
+    for some, end in ((plan, plan.position), (back, back.position)):
+        turn = rotation_from_vector(-0.5 * some.sweep[arcs, None] * some.normal[arcs])
+        radius = end[arcs] - some.centre[arcs]
+        middles.append(some.centre[arcs] + (turn @ radius[..., None])[..., 0])
+    off = np.zeros(len(plan))
+    off[arcs] = np.abs(middles[0] - middles[1]).max(axis=1) / MM
+    _within(off, 4 * HALF_MM, "mm half way of an arc", path, plan)
+
+
+def _within(off: Floats, limit: float, unit: str, path: Toolpath, plan: Plan) -> None:
+    if len(off) and not off.max() <= limit:
+        m = int(np.argmax(off))
+        row = int(plan.source[m])
+        what = Role(int(plan.role[m])).name.lower()
+        raise Broken(
+            f"row {row} ({what}, line {path.line[row]}) is {off[m]:.6f} {unit} from where it was meant"
+        )
+
+
+def _frames(path: Toolpath, index: np.ndarray) -> np.ndarray:
+    """Numbers of frames that are the same wherever they stand in ``frames``: poses, not places."""
+    known: list[tuple[object, ...]] = []
+    for frame in path.frames:
+        pose = (
+            ()
+            if frame.pose is None
+            else tuple(np.round([*frame.pose.position, *frame.pose.rotation.ravel()], 9))
+        )
+        known.append((frame.number, pose))
+    names = {key: float(abs(hash(key)) % 2**40) for key in Counter(known)}
+    return np.array([-1.0 if i < 0 else names[known[i]] for i in index.tolist()])
