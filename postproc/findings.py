@@ -229,6 +229,11 @@ CODES: dict[str, Code] = {
         "What the control knows of bases and tools then differs from the cell; motions with that base are kept.",
     ),
     "GCO025": Code("info", "motion behind the end", "It stands behind M2, M30 or M99 and does not run."),
+    "GCO026": Code(
+        "info",
+        "further axes move",
+        "One that carries the robot or the workpiece puts both elsewhere than the cell says; make sure that none does.",
+    ),
     # YAML files
     "YML001": Code("error", "not valid YAML", "It does not parse, or has aliases, tags or odd characters."),
     "YML002": Code("error", "unknown key", "A key that has no meaning here; nothing is ignored silently."),
