@@ -61,7 +61,9 @@ CODES: dict[str, Code] = {
     # KRL
     "KRL001": Code("warning", "motion not understood", "The motion is kept as it is and is not corrected."),
     "KRL002": Code(
-        "warning", "target is an expression", "Only numbers can be corrected; the motion is kept as it is."
+        "warning",
+        "target is not a constant",
+        "It depends on what the program does not say (inputs, other programs); the motion is kept as it is.",
     ),
     "KRL003": Code("warning", "point is not declared", "Neither the program nor its .dat gives this point."),
     "KRL004": Code(
@@ -75,20 +77,24 @@ CODES: dict[str, Code] = {
         "No $BASE or $TOOL that this tool can read was set before the motion.",
     ),
     "KRL006": Code(
-        "warning", "motion in a loop or branch", "It may run many times or never; it is kept as it is."
+        "warning",
+        "motion in a loop or branch that inputs decide",
+        "It may run many times or never; it is kept as it is.",
     ),
     "KRL007": Code(
         "warning",
         "point serves several places",
-        "Changing it would move more than this motion; it is kept as it is.",
+        "Changing it would move more than this motion, and it can not get a point of its own; it is kept as it is.",
     ),
     "KRL008": Code(
-        "warning", "relative motion", "Its end depends on the point before; both are kept as they are."
+        "warning",
+        "relative motion",
+        "Its end is not known in numbers, or it turns; it and the motion before are kept as they are.",
     ),
     "KRL009": Code(
         "warning",
-        "arc or spline",
-        "Arcs and splines are read, but not corrected by this version; they are kept as they are.",
+        "way of an arc is not known",
+        "Its begin or auxiliary point is not known in numbers, or they define no circle; it is kept as it is.",
     ),
     "KRL010": Code(
         "warning",
@@ -112,7 +118,9 @@ CODES: dict[str, Code] = {
         "warning", "block is not closed", "A loop, branch or DEF has no end, or an end has no begin."
     ),
     "KRL015": Code(
-        "warning", "motion in a local subprogram", "It may be called from many places; it is kept as it is."
+        "warning",
+        "motion in a local subprogram",
+        "It is called, or also called, with what is not known; it is kept as it is.",
     ),
     "KRL016": Code(
         "info",
@@ -144,6 +152,16 @@ CODES: dict[str, Code] = {
         "warning",
         "external axes move",
         "One that carries the robot or the workpiece puts both elsewhere than the cell says; make sure that none does.",
+    ),
+    "KRL023": Code(
+        "info",
+        "motion never runs",
+        "The flow that the program's constants give does not lead there; it is kept as it is.",
+    ),
+    "KRL024": Code(
+        "warning",
+        "flow is too long to follow",
+        "Loops and calls run more statements than are followed; motions in them are kept as they are.",
     ),
     # G-code
     "GCO001": Code(
