@@ -62,6 +62,8 @@ def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
         left=left_over(data),
         facts=program_facts(report),
         places=_places(data),
+        inserted=report.inserted,
+        inserted_links=[(link.line, f"{link.length_mm:.3f}") for link in report.links],
         findings=finding_rows(report.findings),
         more_findings=max(0, len(report.findings) - FINDINGS),
         parameters=parameter_rows(report.model),
