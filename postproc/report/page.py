@@ -120,10 +120,10 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, object]]:
                 "severity": finding.severity,
                 "code": finding.code,
                 "title": code.title,
-                "place": printed(finding.place),
+                "place": finding.place,
                 "line": finding.line,
-                "message": printed(finding.message),
-                "help": printed(finding.help or code.explanation),
+                "message": finding.message,
+                "help": finding.help or code.explanation,
             }
         )
     return rows
@@ -139,7 +139,7 @@ def linked(links: Mapping[str, str]) -> list[tuple[str, str, str]]:
     told = []
     for word, path in links.items():
         parts = Path(path).as_posix()
-        told.append((word, printed(parts), "./" + quote(os.fsencode(parts))))
+        told.append((word, parts, "./" + quote(os.fsencode(parts))))
     return told
 
 
@@ -158,8 +158,8 @@ def _places(data: PageData) -> list[dict[str, object]]:
             "after": _number(data.after[place.row], 4),
             "between": _number(data.between[place.row], 4),
             "force": f"{force[place.row]:.0f}",
-            "source": printed(place.source),
-            "written": [printed(line) for line in place.written],
+            "source": place.source,
+            "written": list(place.written),
             "same": place.written == (place.source,),
             "state": State(data.state[place.row]).name.lower(),
         }
@@ -232,12 +232,18 @@ def _digest(text: str) -> str:
     return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode("ascii")
 
 
+def _finalized(value: object) -> object:
+    """Every text that a template shows passes here."""
+    return printed(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+
 @cache
 def _templates() -> jinja2.Environment:
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(FOLDER),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
+        finalize=_finalized,
         trim_blocks=True,
         lstrip_blocks=True,
     )

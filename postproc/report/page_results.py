@@ -19,7 +19,7 @@ from postproc.report.identified import Identified
 from postproc.report.identified_picture import identified_picture
 from postproc.report.identified_terminal import verdict
 from postproc.report.page import FINDINGS, finding_rows, linked, rendered
-from postproc.report.page_words import badge, printed
+from postproc.report.page_words import badge
 from postproc.report.picture import picture
 from postproc.report.workspace import Mapped, _list
 from postproc.report.workspace import _rows as map_rows
@@ -148,13 +148,13 @@ def _page(
         "result.html.j2",
         goes=False,
         what=what,
-        title=printed(title),
-        verdict=printed(told),
-        words=[printed(text) for text in words],
+        title=title,
+        verdict=told,
+        words=list(words),
         badge=badge(exit, None),
-        facts=[(key, printed(value)) for key, value in facts],
+        facts=list(facts),
         tables=[one for one in map(shown, tables) if one.rows],
-        notes=[printed(note) for note in notes],
+        notes=list(notes),
         drawing=Markup("data:image/svg+xml;base64," + base64.b64encode(drawing).decode("ascii"))
         if drawing
         else "",
@@ -173,4 +173,4 @@ def _place(mapped: Mapped, row: int) -> str:
 
 def _plain(cell: object) -> str:
     """What a cell of a terminal's table says."""
-    return printed(cell.plain if isinstance(cell, Text) else Text.from_markup(str(cell)).plain)
+    return cell.plain if isinstance(cell, Text) else Text.from_markup(str(cell)).plain

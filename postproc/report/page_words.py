@@ -31,8 +31,9 @@ class Tile:
 
 
 def printed(text: str) -> str:
-    """Text of a program or a file name as a page can hold it."""
-    return printable(text).encode("utf-8", "replace").decode("utf-8")
+    """Text of a program or a file name as a page can hold it; its lines stay lines."""
+    lines = text.encode("utf-8", "replace").decode("utf-8").split("\n")
+    return "\n".join(printable(line) for line in lines)
 
 
 def badge(exit: int, changed: int | None) -> tuple[str, str, str]:
@@ -115,7 +116,7 @@ def left_over(data: PageData) -> list[str]:
     """What was left and why, cut by cut; [] where nothing was."""
     if not data.corrected:
         return []
-    told = [printed(f.message) for f in data.report.findings if f.code == "COR003"]
+    told = [f.message for f in data.report.findings if f.code == "COR003"]
     more = [f"and {len(told) - LEFT} more cuts, see the findings"] if len(told) > LEFT else []
     off = int((data.state == State.OFF).sum())
     own = [f"{count(off, 'motion')} between COMPENSATE OFF and ON, as the program says"] if off else []
@@ -124,7 +125,7 @@ def left_over(data: PageData) -> list[str]:
 
 def program_facts(report: Report) -> list[tuple[str, str]]:
     """The lines that the terminal shows as well."""
-    return [(key, printed(Text.from_markup(value).plain)) for key, value in _rows(report)]
+    return [(key, Text.from_markup(value).plain) for key, value in _rows(report)]
 
 
 def parameter_rows(model: Mapping[str, object]) -> list[dict[str, str]]:
@@ -145,12 +146,12 @@ def parameter_rows(model: Mapping[str, object]) -> list[dict[str, str]]:
             rows.append(
                 {
                     "effect": effect,
-                    "options": printed(options),
+                    "options": options,
                     "name": name,
                     "value": f"{stated['value']:.6g}",
                     "unit": stated.get("unit", ""),
                     "interval": wide + how,
-                    "source": printed(str(stated["source"] or "")),
+                    "source": str(stated["source"] or ""),
                 }
             )
     return rows
