@@ -252,6 +252,17 @@ CODES: dict[str, Code] = {
         "further axes move",
         "One that carries the robot or the workpiece puts both elsewhere than the cell says; make sure that none does.",
     ),
+    # G-code, written
+    "GCW001": Code(
+        "warning",
+        "arc can not be written",
+        "No numbers of the block's form state the corrected arc: a circle that no longer closes, an arc shorter than a digit.",
+    ),
+    "GCW002": Code(
+        "warning",
+        "orientation can not be written",
+        "The words of the block reach no such orientation of the tool; the motion is kept as it is.",
+    ),
     # YAML files
     "YML001": Code("error", "not valid YAML", "It does not parse, or has aliases, tags or odd characters."),
     "YML002": Code("error", "unknown key", "A key that has no meaning here; nothing is ignored silently."),
@@ -323,8 +334,8 @@ CODES: dict[str, Code] = {
     ),
     "FRC014": Code(
         "info",
-        "plunge without a force",
-        "The process model knows side cutting only; motions along the spindle are taken as air.",
+        "motion without a force",
+        "The process model knows side cutting only: plunges, and approaches from axis positions, are taken as air.",
     ),
     "FRC015": Code("info", "force of an operation", "What the process file came to for this operation."),
     "FRC016": Code(

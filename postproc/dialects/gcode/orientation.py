@@ -26,13 +26,17 @@ class Orientation(Protocol):
 
     words: their keys, -1 for one that is not used.  joint: the words are one whole: a block that writes one of them
     states all (those it leaves out are zero).  angles: the numbers are degrees, 360 of which are a turn.
-    free_spin: the words say where the tool axis points and nothing of the turn about it.
+    free_axis (3,): unit vector in tool axes about which the words say nothing of the turn; NaN where they say all.
     """
 
-    words: tuple[int, int, int]
-    joint: bool
-    angles: bool
-    free_spin: bool
+    @property
+    def words(self) -> tuple[int, int, int]: ...
+    @property
+    def joint(self) -> bool: ...
+    @property
+    def angles(self) -> bool: ...
+    @property
+    def free_axis(self) -> Floats: ...
 
     def rotation(self, values: Floats) -> Floats:
         """(n, 3, 3) orientation of the tool in the base, of values (n, 3); NaN where it is not known."""
@@ -68,7 +72,10 @@ class Vector:
     start: Floats | None
     joint: bool = True
     angles: bool = False
-    free_spin: bool = True
+
+    @property
+    def free_axis(self) -> Floats:
+        return np.full(3, np.nan) if self.start is None else self.start.T @ UP
 
     def rotation(self, values: Floats) -> Floats:
         if self.start is None:
@@ -107,6 +114,10 @@ class Angles:
     free_spin: bool = False
     joint: bool = False
     angles: bool = True
+
+    @property
+    def free_axis(self) -> Floats:
+        return self.tool.T @ UP if self.free_spin and self.tool is not None else np.full(3, np.nan)
 
     def _turned(self, values: Floats) -> tuple[Floats, Floats]:
         """R (n, 3, 3) and the axes (n, 3, k) about which the angles turn it, in the programmed axes."""

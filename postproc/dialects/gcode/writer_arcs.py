@@ -1,0 +1,181 @@
+"""The centre, radius or intermediate point of arcs, so that a control reads the arc that is meant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.dialects.gcode.writer_text import PLANES
+from postproc.geometry import arc_through, on_arc
+
+WELL = np.radians([167.0, 193.0, 300.0])
+"""Sweeps up to the first and between the others leave an arc given by its radius well determined: between the first
+two the centre moves by more than nine times what the radius is rounded by, beyond the last it turns with the ends."""
+
+FAR = 2.0
+"""Written steps by which the inside of a written arc may be elsewhere than planned."""
+
+
+class Form(IntEnum):
+    """How the block states the way of its arc."""
+
+    CENTRE = 0
+    RADIUS = 1
+    THROUGH = 2
+
+
+@dataclass(frozen=True, eq=False)
+class Arcs:
+    """K arcs in programmed units and the coordinates of their frame.
+
+    begin, end (K, 3): as written.  centre, normal (K, 3), sweep (K,): as planned.  plane (K,); form (K,) Form;
+    clockwise (K,) in the coordinates of the frame; turns (K,) full turns stated apart.  relative (K, 3): I J K are
+    from the begin.  own (K, 4): numbers that stand there for I J K R, NaN if none; decimals (K, 4).
+    """
+
+    begin: Floats
+    end: Floats
+    centre: Floats
+    normal: Floats
+    sweep: Floats
+    plane: Ints
+    form: Ints
+    clockwise: Bools
+    turns: Ints
+    relative: Bools
+    own: Floats
+    decimals: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class WrittenArcs:
+    """write (K, 4): the number of I J K R is written anew, number (K, 4), decimals (K, 4).
+    convert (K,): R gives way to I J K.  bad (K,): no numbers of this form state the arc."""
+
+    write: Bools
+    number: Floats
+    decimals: Ints
+    convert: Bools
+    bad: Bools
+
+
+def write_arcs(arcs: Arcs) -> WrittenArcs:
+    """The numbers of the arcs: a number stays where it is right within half a step."""
+    count = len(arcs.sweep)
+    rows = np.arange(count)
+    wanted = np.full((count, 4), np.nan)
+    decimals = arcs.decimals.copy()
+    centre = _balanced(arcs)
+    through = arcs.form == Form.THROUGH
+    convert = (arcs.form == Form.RADIUS) & ~_well(arcs.sweep)
+    by_radius = (arcs.form == Form.RADIUS) & ~convert
+    by_centre = ~through & ~by_radius
+
+    middle = on_arc(arcs.begin, arcs.end, arcs.centre, arcs.normal, arcs.sweep, np.full(count, 0.5))
+    point = np.where(through[:, None], middle, centre)
+    wanted[:, :3] = point - np.where(arcs.relative, arcs.begin, 0.0)
+    across = PLANES[arcs.plane, 2]
+    wanted[rows[by_centre], across[by_centre]] = np.nan
+    wanted[by_radius, :3] = np.nan
+    radius = 0.5 * (np.linalg.norm(centre - arcs.begin, axis=1) + np.linalg.norm(centre - arcs.end, axis=1))
+    wanted[by_radius, 3] = np.where(arcs.sweep > np.pi, -radius, radius)[by_radius]
+    # Beyond 120 deg the middle moves by more than the radius does.
+    decimals[:, 3] += by_radius & (arcs.sweep > np.radians(120.0))
+
+    number, write = _kept(wanted, arcs.own, decimals)
+    unequal = by_centre & (_mismatch(arcs, number) > 0.5 * 10.0 ** -decimals[:, :3].max(axis=1))
+    decimals[unequal, :3] += 1
+    number[unequal], write[unequal] = (
+        part[unequal] for part in _kept(wanted, np.where(write, np.nan, arcs.own), decimals)
+    )
+    # An absent word is zero (or inherits): it is written where that is not meant.
+    default = np.where(arcs.relative, 0.0, arcs.begin)
+    absent = np.isnan(arcs.own[:, :3]) & (np.abs(wanted[:, :3] - default) <= 0.5 * 10.0 ** -decimals[:, :3])
+    absent &= through[:, None] | arcs.relative
+    write[:, :3] &= ~absent
+    number[:, :3] = np.where(absent, default, number[:, :3])
+    write[:, :3] |= convert[:, None] & np.isfinite(wanted[:, :3])
+    return WrittenArcs(write, number, decimals, convert, _misread(arcs, number, through, by_radius))
+
+
+def _well(sweep: Floats) -> Bools:
+    return np.asarray((sweep <= WELL[0]) | ((sweep >= WELL[1]) & (sweep <= WELL[2])))
+
+
+def _kept(wanted: Floats, own: Floats, decimals: Ints) -> tuple[Floats, Bools]:
+    """The numbers, and which of them are written anew: all that are wanted and do not stand there."""
+    scale = 10.0**decimals
+    with np.errstate(invalid="ignore"):
+        stays = np.abs(wanted - own) <= 0.5 / scale + 1e-9
+    return np.where(stays, own, np.rint(wanted * scale) / scale), np.isfinite(wanted) & ~stays
+
+
+def _in_plane(arcs: Arcs, vectors: Floats) -> Floats:
+    return np.take_along_axis(vectors, PLANES[arcs.plane, :2], axis=1)
+
+
+def _balanced(arcs: Arcs) -> Floats:
+    """Centres at the same distance from begin and end: shifted along the chord, but for circles that nearly
+    close, whose chord has no direction."""
+    axes = PLANES[arcs.plane, :2]
+    begin, end, centre = (_in_plane(arcs, p) for p in (arcs.begin, arcs.end, arcs.centre))
+    chord = end - begin
+    length = np.linalg.norm(chord, axis=1)
+    radius = np.linalg.norm(centre - begin, axis=1)
+    usable = (arcs.form != Form.THROUGH) & (length > 0) & ((arcs.sweep <= np.pi) | (length > 0.2 * radius))
+    unit = chord / np.where(length > 0, length, 1.0)[:, None]
+    off = np.sum((centre - 0.5 * (begin + end)) * unit, axis=1)
+    result = arcs.centre.copy()
+    np.put_along_axis(result, axes, centre - np.where(usable, off, 0.0)[:, None] * unit, axis=1)
+    return result
+
+
+def _centre(arcs: Arcs, number: Floats) -> Floats:
+    """(K, 3) centres that I J K state."""
+    return np.where(np.isnan(number[:, :3]), 0.0, number[:, :3]) + np.where(arcs.relative, arcs.begin, 0.0)
+
+
+def _mismatch(arcs: Arcs, number: Floats) -> Floats:
+    begin, end, centre = (_in_plane(arcs, p) for p in (arcs.begin, arcs.end, _centre(arcs, number)))
+    return np.asarray(np.abs(np.linalg.norm(begin - centre, axis=1) - np.linalg.norm(end - centre, axis=1)))
+
+
+def _misread(arcs: Arcs, number: Floats, through: Bools, by_radius: Bools) -> Bools:
+    """(K,) whether the written numbers are read as another arc than the planned one: points inside are elsewhere."""
+    count = len(arcs.sweep)
+    normal = np.zeros((count, 3))
+    normal[np.arange(count), PLANES[arcs.plane, 2]] = np.where(arcs.clockwise, -1.0, 1.0)
+    centre = np.where(by_radius[:, None], _by_radius(arcs, normal, number[:, 3]), _centre(arcs, number))
+    start, stop = arcs.begin - centre, arcs.end - centre
+    across = np.sum(np.cross(start, stop) * normal, axis=1)
+    along = np.sum(start * stop, axis=1) - np.sum(start * normal, axis=1) * np.sum(stop * normal, axis=1)
+    sweep = np.mod(np.arctan2(across, along), 2 * np.pi)
+    closes = (np.abs(_in_plane(arcs, start - stop)) <= 1e-9).all(axis=1)
+    sweep = np.where(closes, 2 * np.pi, sweep) + 2 * np.pi * arcs.turns
+    if through.any():
+        via = np.where(np.isnan(number[:, :3]), 0.0, number[:, :3])
+        via = via + np.where(arcs.relative, arcs.begin, 0.0)
+        way = arc_through(arcs.begin[through], via[through], arcs.end[through])
+        centre[through], normal[through], sweep[through] = way
+    step = 10.0 ** -arcs.decimals[:, :3].min(axis=1)
+    worst = np.zeros(count)
+    for share in (0.25, 0.5, 0.75):
+        at = np.full(count, share)
+        meant = on_arc(arcs.begin, arcs.end, arcs.centre, arcs.normal, arcs.sweep, at)
+        read = on_arc(arcs.begin, arcs.end, centre, normal, sweep, at)
+        worst = np.maximum(worst, np.linalg.norm(meant - read, axis=1))
+    return ~(worst <= FAR * step) | ~(np.abs(sweep - arcs.sweep) < np.pi)
+
+
+def _by_radius(arcs: Arcs, normal: Floats, radius: Floats) -> Floats:
+    """(K, 3) centres at a signed radius: to the left of the chord, seen along -normal; a negative one beyond it."""
+    chord = arcs.end - arcs.begin
+    chord = chord - np.sum(chord * normal, axis=1, keepdims=True) * normal
+    length = np.linalg.norm(chord, axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        height = np.sqrt(radius**2 - 0.25 * length**2) * np.sign(radius)
+        left = np.cross(normal, chord) / length[:, None]
+    return np.asarray(arcs.begin + 0.5 * chord + height[:, None] * left)

@@ -1,0 +1,181 @@
+"""Words that are inserted into blocks, and blocks that are inserted before them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from postproc.arrays import Bools, Ints
+from postproc.dialects.dialect import Program, Role
+from postproc.dialects.gcode.control import Move
+from postproc.dialects.gcode.places import Places
+from postproc.dialects.gcode.words import key
+from postproc.dialects.gcode.writer_text import RADIUS, Stated
+from postproc.document import Edit, Span
+
+_HEAD = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*(?:/[ \t]*\d?[ \t]*)?)")
+_NAME = re.compile(rb"[A-Za-z_][A-Za-z0-9_]*")
+_BLANK = re.compile(rb"[ \t]")
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """row, role (M,) as in the plan; convert (M,): I J K take the place of R; missing: motion -> column -> number."""
+
+    program: Program
+    text: Stated
+    row: Ints
+    role: Ints
+    convert: Bools
+    missing: Mapping[int, Mapping[int, bytes]]
+
+    @property
+    def places(self) -> Places:
+        places: Places = self.program.text
+        return places
+
+    @property
+    def raw(self) -> bytes:
+        return self.program.documents[0].raw
+
+    @cached_property
+    def spaced(self) -> bool:
+        """Whether blocks of this program have blanks between their words."""
+        words = self.places.text.words
+        gaps = [
+            self.raw[a:b]
+            for a, b in zip(words.stop[:200].tolist(), words.at[1:201].tolist(), strict=False)
+            if 0 <= a <= b and b"\n" not in self.raw[a:b]
+        ]
+        return not gaps or any(gaps)
+
+    @cached_property
+    def two_digits(self) -> bool:
+        """Whether the program writes G01 for G1."""
+        verbs = self.places.verb[self.places.verb >= 0][:1].tolist()
+        words = self.places.text.words
+        return any(self.raw[int(words.start[v]) : int(words.stop[v])].startswith(b"0") for v in verbs)
+
+
+def insertions(blocks: Blocks) -> Iterator[Edit]:
+    """The edits that insert, in the order of the text; a converted R as well."""
+    wanted = set(blocks.missing) | set(np.flatnonzero(blocks.role != Role.OWN).tolist())
+    before: list[int] = []
+    for m in sorted(wanted | _owners(blocks)):
+        if blocks.role[m] != Role.OWN:
+            before.append(m)
+            continue
+        block = _Block(blocks, int(blocks.row[m]))
+        if before:
+            yield block.inserted(before)
+        yield from block.completed(m, before)
+        before = []
+
+
+def _owners(blocks: Blocks) -> set[int]:
+    """The own motions behind inserted ones."""
+    own = np.flatnonzero(blocks.role == Role.OWN)
+    inserted = np.flatnonzero(blocks.role != Role.OWN)
+    return set(own[np.searchsorted(own, inserted)].tolist())
+
+
+class _Block:
+    """The block of one row."""
+
+    def __init__(self, blocks: Blocks, row: int) -> None:
+        self.blocks, self.row = blocks, row
+        places = blocks.places
+        self.raw = blocks.raw
+        words, block = places.text.words, int(places.block[row])
+        low, high = np.searchsorted(words.block, [block, block + 1]).tolist()
+        self.words = [k for k in range(low, high) if words.key[k] != key("N")]
+        self.start = int(places.text.blocks.start[block])
+        self.insert = int(places.insert[row])
+        code = self.raw[int(words.at[self.words[0]]) : self.insert]
+        several = len(self.words) > 1
+        self.gap = b" " if (_BLANK.search(code) is not None if several else blocks.spaced) else b""
+        self.lower = self.raw[int(words.at[self.words[-1]])] > 96
+        self.verb = int(places.verb[row])
+        self.move = int(places.move[row])
+
+    def _word(self, k: int) -> bytes:
+        words = self.blocks.places.text.words
+        at, stop = int(words.at[k]), int(words.stop[k])
+        if stop < 0:
+            name = _NAME.match(self.raw, at)
+            return name[0] if name else b""
+        return self.raw[at:stop]
+
+    def _cased(self, text: bytes) -> bytes:
+        return text.lower() if self.lower else text
+
+    def _motion(self, move: int) -> bytes:
+        if move == self.move and self.verb >= 0:
+            return self._word(self.verb)
+        if move == Move.THROUGH:
+            return self._cased(b"CIP")
+        return self._cased(b"G%02d" % move if self.blocks.two_digits else b"G%d" % move)
+
+    def _address(self, column: int) -> bytes:
+        """The address of a column, spelt as in the block if it is there."""
+        k = int(self.blocks.text.word[self.row, column])
+        if k >= 0:
+            words = self.blocks.places.text.words
+            own = self.raw[int(words.at[k]) : int(words.start[k])]
+            if b"(" not in own:
+                return own
+        number = int(self.blocks.text.keys[self.row, column])
+        letter = bytes([number & 0xFF])
+        return self._cased(letter if number < 256 else b"%s%d=" % (letter, (number >> 8) - 1))
+
+    def _stated(self, m: int) -> list[bytes]:
+        numbers = self.blocks.missing.get(m, {})
+        return [self._address(column) + numbers[column] for column in sorted(numbers)]
+
+    def inserted(self, motions: list[int]) -> Edit:
+        """The blocks of motions before the row's own."""
+        head = _HEAD.match(self.raw, self.start)
+        lead = head[1] if head else b""
+        at = self.start + (3 if self.raw.startswith(b"\xef\xbb\xbf", self.start) else 0)
+        lines: list[bytes] = []
+        for m in motions:
+            link = self.blocks.role[m] == Role.LINK
+            words = [self._motion(Move.LINE if link else self.move), *self._stated(m)]
+            if not lines:
+                words = [*self._modal(), *words, *self._feed()]
+            lines.append(lead + self.gap.join(words) + self.blocks.program.documents[0].newline)
+        return Edit(Span(0, at, at), b"".join(lines))
+
+    def _modal(self) -> list[bytes]:
+        """The codes of the block other than its motion: they hold for what is inserted before it as well."""
+        words = self.blocks.places.text.words
+        return [self._word(k) for k in self.words if words.key[k] == key("G") and k != self.verb]
+
+    def _feed(self) -> list[bytes]:
+        words = self.blocks.places.text.words
+        return [self._word(k) for k in self.words if words.key[k] == key("F")]
+
+    def completed(self, m: int, before: list[int]) -> Iterator[Edit]:
+        """The row's own block with the words that it lacks."""
+        link = bool(before) and self.blocks.role[before[-1]] == Role.LINK
+        if link and self.verb < 0 and self.move != Move.LINE:
+            at = int(self.blocks.places.text.words.at[self.words[0]])
+            yield Edit(Span(0, at, at), self._motion(self.move) + self.gap)
+        stated = self._stated(m)
+        if self.blocks.convert[m]:
+            centre = [
+                word
+                for column, word in zip(sorted(self.blocks.missing[m]), stated, strict=True)
+                if column > 5
+            ]
+            stated = stated[: len(stated) - len(centre)]
+            k = int(self.blocks.text.word[self.row, RADIUS])
+            words = self.blocks.places.text.words
+            yield Edit(Span(0, int(words.at[k]), int(words.stop[k])), self.gap.join(centre))
+        if stated:
+            text = b"".join(self.gap + word for word in stated)
+            yield Edit(Span(0, self.insert, self.insert), text)

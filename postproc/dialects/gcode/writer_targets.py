@@ -1,0 +1,157 @@
+"""Targets as numbers: which are written anew, and where a control that reads what is written arrives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+
+SLACK = 1e-9
+"""Programmed units by which a number may miss half a step, as a part of its rounding."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """M motions, K columns, programmed units.
+
+    wanted: where the motion is to end; source: where it ends in the source, NaN for what is inserted; own: the number
+    that stands in its block, NaN where there is none; relative, decimals: see ``Stated``.  fixed (M,): its block must
+    stay as it is.  closed (M, K): it has to end exactly where it begins, with as many decimals as that takes.
+    What is not known (NaN wanted) is left as it stands.
+    """
+
+    wanted: Floats
+    source: Floats
+    own: Floats
+    relative: Bools
+    decimals: Ints
+    fixed: Bools
+    closed: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """begin, end (M, K): where the written motions begin and end; write (M, K): the number is written anew;
+    number (M, K): it."""
+
+    begin: Floats
+    end: Floats
+    write: Bools
+    number: Floats
+
+    @staticmethod
+    def nothing(motions: Wanted) -> Followed:
+        shape = motions.wanted.shape
+        nan = np.full(shape, np.nan)
+        return Followed(nan, nan.copy(), np.zeros(shape, dtype=bool), motions.own.copy())
+
+
+def follow(motions: Wanted, start: Floats, a: int, b: int, into: Followed) -> None:
+    """Follows the motions a .. b - 1, which share a frame, from ``start`` (K,), NaN where unknown; fills ``into``.
+
+    A number that stands there stays where it leads within half a step; a missing one is inherited where that does.
+    """
+    for column in range(motions.wanted.shape[1]):
+        _follow_column(motions, float(start[column]), a, b, column, into)
+
+
+def _follow_column(motions: Wanted, start: float, a: int, b: int, column: int, into: Followed) -> None:
+    want, own = motions.wanted[a:b, column], motions.own[a:b, column]
+    decimals = motions.decimals[a:b, column]
+    closed, known = motions.closed[a:b, column], np.isfinite(want)
+    half = np.asarray(0.5 * 10.0**-decimals + SLACK, dtype=np.float64)
+    alone = np.isfinite(own) & ~motions.relative[a:b, column] & ~motions.fixed[a:b] & ~closed
+    with np.errstate(invalid="ignore"):
+        write = alone & known & ~(np.abs(want - own) <= half)
+    number = np.where(write, _rounded(want, decimals), own)
+    end = np.where(alone, number, want)
+    led = np.flatnonzero(~alone & ~motions.fixed[a:b] & known)
+    if len(led):
+        _follow_led(motions, start, a, b, column, led, half, write, number, end)
+    into.end[a:b, column], into.write[a:b, column], into.number[a:b, column] = end, write, number
+    into.begin[a, column], into.begin[a + 1 : b, column] = start, end[:-1]
+
+
+def _follow_led(
+    motions: Wanted,
+    start: float,
+    a: int,
+    b: int,
+    column: int,
+    led: Ints,
+    half: Floats,
+    write: Bools,
+    number: Floats,
+    end: Floats,
+) -> None:
+    """What depends on where the motion before ended: absent words, increments, circles that close."""
+    wants, owns = motions.wanted[a:b, column].tolist(), motions.own[a:b, column].tolist()
+    relatives, closed = motions.relative[a:b, column].tolist(), motions.closed[a:b, column].tolist()
+    sources, halves = motions.source[a:b, column].tolist(), half.tolist()
+    digits = motions.decimals[a:b, column].tolist()
+    ends = end.tolist()
+    for k in led.tolist():
+        begin = ends[k - 1] if k else start
+        want, own, d, within = wants[k], owns[k], digits[k], halves[k]
+        if begin != begin and (relatives[k] or abs(want - sources[k]) <= within):
+            continue  # not known where it begins, and not moved
+        if closed[k] and begin == begin:
+            want = begin
+        if own != own and abs(want - begin) <= within:
+            ends[k] = begin
+            continue
+        origin = begin if relatives[k] else 0.0
+        if closed[k] and not relatives[k]:
+            d = max(d, _decimals_of(want))
+            into_place = abs(want - own) <= SLACK
+        else:
+            into_place = abs(want - origin - own) <= within
+        value = own if into_place else round(want - origin, d)
+        write[k] = not into_place
+        number[k] = value
+        motions.decimals[a + k, column] = d
+        ends[k] = origin + value
+    end[:] = ends
+
+
+def _rounded(values: Floats, decimals: Ints) -> Floats:
+    scale = 10.0**decimals
+    return np.asarray(np.rint(values * scale) / scale)
+
+
+def _decimals_of(value: float) -> int:
+    """The decimals that a number needs, as far as they can be written."""
+    return len(f"{value:.9f}".rstrip("0").partition(".")[2])
+
+
+def follow_whole(motions: Wanted, start: Floats, a: int, b: int, into: Followed) -> None:
+    """As ``follow`` for words that are one whole (a vector): all are written anew or none, missing ones are zero where
+    another stands, and where none stands the direction of the motion before holds."""
+    has = np.isfinite(motions.own[a:b]).any(axis=1)
+    present = has & ~motions.fixed[a:b]
+    want, own = motions.wanted[a:b], np.nan_to_num(motions.own[a:b])
+    half = 0.5 * 10.0 ** -motions.decimals[a:b] + SLACK
+    with np.errstate(invalid="ignore"):
+        changed = present[:, None] & np.isfinite(want) & ~(np.abs(want - own) <= half)
+    number = np.where(changed, _rounded(want, motions.decimals[a:b]), motions.own[a:b])
+    end = np.where(present[:, None], np.nan_to_num(number), want)
+    write = changed
+    for k in np.flatnonzero(~has & ~motions.fixed[a:b] & np.isfinite(want).all(axis=1)).tolist():
+        begin = end[k - 1] if k else start
+        source = motions.source[a + k]
+        known = np.isfinite(begin).all()
+        if (known and _near(want[k], begin, half[k])) or (not known and _near(want[k], source, half[k])):
+            end[k] = begin if known else want[k]
+            continue
+        number[k] = end[k] = _rounded(want[k], motions.decimals[a + k])
+        write[k] = True
+    into.end[a:b], into.write[a:b], into.number[a:b] = end, write, number
+    into.begin[a], into.begin[a + 1 : b] = start, end[:-1]
+
+
+def _near(one: Floats, other: Floats, half: Floats) -> bool:
+    """Vectors of any length that point the same way."""
+    lengths = np.linalg.norm(one) or 1.0, np.linalg.norm(other) or 1.0
+    return bool((np.abs(one / lengths[0] - other / lengths[1]) <= half).all())
