@@ -194,6 +194,15 @@ def test_a_plunge_is_one_along_the_spindle_wherever_that_points(tmp_path):
     assert np.flatnonzero(result.carries).tolist() == [5, 6]
 
 
+def test_an_approach_from_an_axis_position_is_air(tmp_path):
+    points = [[np.nan] * 3, [0, 0, 0.05], [0, 0, 0], [0.1, 0, 0]]
+    path = path_of(points, [Kind.AXIS, Kind.LIN, Kind.LIN, Kind.LIN])
+    result = run(path, operations(tmp_path, "lines: [1, 99]"))
+    assert result.carries.tolist() == [False, False, False, True]
+    (told,) = [f for f in result.findings if f.code == "FRC014"]
+    assert told.message == "motions without a force: 1 along the spindle, 1 from axis positions"
+
+
 def test_a_fast_move_that_counts_as_cutting_is_told(tmp_path):
     feed = np.array([0.1, 0.06, 0.06, 0.25, 0.1, 0.06, 0.06])
     result = run(program(feed=feed), operations(tmp_path, "lines: [1, 99]"))

@@ -18,7 +18,7 @@ from postproc.forces.process import Operation, read_process
 from postproc.forces.stated import FEED, Stated
 from postproc.forces.way import Way, shifted
 from postproc.forces.wrench import is_air
-from postproc.toolpath import Annotation, Toolpath
+from postproc.toolpath import Annotation, Kind, Toolpath
 from postproc.units import MM
 
 UNUSUAL = 2.0
@@ -33,7 +33,8 @@ def process_forces(
     """The mean milling force of every motion that an operation of the process file ``path`` has, in the feed frame.
 
     Air, with no force, are: motions of no operation, PTP and G0, those under FORCE OFF, at the operation's ``rapid``
-    and above, and those along the spindle axis (of plunges the model knows nothing).  Refusal: of the file; FRC011
+    and above, those that come from axis positions (approaches, with no known direction), and those along the spindle
+    axis (of plunges the model knows nothing).  Refusal: of the file; FRC011
     where no operation has any motion; FRC013 where a feed is not known.
     """
     operations = read_process(path)
@@ -43,10 +44,13 @@ def process_forces(
     rapid = np.array([operation.rapid for operation in operations])[joined]
     cutting &= ~(toolpath.feed >= rapid)
     along = cutting & _along_spindle(toolpath, frames)
-    cutting &= ~along
-    if np.any(along):
-        what = f"plunges and retracts along the spindle, of which the process knows no force: {np.sum(along)}"
-        findings.append(Finding("FRC014", what, program, int(toolpath.line[np.argmax(along)])))
+    approach = cutting & ~shifted(toolpath.kind != Kind.AXIS)
+    if np.any(free := along | approach):
+        what = (
+            f"motions without a force: {along.sum()} along the spindle, {approach.sum()} from axis positions"
+        )
+        findings.append(Finding("FRC014", what, program, int(toolpath.line[np.argmax(free)])))
+    cutting &= ~free
     _check_feed(operations, joined, cutting, toolpath, program)
     findings += _passed_over(operations, joined, cutting, toolpath, program)
 
