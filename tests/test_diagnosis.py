@@ -23,6 +23,7 @@ from postproc.diagnosis.verdict import (
     _alternatives,
     _beyond_telling,
     _left_out,
+    _of_another_course,
     judged,
 )
 from postproc.effects import Conditions
@@ -196,6 +197,16 @@ def test_hardware_of_the_file_is_doubted_only_where_something_else_explains_more
 
     assert sets(BUILT, True) == sets(0.0, True) == sets(-0.9 * BUILT, True) == 1
     assert sets(-1.1 * BUILT, True) == 2
+
+    def refused(worse, **change):
+        other = replace(found, rivals=(replace(foil, worse=worse, more=0.0, fitted=True, **change),))
+        return _of_another_course(other, found.linear.candidates[group])
+
+    assert refused(-1.1 * MARGIN)
+    assert not refused(-0.9 * MARGIN)
+    named = next(c for c in found.linear.candidates if c.name == "backlash")
+    assert not refused(-1.1 * MARGIN, candidate=named), "that has a name"
+    assert not refused(-1.1 * MARGIN, of=named.key), "that is another's"
     # of which the readings do not tell that it is there
     assert sets(0.9 * MARGIN, False) == 2
     assert sets(1.1 * MARGIN, False) == 1
@@ -292,6 +303,8 @@ def test_what_poses_share_is_no_more_than_scatter_can_be():
     base = fitted(campaign_of(stated(), 20, shared=20 * SIGMA))
     assert base.weights.shared > 10 * SIGMA
     assert _sharing(base, base).shared == pytest.approx(SHARED * SIGMA)
+    # what is stated is all the scatter of a coordinate, shared or not
+    assert _sharing(base, base).shared < 1.001 * SIGMA
     little = fitted(campaign_of(stated(), 20, shared=0.9 * SIGMA))
     assert 0 < little.weights.shared < SHARED * SIGMA
     assert _sharing(base, little).shared == little.weights.shared
