@@ -129,9 +129,9 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, object]]:
     return rows
 
 
-def beside(page: Path, files: Mapping[str, Path]) -> dict[str, str]:
-    """Words -> path of each of ``files`` as seen from the folder of ``page``."""
-    return {word: os.path.relpath(path, page.parent) for word, path in files.items()}
+def beside(page: Path, files: Mapping[str, Path | None]) -> dict[str, str]:
+    """Words -> path of each of ``files`` as seen from the folder of ``page``, without those that are None."""
+    return {word: os.path.relpath(path, page.parent) for word, path in files.items() if path is not None}
 
 
 def linked(links: Mapping[str, str]) -> list[tuple[str, str, str]]:

@@ -68,6 +68,7 @@ class DiagnoseRequest:
     next_poses: Path | None = None
     tool_mm_deg: tuple[float, ...] | None = None
     picture: Path | None = None
+    page: Path | None = None
     csv: Path | None = None
     json: Path | None = None
     strict: bool = False
@@ -141,7 +142,7 @@ def _spare_inputs(request: DiagnoseRequest) -> None:
     inputs = {path.resolve() for path in request.data}
     if request.robot and request.robot.endswith((".yaml", ".yml")):
         inputs.add(Path(request.robot).resolve())
-    ways = (request.output, request.next_poses, request.json, request.csv, request.picture)
+    ways = (request.output, request.next_poses, request.json, request.csv, request.picture, request.page)
     written = [path for path in ways if path is not None]
     for path in written:
         if path.resolve() in inputs:
@@ -263,15 +264,29 @@ def _published(request: DiagnoseRequest, measured: Measured, result: Diagnosed, 
 
         stage("drawing")
         files[request.picture] = diagnosed_picture(result, request.picture.suffix.lower().lstrip("."))
-    outputs = [str(path) for path in files]
-    if request.json is not None:
-        outputs.append(str(request.json))
-    result = replace(result, outputs=tuple(outputs))
+    told = [path for path in (request.json, request.page) if path is not None]
+    result = replace(result, outputs=tuple(str(path) for path in (*files, *told)))
     if request.json is not None:
         files[request.json] = json_bytes(result)
+    if request.page is not None:
+        from postproc.report.page import beside
+        from postproc.report.page_results import diagnosed_page
+
+        files[request.page] = diagnosed_page(result, beside(request.page, _beside(request, result)))
     if files:
         publish(files, last=request.output)
     return result
+
+
+def _beside(request: DiagnoseRequest, result: Diagnosed) -> dict[str, Path | None]:
+    """What a page leads to."""
+    files = {"new robot file": result.robot_file, "poses to measure next": result.next_poses_file}
+    return {
+        **{word: Path(path) if path else None for word, path in files.items()},
+        "residuals (CSV)": request.csv,
+        "picture": request.picture,
+        "result (JSON)": request.json,
+    }
 
 
 def _about(result: Diagnosed) -> list[str]:

@@ -66,6 +66,7 @@ class IdentifyRequest:
     bootstrap: int | None = None
     tool_mm_deg: tuple[float, ...] | None = None
     picture: Path | None = None
+    page: Path | None = None
     csv: Path | None = None
     json: Path | None = None
     strict: bool = False
@@ -199,7 +200,9 @@ def _spare_inputs(request: IdentifyRequest) -> None:
     inputs = {path.resolve() for path in (*request.data, *request.validate)}
     if request.robot and request.robot.endswith((".yaml", ".yml")):
         inputs.add(Path(request.robot).resolve())
-    written = [p for p in (request.output, request.json, request.csv, request.picture) if p is not None]
+    written = [
+        p for p in (request.output, request.json, request.csv, request.picture, request.page) if p is not None
+    ]
     for path in written:
         if path.resolve() in inputs:
             raise Refusal(Finding("FIL007", "would replace an input", str(path)))
@@ -358,12 +361,25 @@ def _published(request: IdentifyRequest, measured: Measured, result: Identified,
 
         stage("drawing")
         files[request.picture] = identified_picture(result, request.picture.suffix.lower().lstrip("."))
-    outputs = [str(path) for path in files]
-    if request.json is not None:
-        outputs.append(str(request.json))
-    result = replace(result, outputs=tuple(outputs))
+    told = [path for path in (request.json, request.page) if path is not None]
+    result = replace(result, outputs=tuple(str(path) for path in (*files, *told)))
     if request.json is not None:
         files[request.json] = json_bytes(result)
+    if request.page is not None:
+        from postproc.report.page import beside
+        from postproc.report.page_results import identified_page
+
+        files[request.page] = identified_page(result, beside(request.page, _beside(request)))
     if files:
         publish(files, last=request.output)
     return result
+
+
+def _beside(request: IdentifyRequest) -> dict[str, Path | None]:
+    """What a page leads to."""
+    return {
+        "new robot file": request.output,
+        "residuals (CSV)": request.csv,
+        "picture": request.picture,
+        "result (JSON)": request.json,
+    }

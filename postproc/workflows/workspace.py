@@ -36,6 +36,7 @@ class MapRequest:
     ignore_limits: bool = False
     status: int | None = None
     picture: Path | None = None
+    page: Path | None = None
     csv: Path | None = None
     json: Path | None = None
 
@@ -81,14 +82,23 @@ def map_workspace(request: MapRequest, stage: Stage = silent) -> Mapped:
             from postproc.report.picture import picture
 
             files[request.picture] = picture(mapped, request.picture.suffix[1:].lower())
-    pages = [] if request.json is None else [request.json]
+    told = {"result (JSON)": request.json, "page": request.page}
+    names = [*files, *(path for path in told.values() if path is not None)]
     mapped = replace(
         mapped,
         findings=tuple(findings),
-        outputs=tuple(str(path) for path in (*files, *pages)),
+        outputs=tuple(str(path) for path in names),
         exit=exit_code(findings),
     )
-    publish({**files, **dict.fromkeys(pages, json_bytes(mapped))})
+    if request.json is not None:
+        files[request.json] = json_bytes(mapped)
+    if request.page is not None:
+        from postproc.report.page import beside
+        from postproc.report.page_results import mapped_page
+
+        also = {"every cell (CSV)": request.csv, "picture": request.picture, "result (JSON)": request.json}
+        files[request.page] = mapped_page(mapped, beside(request.page, also))
+    publish(files)
     return mapped
 
 

@@ -1,0 +1,150 @@
+"""Pages of a map, an identification and a diagnosis: they say what the terminal says, and escape it."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from browser import chromium, window  # noqa: F401
+from rich.console import Console
+from test_pages import HOSTILE, _Tags
+
+from postproc.findings import Finding, Refusal
+from postproc.report.diagnosed_terminal import show_diagnosed
+from postproc.report.identified_terminal import show_identified
+from postproc.report.page_results import diagnosed_page, identified_page, mapped_page
+from postproc.report.workspace import show_map
+from postproc.workflows.diagnose import DiagnoseRequest, diagnose_robot
+from postproc.workflows.identify import IdentifyRequest, identify
+from postproc.workflows.workspace import MapRequest, map_workspace
+
+SAMPLES = Path(__file__).parents[1] / "samples"
+MAP = MapRequest(
+    robot="kuka_kr270",
+    ranges_mm=((1000.0, 2000.0), (-400.0, 400.0), (500.0,)),
+    points=5,
+    tool_mm_deg=(0.0, 0.0, 300.0, 0.0, 0.0, 0.0),
+    orientation_deg=(0.0, 0.0, 180.0),
+    wrench=(-360.0, 0.0, 560.0, 0.0, 0.0, 0.0),
+    frame="base",
+)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """name -> (result, its page, how it is shown on a terminal, how its page is made)."""
+    folder = tmp_path_factory.mktemp("results")
+    mapped = map_workspace(replace(MAP, page=folder / "map.html", csv=folder / "sub" / "map.csv"))
+    identified = identify(
+        IdentifyRequest(
+            (SAMPLES / "kr270_campaign" / "loads.csv",),
+            None,
+            ("joint_compliance", "gravity_compensator"),
+            output=folder / "new.yaml",
+            page=folder / "identify.html",
+        )
+    )
+    story = SAMPLES / "kr270_missing_compensator"
+    diagnosed = diagnose_robot(
+        DiagnoseRequest(
+            (story / "loads.csv",),
+            str(story / "kr270_plain.yaml"),
+            output=folder / "found.yaml",
+            page=folder / "diagnose.html",
+        )
+    )
+    return {
+        "map": (mapped, folder / "map.html", show_map, mapped_page),
+        "identify": (identified, folder / "identify.html", show_identified, identified_page),
+        "diagnose": (diagnosed, folder / "diagnose.html", show_diagnosed, diagnosed_page),
+    }
+
+
+@pytest.fixture(params=["map", "identify", "diagnose"])
+def one(request, made):
+    return made[request.param]
+
+
+def test_the_page_says_what_the_terminal_says(one):
+    result, page, show, _ = one
+    stream = io.StringIO()
+    show(Console(file=stream, width=4000, highlight=False), result, True)
+    seen = " ".join(_Tags(page.read_text(encoding="utf-8")).text.split())
+    said = [
+        line
+        for line in stream.getvalue().splitlines()
+        if not line.startswith(("wrote ", "stiffest", "softest"))
+    ]
+    words = {word for line in said for word in line.split() if any(c.isdigit() for c in word)}
+    missing = {word for word in words if word.strip("();,") not in seen}
+    assert len(words) > 20
+    assert missing == set()
+
+
+def test_the_page_is_among_the_outputs_and_leads_to_the_others(one):
+    result, page, *_ = one
+    assert str(page) in result.outputs
+    links = {
+        value
+        for _, attributes in _Tags(page.read_text()).found
+        for value in [attributes.get("href")]
+        if value
+    }
+    wanted = {"./" + Path(path).relative_to(page.parent).as_posix() for path in result.outputs} - {
+        f"./{page.name}"
+    }
+    assert wanted <= links
+
+
+def test_hostile_names_are_text(one):
+    result, _, _, make = one
+    said = Finding("FIL001", HOSTILE, HOSTILE, help=HOSTILE)
+    seen = _Tags(
+        make(
+            replace(result, robot=HOSTILE.replace("\x1b", ""), findings=(said,)), {HOSTILE: HOSTILE}
+        ).decode()
+    )
+    assert "script" not in seen.tags
+    assert seen.tags.count("img") == 1  # the picture
+    assert not any(name.startswith("on") for name in seen.attributes)
+    assert seen.open == []
+
+
+def test_it_opens_without_network_and_without_a_script(window, one):  # noqa: F811
+    _, page, *_ = one
+    for scheme in ("light", "dark"):
+        shown = window(page, color_scheme=scheme)
+        assert shown.requests[0] == page.as_uri()
+        assert all(url.startswith("data:image/svg") for url in shown.requests[1:])
+        assert shown.complaints == []
+        size = shown.page.eval_on_selector(".drawn img", "one => [one.naturalWidth, one.alt.length]")
+        assert min(size) > 20
+        drawn = shown.pixels(".drawn")
+        assert drawn.std() > 10
+
+
+def test_a_map_of_what_is_out_of_reach(tmp_path):
+    far = replace(MAP, ranges_mm=((9000.0, 9500.0), (0.0,), (500.0,)), page=tmp_path / "far.html")
+    mapped = map_workspace(far)
+    assert mapped.exit == 3
+    text = (tmp_path / "far.html").read_text()
+    assert "No cell is in reach." in text
+    assert "<img" not in text
+
+
+@pytest.mark.parametrize("name", ["loads.csv", "new.yaml"])
+def test_a_page_replaces_neither_an_input_nor_another_result(tmp_path, name):
+    data = tmp_path / "loads.csv"
+    data.write_bytes((SAMPLES / "kr270_campaign" / "loads.csv").read_bytes())
+    before = data.read_bytes()
+    request = IdentifyRequest(
+        (data,), None, ("joint_compliance",), output=tmp_path / "new.yaml", page=tmp_path / name
+    )
+    with pytest.raises(Refusal, match="FIL007"):
+        identify(request)
+    with pytest.raises(Refusal, match="FIL007"):
+        diagnose_robot(DiagnoseRequest((data,), output=tmp_path / "new.yaml", page=tmp_path / name))
+    assert data.read_bytes() == before
+    assert not (tmp_path / "new.yaml").exists()
