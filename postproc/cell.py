@@ -24,7 +24,7 @@ SAME_POSITION = 0.01 * MM
 SAME_ANGLE = 0.01 * DEG
 """Within these a literal $TOOL is taken for a tool of the cell."""
 
-_KEYS = (
+KEYS = (
     "robot",
     "robot_base",
     "tools",
@@ -44,7 +44,7 @@ _KEYS = (
     "dialect",
 )
 _POSE_KEYS = ("x", "y", "z", "a", "b", "c")
-_AXES = {
+AXES = {
     sign + name: tuple((1.0 if sign == "+" else -1.0) if i == k else 0.0 for i in range(3))
     for k, name in enumerate("xyz")
     for sign in "+-"
@@ -151,7 +151,7 @@ def find_cell(program: Path) -> Path:
 def load_cell(path: Path) -> Cell:
     """Reads and checks a cell file.  Refusal: FIL..., YML... with file, line and key."""
     top = load(path)
-    top.only(*_KEYS)
+    top.only(*KEYS)
     if "force" in top and "process" in top:
         raise top.error("YML004", "stands beside 'force'; only one of them can be meant", "process")
     controller = top.section("controller", None)
@@ -374,8 +374,8 @@ def _axis(section: Section) -> Floats:
         vector /= largest  # squares of very large or small numbers leave the range
         return frozen(vector / np.linalg.norm(vector), (3,))
     word = section.text("axis", "+z").strip().lower()
-    if word not in _AXES:
+    if word not in AXES:
         # no nearest name: z is as near to -z as to +z, and the wrong one turns the force round
-        allowed = ", ".join(_AXES)
+        allowed = ", ".join(AXES)
         raise section.error("YML004", f"{word!r} is not one of {allowed}, nor a list [x, y, z]", "axis")
-    return frozen(_AXES[word], (3,))
+    return frozen(AXES[word], (3,))

@@ -8,11 +8,10 @@ import signal
 import socket
 import time
 
+import distributed
 import pytest
 from conftest import CELL
 from test_batch_killed import a_long_program
-
-distributed = pytest.importorskip("distributed")
 
 from postproc.batch.cluster import run_on_cluster
 from postproc.batch.jobs import jobs_of

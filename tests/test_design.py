@@ -13,6 +13,8 @@ ROOT = Path(postproc.__file__).parent
 ROOMS = {
     "__main__": 11,
     "cli": 10,
+    "api": 9,
+    "schemas": 9,
     "batch": 9,
     "workflows": 8,
     "report": 7,
@@ -44,6 +46,7 @@ ROOMS = {
 """Room -> its floor.  A new room gets its floor here."""
 
 ONE_FLOOR = {
+    ("schemas", "batch"),
     ("forces", "cell"),
     ("experiments", "identification"),
     ("toolpath", "geometry"),

@@ -12,6 +12,7 @@ import click
 from postproc import __version__
 from postproc.cli.batch import batch
 from postproc.cli.check import check
+from postproc.cli.completion import Commands, completion
 from postproc.cli.diagnose import diagnose
 from postproc.cli.identify import identify
 from postproc.cli.map import map_
@@ -19,6 +20,7 @@ from postproc.cli.plan import plan
 from postproc.cli.predict import predict
 from postproc.cli.program import program
 from postproc.cli.robots import robots
+from postproc.cli.schema import schema
 from postproc.cli.verify import verify
 from postproc.findings import nearest
 
@@ -33,10 +35,12 @@ COMMANDS = {
     "diagnose": diagnose,
     "batch": batch,
     "robots": robots,
+    "schema": schema,
+    "completion": completion,
 }
 
 
-@click.group(commands=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Commands, commands=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="compensate")
 def main() -> None:
     """Make an industrial robot cut as if it did not bend.
