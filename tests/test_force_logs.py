@@ -1,14 +1,21 @@
 """Measured forces over path length or time, brought to the motions, and what they refuse."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from test_forces import PTP_THEN, cell_of, codes, path_of, refused, run
 from test_forces_along import arc_path
 
+from postproc.cell import frames_of
 from postproc.findings import Finding, Refusal
+from postproc.forces import wrenches
+from postproc.forces.logs import read_log
+from postproc.tables import Table
 from postproc.toolpath import Kind
 
 # lines 10 to 14: a PTP, then 100, 200 and 50 mm along +x
@@ -27,9 +34,6 @@ def log(folder: Path, place, forces, column="s_mm", head="fx,fy,fz", name="part.
 
 
 def taken_off(toolpath, spec):
-    from postproc.cell import frames_of
-    from postproc.forces import wrenches
-
     cell = cell_of()
     return wrenches(
         Path("part.src"), toolpath, frames_of(cell, toolpath, "part.src"), cell, spec, offset=True
@@ -84,7 +88,7 @@ def test_the_mean_and_the_peak_of_each_motion(tmp_path):
     assert np.allclose(result.peak[1:], 350, atol=1)
     assert np.isnan(result.peak[0])
     what = told(result, "FRC029").message
-    assert "3500 samples over 3 motions, 1000 each in the median" in what
+    assert "3500 readings on 3 motions, 1000 each in the median" in what
     assert "largest mean force 20" in what
     assert "largest peak 350 N" in what
 
@@ -105,6 +109,18 @@ def test_the_force_may_step_between_two_motions(tmp_path):
     assert np.allclose(result.values[1:, 0], [20, 400, 400])
     assert np.allclose(result.start[1:, 0], [20, 400, 400])
     assert result.steps.tolist() == [False, True, True, False]
+
+
+def test_scatter_makes_no_steps(tmp_path):
+    """Teeth that come faster than the readings scatter them by half of their mean; that is no jump of the force."""
+    rng = np.random.default_rng(4)
+    path = path_of([[0.001 * i, 0, 0] for i in range(301)], [Kind.PTP] + [Kind.LIN] * 300)
+    s = np.arange(0, 300, 0.1)
+    force = np.where(s < 150, 200.0, 800.0) * (1 + 0.7 * np.sin(rng.uniform(0, 2 * np.pi, len(s))))
+    result = run(path, log(tmp_path, s, force))
+    assert np.flatnonzero(result.steps).tolist() == [1, 151]
+    few = run(path, log(tmp_path, s[::7], force[::7]))  # one reading or two a motion
+    assert np.count_nonzero(few.steps) <= 2
 
 
 def test_a_cut_that_begins_within_a_motion_is_told(tmp_path):
@@ -320,3 +336,29 @@ def test_mistakes_in_logs_are_told_with_their_line(tmp_path, text, line, words):
 
 def test_an_empty_program_has_no_log(tmp_path):
     assert not run(path_of([]), log(tmp_path, S, S)).any
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_the_line_of_each_motion_keeps_the_mean_of_its_samples(seed):
+    """Even samples, as many in both halves: what the line carries along the motion is what was measured there."""
+    rng = np.random.default_rng(seed)
+    length = rng.integers(3, 40, 6) * 2  # samples per motion, 1 mm apart, in the middle of each mm
+    ends = np.append(0, np.cumsum(length))
+    path = path_of(np.stack([ends * 1e-3, 0 * ends, 0 * ends], axis=1), [Kind.PTP] + [Kind.LIN] * 6)
+    s = np.arange(ends[-1]) + 0.5
+    force = np.cumsum(rng.normal(size=len(s))) * 10 + 300 * np.sin(s / 30)
+    columns = {"s_mm": s, "fx": force, "fy": 0 * s, "fz": 0 * s}
+    table = Table(
+        Path("l.csv"),
+        "FRC003",
+        {k: [repr(float(v)) for v in c] for k, c in columns.items()},
+        np.arange(2, len(s) + 2),
+        1,
+        ",",
+    )
+    stated, _ = read_log(table, "s_mm", path, frames_of(cell_of(), path, "part.src"), "part.src", False)
+    mean = [force[a:b].mean() for a, b in pairwise(ends)]
+    assert np.allclose(0.5 * (stated.begin + stated.values)[1:, 0], mean, atol=1e-9)
+    largest = [np.abs(force[a:b]).max() for a, b in pairwise(ends)]
+    assert np.allclose(stated.peak[1:], largest)

@@ -27,7 +27,8 @@ class Stated:
 
     ``values`` (N, 6): where the motion ends; ``start`` (N, 6): where it begins (the same where it is not given), linear
     in between.  ``ci95`` (N,): half width of the 95 % interval of the force as a share of it; ``peak`` (N,) [N]: the
-    largest force on the way of the motion.  NaN where not known, None where known of no motion.
+    largest force on the way of the motion.  NaN where not known, None where known of no motion.  ``error`` (N,) [N]:
+    standard error of the force at the ends, where it was measured.
     """
 
     values: Floats
@@ -35,12 +36,13 @@ class Stated:
     start: Floats | None = None
     ci95: Floats | None = None
     peak: Floats | None = None
+    error: Floats | None = None
 
     def __post_init__(self) -> None:
         n = len(self.values)
         object.__setattr__(self, "values", frozen(self.values, (n, 6)))
         object.__setattr__(self, "frame", frozen(self.frame, (n,), np.int64))
-        for name, shape in (("start", (n, 6)), ("ci95", (n,)), ("peak", (n,))):
+        for name, shape in (("start", (n, 6)), ("ci95", (n,)), ("peak", (n,)), ("error", (n,))):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name), shape))
 

@@ -21,6 +21,9 @@ JUMP = float(2 * np.sin(SMOOTH_TURN / 2))
 JUMP_OF_LARGEST = 0.05
 """Changes below this share of the program's largest force are no steps."""
 
+CLEAR = 4.0
+"""A measured force jumps where it does by more than so many of its standard errors."""
+
 
 @dataclass(frozen=True, eq=False)
 class Wrenches:
@@ -170,7 +173,9 @@ def turned(
     start[lost] = instead
 
     after = np.flatnonzero(runs.smooth & ~np.isnan(leaving[:, 0]) & ~np.roll(placeholder, 1))
-    after = after[~_jumps(own[after - 1], leaving[after], own)]
+    error = np.zeros(n) if stated.error is None else stated.error
+    scatter = np.hypot(error[after - 1], error[after])
+    after = after[~_jumps(own[after - 1], leaving[after], own, scatter)]
     shared = 0.5 * (own[after - 1] + leaving[after])
     values[after - 1] = start[after] = shared
     steps = carries.copy()
@@ -180,12 +185,15 @@ def turned(
     )
 
 
-def _jumps(one: Floats, two: Floats, program: Floats) -> Bools:
-    """(M,) whether the force between ``one`` and ``two`` (M, 6) changes by more than JUMP."""
+def _jumps(one: Floats, two: Floats, program: Floats, scatter: Floats) -> Bools:
+    """(M,) whether the force between ``one`` and ``two`` (M, 6) changes by more than JUMP, and clear of its
+    ``scatter`` (M,) [N]."""
     size = np.maximum(np.linalg.norm(one[:, :3], axis=1), np.linalg.norm(two[:, :3], axis=1))
     largest = np.linalg.norm(program[:, :3], axis=1).max(initial=0.0)
     change = np.linalg.norm(two[:, :3] - one[:, :3], axis=1)
-    return np.asarray((change > JUMP * size) & (change > JUMP_OF_LARGEST * largest))
+    return np.asarray(
+        (change > np.maximum(JUMP * size, JUMP_OF_LARGEST * largest)) & (change > CLEAR * scatter)
+    )
 
 
 class _Turn:
