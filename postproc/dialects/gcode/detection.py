@@ -6,6 +6,8 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from postproc.dialects.gcode import kuka_cnc, sinumerik
+
 SUFFIXES = frozenset(
     f".{suffix}"
     for suffix in (
@@ -17,13 +19,13 @@ BEGIN = 65536
 """Bytes from the begin of a file that are looked at."""
 
 _KRL = re.compile(
-    rb"^(?:\xef\xbb\xbf)?[ \t]*(?:(?:GLOBAL[ \t]+)?DEF(?:FCT|DAT)?[ \t]+[A-Za-z_$]|&(?:ACCESS|REL|PARAM)\b"
-    rb"|S?(?:PTP|LIN|CIRC)[ \t]*\{)",
+    rb"^(?:\xef\xbb\xbf)?[ \t]*+(?:(?:GLOBAL[ \t]++)?(?:DEF|DEFDAT)[ \t]++[A-Za-z_$][A-Za-z0-9_$]*+[ \t]*+(?:\(|;|PUBLIC|\r?$)"
+    rb"|&(?:ACCESS|REL|PARAM)\b|S?(?:PTP|LIN|CIRC)(?:_REL)?[ \t]*+\{|BAS[ \t]*+\(|\$(?:BASE|TOOL|VEL|APO)\b)",
     re.I | re.M,
 )
 _BLOCK = re.compile(
-    rb"^(?:\xef\xbb\xbf)?[ \t]*/?[ \t]*(?:N[ \t]*\d+[ \t]*)?"
-    rb"(?:G[ \t]*\d{1,3}(?:\.\d)?|[XYZ][ \t]*[-+]?[ \t]*\.?\d|[MT][ \t]*\d{1,4}(?![A-Za-z_]))"
+    rb"^(?:\xef\xbb\xbf)?[ \t]*+/?[ \t]*+(?:N[ \t]*+\d++[ \t]*+)?"
+    rb"(?:G[ \t]*+\d{1,3}(?:\.\d)?|[XYZ][ \t]*+[-+]?[ \t]*+\.?\d|[MT][ \t]*+\d{1,4}(?![A-Za-z_]))"
     rb"[^\r\n;({=]{0,200}(?:[;(\r\n]|\Z)",
     re.I | re.M,
 )
@@ -51,4 +53,9 @@ def is_fanuc(path: Path, raw: bytes) -> bool:
     return is_gcode(path, raw) and _FANUC.search(raw[:BEGIN]) is not None
 
 
-CLAIMS: dict[str, Callable[[Path, bytes], bool]] = {"fanuc": is_fanuc, "linuxcnc": is_gcode}
+CLAIMS: dict[str, Callable[[Path, bytes], bool]] = {
+    "kuka_cnc": lambda path, raw: is_gcode(path, raw) and kuka_cnc.claims(raw),
+    "sinumerik": lambda path, raw: is_gcode(path, raw) and sinumerik.claims(path.suffix, raw),
+    "fanuc": is_fanuc,
+    "linuxcnc": is_gcode,
+}

@@ -127,16 +127,18 @@ CONTROL = Control(
     codes=CODES,
     line=Lines(NAMED),
     comment=COMMENT,
-    start={Group.OFFSET: 0},
+    start={Group.OFFSET: 0, Group.TCP: 1},
     endings=frozenset((2, 30)),
     frame=frame,
     columns=tuple(key(letter, 1) for letter in "IJK"),
+    angles=((2, 0), (1, 1), (0, 2)),
+    whole=True,
 )
 """KUKA.CNC, on a KRC."""
 
 _CLAIM = re.compile(rb"^[ \t]*(?:N[ \t]*\d+[ \t]*)?#[ \t]*(?:TRAFO|MCS|PTP|HSC|CS|ACS|SLOPE)\b", re.I | re.M)
 
 
-def claims(suffix: str, raw: bytes) -> bool:
+def claims(raw: bytes) -> bool:
     """Whether a file is for KUKA.CNC: by its # commands."""
     return _CLAIM.search(raw[: 1 << 20]) is not None

@@ -72,7 +72,7 @@ class Lines:
             if address is not None:
                 letter, index = address[1].decode().upper(), address[2]
                 if letter == "P" and index:
-                    note("assign", address[0], place)
+                    note("assign", b"<" + address[0], place)
                     break
                 close = expression_end(text, address.end())
                 literal = text[address.end() : close].rstrip()
@@ -113,7 +113,8 @@ class Lines:
             while text[at : at + 1] == b"[":
                 at = bracket_end(text, at)
             assigned = text[at:].lstrip(b" \t").startswith(b"=")
-            note("assign" if assigned or name[0].upper() == b"WAIT" else "call", rest, place)
+            quiet = assigned or name[0].upper() == b"WAIT"
+            note("assign" if quiet else "call", b"<" + rest if quiet else rest, place)
         else:
             note("unknown", rest, place)
         return len(text)

@@ -85,6 +85,9 @@ _NAMED: tuple[tuple[Group, int, str], ...] = (
     (Group.FOREIGN, 0, "TRAFOOF TRAORI"),
     (Group.AXIAL, 1, "PTP PTPG0 PTPWOC"),
     (Group.AXIAL, 0, "CP"),
+    (Group.EULER, 0, "ORIEULER"),
+    (Group.EULER, 1, "ORIRPY"),
+    (Group.EULER, -1, "ORIRPY2"),
     (Group.DIAMETER, 1, "DIAMON DIAM90 DIAMCYCOF"),
     (Group.DIAMETER, 0, "DIAMOF"),
     (Group.MACRO, 1, "MCALL()"),
@@ -104,7 +107,7 @@ _NAMED: tuple[tuple[Group, int, str], ...] = (
         "FNORM FLIN FCUB FPO BRISK SOFT DRIVE FFWON FFWOF COMPON COMPCURV COMPCAD COMPSURF COMPOF FIFOCTRL STARTFIFO "
         "STOPFIFO DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH DYNPREC CUT2D CUT2DF CUT3DC CUT3DF CUT3DFS CUT3DFF CDON "
         "CDOF CDOF2 NORM KONT KONTT KONTC SPCON SPCOF CFC CFTCP CFIN SPATH UPATH LFTXT LFWP LFPOS STOPRE RTLION RTLIOF "
-        "SBLON SBLOF ORISON ORISOF ORIWKS ORIMKS ORIAXES ORIVECT ORIPLANE ORIMACHAX ORIVIRTAX ORIRESET FGROUP "
+        "SBLON SBLOF ORISON ORISOF ORIWKS ORIMKS ORIAXES ORIVECT ORIPLANE ORIMACHAX ORIVIRTAX ORIVIRT1 FGROUP "
         "ADISPOSA GEOAX DISPLOF DISPLON TCOABS TCOFR TCOFRX TCOFRY TCOFRZ NOC FEEDOF BNAT BTAN BAUTO ENAT ETAN EAUTO "
         "TRAFOON ORIROTA ORIROTR ORIROTT ORIROTC OSC OSD OSSE OST OSOF GFRAME0 PTPON LIFTFAST ACCLIMA SPIF1 SPIF2",
     ),
@@ -164,6 +167,8 @@ def frame(event: Event) -> Frame:
     return replace(base, turn=base.turn @ turn)
 
 
+EULER, VECTOR = (tuple(key(letter, index) for letter in "ABC") for index in (2, 3))
+
 CONTROL = Control(
     name="sinumerik",
     codes=CODES,
@@ -173,11 +178,13 @@ CONTROL = Control(
     endings=frozenset((2, 17, 30)),
     turns=(TURN, 0),
     frame=frame,
-    columns=(
-        RPL,
-        TURN,
-        *(key(letter, index) for index in (1, 2, 3) for letter in ("IJK" if index == 1 else "ABC")),
-    ),
+    columns=(RPL, TURN, *(key(letter, 1) for letter in "IJK"), *EULER, *VECTOR),
+    angles=((0, 0), (1, 1), (2, 2)),
+    whole=True,
+    vector=VECTOR,
+    euler=EULER,
+    calls=frozenset((key("L"),)),
+    further=True,
 )
 """Sinumerik 840D, its own language (G290)."""
 
@@ -190,7 +197,7 @@ _CLAIM = re.compile(
 )
 
 
-def control(raw: bytes) -> Control:
+def with_tools(raw: bytes) -> Control:
     """The control with the named tools of a program: T="MILL10" is the tool whose number is its place among the
     names, in the order in which they appear."""
     tools: dict[bytes, int] = {}

@@ -118,7 +118,7 @@ class _Taken:
         if address is not None:
             letter, index = address[1].upper(), address[2]
             if letter == b"R" and index:
-                self.note("assign", address[0], place)
+                self.note("assign", b"<" + address[0], place)
                 return len(text)
             if letter == b"G":
                 self.note("axis", address[0], place)
@@ -176,7 +176,7 @@ class _Taken:
                 behind += 1
             return self.assigned(name, place, behind)
         if name.startswith(b"$") or assigned:
-            self.note("base" if name.startswith(b"$P_UIFR") else "assign", text[place:].strip(), place)
+            self.note("base" if name.startswith(b"$P_UIFR") else "assign", b"<" + text[place:].strip(), place)
             return len(text)
         if name in self.names:
             self.codes(place, end, name)
@@ -202,7 +202,7 @@ class _Taken:
             # In a block with other words it can only be an axis of the machine.
             self.note("axis", name, place)
         else:
-            self.note("assign", self.text[place:].strip(), place)
+            self.note("assign", b"<" + self.text[place:].strip(), place)
         return max(close, behind + 1)
 
     def arguments(self, end: int) -> int:
@@ -228,7 +228,7 @@ class _Taken:
             elif name in OPENS or name in CLOSES:
                 self.note("open" if name in OPENS else "close", said, place)
             else:
-                self.note("assign", said, place)
+                self.note("assign", b"<" + said, place)
             return len(text)
         closed = self.arguments(end)
         if name in QUIET_CALLS:

@@ -80,7 +80,7 @@ def write_arcs(arcs: Arcs) -> WrittenArcs:
     across = PLANES[arcs.plane, 2]
     wanted[rows[by_centre], across[by_centre]] = np.nan
     wanted[by_radius, :3] = np.nan
-    radius = 0.5 * (np.linalg.norm(centre - arcs.begin, axis=1) + np.linalg.norm(centre - arcs.end, axis=1))
+    radius = 0.5 * (_distance(arcs, centre, arcs.begin) + _distance(arcs, centre, arcs.end))
     wanted[by_radius, 3] = np.where(arcs.sweep > np.pi, -radius, radius)[by_radius]
     # Beyond 120 deg the middle moves by more than the radius does.
     decimals[:, 3] += by_radius & (arcs.sweep > np.radians(120.0))
@@ -118,14 +118,14 @@ def _in_plane(arcs: Arcs, vectors: Floats) -> Floats:
 
 
 def _balanced(arcs: Arcs) -> Floats:
-    """Centres at the same distance from begin and end: shifted along the chord, but for circles that nearly
-    close, whose chord has no direction."""
+    """Centres at the same distance from begin and end: shifted along the chord, by what the radii differ times radius /
+    chord.  Circles that nearly close stay: there that moves the far side by many digits."""
     axes = PLANES[arcs.plane, :2]
     begin, end, centre = (_in_plane(arcs, p) for p in (arcs.begin, arcs.end, arcs.centre))
     chord = end - begin
     length = np.linalg.norm(chord, axis=1)
     radius = np.linalg.norm(centre - begin, axis=1)
-    usable = (arcs.form != Form.THROUGH) & (length > 0) & ((arcs.sweep <= np.pi) | (length > 0.2 * radius))
+    usable = (arcs.form != Form.THROUGH) & (length > 0) & ((arcs.sweep <= np.pi) | (length >= radius))
     unit = chord / np.where(length > 0, length, 1.0)[:, None]
     off = np.sum((centre - 0.5 * (begin + end)) * unit, axis=1)
     result = arcs.centre.copy()
@@ -138,9 +138,14 @@ def _centre(arcs: Arcs, number: Floats) -> Floats:
     return np.where(np.isnan(number[:, :3]), 0.0, number[:, :3]) + np.where(arcs.relative, arcs.begin, 0.0)
 
 
+def _distance(arcs: Arcs, one: Floats, other: Floats) -> Floats:
+    """(K,) in the plane."""
+    return np.asarray(np.linalg.norm(_in_plane(arcs, one - other), axis=1))
+
+
 def _mismatch(arcs: Arcs, number: Floats) -> Floats:
-    begin, end, centre = (_in_plane(arcs, p) for p in (arcs.begin, arcs.end, _centre(arcs, number)))
-    return np.asarray(np.abs(np.linalg.norm(begin - centre, axis=1) - np.linalg.norm(end - centre, axis=1)))
+    centre = _centre(arcs, number)
+    return np.abs(_distance(arcs, arcs.begin, centre) - _distance(arcs, arcs.end, centre))
 
 
 def _misread(arcs: Arcs, number: Floats, through: Bools, by_radius: Bools) -> Bools:

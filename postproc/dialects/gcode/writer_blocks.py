@@ -58,7 +58,7 @@ class Blocks:
         """Whether the program writes G01 for G1."""
         verbs = self.places.verb[self.places.verb >= 0][:1].tolist()
         words = self.places.text.words
-        return any(self.raw[int(words.start[v]) : int(words.stop[v])].startswith(b"0") for v in verbs)
+        return any(len(self.raw[int(words.start[v]) : int(words.stop[v])].strip()) > 1 for v in verbs)
 
 
 def insertions(blocks: Blocks) -> Iterator[Edit]:
