@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from postproc.dialects.dialect import Dialect
+from postproc.dialects.gcode import DIALECTS as GCODE
 from postproc.dialects.krl import KrlDialect
 from postproc.findings import Finding, Refusal
 
-DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (KrlDialect(),)}
+DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (*GCODE, KrlDialect())}
 """Name -> dialect; the first that claims a file reads it."""
 
 

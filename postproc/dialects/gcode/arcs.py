@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.geometry import arc_through
 
 PLANES = np.array([[0, 1, 2], [2, 0, 1], [1, 2, 0]])
 """Axes u, v, w of G17, G18, G19."""
@@ -26,7 +27,8 @@ ABSOLUTE, RELATIVE, MOST = 1e-5, 1e-3, 1e-4
 @dataclass(frozen=True, eq=False)
 class Arcs:
     """centre (N, 3) [m], normal (N, 3), sweep (N,) > 0 [rad], in the frame of the program; wrong (N,): 0, or why there
-    is none: 1 begin or end not known, 2 no centre, 3 radii differ, 4 R too short or a full circle, 5 no plane."""
+    is none: 1 begin or end not known, 2 no centre, 3 radii differ, 4 R too short or a full circle, 5 no plane,
+    6 three points on a line."""
 
     centre: Floats
     normal: Floats
@@ -104,3 +106,13 @@ def arcs(
     bad = wrong > 0
     place[bad], normal[bad], sweep[bad] = np.nan, np.nan, np.nan
     return Arcs(place, normal, sweep, wrong)
+
+
+def through(begin: Floats, via: Floats, end: Floats, turns: Floats) -> Arcs:
+    """The arcs through three points (N, 3) each [m]."""
+    centre, normal, sweep = arc_through(begin, via, end)
+    unknown = ~np.isfinite(np.concatenate([begin, via, end], axis=1)).all(axis=1)
+    wrong = np.where(unknown, 1, np.where(np.isnan(sweep) | ~(turns >= 0), 6, 0))
+    bad = wrong > 0
+    centre[bad], normal[bad] = np.nan, np.nan
+    return Arcs(centre, normal, np.where(bad, np.nan, sweep + 2 * np.pi * turns), wrong)

@@ -18,6 +18,9 @@ from postproc.units import DEG, MM
 
 INCH = 25.4 * MM
 AXES = tuple(key(letter) for letter in "XYZABC")
+THROUGH = tuple(key(letter, 1) for letter in "IJK")
+"""The point between of an arc through three points."""
+
 SECOND = tuple(key(letter) for letter in "UVW")
 FRAMED = {
     Group.TURNED: "turned coordinates (G68)",
@@ -25,7 +28,8 @@ FRAMED = {
     Group.MIRRORED: "mirrored coordinates (G51.1)",
     Group.POLAR: "polar coordinates (G16)",
     Group.DIAMETER: "diameters (G7)",
-    Group.LENGTHS: "a tool offset that the program computes",
+    Group.LENGTHS: "offset by what the program computes",
+    Group.FOREIGN: "those of a mode that is not read",
 }
 """Modes in which words are no coordinates of the base."""
 
@@ -69,9 +73,18 @@ class Blocks:
     length: Floats
     length_of_integer: Floats
     degrees_of_integer: float
+    notes: dict[str, Bools]
 
     def __len__(self) -> int:
         return len(self.word)
+
+    def noted(self, *kinds: str) -> Bools:
+        """(B,) blocks with a note of one of these kinds."""
+        result = np.zeros(len(self), np.bool_)
+        for kind in kinds:
+            if kind in self.notes:
+                result |= self.notes[kind]
+        return result
 
     def of(self, wanted: int) -> Ints:
         """(B,) row in text.words of the words with this key."""
@@ -105,15 +118,17 @@ class Blocks:
 
     @cached_property
     def axis(self) -> Bools:
-        return self.has(*AXES, *SECOND)
+        """(B,) words of axes, or what stands for them."""
+        second = () if self.control.further else SECOND
+        return self.has(*AXES, *second) | self.noted("axis", "polar")
 
     @cached_property
     def motion(self) -> Bools:
         """(B,) the block moves the machine."""
         modal = self.modal
         silent = modal.has(Once.DWELL, Once.SETTING, Once.CALL, Once.OTHER, *CHANGES)
-        arc = np.isin(self.move, (Move.CLOCKWISE, Move.COUNTER)) & (modal.verb >= 0)
-        arc &= self.has(*(key(letter) for letter in "IJKR"))
+        arc = np.isin(self.move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH)) & (modal.verb >= 0)
+        arc &= self.has(*(key(letter) for letter in "IJKR"), *(one for one in THROUGH if one in self.columns))
         return modal.flow.tape & ((self.axis | arc) & ~silent | modal.has(Once.HOME))
 
     @cached_property
@@ -147,14 +162,21 @@ def blocks(text: Text, modal: Modal, control: Control, increments: bool) -> Bloc
     integer = length * np.where(inch, 1e-4, 1e-3) if increments else length
     return Blocks(
         text, modal, control, columns, word, np.any(many, axis=1), length, integer,
-        DEG * (1e-3 if increments else 1.0),
+        DEG * (1e-3 if increments else 1.0), _noted(text),
     )  # fmt: skip
 
 
-def course(given: Blocks, notes: dict[str, Bools], spoiled: Bools) -> tuple[Course, list[str], Ints]:
+def _noted(text: Text) -> dict[str, Bools]:
+    found: dict[str, Bools] = {}
+    for note in text.notes:
+        found.setdefault(note.kind, np.zeros(len(text.blocks), np.bool_))[note.block] = True
+    return found
+
+
+def course(given: Blocks, spoiled: Bools) -> tuple[Course, list[str], Ints]:
     """What the blocks do to the coordinates; the reasons why they leave them unknown, and which of them each block has.
 
-    notes: kind -> (B,) blocks with such a note; spoiled (B,): blocks behind which the base is another one.
+    spoiled (B,): blocks before which the base became another one.
     """
     modal, n = given.modal, len(given)
     force, flow = modal.force, modal.flow
@@ -197,7 +219,8 @@ def course(given: Blocks, notes: dict[str, Bools], spoiled: Bools) -> tuple[Cour
     lose(whole, given.motion & given.twice, What.TWICE)
     parallel = np.stack([given.of(axis) >= 0 for axis in SECOND], axis=1)
     both = np.concatenate([parallel, np.zeros((n, 3), np.bool_)], axis=1)
-    lose(both, parallel.any(axis=1) & given.motion, What.PARALLEL)
+    if not given.control.further:
+        lose(both, parallel.any(axis=1) & given.motion, What.PARALLEL)
     lose(whole, other | (given.motion & (force[Group.MACRO] != 0)), What.OTHER)
     if cycle.any():
         # Words of a cycle give where it works; it ends at the depth that it began at, or at R.
@@ -209,8 +232,8 @@ def course(given: Blocks, notes: dict[str, Bools], spoiled: Bools) -> tuple[Cour
         lose(deep, cycle & (force[Group.RETURN] != 0), What.CYCLE)
         lose(whole, cycle & repeats & (force[Group.DISTANCE] != 0), What.CYCLE)
     lose(present, given.motion & (flow.doubt != Doubt.NONE), What.DOUBT)
-    for kind, why in (("unknown", What.TEXT), ("corner", What.OTHER)):
-        lose(whole, notes.get(kind, np.zeros(n, np.bool_)), why)
+    lose(whole, given.noted("unknown"), What.TEXT)
+    lose(whole, given.noted("corner", "axis", "polar"), What.OTHER)
     leave(whole, flow.forget, What.CALL)
 
     base = force[Group.OFFSET]

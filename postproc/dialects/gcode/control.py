@@ -36,8 +36,11 @@ class Group(IntEnum):
     DIAMETER = 17  # 0; else X is a diameter
     SPINDLE = 18  # 0 speed, 1 constant surface speed: F per revolution is then unknown
     MACRO = 19  # 0; else every block calls a macro (G66)
-    ONCE = 20  # Once
-    NONE = 21  # known, says nothing about the path
+    FOREIGN = 20  # 0; else words are no coordinates of the base in this mode (#MCS ON, TRANSMIT)
+    AXIAL = 21  # 0; else targets are axis positions, or reached as the axes go (PTP)
+    ONCE = 22  # Once
+    NONE = 23  # known, says nothing about the path
+    EULER = 40  # what A2= B2= C2= are: 0 Euler angles (Z X' Z''), 1 RPY angles (Z Y' X'')
 
 
 class Move(IntEnum):
@@ -130,13 +133,15 @@ class Frame:
 class Event:
     """A block that changes the frame: its words (key -> value as written, NaN if UNREAD), its Once bits, its notes.
 
-    scale [m]: one unit of length; frame: before the block; position (6,) [m, rad]: where the tool is, in the base.
+    plane: 0, 1, 2 for G17, G18, G19; scale [m]: one unit of length; frame: before the block; position (6,) [m, rad]:
+    where the tool is, in the base.
     """
 
     words: Mapping[int, float]
     once: int
     notes: tuple[Note, ...]
     codes: tuple[float, ...]
+    plane: int
     scale: float
     frame: Frame
     position: Floats
@@ -158,6 +163,11 @@ class Control:
     cycle; increments: a length without a decimal point may count increments; turns: key of the word that gives the
     turns of an arc, and how many of them an arc without the word has.
     frame: the frame behind a block with G52, G92 ... or Once.FRAME; columns: keys of further words of motions.
+    angles: what A, B, C do where a program uses all three, see ``orientation.Angles.sequence``; whole: they then give
+    the orientation of the tool itself, not what turns it from where it stands in the cell; vector, euler: keys of the
+    words of a tool vector and of angles that say where it points.
+    calls: keys of words that call a subprogram in a block without G and M; further: U, V, W are axes beside X, Y, Z,
+    and leave these as they are.
     """
 
     name: str
@@ -173,3 +183,9 @@ class Control:
     turns: tuple[int, int] = (key("P"), 1)
     frame: Callable[[Event], Frame] = kept
     columns: tuple[int, ...] = ()
+    angles: tuple[tuple[int, int], ...] = ((2, 2), (1, 1), (0, 0))
+    whole: bool = False
+    vector: tuple[int, ...] = ()
+    euler: tuple[int, ...] = ()
+    calls: frozenset[int] = frozenset()
+    further: bool = False

@@ -19,7 +19,8 @@ BEGIN = 65536
 """Bytes from the begin of a file that are looked at."""
 
 _KRL = re.compile(
-    rb"^(?:\xef\xbb\xbf)?[ \t]*+(?:(?:GLOBAL[ \t]++)?(?:DEF|DEFDAT)[ \t]++[A-Za-z_$][A-Za-z0-9_$]*+[ \t]*+(?:\(|;|PUBLIC|\r?$)"
+    rb"^(?:\xef\xbb\xbf)?[ \t]*+(?:(?:GLOBAL[ \t]++)?(?:DEF|DEFDAT)[ \t]++[A-Za-z_$][A-Za-z0-9_$]*+[ \t]*+"
+    rb"(?:\(|;|PUBLIC|\r?$)"
     rb"|&(?:ACCESS|REL|PARAM)\b|S?(?:PTP|LIN|CIRC)(?:_REL)?[ \t]*+\{|BAS[ \t]*+\(|\$(?:BASE|TOOL|VEL|APO)\b)",
     re.I | re.M,
 )

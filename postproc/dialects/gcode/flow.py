@@ -12,7 +12,7 @@ from postproc.arrays import Bools, Ints
 from postproc.dialects.gcode.control import Control, Once
 from postproc.dialects.gcode.words import Text, key
 
-_GOTO = re.compile(r"GOTO\s*(\d+)?", re.I)
+_GOTO = re.compile(r"(?:GOTO[BFC]?|REPEATB?)\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
 CALLS = (97, 98, 198)
 RETURNS = (99,)
 
@@ -51,6 +51,11 @@ def follow(text: Text, control: Control, once: Ints) -> Flow:
     codes, at = words.value[m_rows], words.block[m_rows]
     forget[at[np.isin(codes, CALLS)] + 1] = True
     forget[1:] |= (once & (1 << Once.CALL)) != 0
+    if control.calls:
+        coded = np.zeros(n, np.bool_)
+        coded[words.block[np.isin(words.key, (key("G"), key("M")))]] = True
+        named = words.block[np.isin(words.key, list(control.calls))]
+        forget[named[~coded[named]] + 1] = True
     for begin, end in _stretches(text, n, forget):
         doubt[begin:end] = Doubt.FLOW
     programs = _programs(text)
@@ -91,7 +96,7 @@ def _stretches(text: Text, n: int, forget: Bools) -> list[tuple[int, int]]:
     """Ranges of blocks that are loops, branches, subprograms or lie under a jump; calls are put into ``forget``."""
     found: list[tuple[int, int]] = []
     stack: list[tuple[int, str]] = []
-    labels: dict[int, int] | None = None
+    labels: dict[str, int] = {}
     for note in text.notes:
         if note.kind == "call":
             forget[note.block + 1] = True
@@ -106,23 +111,26 @@ def _stretches(text: Text, n: int, forget: Bools) -> list[tuple[int, int]]:
             goto = _GOTO.search(note.text)
             if goto is None:
                 continue
-            if labels is None:
-                rows = np.flatnonzero((text.words.key == key("N")) & np.isfinite(text.words.value))
-                labels = dict(
-                    zip(
-                        text.words.value[rows].astype(int).tolist(),
-                        text.words.block[rows].tolist(),
-                        strict=True,
-                    )
-                )
-            label = labels.get(int(goto[1][:9])) if goto[1] else None
-            if label is None:
-                found.append((0 if goto[1] is None else note.block, n))
+            labels = labels or _labels(text)
+            ends = [labels.get(name.upper().lstrip("N0") or "0") for name in goto.groups() if name]
+            if not ends or None in ends:
+                found.append((0, n))
             else:
-                found.append((min(label, note.block), max(label, note.block + 1)))
+                at = [note.block, *(end for end in ends if end is not None)]
+                found.append((min(at), max([note.block + 1, *at])))
     if stack:
         found.append((stack[0][0], n))
     return found
+
+
+def _labels(text: Text) -> dict[str, int]:
+    """Blocks by the N-number or the label that they begin with."""
+    rows = np.flatnonzero((text.words.key == key("N")) & np.isfinite(text.words.value))
+    names = [f"{value:.0f}" for value in text.words.value[rows].tolist()]
+    labels = dict(zip(names, text.words.block[rows].tolist(), strict=True))
+    return labels | {
+        note.text.upper().lstrip("N0"): note.block for note in text.notes if note.kind == "label"
+    }
 
 
 def _last(doubt: Ints) -> Ints:

@@ -26,6 +26,7 @@ ARCS = {
     3: "the radii of the arc at its begin and at its end differ",
     4: "R of the arc is too short, or its end is its begin",
     5: "the plane of the arc is not known",
+    6: "the three points of the arc lie on a line",
 }
 NUMBERS = (*AXES, *(key(letter) for letter in "IJKR"))
 
@@ -34,7 +35,6 @@ def judged(
     given: Blocks,
     moves: Motions,
     where: Positions,
-    noted: dict[str, Bools],
     base: Ints,
     tool: Ints,
     reasons: list[str],
@@ -51,7 +51,7 @@ def judged(
     for doubt, message in DOUBTS.items():
         code = "GCO025" if doubt == Doubt.ENDED else "GCO006"
         refuse(modal.flow.doubt[rows] == doubt, code, message)
-    refuse(force[Group.MACRO] != 0, "GCO007", "every block calls a macro here (G66)")
+    refuse(force[Group.MACRO] != 0, "GCO007", "every block calls a macro or a cycle here (G66, MCALL)")
     refuse(modal.has(Once.HOME)[rows], "GCO004", "move to the reference point")
     refuse(modal.has(Once.MACHINE)[rows], "GCO004", "move in machine coordinates")
     refuse(modal.has(Once.PROBE)[rows], "GCO011", "probing: where it ends is not known")
@@ -62,10 +62,15 @@ def judged(
         ("unknown", "GCO001", "the block is not understood"),
         ("corner", "GCO016", "a corner that the control rounds or chamfers"),
         ("assign", "GCO005", "the block sets a variable"),
+        ("axis", "GCO004", "axes of the machine by their names"),
+        ("polar", "GCO010", "polar coordinates"),
     ):
-        if kind in noted:
-            refuse(noted[kind][rows], code, message)
-    refuse(given.has(*SECOND)[rows], "GCO016", "U, V, W: further axes, or steps of a lathe")
+        refuse(given.noted(kind)[rows], code, message)
+    refuse(
+        given.has(*SECOND)[rows] & (not given.control.further),
+        "GCO016",
+        "U, V, W: further axes, or steps of a lathe",
+    )
     hows = np.stack([given.how(one)[rows] for one in NUMBERS], axis=1)
     refuse(np.any(hows == How.UNREAD, axis=1), "GCO005", "a word is an expression or a variable, no number")
     quiet = np.isin(moves.move, (-1, Move.NOTHING))
@@ -77,6 +82,7 @@ def judged(
         "a spline, a thread or another motion of the control",
     )
     refuse(force[Group.RADIUS] != 0, "GCO009", "tool radius compensation: the contour is not the tool's path")
+    refuse(force[Group.AXIAL] != 0, "GCO016", "the target is reached as the axes go (PTP)")
     for group, message in FRAMED.items():
         refuse(force[group] != 0, "GCO010", f"the words are {message}")
     refuse(base < 0, "GCO014", "the work offset is not known, or the program itself writes it")
@@ -89,7 +95,7 @@ def judged(
     refuse(
         moves.stand.wrong == 1,
         "GCO013",
-        "rotary axes away from 0 without a TCP mode: the machine's own geometry",
+        "a rotary axis away from 0, or not known, without a TCP mode: the machine's own geometry",
     )
     refuse(moves.stand.wrong == 2, "GCO013", "a rotary axis that the program names was not set yet")
     return doubts
@@ -140,17 +146,17 @@ def _positions(
             message = f"{names}: {why}{f' ({what})' if what else ''}"
             messages.append(("GCO003" if rapid else "GCO002", message, what))
         doubts.refuse_each(some, messages, which.reshape(-1))
-    doubts.refuse(frame.any(axis=1), "GCO019", "the origin was set where the position was not known (G92)")
+    doubts.refuse(
+        np.any(frame, axis=1), "GCO019", "the origin was set where the position was not known (G92)"
+    )
 
 
-def pinned(
-    document: Document, given: Blocks, moves: Motions, way: Course, doubts: Doubts, noted: dict[str, Bools]
-) -> Refusals:
+def pinned(document: Document, given: Blocks, moves: Motions, way: Course, doubts: Doubts) -> Refusals:
     """Motions whose end a refused motion, an origin or other code builds on."""
     rows, n = moves.block, len(moves.block)
     pins = Doubts(n)
     modal = given.modal
-    partial = ~np.all(way.sets[rows, :3], axis=1)
+    partial = np.asarray(np.logical_not(np.all(way.sets[rows, :3], axis=1)))
     reaching = modal.has(Once.HOME, Once.MACHINE)[rows]
     building = np.flatnonzero((doubts.why >= 0) & partial & ~reaching)
     building = building[building > 0]
@@ -164,7 +170,7 @@ def pinned(
         (np.flatnonzero(shifting), "G92 sets the origin at this end point"),
         (np.flatnonzero(modal.flow.forget) - 1, "code that was not read may build on this end point"),
         (
-            np.flatnonzero(noted.get("unknown", np.zeros(len(given), np.bool_))),
+            np.flatnonzero(given.noted("unknown")),
             "a block that is not understood may build on it",
         ),
     ):

@@ -50,7 +50,8 @@ class Modal:
     """force: group -> (B,) value in force in each block, UNKNOWN where it can not be told.
 
     once (B,): bits 1 << Once; verb (B,): word that states the motion, -1 where none; unknown (B,): word whose code is
-    not known, -1 where none; twice (B,): two codes that state different motions.
+    not known, -1 where none; twice (B,): two codes that state different motions.  states: group -> the blocks of its
+    codes.
     """
 
     force: Mapping[Group, Ints]
@@ -59,6 +60,7 @@ class Modal:
     unknown: Ints
     twice: Bools
     flow: Flow
+    states: Mapping[Group, Ints]
 
     def has(self, *once: Once) -> Bools:
         """(B,) blocks with one of these codes."""
@@ -109,7 +111,8 @@ def modal(text: Text, control: Control) -> Modal:
         else:
             force[one] = fill(blocks[own], values[own])
     verb, twice = _verbs(rows, blocks, values, groups == Group.MOTION, n)
-    return Modal(force, once, verb, unknown, twice, flow)
+    states = {one: np.unique(blocks[groups == one]) for one in Group}
+    return Modal(force, once, verb, unknown, twice, flow, states)
 
 
 def _numbers(value: Floats) -> tuple[Ints, Bools]:

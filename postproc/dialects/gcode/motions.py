@@ -9,7 +9,7 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.dialects.gcode.arcs import Arcs
 from postproc.dialects.gcode.positions import Positions
-from postproc.dialects.gcode.rotary import Stand
+from postproc.dialects.gcode.stands import Stand
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +46,9 @@ class Motions:
         turn = np.array([frame.turn for frame in where.frames])[where.frame[block]]
         shift = np.array([frame.shift[:3] for frame in where.frames])[where.frame[block]]
         centre = (turn @ arcs.centre[..., None])[..., 0] + shift
-        normal = (turn @ arcs.normal[..., None])[..., 0]
+        # A mirrored frame turns the sense of a rotation about a mirrored axis.
+        sense = np.sign(np.linalg.det(turn))[:, None]
+        normal = (turn @ arcs.normal[..., None])[..., 0] * sense
         step = end[:, :3] - begin[:, :3]
         bent = np.isfinite(arcs.sweep)
         along = np.einsum("ij,ij->i", step, np.where(bent[:, None], arcs.normal, 0.0))

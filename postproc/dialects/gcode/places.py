@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.dialects.gcode.orientation import Orientation
 from postproc.dialects.gcode.words import Text, key
 from postproc.geometry import Poses
 
@@ -27,8 +28,8 @@ class Places:
     decimal point is (the same but for controls that count in increments).
     frame (N,): row in ``frames``, the programmed coordinates in the base: base = frame @ (number * scale).
     begin (N, 3) [m]: where the motion begins, in its ``frame``; NaN where not known.
-    rotary (N, 3) [rad]: A, B, C in force at the end of the motion, not wrapped; NaN where none was programmed.
-    turned (3, 3): the tool in the base at A = B = C = 0, NaN where nothing says it; rotation = R(A, B, C) @ turned.
+    orient (N,): row in ``orientations``, what the orientation words mean there, -1 where none are in force;
+    turned_values (N, 3): the numbers of these words in force at the end of the motion, NaN where not known.
     feed_mode (N,) Feed: F of INVERSE_TIME belongs to the whole motion.
     """
 
@@ -47,8 +48,9 @@ class Places:
     frame: Ints
     frames: Poses
     begin: Floats
-    rotary: Floats
-    turned: Floats
+    orient: Ints
+    orientations: tuple[Orientation, ...]
+    turned_values: Floats
     feed_mode: Ints
 
     def __len__(self) -> int:

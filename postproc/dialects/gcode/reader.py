@@ -9,10 +9,10 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.dialects.dialect import PLAIN, Program, Settings
 from postproc.dialects.gcode import offsets
-from postproc.dialects.gcode.arcs import Arcs, arcs
-from postproc.dialects.gcode.blocks import Blocks, blocks, course
+from postproc.dialects.gcode.arcs import Arcs, arcs, through
+from postproc.dialects.gcode.blocks import THROUGH, Blocks, blocks, course
 from postproc.dialects.gcode.comments import remarks
-from postproc.dialects.gcode.control import Control, Event, Frame, Group, Move, Once
+from postproc.dialects.gcode.control import Control, Event, Feed, Frame, Group, Move, Once
 from postproc.dialects.gcode.feeds import feeds
 from postproc.dialects.gcode.judging import judged, pinned
 from postproc.dialects.gcode.lexing import lex
@@ -21,7 +21,7 @@ from postproc.dialects.gcode.motions import Motions
 from postproc.dialects.gcode.numbered import references, spoiled, tools
 from postproc.dialects.gcode.places import COLUMNS, Places
 from postproc.dialects.gcode.positions import Positions, positions
-from postproc.dialects.gcode.rotary import stand
+from postproc.dialects.gcode.stands import stands
 from postproc.dialects.gcode.telling import told
 from postproc.dialects.gcode.words import How, Note, Text, key
 from postproc.document import Document
@@ -34,19 +34,16 @@ def read(documents: tuple[Document, ...], control: Control, settings: Settings =
     document = documents[0]
     text = lex(document.raw, control)
     given = blocks(text, modal(text, control), control, control.increments and settings.integer_words == "um")
-    noted = _noted(text)
     offset = spoiled(given)
-    way, reasons, reason = course(given, noted, offset.at)
+    way, reasons, reason = course(given, offset.at)
     where = positions(way, offsets.start(), _events(given), _change(given))
     tool, named = tools(given)
 
     rows = np.flatnonzero(given.motion)
     base = np.where(offset.bad, -1, given.modal.force[Group.OFFSET])[rows]
-    turned = (
-        np.full((3, 3), np.nan) if settings.orientation is None else rotation_from_abc(settings.orientation)
-    )
+    turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
     moves = _motions(given, where, rows, turned)
-    doubts = judged(given, moves, where, noted, base, tool[rows], reasons, reason)
+    doubts = judged(given, moves, where, base, tool[rows], reasons, reason)
     start = text.blocks.start[rows]
     refused = doubts.done(document, text.blocks.line[rows], start, _first(text)[rows])
     frame_of_base, frame_of_tool, frames = references(base, tool[rows], text.blocks.line[rows])
@@ -66,7 +63,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: Settings =
         line=text.blocks.line[rows],
         frames=frames,
         refused=refused,
-        pinned=pinned(document, given, moves, way, doubts, noted),
+        pinned=pinned(document, given, moves, way, doubts),
         annotations=said.annotations,
         centre=moves.centre,
         normal=moves.normal,
@@ -75,26 +72,19 @@ def read(documents: tuple[Document, ...], control: Control, settings: Settings =
         whole=_whole(given, rows),
         comments=said.comments,
         oriented=moves.stand.oriented,
+        free_axis=moves.stand.free_axis,
     )
-    findings = [*refused.told(), *told(document, given, noted, rows, named, settings)]
+    findings = [*refused.told(), *told(document, given, rows, tool, named, settings)]
     return Program(
         control.name,
         documents,
         path,
-        _places(given, where, moves, turned),
+        _places(given, where, moves),
         tuple(sorted(findings, key=lambda finding: finding.line)),
         said.marker,
         said.marker_at,
         (),
     )
-
-
-def _noted(text: Text) -> dict[str, Bools]:
-    """Kind of note -> (B,) blocks that have one."""
-    found: dict[str, Bools] = {}
-    for note in text.notes:
-        found.setdefault(note.kind, np.zeros(len(text.blocks), np.bool_))[note.block] = True
-    return found
 
 
 def _first(text: Text) -> Ints:
@@ -136,6 +126,7 @@ def _change(given: Blocks) -> Callable[[int, Frame, Floats], Frame]:
             int(given.modal.once[block]),
             tuple(notes.get(block, ())),
             codes,
+            int(given.modal.force[Group.PLANE][block]),
             float(given.length[block]),
             frame,
             position,
@@ -149,49 +140,50 @@ def _change(given: Blocks) -> Callable[[int, Frame, Floats], Frame]:
     return changed
 
 
-def _motions(given: Blocks, where: Positions, rows: Ints, turned: Floats) -> Motions:
+def _motions(given: Blocks, where: Positions, rows: Ints, turned: Floats | None) -> Motions:
     begin, end = where.begin[rows], where.end[rows]
     force, move = given.modal.force, given.move[rows]
     plane = force[Group.PLANE][rows]
-    bent = np.isin(move, (Move.CLOCKWISE, Move.COUNTER)) & ~given.machine[rows]
+    bent = np.isin(move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH)) & ~given.machine[rows]
     ways = _arcs(given, rows, begin, end, plane, bent)
     kind = KINDS[move]
     kind[given.modal.has(Once.HOME)[rows]] = Kind.PTP
     kind[given.modal.has(Once.PROBE)[rows]] = Kind.LIN
+    kind[force[Group.AXIAL][rows] != 0] = Kind.PTP
     kind[given.modal.unknown[rows] >= 0] = Kind.OTHER
-    used = given.text.words.key
-    names = np.array([bool((used == key(letter)).any()) for letter in "ABC"])
-    tcp = force[Group.TCP][rows] == 1
-    pose = stand(begin[:, 3:], end[:, 3:], names, tcp, kind == Kind.PTP, turned)
+    pose = stands(given, where, rows, kind == Kind.PTP, turned)
     return Motions.of(rows, move, kind, plane, begin, end, where, ways, pose)
 
 
 def _arcs(given: Blocks, rows: Ints, begin: Floats, end: Floats, plane: Ints, bent: Bools) -> Arcs:
     n = len(rows)
     result = Arcs(np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan), np.zeros(n, np.int64))
-    some = np.flatnonzero(bent)
-    if not len(some):
-        return result
-    at = rows[some]
-    hows = np.stack([given.how(key(letter))[at] for letter in "IJK"], axis=1)
-    absolute = np.where(hows == How.ABSOLUTE, True, (given.modal.force[Group.ARCS][at] == 1)[:, None])
-    absolute &= hows != How.INCREMENTAL
+    between = given.has(*THROUGH)[rows] if THROUGH[0] in given.columns else np.zeros(n, np.bool_)
+    between |= given.move[rows] == Move.THROUGH
     word, usual = given.control.turns
-    turns = np.zeros(len(at))
+    turns = np.zeros(n)
     if word in given.columns:
-        turns = np.nan_to_num(given.number(word)[at] - usual)
-    found = arcs(
-        begin[some, :3],
-        end[some, :3],
-        plane[some],
-        given.move[at] == Move.COUNTER,
-        np.stack([given.lengths(key(letter))[at] for letter in "IJK"], axis=1),
-        absolute,
-        given.lengths(key("R"))[at],
-        turns,
-    )
-    for name in ("centre", "normal", "sweep", "wrong"):
-        getattr(result, name)[some] = getattr(found, name)
+        turns = np.nan_to_num(given.number(word)[rows] - usual)
+    for some, keys in ((bent & ~between, tuple(key(letter) for letter in "IJK")), (bent & between, THROUGH)):
+        if not some.any():
+            continue
+        at = rows[some]
+        hows = np.stack([given.how(one)[at] for one in keys], axis=1)
+        values = np.stack([given.lengths(one)[at] for one in keys], axis=1)
+        group = Group.DISTANCE if keys is THROUGH else Group.ARCS
+        relative = given.modal.force[group][at] == 1
+        absolute = np.where(hows == How.ABSOLUTE, True, (relative != (group == Group.DISTANCE))[:, None])
+        absolute &= hows != How.INCREMENTAL
+        if keys is THROUGH:
+            via = np.where(absolute & (hows >= 0), values, begin[some, :3] + np.where(hows >= 0, values, 0.0))
+            found = through(begin[some, :3], via, end[some, :3], turns[some])
+        else:
+            counter, radius = given.move[at] == Move.COUNTER, given.lengths(key("R"))[at]
+            found = arcs(
+                begin[some, :3], end[some, :3], plane[some], counter, values, absolute, radius, turns[some]
+            )
+        for name in ("centre", "normal", "sweep", "wrong"):
+            getattr(result, name)[some] = getattr(found, name)
     return result
 
 
@@ -207,12 +199,38 @@ def _blend(given: Blocks, rows: Ints) -> Floats:
 
 
 def _whole(given: Blocks, rows: Ints) -> dict[int, str]:
-    """Motions before which nothing may be inserted."""
-    extruding = np.flatnonzero(given.of(key("E"))[rows] >= 0)
-    return dict.fromkeys(extruding.tolist(), "E would have to be divided as well")
+    """Motions before which nothing may be inserted, because their block says more than the motion."""
+    words, modal, n = given.text.words, given.modal, len(given)
+    more = given.has(*(key(letter) for letter in "ESTHDLQUVW")) | given.noted(
+        "assign", "corner", "axis", "polar"
+    )
+    more[words.block[np.isin(words.key, (key("M"), *given.control.columns)) & ~np.isin(words.key, _WAY)]] = (
+        True
+    )
+    codes = np.flatnonzero(words.key == key("G"))
+    said = np.bincount(words.block[codes], minlength=n)
+    silent = (modal.verb >= 0).astype(np.int64)
+    for group in (Group.PLANE, Group.DISTANCE, Group.ARCS, Group.UNITS):
+        silent[modal.states[group]] += 1
+    more |= said != silent
+    word, usual = given.control.turns
+    if word in given.columns:
+        more |= given.number(word) > usual
+    timed = modal.force[Group.FEED] == Feed.INVERSE_TIME
+    found: dict[int, str] = {}
+    for mask, why in (
+        (timed, "F is the time of the whole block (G93)"),
+        (more, "its block says more than the motion"),
+    ):
+        found.update(dict.fromkeys(np.flatnonzero(mask[rows]).tolist(), why))
+    return found
 
 
-def _places(given: Blocks, where: Positions, moves: Motions, turned: Floats) -> Places:
+_WAY = tuple(key(letter, index) for letter in "ABCIJK" for index in (1, 2, 3))
+"""Words of the way itself: the point between, orientations."""
+
+
+def _places(given: Blocks, where: Positions, moves: Motions) -> Places:
     rows, force = moves.block, given.modal.force
     columns = (*COLUMNS, *given.control.columns)
     return Places(
@@ -234,8 +252,9 @@ def _places(given: Blocks, where: Positions, moves: Motions, turned: Floats) -> 
             np.array([frame.shift[:3] for frame in where.frames]),
         ),
         begin=moves.begin[:, :3],
-        rotary=moves.end[:, 3:],
-        turned=turned,
+        orient=moves.stand.orient,
+        orientations=moves.stand.orientations,
+        turned_values=moves.stand.values,
         feed_mode=force[Group.FEED][rows],
     )
 

@@ -37,6 +37,7 @@ HELP = {
     "GCO023": "See that the cell's tool has the length that is meant.",
     "GCO024": "Offsets and tools lie in the cell; see that both agree.",
     "GCO025": "Nothing needs to be done.",
+    "GCO026": "See that no such axis carries the robot or the workpiece.",
 }
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Ints
 from postproc.dialects.dialect import Settings
-from postproc.dialects.gcode.blocks import AXES, Blocks
+from postproc.dialects.gcode.blocks import AXES, SECOND, Blocks
 from postproc.dialects.gcode.control import Group, Once
 from postproc.dialects.gcode.flow import CALLS, Doubt
 from postproc.dialects.gcode.judging import code_name
@@ -17,9 +17,10 @@ from postproc.findings import Finding
 
 
 def told(
-    document: Document, given: Blocks, noted: dict[str, Bools], rows: Ints, named: bool, settings: Settings
+    document: Document, given: Blocks, rows: Ints, loaded: Ints, named: bool, settings: Settings
 ) -> list[Finding]:
-    """Findings that belong to no motion; ``rows``: blocks of the motions; ``named``: the program names a tool."""
+    """Findings that belong to no motion; ``rows``: blocks of the motions; loaded (B,): number of the
+    tool in force; ``named``: the program names one."""
     blocks, modal, words = given.text.blocks, given.modal, given.text.words
     findings: list[Finding] = []
     live = modal.flow.tape & (modal.flow.doubt != Doubt.ENDED)
@@ -38,7 +39,7 @@ def told(
 
     none = np.zeros(len(given), np.bool_)
     motion = given.motion
-    text = noted.get("unknown", none) & ~motion
+    text = given.noted("unknown") & ~motion
     if text.any():
         said = next(note.text for note in given.text.notes if note.kind == "unknown" and text[note.block])
         tell(text, "GCO001", f"not understood: {said!r}")
@@ -49,9 +50,14 @@ def told(
         tell(same, "GCO001", f"{code_name(value)} is not known here")
     calls = none.copy()
     calls[words.block[np.flatnonzero((words.key == key("M")) & np.isin(words.value, CALLS))]] = True
-    tell(calls | modal.has(Once.CALL) | noted.get("call", none), "GCO007", "calls code that was not read")
+    tell(calls | modal.has(Once.CALL) | given.noted("call"), "GCO007", "calls code that was not read")
     setting = modal.has(Once.SETTING) & given.has(*AXES, key("L"), key("P"), key("R"))
     tell(setting, "GCO024", "the program writes offsets or tools")
+    tell(
+        given.noted("base"),
+        "GCO024",
+        "the program writes a work offset; the cell's base of its number is taken",
+    )
     if not len(rows):
         return findings
     units = np.isin(words.value, (20, 21, 70, 71, 700, 710)) & (words.key == key("G"))
@@ -66,9 +72,29 @@ def told(
         hows = np.stack([given.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
         whole[rows] = hows[rows].any(axis=1)
         tell(whole, "GCO022", f"words without a decimal point are mm or inch in {given.control.name}")
-    height, tool = given.number(key("H")), given.number(key("T"))
-    at = np.maximum.accumulate(np.where(given.of(key("T")) >= 0, np.arange(len(given)), -1))
-    loaded = np.where(at >= 0, tool[np.maximum(at, 0)], np.nan)
-    other = (height > 0) & (modal.force[Group.LENGTH] == 1) & (height != loaded) & np.isfinite(loaded)
+    height = given.number(key("H"))
+    other = (height > 0) & (modal.force[Group.LENGTH] == 1) & (height != loaded) & (loaded > 0)
     tell(other, "GCO023", "H is of another number than the tool; the length of the cell's tool is taken")
+    if given.control.further:
+        tell(
+            _further(given),
+            "GCO026",
+            "axes beside X, Y, Z and the rotary axes move; they are taken as carrying nothing",
+        )
     return findings
+
+
+def _further(given: Blocks) -> Bools:
+    """(B,) the first block in which an axis beside those that are read is not where it was first."""
+    words = given.text.words
+    letter, index = words.key % 256, words.key // 256
+    named = np.isin(letter, [key(one) for one in "XYZABCUVW"]) & (words.key < 1 << 14)
+    own = np.flatnonzero(
+        named & ~np.isin(words.key, given.columns) & (index > 0) | np.isin(words.key, SECOND)
+    )
+    moving = np.zeros(len(given), np.bool_)
+    for one in np.unique(words.key[own]).tolist():
+        rows = own[words.key[own] == one]
+        away = rows[words.value[rows] != words.value[rows[0]]]
+        moving[words.block[away[:1]]] = True
+    return moving
