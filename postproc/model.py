@@ -351,6 +351,21 @@ class StiffnessModel:
             conditions,
         )
 
+    def motors_at(
+        self, coordinates: Floats, wrench: Floats, tool: Poses, conditions: Conditions = NOTHING
+    ) -> tuple[Floats, Floats]:
+        """Motors (N, n) that leave the loaded joints at ``coordinates`` (N, n), and the displacement (N, m) there.
+
+        q = z - theta(z) - offsets(z), without an iteration: exact where only the joints give way and have offsets that
+        do not depend on the motors; elsewhere a value to begin with.
+        """
+        state = self.state(coordinates, wrench, tool, conditions)
+        force, _ = self._forces(state)
+        theta, _ = self._displacement(state, force)
+        rows = self.chain.motor_rows
+        away = theta[rows] + state.rest[rows] - state.motors
+        return np.asarray((state.motors - away).T), np.asarray(theta.T)
+
     def compliance(self, state: State) -> Floats:
         """(N, m) [rad/(N m), m/N] compliance of each coordinate at ``state``, its own part of the loads' stiffness in
         it: 1 / (K_theta^0 + K_theta^GC(q)), eq. (6)."""

@@ -87,22 +87,24 @@ def mirror(
     status: Ints,
     near: Floats,
     turns: Floats | None = None,
+    begin: tuple[Poses, Floats] | None = None,
 ) -> Correction:
     """Correct N commands that start at ``wanted`` so that the predicted tool comes to ``goal``.
 
     ``turns`` (N, 3, 3): projection onto the rotation vectors that can be corrected (all of them without it); nothing
-    else of the orientation is corrected, nor judged.
+    else of the orientation is corrected, nor judged.  ``begin``: commands to begin with instead of ``wanted``, and
+    displacements (N, m) to begin their equilibria with; the result does not depend on them.
 
     A motion stops when it is within tolerance, out of reach, without equilibrium, or when an iteration does not
     at least halve its error (it would not settle): ``converged`` says which, nothing diverges silently.
     """
     n = len(wanted)
-    rotation, position = wanted.rotation.copy(), wanted.position.copy()
+    first, bent = (wanted, None) if begin is None else begin
+    rotation, position = first.rotation.copy(), first.position.copy()
     q, iterations = near.copy(), np.zeros(n, np.int64)
     reachable, settled, converged = np.ones(n, bool), np.ones(n, bool), np.zeros(n, bool)
     history: list[Floats] = []
     last = np.full(n, np.inf)
-    bent: Floats | None = None
     active = np.arange(n)
     for iteration in range(MAX_ITERATIONS + 1):
         here = predict(

@@ -14,7 +14,8 @@ from postproc.effects import Conditions
 from postproc.forces import Wrenches
 from postproc.geometry import Poses
 from postproc.model import StiffnessModel
-from postproc.robot.track import Track
+from postproc.robot.inverse import inverse
+from postproc.robot.track import Track, nominal_flange
 from postproc.toolpath import Toolpath
 
 
@@ -78,6 +79,7 @@ class Task:
 
     def command(self, rows: Ints, wanted: Poses, wrench: Floats, goal: Poses) -> Correction:
         """The commands (K) that bring the tool to ``goal`` (K) in motions ``rows`` (K,)."""
+        turns = self.turns(rows, goal.rotation)
         return mirror(
             self.model,
             wanted,
@@ -87,8 +89,24 @@ class Task:
             self.conditions.part(rows),
             self.track.status[rows],
             self.track.q[rows],
-            self.turns(rows, goal.rotation),
+            turns,
+            self._begin(rows, wanted, wrench, goal) if turns is None else None,
         )
+
+    def _begin(self, rows: Ints, wanted: Poses, wrench: Floats, goal: Poses) -> tuple[Poses, Floats]:
+        """Commands whose loaded joints stand where the goal is, and how far they are bent there; the wanted pose where
+        that is out of reach, or far away."""
+        model, tool = self.model, self.tool[rows]
+        near, status, given = self.track.q[rows], self.track.status[rows], self.conditions.part(rows)
+        there = inverse(model.robot.nominal, goal @ tool.inverse(), status, near)
+        motors, bent = model.motors_at(np.where(there.reachable[:, None], there.q, near), wrench, tool, given)
+        begin = nominal_flange(model.robot, motors) @ tool
+        away = np.linalg.norm(begin.position - wanted.position, axis=1)
+        good = there.reachable & (away <= self.max_correction) & np.isfinite(bent).all(axis=1)
+        return Poses(
+            np.where(good[:, None, None], begin.rotation, wanted.rotation),
+            np.where(good[:, None], begin.position, wanted.position),
+        ), np.where(good[:, None], bent, 0.0)
 
     def turns(self, rows: Ints, rotation: Floats) -> Floats | None:
         """(K, 3, 3) projection onto the rotation vectors, robot base axes, that the texts of motions ``rows`` (K,) at

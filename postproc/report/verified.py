@@ -117,8 +117,8 @@ def show(console: Console, done: Verified, verbose: bool = False) -> None:
         )
     console.print(table)
     if done.compensated.worst:
-        places = Table(title="worst places of the compensated program", title_justify="left", title_style="",
-                       box=None, pad_edge=False)  # fmt: skip
+        console.print("worst places of the compensated program")
+        places = Table(box=None, pad_edge=False)
         for head in ("line", "mm", "axis", "force N"):
             places.add_column(head, justify="right")
         for place in done.compensated.worst:
