@@ -171,7 +171,7 @@ def test_an_unknown_feed_is_refused_with_its_line(tmp_path):
     feed = np.array([0.1, 0.06, np.nan, 0.06, np.nan, 0.06, 0])
     (finding,) = refused(program(feed=feed), operations(tmp_path, "lines: [1, 99]"))
     assert (finding.code, finding.file, finding.line) == ("FRC013", "part.src", 12)
-    assert "the feed of 2 motions of operation lines 1 to 99" in finding.message
+    assert "the feed of 2 motions of operation lines 1 to 99 (milling.yaml:3)" in finding.message
 
 
 def test_rapid_and_force_off_and_plunges_are_air(tmp_path):

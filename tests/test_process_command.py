@@ -50,6 +50,12 @@ def test_the_sample_has_three_operations_with_an_interval_each(compensate):
     ]
     assert "+- 47 %" in told[0]
     assert "own coefficients, +- 15 %" in told[2]
+    readme = BRACKET.with_name("README.md").read_text()
+    for message in told:
+        mean, peak = re.search(r"mean force (.*) N @feed, up to (\d+) N", message).groups()
+        assert f"| {mean} | up to {peak} |" in readme
+    assert f"of {report['error_before_mm']['max']:.2f} mm before the correction" in readme
+    assert f"{report['error_before_mm']['ci95']:.1f} mm (95 %)" in readme
     # nothing rapid, no plunge and no retract is milling
     assert report["cutting"] == 9
     assert report["cuts"] == 3

@@ -51,7 +51,7 @@ def process_forces(
         )
         findings.append(Finding("FRC014", what, program, int(toolpath.line[np.argmax(free)])))
     cutting &= ~free
-    _check_feed(operations, joined, cutting, toolpath, program)
+    _check_feed(operations, joined, cutting, toolpath, path, program)
     findings += _passed_over(operations, joined, cutting, toolpath, program)
 
     n = len(toolpath)
@@ -119,7 +119,12 @@ def _along_spindle(toolpath: Toolpath, frames: Frames) -> Bools:
 
 
 def _check_feed(
-    operations: Sequence[Operation], joined: Ints, cutting: Bools, toolpath: Toolpath, program: str
+    operations: Sequence[Operation],
+    joined: Ints,
+    cutting: Bools,
+    toolpath: Toolpath,
+    file: Path,
+    program: str,
 ) -> None:
     lost = np.flatnonzero(cutting & ~(toolpath.feed > 0))
     if not len(lost):
@@ -128,8 +133,8 @@ def _check_feed(
     raise Refusal(
         Finding(
             "FRC013",
-            f"the feed of {len(lost)} motions of operation {operation.label} is not known, and with it the feed per "
-            "tooth",
+            f"the feed of {len(lost)} motions of operation {operation.label} ({file.name}:{operation.line}) is not "
+            "known, and with it the feed per tooth",
             program,
             int(toolpath.line[lost[0]]),
             help="set the feed in the program before the motion ($VEL.CP, F), or mark air with FORCE OFF",
