@@ -446,13 +446,14 @@ def test_verdicts(data):
 
 
 def test_what_was_left_is_told_with_its_reason(tmp_path):
-    lines = list(LINES)
-    lines[lines.index("LIN {X 450.000}")] = "LIN_REL {X 50.000}"
+    lines = [*LINES[:11], ";COMPENSATE OFF", *LINES[11:]]
+    lines.insert(lines.index("LIN {X 400.000}"), ";COMPENSATE ON")
     report, page = written(tmp_path, lines)
-    assert report.left == 1
+    assert (report.cutting, report.corrected) == (5, 1)
     left = re.search(r'<details class="left".*?</details>', page, re.S)[0]
     assert "is left as it was" in left
-    assert "4 of 5 cutting motions are corrected" in page or "are corrected" in page
+    assert "between COMPENSATE OFF and ON" in left
+    assert "1 of 5 cutting motions are corrected" in page
 
 
 def test_left_cuts_beyond_some_are_counted(data):

@@ -7,8 +7,9 @@ import re
 
 import numpy as np
 import pytest
-from browser import chromium, window  # noqa: F401
 from conftest import CELL, LINES
+
+pytest_plugins = ("browser",)
 
 HOSTILE = ";</code></script><script>window.hacked=1</script><img src=x onerror='window.hacked=1'>&amp;"
 """What a comment behind a motion may say."""
@@ -37,7 +38,7 @@ def rows(done):
         return {int(row["line"]): row for row in csv.DictReader(stream)}
 
 
-def test_it_asks_for_nothing_and_complains_of_nothing(window, done):  # noqa: F811
+def test_it_asks_for_nothing_and_complains_of_nothing(window, done):
     shown = window(done / "part.report.html")
     page = shown.page
     for selector in ("#space", "#error", "#correction"):
@@ -49,7 +50,7 @@ def test_it_asks_for_nothing_and_complains_of_nothing(window, done):  # noqa: F8
     assert shown.complaints == []
 
 
-def test_what_a_comment_says_is_shown_and_does_not_run(window, done):  # noqa: F811
+def test_what_a_comment_says_is_shown_and_does_not_run(window, done):
     shown = window(done / "part.report.html")
     shown.page.wait_for_timeout(200)
     assert shown.page.evaluate("typeof window.hacked") == "undefined"
@@ -59,7 +60,7 @@ def test_what_a_comment_says_is_shown_and_does_not_run(window, done):  # noqa: F
     assert "<script>window.hacked=1</script>" in findings
 
 
-def test_a_script_that_got_in_would_not_run(window, done, tmp_path):  # noqa: F811
+def test_a_script_that_got_in_would_not_run(window, done, tmp_path):
     """The policy stands behind the escaping: even where a tag is in the page, it is not obeyed."""
     page = (done / "part.report.html").read_text(encoding="utf-8")
     (tmp_path / "x.html").write_text(
@@ -73,7 +74,7 @@ def test_a_script_that_got_in_would_not_run(window, done, tmp_path):  # noqa: F8
     assert len(shown.complaints) == 2
 
 
-def test_the_path_is_drawn(window, done):  # noqa: F811
+def test_the_path_is_drawn(window, done):
     shown = window(done / "part.report.html")
     drawn = shown.pixels("#space")
     ground = drawn[5, 5]
@@ -92,7 +93,7 @@ def test_the_path_is_drawn(window, done):  # noqa: F811
         assert (np.abs(shown.pixels("#space") - before).sum(axis=2) > 60).sum() > 50
 
 
-def test_turning_and_zooming(window, done):  # noqa: F811
+def test_turning_and_zooming(window, done):
     shown = window(done / "part.report.html")
     page = shown.page
     page.locator("#space").scroll_into_view_if_needed()
@@ -115,7 +116,7 @@ def test_turning_and_zooming(window, done):  # noqa: F811
         assert (np.abs(one - other).sum(axis=2) > 60).sum() > 200
 
 
-def test_hover_tells_line_and_figures(window, done, rows):  # noqa: F811
+def test_hover_tells_line_and_figures(window, done, rows):
     """Wherever the pointer meets the path, what is told stands so in the corrections."""
     shown = window(done / "part.report.html")
     page = shown.page
@@ -143,7 +144,7 @@ def test_hover_tells_line_and_figures(window, done, rows):  # noqa: F811
         )
 
 
-def test_without_a_mouse(window, done, rows):  # noqa: F811
+def test_without_a_mouse(window, done, rows):
     shown = window(done / "part.report.html")
     page = shown.page
     readout = page.locator("#readout")
@@ -182,7 +183,7 @@ def test_without_a_mouse(window, done, rows):  # noqa: F811
     assert [name for name in reached if name in wanted] == wanted
 
 
-def test_light_and_dark(window, done):  # noqa: F811
+def test_light_and_dark(window, done):
     """Both have their ground, and words that stand out from it (WCAG 2: 4.5 to 1)."""
     means = {}
     for scheme in ("light", "dark"):
@@ -206,7 +207,7 @@ def test_light_and_dark(window, done):  # noqa: F811
     assert means["dark"] < 40
 
 
-def test_on_paper_it_is_light_and_without_buttons(window, done):  # noqa: F811
+def test_on_paper_it_is_light_and_without_buttons(window, done):
     shown = window(done / "part.report.html", color_scheme="dark")
     shown.page.emulate_media(media="print", color_scheme="dark")
     shown.page.evaluate("dispatchEvent(new Event('beforeprint'))")
@@ -216,7 +217,7 @@ def test_on_paper_it_is_light_and_without_buttons(window, done):  # noqa: F811
     assert shown.page.locator("table.places code.new").first.is_visible()
 
 
-def test_without_scripts_the_words_are_there(chromium, done):  # noqa: F811
+def test_without_scripts_the_words_are_there(chromium, done):
     context = chromium.new_context(java_script_enabled=False)
     page = context.new_page()
     page.goto((done / "part.report.html").as_uri())
@@ -227,7 +228,7 @@ def test_without_scripts_the_words_are_there(chromium, done):  # noqa: F811
     assert "joint_compliance" in text
 
 
-def test_the_links_lead_to_the_files(window, done):  # noqa: F811
+def test_the_links_lead_to_the_files(window, done):
     shown = window(done / "part.report.html")
     names = shown.page.eval_on_selector_all(
         "ul.files a", "all => all.map(a => decodeURIComponent(a.pathname))"

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from browser import chromium, window  # noqa: F401
 from rich.console import Console
 from test_pages import HOSTILE, _Tags
 
@@ -19,6 +18,8 @@ from postproc.report.workspace import show_map
 from postproc.workflows.diagnose import DiagnoseRequest, diagnose_robot
 from postproc.workflows.identify import IdentifyRequest, identify
 from postproc.workflows.workspace import MapRequest, map_workspace
+
+pytest_plugins = ("browser",)
 
 SAMPLES = Path(__file__).parents[1] / "samples"
 MAP = MapRequest(
@@ -112,7 +113,7 @@ def test_hostile_names_are_text(one):
     assert seen.open == []
 
 
-def test_it_opens_without_network_and_without_a_script(window, one):  # noqa: F811
+def test_it_opens_without_network_and_without_a_script(window, one):
     _, page, *_ = one
     for scheme in ("light", "dark"):
         shown = window(page, color_scheme=scheme)

@@ -51,8 +51,8 @@ function hands(space) {
     const act = {
       ArrowLeft: () => space[by](-step, 0), ArrowRight: () => space[by](step, 0),
       ArrowUp: () => space[by](0, -step), ArrowDown: () => space[by](0, step),
-      '+': () => space.zoomAt(1.25, ...space.centre), '=': () => space.zoomAt(1.25, ...space.centre),
-      '-': () => space.zoomAt(0.8, ...space.centre), 0: () => space.fit(),
+      '+': () => space.zoomAt(1.25, ...space.heart()), '=': () => space.zoomAt(1.25, ...space.heart()),
+      '-': () => space.zoomAt(0.8, ...space.heart()), 0: () => space.fit(),
       n: () => choose(chosen + 1, true), p: () => choose(chosen - 1, true),
     }[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!act || event.ctrlKey || event.altKey || event.metaKey) return;

@@ -100,6 +100,7 @@ function bar(space, error) {
   });
   const goTo = (i) => {
     choose(i, true);
+    space.approach();
     byId('h-path').scrollIntoView({ block: 'start' });
     byId('space').focus({ preventScroll: true });
   };

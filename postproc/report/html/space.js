@@ -4,7 +4,7 @@
 // Turn about Z and tilt: the front is seen from +X, the side from -Y.
 const VIEWS = { oblique: [0.6, 0.6], top: [0, Math.PI / 2], front: [Math.PI / 2, 0], side: [0, 0] };
 
-const BINS = 24, SLABS = 24, NEAR = 16, WHILE_MOVING = 15000, ARROWS = 90;
+const BINS = 24, SLABS = 24, NEAR = 16, WHILE_MOVING = 15000, ARROWS = 90, CLOSE = 4;
 
 class Space {
   // marks: a clear canvas above the other, for what changes while the view stays.
@@ -124,8 +124,8 @@ class Space {
     const stride = this.moving ? Math.ceil(count / WHILE_MOVING) : 1;
     this.air(pen, stride);
     this.path(pen, values, stride);
-    if (this.bent && this.magnify > 0) this.bentPath(pen, stride);
-    if (this.arrows) this.forces(pen);
+    if (this.bent) this.bentPath(pen, stride, wide, high);
+    if (this.arrows) this.forces(pen, wide);
     this.sizes(pen);
     this.triad(pen, high);
     this.key(pen, wide, high);
@@ -212,7 +212,7 @@ class Space {
     pen.setLineDash([]);
   }
 
-  bentPath(pen, stride) {
+  bentPath(pen, stride, wide, high) {
     const by = this.magnify * this.scale;
     pen.strokeStyle = theme().before;
     pen.lineWidth = 0.9;
@@ -228,10 +228,13 @@ class Space {
       open = bent;
     }
     pen.stroke();
+    pen.font = FONT;
+    pen.textAlign = 'right';
+    halo(pen, `thin line: the path as it would bend, ${this.magnify} ×`, wide - 12, high - 14, theme().before);
   }
 
   // Some motions with their force, as long as it is large; the arrow ends where the force acts.
-  forces(pen) {
+  forces(pen, wide) {
     const rows = this.inside, every = Math.max(1, Math.ceil(rows.length / ARROWS));
     const largest = extent(quantities.force.values, rows)[1];
     if (!(largest > 0)) return;
@@ -242,7 +245,7 @@ class Space {
       const i = rows[k];
       if (!this.known[i]) continue;
       const [x, y] = [this.screen[2 * i], this.screen[2 * i + 1]];
-      const [dx, dy] = this.along(motions.force, i, 46 / largest);
+      const [dx, dy] = this.along(motions.force, i, Math.min(46, wide / 16) / largest);
       const long = Math.hypot(dx, dy);
       if (!(long > 3)) continue;
       const [ux, uy] = [dx / long, dy / long];
@@ -277,7 +280,10 @@ class Space {
       pen.stroke();
       pen.fillStyle = theme().ink;
       pen.fill();
-      halo(pen, `worst, line ${motions.line[worst]}`, x + 10, y - 10, theme().ink);
+      const right = x + 130 > this.canvas.clientWidth;
+      pen.textAlign = right ? 'right' : 'left';
+      halo(pen, `worst, line ${motions.line[worst]}`, x + (right ? -10 : 10), y - 10, theme().ink);
+      pen.textAlign = 'left';
     }
     for (const [i, text] of [[chosen, chosen === worst ? '' : `line ${motions.line[chosen]}`], [this.hovered, '']]) {
       if (i < 0 || !this.known[i]) continue;
@@ -384,6 +390,21 @@ class Space {
       this.tip.style.top = `${Math.max(0, Math.min(sy + 16, high - this.tip.offsetHeight - 4))}px`;
     }
     this.above.later();
+  }
+
+  // Where the keys zoom to: the chosen motion.
+  heart() {
+    return this.known[chosen] ? [this.screen[2 * chosen], this.screen[2 * chosen + 1]] : this.centre;
+  }
+
+  // The chosen motion in the middle, and near.
+  approach() {
+    if (!this.known[chosen]) return;
+    this.zoomAt(Math.max(1, CLOSE / this.zoom), ...this.heart());
+    this.project(this.canvas.clientWidth, this.canvas.clientHeight);
+    const [x, y] = this.heart();
+    this.move(this.canvas.clientWidth / 2 - x, this.canvas.clientHeight / 2 - y);
+    this.rest();
   }
 
   // Another motion was chosen; `show`: bring it into the view.
