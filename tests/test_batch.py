@@ -130,7 +130,7 @@ def test_one_that_fails_stops_no_other(compensate, parts):
 
 def test_the_exit_code_is_that_of_the_worst(compensate, parts):
     assert compensate("batch", parts, "--force").code == 0
-    lines = [*LINES[:10], "LIN_REL {X 5}", *LINES[10:]]
+    lines = [*LINES[:10], "LIN {X $POS_ACT.X,Y 0,Z 0}", *LINES[10:]]
     program(parts / "look.src", 0, lines)
     assert compensate("batch", parts, "--force").code == 3
     assert compensate("batch", parts, "--force", "--strict").code == 1

@@ -160,6 +160,10 @@ force: true
 gain: 0.5
 strict: false
 again: true
+config_dat: cell.yaml
+force_offset: false
+keep_points: true
+own_points: dat
 output: out
 overrides:
   a.src: {force: '0,1,2', gain: 1, cell: cell.yaml, robot: ur5, strict: true, again: false, output: x.src}

@@ -21,6 +21,7 @@ from postproc.workflows.preparation import Request
 from postproc.yamlfile import Section, parsed, read
 
 JOB_FILE = (".yaml", ".yml")
+OWN_POINTS = ("inline", "dat", "refuse")
 FOLDER = "compensated"
 """Where results go that no ``output`` names, below the folder of the batch."""
 
@@ -287,6 +288,10 @@ def _gain(section: Section, key: str) -> float:
     return section.number(key, low=0.0, high=1.0)
 
 
+def _own_points(section: Section, key: str) -> str:
+    return section.text(key, choices=OWN_POINTS)
+
+
 def _flag(section: Section, key: str) -> bool:
     return section.flag(key, False)
 
@@ -296,6 +301,10 @@ PROGRAM_KEYS: dict[str, Callable[[Section, str], object]] = {
     "robot": _robot,
     "force": _force,
     "gain": _gain,
+    "config_dat": _file,
+    "force_offset": _flag,
+    "keep_points": _flag,
+    "own_points": _own_points,
     "strict": _flag,
     "again": _flag,
 }

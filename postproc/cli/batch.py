@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from postproc.cli.common import Out, result_options
+from postproc.cli.common import Out, language_options, result_options
 
 if TYPE_CHECKING:
     from postproc.batch.jobs import Jobs
@@ -28,12 +28,11 @@ if TYPE_CHECKING:
     help="Machining force of every program. Alone: the forces that belong to each program; with a value: 0,360,560@base"
     " or a CSV, as in the main job.",
 )
-@click.option("--robot", metavar="NAME|FILE", help="Robot instead of the cells'.")
 @click.option(
-    "--cell",
-    type=click.Path(path_type=Path),
-    help="Cell file instead of the nearest cell.yaml of each program.",
+    "--force-offset", is_flag=True, help="Take the mean of each force CSV in air off all its readings."
 )
+@click.option("--robot", metavar="NAME|FILE", help="Robot instead of the cells'.")
+@language_options
 @click.option("--gain", type=click.FloatRange(0.0, 1.0), help="Share of the correction that is applied [1].")
 @click.option(
     "-o",
@@ -41,6 +40,12 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path, file_okay=False),
     metavar="DIR",
     help="Folder of the results; those of folders below lie in folders below [compensated/ where JOBS are].",
+)
+@click.option("--keep-points", is_flag=True, help="Insert no motion; what that leaves on the way is told.")
+@click.option(
+    "--own-points",
+    type=click.Choice(["inline", "dat", "refuse"]),
+    help="What a named point that serves several motions becomes [inline].",
 )
 @click.option("--strict", is_flag=True, help="Warnings count as errors.")
 @click.option("--again", is_flag=True, help="Compensate programs that are compensated already.")
@@ -64,10 +69,14 @@ if TYPE_CHECKING:
 def batch(
     jobs: tuple[str, ...],
     force: str | None,
+    force_offset: bool,
     robot: str | None,
     cell: Path | None,
+    config_dat: Path | None,
     gain: float | None,
     output: Path | None,
+    keep_points: bool,
+    own_points: str | None,
     strict: bool,
     again: bool,
     dry_run: bool,
@@ -125,7 +134,11 @@ def batch(
         "force": force,
         "robot": robot,
         "cell": None if cell is None else Path(os.path.abspath(cell)),
+        "config_dat": None if config_dat is None else Path(os.path.abspath(config_dat)),
         "gain": gain,
+        "force_offset": force_offset or None,
+        "keep_points": keep_points or None,
+        "own_points": own_points,
         "strict": strict or None,
         "again": again or None,
         "dry_run": dry_run or None,

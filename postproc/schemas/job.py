@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.batch.jobs import JOB_KEYS, PROGRAM_KEYS
+from postproc.batch.jobs import JOB_KEYS, OWN_POINTS, PROGRAM_KEYS
 from postproc.schemas.parts import Schema, flag, known, listed, mapping, number, text, told
 
 _PATTERN = text(
@@ -18,6 +18,10 @@ PROGRAM: dict[str, Schema] = {
         "anyOf": [flag(), text()],
     },
     "gain": number("share of the correction that is applied", 0.0, 1.0),
+    "config_dat": text("the controller's $config.dat, for points and frames that stand there [the cell's]"),
+    "force_offset": flag("take the mean of the force CSV in air off all its readings"),
+    "keep_points": flag("insert no motion"),
+    "own_points": text("what a named point that serves several motions becomes [inline]", OWN_POINTS),
     "strict": flag("warnings count as errors"),
     "again": flag("compensate programs that are compensated already"),
 }

@@ -1,0 +1,93 @@
+"""The package from Python: light, typed, and its examples run."""
+
+from __future__ import annotations
+
+import doctest
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import postproc
+from postproc import api
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture
+def at_samples(tmp_path, monkeypatch):
+    """A working folder with the samples in it."""
+    shutil.copytree(
+        ROOT / "samples" / "kr270_taught",
+        tmp_path / "samples" / "kr270_taught",
+        ignore=shutil.ignore_patterns("compensated"),
+    )
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("module", [postproc, api], ids=lambda module: module.__name__)
+def test_the_examples_run(at_samples, module):
+    done = doctest.testmod(module)
+    assert done.attempted >= 1
+    assert done.failed == 0
+
+
+def test_import_is_light():
+    code = "import sys, postproc, json; print(json.dumps(sorted(sys.modules)))"
+    out = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
+    loaded = set(json.loads(out))
+    assert {"postproc"} == {name for name in loaded if name.split(".")[0] == "postproc"}
+    assert not loaded & {"numpy", "scipy", "pinocchio", "click", "yaml", "rich"}
+
+
+def test_what_is_public_is_there_and_nothing_else():
+    assert set(postproc.__all__) <= set(dir(postproc))
+    for name in postproc.__all__:
+        assert getattr(postproc, name) is not None
+    assert postproc.compensate is api.compensate
+    with pytest.raises(AttributeError, match="no attribute 'compensat'"):
+        postproc.compensat  # noqa: B018
+
+
+def test_types_are_seen(tmp_path):
+    """A caller's mistake is told by a type checker, from the installed package."""
+    wrong = tmp_path / "caller.py"
+    wrong.write_text(
+        "import postproc\n"
+        "good: postproc.Report = postproc.compensate('a.src', force=True)\n"
+        "postproc.compensate('a.src', force=3)\n"
+        "postproc.compensate('a.src', gaim=0.5)\n"
+        "bad: int = postproc.check('a.src')\n"
+    )
+    words = [sys.executable, "-m", "mypy", "--no-incremental", "--follow-imports=silent", str(wrong)]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=ROOT)
+    lines = [
+        line.partition("caller.py:")[2].split(":")[0] for line in done.stdout.splitlines() if "error" in line
+    ]
+    assert [line for line in lines if line] == ["3", "4", "5"], done.stdout + done.stderr
+
+
+def test_the_same_as_the_command(at_samples, compensate):
+    path = "samples/kr270_taught/taught.src"
+    report = postproc.compensate(path, force=True, gain=0.5, output="one/taught.src")
+    done = compensate(path, "--force", "--gain", "0.5", "-o", "two/taught.src", "--json", "-")
+    mine = json.loads(json.dumps(report.as_json()))
+    theirs = done.json
+    for result in (mine, theirs):
+        result.pop("outputs")
+    assert mine == theirs
+    assert Path("one/taught.src").read_bytes() == Path("two/taught.src").read_bytes()
+
+
+def test_mistakes_of_the_caller_are_told(at_samples):
+    path = "samples/kr270_taught/taught.src"
+    for wrong in ({"gain": 1.5}, {"force": " "}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            postproc.compensate(path, **wrong)
+    with pytest.raises(postproc.Refusal) as refusal:
+        postproc.check("samples/none.src")
+    assert refusal.value.findings[0].code == "FIL001"
