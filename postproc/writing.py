@@ -118,7 +118,9 @@ def way_errors(task: Task, result: Result, division: Division) -> Floats:
     source = division.source
     chosen = np.flatnonzero(result.corrected[source] & task.ways.known[source] & ~division.links)
     if len(chosen):
-        errors[chosen], _ = errors_between(task, made(task, division)[chosen])
+        pieces = made(task, division)[chosen]
+        first = (pieces.first == 0.0) & task.steps(pieces.rows, result.corrected)
+        errors[chosen], _ = errors_between(task, pieces, first)
     return errors
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.mirror import difference
 from postproc.compensation.task import Task
 from postproc.compensation.ways import between
@@ -82,11 +82,12 @@ class Pieces:
         return found
 
 
-def errors_between(task: Task, pieces: Pieces) -> tuple[Floats, Floats]:
+def errors_between(task: Task, pieces: Pieces, from_begin: Bools | None = None) -> tuple[Floats, Floats]:
     """Largest distance (K,) [m] of the predicted tool from the wanted way, and largest angle (K,) [rad] from the wanted
     orientation, inside of each piece; infinite where the robot can not be there.
 
-    Along the way the tool may be early or late: only what it is beside the way counts.
+    Along the way the tool may be early or late: only what it is beside the way counts.  ``from_begin`` (K,): pieces
+    that are looked at where they begin as well (another ended there in its own place).
     """
     length = np.linalg.norm(pieces.end.position - pieces.begin.position, axis=1)
     _, turn = difference(pieces.end, pieces.begin)
@@ -98,6 +99,10 @@ def errors_between(task: Task, pieces: Pieces) -> tuple[Floats, Floats]:
             here = _errors(task, pieces[chosen], share)
             off[chosen] = np.maximum(off[chosen], here[0])
             angle[chosen] = np.maximum(angle[chosen], here[1])
+    if from_begin is not None and from_begin.any():
+        chosen = np.flatnonzero(from_begin)
+        here = _errors(task, pieces[chosen], 0.0)
+        off[chosen], angle[chosen] = np.maximum(off[chosen], here[0]), np.maximum(angle[chosen], here[1])
     return off, angle
 
 

@@ -77,7 +77,7 @@ def correct(task: Task) -> Result:
     goal = task.goal(rows, task.wanted[rows])
     here = task.real(rows, task.wanted[rows], task.wrench[rows])
     deflection, before, before_angle = np.full((n, 3), np.nan), np.full(n, np.nan), np.full(n, np.nan)
-    shift, turn = task.off(rows, here.pose, goal)
+    shift, turn = task.seen(rows, here.pose, goal)
     shift[~here.settled], turn[~here.settled] = np.nan, np.nan
     deflection[rows], before[rows] = shift, np.linalg.norm(shift, axis=1)
     before_angle[rows] = np.linalg.norm(turn, axis=1)
@@ -134,7 +134,7 @@ def with_residual(task: Task, result: Result, command: Poses) -> Result:
     """The result with its residual predicted for ``command``, the poses as they were really written."""
     rows = np.flatnonzero(result.corrected)
     here = task.real(rows, command[rows], task.wrench[rows])
-    shift, turn = task.off(rows, here.pose, task.goal(rows, task.wanted[rows]))
+    shift, turn = task.seen(rows, here.pose, task.goal(rows, task.wanted[rows]))
     after, after_angle = result.before.copy(), result.before_angle.copy()
     after[rows] = np.where(here.reachable & here.settled, np.linalg.norm(shift, axis=1), np.inf)
     after_angle[rows] = np.linalg.norm(turn, axis=1)

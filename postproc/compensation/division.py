@@ -141,12 +141,9 @@ class _Search:
     def _own_begins(self) -> Poses:
         """The commands (R) by which the tool is where the ways begin, under the force of that motion there."""
         task, rows = self.task, self.rows
-        before = np.maximum(rows - 1, 0)
-        path, wrench = task.toolpath, task.force.along(rows, np.zeros(len(rows)))
-        same = (rows > 0) & self.full.corrected[before] & (path.tool[rows] == path.tool[before])
-        same &= np.all(np.abs(wrench - task.wrench[before]) <= 1e-9 * max(1.0, task.force.max_force), axis=1)
+        wrench = task.force.along(rows, np.zeros(len(rows)))
         found = Poses(self.start.rotation.copy(), self.start.position.copy())
-        other = np.flatnonzero(~same)
+        other = np.flatnonzero(task.steps(rows, self.full.corrected))
         if len(other):
             at = rows[other]
             begin = task.ways.begin[at]
@@ -212,36 +209,44 @@ class _Search:
             self.count[active] = np.clip(guess, fails[active] + 1, top).astype(np.int64)
 
     def ration(self) -> None:
-        """Where all together are more than may be inserted, the largest errors come first."""
-        least = self.least
-        spare = int(self.limits.max_growth * self.n) - self.n - int(self.back.sum()) - int((least - 1).sum())
-        cost = self.linked + self.count - least
-        if cost.sum() <= spare:
+        """Where all together are more than may be inserted: links first, then points, the largest errors before."""
+        spare = int(self.limits.max_growth * self.n) - self.n
+        spare -= int(self.back.sum()) + int((self.least - 1).sum())
+        wanted = self.linked.astype(np.int64) + self.count - self.least
+        if wanted.sum() <= spare:
             return
-        need = np.maximum(np.where(self.linked, self.step, 0.0), self.error)
-        order = np.argsort(-need, kind="stable")
-        paid = np.zeros(len(cost), bool)
-        paid[order] = np.cumsum(cost[order]) <= max(spare, 0)
-        unpaid = ~paid & (cost > 0)
-        self.linked &= paid
-        self.count = np.where(paid, self.count, least)
+        spare = max(spare, 0)
+        paid = self._first(self.linked.astype(np.int64), self.step, spare) > 0
+        unlinked = self.linked & ~paid
+        more = np.where(unlinked, 0, self.count - self.least)
+        self.count = self.least + self._first(more, self.error, spare - int(paid.sum()))
         entry = self.entry[self.rows]
+        self.linked = paid
         self.start = Poses(
-            np.where(unpaid[:, None, None], entry.rotation, self.start.rotation),
-            np.where(unpaid[:, None], entry.position, self.start.position),
+            np.where(unlinked[:, None, None], entry.rotation, self.start.rotation),
+            np.where(unlinked[:, None], entry.position, self.start.position),
         )
-        rows = self.rows[unpaid]
-        first = int(rows[np.argmax(need[unpaid])])
+        left = np.flatnonzero(self.linked + self.count - self.least < wanted)
+        first = int(self.rows[left[np.argmax(np.maximum(self.step, self.error)[left])]])
         self.findings.append(
             Finding(
                 "COR014",
-                f"{int(cost.sum())} motions would have to be inserted, max_growth ({self.limits.max_growth:g}) allows"
-                f" {max(spare, 0)}: {len(rows)} motions stay undivided (largest error here)",
+                f"{int(wanted.sum())} motions would have to be inserted, max_growth ({self.limits.max_growth:g}) allows"
+                f" {spare}: {len(left)} motions have fewer than they need (the largest error here)",
                 self.task.file,
                 int(self.task.toolpath.line[first]),
                 help="raise max_growth or tolerance in the cell",
             )
         )
+
+    @staticmethod
+    def _first(wanted: Ints, need: Floats, spare: int) -> Ints:
+        """(R,) how many of ``wanted`` (R,) each gets of ``spare``, those with the largest ``need`` (R,) first."""
+        order = np.argsort(-need, kind="stable")
+        before = np.cumsum(wanted[order]) - wanted[order]
+        given = np.zeros_like(wanted)
+        given[order] = np.clip(spare - before, 0, wanted[order])
+        return given
 
     def _errors(self, chosen: Ints, count: Ints) -> Floats:
         """(A,) what is left between the points of the motions ``chosen`` (A,) in ``count`` (A,) even pieces, in parts

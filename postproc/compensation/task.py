@@ -124,3 +124,21 @@ class Task:
         shift, turn = difference(real, goal)
         turns = self.turns(rows, goal.rotation)
         return shift, turn if turns is None else (turns @ turn[..., None])[..., 0]
+
+    def seen(self, rows: Ints, real: Poses, goal: Poses) -> tuple[Floats, Floats]:
+        """real (-) goal (K, 3) [m], [rad] as it shows on the part: a turn about a free axis does not."""
+        shift, turn = difference(real, goal)
+        free = np.nan_to_num(self.toolpath.free_axis[rows])
+        if not free.any():
+            return shift, turn
+        axis = (goal.rotation @ free[..., None])[..., 0]
+        return shift, turn - np.sum(turn * axis, axis=1, keepdims=True) * axis
+
+    def steps(self, rows: Ints, corrected: Bools) -> Bools:
+        """(K,) whether the correction of motions ``rows`` (K,) begins anew, and does not go on from the one before:
+        that one is not ``corrected`` (N,), has another tool, or ends under another force."""
+        before, path = np.maximum(rows - 1, 0), self.toolpath
+        begin = self.force.along(rows, np.zeros(len(rows)))
+        away = np.abs(begin - self.wrench[before]) > 1e-9 * max(1.0, self.force.max_force)
+        other = path.tool[rows] != path.tool[before]
+        return np.asarray((rows == 0) | ~corrected[before] | other | away.any(axis=1))
