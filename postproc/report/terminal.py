@@ -39,7 +39,7 @@ def show(console: Console, report: Report, verbose: bool = False) -> None:
 
 
 def _rows(report: Report) -> Iterable[tuple[str, str]]:
-    cuts = f"{report.cuts} cut" + ("" if report.cuts == 1 else "s")
+    cuts = _count(report.cuts, "cut")
     yield (
         "program",
         escape(f"{report.program} ({report.dialect}), {report.motions} motions,")
@@ -57,7 +57,7 @@ def _rows(report: Report) -> Iterable[tuple[str, str]]:
         yield "error after", f"{after}, orientation {_deg(report.angle_after_deg)}"
         if report.between is not None:
             yield "on the way", f"{_spread(report.between)}, between the points as written"
-        yield "correction", f"{_spread(report.correction)} ({report.iterations} iterations{share})"
+        yield "correction", f"{_spread(report.correction)} ({_count(report.iterations, 'iteration')}{share})"
         yield (
             "motions",
             (
@@ -71,13 +71,16 @@ def _rows(report: Report) -> Iterable[tuple[str, str]]:
             yield "", escape(_left_out(report.doubt))
 
 
+def _count(number: int, word: str) -> str:
+    return f"{number} {word}" if number == 1 else f"{number} {word}s"
+
+
 def _links(report: Report) -> str:
     """Links are counted apart: they lead from one correction to the next, mostly at the begin of a cut."""
     if not report.links:
         return ""
     longest = max(report.links, key=lambda link: link.length_mm)
-    count = "1 link" if len(report.links) == 1 else f"{len(report.links)} links"
-    return f", {count} among them, up to {longest.length_mm:.3f} mm (line {longest.line})"
+    return f", {_count(len(report.links), 'link')} among them, up to {longest.length_mm:.3f} mm (line {longest.line})"
 
 
 def _worst(report: Report) -> Table:

@@ -180,7 +180,7 @@ def _closing(request: Request, ready: Prepared, written: Written) -> list[Findin
         findings.append(
             Finding(
                 "COR012",
-                f"{links} links where the correction steps, and {division.inserted - links} points on the way"
+                f"{links} link{'' if links == 1 else 's'} where the correction steps, and {division.inserted - links} points on the way"
                 f" (here the first one): {len(division) / max(len(path), 1):.3f} times the motions",
                 file,
                 int(path.line[first]),
