@@ -36,11 +36,10 @@ class KrlDialect:
         return sorted(matches, key=lambda p: p.stem != path.stem)[:1]
 
     def read(self, documents: tuple[Document, ...], settings: Settings = PLAIN) -> Program:
-        return interpreter.read(documents)
+        return interpreter.read(documents, settings.references)
 
     def moved(self, program: Program, plan: Plan, writing: Writing) -> Moved:
-        decimals = {"mm": writing.mm, "deg": writing.deg}
-        return Moved(tuple(writer.moved(program, plan.position, plan.rotation, decimals)))
+        return writer.moved(program, plan, writing)
 
     def marked(self, program: Program, text: str) -> Edit:
         comment = b";COMPENSATED by compensate " + text.encode("latin-1", "replace")

@@ -35,11 +35,12 @@ CLOSES: dict[bytes, frozenset[bytes]] = {
 }
 BRANCHES = {b"ELSE": b"IF", b"CASE": b"SWITCH", b"DEFAULT": b"SWITCH"}
 POINT_TYPES = frozenset([b"FRAME", b"POS", b"E3POS", b"E6POS", b"AXIS", b"E3AXIS", b"E6AXIS"])
-RECORD_TYPES = frozenset([b"FDAT", b"LDAT", b"PDAT"])
-TYPES = POINT_TYPES | RECORD_TYPES | {b"INT", b"REAL", b"BOOL", b"CHAR"}
+RECORD_TYPES = frozenset([b"FDAT", b"LDAT", b"PDAT", b"ODAT"])
+SCALARS = frozenset([b"INT", b"REAL", b"BOOL", b"CHAR"])
+TYPES = POINT_TYPES | RECORD_TYPES | SCALARS
 KEPT = frozenset(
     b"HALT WAIT CONTINUE INTERRUPT TRIGGER BRAKE RESUME EXT EXTFCT "
-    b"IMPORT SIGNAL ENUM STRUC ANOUT ANIN DIGIN RETURN EXIT INI".split()
+    b"IMPORT SIGNAL ENUM STRUC ANOUT ANIN DIGIN INI".split()
 )
 
 _FIRST = re.compile(rb"[ \t]*(" + NAME + rb")")
@@ -49,12 +50,12 @@ _DEF = re.compile(
     + NAME
     + rb"(?:\[[^\]]*\])?|DEF)[ \t]+("
     + NAME
-    + rb")[ \t]*(?:\(|\Z)",
+    + rb")[ \t]*(?:\(([^)]*)|\Z)",
     re.I,
 )
 _GOTO = re.compile(rb"GOTO[ \t]+(" + NAME + rb")", re.I)
 _ASSIGNMENT = re.compile(
-    rb"(" + NAME + rb")[ \t]*(?:\[([^\]]*)\])?[ \t]*"
+    rb"(" + NAME + rb")[ \t]*(?:\[((?:[^\[\]]|\[[^\[\]]*\])*)\])?[ \t]*"
     rb"((?:\.[ \t]*" + NAME + rb"(?:\[[^\]]*\])?[ \t]*)*)=(?!=)[ \t]*"
 )
 _CALL = re.compile(rb"(" + NAME + rb")[ \t]*\((.*)\)\Z", re.S)
@@ -64,6 +65,8 @@ _DECLARED = re.compile(
 )
 _ITEM = re.compile(rb"(" + NAME + rb")[ \t]*(?:\[([^\]]*)\])?[ \t]*(=[ \t]*)?")
 _STRING = re.compile(rb'"[^"\r\n]*"?')
+_BRACKET = re.compile(rb'"[^"\r\n]*"?|[{}()\[\],]')
+_BLANKS = re.compile(rb"[ \t]*")
 _IDENTIFIER = re.compile(rb"(?<![A-Za-z0-9_$#'])" + NAME)
 _NUMBER = re.compile(rb"[-+]?[ \t]*(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,4})?\Z")
 _RADIX = re.compile(rb"'[ \t]*(?:[Bb][ \t]*([01]+)|[Hh][ \t]*([0-9A-Fa-f]+))[ \t]*'\Z")
@@ -86,6 +89,13 @@ class Call(NamedTuple):
     arguments: bytes
 
 
+class Head(NamedTuple):
+    """The head of a DEF or DEFFCT: its name, its parameters and whether each comes back changed (OUT)."""
+
+    name: bytes
+    parameters: tuple[tuple[bytes, bool], ...]
+
+
 class Declared(NamedTuple):
     type: bytes
     is_global: bool
@@ -100,7 +110,7 @@ class Statement(NamedTuple):
     code: bytes
     line: int
     at: int  # offset of the first byte of the code
-    said: Assignment | Call | Declared | bytes | None = None
+    said: Assignment | Call | Declared | Head | bytes | None = None
     comment: bytes = b""
 
 
@@ -143,11 +153,13 @@ def number(literal: bytes) -> float | None:
 
 def lines(document: Document) -> Iterator[tuple[int, int, int]]:
     """Number (from 1), start and stop (line ending included) of every line; a BOM belongs to none."""
-    starts = document.line_starts
-    first = len(BOM) if document.raw.startswith(BOM) else 0
-    stops = [*starts[1:], len(document.raw)]
-    for i, (start, stop) in enumerate(zip(starts, stops, strict=True)):
-        yield i + 1, max(start, first), stop
+    raw, line = document.raw, 0
+    start, last = len(BOM) if raw.startswith(BOM) else 0, len(raw)
+    while start < last or not line:
+        stop = raw.find(b"\n", start) + 1 or last
+        line += 1
+        yield line, start, stop
+        start = stop
 
 
 def statement(raw: bytes, line: int, start: int, stop: int) -> Statement | None:
@@ -166,7 +178,18 @@ def statement(raw: bytes, line: int, start: int, stop: int) -> Statement | None:
     return Statement(kind, word, code, line, at, said, comment)
 
 
-def _kind(word: bytes, code: bytes, at: int) -> tuple[str, Assignment | Call | Declared | bytes | None]:
+def _parameters(text: bytes) -> tuple[tuple[bytes, bool], ...]:
+    found = []
+    for part in text.split(b",")[:50]:
+        name = _FIRST.match(part)
+        if name:
+            found.append((name[1].upper(), not part.rstrip().upper().endswith(b"IN")))
+    return tuple(found)
+
+
+def _kind(
+    word: bytes, code: bytes, at: int
+) -> tuple[str, Assignment | Call | Declared | Head | bytes | None]:
     found: re.Match[bytes] | None
     if word in MOTIONS:
         # A variable may bear such a name only where no motion can stand.
@@ -180,26 +203,35 @@ def _kind(word: bytes, code: bytes, at: int) -> tuple[str, Assignment | Call | D
     if word in BRANCHES:
         return "branch", None
     if word in (b"DEF", b"DEFFCT", b"GLOBAL") and (found := _DEF.match(code)):
-        return "def", found[1].upper()
+        return "def", Head(found[1].upper(), _parameters(found[2] or b""))
     if word in (b"END", b"ENDFCT"):
         return "end", None
     if word == b"GOTO" and (found := _GOTO.match(code)):
         return "goto", found[1].upper()
+    if word in (b"EXIT", b"RETURN"):
+        return word.decode().lower(), None
     if word in KEPT:
         return "kept", None
     if word == b"DECL" or word in TYPES or word == b"GLOBAL":
         declared = declaration(code, at)
         if declared is not None:
             return "declaration", declared
-    if found := _ASSIGNMENT.match(code):
-        path = found[3].replace(b" ", b"").replace(b"\t", b"").upper()[1:]
-        value = Assignment(found[1].upper(), found[2], path, code[found.end() :], at + found.end())
-        return "assignment", value
+    if (said := assignment(code, at)) is not None:
+        return "assignment", said
     if found := _CALL.match(code):
         return "call", Call(found[1].upper(), found[2])
     if found := _LABEL.match(code):
         return "label", found[1].upper()
     return "other", None
+
+
+def assignment(code: bytes, at: int) -> Assignment | None:
+    """``NAME[index].path = value``; None if the code, which stands at byte ``at``, is none."""
+    found = _ASSIGNMENT.match(code)
+    if found is None:
+        return None
+    path = found[3].replace(b" ", b"").replace(b"\t", b"").upper()[1:]
+    return Assignment(found[1].upper(), found[2], path, code[found.end() :], at + found.end())
 
 
 def declaration(code: bytes, at: int) -> Declared | None:
@@ -221,26 +253,29 @@ def declaration(code: bytes, at: int) -> Declared | None:
         else:
             # The size of an array is no element of it.
             items.append((found[1].upper(), b"", at + place))
-        rest = code[place:].lstrip()
-        if not rest.startswith(b","):
+        place = _skip(code, place)
+        if code[place : place + 1] != b",":
             break
-        place = len(code) - len(rest) + 1
-        place += len(code[place:]) - len(code[place:].lstrip())
+        place = _skip(code, place + 1)
     return Declared(head[2].upper(), is_global, tuple(items)) if items else None
+
+
+def _skip(code: bytes, place: int) -> int:
+    found = _BLANKS.match(code, place)
+    return found.end() if found else place
 
 
 def value_end(code: bytes, start: int) -> int:
     """Where a value that begins at ``start`` ends: at the comma outside of all braces, or at the end."""
     depth = 0
-    masked = _STRING.sub(lambda found: b"_" * len(found[0]), code)
-    for i in range(start, len(masked)):
-        letter = masked[i]
+    for found in _BRACKET.finditer(code, start):
+        letter = found[0]
         if letter in b"{([":
             depth += 1
         elif letter in b"})]":
             depth -= 1
-        elif letter == 0x2C and depth <= 0:
-            return i
+        elif letter == b"," and depth <= 0:
+            return found.start()
     return len(code)
 
 

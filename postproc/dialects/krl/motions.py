@@ -1,216 +1,345 @@
-"""The motion statements: their target, and whether it can be corrected."""
+"""The motion statements: their target, their way, and whether they can be corrected."""
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import replace
 
-from postproc.dialects.krl.lexing import LONGEST, LOOPS, NAME, SPLINES, Statement, identifiers, keyed
-from postproc.dialects.krl.rows import Reason, refusal
+from postproc.dialects.krl.assignments import with_clause
+from postproc.dialects.krl.bulk import Bulk
+from postproc.dialects.krl.lexing import LONGEST, LOOPS, SPLINES, Statement, identifiers
+from postproc.dialects.krl.operands import Operand, Parts, operand_at, take_apart
+from postproc.dialects.krl.places import Auxiliary, Relative
+from postproc.dialects.krl.rows import NAN6, NO_ARC, Reason, Row, index, refusal, way_of
 from postproc.dialects.krl.run import Run
-from postproc.dialects.krl.state import Anchor, Numbers, Point, State
-from postproc.dialects.krl.survey import HERE, READS_POSITION, in_spline
-from postproc.dialects.krl.target import Six, Target, Unclear, parse, six
+from postproc.dialects.krl.spatial import Arc, Numbers, Vector, arc, rotation, turned
+from postproc.dialects.krl.state import NAN, Anchor, State
+from postproc.dialects.krl.survey import HERE
+from postproc.dialects.krl.target import Six, Target, Unclear, shown, six
+from postproc.document import Span
 from postproc.toolpath import Kind
 
-_NAMED = re.compile(
-    rb"(" + NAME + rb")[ \t]*(?:\[([^\]]*)\])?((?:[ \t]*\.[ \t]*" + NAME + rb"(?:\[[^\]]*\])?)*)"
-)
-_APPROXIMATION = re.compile(rb"(?:[ \t,]*C_(?:DIS|VEL|ORI|PTP|SPL)\b){0,2}[ \t]*\Z", re.I)
-_COMPUTED = re.compile(rb"[ \t]*[:+\-*/(]")
-_WITH = re.compile(rb"[ \t]*(?:C_[A-Za-z]+[ \t]*)*WITH\b", re.I)
-_CIRCLE_ANGLE = re.compile(rb"[ \t]*,[ \t]*CA\b", re.I)
-_RELATIVE = {
-    b"PTP_REL": Kind.PTP,
-    b"SPTP_REL": Kind.PTP,
-    b"LIN_REL": Kind.LIN,
-    b"SLIN_REL": Kind.LIN,
-    b"CIRC_REL": Kind.CIRC,
-    b"SCIRC_REL": Kind.CIRC,
-}
-_HOME = re.compile(rb"X?HOME[1-5]?\Z")
-
-
-@dataclass(frozen=True, slots=True)
-class Operand:
-    """One target as it is written: what it says, the variable that holds it, and what follows it."""
-
-    target: Target | Unclear
-    rest: bytes = b""
-    name: bytes = b""
-    point: Point | None = None
-    builds: bool = False  # it is not clear, and may leave components to the point before
+_CIRCLE_ANGLE = re.compile(rb"CA(?![A-Za-z0-9_$])[ \t]*=?[ \t]*", re.I)
+_POINTS = (b"PTP", b"SPTP", b"PTP_REL", b"SPTP_REL")
+_ARCS = (b"CIRC", b"SCIRC", b"CIRC_REL", b"SCIRC_REL")
+_SPLINES = (b"SPL", b"SPL_REL")
 
 
 def move(run: Run, statement: Statement) -> None:
     """Takes up a motion statement."""
+    word = statement.word
     if len(statement.code) > LONGEST:
         unknown_motion(run, statement)
         return
-    word = statement.word
-    text = statement.code[len(word) :]
-    at = statement.at + len(word)
-    operand = _operand(run, text, at)
-    plain = word in (b"PTP", b"LIN", b"SPTP", b"SLIN")
-    if plain and operand.name in HERE and _APPROXIMATION.match(operand.rest):
+    parts = take_apart(statement.code, len(word))
+    if not parts.clause:
+        _move(run, statement, parts, None)
         return
-    if word.endswith(b"_REL"):
-        run.mentioned |= identifiers(text)
-        reason = Reason(
-            "KRL008", "a relative motion; it and the motion before it are kept as they are", "rel"
-        )
-        spline = in_spline(item.block for item in run.stack)
-        kind = Kind.OTHER if spline else _RELATIVE.get(word, Kind.OTHER)
-        _enter(run, statement.line, statement.at, kind, Unclear("KRL008", ""), reason)
-        return
-    if word in (b"CIRC", b"SCIRC"):
-        _arc(run, statement, operand, at + len(text))
-        return
-    if word == b"SPL" or (in_spline(item.block for item in run.stack) and word != b"PTP"):
-        operand = _closed(operand)
-        reason = Reason("KRL009", "a spline is not corrected", "spline")
-        _enter(run, statement.line, statement.at, Kind.OTHER, operand.target, reason, operand)
-        return
-    kind = Kind.PTP if word.endswith(b"PTP") else Kind.LIN
-    if kind is Kind.PTP and _HOME.match(operand.name) and operand.point is None:
-        shown = operand.name.decode("latin-1")
-        home = Reason("KRL016", f"{shown} is a point of the controller; the motion stays as it is", "home")
-        _enter(run, statement.line, statement.at, Kind.PTP, Unclear("KRL016", ""), home)
-        return
-    operand = _closed(operand)
-    _enter(run, statement.line, statement.at, kind, operand.target, None, operand)
+    outside = run.state
+    run.state = outside.copy()
+    problem = with_clause(run, statement, parts.clause)
+    _move(run, statement, parts, problem)
+    state = run.state
+    state.base, state.tool, state.feed = outside.base, outside.tool, outside.feed
+    state.blend, state.tool_stands = outside.blend, outside.tool_stands
 
 
-def move_to(run: Run, word: bytes, line: int, at: int, target: Target) -> None:
-    """Takes up a PTP or LIN to an inline aggregate that was read already."""
-    _enter(run, line, at, Kind.LIN if word in b"LINlin" else Kind.PTP, target, None)
+def move_bulk(run: Run, bulk: Bulk) -> None:
+    """Takes up a run of common lines."""
+    state = run.state
+    reason = _structure(run) or _frames_missing(run)
+    last = run.rows.add_bulk(bulk, state, reason)
+    x, y, z, a, b, c = bulk.values[-1].tolist()
+    state.point, state.point_frames, state.axes, state.anchor = (
+        (x, y, z, a, b, c),
+        (state.base, state.tool),
+        None,
+        None,
+    )
+    state.sources = frozenset([last])
 
 
 def unknown_motion(run: Run, statement: Statement) -> None:
-    """Takes up a statement of a package that holds a motion word."""
-    run.mentioned |= identifiers(statement.code)
-    shown = statement.code[:40].decode("latin-1")
-    _enter(
-        run, statement.line, statement.at, Kind.OTHER, Unclear("KRL001", ""),
-        Reason("KRL001", f"'{shown}' is not understood", "package"),
-    )  # fmt: skip
+    """Takes up a statement of a package that holds a motion word, or a motion that is no KRL."""
+    run.mentioned |= identifiers(statement.code[:LONGEST])
+    motion = _extent(statement, None)
+    operand = Operand(Unclear("KRL001", ""), motion[1], motion[2])
+    reason = Reason("KRL001", f"'{shown(statement.code)}' is not understood", "package")
+    _enter(run, statement, Kind.OTHER, operand, reason, NAN)
 
 
-def _operand(run: Run, text: bytes, at: int) -> Operand:
-    """The first target in ``text``, which stands at byte ``at``."""
-    stripped = text.lstrip(b" \t")
-    at += len(text) - len(stripped)
-    if stripped.startswith(b"{"):
-        stop = stripped.find(b"}")
-        if stop < 0 or b"{" in stripped[1:stop]:
-            return Operand(Unclear("KRL001", "its braces do not close"), builds=True)
-        rest = stripped[stop + 1 :]
-        if _COMPUTED.match(rest):
-            run.mentioned |= identifiers(rest)
-            return Operand(Unclear("KRL002", "its target is computed"), builds=True)
-        target = parse(stripped[: stop + 1], at, 0)
-        return Operand(target, rest, builds=isinstance(target, Unclear))
-    found = _NAMED.match(stripped)
-    if found is None:
-        return Operand(Unclear("KRL001", "it has no target that can be read"))
-    name, rest = found[1].upper(), stripped[found.end() :]
-    shown = found[0].strip().decode("latin-1")
-    key = keyed(name, found[2])
-    if _COMPUTED.match(rest) or found[3].strip() or key is None:
-        run.mentioned |= identifiers(stripped)
-        reads = READS_POSITION.search(stripped) is not None
-        return Operand(Unclear("KRL002", f"its target {shown} is computed"), rest, builds=reads)
-    point = run.state.variables.get(key)
-    if point is not None:
-        computed = isinstance(point.target, Unclear) and point.target.code != "KRL003"
-        return Operand(point.target, rest, key, point, computed)
-    if name.startswith(b"$"):
-        reads = READS_POSITION.match(name) is not None
-        variable = Unclear("KRL002", f"its target {shown} is a variable of the controller")
-        return Operand(variable, rest, key, None, reads)
-    return Operand(Unclear("KRL003", f"point {shown} is not declared"), rest, key)
+def _move(run: Run, statement: Statement, parts: Parts, reason: Reason | None) -> None:
+    word, code = statement.word, statement.code
+    relative = word.endswith(b"_REL")
+    kind = _kind(run, word)
+    if not parts.points:
+        empty = Operand(
+            Unclear("KRL001", "it has no target that can be read"), *_extent(statement, None)[1:3]
+        )
+        _enter(run, statement, kind, empty, reason, NAN)
+        return
+    blend = _blend(run.state, parts, kind)
+    first = operand_at(run, code, statement.at, parts.points[0])
+    if not relative and first.variable is not None and first.variable.name in HERE and len(parts.points) == 1:
+        return
+    if parts.odd:
+        reason = reason or Reason("KRL001", f"'{shown(parts.odd)}' is not understood")
+    if kind == Kind.CIRC:
+        _arc(run, statement, parts, first, reason, blend)
+        return
+    if len(parts.points) > 1:
+        odd = code[slice(*parts.points[1])]
+        reason = reason or Reason("KRL001", f"'{shown(odd)}' is not understood")
+    if relative:
+        first, reason = _absolute(run, statement, parts, first, reason)
+    if first.variable is not None and isinstance(first.target, Unclear) and first.target.code == "KRL016":
+        reason = Reason("KRL016", first.target.message, "home")
+    row = _enter(run, statement, kind, first, reason, blend, relative=relative)
+    if relative and row not in run.rows.reasons:
+        run.rows.relative[row] = _reference(statement, parts)
 
 
-def _closed(operand: Operand) -> Operand:
-    """The operand if nothing but approximation follows it."""
-    if _APPROXIMATION.match(operand.rest):
-        return operand
-    if isinstance(operand.target, Unclear) and operand.target.code in ("KRL001", "KRL002"):
-        return operand
-    message = "WITH sets frames or speeds for this motion only"
-    if not _WITH.match(operand.rest):
-        message = f"'{operand.rest.strip()[:40].decode('latin-1')}' is not understood"
-        if operand.name:
-            message += "; an inline form without the lines that it unfolds to"
-    return Operand(Unclear("KRL001", message), b"", operand.name, operand.point, not operand.name)
+def _kind(run: Run, word: bytes) -> Kind:
+    if word in _POINTS:
+        return Kind.PTP
+    if word in _ARCS:
+        return Kind.CIRC
+    return Kind.SPL if word in _SPLINES else Kind.LIN
 
 
-def _cause(target: Unclear, operand: Operand | None) -> str:
-    """What joins refusals that are to be told together."""
-    if target.code == "KRL003" or (target.code == "KRL001" and operand is not None and operand.name):
-        return target.code
-    return ""
+def _blend(state: State, parts: Parts, kind: Kind) -> float:
+    """[mm] that the controller may leave the way before the end point."""
+    if not parts.slurs:
+        return 0.0
+    return state.blend if set(parts.slurs) == {b"C_DIS"} else NAN
 
 
-def _arc(run: Run, statement: Statement, auxiliary: Operand, stop: int) -> None:
-    reason = Reason("KRL009", "an arc is not corrected", "arc")
-    rest = auxiliary.rest.lstrip(b" \t")
-    end = Operand(Unclear("KRL009", ""))
-    if rest.startswith(b","):
-        end = _operand(run, rest[1:], stop - len(rest) + 1)
-        if _CIRCLE_ANGLE.match(end.rest):
-            # The arc goes on or ends before: the end point only gives the direction.
-            end = Operand(Unclear("KRL009", ""), b"", end.name, end.point, True)
-        end = _closed(end)
-    row = _enter(run, statement.line, statement.at, Kind.CIRC, end.target, reason, end)
-    if auxiliary.point is not None:
-        auxiliary.point.serve(row)
+def _extent(statement: Statement, operand: Operand | None) -> tuple[int, int, int, int]:
+    """Offsets of the word, of the operand and behind it, and behind the code."""
+    at = statement.at
+    stop = at + len(statement.code)
+    if operand is None:
+        behind = min(at + len(statement.word), stop)
+        return at, behind, stop, stop
+    return at, operand.start, operand.stop, stop
+
+
+def _reference(statement: Statement, parts: Parts) -> Relative:
+    at = statement.at
+    word = Span(0, at, at + len(statement.word))
+    if parts.reference is None:
+        return Relative(word, None, False)
+    begin, end = parts.reference
+    return Relative(word, Span(0, at + begin, at + end), statement.code[begin:end].upper().endswith(b"TOOL"))
+
+
+def _absolute(
+    run: Run, statement: Statement, parts: Parts, operand: Operand, reason: Reason | None
+) -> tuple[Operand, Reason | None]:
+    """A relative target as the absolute one."""
+    state, moved = run.state, operand.target
+    if parts.reference is not None:
+        named = statement.code[slice(*parts.reference)].upper().replace(b" ", b"")
+        if named not in (b"#BASE", b"#TOOL"):
+            return operand, reason or Reason("KRL008", f"a relative motion in {shown(named)}")
+    if isinstance(moved, Unclear):
+        return operand, reason
+    if moved.axes is not None:
+        if state.axes is None:
+            why = Reason(
+                "KRL008", f"a motion relative to axis angles that are not known: {_axes_lost(state)}", "axes"
+            )
+            return replace(operand, target=Unclear("KRL008", "")), reason or why
+        there = [old + (new or 0.0) for old, new in zip(state.axes, moved.axes, strict=True)]
+        return replace(operand, target=Target((None,) * 6, axes=six(there))), reason
+    if any(moved.values[3:]):
+        why = Reason("KRL008", "a relative rotation; it is not documented well enough to be followed", "turn")
+        return replace(operand, target=Unclear("KRL008", "")), reason or why
+    if state.point is None or state.point_frames != (state.base, state.tool):
+        lost = state.point_lost
+        if state.point is not None:
+            lost = "base or tool changed since the point before"
+        elif state.anchor is not None:
+            lost = "it is where an axis motion ends"
+        why = Reason(
+            "KRL008", f"a relative motion, and the position before is not known in numbers: {lost}", lost
+        )
+        return replace(operand, target=Unclear("KRL008", "")), reason or why
+    by = shift(state.point, moved, _reference(statement, parts).in_tool)
+    x, y, z = (old + new for old, new in zip(state.point, by, strict=False))
+    return replace(operand, target=replace(moved, values=(x, y, z, *state.point[3:]))), reason
+
+
+def shift(point: Numbers, moved: Target, in_tool: bool) -> Vector:
+    """A relative translation in the axes of the base."""
+    x, y, z = (value or 0.0 for value in moved.values[:3])
+    return turned(rotation(*point[3:]), (x, y, z)) if in_tool else (x, y, z)
+
+
+def _axes_lost(state: State) -> str:
+    return state.point_lost if state.point is None else "the motion before it does not give the axes"
+
+
+def _arc(
+    run: Run, statement: Statement, parts: Parts, first: Operand, reason: Reason | None, blend: float
+) -> None:  # fmt: skip
+    code, state = statement.code, run.state
+    points, angle, span = parts.points[1:], None, None
+    has_angle = bool(points) and _CIRCLE_ANGLE.match(code[slice(*points[-1])]) is not None
+    if has_angle:
+        begin, end = points.pop()
+        head = _CIRCLE_ANGLE.match(code[begin:end])
+        assert head is not None
+        text = code[begin + head.end() : end]
+        value = run.value(text)
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            angle = float(value)
+            span = Span(0, statement.at + begin + head.end(), statement.at + end)
+            run.mentioned |= identifiers(text)
+        else:
+            why = value.message if isinstance(value, Unclear) else "it is no number"
+            reason = reason or Reason("KRL002", f"its angle CA is computed: {why}")
+    if len(points) != 1:
+        what = (
+            "it has no end point" if not points else f"'{shown(code[slice(*points[1])])}' is not understood"
+        )
+        operand = Operand(Unclear("KRL001", what), first.start, first.stop, None, True)
+        _enter(run, statement, Kind.CIRC, operand, reason, blend)
+        return
+    end_point = operand_at(run, code, statement.at, points[0])
+    begin_known = state.point if state.point_frames == (state.base, state.tool) else None
+    written = end_point
+    if statement.word.endswith(b"_REL"):
+        end_point, reason = _absolute(run, statement, parts, end_point, reason)
+        if isinstance(first.target, Target) and begin_known is not None:
+            by = shift(begin_known, first.target, _reference(statement, parts).in_tool)
+            x, y, z = (old + new for old, new in zip(begin_known, by, strict=False))
+            first = replace(first, target=replace(first.target, values=(x, y, z, None, None, None)))
+    found, unknown = _way(state, begin_known, first.target, end_point.target, angle)
+    if found is None and reason is None and isinstance(end_point.target, Target):
+        reason = unknown
+    if has_angle and (angle is None or found is None):
+        # Where the path ends is not where the end point is.
+        found = None
+        code_of = reason.code if reason is not None else "KRL009"
+        end_point = replace(end_point, target=Unclear(code_of, "its way is not known"), builds=True)
+    row = _enter(
+        run, statement, Kind.CIRC, end_point, reason, blend, found, relative=written is not end_point
+    )
+    if row in run.rows.reasons:
+        run.rows.builds_on[row] = run.rows.builds_on.get(row, frozenset()) | _before(run, row)
+    if isinstance(first.target, Target):
+        t = first.target
+        run.rows.arcs[row] = Auxiliary(
+            t.start[:3], t.stop[:3], t.file[:3], t.insert, t.home,  # type: ignore[arg-type]
+            Span(0, first.start, first.stop), first.variable, -1, t.locked, span if angle is not None else None,
+            has_angle,
+        )  # fmt: skip
+    if written is not end_point and row not in run.rows.reasons:
+        run.rows.relative[row] = _reference(statement, parts)
+
+
+def _before(run: Run, row: int) -> frozenset[int | bytes]:
+    return frozenset([row - 1]) if row else frozenset()
+
+
+def _way(
+    state: State,
+    begin: Numbers | None,
+    auxiliary: Target | Unclear,
+    end: Target | Unclear,
+    angle: float | None,
+) -> tuple[Arc | None, Reason]:
+    """The way of an arc, or why it is not known."""
+    if isinstance(auxiliary, Unclear):
+        code = auxiliary.code if auxiliary.code in ("KRL001", "KRL002", "KRL003") else "KRL009"
+        return None, Reason(code, f"its auxiliary point is not known: {auxiliary.message}", auxiliary.message)
+    if auxiliary.axes is not None:
+        return None, Reason("KRL009", "its auxiliary point is given in axis angles")
+    if begin is None:
+        lost = state.point_lost
+        if state.point_frames is not None and state.point_frames != (state.base, state.tool):
+            lost = "base or tool changed since the point before"
+        elif state.anchor is not None:
+            lost = "it is where an axis motion ends"
+        return None, Reason(
+            "KRL009", f"an arc, and its begin is not known in numbers: {lost}", f"begin {lost}"
+        )
+    if isinstance(end, Unclear) or end.axes is not None:
+        return None, Reason("KRL009", "its end is not known")
+    through = [old if new is None else new for new, old in zip(auxiliary.values[:3], begin, strict=False)]
+    there = [old if new is None else new for new, old in zip(end.values[:3], begin, strict=False)]
+    found = arc(begin[:3], (through[0], through[1], through[2]), (there[0], there[1], there[2]), angle)
+    same = "an arc whose begin, auxiliary point and end do not define a circle"
+    return found, Reason("KRL009", same, "flat")
 
 
 def _enter(
-    run: Run, line: int, at: int, kind: Kind, target: Target | Unclear, reason: Reason | None,
-    operand: Operand | None = None,
+    run: Run, statement: Statement, kind: Kind, operand: Operand, reason: Reason | None, blend: float,
+    way: Arc | None = None, relative: bool = False,
 ) -> int:  # fmt: skip
     """Adds the row of a motion and brings the state behind it.  ``reason``: why it is refused in any case."""
-    state = run.state
+    state, target = run.state, operand.target
     values: Numbers | None = None
     axes: Numbers | None = None
     anchor: Anchor | None = None
+    stated: Target | None = None
     if isinstance(target, Unclear):
-        reason = reason or refusal(target, _subject(target, operand), _cause(target, operand))
+        cause = target.code if target.code in ("KRL001", "KRL003") and operand.variable is not None else ""
+        reason = reason or refusal(target, "", cause)
     elif target.axes is not None:
         if kind is Kind.PTP:
             kind = Kind.AXIS
             axes = _filled(target.axes, state.axes)
         else:
             reason = reason or Reason("KRL001", "a straight line can not go to axis angles")
+        if target.lost is not None:
+            axes, reason = None, reason or refusal(target.lost, "")
+        stated = replace(target.detached(), locked="")
     else:
         values = _filled(target.values, state.point)
         if values is None and state.point_frames == (state.base, state.tool):
             values, anchor = _anchored(target.values, state.anchor)
-    partial = isinstance(target, Target) and bool(target.missing)
-    if partial and isinstance(target, Target) and reason is None and anchor is None:
-        reason = _incomplete(state, target, axes if kind is Kind.AXIS else values)
-    if partial and values is not None and state.point_frames != (state.base, state.tool):
+        stated = target
+    partial = stated is not None and bool(stated.missing) and not relative
+    if partial and stated is not None and reason is None and anchor is None:
+        reason = _incomplete(state, stated, axes if kind is Kind.AXIS else values)
+    if partial and values is not None and state.point_frames not in (None, (state.base, state.tool)):
         values = None
+    if values is not None and way is not None:
+        values = (*way.end, *values[3:])
+    elif kind == Kind.CIRC and reason is None:
+        reason = Reason("KRL009", "its way is not known")
     if reason is None and kind is not Kind.AXIS:
         reason = _frames_missing(run)
     structure = _structure(run)
     if structure is not None and (reason is None or reason.code != "KRL016"):
         reason = structure
-    clear = target if isinstance(target, Target) else None
-    row = run.rows.add(kind, line, at, state, values, axes, clear, anchor)
-    if clear is not None and clear.external:
-        run.rows.follow_external(row, clear)
+    if stated is not None and values is None and anchor is None and stated.axes is None:
+        stated = replace(stated.detached(), locked="")
+    rows = run.rows
+    row = rows.add(
+        Row(
+            kind, statement.line, _extent(statement, operand), values or NAN6, axes or NAN6,
+            NAN if kind in (Kind.PTP, Kind.AXIS) else state.feed, index(state.base), index(state.tool), blend,
+            stated, _inherits(stated, relative), way_of(way) if values is not None else NO_ARC,
+        ),
+        anchor,
+    )  # fmt: skip
     if reason is not None:
-        run.rows.reasons[row] = reason
-    relative = isinstance(target, Unclear) and target.code == "KRL008"
-    if partial or relative or (operand is not None and operand.builds):
-        run.rows.builds_on[row] = state.sources
-    if operand is not None and operand.point is not None:
-        operand.point.serve(row)
-        run.rows.points[row] = (operand.name, operand.point)
-    _advance(state, line, values, axes, reason)
+        rows.reasons[row] = reason
+    if operand.variable is not None and stated is not None:
+        rows.variables[row] = operand.variable
+        if stated.locked:
+            rows.locked[row] = stated.locked
+    if any(item.block.word in SPLINES for item in run.stack) or kind == Kind.SPL:
+        rows.whole[row] = "it is part of a spline"
+    elif run.triggered:
+        rows.whole[row] = "a TRIGGER before it counts from it"
+    run.triggered = False
+    if partial or relative or operand.builds:
+        rows.builds_on[row] = state.sources
+    _advance(state, statement.line, values, axes, reason)
     if axes is not None:
         anchor = Anchor(row)
     if anchor is not None:
@@ -219,17 +348,20 @@ def _enter(
     return row
 
 
-def _subject(target: Unclear, operand: Operand | None) -> str:
-    if operand is not None and operand.point is not None and target.code != "KRL001":
-        return f"point {operand.name.decode('latin-1')}: "
-    return ""
+def _inherits(stated: Target | None, relative: bool) -> int:
+    if stated is None or stated.axes is not None:
+        return 0
+    if relative:
+        return sum(1 << i for i in range(6) if stated.start[i] < 0)
+    return sum(1 << i for i, value in enumerate(stated.values) if value is None)
 
 
 def _advance(
     state: State, line: int, values: Numbers | None, axes: Numbers | None, reason: Reason | None
 ) -> None:
     if values is not None:
-        state.point, state.point_frames, state.axes = values, (state.base, state.tool), None
+        state.point, state.point_frames = values, (state.base, state.tool)
+        state.axes = state.anchor = None
     elif axes is not None:
         state.lose_point(f"after the axis motion in line {line}")
         state.axes = axes
@@ -262,8 +394,8 @@ def _anchored(own: Six, anchor: Anchor | None) -> tuple[Numbers | None, Anchor |
     full = _filled(given, None)
     if full is not None:
         return full, None
-    angles = [value is None for value in given[3:]]
-    return None, Anchor(anchor.row, given) if all(angles) or not any(angles) else None
+    open_angles = [value is None for value in given[3:]]
+    return None, Anchor(anchor.row, given) if all(open_angles) or not any(open_angles) else None
 
 
 def _incomplete(state: State, target: Target, values: Numbers | None) -> Reason | None:
@@ -293,17 +425,19 @@ def _frames_missing(run: Run) -> Reason | None:
 def _structure(run: Run) -> Reason | None:
     """The reason that lies in where the motion stands."""
     routine = run.routine
+    if run.idle:
+        return Reason("KRL023", "the flow that this program's constants give does not lead here", "never")
     if routine is None:
         if run.survey.has_routine:
             return Reason("KRL014", "a motion outside of every DEF", "outside")
-    elif not routine.is_main:
-        return Reason("KRL015", f"a motion of the subprogram in line {routine.line}", f"def {routine.line}")
+    elif run.walked and not routine.is_main:
+        return Reason("KRL015", run.why_walked(routine), f"def {routine.line}")
     for item in run.stack:
         word = item.block.word
-        if word != b"DEF" and word not in SPLINES:
+        if not item.followed and word not in SPLINES:
             what = "loop" if word in LOOPS else "branch"
-            shown = word.decode("latin-1")
+            told = word.decode("latin-1")
             return Reason(
-                "KRL006", f"inside of the {what} ({shown}) of line {item.block.line}", f"in {item.block.line}"
+                "KRL006", f"inside of the {what} ({told}) of line {item.block.line}", f"in {item.block.line}"
             )
     return None

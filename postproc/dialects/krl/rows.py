@@ -4,41 +4,27 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
-from postproc.arrays import Ints
-from postproc.dialects.krl.state import Anchor, Frame, Frames, Numbers, Point, Source, State
+from postproc.arrays import Floats
+from postproc.dialects.krl.bulk import Bulk
+from postproc.dialects.krl.places import Auxiliary, Relative, Variable
+from postproc.dialects.krl.spatial import Arc, Numbers
+from postproc.dialects.krl.state import Anchor, Frame, Source, State
 from postproc.dialects.krl.target import NOWHERE, Target, Unclear
 from postproc.document import Document
-from postproc.findings import Finding
-from postproc.geometry import rotation_from_abc
-from postproc.toolpath import Annotation, FrameRef, Kind, Toolpath
-from postproc.units import DEG, MM
+from postproc.toolpath import Annotation, Kind
 
-
-@dataclass(frozen=True)
-class Places:
-    """Where the numbers of a motion stand in the text.
-
-    start, stop (N, 6): byte range of the literals of X, Y, Z, A, B, C; -1 where the text has none.
-    file (N,): the document that holds them, -1 where the motion has no aggregate of numbers.
-    insert (N,): offset at which missing components are inserted (behind the last component).
-    """
-
-    start: Ints
-    stop: Ints
-    file: Ints
-    insert: Ints
-
-
-NAN6: Numbers = (float("nan"),) * 6
-SHARED = "KRL007"
+NAN = float("nan")
+NAN6: Numbers = (NAN,) * 6
+NO_ARC = (NAN,) * 7
 
 
 @dataclass(frozen=True, slots=True)
 class Reason:
-    """Why a row is refused; equal ``cause`` and code are told together.  ``subject`` begins the message."""
+    """Why a row is refused; equal ``cause`` and code are told together."""
 
     code: str
     message: str
@@ -48,247 +34,213 @@ class Reason:
 HELP = {
     "KRL001": "Write it as PTP or LIN with an aggregate of numbers, or leave it as it is.",
     "KRL002": "Write the target as numbers: LIN {X .., Y .., Z .., A .., B .., C ..}.",
-    "KRL003": "Put the module's .dat beside its .src, or declare the point there.",
+    "KRL003": "Put the module's .dat beside its .src, declare the point there, or give the $config.dat that does.",
     "KRL004": "Write all of X, Y, Z, A, B, C in the first Cartesian motion after that.",
     "KRL005": "Set $BASE and $TOOL before it: to numbers, to BASE_DATA[n] and TOOL_DATA[n], or with BAS.",
-    "KRL006": "Write the cut as a straight run of motions, outside of loops and branches.",
-    "KRL007": "Give every motion a point of its own that nothing else uses.",
+    "KRL006": "Write the cut as a straight run of motions, outside of loops and branches that inputs decide.",
     "KRL008": "Write the motion and the one before it with absolute targets.",
-    "KRL009": "Let the post-processor write arcs and splines as LIN, or leave them uncorrected.",
+    "KRL009": "Write the motion before the arc with all components, and the arc with three points apart.",
     "KRL010": "Check what the routine does; write all components in the motion after it.",
     "KRL011": "Set $BASE to numbers or to BASE_DATA[n] for this cut.",
     "KRL013": "Programs with a stationary tool are not corrected by this version.",
     "KRL014": "Close every block and every DEF.",
-    "KRL015": "Move the cut into the first DEF of the file, or make the subprogram a file of its own.",
+    "KRL015": "Call it where it always runs with the same values, or make the subprogram a file of its own.",
     "KRL016": "Nothing needs to be done.",
     "KRL017": "Write all of X, Y, Z, A, B, C in the first motion after the change of frame.",
     "KRL022": "Correct only cuts in which no external axis carries the robot or the workpiece.",
     "KRL019": "Write the declaration as an aggregate of numbers.",
+    "KRL023": "Nothing needs to be done if these motions are not meant to run.",
+    "KRL024": "Let the post-processor write the loop as a straight run of motions.",
 }
+
+
+class Row(NamedTuple):
+    """A motion that was read alone; see Toolpath and Places for what its entries mean (mm, deg)."""
+
+    kind: int
+    line: int
+    motion: tuple[int, int, int, int]
+    values: Numbers
+    axes: Numbers
+    feed: float
+    base: int
+    tool: int
+    blend: float
+    target: Target | None
+    inherits: int
+    way: tuple[float, ...]
+
+
+class Lot(NamedTuple):
+    """A run of common lines, and the state in which it is passed."""
+
+    bulk: Bulk
+    feed: float
+    base: int
+    tool: int
+    blend: float
 
 
 @dataclass
 class Rows:
-    """One entry a motion in every list."""
+    """``chunks``: single rows and runs of common lines in their order; ``places``: rows by what is rare."""
 
     document: Document
-    kind: list[int] = field(default_factory=list)
-    values: list[Numbers] = field(default_factory=list)
-    axes: list[Numbers] = field(default_factory=list)
-    feed: list[float] = field(default_factory=list)
-    base: list[int] = field(default_factory=list)
-    tool: list[int] = field(default_factory=list)
-    status: list[int] = field(default_factory=list)
-    turn: list[int] = field(default_factory=list)
-    at: list[int] = field(default_factory=list)
-    line: list[int] = field(default_factory=list)
-    start: list[tuple[int, ...]] = field(default_factory=list)
-    stop: list[tuple[int, ...]] = field(default_factory=list)
-    file: list[int] = field(default_factory=list)
-    insert: list[int] = field(default_factory=list)
+    chunks: list[list[Row] | Lot] = field(default_factory=list)
+    count: int = 0
     anchors: dict[int, Anchor] = field(default_factory=dict)
     reasons: dict[int, Reason] = field(default_factory=dict)
-    points: dict[int, tuple[bytes, Point]] = field(default_factory=dict)
+    ranges: list[tuple[int, int, Reason]] = field(default_factory=list)
+    variables: dict[int, Variable] = field(default_factory=dict)
+    locked: dict[int, str] = field(default_factory=dict)
+    arcs: dict[int, Auxiliary] = field(default_factory=dict)
+    relative: dict[int, Relative] = field(default_factory=dict)
+    whole: dict[int, str] = field(default_factory=dict)
+    slurred: dict[int, float] = field(default_factory=dict)
     builds_on: dict[int, frozenset[Source]] = field(default_factory=dict)
     reads: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
     sources: defaultdict[bytes, set[Source]] = field(default_factory=lambda: defaultdict(set))
     annotations: list[Annotation] = field(default_factory=list)
+    comments: list[Annotation] = field(default_factory=list)
     external: dict[bytes, float | None] = field(default_factory=dict)
     moving: dict[bytes, int] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        return len(self.kind)
+        return self.count
 
-    def add(
-        self,
-        kind: Kind,
-        line: int,
-        at: int,
-        state: State,
-        values: Numbers | None,
-        axes: Numbers | None = None,
-        target: Target | None = None,
-        anchor: Anchor | None = None,
-    ) -> int:
-        """Adds a motion; gives its row."""
+    def add(self, row: Row, anchor: Anchor | None) -> int:
+        """Adds a motion; gives its number."""
+        if not self.chunks or not isinstance(self.chunks[-1], list):
+            self.chunks.append([])
+        chunk = self.chunks[-1]
+        assert isinstance(chunk, list)
+        chunk.append(row)
         if anchor is not None:
-            self.anchors[len(self.kind)] = anchor
-        self.kind.append(kind)
-        self.values.append(NAN6 if values is None else values)
-        self.axes.append(NAN6 if axes is None else axes)
-        # $VEL.CP is the speed of continuous-path motions only.
-        self.feed.append(float("nan") if kind in (Kind.PTP, Kind.AXIS) else state.feed)
-        self.base.append(state.base.index if isinstance(state.base, Frame) else -1)
-        self.tool.append(state.tool.index if isinstance(state.tool, Frame) else -1)
-        self.line.append(line)
-        self.at.append(at)
-        if target is None or target.axes is not None or (values is None and anchor is None):
-            self.start.append(NOWHERE)
-            self.stop.append(NOWHERE)
-            self.file.append(-1)
-            self.insert.append(-1)
-        else:
-            self.start.append(target.start)
-            self.stop.append(target.stop)
-            self.file.append(target.file)
-            self.insert.append(target.insert)
-        self.status.append(-1 if target is None else target.status)
-        self.turn.append(-1 if target is None else target.turn)
-        return len(self.kind) - 1
+            self.anchors[self.count] = anchor
+        if row.target is not None and row.target.external:
+            self.follow_external(self.count, row.target.external)
+        self.count += 1
+        return self.count - 1
 
-    def follow_external(self, row: int, target: Target) -> None:
+    def add_bulk(self, bulk: Bulk, state: State, reason: Reason | None) -> int:
+        """Adds a run of common lines; gives the number of the last row."""
+        first = self.count
+        self.chunks.append(Lot(bulk, state.feed, index(state.base), index(state.tool), state.blend))
+        self.count += len(bulk)
+        for at, external in bulk.external:
+            self.follow_external(first + at, external)
+        if reason is not None:
+            self.ranges.append((first, self.count, reason))
+        return self.count - 1
+
+    def truncate(self, count: int) -> None:
+        """Takes the rows from ``count`` on out again."""
+        while self.count > count:
+            chunk = self.chunks.pop()
+            size = len(chunk) if isinstance(chunk, list) else len(chunk.bulk)
+            self.count -= size
+            if self.count < count and isinstance(chunk, list):
+                self.chunks.append(chunk[: count - self.count])
+                self.count = count
+        for sparse in (
+            self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative, self.whole,
+            self.slurred, self.builds_on,
+        ):  # fmt: skip
+            while sparse and next(reversed(sparse)) >= count:
+                sparse.popitem()
+        while self.ranges and self.ranges[-1][0] >= count:
+            self.ranges.pop()
+
+    def follow_external(self, row: int, external: tuple[tuple[bytes, float | None, bytes], ...]) -> None:
         """Notes in ``moving`` the first row at which an external axis is not where it was before."""
-        for key, value in target.external:
+        for key, value, _ in external:
             if value is None or self.external.setdefault(key, value) != value:
                 self.moving.setdefault(key, row)
 
-    def told_external(self) -> list[Finding]:
-        names = {key.decode(): row for key, row in sorted(self.moving.items())}
-        if not names:
-            return []
-        verb = "moves" if len(names) == 1 else "move"
-        message = f"{', '.join(names)} {verb}; robot and base are taken as standing still"
-        return [self._finding(min(names.values()), "KRL022", message)]
 
-    def judge_points(self, mentioned: set[bytes], assigned: set[bytes], declared: set[int]) -> None:
-        """Refuses the motions whose point serves more than them.
-
-        mentioned: names that other code reads; assigned: names that the program assigns; declared: ids of
-        the points of the .dat, whose numbers do not hold when the program assigns the name.
-        """
-        for row, (name, point) in self.points.items():
-            # Axis targets are air moves that are never edited.
-            if row in self.reasons or self.kind[row] == Kind.AXIS:
-                continue
-            shown = name.decode("latin-1")
-            plain = name.split(b"[")[0]
-            chain = []
-            link: Point | None = point
-            while link is not None:
-                chain.append(link)
-                link = link.origin
-            blocked = next((p.blocked for p in chain if p.blocked), None)
-            rows = max((p.rows for p in chain), key=len)
-            if blocked is not None:
-                self.reasons[row] = Reason(SHARED, f"point {shown}: {blocked.message}", blocked.message)
-            elif len(rows) > 1:
-                lines = sorted({self.line[i] for i in rows})
-                places = ", ".join(map(str, lines[:6])) + (" ..." if len(lines) > 6 else "")
-                self.reasons[row] = Reason(
-                    SHARED,
-                    f"point {shown} is the target of several motions (lines {places})",
-                    f"many {shown}",
-                )
-            elif plain in mentioned:
-                self.reasons[row] = Reason(SHARED, f"point {shown} is read by other code too", "read")
-            elif plain in assigned and id(chain[-1]) in declared:
-                self.reasons[row] = Reason(
-                    SHARED, f"point {shown} of the .dat is assigned in the program", "set"
-                )
-
-    def _finding(self, row: int, code: str, message: str) -> Finding:
-        line, column = self.document.place(self.at[row])
-        return Finding(code, message, str(self.document.path), line, column, HELP.get(code, ""))
-
-    def refused(self) -> dict[int, Finding]:
-        return {
-            row: self._finding(row, reason.code, reason.message)
-            for row, reason in sorted(self.reasons.items())
-        }
-
-    def told(self, refused: dict[int, Finding]) -> list[Finding]:
-        """The refusals, those of one code and cause as one finding."""
-        groups: dict[tuple[str, str], list[int]] = {}
-        for row in refused:
-            reason = self.reasons[row]
-            groups.setdefault((reason.code, reason.cause or reason.message), []).append(row)
-        findings = []
-        for rows in groups.values():
-            first = refused[rows[0]]
-            if len(rows) == 1:
-                findings.append(first)
-                continue
-            lines = f"lines {self.line[rows[0]]} to {self.line[rows[-1]]}"
-            message = f"{first.message}; {len(rows)} motions, {lines}"
-            findings.append(Finding(first.code, message, first.file, first.line, first.column, first.help))
-        return findings
-
-    def _rows_of(self, sources: frozenset[Source]) -> set[int]:
-        """The rows after which the robot may stand, marks of labels and routines followed to their callers."""
-        rows: set[int] = set()
-        seen: set[Source] = set()
-        todo: list[Source] = list(sources)
-        while todo:
-            source = todo.pop()
-            if source in seen:
-                continue
-            seen.add(source)
-            if isinstance(source, int):
-                rows.add(source)
-            else:
-                todo.extend(self.sources[source])
-        return rows
-
-    def pinned(self, refused: dict[int, Finding]) -> dict[int, Finding]:
-        """Rows that a refused motion builds on, or whose reached position the program reads."""
-        pins: dict[int, Finding] = {}
-        for row in refused:
-            if row in self.builds_on:
-                for pin in self._rows_of(self.builds_on[row]):
-                    code = self.reasons[row].code
-                    message = (
-                        f"the motion in line {self.line[row]} builds on this end point and is not corrected"
-                    )
-                    pins.setdefault(pin, self._finding(pin, code, message))
-        for line, sources in self.reads:
-            for pin in self._rows_of(sources):
-                message = f"line {line} reads the position that this motion reaches"
-                pins.setdefault(pin, self._finding(pin, "KRL002", message))
-        return dict(sorted(pins.items()))
-
-    def finished(self, frames: Frames) -> tuple[Toolpath, Places, list[Finding]]:
-        n = len(self)
-        values = np.array(self.values, dtype=float).reshape(n, 6)
-        refused = self.refused()
-        base, tool, used = _used(np.array(self.base, int), np.array(self.tool, int), frames.refs())
-        anchor, given = np.full(n, -1), np.full((n, 6), np.nan)
-        for row, at in self.anchors.items():
-            anchor[row] = at.row
-            given[row] = [np.nan if value is None else value for value in at.given]
-        toolpath = Toolpath(
-            kind=np.array(self.kind, dtype=np.int64),
-            position=values[:, :3] * MM,
-            rotation=rotation_from_abc(values[:, 3:] * DEG),
-            axes=np.array(self.axes, dtype=float).reshape(n, 6) * DEG,
-            feed=np.array(self.feed, dtype=float),
-            base=base,
-            tool=tool,
-            status=np.array(self.status, dtype=np.int64),
-            turn=np.array(self.turn, dtype=np.int64),
-            line=np.array(self.line, dtype=np.int64),
-            frames=used,
-            refused=refused,
-            pinned=self.pinned(refused),
-            annotations=tuple(self.annotations),
-            anchor=anchor,
-            given=given * ([MM] * 3 + [DEG] * 3),
-        )
-        places = Places(
-            start=np.array(self.start, dtype=np.int64).reshape(n, 6),
-            stop=np.array(self.stop, dtype=np.int64).reshape(n, 6),
-            file=np.array(self.file, dtype=np.int64),
-            insert=np.array(self.insert, dtype=np.int64),
-        )
-        return toolpath, places, [*self.told(refused), *self.told_external()]
-
-
-def _used(base: Ints, tool: Ints, frames: tuple[FrameRef, ...]) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
-    """The indices and frames without those that no motion has: nobody needs to know their pose."""
-    kept = [i for i in range(len(frames)) if (base == i).any() or (tool == i).any()]
-    renamed = np.full(len(frames) + 1, -1, dtype=np.int64)
-    renamed[kept] = np.arange(len(kept))
-    return renamed[base], renamed[tool], tuple(frames[i] for i in kept)
+def index(frame: Frame | Unclear) -> int:
+    """Index in the table of frames, -1 for one that is not known."""
+    return frame.index if isinstance(frame, Frame) else -1
 
 
 def refusal(unclear: Unclear, subject: str, cause: str = "") -> Reason:
     return Reason(unclear.code, f"{subject}{unclear.message}", cause)
+
+
+def way_of(arc: Arc | None) -> tuple[float, ...]:
+    """Centre [mm], normal and sweep [deg] in a row."""
+    return NO_ARC if arc is None else (*arc.centre, *arc.normal, arc.sweep)
+
+
+class Table:
+    """The entries of all rows as arrays; mm and deg.  ``loose``: numbers of the rows that were read alone."""
+
+    def __init__(self, rows: Rows) -> None:
+        n = len(rows)
+        offsets: type[np.signedinteger] = np.int32 if len(rows.document.raw) < 2**31 - 1 else np.int64
+        self.values: Floats = np.empty((n, 6))
+        self.kind = np.empty(n, np.int64)
+        self.line = np.empty(n, np.int64)
+        self.status, self.turn = np.empty(n, np.int64), np.empty(n, np.int64)
+        self.base, self.tool = np.empty(n, np.int64), np.empty(n, np.int64)
+        self.feed, self.blend = np.empty(n), np.empty(n)
+        self.motion = np.empty((n, 4), offsets)
+        self.start, self.stop = np.empty((n, 6), offsets), np.empty((n, 6), offsets)
+        self.file = np.zeros((n, 6), np.int8)
+        self.inherits = np.zeros(n, np.uint8)
+        self.insert, self.home = np.empty(n, offsets), np.zeros(n, np.int8)
+        self.text = np.arange(n)
+        self.axes: dict[int, Numbers] = {}
+        self.ways: dict[int, tuple[float, ...]] = {}
+        self.loose: list[tuple[int, Row]] = []
+        first_lot: dict[int, int] = {}
+        at = 0
+        for chunk in rows.chunks:
+            if isinstance(chunk, list):
+                self._fill(at, chunk)
+                at += len(chunk)
+                continue
+            bulk = chunk.bulk
+            part = slice(at, at + len(bulk))
+            self.values[part], self.start[part], self.stop[part] = bulk.values, bulk.start, bulk.stop
+            self.kind[part] = np.where(bulk.is_line, Kind.LIN, Kind.PTP)
+            self.line[part] = bulk.line + np.arange(len(bulk))
+            self.status[part], self.turn[part] = bulk.status, bulk.turn
+            self.base[part], self.tool[part] = chunk.base, chunk.tool
+            self.feed[part] = np.where(bulk.is_line, chunk.feed, NAN)
+            self.blend[part] = np.array([0.0, chunk.blend, NAN])[bulk.slur]
+            self.motion[part], self.insert[part] = bulk.motion, bulk.stop[:, 5]
+            first = first_lot.setdefault(id(bulk), at)
+            self.text[part] = np.arange(first, first + len(bulk))
+            at += len(bulk)
+        for row, blend in rows.slurred.items():
+            self.blend[row] = blend
+
+    def _fill(self, at: int, chunk: list[Row]) -> None:
+        part = slice(at, at + len(chunk))
+        self.loose += zip(range(at, at + len(chunk)), chunk, strict=True)
+        targets = [row.target for row in chunk]
+        for array, found in (
+            (self.values, [row.values for row in chunk]),
+            (self.kind, [row.kind for row in chunk]),
+            (self.line, [row.line for row in chunk]),
+            (self.base, [row.base for row in chunk]),
+            (self.tool, [row.tool for row in chunk]),
+            (self.feed, [row.feed for row in chunk]),
+            (self.blend, [row.blend for row in chunk]),
+            (self.inherits, [row.inherits for row in chunk]),
+            (self.motion, [row.motion for row in chunk]),
+            (self.status, [-1 if t is None else t.status for t in targets]),
+            (self.turn, [-1 if t is None else t.turn for t in targets]),
+            (self.start, [NOWHERE if t is None else t.start for t in targets]),
+            (self.stop, [NOWHERE if t is None else t.stop for t in targets]),
+            (self.file, [NOWHERE if t is None else t.file for t in targets]),
+            (self.insert, [-1 if t is None else t.insert for t in targets]),
+            (self.home, [-1 if t is None else t.home for t in targets]),
+        ):
+            array[part] = found
+        for i, row in enumerate(chunk):
+            if row.axes is not NAN6:
+                self.axes[at + i] = row.axes
+            if row.way is not NO_ARC:
+                self.ways[at + i] = row.way

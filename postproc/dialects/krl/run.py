@@ -2,34 +2,67 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from postproc.dialects.krl.bulk import Bulk
 from postproc.dialects.krl.data import Declarations
-from postproc.dialects.krl.lexing import Statement
+from postproc.dialects.krl.expressions import Value, evaluate
+from postproc.dialects.krl.lexing import LOOPS, SCALARS, Statement
 from postproc.dialects.krl.rows import HELP, Rows
-from postproc.dialects.krl.state import Frames, Source, State
-from postproc.dialects.krl.survey import Block, Routine, Survey
+from postproc.dialects.krl.state import ZERO, Frames, Source, State
+from postproc.dialects.krl.survey import Block, Effects, Routine, Survey
+from postproc.dialects.krl.target import Unclear, known, shown
+from postproc.dialects.krl.variables import Entry, Variables
 from postproc.document import Document
 from postproc.findings import Finding
+
+Item = Statement | Bulk
 
 
 @dataclass(eq=False)
 class Open:
-    """A block that is open: the state at its begin, and where its branches so far may have left the robot."""
+    """A block or call that is open.
+
+    followed: it runs with values that are all known; else it is passed over once, and what it changes is forgotten.
+    entry, mark, rows, notes, routine: what was before it (notes: number of annotations, comments, readings of the
+    position, routines followed); sources: where its branches so far may have left the robot; counter: of a FOR: name,
+    value, last value, step; back, returned, saved: of a call: where it goes on, which parameter comes back into which
+    variable (name, path), and the entries that the caller's variables had.
+    """
 
     block: Block
+    followed: bool
     entry: State
+    mark: int
+    rows: int
+    notes: tuple[int, int, int, int] = (0, 0, 0, 0)
     sources: frozenset[Source] = frozenset()
+    counter: tuple[bytes, int, int, int] | None = None
+    back: int = -1
+    returned: tuple[tuple[bytes, bytes, bytes], ...] = ()
+    saved: tuple[tuple[bytes, Entry | None], ...] = ()
+    routine: Routine | None = None
+
+    @property
+    def repeats(self) -> bool:
+        """A loop or a call that is followed."""
+        return self.followed and (self.back >= 0 or self.block.word in LOOPS)
 
 
 @dataclass(eq=False)
 class Run:
     """``mentioned``: names that code reads, other than as the target of a motion.  ``root_set``: the line, if any, from
-    which on the program itself says where the robot stands in the world."""
+    which on the program itself says where the robot stands in the world.  ``routine``: the one that runs.
+    ``walked``: it is passed over without a call that is known.  ``idle``: what no flow leads to is listed.
+    ``triggered``: a TRIGGER stands between the last motion and here.  ``followed``: routines that ran.
+    """
 
     document: Document
+    code: Sequence[Item]
     survey: Survey
     declarations: Declarations
+    variables: Variables
     has_tcp_mode: bool
     rows: Rows
     state: State = field(default_factory=State)
@@ -39,11 +72,11 @@ class Run:
     mentioned: set[bytes] = field(default_factory=set)
     told: set[tuple[str, str]] = field(default_factory=set)
     root_set: int | None = None
-
-    @property
-    def routine(self) -> Routine | None:
-        block = self.stack[0].block if self.stack else None
-        return block if isinstance(block, Routine) else None
+    routine: Routine | None = None
+    walked: bool = False
+    idle: bool = False
+    triggered: bool = False
+    followed: dict[bytes, None] = field(default_factory=dict)
 
     def tell(self, code: str, message: str, statement: Statement) -> None:
         """Notes a finding; the same words are told once, at their first place."""
@@ -55,7 +88,69 @@ class Run:
             Finding(code, message, str(self.document.path), line, column, HELP.get(code, ""))
         )
 
-    def forget(self, effects: set[str | bytes], why: str) -> None:
+    def forget(self, effects: Effects, why: str) -> None:
         """Makes unknown what ``effects`` name.  A variable that is forgotten may still hold any value that it had,
-        so none of its values can be changed for one motion alone."""
-        self.mentioned |= self.state.forget(effects, why, self.has_tcp_mode)
+        so none of its literals can be changed for one motion alone."""
+        words = {effect for effect in effects if isinstance(effect, str)}
+        self.state.forget(words, why, self.has_tcp_mode)
+        unclear = Unclear("KRL002", f"its value is not known {why}")
+        if "all" in words:
+            self.variables.forget_all(unclear)
+            self.mentioned |= {name.partition(b".")[0] for name in self.survey.assigned}
+        for effect in effects:
+            if isinstance(effect, bytes) and self.variables.forget(effect, unclear):
+                self.mentioned.add(effect)
+
+    def type_of(self, name: bytes) -> bytes:
+        """The type with which a variable is declared, b"" where it is not."""
+        if self.routine is not None and self.routine.types.get(name):
+            return self.routine.types[name]
+        return self.declarations.types.get(name, b"")
+
+    def lookup(self, name: bytes, path: bytes) -> Value | None:
+        """The value of a variable, where nothing else than this program's flow can have changed it."""
+        value = self.variables.get(name, path)
+        if value is None and name.startswith(b"$") and not path:
+            if name in (b"$BASE", b"$TOOL"):
+                numbers = self.frames.values(self.state.base if name == b"$BASE" else self.state.tool)
+                return known(numbers) if numbers is not None else None
+            return known(ZERO) if name in (b"$NULLFRAME", b"$WORLD") else None
+        if value is None:
+            if self.type_of(name):
+                return Unclear("KRL002", f"{shown(name)} has no value yet")
+            return None
+        if name in self.survey.later:
+            return Unclear("KRL002", f"{shown(name)} is changed by an interrupt or a trigger")
+        return value
+
+    def value(self, text: bytes) -> Value:
+        """The value of an expression in the program."""
+        return evaluate(text, self.lookup)
+
+    def trusted(self, name: bytes) -> bool:
+        """Whether a number assigned to a variable stays there: it is one of this program's own."""
+        routine = self.routine
+        if routine is not None and name in routine.types:
+            return True
+        return name in self.declarations.types and name not in self.declarations.shared
+
+    def converted(self, name: bytes, value: Value) -> Value:
+        """The value as a variable of its type holds it."""
+        kind = self.type_of(name)
+        if kind in SCALARS and isinstance(value, (int, float)) and not isinstance(value, bool):
+            if kind == b"INT":
+                return int(value + 0.5) if value >= 0 else -int(0.5 - value)
+            if kind == b"REAL":
+                return float(value)
+        return value
+
+    def why_walked(self, routine: Routine) -> str:
+        """Why the motions of a subprogram are not known to run, or run otherwise than they are read here."""
+        if routine.name in self.survey.later:
+            return f"a motion of the subprogram in line {routine.line}, which an interrupt or trigger calls"
+        return f"a motion of the subprogram in line {routine.line}, which is not called with values that are known"
+
+    @property
+    def unsure(self) -> bool:
+        """Whether it is not known that, and how often, the present line runs."""
+        return self.walked or any(not item.followed for item in self.stack)

@@ -1,31 +1,40 @@
 """What a program may change where: its routines, its blocks and labels, before it is interpreted.
 
-An effect is a word ("point", "base", "tool", "feed", "mode", "data", "record") or the name (bytes) of a
-variable that is assigned.
+An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "record", "all" for every variable that the program
+assigns) or the name (bytes) of a variable that is assigned.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from postproc.dialects.krl.lexing import (
     BRANCHES,
     CLOSES,
+    LOOPS,
     NAME,
     SPLINES,
+    TYPES,
     Assignment,
     Call,
     Declared,
+    Head,
     Statement,
     identifiers,
     without_strings,
 )
-from postproc.dialects.krl.target import EXTERNAL
+from postproc.dialects.krl.target import AXES, COMPONENTS, EXTERNAL
 
 Effect = str | bytes
 Effects = set[Effect]
+
+MOST_EFFECTS = 200
+"""Variables of one block; where it assigns more, all that the program assigns count as changed."""
+
+DEEPEST = 100
+"""Nested blocks; what lies deeper is passed over as one."""
 
 HERE = frozenset([b"$AXIS_ACT", b"$POS_ACT"])
 """Motions to where the robot stands already."""
@@ -39,6 +48,7 @@ HARMLESS = frozenset(
     b"ABS SIN COS TAN ACOS ATAN ATAN2 SQRT FRAND FORWARD INVERSE INV_POS EK EB EO LK TOOL_ADJ VARTYPE GETVARSIZE "
     b"STRCOMP STRFIND STRLEN STRDECLLEN STRTOBOOL STRTOINT STRTOREAL STRTOSTRING STRTOFRAME STRTOPOS STRTOE3POS "
     b"STRTOE6POS STRTOAXIS STRTOE3AXIS STRTOE6AXIS GET_SIG_INF GETSYSSTATE GETCYCDEF GET_DECL_PLACE GET_MSGBUFFER "
+    b"SVEL_CP SVEL_JOINT STOOL2 SBASE SIPO_MODE SLOAD SACC_CP SACC_JOINT SORI_TYP SAPO SAPO_PTP SJERK SGEAR_JERK "
     b"IS_KEY_PRESSED TIMER_LIMIT ISMESSAGESET SET_KRLMSG EXISTS_KRLMSG CLEAR_KRLMSG SET_KRLDLG EXISTS_KRLDLG".split()
 )
 HARMLESS_BEGIN = (b"SR_", b"EKI_")
@@ -51,64 +61,93 @@ _FUNCTION = re.compile(rb"(?<![A-Za-z0-9_$#.'])(" + NAME + rb")[ \t]*\(")
 _WORDS = frozenset(
     b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN WHILE UNTIL FOR TO STEP SWITCH CASE WAIT SEC RETURN".split()
 )
-_CALLING = frozenset(["assignment", "call", "open", "close"])
-"""Kinds of statement whose expressions may call functions, besides WAIT and RETURN."""
+_CALLING = frozenset(["assignment", "call", "open", "close", "return"])
+"""Kinds of statement whose expressions may call functions, besides WAIT."""
+
+_DONE_LATER = re.compile(rb"\bDO[ \t]+(" + NAME + rb")", re.I)
+_COUNTER = re.compile(rb"FOR[ \t]+(" + NAME + rb")[ \t]*=", re.I)
+_KEYS = frozenset([*COMPONENTS, *AXES, *EXTERNAL, b"S", b"T"])
 
 _BAS = re.compile(rb"[ \t]*#[ \t]*([A-Za-z_][A-Za-z0-9_]*)[ \t]*(?:,[ \t]*(.*?)[ \t]*)?\Z", re.S)
 _BAS_EFFECTS: dict[bytes, Effects] = {
-    b"INITMOV": {"base", "tool", "feed"},
+    b"INITMOV": {"base", "tool", "feed", "apo", "mode"},
     b"BASE": {"base"},
     b"EX_BASE": {"base"},
     b"TOOL": {"tool"},
-    b"FRAMES": {"base", "tool"},
-    b"PTP_PARAMS": {"base", "tool"},
-    b"CP_PARAMS": {"base", "tool", "feed"},
+    b"FRAMES": {"base", "tool", "mode"},
+    b"PTP_PARAMS": {"base", "tool", "mode", "apo"},
+    b"CP_PARAMS": {"base", "tool", "mode", "feed", "apo"},
+    b"PTP_DAT": {"apo"},
+    b"CP_DAT": {"feed", "apo"},
     b"VEL_CP": {"feed"},
 }
 _SYSTEM: dict[bytes, str] = {
     b"$BASE": "base",
     b"$TOOL": "tool",
     b"$VEL": "feed",
+    b"$APO": "apo",
     b"$IPO_MODE": "mode",
-    b"BASE_DATA": "data",
-    b"TOOL_DATA": "data",
     b"FDAT_ACT": "record",
     b"LDAT_ACT": "record",
+    b"PDAT_ACT": "record",
 }
 
 
 @dataclass(eq=False)
 class Block:
-    """An IF, SWITCH, loop or spline block: what it may change, and the routines it calls."""
+    """An IF, SWITCH, loop or spline block: what it may change, and the routines it calls.
+
+    begin, end: index of its first and last statement; branches: those of its ELSE, CASE, DEFAULT; broken: its end is
+    missing; leaves: an EXIT leads out of it.
+    """
 
     word: bytes
     line: int
+    begin: int
+    end: int = -1
+    branches: list[int] = field(default_factory=list)
     effects: Effects = field(default_factory=set)
     calls: set[bytes] = field(default_factory=set)
+    broken: bool = False
+    leaves: bool = False
 
 
 @dataclass(eq=False)
 class Routine(Block):
-    """A DEF or DEFFCT of the file."""
+    """A DEF or DEFFCT of the file.  types: the variables that it declares and their types, parameters included."""
 
+    name: bytes = b""
     is_main: bool = False
+    is_function: bool = False
+    parameters: tuple[tuple[bytes, bool], ...] = ()
+    types: dict[bytes, bytes] = field(default_factory=dict)
+    labels: dict[bytes, tuple[int, tuple[Block, ...]]] = field(default_factory=dict)
 
 
 @dataclass
 class Survey:
     """``events``: index of a statement -> what it opens, branches or closes, in this order of closing.
 
-    ``unclosed``: (line, what) of blocks without an end and ends without a begin; ``jumps``: labels that a GOTO
-    names; ``assigned``: names that the program assigns anywhere; ``effects``: all that it changes anywhere.
+    ``routine_at``: index of the DEF -> routine; ``unclosed``: (line, what) of blocks without an end and ends without a
+    begin; ``assigned``: names that the program assigns as a whole, or with ``.X`` behind them a component of; ``read``:
+    names that code reads, other than as the target of a motion; ``later``: names that run or change at a time of their
+    own (interrupts, triggers); ``jumps``: begin of the routine and name of every label that a GOTO names; ``effects``:
+    all that the program changes anywhere.
     """
 
     events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
     routines: dict[bytes, Routine] = field(default_factory=dict)
-    jumps: set[bytes] = field(default_factory=set)
+    routine_at: dict[int, Routine] = field(default_factory=dict)
     assigned: set[bytes] = field(default_factory=set)
+    read: set[bytes] = field(default_factory=set)
+    later: set[bytes] = field(default_factory=set)
+    jumps: set[tuple[int, bytes]] = field(default_factory=set)
     effects: Effects = field(default_factory=set)
     unclosed: list[tuple[int, str]] = field(default_factory=list)
-    has_routine: bool = False
+
+    @property
+    def has_routine(self) -> bool:
+        return bool(self.routine_at)
 
 
 def bas(arguments: bytes) -> tuple[bytes, bytes] | None:
@@ -124,7 +163,9 @@ def is_harmless(name: bytes) -> bool:
 
 def functions_of(statement: Statement) -> list[bytes]:
     """The functions that the expressions of a statement call, those of KRL itself left out; upper case."""
-    if statement.kind not in _CALLING and statement.word not in (b"WAIT", b"RETURN"):
+    if statement.kind not in _CALLING and statement.word != b"WAIT":
+        return []
+    if b"(" not in statement.code:
         return []
     code = without_strings(statement.code)
     if isinstance(statement.said, Call):
@@ -133,97 +174,199 @@ def functions_of(statement: Statement) -> list[bytes]:
     return [name for name in names if name not in _WORDS]
 
 
-def survey(statements: Iterable[tuple[int, Statement]]) -> Survey:
-    """Goes over the statements (index, statement) once; a motion line in the common form may be left out of
-    the parsing, only its kind counts."""
-    result = Survey()
-    blocks: list[Block] = []
-    stack: list[Block] = []
-    routine: Routine | None = None
+class _Surveyor:
+    def __init__(self) -> None:
+        self.found = Survey()
+        self.blocks: list[Block] = []
+        self.stack: list[Block] = []
+        self.buried = 0  # blocks deeper than DEEPEST that are open
+        self.routine: Routine | None = None
 
-    def close_all() -> None:
-        result.unclosed.extend((b.line, f"{_shown(b.word)} has no end") for b in stack[1:])
-        stack.clear()
-
-    for index, statement in statements:
-        kind = statement.kind
+    def take(self, index: int, statement: Statement) -> None:
+        kind, stack = statement.kind, self.stack
         if kind == "motion":
             if stack and not _stays(statement.code):
                 stack[-1].effects.add("point")
         elif kind == "def":
-            if stack:
-                close_all()
-                result.unclosed.append((statement.line, "DEF before the END of the one above"))
-            name = statement.said if isinstance(statement.said, bytes) else b""
-            routine = Routine(b"DEF", statement.line, is_main=not result.has_routine)
-            result.has_routine = True
-            result.routines.setdefault(name, routine)
-            blocks.append(routine)
-            stack = [routine]
-            result.events[index] = [("open", routine)]
+            self._routine(index, statement)
         elif kind == "end":
-            if not stack or not stack[0].line:
-                result.events[index] = [("close", block) for block in stack[:0:-1]]
-                close_all()
-                result.unclosed.append((statement.line, f"{_shown(statement.word)} without a DEF"))
+            if not stack or not isinstance(stack[0], Routine):
+                self._close_all(index)
+                self.found.unclosed.append((statement.line, f"{_shown(statement.word)} without a DEF"))
             else:
-                result.events[index] = [("close", block) for block in reversed(stack)]
-                close_all()
+                self._close_all(index)
         elif kind == "open":
-            if not stack:  # a program without DEF
-                stack = [Routine(b"DEF", 0, is_main=True)]
-                blocks.append(stack[0])
-            block = Block(statement.word, statement.line)
-            blocks.append(block)
-            stack.append(block)
-            _note(result, stack, statement)
-            result.events[index] = [("open", block)]
+            self._open(index, statement)
         elif kind == "branch":
-            if len(stack) > 1 and stack[-1].word == BRANCHES[statement.word]:
-                result.events[index] = [("branch", stack[-1])]
+            self.note(statement)
+            if not self.buried and len(stack) > 1 and stack[-1].word == BRANCHES[statement.word]:
+                stack[-1].branches.append(index)
+                self.found.events[index] = [("branch", stack[-1])]
         elif kind == "close":
-            _close(result, stack, statement, index)
+            self._close(index, statement)
         elif kind == "goto":
-            if isinstance(statement.said, bytes):
-                result.jumps.add(statement.said)
+            if self.routine is not None and isinstance(statement.said, bytes):
+                self.found.jumps.add((self.routine.begin, statement.said))
+        elif kind == "exit":
+            loop = next((block for block in reversed(stack) if block.word in LOOPS), None)
+            if loop is not None:
+                loop.leaves = True
+        elif kind == "label" and isinstance(statement.said, bytes):
+            if self.routine is not None:
+                self.routine.labels.setdefault(statement.said, (index, tuple(stack[1:])))
+        elif kind != "comment":
+            self.note(statement)
+
+    def _routine(self, index: int, statement: Statement) -> None:
+        if self.stack:
+            self._close_all(index - 1)
+            self.found.unclosed.append((statement.line, "DEF before the END of the one above"))
+        head = statement.said if isinstance(statement.said, Head) else Head(b"", ())
+        routine = Routine(
+            b"DEF", statement.line, index,
+            name=head.name, is_main=not self.found.routine_at, parameters=head.parameters,
+            is_function=b"DEFFCT" in statement.code[:40].upper(),
+            types={name: b"" for name, _ in head.parameters},
+        )  # fmt: skip
+        self.routine = routine
+        self.found.routine_at[index] = routine
+        self.found.routines.setdefault(head.name, routine)
+        self.blocks.append(routine)
+        self.stack.append(routine)
+
+    def _open(self, index: int, statement: Statement) -> None:
+        self.note(statement)
+        if len(self.stack) > DEEPEST:
+            self.buried += 1
+            return
+        if not self.stack:  # a program without DEF
+            self.stack.append(Block(b"", 0, 0))
+            self.blocks.append(self.stack[0])
+        block = Block(statement.word, statement.line, index)
+        self.blocks.append(block)
+        self.stack.append(block)
+        self.note(statement)
+        self.found.events[index] = [("open", block)]
+
+    def _close(self, index: int, statement: Statement) -> None:
+        stack = self.stack
+        if self.buried:
+            self.buried -= 1
+            self.note(statement)
+            return
+        wanted = CLOSES[statement.word]
+        depth = next((i for i in range(len(stack) - 1, 0, -1) if stack[i].word in wanted), 0)
+        if not depth:
+            self.found.unclosed.append((statement.line, f"{_shown(statement.word)} without its begin"))
+            return
+        self.note(statement)
+        self._pop(index, depth)
+
+    def _pop(self, index: int, depth: int, proper: bool = True) -> None:
+        """Closes the blocks from ``depth`` on; ``proper``: the outermost of them has its own end here."""
+        stack = self.stack
+        closed = stack[depth:][::-1]
+        del stack[depth:]
+        inner = closed[:-1] if proper else closed
+        for block in inner:
+            block.broken = True
+            self.found.unclosed.append((block.line, f"{_shown(block.word)} has no end"))
+        for i, block in enumerate(closed):
+            block.end = index
+            outer = closed[i + 1] if i + 1 < len(closed) else stack[-1]
+            _join(outer.effects, block.effects)
+            outer.calls |= block.calls
+        self.found.events.setdefault(index, []).extend(("close", block) for block in closed)
+
+    def _close_all(self, index: int) -> None:
+        self.buried = 0
+        if not self.stack:
+            return
+        if len(self.stack) > 1:
+            self._pop(index, 1, proper=False)
+        self.stack[0].end = index
+        self.stack.clear()
+        self.routine = None
+
+    def note(self, statement: Statement) -> None:
+        """Takes up what a statement that moves nothing changes and reads."""
+        found, stack = self.found, self.stack
+        effects, called = effects_of(statement)
+        functions = functions_of(statement)
+        if not all(map(is_harmless, functions)):
+            # What is handed to a function may come back changed.
+            effects = effects | identifiers(statement.code)
+        _join(found.effects, effects)
+        said = statement.said
+        if isinstance(said, Assignment) and said.path and said.element is None and len(effects) == 1:
+            found.assigned.add(said.name + b"." + said.path)
         else:
-            _note(result, stack, statement)
-    if stack and stack[0].line and result.has_routine:
-        result.unclosed.append((stack[0].line, "DEF has no END"))
-    close_all()
-    _settle(result, blocks)
-    return result
+            found.assigned.update(effect for effect in effects if isinstance(effect, bytes))
+        if isinstance(said, Declared) and self.routine is not None:
+            for key, _, _ in said.items:
+                if key is not None:
+                    self.routine.types[key.split(b"[")[0]] = said.type
+        found.read |= _read_by(statement)
+        if statement.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL"):
+            found.later.update(name.upper() for name in _DONE_LATER.findall(statement.code))
+        if stack:
+            _join(stack[-1].effects, effects)
+            stack[-1].calls.update(functions)
+            if called:
+                stack[-1].calls.add(called)
 
 
-def _close(result: Survey, stack: list[Block], statement: Statement, index: int) -> None:
-    wanted = CLOSES[statement.word]
-    depth = next((i for i in range(len(stack) - 1, 0, -1) if stack[i].word in wanted), 0)
-    if not depth:
-        result.unclosed.append((statement.line, f"{_shown(statement.word)} without its begin"))
-        return
-    _note(result, stack, statement)
-    closed = stack[depth:][::-1]
-    result.unclosed.extend((block.line, f"{_shown(block.word)} has no end") for block in closed[:-1])
-    result.events[index] = [("close", block) for block in closed]
-    del stack[depth:]
-    for block in closed:
-        stack[-1].effects |= block.effects
-        stack[-1].calls |= block.calls
+def survey(statements: Iterable[tuple[int, Statement]]) -> Survey:
+    """Goes over the statements (index, statement) once."""
+    surveyor = _Surveyor()
+    index = -1
+    for index, statement in statements:
+        surveyor.take(index, statement)
+    stack, found = surveyor.stack, surveyor.found
+    if stack and isinstance(stack[0], Routine):
+        found.unclosed.append((stack[0].line, "DEF has no END"))
+    surveyor._close_all(index)
+    _settle(found, surveyor.blocks)
+    return found
 
 
-def _note(result: Survey, stack: list[Block], statement: Statement) -> None:
-    effects, called = effects_of(statement)
-    functions = functions_of(statement)
-    if not all(map(is_harmless, functions)):
-        # What is handed to a function may come back changed.
-        effects = effects | identifiers(statement.code)
-    result.effects |= effects
-    result.assigned.update(effect for effect in effects if isinstance(effect, bytes))
-    if stack:
-        stack[-1].effects |= effects
-        stack[-1].calls.update(functions)
-        if called:
-            stack[-1].calls.add(called)
+def closure(found: Survey, names: Iterable[bytes]) -> set[bytes]:
+    """The routines of the file among ``names``, and all that they call."""
+    seen: set[bytes] = set()
+    todo = list(names)
+    while todo:
+        name = todo.pop()
+        routine = found.routines.get(name)
+        if routine is not None and name not in seen:
+            seen.add(name)
+            todo.extend(routine.calls)
+    return seen
+
+
+def _join(into: Effects, more: Iterable[Effect]) -> None:
+    into.update(more)
+    if len(into) > MOST_EFFECTS:
+        words = {effect for effect in into if isinstance(effect, str)}
+        into.clear()
+        into.update(words, ["all"])
+
+
+def _read_by(statement: Statement) -> set[bytes]:
+    """Names that a statement reads."""
+    said = statement.said
+    if isinstance(said, Assignment):
+        names = identifiers(said.element) if said.element is not None else set()
+        if said.name in (b"$H_POS", b"FDAT_ACT", b"LDAT_ACT", b"PDAT_ACT"):
+            return names  # they belong to the inline form of the motion to that point
+        read = identifiers(said.value)
+        return names | (read - _KEYS if said.value.startswith(b"{") else read)
+    if isinstance(said, Declared):
+        if said.type in TYPES:
+            return {name for _, value, _ in said.items if value for name in identifiers(value)} - _KEYS
+        return set()
+    if isinstance(said, Call):
+        return set() if said.name == b"BAS" and bas(said.arguments) else identifiers(said.arguments)
+    return identifiers(statement.code)
 
 
 def effects_of(statement: Statement) -> tuple[Effects, bytes]:
@@ -242,30 +385,44 @@ def effects_of(statement: Statement) -> tuple[Effects, bytes]:
     if isinstance(said, Call):
         if said.name == b"BAS":
             command = bas(said.arguments)
-            return set(_BAS_EFFECTS.get(command[0], set())) if command else {"base", "tool", "feed"}, b""
+            everything: Effects = {"base", "tool", "feed", "apo", "mode"}
+            return set(_BAS_EFFECTS.get(command[0], set())) if command else everything, b""
         words: Effects = set() if is_harmless(said.name) else set(identifiers(said.arguments))
         return words, said.name
+    if statement.kind == "open" and statement.word == b"FOR":
+        counter = _COUNTER.match(statement.code)
+        return ({counter[1].upper()} if counter else set()), b""
     return ({"point"} if statement.kind == "other" and HIDDEN.search(statement.code) else set()), b""
 
 
-def _settle(result: Survey, blocks: list[Block]) -> None:
+def _settle(found: Survey, blocks: Sequence[Block]) -> None:
     """Brings what the called routines change into the effects of who calls them."""
-    changed = True
-    while changed:
-        changed = False
+    if len(found.routines) > MOST_EFFECTS:
         for block in blocks:
-            before = len(block.effects)
-            for name in block.calls:
-                routine = result.routines.get(name)
-                if routine is not None:
-                    block.effects |= routine.effects
-                elif not is_harmless(name):
-                    block.effects.add("point")
-            changed = changed or len(block.effects) != before
+            if block.calls:
+                _join(block.effects, [*found.effects, "all", "point", "base", "tool", "feed", "apo", "mode"])
+        return
+    reached = {name: closure(found, [name]) for name in found.routines}
+    strange = {
+        name
+        for name, routine in found.routines.items()
+        if any(call not in found.routines and not is_harmless(call) for call in routine.calls)
+    }
+    total: dict[bytes, Effects] = {}
+    for name, routines in reached.items():
+        total[name] = set() if strange.isdisjoint(routines) else {"point"}
+        for other in routines:
+            _join(total[name], found.routines[other].effects)
+    for block in blocks:
+        for name in block.calls:
+            if name in total:
+                _join(block.effects, total[name])
+            elif not is_harmless(name):
+                block.effects.add("point")
 
 
 def _stays(code: bytes) -> bool:
-    words = code.split()
+    words = code.split(None, 2)
     return len(words) > 1 and words[1].upper() in HERE
 
 

@@ -1,0 +1,37 @@
+"""Runs of lines in the form that nearly all lines of a generated program have, read together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.dialects.krl.target import External
+
+
+@dataclass(frozen=True, eq=False)
+class Bulk:
+    """Lines ``LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}`` that follow one another, K of them.
+
+    line: number of the first; is_line (K,): LIN, else PTP; values (K, 6) [mm, deg]; start, stop (K, 6): byte ranges of
+    the literals; motion (K, 4): offsets of word, operand, behind the operand, behind the code; status, turn (K,): S and
+    T, -1 without; slur (K,): 0 without an approximation, 1 with C_DIS, 2 with another one; external: where in the
+    run (from 0) which external axes have which values, for every set of them that occurs, and at the first line.
+    """
+
+    line: int
+    is_line: Bools
+    values: Floats
+    start: NDArray[Any]
+    stop: NDArray[Any]
+    motion: NDArray[Any]
+    status: Ints
+    turn: Ints
+    slur: NDArray[np.int8]
+    external: tuple[tuple[int, External], ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.is_line)

@@ -1,0 +1,259 @@
+"""The rows that were read as a Toolpath, the places of their numbers, and the findings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.arrays import Floats, Ints
+from postproc.dialects.krl.places import Places
+from postproc.dialects.krl.rows import HELP, Reason, Rows, Table
+from postproc.dialects.krl.run import Run
+from postproc.dialects.krl.state import Source
+from postproc.dialects.krl.survey import closure
+from postproc.findings import Finding
+from postproc.geometry import rotation_from_abc
+from postproc.toolpath import FrameRef, Toolpath
+from postproc.units import DEG, MM
+
+READ_TOO = "other code reads it too"
+SEVERAL = "its line runs several times"
+
+
+def finished(run: Run, text_called: Iterable[bytes]) -> tuple[Toolpath, Places, list[Finding]]:
+    """``text_called``: routines that were called where it is not known that, or with what, they run."""
+    rows = run.rows
+    table = Table(rows)
+    _refuse_other_calls(run, table, text_called)
+    _lock(run)
+    refused = _refused(rows, table)
+    base, tool, used = _used(table.base, table.tool, run.frames.refs())
+    n = len(rows)
+    anchor, given = np.full(n, -1), _blank((n, 6), rows.anchors)
+    for row, at in rows.anchors.items():
+        anchor[row] = at.row
+        given[row] = [np.nan if value is None else value for value in at.given]
+    axes, way = _blank((n, 6), table.axes), _blank((n, 7), table.ways)
+    for array, sparse in ((axes, table.axes), (way, table.ways)):
+        for row, values in sparse.items():
+            array[row] = values
+    if table.ways:
+        way[:, :3] *= MM
+        way[:, 6] *= DEG
+    whole = _whole(rows, table)
+    toolpath = Toolpath(
+        kind=table.kind,
+        position=table.values[:, :3] * MM,
+        rotation=rotation_from_abc(table.values[:, 3:] * DEG),
+        axes=axes * DEG if table.axes else axes,
+        feed=table.feed,
+        base=base,
+        tool=tool,
+        status=table.status,
+        turn=table.turn,
+        line=table.line,
+        frames=used,
+        refused=refused,
+        pinned=_pinned(rows, table, refused),
+        annotations=tuple(rows.annotations),
+        anchor=anchor,
+        given=given * ([MM] * 3 + [DEG] * 3) if rows.anchors else given,
+        centre=way[:, :3],
+        normal=way[:, 3:6],
+        sweep=way[:, 6],
+        blend=table.blend * MM,
+        whole=whole,
+        comments=tuple(rows.comments),
+    )
+    _number_texts(rows, table)
+    places = Places(
+        start=table.start,
+        stop=table.stop,
+        file=table.file,
+        inherits=table.inherits,
+        insert=table.insert,
+        home=table.home,
+        motion=table.motion,
+        text=table.text,
+        variables=rows.variables,
+        locked=rows.locked,
+        arcs=rows.arcs,
+        relative=rows.relative,
+    )
+    return toolpath, places, [*_told(rows, table, refused), *_told_external(rows, table)]
+
+
+def _blank(shape: tuple[int, ...], filled: object) -> Floats:
+    """NaN of a shape; without memory of its own where nothing will be filled in."""
+    return np.full(shape, np.nan) if filled else np.broadcast_to(np.nan, shape)
+
+
+def _used(base: Ints, tool: Ints, frames: tuple[FrameRef, ...]) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
+    """The indices and frames without those that no motion has: nobody needs to know their pose."""
+    present = {int(i) for array in (base, tool) for i in np.unique(array)}
+    kept = [i for i in range(len(frames)) if i in present]
+    renamed = np.full(len(frames) + 1, -1, dtype=np.int64)
+    renamed[kept] = np.arange(len(kept))
+    return renamed[base], renamed[tool], tuple(frames[i] for i in kept)
+
+
+def _refuse_other_calls(run: Run, table: Table, text_called: Iterable[bytes]) -> None:
+    """A routine that also runs where its values are not known can not be corrected for the calls that are followed."""
+    survey, rows = run.survey, run.rows
+    for name in closure(survey, [*text_called, *survey.later]):
+        if name not in run.followed:
+            continue
+        routine = survey.routines[name]
+        last = run.code[min(routine.end, len(run.code) - 1)]
+        inside = (table.line >= routine.line) & (table.line <= last.line)
+        reason = Reason("KRL015", run.why_walked(routine), f"def {routine.line}")
+        for row in np.flatnonzero(inside).tolist():
+            rows.reasons.setdefault(row, reason)
+
+
+def _lock(run: Run) -> None:
+    """Literals of variables that other code reads stay as they are."""
+    rows, read = run.rows, run.mentioned | run.survey.read
+    for row, variable in rows.variables.items():
+        if variable.name and _root(variable.name) in read:
+            rows.locked.setdefault(row, READ_TOO)
+    for row, auxiliary in rows.arcs.items():
+        variable_or_none = auxiliary.variable
+        if variable_or_none is not None and _root(variable_or_none.name) in read and not auxiliary.locked:
+            rows.arcs[row] = replace(auxiliary, locked=READ_TOO)
+
+
+def _root(name: bytes) -> bytes:
+    return name.partition(b".")[0].partition(b"[")[0]
+
+
+def _whole(rows: Rows, table: Table) -> dict[int, str]:
+    """Rows before which nothing can be inserted."""
+    whole = dict(rows.whole)
+    if len(table.line):
+        ordered = np.sort(table.line)
+        again = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
+        if len(again):
+            for row in np.flatnonzero(np.isin(table.line, again)).tolist():
+                whole.setdefault(row, SEVERAL)
+    return dict(sorted(whole.items()))
+
+
+def _number_texts(rows: Rows, table: Table) -> None:
+    """Gives the rows and auxiliary points that share a literal one number."""
+    n = len(rows)
+    parent: dict[int, int] = {}
+    first: dict[tuple[int, int], int] = {}
+
+    def top(node: int) -> int:
+        above = parent.get(node, node)
+        while above != node:
+            parent[node] = parent.get(above, above)
+            node, above = above, parent[node]
+        return node
+
+    def take(node: int, files: Iterable[int], starts: Iterable[int]) -> None:
+        for place in zip(files, starts, strict=True):
+            if place[1] >= 0 and (other := first.setdefault(place, node)) != node:
+                one, two = sorted((top(node), top(other)))
+                parent[two] = one
+
+    for row, found in table.loose:
+        if found.target is not None:
+            take(row, found.target.file, found.target.start)
+    nodes = dict(zip(rows.arcs, range(n, n + len(rows.arcs)), strict=True))
+    for row, node in nodes.items():
+        take(node, rows.arcs[row].file, rows.arcs[row].start)
+    for node in list(parent):
+        if node < n:
+            table.text[node] = top(node)
+    for row, node in nodes.items():
+        rows.arcs[row] = replace(rows.arcs[row], text=top(node))
+
+
+def _finder(rows: Rows, table: Table) -> Callable[[int, str, str], Finding]:
+    starts = np.array(rows.document.line_starts)
+    name = str(rows.document.path)
+    columns = table.motion[:, 0] - starts[table.line - 1] + 1
+
+    def finding(row: int, code: str, message: str) -> Finding:
+        return Finding(code, message, name, int(table.line[row]), int(columns[row]), HELP.get(code, ""))
+
+    return finding
+
+
+def _refused(rows: Rows, table: Table) -> dict[int, Finding]:
+    for begin, stop, reason in rows.ranges:
+        for row in range(begin, stop):
+            rows.reasons.setdefault(row, reason)
+    if not rows.reasons:
+        return {}
+    finding = _finder(rows, table)
+    return {row: finding(row, reason.code, reason.message) for row, reason in sorted(rows.reasons.items())}
+
+
+def _told(rows: Rows, table: Table, refused: dict[int, Finding]) -> list[Finding]:
+    """The refusals, those of one code and cause as one finding."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for row in refused:
+        reason = rows.reasons[row]
+        groups.setdefault((reason.code, reason.cause or reason.message), []).append(row)
+    findings = []
+    for found in groups.values():
+        first = refused[found[0]]
+        if len(found) == 1:
+            findings.append(first)
+            continue
+        places = table.line[found]
+        message = f"{first.message}; {len(found)} motions, lines {places.min()} to {places.max()}"
+        findings.append(replace(first, message=message))
+    return findings
+
+
+def _told_external(rows: Rows, table: Table) -> list[Finding]:
+    names = {key.decode(): row for key, row in sorted(rows.moving.items()) if row < len(rows)}
+    if not names:
+        return []
+    verb = "moves" if len(names) == 1 else "move"
+    message = f"{', '.join(names)} {verb}; robot and base are taken as standing still"
+    return [_finder(rows, table)(min(names.values()), "KRL022", message)]
+
+
+def _pinned(rows: Rows, table: Table, refused: dict[int, Finding]) -> dict[int, Finding]:
+    """Rows that a refused motion builds on, or whose reached position the program reads."""
+    pins: dict[int, Finding] = {}
+    if not rows.builds_on and not rows.reads:
+        return pins
+    finding = _finder(rows, table)
+    seen: set[Source] = set()
+    for row in rows.builds_on:
+        if row in refused:
+            message = f"the motion in line {table.line[row]} builds on this end point and is not corrected"
+            for pin in _rows_of(rows, rows.builds_on[row], seen):
+                pins.setdefault(pin, finding(pin, rows.reasons[row].code, message))
+    seen = set()
+    for line, sources in rows.reads:
+        for pin in _rows_of(rows, sources, seen):
+            message = f"line {line} reads the position that this motion reaches"
+            pins.setdefault(pin, finding(pin, "KRL002", message))
+    return dict(sorted(pins.items()))
+
+
+def _rows_of(rows: Rows, sources: frozenset[Source], seen: set[Source]) -> set[int]:
+    """The rows after which the robot may stand, marks of labels and routines followed to their callers; what ``seen``
+    has was given before."""
+    found: set[int] = set()
+    todo: list[Source] = list(sources)
+    while todo:
+        source = todo.pop()
+        if source in seen:
+            continue
+        seen.add(source)
+        if isinstance(source, int):
+            if source < len(rows):
+                found.add(source)
+        else:
+            todo.extend(rows.sources[source])
+    return found

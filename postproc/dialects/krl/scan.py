@@ -1,0 +1,150 @@
+"""Lines as statements; runs of common lines are read together, with numpy on their bytes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.dialects.krl.bulk import Bulk
+from postproc.dialects.krl.lexing import BOM, statement
+from postproc.dialects.krl.run import Item
+from postproc.dialects.krl.target import COMPONENTS, External, Target, parse
+from postproc.document import Document
+
+FEWEST, MOST = 8, 1 << 16
+"""Lines of a run that are read together: with fewer it does not pay, with more it takes memory."""
+
+_B = rb"[ \t]*+"
+_REAL = rb"[-+]?\d{1,15}+(?:\.\d{0,20}+)?+"
+_STATE = rb"(?:\d{1,9}+|'[Bb][01]{1,30}+')"
+_LINE = (
+    _B
+    + rb"(?:LIN|PTP)"
+    + _B
+    + rb"\{"
+    + (_B + rb",").join(_B + key + rb"[ \t]++" + _REAL for key in COMPONENTS)
+    + rb"(?:" + b"".join(_B + rb"," + _B + key + rb"(?=[ \t'])" + _B + _STATE for key in (b"S", b"T")) + rb")?+"
+    + b"".join(rb"(?:" + _B + rb"," + _B + rb"E%d[ \t]++" % i + _REAL + rb")?+" for i in range(1, 7))
+    + _B
+    + rb"\}"
+    + _B
+    + rb"(?:C_(?:DIS|VEL|ORI|PTP)"
+    + _B
+    + rb")?+\r?\n"
+)  # fmt: skip
+_RUN = re.compile(rb"^(?:%s){%d,%d}+" % (_LINE, FEWEST, MOST), re.I | re.M)
+_IN_NUMBER = np.zeros(256, bool)
+_IN_NUMBER[list(b"0123456789.+-")] = True
+
+
+def scan(document: Document, fast: bool) -> Iterator[Item]:
+    """The statements of a program in the order of the text; ``fast``: runs of common lines as one."""
+    raw = document.raw
+    line, place = 1, len(BOM) if document.raw.startswith(BOM) else 0
+    for found in _RUN.finditer(raw, place) if fast else ():
+        start, stop = found.span()
+        yield from _lines(raw, line, place, start)
+        line += raw.count(b"\n", place, start)
+        bulk = _bulk(raw, line, start, stop)
+        yield bulk
+        line += len(bulk)
+        place = stop
+    yield from _lines(raw, line, place, len(raw))
+
+
+def _lines(raw: bytes, line: int, start: int, stop: int) -> Iterator[Item]:
+    while start < stop:
+        end = raw.find(b"\n", start, stop)
+        end = stop if end < 0 else end + 1
+        found = statement(raw, line, start, end)
+        if found is not None:
+            yield found
+        start, line = end, line + 1
+
+
+def _bulk(raw: bytes, line: int, start: int, stop: int) -> Bulk:
+    """The common lines from byte ``start`` to ``stop``, whose number is ``line`` on."""
+    text = np.frombuffer(raw, np.uint8, stop - start, start)
+    ends = np.flatnonzero(text == 0x0A)
+    begins = np.concatenate([[0], ends[:-1] + 1])
+    opening, closing = np.flatnonzero(text == 0x7B), np.flatnonzero(text == 0x7D)
+    inside = _IN_NUMBER[text]
+    edges = np.flatnonzero(inside[1:] != inside[:-1]) + 1  # a line begins and ends with neither
+    first, behind = edges[0::2], edges[1::2]
+    six = np.searchsorted(first, begins)[:, None] + np.arange(6)
+    starts, stops = first[six], behind[six]
+    word = begins.copy()
+    while (blank := text[word] <= 0x20).any():
+        word += blank
+    slur, code = _approximations(raw, start, closing, ends)
+    status, turn, external = _states(raw, start, stops[:, 5], closing)
+    offset: type[np.signedinteger] = np.int32 if len(raw) < 2**31 - 1 else np.int64
+    motion = np.stack([word, opening, closing + 1, code], axis=1) + start
+    return Bulk(
+        line, (text[word] | 0x20) == ord("l"), _numbers(text, starts, stops), (starts + start).astype(offset),
+        (stops + start).astype(offset), motion.astype(offset), status, turn, slur, external,
+    )  # fmt: skip
+
+
+def _numbers(text: NDArray[Any], starts: NDArray[Any], stops: NDArray[Any]) -> NDArray[np.float64]:
+    """The values of the literals, as ``float`` reads them."""
+    change = np.zeros(len(text) + 1, np.int8)
+    change[starts.ravel()] += 1
+    change[stops.ravel()] -= 1
+    plain = np.where(np.cumsum(change[:-1], dtype=np.int8) > 0, text, 0x20).astype(np.uint8)
+    return np.fromstring(plain.tobytes().decode("ascii"), sep=" ").reshape(starts.shape)
+
+
+def _approximations(
+    raw: bytes, start: int, closing: NDArray[Any], ends: NDArray[Any]
+) -> tuple[NDArray[np.int8], NDArray[Any]]:
+    """Kind of the approximation (see ``Bulk.slur``), and where the code of the line ends."""
+    slur, code = np.zeros(len(ends), np.int8), closing + 1
+    rows = np.flatnonzero(ends > code)
+    rests = [
+        raw[a:b] for a, b in zip((code[rows] + start).tolist(), (ends[rows] + start).tolist(), strict=True)
+    ]
+    known = {rest: _approximation(rest) for rest in set(rests)}
+    found = np.array([known[rest] for rest in rests], np.int64).reshape(len(rests), 2)
+    slur[rows] = found[:, 0]
+    code[rows] += found[:, 1]
+    return slur, code
+
+
+def _approximation(rest: bytes) -> tuple[int, int]:
+    word = rest.strip(b" \t\r")
+    kind = 0 if not word else 1 if word.upper() == b"C_DIS" else 2
+    return kind, len(rest.rstrip(b" \t\r"))
+
+
+def _states(
+    raw: bytes, start: int, behind: NDArray[Any], closing: NDArray[Any]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[tuple[int, External], ...]]:
+    """S, T and the external axes of the lines, which stand between their last angle and the brace."""
+    status, turn = np.full(len(closing), -1), np.full(len(closing), -1)
+    rows = np.flatnonzero(closing > behind)
+    if not len(rows):
+        return status, turn, ()
+    rests = [
+        raw[a:b]
+        for a, b in zip((behind[rows] + start).tolist(), (closing[rows] + start).tolist(), strict=True)
+    ]
+    known = {rest: _state(rest) for rest in set(rests)}
+    found = np.array([known[rest][:2] for rest in rests], np.int64)
+    status[rows], turn[rows] = found[:, 0], found[:, 1]
+    external: dict[External, int] = {}
+    for row, rest in zip(rows.tolist(), rests, strict=True):
+        if known[rest][2]:
+            external.setdefault(known[rest][2], row)
+    return status, turn, tuple((row, axes) for axes, row in external.items())
+
+
+@lru_cache(maxsize=1024)
+def _state(rest: bytes) -> tuple[int, int, External]:
+    target = parse(b"{X 0" + rest + b"}", 0, 0)
+    return (target.status, target.turn, target.external) if isinstance(target, Target) else (-1, -1, ())
