@@ -176,12 +176,13 @@ def _closing(request: Request, ready: Prepared, written: Written) -> list[Findin
         findings.append(Finding("COR010", f"{said}: nothing is corrected", file))
     if division.inserted:
         links = int(division.links.sum())
+        points = division.inserted - links
         first = int(division.source[np.argmax(division.role != Role.OWN)])
         findings.append(
             Finding(
                 "COR012",
-                f"{links} link{'' if links == 1 else 's'} where the correction steps, and {division.inserted - links} points on the way"
-                f" (here the first one): {len(division) / max(len(path), 1):.3f} times the motions",
+                f"{links} link{'' if links == 1 else 's'} where the correction steps, and {points} on the way (here the first"
+                f" one): {len(division) / max(len(path), 1):.3f} times the motions",
                 file,
                 int(path.line[first]),
             )
