@@ -34,7 +34,7 @@ class Section:
         self.node = node
         self.file = file
         self.where = where
-        self.line = node.start_mark.line + 1
+        self.line, self.column = node.start_mark.line + 1, node.start_mark.column + 1
         self._values: dict[str, yaml.Node] = {}
         for key, value in node.value:
             name = str(key.value)
@@ -63,7 +63,7 @@ class Section:
     def error(self, code: str, message: str, key: str | None = None, help: str = "") -> Refusal:
         """A Refusal that points at ``key`` (at the section itself without one)."""
         node = self._keys.get(key) if key is not None else None
-        line, column = (node.start_mark.line + 1, node.start_mark.column + 1) if node else (self.line, 1)
+        line, column = (node.start_mark.line + 1, node.start_mark.column + 1) if node else (self.line, self.column)
         name = self._path(key) if key is not None else self.where
         text = f"{name}: {message}" if name else message
         return Refusal(Finding(code, text, str(self.file), line, column, help))
