@@ -252,6 +252,12 @@ CODES: dict[str, Code] = {
         "further axes move",
         "One that carries the robot or the workpiece puts both elsewhere than the cell says; make sure that none does.",
     ),
+    # Sinumerik
+    "SIN001": Code(
+        "info",
+        "tool is called by a name",
+        "Named tools are taken as the cell's tools 1, 2 ... in the order in which the program names them.",
+    ),
     # G-code, written
     "GCW001": Code(
         "warning",

@@ -147,7 +147,9 @@ def _positions(
             messages.append(("GCO003" if rapid else "GCO002", message, what))
         doubts.refuse_each(some, messages, which.reshape(-1))
     doubts.refuse(
-        np.any(frame, axis=1), "GCO019", "the origin was set where the position was not known (G92)"
+        np.any(frame, axis=1),
+        "GCO019",
+        "the coordinates are not known: G92 where the position was not, or a frame that is not read",
     )
 
 

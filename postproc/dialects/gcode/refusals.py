@@ -36,6 +36,7 @@ HELP = {
     "GCO022": "Say `dialect: {name: fanuc, integer_words: um}` in the cell if the control counts increments.",
     "GCO023": "See that the cell's tool has the length that is meant.",
     "GCO024": "Offsets and tools lie in the cell; see that both agree.",
+    "SIN001": "See that the cell's tools of these numbers are those; or write T=1.",
     "GCO025": "Nothing needs to be done.",
     "GCO026": "See that no such axis carries the robot or the workpiece.",
 }

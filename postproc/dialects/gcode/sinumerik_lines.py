@@ -144,7 +144,9 @@ class _Taken:
         if address == key("T"):
             string = _STRING.match(text, at)
             if string is not None:
-                self.word(place, address, -1, string.end(), float(self.tools[string[0]]), How.INTEGER)
+                number = self.tools[string[0]]
+                self.note("tool", b"T=%s is tool %d of the cell" % (string[0], number), place)
+                self.word(place, address, -1, string.end(), float(number), How.INTEGER)
                 return string.end()
         how = _HOW.match(text, at)
         if how is not None:

@@ -1,10 +1,10 @@
 """The tool's orientation from the words of the blocks.
 
 Rotary axes A, B, C turn the tool against the part: R(A, B, C) = Rz(C) Ry(B) Rx(A) in the base's axes, and the tool
-stands at R turned, with ``turned`` its orientation at A = B = C = 0; an axis that no block names stays at 0.  That
+stands at R turned, with ``turned`` its orientation at A = B = C = 0; an axis that no block names stays at 0. That
 holds where X, Y, Z are the tool's tip (TCP modes); else where the tip is, and how the part stands, is the machine's
-own, and only blocks with all rotary axes at 0 say where the tool is.  Controls of robots take A, B, C as angles of the tool's
-frame itself (``Control.whole``).  A vector, or angles A2= B2= C2=, say where the tool points in the programmed
+own, and only blocks with all rotary axes at 0 say where the tool is. Controls of robots take A, B, C as angles of the
+tool's frame itself (``Control.whole``). A vector, or angles A2= B2= C2=, say where the tool points in the programmed
 coordinates; they hold until another block states an orientation.
 """
 

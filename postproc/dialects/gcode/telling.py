@@ -58,6 +58,10 @@ def told(
         "GCO024",
         "the program writes a work offset; the cell's base of its number is taken",
     )
+    for name in dict.fromkeys(note.text for note in given.text.notes if note.kind == "tool"):
+        same = none.copy()
+        same[[note.block for note in given.text.notes if note.kind == "tool" and note.text == name]] = True
+        tell(same, "SIN001", name)
     if not len(rows):
         return findings
     units = np.isin(words.value, (20, 21, 70, 71, 700, 710)) & (words.key == key("G"))

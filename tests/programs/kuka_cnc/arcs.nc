@@ -1,0 +1,13 @@
+; arcs with centres from the begin (G162) and absolute ones (G161), by radius, through a point
+N1 G90 G71 G17 G54
+N2 T1 M6
+N3 G0 X0 Y0 Z0 A0 B90 C0
+N4 G1 X10 F1000
+N5 G2 X20 Y10 I10 J0
+N6 G161 G3 X30 Y20 I20 J20
+N7 G162 G2 X40 Y10 R10
+N8 G2 X60 Y10 Z5 I1=50 J1=15 K1=2
+N9 G18 G2 X70 Z15 I0 K10 A5 B85 C2
+N10 G91 G1 X1 Y1 (increment)
+N11 G17 G3 X5 Y5 J5
+M30
