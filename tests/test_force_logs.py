@@ -311,6 +311,7 @@ def test_turning_on_the_spot_has_the_force_of_its_place(tmp_path):
     ("text", "line", "words"),
     [
         ("s_mm,fx,fy,fz\n0,1,2,3\n1,nan,2,3\n", 3, "column fx: 'nan' is not a number"),
+        ("s_mm,fx,fy,fz\n0,1,2,3\n1,1,-1e300,3\n", 3, "column fy: '-1e300' is beyond 1e+09"),
         ("s_mm,fx,fy,fz\n0,1,2,3\n1,,2,3\n", 3, "column fx: the cell is empty"),
         (
             "s_mm,fx,fy,fz\n0,1,2,3\n2,1,2,3\n1,1,2,3\n",

@@ -253,11 +253,11 @@ GOOD = OPERATION.format(by="lines: [1, 99]")
     ("old", "new", "code", "line", "words", "help"),
     [
         ("radial_width: 8", "radial_width: 16.5", "YML004", 8, "16.5 mm is wider than the cutter", ""),
-        ("radial_width: 8", "radial_width: 0", "YML004", 8, "0 is not above 0", ""),
+        ("radial_width: 8", "radial_width: 0", "YML004", 8, "0 is not within 0.0001 .. 1000", ""),
         ("teeth: 3", "teeth: 0", "YML004", 5, "teeth: 0 is not a whole number from 1", ""),
         ("teeth: 3", "teeth: 2.5", "YML004", 5, "2.5 is not a whole number", ""),
         ("    spindle: 12000\n", "", "YML003", 3, "the key 'spindle' is missing", ""),
-        ("spindle: 12000", "spindle: 0", "YML004", 10, "0 is not above 0", "1/min"),
+        ("spindle: 12000", "spindle: 0", "YML004", 10, "0 is not within 1 .. 1e+06", ""),
         (
             "spindle: 12000",
             "spindle: 12000 rpm",
@@ -272,7 +272,7 @@ GOOD = OPERATION.format(by="lines: [1, 99]")
         ("direction: down", "direction: dwon", "YML004", 9, "did you mean 'down'", ""),
         ("direction: down", "direction: slot", "YML004", 8, "8 mm is no slot", "up or down"),
         ("helix: 30", "helix: 95", "YML004", 6, "95 is not within -75 .. 75", ""),
-        ("diameter: 16", "diameter: -16", "YML004", 4, "-16 is not above 0", ""),
+        ("diameter: 16", "diameter: -16", "YML004", 4, "-16 is not within 0.01 .. 1000", ""),
         ("diameter: 16", "diamter: 16", "YML002", 4, "did you mean 'diameter'", "radial_width"),
         ("axial_depth: 5", "axial_depth: nan", "YML004", 7, "'nan' is not a number", ""),
         ("lines: [1, 99]", "lines: [9, 1]", "YML004", 3, "9 to 1 is no range of lines", ""),

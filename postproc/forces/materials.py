@@ -13,6 +13,7 @@ from postproc.units import MM
 from postproc.yamlfile import Section, load
 
 TABLE = Path(__file__).with_name("materials.yaml")
+_LARGEST = 1e6
 CUTTING, EDGE = ("ktc", "krc", "kac"), ("kte", "kre", "kae")
 
 
@@ -56,9 +57,9 @@ def stated_coefficients(section: Section) -> Material:
 
 def _coefficients(section: Section) -> Coefficients:
     """Ktc and Krc have to be there; edge and axial coefficients count as 0 where they are not."""
-    kt, kr = (section.number(key, low=0.0, unit="N/mm2") for key in CUTTING[:2])
-    ka = section.number("kac", 0.0, unit="N/mm2")
-    et, er, ea = (section.number(key, 0.0, unit="N/mm") for key in EDGE)
+    kt, kr = (section.number(key, low=0.0, high=_LARGEST, unit="N/mm2") for key in CUTTING[:2])
+    ka = section.number("kac", 0.0, -_LARGEST, _LARGEST, unit="N/mm2")
+    et, er, ea = (section.number(key, 0.0, -_LARGEST, _LARGEST, unit="N/mm") for key in EDGE)
     return Coefficients((kt / MM**2, kr / MM**2, ka / MM**2), (et / MM, er / MM, ea / MM))
 
 

@@ -36,7 +36,17 @@ _CUT = (
     "coefficients",
     "ci95",
 )
-_STEEPEST_HELIX = 75.0  # deg; end mills have up to 60
+_RANGES = {
+    "diameter": (0.01, 1000.0, "mm"),
+    "axial_depth": (1e-4, 1000.0, "mm"),
+    "radial_width": (1e-4, 1000.0, "mm"),
+    "spindle": (1.0, 1e6, "1/min"),
+    "rapid": (1e-6, 100.0, "m/s"),
+    "helix": (-75.0, 75.0, "deg"),
+}
+"""Key -> lowest and highest value, and the unit: wider than any cutter is."""
+
+_MOST_TEETH = 1000
 
 
 @dataclass(frozen=True)
@@ -101,15 +111,14 @@ def _operation(section: Section, defaults: Section) -> Operation:
             "one of: name (words of a comment in the program), tool (its number), lines: [first, last]",
         )
     own = _Values(section, defaults)
-    diameter = own.positive("diameter", "mm") * MM
+    diameter = own.number("diameter") * MM
     material = _material(own)
     entry, leave = _engagement(own, diameter)
     cut = Cut(
         diameter=diameter,
-        teeth=_whole(own.place("teeth"), "teeth"),
-        helix=own.place("helix").number("helix", low=-_STEEPEST_HELIX, high=_STEEPEST_HELIX, unit="deg")
-        * DEG,
-        depth=own.positive("axial_depth", "mm") * MM,
+        teeth=_whole(own.place("teeth"), "teeth", _MOST_TEETH),
+        helix=own.number("helix") * DEG,
+        depth=own.number("axial_depth") * MM,
         entry=entry,
         exit=leave,
         coefficients=material.coefficients,
@@ -119,8 +128,8 @@ def _operation(section: Section, defaults: Section) -> Operation:
         tool=_whole(section, "tool") if "tool" in section else 0,
         lines=_lines(section),
         cut=cut,
-        speed=own.positive("spindle", "1/min") * 2 * np.pi / 60,
-        rapid=own.positive("rapid", "m/s") if own.has("rapid") else np.inf,
+        speed=own.number("spindle") * 2 * np.pi / 60,
+        rapid=own.number("rapid") if own.has("rapid") else np.inf,
         material=material,
         line=section.line,
     )
@@ -139,12 +148,10 @@ class _Values:
         """The section that holds ``key``; the operation's own where neither does, so that it is told there."""
         return self.defaults if key in self.defaults and key not in self.section else self.section
 
-    def positive(self, key: str, unit: str) -> float:
-        section = self.place(key)
-        value = section.number(key, unit=unit)
-        if value <= 0:
-            raise section.error("YML004", f"{value:g} is not above 0", key, f"a number in {unit}, above 0")
-        return value
+    def number(self, key: str) -> float:
+        """The number under ``key``, in the unit of the file."""
+        low, high, unit = _RANGES[key]
+        return self.place(key).number(key, low=low, high=high, unit=unit)
 
 
 def _engagement(own: _Values, diameter: float) -> tuple[float, float]:
@@ -153,7 +160,7 @@ def _engagement(own: _Values, diameter: float) -> tuple[float, float]:
     direction = section.text("direction", choices=DIRECTIONS)
     if direction == "slot" and not own.has("radial_width"):
         return engagement(direction, diameter, diameter)
-    width = own.positive("radial_width", "mm") * MM
+    width = own.number("radial_width") * MM
     section = own.place("radial_width")
     if width > diameter * (1 + 1e-9):
         message = f"{width / MM:g} mm is wider than the cutter, whose diameter is {diameter / MM:g} mm"
@@ -223,10 +230,10 @@ def _lines(section: Section) -> tuple[int, int]:
     return int(first), int(last)
 
 
-def _whole(section: Section, key: str) -> int:
+def _whole(section: Section, key: str, most: int = 10**6) -> int:
     value = section.number(key)
-    if value < 1 or value != int(value) or value > 1e6:
-        raise section.error("YML004", f"{value:g} is not a whole number from 1", key)
+    if value < 1 or value != int(value) or value > most:
+        raise section.error("YML004", f"{value:g} is not a whole number from 1 to {most}", key)
     return int(value)
 
 

@@ -18,6 +18,9 @@ FORM = (
     "line (of the motion, from 1) or s_mm (path length) or t_s (time at programmed feed), then fx,fy,fz[,mx,my,mz]"
     "[,frame] in N and N m"
 )
+LARGEST = 1e9
+"""[N, N m] No reading is larger."""
+
 _SHOWN = 10
 
 
@@ -44,6 +47,12 @@ def read_channels(table: Table) -> Floats:
     for index, name in enumerate(CHANNELS):
         if name in table:
             values[:, index] = table.numbers(name)
+            beyond = np.flatnonzero(np.abs(values[:, index]) > LARGEST)
+            if len(beyond):
+                row = int(beyond[0])
+                raise table.error(
+                    row, name, f"{table.texts(name)[row][:40]!r} is beyond {LARGEST:g} N or N m"
+                )
     return values
 
 
