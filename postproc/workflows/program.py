@@ -181,8 +181,8 @@ def _closing(request: Request, ready: Prepared, written: Written) -> list[Findin
         findings.append(
             Finding(
                 "COR012",
-                f"{links} link{'' if links == 1 else 's'} where the correction steps, and {points} on the way (here the first"
-                f" one): {len(division) / max(len(path), 1):.3f} times the motions",
+                f"{links} link{'' if links == 1 else 's'} where the correction steps, {points} points on the"
+                f" way (the first one here): {len(division) / max(len(path), 1):.3f} times the motions",
                 file,
                 int(path.line[first]),
             )
