@@ -49,6 +49,10 @@ class Space {
       }
       if (this.low[0] <= this.high[0]) break;
     }
+    motions.bends.forEach((value, at) => {
+      this.low[at % 3] = Math.min(this.low[at % 3], value);
+      this.high[at % 3] = Math.max(this.high[at % 3], value);
+    });
     if (!(this.low[0] <= this.high[0])) { this.low = [0, 0, 0]; this.high = [1, 1, 1]; }
     this.middle = this.low.map((low, k) => 0.5 * (low + this.high[k]));
     this.size = Math.max(1, Math.hypot(...this.low.map((low, k) => this.high[k] - low)));
