@@ -10,6 +10,7 @@ import numpy as np
 from postproc.arrays import Floats
 from postproc.dialects.dialect import PLAIN, Plan, Program, Role, Settings, Writing
 from postproc.dialects.gcode import GcodeDialect
+from postproc.dialects.gcode.writer_text import stated
 from postproc.document import Document, apply, undone
 from postproc.geometry import arc_in_plane, on_arc, rotation_from_vector, vector_from_rotation
 from postproc.toolpath import Kind, Toolpath
@@ -40,9 +41,9 @@ def free(path: Toolpath) -> np.ndarray:
 
 
 def random_plan(
-    path: Toolpath,
+    program: Program,
     seed: int,
-    size: float = 3e-4,
+    size: float = 1e-4,
     share: float = 0.7,
     divided: float = 0.3,
     turn: float = 1e-3,
@@ -50,8 +51,10 @@ def random_plan(
     """Some motions moved by some tenths of a millimetre and turned where they can be, with pieces and links before
     some; arcs through the moved begin, middle and end; circles that nearly close are divided."""
     random = np.random.default_rng(seed)
+    path, through = program.toolpath, stated(program, WRITING).through
     n = len(path)
-    moves = free(path) & (random.random(n) < share)
+    movable = free(path)
+    moves = movable & (random.random(n) < share)
     end = path.position + np.where(moves[:, None], random.normal(0, size, (n, 3)), 0.0)
     turns = rotation_from_vector(random.normal(0, turn, (n, 3)) * (moves & path.oriented)[:, None])
     rotation = np.where(
@@ -73,8 +76,21 @@ def random_plan(
                 groups.append((row, Role.PIECE, middle, rotation[row], np.full(7, np.nan)))
             groups.append((row, Role.OWN, end[row], rotation[row], np.full(7, np.nan)))
         else:
+            if through[row] and movable[row]:
+                # Three points: no advance along the normal.
+                end[row] -= path.normal[row] * ((end[row] - begin) @ path.normal[row])
             groups += _arc(
-                path, row, start[row], begin, end[row], rotation[row], whole, moves[row], random, divided
+                path,
+                row,
+                start[row],
+                begin,
+                end[row],
+                rotation[row],
+                whole,
+                moves[row],
+                random,
+                divided,
+                through[row],
             )
         last = groups[-1][2]
     ways = np.array([group[4] for group in groups]).reshape(-1, 7)
@@ -89,7 +105,7 @@ def random_plan(
     )
 
 
-def _arc(path, row, start, begin, end, rotation, whole, moves, random, divided):
+def _arc(path, row, start, begin, end, rotation, whole, moves, random, divided, flat):
     """An arc, or two, from ``begin``; as it is where nothing moves."""
     own = np.concatenate([path.centre[row], path.normal[row], [path.sweep[row]]])
     if row in path.refused or (not moves and np.array_equal(begin, start)):
@@ -103,7 +119,7 @@ def _arc(path, row, start, begin, end, rotation, whole, moves, random, divided):
         for point in source
     ]
     link = []
-    if not whole and random.random() < divided:
+    if not whole and not flat and random.random() < divided:
         begin = begin + random.normal(0, 1e-4, 3)
         link = [(row, Role.LINK, begin, rotation, np.full(7, np.nan))]
     two = not whole and (own[6] > np.radians(300) or random.random() < divided)
@@ -116,8 +132,7 @@ def _arc(path, row, start, begin, end, rotation, whole, moves, random, divided):
             (row, Role.OWN, end, rotation, second),
         ]
     extra = np.floor(own[6] / (2 * np.pi) - 1e-9) * 2 * np.pi
-    closed = np.linalg.norm(start - path.position[row]) < 1e-9 and own[6] > 6
-    if closed or extra:
+    if own[6] > 6 or extra:
         # A circle that must stay whole moves as it is.
         way = own.copy()
         way[:3] += begin - start
@@ -234,7 +249,7 @@ def round_trip(
 ) -> bytes:
     """Reads, moves at random, writes, reads again; the output."""
     program = dialect.read((Document(Path("part.nc"), raw),), settings)
-    plan = random_plan(program.toolpath, seed, **change)
+    plan = random_plan(program, seed, **change)
     output = written(dialect, program, plan, writing)
     assert_reads_as(dialect, program, plan, output, settings, writing)
     return output

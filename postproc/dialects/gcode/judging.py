@@ -159,6 +159,9 @@ def pinned(document: Document, given: Blocks, moves: Motions, way: Course, doubt
     pins = Doubts(n)
     modal = given.modal
     partial = np.asarray(np.logical_not(np.all(way.sets[rows, :3], axis=1)))
+    # Orientation words are inherited as well; an arc begins there.
+    partial |= (moves.stand.orient >= 0) & ~moves.stand.stated
+    partial |= ~np.isin(moves.kind, (Kind.LIN, Kind.PTP))
     reaching = modal.has(Once.HOME, Once.MACHINE)[rows]
     building = np.flatnonzero((doubts.why >= 0) & partial & ~reaching)
     building = building[building > 0]

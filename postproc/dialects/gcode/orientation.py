@@ -149,7 +149,7 @@ class Angles:
         target = self.frame.T @ rotation @ self.tool.T
         if self.free_spin:
             target = target[:, :, 2]
-        rows = np.flatnonzero(np.isfinite(target.reshape(len(target), -1)).all(axis=1))
+        rows = np.flatnonzero(np.isfinite(target).all(axis=tuple(range(1, target.ndim))))
         missed = np.ones(len(found), dtype=bool)
         for _ in range(_ROUNDS):
             left, axes = self._left(found[rows], target[rows])

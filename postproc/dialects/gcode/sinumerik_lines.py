@@ -144,9 +144,9 @@ class _Taken:
         if address == key("T"):
             string = _STRING.match(text, at)
             if string is not None:
-                number = self.tools[string[0]]
-                self.note("tool", b"T=%s is tool %d of the cell" % (string[0], number), place)
-                self.word(place, address, -1, string.end(), float(number), How.INTEGER)
+                tool = self.tools[string[0]]
+                self.note("tool", b"T=%s is tool %d of the cell" % (string[0], tool), place)
+                self.word(place, address, -1, string.end(), float(tool), How.INTEGER)
                 return string.end()
         how = _HOW.match(text, at)
         if how is not None:

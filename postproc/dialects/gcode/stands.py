@@ -35,7 +35,7 @@ _SEQUENCES = {EULER: ((2, 0), (0, 1), (2, 2)), RPY: ((2, 2), (1, 1), (0, 0))}
 class Stand:
     """rotation (N, 3, 3); oriented (N,): the words can be written; free_axis (N, 3): as in a Toolpath; wrong (N,):
     0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one.  orient (N,), orientations,
-    values (N, 3): as in Places."""
+    values (N, 3): as in Places.  stated (N,): the block itself states the whole orientation in force."""
 
     rotation: Floats
     oriented: Bools
@@ -44,6 +44,7 @@ class Stand:
     orient: Ints
     orientations: tuple[Orientation, ...]
     values: Floats
+    stated: Bools
 
 
 def stands(given: Blocks, where: Positions, rows: Ints, rapid: Bools, turned: Floats | None) -> Stand:
@@ -64,6 +65,7 @@ def stands(given: Blocks, where: Positions, rows: Ints, rapid: Bools, turned: Fl
         np.full(n, -1),
         (),
         np.full((n, 3), np.nan),
+        np.zeros(n, np.bool_),
     )
     if not used.any() and not (kind > ROTARY).any():
         return result
@@ -80,6 +82,10 @@ def stands(given: Blocks, where: Positions, rows: Ints, rapid: Bools, turned: Fl
         values = _values(given, where, one, rows[here], stating[rows[here]], turned, turns, used, orientation)
         shifted = np.array([frame.shift[3:].any() for frame in where.frames])[where.frame[rows[here]]]
         result.values[here] = values
+        present = np.stack(
+            [given.of(address)[rows[here]] >= 0 for address in orientation.words if address >= 0], axis=1
+        )
+        result.stated[here] = present.any(axis=1) if orientation.joint else present.all(axis=1)
         columns = np.array(orientation.words) >= 0
         known = np.isfinite(values[:, columns]).all(axis=1)
         result.wrong[here[~known]] = 2

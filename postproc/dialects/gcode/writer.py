@@ -86,7 +86,7 @@ class _Sheet:
 def _differs(new: Floats, old: Floats) -> Bools:
     with np.errstate(invalid="ignore"):
         same = (np.abs(new - old) <= SAME) | (np.isnan(new) & np.isnan(old))
-    return np.asarray(~same.reshape(len(same), -1).all(axis=1))
+    return np.asarray(~same.all(axis=tuple(range(1, same.ndim))))
 
 
 def _allowed(program: Program, plan: Plan) -> None:
@@ -195,8 +195,11 @@ def _orientations(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet
     bounds = [0, *(np.flatnonzero(np.diff(orient)) + 1).tolist(), len(row)]
     for a, b in pairwise(bounds):
         if orient[a] >= 0:
-            way = follow_whole if places.orientations[orient[a]].joint else follow
-            way(wanted, np.full(3, np.nan), a, b, into)
+            unknown, orientation = np.full(3, np.nan), places.orientations[orient[a]]
+            if orientation.joint:
+                follow_whole(wanted, unknown, a, b, into, not orientation.angles)
+            else:
+                follow(wanted, unknown, a, b, into)
     sheet.write[:, TURNED], sheet.number[:, TURNED] = into.write, into.number
     return held
 
@@ -219,7 +222,7 @@ def _arcs(
     m, row, centre = m[touched], row[touched], centre[touched]
     if not len(m):
         return convert, bad
-    through = places.move[row] == Move.THROUGH
+    through = text.through[row]
     by_radius = text.word[row, RADIUS] >= 0
     columns = np.r_[CENTRE, RADIUS]
     own = np.where(motions.own[m, None], text.value[row][:, columns], np.nan)

@@ -16,7 +16,8 @@ WELL = np.radians([167.0, 193.0, 300.0])
 two the centre moves by more than nine times what the radius is rounded by, beyond the last it turns with the ends."""
 
 FAR = 2.0
-"""Written steps by which the inside of a written arc may be elsewhere than planned."""
+"""Written steps by which the inside of a written arc may be elsewhere than planned, or its radii differ; twice as many
+for an arc through a point, which can not advance along its normal evenly."""
 
 
 class Form(IntEnum):
@@ -172,7 +173,10 @@ def _misread(arcs: Arcs, number: Floats, through: Bools, by_radius: Bools) -> Bo
         meant = on_arc(arcs.begin, arcs.end, arcs.centre, arcs.normal, arcs.sweep, at)
         read = on_arc(arcs.begin, arcs.end, centre, normal, sweep, at)
         worst = np.maximum(worst, np.linalg.norm(meant - read, axis=1))
-    return ~(worst <= FAR * step) | ~(np.abs(sweep - arcs.sweep) < np.pi)
+    unequal = ~through & ~by_radius & (_mismatch(arcs, number) > FAR * step)
+    return (
+        unequal | ~(worst <= np.where(through, 2.0, 1.0) * FAR * step) | ~(np.abs(sweep - arcs.sweep) < np.pi)
+    )
 
 
 def _by_radius(arcs: Arcs, normal: Floats, radius: Floats) -> Floats:

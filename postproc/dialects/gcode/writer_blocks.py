@@ -19,6 +19,7 @@ from postproc.document import Edit, Span
 
 _HEAD = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*(?:/[ \t]*\d?[ \t]*)?)")
 _NAME = re.compile(rb"[A-Za-z_][A-Za-z0-9_]*")
+_CLOSED = re.compile(rb"(?:[ \t]*\))*")
 _BLANK = re.compile(rb"[ \t]")
 
 
@@ -94,7 +95,8 @@ class _Block:
         low, high = np.searchsorted(words.block, [block, block + 1]).tolist()
         self.words = [k for k in range(low, high) if words.key[k] != key("N")]
         self.start = int(places.text.blocks.start[block])
-        self.insert = int(places.insert[row])
+        # AC( and IC( are closed behind the number.
+        self.insert = _CLOSED.match(self.raw, int(places.insert[row])).end()  # type: ignore[union-attr]
         code = self.raw[int(words.at[self.words[0]]) : self.insert]
         several = len(self.words) > 1
         self.gap = b" " if (_BLANK.search(code) is not None if several else blocks.spaced) else b""

@@ -126,9 +126,9 @@ def _decimals_of(value: float) -> int:
     return len(f"{value:.9f}".rstrip("0").partition(".")[2])
 
 
-def follow_whole(motions: Wanted, start: Floats, a: int, b: int, into: Followed) -> None:
+def follow_whole(motions: Wanted, start: Floats, a: int, b: int, into: Followed, vector: bool) -> None:
     """As ``follow`` for words that are one whole (a vector): all are written anew or none, missing ones are zero where
-    another stands, and where none stands the direction of the motion before holds."""
+    another stands, and where none stands those of the motion before hold; a vector's length says nothing."""
     has = np.isfinite(motions.own[a:b]).any(axis=1)
     present = has & ~motions.fixed[a:b]
     want, own = motions.wanted[a:b], np.nan_to_num(motions.own[a:b])
@@ -142,7 +142,8 @@ def follow_whole(motions: Wanted, start: Floats, a: int, b: int, into: Followed)
         begin = end[k - 1] if k else start
         source = motions.source[a + k]
         known = np.isfinite(begin).all()
-        if (known and _near(want[k], begin, half[k])) or (not known and _near(want[k], source, half[k])):
+        other = begin if known else source
+        if _near(_unit(want[k]), _unit(other), half[k]) if vector else _near(want[k], other, half[k]):
             end[k] = begin if known else want[k]
             continue
         number[k] = end[k] = _rounded(want[k], motions.decimals[a + k])
@@ -151,7 +152,9 @@ def follow_whole(motions: Wanted, start: Floats, a: int, b: int, into: Followed)
     into.begin[a], into.begin[a + 1 : b] = start, end[:-1]
 
 
+def _unit(values: Floats) -> Floats:
+    return np.asarray(values / (np.linalg.norm(values) or 1.0))
+
+
 def _near(one: Floats, other: Floats, half: Floats) -> bool:
-    """Vectors of any length that point the same way."""
-    lengths = np.linalg.norm(one) or 1.0, np.linalg.norm(other) or 1.0
-    return bool((np.abs(one / lengths[0] - other / lengths[1]) <= half).all())
+    return bool((np.abs(one - other) <= half).all())

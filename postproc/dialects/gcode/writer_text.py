@@ -34,7 +34,8 @@ class Stated:
 
     word: row in the words, -1 where absent; keys: the address of each column, -1 where it has none; value: the numbers
     as the control reads them, programmed units; relative: the number is an increment; modal: a number that is inserted
-    is one; decimals: with which a number is written.  turns (N,): full turns of an arc that the block states apart.
+    is one; decimals: with which a number is written.  turns (N,): full turns of an arc that the block states apart;
+    through (N,): arcs through a point.
     inverse (N, 3, 3), origin (N, 3), scale (N,): units = inverse @ (base - origin) / scale.
     """
 
@@ -45,6 +46,7 @@ class Stated:
     modal: Bools
     decimals: Ints
     turns: Ints
+    through: Bools
     inverse: Floats
     origin: Floats
     scale: Floats
@@ -65,7 +67,8 @@ def stated(program: Program, writing: Writing) -> Stated:
     places = program.text
     n = len(program.toolpath)
     orient = places.orient
-    keys = _keys(places, orient)
+    through = _through(places)
+    keys = _keys(places, orient, through)
     index = {address: column for column, address in enumerate(places.columns)}
     word = np.full((n, COLUMNS), -1)
     for address in np.unique(keys[keys >= 0]).tolist():
@@ -80,7 +83,7 @@ def stated(program: Program, writing: Writing) -> Stated:
     counted[:, lengths] = (places.increment / places.scale)[:, None]
     integer = how == How.INTEGER
     value[integer] *= counted[integer]
-    modal = _modal(places, orient)
+    modal = _modal(places, orient, through)
     inverse = np.linalg.inv(places.frames.rotation)
     decimals = np.maximum(_written_decimals(program, word), _least(program, orient, writing))
     whole = integer & (counted != 1.0)
@@ -94,14 +97,23 @@ def stated(program: Program, writing: Writing) -> Stated:
         modal,
         np.minimum(np.maximum(decimals, finest), MOST_DECIMALS),
         _turns(places, index),
+        through,
         inverse[places.frame],
         places.frames.position[places.frame],
         places.scale,
     )
 
 
-def _keys(places: Places, orient: Ints) -> Ints:
-    through = places.move == Move.THROUGH
+def _through(places: Places) -> Bools:
+    """(N,) arcs through a point: CIP, or G2 and G3 with I1=."""
+    through = np.asarray(places.move == Move.THROUGH)
+    for letter in "IJK":
+        if key(letter, 1) in places.columns:
+            through |= places.column(letter, 1) >= 0
+    return through
+
+
+def _keys(places: Places, orient: Ints, through: Bools) -> Ints:
     keys = np.full((len(orient), COLUMNS), -1)
     keys[:, AXES] = [key(letter) for letter in "XYZ"]
     keys[:, CENTRE] = [key(letter) for letter in "IJK"]
@@ -124,9 +136,8 @@ def _least(program: Program, orient: Ints, writing: Writing) -> Ints:
     return np.maximum(least, 1)
 
 
-def _modal(places: Places, orient: Ints) -> Bools:
+def _modal(places: Places, orient: Ints, through: Bools) -> Bools:
     """(N, 10) plain numbers are increments."""
-    through = places.move == Move.THROUGH
     relative = np.zeros((len(orient), COLUMNS), dtype=bool)
     relative[:, AXES] = places.incremental[:, None]
     joint = np.array([o.joint for o in places.orientations] + [True])
