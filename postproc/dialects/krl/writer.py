@@ -1,169 +1,123 @@
-"""Moved targets as edits: only the literals that changed, and the components that a partial point needs."""
+"""A plan as edits: only the literals that changed, what a changed neighbour would alter, and inserted motions."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.dialects.dialect import Program
-from postproc.dialects.krl.lexing import number
-from postproc.document import Edit, Span
-from postproc.geometry import abc_from_rotation
-from postproc.units import DEG, MM
+from postproc.dialects.decimals import fixed
+from postproc.dialects.dialect import Moved, Plan, Program, Writing
+from postproc.dialects.krl.components import LETTER, Components, Task, differs
+from postproc.dialects.krl.inserting import insertions
+from postproc.dialects.krl.targets import single_edits
+from postproc.document import Edits
+from postproc.toolpath import Kind
 
-KEYS = "XYZABC"
-SAME = 1e-12
-"""Positions [m] and rotations that differ by less are the same."""
-
-MOST_DECIMALS = 12
-_LETTER = re.compile(rb"[A-Za-z0-9_$]")
+BLOCK = 1 << 16
+"""Rows that are worked on at a time."""
 
 
-def moved(program: Program, position: Floats, rotation: Floats, decimals: Mapping[str, int]) -> list[Edit]:
-    """The edits that bring the targets to ``position`` (N, 3) [m] and ``rotation`` (N, 3, 3).
+def moved(program: Program, plan: Plan, writing: Writing) -> Moved:
+    """The edits after which the program makes the motions of ``plan``.
 
-    ``decimals``: the least number of decimals of what is written, "mm" and "deg".  Raises ValueError if a row
-    is asked to move that can not: a defect of the caller.
+    Raises ValueError if a row is asked to move, or to be divided, that can not: a defect of the caller.
     """
-    path, places = program.toolpath, program.text
-    shifted: Bools = np.any(_differs(position, path.position), axis=1)
-    turned: Bools = np.any(_differs(rotation, path.rotation), axis=(1, 2))
-    fixed = [row for row in (*path.refused, *path.pinned) if shifted[row] or turned[row]]
-    if fixed or (shifted | turned)[places.file < 0].any():
-        raise ValueError(f"motions that can not be corrected were moved: rows {sorted(set(fixed))[:5]}")
-    return _Writer(program, position, rotation, decimals, shifted, turned).edits()
+    task = Task(program, plan, writing)
+    touched, way = _touched(task)
+    _refuse_forbidden(task, touched, way)
+    plain = touched & _plain(task)
+    changed = np.zeros((len(touched), 6), dtype=bool)
+    parts: list[Edits] = []
+    for rows in _blocks(np.flatnonzero(touched)):
+        said = task.components(rows)
+        there = task.own[rows]
+        wanted = task.wanted(rows, said.own, plan.position[there], plan.rotation[there])
+        kept = said.kept(wanted)
+        changed[rows] = ~kept
+        simple = plain[rows]
+        if simple.any():
+            parts.append(_literal_edits(task, said, wanted, ~kept & simple[:, None]))
+    changed[task.has_angle & touched] = True
+    singly, completed = _singly(task, touched & ~plain, touched | way, changed)
+    single, held = single_edits(task, singly, completed)
+    if held:
+        return Moved((), held)
+    return Moved(Edits.joined(*parts, *insertions(task), single))
 
 
-def _differs(new: Floats, old: Floats) -> Bools:
-    with np.errstate(invalid="ignore"):
-        return ~((np.abs(new - old) <= SAME) | (np.isnan(new) & np.isnan(old)))
+def _touched(task: Task) -> tuple[Bools, Bools]:
+    """(N,) rows whose end is another one, and arcs whose way is."""
+    path, plan, n = task.path, task.plan, len(task.path)
+    touched, way = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    for rows in _blocks(np.arange(n)):
+        there = task.own[rows]
+        touched[rows] = differs(plan.position[there], path.position[rows]).any(axis=1)
+        touched[rows] |= differs(plan.rotation[there], path.rotation[rows]).any(axis=(1, 2))
+    arcs = np.flatnonzero(path.kind == Kind.CIRC)
+    there = task.own[arcs]
+    for new, old in ((plan.centre, path.centre), (plan.normal, path.normal), (plan.sweep, path.sweep)):
+        other = differs(new[there], old[arcs])
+        way[arcs] |= other.any(axis=1) if other.ndim > 1 else other
+    return touched, way
 
 
-class _Writer:
-    def __init__(
-        self,
-        program: Program,
-        position: Floats,
-        rotation: Floats,
-        decimals: Mapping[str, int],
-        shifted: Bools,
-        turned: Bools,
-    ) -> None:
-        self.program = program
-        self.position, self.rotation = position, rotation
-        self.least = [decimals["mm"]] * 3 + [decimals["deg"]] * 3
-        self.shifted, self.turned = shifted, turned
-        self.given = _given_by(program)
-        self.edited: list[Edit] = []
-
-    def edits(self) -> list[Edit]:
-        path, places = self.program.toolpath, self.program.text
-        partial = (places.file >= 0) & (places.start < 0).any(axis=1)
-        refused = np.zeros(len(path), dtype=bool)
-        refused[list(path.refused)] = True
-        touched = self.shifted | self.turned
-        every = self._new_texts(np.flatnonzero(touched))
-        # The components in which the row before differs from its own value in the output.
-        before: set[int] = set()
-        last = -2
-        for row in np.flatnonzero(touched | (partial & ~refused)).tolist():
-            if last != row - 1:
-                before = set()
-            last = row
-            texts = every.get(row, {})
-            missing = [i for i in range(6) if places.start[row, i] < 0]
-            if texts or any(i in before for i in missing):
-                self._write(row, texts, missing if texts else [i for i in missing if i in before])
-                before = set(texts)
-            else:
-                before = set()
-        return self.edited
-
-    def _own(self, row: int, i: int) -> tuple[float, str, int]:
-        """Value [mm, deg], text and decimals of a component of the row as the program has it.
-
-        The text is the row's own, or that of the row before which gives the component.
-        """
-        places, path, source = self.program.text, self.program.toolpath, int(self.given[row, i])
-        start = int(places.start[source, i])
-        if start >= 0:
-            literal = self.program.documents[int(places.file[source])].raw[
-                start : int(places.stop[source, i])
-            ]
-            value = number(literal)
-            if value is not None:
-                return value, literal.decode("latin-1"), max(_decimals(literal), self.least[i])
-        if i < 3:
-            value = float(path.position[row, i]) / MM
-        else:
-            value = float(abc_from_rotation(path.rotation[row])[i - 3]) / DEG
-        text = _fixed(value, 9)
-        return float(text), text, max(9, self.least[i])
-
-    def _new_texts(self, rows: Ints) -> dict[int, dict[int, str]]:
-        """Row -> the components whose value moved by more than half of its written step, as to be written."""
-        own = np.empty((len(rows), 6))
-        places = np.empty((len(rows), 6), dtype=np.int64)
-        for k, row in enumerate(rows.tolist()):
-            for i in range(6):
-                own[k, i], _, places[k, i] = self._own(row, i)
-        new = own.copy()
-        shifted, turned = self.shifted[rows], self.turned[rows]
-        new[shifted, :3] = self.position[rows[shifted]] / MM
-        new[turned, 3:] = abc_from_rotation(self.rotation[rows[turned]], own[turned, 3:] * DEG) / DEG
-        change = new - own
-        change[:, 3:] = (change[:, 3:] + 180.0) % 360.0 - 180.0
-        counts = np.abs(change) > 0.5 * 10.0**-places
-        texts: dict[int, dict[int, str]] = {}
-        for k, i in zip(*(axis.tolist() for axis in np.nonzero(counts)), strict=True):
-            texts.setdefault(int(rows[k]), {})[i] = _fixed(float(new[k, i]), int(places[k, i]))
-        return texts
-
-    def _write(self, row: int, texts: dict[int, str], missing: list[int]) -> None:
-        places = self.program.text
-        file = int(places.file[row])
-        raw = self.program.documents[file].raw
-        present = [i for i in range(6) if places.start[row, i] >= 0]
-        for i in present:
-            if i in texts:
-                start, stop = int(places.start[row, i]), int(places.stop[row, i])
-                # "Z- 30" is Z and a number, "Z30.1" would be a name.
-                touches = _LETTER.match(raw[start - 1 : start]) and not texts[i].startswith("-")
-                text = " " + texts[i] if touches else texts[i]
-                self.edited.append(Edit(Span(file, start, stop), text.encode()))
-        if not missing:
-            return
-        at = int(places.insert[row])
-        first = int(places.start[row, present[0]]) if present else at + 1
-        lower = raw[:first].rstrip(b" \t")[-1:].islower()
-        words = []
-        for i in missing:
-            value = texts[i] if i in texts else self._own(row, i)[1]
-            words.append(f"{KEYS[i].lower() if lower else KEYS[i]} {value.lstrip('+')}")
-        inserted = "," + ",".join(words) if present else ",".join(words) + ","
-        self.edited.append(Edit(Span(file, at, at), inserted.encode("latin-1")))
+def _refuse_forbidden(task: Task, touched: Bools, way: Bools) -> None:
+    path = task.path
+    fixed_rows = {row for row in (*path.refused, *path.pinned) if touched[row]}
+    fixed_rows |= {row for row in path.refused if way[row]}
+    fixed_rows |= set(np.flatnonzero(touched & (path.kind == Kind.AXIS)).tolist())
+    if fixed_rows:
+        raise ValueError(f"motions that can not be corrected were moved: rows {sorted(fixed_rows)[:5]}")
+    whole = {row for row in (*path.refused, *path.whole) if task.inserted[row]}
+    if whole:
+        raise ValueError(f"motions that can not be divided were: rows {sorted(whole)[:5]}")
 
 
-def _given_by(program: Program) -> Ints:
-    """(N, 6) the row whose text gives a component: the row itself, or the last one before that writes it."""
-    places = program.text
-    rows = np.arange(len(places.file))[:, None]
-    writes = (places.start >= 0) | (places.file < 0)[:, None]
-    return np.maximum.accumulate(np.where(writes, rows, 0), axis=0)
+def _plain(task: Task) -> Bools:
+    """(N,) rows whose target are six literals that nothing else uses."""
+    places = task.places
+    plain = (places.start >= 0).all(axis=1) & ~task.is_relative
+    plain[[*places.locked, *places.arcs]] = False
+    used = np.bincount(places.text, minlength=len(plain))
+    for arc in places.arcs.values():
+        if arc.text < len(used):
+            used[arc.text] += 1
+    return np.asarray(plain & (used[places.text] == 1))
 
 
-def _decimals(literal: bytes) -> int:
-    """The decimals that a literal is written with, its exponent considered."""
-    if literal.startswith(b"'"):
-        return 0
-    mantissa, _, exponent = literal.upper().partition(b"E")
-    written = len(mantissa.partition(b".")[2].strip())
-    return min(max(written - int(exponent or b"0"), 0), MOST_DECIMALS)
+def _literal_edits(task: Task, said: Components, wanted: Floats, chosen: Bools) -> Edits:
+    """Edits of the ``chosen`` (K, 6) literals to the ``wanted`` (K, 6) values."""
+    start, stop, file = said.start[chosen], said.stop[chosen], said.file[chosen]
+    before = np.zeros(len(start), np.uint8)
+    for index, raw in enumerate(task.raws):
+        here = file == index
+        before[here] = raw[start[here] - 1]
+    # "Z- 30" is Z and a number, "Z30.1" would be a name.
+    texts, ends = fixed(wanted[chosen], said.decimals[chosen], LETTER[before])
+    return Edits(file, start, stop, texts, ends)
 
 
-def _fixed(value: float, decimals: int) -> str:
-    text = f"{value:.{decimals}f}"
-    return text[1:] if text.startswith("-") and not text.strip("-0.") else text
+def _singly(task: Task, rows: Bools, moves: Bools, changed: Bools) -> tuple[Ints, Bools]:
+    """Rows that are written one by one, and (N, 6) the components that a changed row before leaves to be written.
+
+    rows (N,): those that are so anyway; moves (N,): end or way is another one; changed (N, 6): components whose text
+    changes.
+    """
+    places = task.places
+    refused = np.zeros(len(rows), dtype=bool)
+    refused[list(task.path.refused)] = True
+    before = np.roll(changed, 1, axis=0)
+    before[:1] = False
+    left_out = ((places.inherits[:, None] >> np.arange(6, dtype=np.uint8)) & 1).astype(bool)
+    completed = left_out & (before | (task.inserted > 0)[:, None]) & ~refused[:, None]
+    builds = task.is_relative.copy()
+    builds[[row for row, _ in places.arcs.items() if np.isfinite(task.path.sweep[row])]] = True
+    again = builds & ~refused & (moves | before.any(axis=1) | (task.inserted > 0))
+    return np.flatnonzero(rows | completed.any(axis=1) | again), completed
+
+
+def _blocks(rows: Ints) -> Iterator[Ints]:
+    for at in range(0, len(rows), BLOCK):
+        yield rows[at : at + BLOCK]

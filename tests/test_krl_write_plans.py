@@ -1,0 +1,427 @@
+"""What a plan makes of points, lines and arcs: own points, relative motions, auxiliary points, inserted motions."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fuzz.examine import examined
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from postproc.dialects.dialect import Moved, Plan, Program, Role, Writing
+from postproc.dialects.krl import KrlDialect
+from postproc.document import Document, apply, undone
+from postproc.geometry import rotation_from_vector
+from postproc.units import DEG, MM
+
+KRL = KrlDialect()
+HEAD = "DEF part()\nBAS(#BASE,1)\nBAS(#TOOL,1)\n"
+START = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+
+
+def read(text: str, data: str = "", newline: str = "\n") -> Program:
+    texts = [HEAD + text + "END\n"] + ([f"DEFDAT part\n{data}ENDDAT\n"] if data else [])
+    names = ("part.src", "part.dat")
+    return KRL.read(
+        tuple(
+            Document(Path(n), t.replace("\n", newline).encode()) for n, t in zip(names, texts, strict=False)
+        )
+    )
+
+
+def plan(program: Program, **shifts: tuple[float, float, float]) -> Plan:
+    """The program's plan with rows shifted [mm]: ``r0=(1, 0, 0)``; arcs as they stand."""
+    position = program.toolpath.position.copy()
+    for name, shift in shifts.items():
+        position[int(name[1:])] += np.array(shift) * MM
+    return dataclasses.replace(Plan.of(program.toolpath), position=position)
+
+
+def written(program: Program, wanted: Plan, own_points: str = "inline") -> tuple[list[str], list[str]]:
+    """The lines behind the head, and of the .dat, of the program with a plan in it, read back and compared."""
+    found = KRL.moved(program, wanted, Writing(3, 3, own_points))
+    assert not found.held
+    documents = []
+    for index, document in enumerate(program.documents):
+        edits = [edit for edit in found.edits if edit.span.file == index]
+        raw = apply(document, edits)
+        assert undone(raw, document.raw, edits)
+        documents.append(dataclasses.replace(document, raw=raw))
+    back = KRL.read(tuple(documents)).toolpath
+    assert len(back) == len(wanted)
+    known = np.isfinite(wanted.position)
+    np.testing.assert_array_equal(np.isfinite(back.position), known)
+    assert np.abs(back.position - wanted.position)[known].max() <= 0.50001e-3 * MM
+    said = known[:, 0]
+    np.testing.assert_allclose(back.rotation[said], wanted.rotation[said], atol=3 * 0.0005 * DEG)
+    texts = [document.raw.decode().splitlines() for document in documents]
+    return texts[0][3:-1], texts[1][1:-1] if len(texts) > 1 else []
+
+
+def held(program: Program, wanted: Plan, own_points: str = "inline") -> Moved:
+    found = KRL.moved(program, wanted, Writing(3, 3, own_points))
+    assert len(found.edits) == 0
+    assert found.held
+    for row, finding in found.held.items():
+        assert finding.line == program.toolpath.line[row]
+    return found
+
+
+POINT = "DECL E6POS XP1={X 1.5,Y 2,Z 3,A 4,B 5,C 6,S 2,T 35,E1 7.0}\n"
+
+
+def test_a_point_of_two_motions_that_want_the_same_is_edited_once() -> None:
+    program = read("LIN XP1\nPTP XP1 C_DIS\n", POINT)
+    lines, data = written(program, plan(program, r0=(0.5, 0, 0), r1=(0.5, 0, 0)))
+    assert lines == ["LIN XP1", "PTP XP1 C_DIS"]
+    assert data == [POINT.replace("X 1.5", "X 2.000").strip()]
+
+
+def test_a_point_of_motions_that_differ_stays_with_the_first_and_the_others_get_their_own() -> None:
+    program = read("LIN XP1 C_DIS ;first\nLIN XP1 C_VEL\nLIN XP1\n", POINT)
+    wanted = plan(program, r0=(0.5, 0, 0), r1=(0, 0.25, 0), r2=(0, 0.25, 0))
+    lines, data = written(program, wanted)
+    own = "{X 1.5,Y 2.250,Z 3,A 4,B 5,C 6,S 2,T 35,E1 7.0}"
+    assert lines == ["LIN XP1 C_DIS ;first", f"LIN {own} C_VEL", f"LIN {own}"]
+    assert data == [POINT.replace("X 1.5", "X 2.000").strip()]
+    lines, data = written(program, wanted, "dat")
+    assert lines == ["LIN XP1 C_DIS ;first", "LIN XP1_1 C_VEL", "LIN XP1_1"]
+    assert data == [POINT.replace("X 1.5", "X 2.000").strip(), f"DECL E6POS XP1_1={own}"]
+    assert held(program, wanted, "refuse").held.keys() == {1, 2}
+    assert held(program, wanted, "refuse").held[1].code == "KRL007"
+
+
+def test_a_point_that_another_motion_needs_where_it_is_stays() -> None:
+    program = read("LIN XP1\nLIN XP1\nLIN XP1\n", POINT)
+    lines, data = written(program, plan(program, r0=(0.5, 0, 0), r2=(0, 0, 1)))
+    assert lines[1] == "LIN XP1"
+    assert lines[0].startswith("LIN {X 2.000,Y 2,")
+    assert lines[2].startswith("LIN {X 1.5,Y 2,Z 4.000,")
+    assert data == [POINT.strip()]
+
+
+def test_names_of_new_points_are_new_and_not_too_long() -> None:
+    name = "a" * 24
+    data = f"DECL FRAME {name}={{X 1,Y 2,Z 3,A 4,B 5,C 6}}\nDECL INT {'A' * 22}_1\n"
+    program = read(f"LIN {name}\nLIN {name}\n", data)
+    lines, after = written(program, plan(program, r1=(0, 0, 1)), "dat")
+    assert lines[1] == "LIN " + "a" * 22 + "_2"
+    assert after[1] == "DECL FRAME " + "a" * 22 + "_2={X 1,Y 2,Z 4.000,A 4,B 5,C 6}"
+
+
+def test_elements_of_arrays_get_points_of_their_own() -> None:
+    data = "DECL POS P[2]\nP[1]={X 1,Y 2,Z 3,A 4,B 5,C 6}\nP[2]={X 1,Y 2,Z 3,A 4,B 5,C 6,S 2,T 0}\n"
+    program = read("LIN P[2]\nLIN P[2]\n", data)
+    lines, after = written(program, plan(program, r1=(0, 0, 1)))
+    assert lines == ["LIN P[2]", "LIN {X 1,Y 2,Z 4.000,A 4,B 5,C 6,S 2,T 0}"]
+    assert after == data.splitlines()
+    lines, after = written(program, plan(program, r0=(0, 0, 1)))
+    assert lines[0].startswith("LIN {X 1,Y 2,Z 4.000")
+
+
+FORM = """;FOLD LIN P1 CONT Vel=0.1 m/s CPDAT1 Tool[1] Base[1];%{PE}
+LDAT_ACT=LCPDAT1
+FDAT_ACT=FP1
+BAS(#CP_PARAMS,0.1)
+LIN XP1 C_DIS
+;ENDFOLD
+"""
+RECORDS = """DECL FDAT FP1={TOOL_NO 1,BASE_NO 1,IPO_FRAME #BASE}
+DECL LDAT LCPDAT1={VEL 0.10000,ACC 100.000,APO_DIST 2.000}
+"""
+
+
+def test_inline_forms_are_corrected_in_the_dat_and_their_folds_stay() -> None:
+    program = read(FORM, POINT + RECORDS)
+    lines, data = written(program, plan(program, r0=(0.5, 0, 0)))
+    assert lines == FORM.splitlines()
+    assert data[0] == POINT.replace("X 1.5", "X 2.000").strip()
+
+
+def test_a_point_of_two_inline_forms_gets_a_new_point_in_the_dat() -> None:
+    program = read(FORM + FORM, POINT + RECORDS)
+    lines, data = written(program, plan(program, r0=(0.5, 0, 0), r1=(0, 0.5, 0)))
+    assert lines == [*FORM.splitlines(), *FORM.replace("LIN XP1", "LIN XP1_1").splitlines()]
+    assert data[:2] == [
+        POINT.replace("X 1.5", "X 2.000").strip(),
+        "DECL E6POS XP1_1={X 1.5,Y 2.500,Z 3,A 4,B 5,C 6,S 2,T 35,E1 7.0}",
+    ]
+
+
+def test_a_relative_motion_behind_a_moved_point_ends_where_it_did() -> None:
+    program = read(START + "LIN_REL {Z 10.25} #BASE C_DIS ;up\nLIN_REL {X 1}\n")
+    lines, _ = written(program, plan(program, r0=(0.5, 0, 0)))
+    assert lines == [
+        "LIN {X 1.500,Y 2,Z 3,A 4,B 5,C 6}",
+        "LIN {X 1.000,Y 2.000,Z 13.250,A 4.000,B 5.000,C 6.000} C_DIS ;up",
+        "LIN_REL {X 1}",
+    ]
+
+
+def test_a_relative_motion_in_tool_axes_is_written_absolutely() -> None:
+    program = read(START + "lin_rel{Z 10} #tool\n")
+    lines, _ = written(program, plan(program, r1=(0.5, 0, 0)))
+    assert lines[0] == START.strip()
+    assert lines[1].startswith("lin{X ")
+    assert "#" not in lines[1]
+
+
+def test_a_moved_relative_motion_leaves_the_next_where_it_is() -> None:
+    program = read(START + "LIN_REL {Z 10}\nLIN_REL {Z 10}\nLIN_REL {Z 10}\n")
+    lines, _ = written(program, plan(program, r1=(0, 0.5, 0)))
+    assert lines[3] == "LIN_REL {Z 10}"
+    assert lines[2] == "LIN {X 1.000,Y 2.000,Z 23.000,A 4.000,B 5.000,C 6.000}"
+
+
+def test_a_component_that_is_assigned_is_edited_there() -> None:
+    data = "DECL E6POS P={X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+    program = read("P.X = 12.5\nLIN P\n", data)
+    lines, after = written(program, plan(program, r0=(0.5, 0, 0)))
+    assert lines == ["P.X = 13.000", "LIN P"]
+    assert after == [data.strip()]
+
+
+def test_a_computed_target_gets_an_aggregate_in_its_line() -> None:
+    data = "DECL E6POS P={X 1,Y 2,Z 3,A 0,B 0,C 0,S 2,T 1}\n"
+    program = read("LIN P:{X 0,Y 4,Z 0,A 0,B 0,C 0} C_DIS\n", data)
+    if 0 in program.toolpath.refused:
+        pytest.skip("the operator is not read")
+    lines, _ = written(program, plan(program, r0=(0.5, 0, 0)))
+    assert lines[0].startswith("LIN {X 1.500,Y 6.000,Z 3.000,A 0.000,B 0.000,C 0.000")
+    assert lines[0].endswith("} C_DIS")
+
+
+def test_lines_that_run_several_times_move_together_or_not_at_all() -> None:
+    program = read(START + "FOR I=1 TO 3\nLIN {X 9,Y 2,Z 3,A 4,B 5,C 6}\nENDFOR\n")
+    assert len(program.toolpath) == 4
+    same = plan(program, r1=(1, 0, 0), r2=(1, 0, 0), r3=(1, 0, 0))
+    lines, _ = written(program, same)
+    assert lines[2] == "LIN {X 10.000,Y 2,Z 3,A 4,B 5,C 6}"
+    assert held(program, plan(program, r1=(1, 0, 0), r2=(0, 1, 0))).held.keys() == {1, 2}
+    assert held(program, plan(program, r2=(1, 0, 0))).held.keys() == {2}
+
+
+ARC = "CIRC {X 10,Y 10,Z 0},{X 20,Y 0,Z 0,A 0,B 0,C 0} C_DIS ;arc\n"
+FLAT = "LIN {X 0,Y 0,Z 0,A 0,B 0,C 0}\n"
+
+
+def with_arc(program: Program, row: int, shift: tuple[float, float, float], grow: float = 0.0) -> Plan:
+    """Begin, end and centre of the arc at ``row`` shifted [mm], and its end moved on along it [rad]."""
+    path = program.toolpath
+    wanted = plan(program, **{f"r{row - 1}": shift, f"r{row}": shift})
+    centre, sweep, position = path.centre.copy(), path.sweep.copy(), wanted.position.copy()
+    centre[row] += np.array(shift) * MM
+    sweep[row] += grow
+    turn = rotation_from_vector(grow * path.normal[row])
+    position[row] = centre[row] + turn @ (position[row] - centre[row])
+    return dataclasses.replace(wanted, centre=centre, sweep=sweep, position=position)
+
+
+def arcs_agree(program: Program, wanted: Plan, row: int, text: list[str]) -> None:
+    back = read("".join(line + "\n" for line in text)).toolpath
+    assert abs(back.sweep[row] - wanted.sweep[row]) < 1e-3
+    np.testing.assert_allclose(back.centre[row], wanted.centre[row], atol=5e-6)
+    np.testing.assert_allclose(back.normal[row], wanted.normal[row], atol=1e-3)
+
+
+def test_the_auxiliary_point_of_a_moved_arc_stands_half_way() -> None:
+    program = read(FLAT + ARC)
+    wanted = with_arc(program, 1, (1, 2, 3))
+    lines, _ = written(program, wanted)
+    assert lines[1] == "CIRC {X 11.000,Y 12.000,Z 3.000},{X 21.000,Y 2.000,Z 3.000,A 0,B 0,C 0} C_DIS ;arc"
+    wanted = with_arc(program, 1, (0, 0, 0), 30 * DEG)
+    lines, _ = written(program, wanted)
+    arcs_agree(program, wanted, 1, lines)
+
+
+def test_an_arc_whose_begin_alone_moves_gets_a_new_auxiliary_point() -> None:
+    program = read("LIN {X 0,Y 0.5,Z 0,A 0,B 0,C 0}\n" + ARC)
+    path = program.toolpath
+    wanted = Plan.of(path)
+    centre, sweep, normal = wanted.centre.copy(), wanted.sweep.copy(), wanted.normal.copy()
+    centre[1], sweep[1], normal[1] = [0.01, 0, 0], np.pi, [0, 0, -1]
+    position = wanted.position.copy()
+    position[0] = 0
+    wanted = dataclasses.replace(wanted, position=position, centre=centre, sweep=sweep, normal=normal)
+    lines, _ = written(program, wanted)
+    assert lines[1] == ARC.strip()
+    arcs_agree(program, wanted, 1, lines)
+
+
+def test_the_angle_of_an_arc_is_dropped_when_its_end_is_written() -> None:
+    program = read(FLAT + "CIRC {X 10,Y 10,Z 0},{X 20,Y 0,Z 0,A 0,B 0,C 0},CA 90 C_DIS\n")
+    np.testing.assert_allclose(program.toolpath.position[1] / MM, [10, 10, 0], atol=1e-9)
+    wanted = with_arc(program, 1, (0, 0, 1))
+    lines, _ = written(program, wanted)
+    assert lines[1].startswith("CIRC {X 2.929,Y 7.071,Z 1.000},{X 10.000,Y 10.000,Z 1.000,A 0,")
+    assert lines[1].endswith("} C_DIS")
+    assert "CA" not in lines[1]
+    arcs_agree(program, wanted, 1, lines)
+
+
+@pytest.mark.parametrize("angle", ["360", "400.5", "-360"])
+def test_a_full_circle_keeps_its_angle(angle: str) -> None:
+    program = read(FLAT + f"CIRC {{X 10,Y 10,Z 0}},{{X 20,Y 0,Z 0,A 0,B 0,C 0}},CA {angle} C_DIS\n")
+    wanted = with_arc(program, 1, (1, 0, 0))
+    lines, _ = written(program, wanted)
+    assert ",CA " in lines[1]
+    arcs_agree(program, wanted, 1, lines)
+
+
+def test_an_auxiliary_point_that_serves_elsewhere_too_is_kept_there() -> None:
+    data = "DECL E6POS M={X 10,Y 10,Z 0,A 0,B 0,C 0}\n"
+    program = read(FLAT + "CIRC M,{X 20,Y 0,Z 0,A 0,B 0,C 0}\nLIN M\n", data)
+    lines, after = written(program, with_arc(program, 1, (1, 0, 0)))
+    assert lines[1] == "CIRC {X 11.000,Y 10.000,Z 0.000},{X 21.000,Y 0,Z 0,A 0,B 0,C 0}"
+    assert lines[2] == "LIN M"
+    assert after == [data.strip()]
+
+
+def divided(program: Program, row: int, *parts: tuple[Role, tuple[float, float, float]]) -> Plan:
+    """The program's plan with motions inserted before a row, at X, Y, Z [mm]; the row's orientation."""
+    base = Plan.of(program.toolpath)
+    source = np.insert(base.source, row, [row] * len(parts))
+    role = np.insert(base.role, row, [int(part[0]) for part in parts])
+    position = np.insert(base.position, row, [np.array(part[1]) * MM for part in parts], axis=0)
+    return Plan(
+        source, role, position, base.rotation[source], base.centre[source], base.normal[source], base.sweep[source]
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_pieces_and_links_stand_before_the_line(newline: str) -> None:
+    program = read(START + "  \tLIN {X 7.50000, Y 2,Z 3,A 4,B 5,C 6 ,E1 9.5} C_DIS ;a cut\n", newline=newline)
+    wanted = divided(program, 1, (Role.LINK, (1, 2, 4)), (Role.PIECE, (4.25, 2, 3.5)))
+    found = KRL.moved(program, wanted, Writing(3, 3))
+    document = program.documents[0]
+    after = apply(document, found.edits)
+    assert after.count(newline.encode()) == document.raw.count(newline.encode()) + 2
+    lines = after.decode().split(newline)
+    assert lines[4:7] == [
+        "  \tLIN {X 1.00000,Y 2,Z 4.000,A 4,B 5,C 6,E1 9.5}",
+        "  \tLIN {X 4.25000,Y 2,Z 3.500,A 4,B 5,C 6,E1 9.5} C_DIS",
+        "  \tLIN {X 7.50000, Y 2,Z 3,A 4,B 5,C 6 ,E1 9.5} C_DIS ;a cut",
+    ]
+    written(program, wanted)
+
+
+def test_pieces_alone_are_copies_of_the_line() -> None:
+    line = "  slin{y 2,x+7.5,Z- 3,a 4,b 5,c 6} with $vel.cp=0.1 c_dis;cut"
+    program = read(START + line + "\n")
+    lines, _ = written(program, divided(program, 1, (Role.PIECE, (4.25, 2, 3.5))))
+    assert lines[1] == "  slin{y 2,x 4.250,Z 3.500,a 4,b 5,c 6} with $vel.cp=0.1 c_dis"
+    assert lines[2] == line
+
+
+def test_a_link_of_a_spline_motion_is_one_with_its_conditions() -> None:
+    program = read(START + "SLIN {X 7,Y 2,Z 3,A 4,B 5,C 6} WITH $VEL.CP=0.1 C_DIS\n")
+    lines, _ = written(program, divided(program, 1, (Role.LINK, (4.25, 2, 3.5))))
+    assert lines[1].startswith("SLIN {X 4.250,Y 2,Z 3.500,A 4,B 5,C 6} WITH $VEL.CP=0.1")
+
+
+def test_a_partial_point_behind_a_piece_is_completed() -> None:
+    program = read(START + "LIN {X 9}\nLIN {Y 9}\n")
+    lines, _ = written(program, divided(program, 1, (Role.PIECE, (4.25, 2, 3.5))))
+    assert lines[1] == "LIN {X 4.250,Y 2,Z 3.500,A 4,B 5,C 6}"
+    assert lines[2] == "LIN {X 9,Y 2,Z 3,A 4,B 5,C 6}"
+    assert lines[3] == "LIN {Y 9}"
+
+
+def test_a_relative_motion_behind_a_piece_is_absolute() -> None:
+    program = read(START + "LIN_REL {X 8} C_DIS\n")
+    lines, _ = written(program, divided(program, 1, (Role.PIECE, (4.25, 2, 3))))
+    assert lines[1:] == [
+        "LIN {X 4.250,Y 2.000,Z 3.000,A 4.000,B 5.000,C 6.000} C_DIS",
+        "LIN {X 9.000,Y 2.000,Z 3.000,A 4.000,B 5.000,C 6.000} C_DIS",
+    ]
+
+
+def test_an_arc_is_divided_in_arcs() -> None:
+    program = read(FLAT + ARC)
+    path = program.toolpath
+    wanted = divided(program, 1, (Role.PIECE, (10, 10, 0)))
+    sweep = wanted.sweep.copy()
+    sweep[1:] = np.pi / 2
+    wanted = dataclasses.replace(wanted, sweep=sweep)
+    lines, _ = written(program, wanted)
+    assert lines[1] == "CIRC {X 2.929,Y 7.071,Z 0.000},{X 10.000,Y 10.000,Z 0,A 0,B 0,C 0} C_DIS"
+    assert lines[2] == "CIRC {X 17.071,Y 7.071,Z 0},{X 20,Y 0,Z 0,A 0,B 0,C 0} C_DIS ;arc"
+    assert len(path) == 2
+
+
+def test_nothing_is_inserted_where_it_may_not_be() -> None:
+    program = read(START + "SPLINE\nSPL {X 9,Y 2,Z 3,A 4,B 5,C 6}\nENDSPLINE\n")
+    assert 1 in program.toolpath.whole or 1 in program.toolpath.refused
+    with pytest.raises(ValueError, match="divided"):
+        KRL.moved(program, divided(program, 1, (Role.PIECE, (4.25, 2, 3.5))), Writing(3, 3))
+
+
+def test_a_plan_without_a_row_is_an_error() -> None:
+    program = read(START + START)
+    wanted = Plan.of(program.toolpath)
+    with pytest.raises(ValueError, match="every row"):
+        KRL.moved(program, dataclasses.replace(wanted, role=np.array([1, 0])), Writing(3, 3))
+
+
+NUMBER = st.floats(-500, 500).map(lambda v: f"{v:.3f}")
+PARTS = st.lists(st.sampled_from("XYZABC"), min_size=1, max_size=6, unique=True)
+
+
+@st.composite
+def lines(draw: st.DrawFn) -> str:
+    def point(keys: str | list[str] = "XYZABC") -> str:
+        return "{" + ",".join(f"{key} {draw(NUMBER)}" for key in keys) + "}"
+
+    return draw(
+        st.sampled_from(
+            [
+                f"LIN {point()} C_DIS",
+                f"PTP {point()}",
+                f"SLIN {point()} WITH $VEL.CP=0.1",
+                f"LIN {point(draw(PARTS))}",
+                f"LIN P{draw(st.integers(1, 3))}",
+                f"PTP P{draw(st.integers(1, 3))}",
+                f"LIN Q[{draw(st.integers(1, 2))}] C_VEL",
+                f"LIN_REL {point(draw(st.sampled_from(['X', 'XZ', 'ZYX'])))}",
+                f"LIN_REL {point('Z')} #TOOL C_DIS",
+                f"CIRC {point('XYZ')},{point()}",
+                f"CIRC P{draw(st.integers(1, 3))},{point()}",
+                f"CIRC {point('XYZ')},P{draw(st.integers(1, 3))} C_DIS",
+                f"CIRC {point()},{point()},CA {draw(st.integers(-330, 330))}",
+                f"P{draw(st.integers(1, 3))}.{draw(st.sampled_from('XYZ'))} = {draw(NUMBER)}",
+                f"P{draw(st.integers(1, 3))} = {point()}",
+                f"FOR I=1 TO 2\nLIN {point()}\nENDFOR",
+                "FOR I=1 TO 2\nLIN Q[I]\nENDFOR",
+                "$BASE=BASE_DATA[2]",
+                "PTP {A1 0,A2 -90,A3 90,A4 0,A5 30,A6 0}",
+                "WAIT SEC 0",
+            ]
+        )
+    )
+
+
+@st.composite
+def datas(draw: st.DrawFn) -> str:
+    def value() -> str:
+        return ",".join(f"{key} {draw(NUMBER)}" for key in "XYZABC") + draw(
+            st.sampled_from(["", ",S 2,T 35", ",E1 5.0"])
+        )
+
+    points = "".join(f"DECL E6POS P{i}={{{value()}}}\n" for i in (1, 2, 3))
+    return points + "DECL E6POS Q[2]\n" + "".join(f"Q[{i}]={{{value()}}}\n" for i in (1, 2))
+
+
+@settings(deadline=None, max_examples=400)
+@given(st.lists(lines(), max_size=8), datas(), st.integers(0, 2**32 - 1), st.sampled_from(["\n", "\r\n"]))
+def test_programs_of_all_sorts_make_the_motions_of_random_plans(
+    body: list[str], data: str, seed: int, newline: str
+) -> None:
+    text = HEAD + "LIN {X 100,Y 0,Z 50,A 10,B 20,C 30}\n" + "".join(line + "\n" for line in body) + "END\n"
+    documents = tuple(
+        Document(Path(name), raw.replace("\n", newline).encode())
+        for name, raw in (("part.src", text), ("part.dat", f"DEFDAT part\n{data}ENDDAT\n"))
+    )
+    examined(KRL, documents, np.random.default_rng(seed))
