@@ -77,6 +77,18 @@ def compensate(capsys):
     return call
 
 
+def without_inserted(lines: list, report: dict) -> list:
+    """The lines of a KRL output as they would be without its marker and the links inserted into it."""
+    assert report["inserted"] == len(report["links"])
+    mark = ";COMPENSATED by compensate "
+    kept = [line for line in lines if (mark.encode() if isinstance(line, bytes) else mark) not in line]
+    assert len(kept) == len(lines) - 1
+    for link in report["links"]:  # before that line of the input; those before are gone already
+        gone = kept.pop(link["line"] - 1)
+        assert b"LIN {" in gone if isinstance(gone, bytes) else "LIN {" in gone, gone
+    return kept
+
+
 @dataclass
 class Job:
     """A folder with a cell and a program."""

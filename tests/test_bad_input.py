@@ -154,7 +154,7 @@ def test_empty_and_binary_programs(compensate, job, content, code):
 
 
 def test_text_that_is_no_program(compensate, job):
-    job.program.write_bytes(b"N10 G1 X10 Y20 F100\nN20 M30\n")
+    job.program.write_bytes(b"Dear reader,\nthis is a letter.\n")
     refused(compensate(job.program, "--force", "0,0,100"), job, "FIL009")
 
 
@@ -196,7 +196,7 @@ def test_wrong_words_on_the_command_line(compensate, job):
 
 
 READ_ONLY = """
-import os, sys
+import encodings.unicode_escape, os, sys
 from postproc.cli.main import run
 try:
     run([*sys.argv[1:], "--dry-run"])  # loads every module while they can be read

@@ -13,13 +13,15 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import CELL, LINES
+from conftest import CELL, LINES, without_inserted
 
 from postproc.cell import load_cell
 from postproc.dialects.krl import KrlDialect
 from postproc.document import Document
 from postproc.robot.chain import Chain
 from postproc.robot.description import find_robot, load_robot
+
+NOT_UNDERSTOOD = "LIN {X gap,Y 0.000,Z -2.000,A 0.000,B 0.000,C 180.000} C_DIS"
 
 RIGID = """\
 name: rigid
@@ -47,8 +49,9 @@ def test_a_cut_is_corrected_and_the_air_is_not(compensate, job):
     assert report["error_after_mm"]["max"] <= 0.002
     assert report["force"]["max_n"] == pytest.approx(np.linalg.norm([360, 50, 560]), abs=1e-3)
     before, after = job.program.read_bytes().split(b"\r\n"), job.output.read_bytes().split(b"\r\n")
-    assert after[1].startswith(b";COMPENSATED by compensate ")
-    del after[1]
+    # A link to the begin of each cut, and nothing else, is inserted.
+    assert [link["line"] for link in report["links"]] == [10, 19]
+    after = without_inserted(after, report)
     changed = [i for i, (old, new) in enumerate(zip(before, after, strict=True)) if old != new]
     # Lines 14 and 20 are air, but leave out what the cut before them moved: they are completed.
     assert changed == [9, 10, 11, 12, 14, 18, 20]
@@ -65,6 +68,9 @@ def test_every_motion_ends_where_it_should(compensate, job):
     with open(job.output.with_name("part.corrections.csv"), newline="") as stream:
         rows = list(csv.DictReader(stream))
     assert [int(row["line"]) for row in rows] == old.line.tolist()
+    # Where the motions of the input are among those of the output.
+    ends = np.cumsum([1 + int(row["links"]) + int(row["points"]) for row in rows]) - 1
+    assert len(new) == ends[-1] + 1
     for i, row in enumerate(rows):
         if row["state"] == "corrected":
             shift = [float(row[f"correction_{c}_mm"]) for c in "xyz"]
@@ -72,7 +78,7 @@ def test_every_motion_ends_where_it_should(compensate, job):
         else:
             shift = [0.0, 0.0, 0.0]
         if np.isfinite(old.position[i, 0]):
-            np.testing.assert_allclose((new.position[i] - old.position[i]) * 1e3, shift, atol=6e-4)
+            np.testing.assert_allclose((new.position[ends[i]] - old.position[i]) * 1e3, shift, atol=6e-4)
     assert [row["state"] for row in rows].count("corrected") == 5
 
 
@@ -101,11 +107,10 @@ def test_all_other_bytes_stay(compensate, job, ending, bom, last):
     )
     raw = bom + text.encode("latin-1")
     job.program.write_bytes(raw)
-    done = compensate(job.program, "--force")
+    done = compensate(job.program, "--force", "--json", "-")
     assert done.code == 0, done.err
     written = job.output.read_bytes()
-    lines, new = raw.split(b"\n"), written.split(b"\n")
-    assert new.pop(1).startswith(b";COMPENSATED ")
+    lines, new = raw.split(b"\n"), without_inserted(written.split(b"\n"), done.json)
     assert len(lines) == len(new)
     for old, now in zip(lines, new, strict=True):
         skeleton = [b"".join(c for c in _split(line) if not c[:1].isdigit()) for line in (old, now)]
@@ -185,18 +190,18 @@ def test_a_point_that_continues_an_axis_motion(compensate, job):
     assert done.code == 0, done.err
     assert done.json["corrected"] >= 4
     assert done.json["error_after_mm"]["max"] <= 0.002
-    written = job.output.read_bytes().decode().splitlines()
-    assert written[6] == "LIN {Z 50.000}"
+    written = without_inserted(job.output.read_bytes().decode().splitlines(), done.json)
+    assert written[5] == "LIN {Z 50.000}"
     for component in ",X ", ",Y ", ",A ", ",B ", ",C ":
-        assert component in written[8]
-        assert component in written[10]
+        assert component in written[7]
+        assert component in written[9]
     # Where the axes lead, by Pinocchio: the point behind the cut goes back there.
     robot = load_robot(find_robot("kuka_kr270"))
     chain = Chain(robot.joints, robot.flange)
     flange = chain.reference_flange(np.deg2rad([[0, -90, 110, 0, 40, 0]]))
     cell = load_cell(job.folder / "cell.yaml")
     tcp = cell.bases[1].inverse() @ flange[0] @ cell.tools[1].pose
-    numbers = dict(word.split() for word in written[10].split("{")[1].split("}")[0].split(","))
+    numbers = dict(word.split() for word in written[9].split("{")[1].split("}")[0].split(","))
     assert float(numbers["X"]) == pytest.approx(tcp.position[0] * 1e3, abs=1e-3)
     assert float(numbers["Y"]) == pytest.approx(tcp.position[1] * 1e3, abs=1e-3)
     assert float(numbers["Z"]) == 60
@@ -258,7 +263,7 @@ def test_a_relative_motion_between_cuts_keeps_the_configuration(compensate, job)
     lines[at] = "LIN {X 400.000,Y 300.000,Z 0.000,A 0.000,B 0.000,C 180.000}"
     job.write(lines)
     done = compensate(job.program, "--force", "--json", "-")
-    assert (done.code, done.json["corrected"], done.json["left"]) == (3, 5, 0)
+    assert (done.code, done.json["corrected"], done.json["left"]) == (0, 5, 0)
 
 
 def test_stated_configurations_that_are_not_the_robots_are_told_once(compensate, job):
@@ -280,22 +285,42 @@ def test_switching_inside_a_cut_leaves_the_whole_cut(compensate, job):
 
 def test_a_refused_motion_takes_only_its_own_cut(compensate, job):
     lines = list(LINES)
-    lines[10] = "CIRC {X 150.000,Y 20.000,Z -2.000},{X 200.000,Y 0.000,Z -2.000,A 0.000,B 0.000,C 180.000}"
+    lines[10] = NOT_UNDERSTOOD
     job.write(lines)
     done = compensate(job.program, "--force", "--json", "-")
     assert (done.code, done.json["corrected"], done.json["left"]) == (3, 1, 4)
     codes = [f["code"] for f in done.json["findings"]]
-    assert "KRL009" in codes
+    assert "KRL002" in codes
     assert codes.count("COR003") == 1
     assert job.output.read_bytes().split(b"\r\n")[10] == lines[9].encode()
 
 
 def test_strict_writes_nothing_on_a_warning(compensate, job):
     lines = list(LINES)
-    lines[10] = "CIRC {X 150.000,Y 20.000,Z -2.000},{X 200.000,Y 0.000,Z -2.000,A 0.000,B 0.000,C 180.000}"
+    lines[10] = NOT_UNDERSTOOD
     job.write(lines)
     assert compensate(job.program, "--force", "--strict").code == 1
     assert job.nothing_written()
+
+
+def test_nothing_is_inserted_where_it_is_not_wanted(compensate, job):
+    done = compensate(job.program, "--force", "--keep-points", "--json", "-")
+    assert (done.code, done.json["inserted"], done.json["corrected"]) == (3, 0, 5)
+    assert "COR006" in [f["code"] for f in done.json["findings"]]
+    assert job.output.read_bytes().count(b"\r\n") == job.program.read_bytes().count(b"\r\n") + 1
+
+
+def test_a_loose_tolerance_inserts_nothing(compensate, job):
+    job.cell(CELL.replace("tolerance: 0.02", "tolerance: 5\ntolerance_deg: 1"))
+    done = compensate(job.program, "--force", "--json", "-")
+    assert (done.code, done.json["inserted"], done.json["corrected"]) == (0, 0, 5)
+
+
+def test_the_limit_of_growth_is_told(compensate, job):
+    job.cell(CELL + "max_growth: 1.1\n")
+    done = compensate(job.program, "--force", "--json", "-")
+    assert (done.code, done.json["inserted"], done.json["corrected"]) == (3, 1, 5)
+    assert {"COR014", "COR006"} <= {f["code"] for f in done.json["findings"]}
 
 
 def test_dry_run_writes_nothing(compensate, job):
@@ -312,6 +337,7 @@ def test_predict_writes_only_the_report(compensate, job):
     compensate("predict", job.program, "--force", "--report", job.folder / "rep")
     assert sorted(p.name for p in (job.folder / "rep").iterdir()) == [
         "part.deflection.csv",
+        "part.prediction.html",
         "part.prediction.json",
     ]
 
@@ -405,7 +431,7 @@ def test_json_alone_on_standard_output(compensate, job):
     }
     assert done.json["outputs"] == [
         str(job.output.with_name(name))
-        for name in ("part.src", "part.report.json", "part.corrections.csv", "part.diff")
+        for name in ("part.src", "part.report.json", "part.corrections.csv", "part.diff", "part.report.html")
     ]
 
 

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import without_inserted
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"
 
@@ -39,7 +40,9 @@ def test_panel(compensate, sample):
     after = (program.parent / "compensated" / "panel.src").read_bytes().split(b"\r\n")
     marker = [line for line in after if line.startswith(b";COMPENSATED ")]
     assert len(marker) == 1
-    after.remove(marker[0])
+    assert after.index(marker[0]) == before.index(next(line for line in before if line.startswith(b"DEF "))) + 1
+    assert report["inserted"] <= 0.3 * report["motions"]
+    after = without_inserted(after, report)
     assert len(before) == len(after)
     for old, new in zip(before, after, strict=True):
         if old != new and b"{X " in old:
@@ -56,13 +59,33 @@ def test_taught(compensate, sample):
     assert done.json["error_after_mm"]["max"] <= 0.002
     before = (folder / "taught.src").read_bytes().splitlines()
     after = (folder / "compensated" / "taught.src").read_bytes().splitlines()
-    assert [line for line in after if not line.startswith(b";COMPENSATED ")] == before
+    # what is inserted stands between the lines of the original
+    new = iter(after)
+    assert all(line in new for line in before)
+    assert len(after) == len(before) + 1 + done.json["inserted"]
     data = [(folder / where / "taught.dat").read_bytes() for where in (".", "compensated")]
     changed = [(old, new) for old, new in zip(*(d.splitlines() for d in data), strict=True) if old != new]
     assert len(changed) == 18
     for old, new in changed:
         assert old.startswith(b"DECL E6POS XP")
         assert old[old.index(b",S ") :] == new[new.index(b",S ") :]
+
+
+@pytest.mark.parametrize(
+    ("name", "growth"),
+    [("kr270_panel/panel.src", 1.3), ("kr270_taught/taught.src", 2.0), ("kr270_pocket/pocket.ngc", 3.0)],
+)
+def test_the_tool_is_on_the_path(compensate, sample, name, growth):
+    folder, file = name.split("/")
+    program = sample(folder) / file
+    assert compensate(program, "--force", "-q").code == 0
+    done = compensate("verify", program, program.parent / "compensated" / file, "--force", "--json", "-")
+    assert done.code == 0, done.out
+    assert 0.3 <= done.json["original"]["max"] <= 4
+    assert done.json["compensated"]["max"] <= 0.02
+    assert done.json["compensated"]["cut_ends"]["max"] <= 0.05
+    assert done.json["compensated"]["links"]["count"] > 0
+    assert done.json["growth"] <= growth
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,9 @@ from postproc.cli.common import Out, language_options, result_options
 @click.option(
     "--force", metavar="[SPEC]", default=None, help="Machining force of the original, as for the main job."
 )
+@click.option(
+    "--force-offset", is_flag=True, help="Take the offset that a force log shows in air off its forces."
+)
 @click.option("--robot", metavar="NAME|FILE", help="Robot instead of the cell's.")
 @language_options
 @click.option(
@@ -31,6 +34,7 @@ def verify(
     original: Path,
     compensated: Path,
     force: str | None,
+    force_offset: bool,
     robot: str | None,
     cell: Path | None,
     config_dat: Path | None,
@@ -60,6 +64,7 @@ def verify(
     request = Request(
         program=original,
         force=force,
+        force_offset=force_offset,
         cell=cell,
         robot=robot,
         strict=strict,

@@ -109,8 +109,13 @@ def correct(task: Task) -> Result:
     state[scope] = State.LEFT
     state[off] = State.OFF
     state[keeps] = State.CORRECTED
-    iterations, history = np.zeros(n, np.int64), np.full((len(done.history), n), np.nan)
-    iterations[rows_may], history[:, rows_may] = done.iterations, done.history
+    # What the mirror begins with is a first step from the wanted pose.
+    iterations, history = np.zeros(n, np.int64), np.full((len(done.history) + 1, n), np.nan)
+    iterations[rows_may], history[0, rows_may], history[1:, rows_may] = (
+        done.iterations + 1,
+        before[rows_may],
+        done.history,
+    )
     findings += left_findings(task.file, path, cut, why)
     _warn_sides(task, done.q, rows_may, keeps, findings)
     _warn_singular(task, seen & forced, findings)

@@ -22,8 +22,8 @@ from postproc.units import DEG, MM
 ROOM = 0.9
 """Share of the tolerance that the way between points may take: written digits take a part of the rest."""
 
-STEP = 0.5
-"""Share of the tolerance by which the correction may step without a link."""
+STEP = 0.1
+"""Share of the tolerance by which the correction may step without a look at what that does to the way behind it."""
 
 WIDEST = 300 * DEG
 """An arc that turns further is divided: the moved end of a nearly full circle could lie on the wrong side."""
@@ -130,13 +130,26 @@ class _Search:
             np.linalg.norm(shift, axis=1) / task.tolerance,
             np.linalg.norm(turn, axis=1) / task.tolerance_angle,
         )
-        self.linked = (self.step > STEP) & self.free[rows] & task.carries[rows]
-        chosen = self.linked[:, None]
-        self.start = Poses(
-            np.where(chosen[..., None], own.rotation, self.start.rotation),
-            np.where(chosen, own.position, self.start.position),
-        )
+        may = self.free[rows] & task.carries[rows]
+        self._start_at(own, may & (self.step > ROOM))
+        some = np.flatnonzero(may & (self.step > STEP) & ~self.linked)
+        if len(some):
+            late = np.zeros(len(rows), bool)
+            late[some] = self._errors(some, self._least()[some]) > 1.0
+            self._start_at(own, late)
         self._link_back()
+
+    def _start_at(self, own: Poses, linked: Bools) -> None:
+        self.linked = self.linked | linked
+        self.start = Poses(
+            np.where(linked[:, None, None], own.rotation, self.start.rotation),
+            np.where(linked[:, None], own.position, self.start.position),
+        )
+
+    def _least(self) -> Ints:
+        """(R,) pieces that a way has at least."""
+        sweep = np.nan_to_num(self.task.ways.sweep[self.rows])
+        return np.where(sweep > WIDEST, np.ceil(sweep / np.pi), 1).astype(np.int64)
 
     def _own_begins(self) -> Poses:
         """The commands (R) by which the tool is where the ways begin, under the force of that motion there."""
@@ -176,11 +189,10 @@ class _Search:
     def refine(self) -> None:
         """The smallest number of even pieces with which each way is within the tolerance, or the most that may be."""
         ways, rows = self.task.ways, self.rows
-        arc, sweep = ways.arc[rows], np.nan_to_num(ways.sweep[rows])
-        least = np.where(sweep > WIDEST, np.ceil(sweep / np.pi), 1).astype(np.int64)
-        self.least = least
+        arc = ways.arc[rows]
+        self.least = least = self._least()
         # A way that begins beside its place stays beside it, in however many pieces.
-        can = self.free[rows] & (self.linked | (self.step <= STEP))
+        can = self.free[rows] & (self.linked | (self.step <= ROOM))
         if not self.limits.keep:
             self._hold(
                 rows[(least > 1) & ~can], "COR013", "an arc of nearly a full turn can not be divided here"

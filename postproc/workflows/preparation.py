@@ -129,6 +129,8 @@ def read_document(path: Path) -> Document:
 
 def prepare(request: Request) -> Prepared:
     """Read program, cell and robot, and find force and axes of every motion."""
+    if not request.program.is_file():
+        read_document(request.program)  # tells why
     cell = _cell(request)
     dialect, read, settings = read_program(request.program, cell, request.config_dat)
     beside = None if request.robot else cell.path.parent
