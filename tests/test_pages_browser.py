@@ -116,6 +116,23 @@ def test_turning_and_zooming(window, done):
         assert (np.abs(one - other).sum(axis=2) > 60).sum() > 200
 
 
+def test_a_chart_shows_a_part_and_all_again(window, done):
+    shown = window(done / "part.report.html")
+    page = shown.page
+    whole = shown.pixels("#correction")
+    page.click("[data-zoom=in]")
+    part = shown.pixels("#correction")
+    page.focus("#correction")
+    page.keyboard.press("-")
+    page.keyboard.press("0")
+    page.evaluate("document.activeElement.blur()")
+    assert (np.abs(part - whole).sum(axis=2) > 60).sum() > 300
+    assert np.abs(shown.pixels("#correction") - whole).max() == 0
+    before = shown.pixels("#error")
+    page.check("#linear")
+    assert (np.abs(shown.pixels("#error") - before).sum(axis=2) > 60).sum() > 300
+
+
 def test_hover_tells_line_and_figures(window, done, rows):
     """Wherever the pointer meets the path, what is told stands so in the corrections."""
     shown = window(done / "part.report.html")
@@ -260,3 +277,20 @@ def _contrast(ink: str, ground: str) -> float:
 
     low, high = sorted((light(ink), light(ground)))
     return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("lines", [LINES, [*LINES[:4], "END"], [*LINES[:7], "END"]])
+def test_programs_with_nothing_to_show_have_a_page_too(window, tmp_path, lines):
+    """Without a force, without a motion, without a cut."""
+    from postproc.workflows.preparation import Request
+    from postproc.workflows.program import compensate
+
+    (tmp_path / "cell.yaml").write_text(CELL)
+    (tmp_path / "part.src").write_text("\n".join(lines) + "\n")
+    compensate(Request(tmp_path / "part.src"))
+    shown = window(tmp_path / "compensated" / "part.report.html")
+    shown.page.locator("#space").hover()
+    shown.page.locator("#error").click()
+    shown.page.keyboard.press("ArrowRight")
+    assert shown.complaints == []
+    assert shown.page.locator(".sentence").inner_text()

@@ -201,6 +201,7 @@ def _figures(data: PageData, rows: np.ndarray) -> dict[str, object]:
         "each": bends.shape[1],
         "motions": len(data),
         "corrected": data.corrected,
+        "tolerance": data.tolerance,
         "kinds": [kind.name for kind in Kind],
         "states": [_STATES[state] for state in State],
         "places": [place.row for place in data.places],

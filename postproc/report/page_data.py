@@ -58,12 +58,12 @@ class Place:
 class PageData:
     """N motions of one program, mm and N.
 
-    report: figures, findings, model and digests.  line, kind, state, cut (N,): as in Toolpath and Result; cut -1 in
-    air.  way (N,) [mm]: length of the cutting path to the end of each motion.  position (N, 3): wanted end point;
-    arcs (K,): rows of arcs, and bends (K, B, 3) points on their way; force (N, 3) [N]; deflection (N, 3) before: all in
-    the robot base.  correction (N, 3): command minus wanted, in the axes of the programmed base.  before, after (N,):
-    predicted error at the end points; between (N,): the largest on the way there after the correction.
-    inserted (N,): motions of the output before this one.
+    report: figures, findings, model and digests.  tolerance: what the output may keep.  line, kind, state, cut (N,): as
+    in Toolpath and Result; cut -1 in air.  way (N,) [mm]: length of the cutting path to the end of each motion.
+    position (N, 3): wanted end point; arcs (K,): rows of arcs, and bends (K, B, 3) points on their way; force (N, 3)
+    [N]; deflection (N, 3) before: all in the robot base.  correction (N, 3): command minus wanted, in the axes of the
+    programmed base.  before, after (N,): predicted error at the end points; between (N,): the largest on the way there
+    after the correction.  inserted (N,): motions of the output before this one.
     interval (N,): half width of the 95 % interval of a coordinate of the predicted place, in the direction in which it
     is largest; evaluated: motions at which it was computed, between them it is interpolated.  NaN wherever a figure is
     not known.
@@ -71,6 +71,7 @@ class PageData:
 
     report: Report
     corrected: bool
+    tolerance: float
     line: Ints
     kind: Ints
     state: Ints
@@ -118,6 +119,7 @@ def page_data(
     return PageData(
         report=report,
         corrected=output is not None,
+        tolerance=task.tolerance / MM,
         line=path.line,
         kind=path.kind,
         state=result.state,

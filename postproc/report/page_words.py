@@ -70,7 +70,8 @@ def program_verdict(data: PageData) -> str:
         which = f"{report.corrected} of {count(report.cutting, 'cutting motion')} are corrected"
     if report.inserted:
         share = f" For that {count(report.inserted, 'motion')} were inserted.{share}"
-    return f"{which}: the largest predicted error falls from {before} to {after}.{share}"
+    allowed = f" (tolerance {data.tolerance:g} mm)"
+    return f"{which}: the largest predicted error falls from {before} to {after}{allowed}.{share}"
 
 
 def program_tiles(data: PageData) -> list[Tile]:

@@ -4,9 +4,10 @@ const MARGIN = { left: 64, right: 18, top: 20, bottom: 34 };
 const stretch = { all: [0, 1], seen: [0, 1] };
 
 class Chart {
-  // series: [{ name, values, band, colour(theme), dash, width }]; log: whether the scale is.
-  constructor(canvas, series, { unit, log, zero }) {
-    Object.assign(this, { canvas, series, unit, log, zero });
+  // series: [{ name, values, band, colour(theme), dash, width }]; log: whether the scale is; limit: a value with a line
+  // of its own.
+  constructor(canvas, series, { unit, log, zero, limit }) {
+    Object.assign(this, { canvas, series, unit, log, zero, limit });
     this.sheet = new Sheet(canvas, (pen, wide, high) => this.paint(pen, wide, high));
     this.listen();
     this.chosen();
@@ -67,6 +68,7 @@ class Chart {
     for (const one of this.series) if (one.band) this.band(pen, rows, one);
     for (const one of this.series) this.line(pen, rows, one);
     this.cursor(pen, top, h);
+    if (this.limit > low && this.limit < most) this.limited(pen, left, w);
     pen.restore();
   }
 
@@ -201,6 +203,20 @@ class Chart {
       pen.arc(x, this.y(values[chosen]), 4, 0, 2 * Math.PI);
       pen.fill();
     }
+  }
+
+  limited(pen, left, w) {
+    const y = Math.round(this.y(this.limit)) + 0.5;
+    pen.strokeStyle = theme().ink;
+    pen.lineWidth = 1;
+    pen.setLineDash([12, 3, 2, 3]);
+    pen.beginPath();
+    pen.moveTo(left, y);
+    pen.lineTo(left + w, y);
+    pen.stroke();
+    pen.setLineDash([]);
+    pen.textAlign = 'right';
+    halo(pen, `tolerance ${this.limit} mm`, left + w - 6, y - 5, theme().ink);
   }
 
   // The row whose place on the path is nearest to x.

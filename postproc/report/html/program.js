@@ -19,7 +19,7 @@ function start() {
       errors.push({ name: 'after, on the way there', values: motions.between, colour: (t) => t.soft, dash: [2, 2], width: 1.2 });
     }
   }
-  const error = new Chart(byId('error'), errors, { unit: given.corrected ? 'error, mm (logarithmic)' : 'error, mm', log: given.corrected, zero: true });
+  const error = new Chart(byId('error'), errors, { unit: given.corrected ? 'error, mm (logarithmic)' : 'error, mm', log: given.corrected, zero: true, limit: given.tolerance });
   byId('linear').checked = !given.corrected;
   figures.push(error);
   legend(byId('error-legend'), errors);
