@@ -3,62 +3,27 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
+from batches import WRONG, contents, four_programs, program
 from conftest import CELL, LINES
 
-from postproc.batch import reading
-from postproc.batch.jobs import Job, jobs_of
-from postproc.batch.locking import locked
-from postproc.batch.reading import code_digest, digest_of, readings
-from postproc.batch.running import run_here
+from postproc.batch.jobs import jobs_of
+from postproc.batch.reading import code_digest
 from postproc.batch.work import Task, work
 from postproc.report.batched import Outcome
-from postproc.workflows.preparation import Request
 
 ROBOT = Path(__file__).resolve().parent.parent / "robots" / "kuka_kr270.yaml"
-
-WRONG = [line.replace("LIN {X 100.000", "LIN {X 99999.000") for line in LINES]
-
-
-def program(path: Path, number: int = 0, lines=LINES) -> Path:
-    """A program of its own: its cut lies ``number`` mm elsewhere."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    text = (
-        "\r\n".join(lines)
-        .replace("X 200.000", f"X {200 + number}.000")
-        .replace("DEF part", f"DEF {path.stem}")
-    )
-    path.write_text(text + "\r\n")
-    return path
 
 
 @pytest.fixture
 def parts(tmp_path):
     """A folder of four programs in a cell."""
-    folder = tmp_path / "parts"
-    for number in range(4):
-        program(folder / f"p{number}.src", number)
-    (folder / "cell.yaml").write_text(CELL)
-    return folder
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    """Every result below a folder; not records, which say when what was read."""
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes()
-        for path in sorted(folder.rglob("*"))
-        if path.is_file() and ".compensate" not in path.parts
-    }
+    return four_programs(tmp_path / "parts")
 
 
 def states(done) -> dict[str, str]:
@@ -273,193 +238,3 @@ def test_the_command_says_what_is_unchanged(compensate, parts):
     assert set(states(compensate("batch", parts, "--force", "--force-rerun", "--json", "-")).values()) == {
         "done"
     }
-
-
-# ---------------------------------------------------------------------------------- what is read, who is at work
-
-
-def test_readings_see_what_is_opened(tmp_path):
-    read, other, written = tmp_path / "read", tmp_path / "other", tmp_path / "written"
-    read.write_text("a")
-    other.write_text("b")
-    other.read_text()
-    with readings() as seen:
-        read.read_text()
-        assert digest_of(read) == seen[str(read)]
-        written.write_text("c")
-        with pytest.raises(FileNotFoundError):
-            (tmp_path / "absent").read_text()
-        Path(reading.__file__).read_text()
-    other.read_text()
-    assert seen == {str(read): digest_of(read), str(tmp_path / "absent"): "absent"}
-
-
-def a_job(folder: Path, name: str, **options) -> Job:
-    target = folder / "compensated" / name
-    return Job(name, target, Request(program=folder / name, output=target, force="", **options))
-
-
-def test_an_input_that_changes_under_way_leaves_no_record(parts, monkeypatch):
-    job = a_job(parts, "p0.src")
-
-    def meddled(stage: str) -> None:
-        (parts / "cell.yaml").write_text(CELL + "# another\n")
-
-    assert work(Task(job, code_digest()), meddled).state == "done"
-    assert not (parts / "compensated" / ".compensate").exists()
-    assert work(Task(job, code_digest())).state == "done"
-    assert work(Task(job, code_digest())).state == "unchanged"
-
-
-def test_code_of_another_version_is_refused(parts):
-    outcome = work(Task(a_job(parts, "p0.src"), "0" * 64))
-    assert (outcome.state, outcome.findings[0].code) == ("failed", "BAT006")
-
-
-def test_a_defect_is_an_outcome(parts, monkeypatch):
-    from postproc.workflows import program as workflow
-
-    monkeypatch.setattr(workflow, "compensate", lambda request, stage: 1 // 0)
-    outcome = work(Task(a_job(parts, "p0.src"), code_digest()))
-    assert (outcome.state, outcome.exit, outcome.findings[0].code) == ("failed", 1, "BAT004")
-    assert "ZeroDivisionError" in outcome.findings[0].message
-    assert not (parts / "compensated").exists()
-
-
-HOLD = """
-import sys, time
-from pathlib import Path
-from postproc.batch.locking import locked
-with locked(Path(sys.argv[1])):
-    print("held", flush=True)
-    time.sleep(float(sys.argv[2]))
-"""
-
-
-def holder(path: Path, seconds: float) -> subprocess.Popen:
-    process = subprocess.Popen([sys.executable, "-c", HOLD, str(path), str(seconds)], stdout=subprocess.PIPE)
-    assert process.stdout.readline() == b"held\n"
-    return process
-
-
-def test_a_lock_waits_for_its_holder_and_survives_its_death(tmp_path):
-    path = tmp_path / "state" / "x.lock"
-    waited: list[int] = []
-    process = holder(path, 0.5)
-    with locked(path, lambda: waited.append(1)):
-        assert process.wait() == 0
-    assert waited == [1]
-    assert not path.parent.exists()
-    process = holder(path, 60.0)
-    process.kill()
-    process.wait()
-    assert path.exists()
-    with locked(path, lambda: waited.append(2)):
-        pass
-    assert waited == [1]
-    assert not path.exists()
-
-
-def test_two_batches_in_one_folder_share_the_work(parts):
-    words = [sys.executable, "-m", "postproc", "batch", str(parts), "--force", "-j", "2", "--json", "-"]
-    both = [subprocess.Popen(words, stdout=subprocess.PIPE) for _ in range(2)]
-    results = [json.loads(process.communicate()[0]) for process in both]
-    assert [process.returncode for process in both] == [0, 0]
-    ended = [[one["state"] for one in result["programs"]] for result in results]
-    for pair in zip(*ended, strict=True):
-        assert sorted(pair) == ["done", "unchanged"]
-    assert not list(parts.rglob("*.tmp*")) + list(parts.rglob("*.lock"))
-
-
-# ------------------------------------------------------------------------------------------ processes that die
-
-
-def worker_ids(parent: int) -> list[int]:
-    """Children of a process that are workers of a batch."""
-    found = []
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                words = (entry / "cmdline").read_bytes().split(b"\0")
-                status = (entry / "status").read_text()
-            except OSError:
-                continue
-            if f"PPid:\t{parent}\n" in status and any(b"spawn_main" in word for word in words):
-                found.append(int(entry.name))
-    return found
-
-
-class Deadly(Task):
-    """A task whose process is killed as it takes it, the first ``times`` times: counted in a file."""
-
-    def __reduce__(self):
-        return _deadly, (self.job, self.code)
-
-
-def _deadly(job, code):
-    import multiprocessing
-
-    if multiprocessing.parent_process() is not None:
-        counter = job.request.program.with_suffix(".deaths")
-        left = int(counter.read_text())
-        if left:
-            counter.write_text(str(left - 1))
-            os.kill(os.getpid(), signal.SIGKILL)
-    return Task(job, code)
-
-
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
-@pytest.mark.parametrize(("deaths", "state"), [(1, "done"), (2, "failed")])
-def test_a_worker_that_dies_takes_nothing_with_it(parts, deaths, state):
-    (parts / "p1.deaths").write_text(str(deaths))
-    tasks = [Task(a_job(parts, f"p{number}.src"), code_digest()) for number in range(4)]
-    tasks[1] = Deadly(tasks[1].job, code_digest())
-    outcomes: dict[int, Outcome] = dict(run_here(tasks, 2, lambda number, stage: None))
-    assert sorted(outcomes) == [0, 1, 2, 3]
-    assert outcomes.pop(1).state == state
-    assert {outcome.state for outcome in outcomes.values()} == {"done"}
-
-
-def test_what_died_twice_is_told(parts):
-    (parts / "p1.deaths").write_text("9")
-    ((number, outcome),) = run_here(
-        [Deadly(a_job(parts, "p1.src"), code_digest())], 4, lambda number, stage: None
-    )
-    assert (number, outcome.findings[0].code) == (0, "BAT005")
-    assert "SIGKILL" in outcome.findings[0].message
-    assert (parts / "p1.deaths").read_text() == "7"
-
-
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
-def test_workers_die_with_their_batch(parts, tmp_path):
-    for number in range(4, 40):
-        program(parts / f"p{number}.src", number)
-    words = [sys.executable, "-m", "postproc", "batch", str(parts), "--force", "-j", "2", "-q"]
-    process = subprocess.Popen(words)
-    deadline = time.monotonic() + 60
-    while not (parts / "compensated" / "p1.src").exists() and time.monotonic() < deadline:
-        time.sleep(0.02)
-    workers = worker_ids(process.pid)
-    assert workers
-    process.kill()
-    process.wait()
-    while any(Path(f"/proc/{worker}").exists() for worker in workers) and time.monotonic() < deadline:
-        time.sleep(0.02)
-    assert not any(Path(f"/proc/{worker}").exists() for worker in workers)
-
-
-def test_an_interrupted_batch_ends_in_words(parts):
-    for number in range(4, 60):
-        program(parts / f"p{number}.src", number)
-    words = [sys.executable, "-m", "postproc", "batch", str(parts), "--force", "-j", "2"]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
-    deadline = time.monotonic() + 60
-    while not (parts / "compensated" / "p1.src").exists() and time.monotonic() < deadline:
-        time.sleep(0.02)
-    os.killpg(process.pid, signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert out == b""
-    assert b"goes on from there" in err
-    assert b"Traceback" not in err
-    assert not list(parts.rglob("*.tmp*"))

@@ -24,7 +24,7 @@ def batch_page(batched: Batched) -> bytes:
     failures = [finding for outcome in batched.outcomes if outcome.exit == 1 for finding in outcome.findings]
     return rendered(
         "batch.html.j2",
-        title=printed(batched.root.name),
+        title=printed("/".join(batched.root.parts[-2:])),
         what="batch",
         verdict=_verdict(batched),
         badge=_badge(batched),
@@ -49,9 +49,7 @@ def _verdict(batched: Batched) -> str:
     whole = count(len(batched.outcomes), "program")
     well = counts[DONE] + counts[UNCHANGED]
     words = (
-        f"All of {whole} are compensated"
-        if well == len(batched.outcomes)
-        else f"{well} of {whole} are compensated"
+        f"All of {whole} are written" if well == len(batched.outcomes) else f"{well} of {whole} are written"
     )
     parts = [
         f"{counts[state]} {word}"
