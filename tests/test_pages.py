@@ -369,14 +369,18 @@ def test_a_page_is_well_formed_and_can_be_read_aloud(tmp_path):
     for name in ("for", "aria-labelledby", "aria-describedby"):
         for value in seen.values(name):
             assert value in seen.ids, (name, value)
+    regions = []
     for tag, attributes in seen.found:
         if tag == "canvas" and attributes.get("aria-hidden") != "true":
             assert attributes["aria-label"]
             assert attributes["tabindex"] == "0"
+        if attributes.get("role") == "region":
+            regions.append(attributes["aria-label"])
         if tag == "html":
             assert attributes["lang"] == "en"
         if tag == "th":
             assert attributes["scope"]
+    assert len(set(regions)) == len(regions) >= 2
     levels = [int(tag[1]) for tag in seen.tags if re.fullmatch("h[1-6]", tag)]
     assert levels[0] == 1
     assert set(levels[1:]) == {2}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -82,6 +83,7 @@ def test_the_page_says_what_the_terminal_says(one):
     missing = {word for word in words if word.strip("();,") not in seen}
     assert len(words) > 20
     assert missing == set()
+    assert not re.search(r"<th[^>]*></th>", page.read_text(encoding="utf-8"))
 
 
 def test_the_page_is_among_the_outputs_and_leads_to_the_others(one):

@@ -38,7 +38,12 @@ class Shown:
 def shown(table: Table) -> Shown:
     """The table that the terminal shows, for a page."""
     columns = [[_plain(cell) for cell in column.cells] for column in table.columns]
-    heads = tuple((_plain(column.header), column.justify == "right") for column in table.columns)
+    names = [
+        _plain(column.header) or ("note" if place else "what") for place, column in enumerate(table.columns)
+    ]
+    heads = tuple(
+        (name, column.justify == "right") for name, column in zip(names, table.columns, strict=True)
+    )
     rows = []
     for cells in zip(*columns, strict=True):
         rows.append(cells[:1] if len(cells) > 1 and not any(cells[1:]) else cells)
