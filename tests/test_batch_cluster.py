@@ -79,6 +79,25 @@ def test_a_worker_that_is_killed_is_survived(compensate, parts, cluster):
         client.wait_for_workers(2, timeout=60)
 
 
+def test_a_cluster_that_is_lost_midway_is_told(parts):
+    """What was done stays, and the rest is not waited for."""
+    jobs = jobs_of([str(parts)], {"force": ""})
+    tasks = [Task(job, code_digest()) for job in jobs.jobs]
+    outcomes = {}
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
+    ) as lost:
+        for number, outcome in run_on_cluster(tasks, lost.scheduler_address, lambda number, stage: None):
+            outcomes[number] = outcome
+            lost.close()
+    assert sorted(outcomes) == list(range(PROGRAMS))
+    states = [outcome.state for outcome in outcomes.values()]
+    assert states.count("done") >= 1
+    assert states.count("failed") >= 1
+    for outcome in outcomes.values():
+        assert outcome.state == "done" or outcome.findings[0].code in ("BAT005", "BAT006")
+
+
 def test_one_that_fails_stops_no_other(compensate, parts, cluster):
     (parts / "bad.src").write_bytes(b"DEF bad()\r\nLIN {X 1}\r\n\0END\r\n")
     done = compensate("batch", parts, "--force", "--dask", cluster.scheduler_address, "--json", "-")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import uuid
 from collections.abc import Generator, Sequence
 from concurrent.futures import CancelledError
@@ -9,7 +10,7 @@ from typing import Any
 
 from postproc.batch.reading import code_digest
 from postproc.batch.running import Stages, died
-from postproc.batch.work import Task, work
+from postproc.batch.work import Task, failed, work
 from postproc.findings import Finding, Refusal
 from postproc.report.batched import Outcome
 
@@ -24,8 +25,9 @@ def run_on_cluster(
 ) -> Generator[tuple[int, Outcome], None, None]:
     """Do the tasks on the cluster whose scheduler is at ``address``; yields (number, outcome) as they are done.
 
-    The scheduler gives the tasks of a worker that died to another one.  Raises Refusal BAT006 where the cluster is
-    not there, has no workers, or workers of another version.
+    The scheduler gives the tasks of a worker that died to another one.  Where it is lost itself, or all of its workers
+    for longer than ``PATIENCE``, the tasks that are left fail.  Raises Refusal BAT006, before anything is done, where
+    the cluster is not there, has no workers, or workers of another version.
     """
     distributed = _distributed()
     try:
@@ -41,22 +43,31 @@ def run_on_cluster(
         }
         try:
             while pending:
-                try:
-                    with client.as_current():
-                        ready = distributed.wait(list(pending), PATIENCE, "FIRST_COMPLETED").done
-                except TimeoutError:
-                    if client.scheduler_info()["workers"]:
-                        continue
-                    raise _unusable(f"the cluster at {address} has lost all of its workers") from None
-                except CancelledError:
-                    raise _unusable(f"the connection to {address} is lost") from None
+                ready, lost = _ready(distributed, client, list(pending))
                 for future in sorted(ready, key=pending.__getitem__):
                     number = pending.pop(future)
                     yield number, _outcome(distributed, tasks[number], future)
+                if lost:
+                    for number in pending.values():
+                        yield number, failed(tasks[number].job, _finding(f"{lost}: {address}"))
+                    return
         finally:
             client.cancel(list(pending))
     finally:
         client.close()
+
+
+def _ready(distributed: Any, client: Any, futures: list[Any]) -> tuple[set[Any], str]:
+    """Futures that have ended, and what keeps all others from it."""
+    try:
+        with client.as_current():
+            return distributed.wait(futures, PATIENCE, "FIRST_COMPLETED").done, ""
+    except TimeoutError:
+        return set(), "" if client.scheduler_info()["workers"] else "the cluster has lost all of its workers"
+    except CancelledError:
+        return {
+            future for future in futures if future.status == "finished"
+        }, "the connection to the cluster is lost"
 
 
 def _outcome(distributed: Any, task: Task, future: Any) -> Outcome:
@@ -91,11 +102,18 @@ def _distributed() -> Any:
         import distributed
     except ImportError:
         raise _unusable("the package dask.distributed is not installed", EXTRA) from None
+    logging.getLogger("distributed.client").setLevel(
+        logging.CRITICAL
+    )  # what it has to say is said here, in words
     return distributed
 
 
 def _unusable(message: str, help: str = "") -> Refusal:
-    return Refusal(Finding("BAT006", message, help=help))
+    return Refusal(_finding(message, help))
+
+
+def _finding(message: str, help: str = "") -> Finding:
+    return Finding("BAT006", message, help=help)
 
 
 def _line(error: BaseException) -> str:

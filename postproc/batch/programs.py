@@ -6,6 +6,7 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from postproc.cell import NAME as CELL
 from postproc.dialects import DIALECTS
 from postproc.findings import Finding
 
@@ -21,7 +22,7 @@ _MAGIC = frozenset("*?[")
 @dataclass(frozen=True)
 class Found:
     """What a word names.  ``anchor``: the folder below which it was looked for; ``passed_over``: files that match and
-    are of no known language.  Paths are absolute and in order."""
+    are of no known language, nor belong to a program.  Paths are absolute and in order."""
 
     anchor: Path
     programs: tuple[Path, ...]
@@ -75,7 +76,13 @@ def _claimed(anchor: Path, paths: list[Path]) -> Found:
     for path in sorted(paths):
         if path.is_file():
             (programs if _is_program(path) else others).append(path)
-    return Found(anchor, tuple(programs), tuple(others))
+    known = {path.with_suffix("") for path in programs}
+    return Found(anchor, tuple(programs), tuple(path for path in others if not _belongs(path, known)))
+
+
+def _belongs(path: Path, programs: set[Path]) -> bool:
+    """Whether a file is no program because it belongs to one: .dat, .force.csv, the cell."""
+    return path.name == CELL or path.with_name(path.name.partition(".")[0]) in programs
 
 
 def _is_program(path: Path) -> bool:
