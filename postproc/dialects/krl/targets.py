@@ -38,7 +38,7 @@ class Target:
 
     start, stop, file: literals of its components, -1 where there is none.  own, wanted, steps [mm, deg]: what they
     say, what is to be said, and half of a written step.  texts: six components as they are to be written.
-    missing: components to be written into the aggregate.  The others: see ``Places``.
+    missing: components to be written into the aggregate, of those left_out.  The others: see ``Places``.
     """
 
     row: int
@@ -50,6 +50,7 @@ class Target:
     steps: list[float]
     texts: list[bytes]
     missing: list[int]
+    left_out: list[int]
     insert: int
     home: int
     operand: Span
@@ -63,7 +64,7 @@ class Target:
         return [
             i
             for i in range(len(self.start))
-            if i not in self.missing and _apart(self.own[i], self.wanted[i], i) > self.steps[i]
+            if i not in self.left_out and _apart(self.own[i], self.wanted[i], i) > self.steps[i]
         ]
 
     def spots(self) -> list[tuple[int, Spot]]:
@@ -74,7 +75,7 @@ class Target:
 def single_edits(task: Task, rows: Ints, completed: Bools) -> tuple[list[Edit], dict[int, Finding]]:
     """Edits of ``rows`` (K,), and the rows that can not move as planned.
 
-    completed (N, 6): components that a row leaves out and that must be written although it stays where it is.
+    completed (N, 6): components that a row leaves out and that must be written.
     """
     if not len(rows):
         return [], {}
@@ -107,11 +108,10 @@ def _targets(task: Task, rows: Ints, completed: Bools, lines: Lines) -> Iterator
             continue
         inherits = [i for i in range(6) if places.inherits[row] >> i & 1]
         _, start, stop, _ = places.motion[row].tolist()
-        whole = task.has_angle[row] or not kept[k].all()
         end = Target(
             row, places.start[row].tolist(), places.stop[row].tolist(), places.file[row].tolist(),
             said.own[k].tolist(), wanted[k].tolist(), steps[k].tolist(), texts,
-            inherits if whole else [i for i in inherits if completed[row, i]],
+            [i for i in inherits if completed[row, i] or task.has_angle[row]], inherits,
             int(places.insert[row]), int(places.home[row]), Span(0, start, stop),
             places.variables.get(row), int(places.text[row]), places.locked.get(row, ""),
         )  # fmt: skip
@@ -161,7 +161,7 @@ def _auxiliary(
     left_out = [i for i in range(3) if arc.start[i] < 0]
     return Target(
         row, list(arc.start), list(arc.stop), list(arc.file), own, via, steps, [*texts, *angles],
-        left_out if arc.home >= 0 else [], arc.insert, arc.home, arc.operand, arc.variable, arc.text, arc.locked, True,
+        left_out, left_out, arc.insert, arc.home, arc.operand, arc.variable, arc.text, arc.locked, True,
     )  # fmt: skip
 
 

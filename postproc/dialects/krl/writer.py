@@ -9,6 +9,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.dialects.decimals import fixed
 from postproc.dialects.dialect import Moved, Plan, Program, Writing
+from postproc.dialects.krl.chain import Chain
 from postproc.dialects.krl.components import LETTER, Components, Task, differs
 from postproc.dialects.krl.inserting import insertions
 from postproc.dialects.krl.targets import single_edits
@@ -28,20 +29,20 @@ def moved(program: Program, plan: Plan, writing: Writing) -> Moved:
     touched, way = _touched(task)
     _refuse_forbidden(task, touched, way)
     plain = touched & _plain(task)
-    changed = np.zeros((len(touched), 6), dtype=bool)
+    chain = Chain(task, touched)
     parts: list[Edits] = []
-    for rows in _blocks(np.flatnonzero(touched)):
+    for rows in _blocks(np.flatnonzero(touched & ~chain.depends)):
         said = task.components(rows)
         there = task.own[rows]
         wanted = task.wanted(rows, said.own, plan.position[there], plan.rotation[there])
         kept = said.kept(wanted)
-        changed[rows] = ~kept
+        chain.written(rows, said, wanted, kept)
         simple = plain[rows]
         if simple.any():
             parts.append(_literal_edits(task, said, wanted, ~kept & simple[:, None]))
-    changed[task.has_angle & touched] = True
-    singly, completed = _singly(task, touched & ~plain, touched | way, changed)
-    single, held = single_edits(task, singly, completed)
+    chain.follow()
+    singly = np.flatnonzero((touched & ~plain) | chain.again(way))
+    single, held = single_edits(task, singly, chain.completed)
     if held:
         return Moved((), held)
     return Moved(Edits.joined(*parts, *insertions(task), single))
@@ -97,25 +98,6 @@ def _literal_edits(task: Task, said: Components, wanted: Floats, chosen: Bools) 
     # "Z- 30" is Z and a number, "Z30.1" would be a name.
     texts, ends = fixed(wanted[chosen], said.decimals[chosen], LETTER[before])
     return Edits(file, start, stop, texts, ends)
-
-
-def _singly(task: Task, rows: Bools, moves: Bools, changed: Bools) -> tuple[Ints, Bools]:
-    """Rows that are written one by one, and (N, 6) the components that a changed row before leaves to be written.
-
-    rows (N,): those that are so anyway; moves (N,): end or way is another one; changed (N, 6): components whose text
-    changes.
-    """
-    places = task.places
-    refused = np.zeros(len(rows), dtype=bool)
-    refused[list(task.path.refused)] = True
-    before = np.roll(changed, 1, axis=0)
-    before[:1] = False
-    left_out = ((places.inherits[:, None] >> np.arange(6, dtype=np.uint8)) & 1).astype(bool)
-    completed = left_out & (before | (task.inserted > 0)[:, None]) & ~refused[:, None]
-    builds = task.is_relative.copy()
-    builds[[row for row, _ in places.arcs.items() if np.isfinite(task.path.sweep[row])]] = True
-    again = builds & ~refused & (moves | before.any(axis=1) | (task.inserted > 0))
-    return np.flatnonzero(rows | completed.any(axis=1) | again), completed
 
 
 def _blocks(rows: Ints) -> Iterator[Ints]:
