@@ -176,8 +176,8 @@ CODES: dict[str, Code] = {
     ),
     "GCO003": Code(
         "info",
-        "rapid to a place that is not known",
-        "A coordinate is not known yet; an air move, it stays as it is.",
+        "rapid that is not fully known",
+        "A coordinate, the offset or the tool is not known yet; an air move, it stays as it is.",
     ),
     "GCO004": Code(
         "info", "machine or reference position", "G28, G30, G53: not a place in the base; it stays as it is."

@@ -54,6 +54,7 @@ class What:
     BASE = "the change of the offset"
     FRAME = "the change of coordinates"
     MODE = "absolute or incremental is not known"
+    TIP = "the change of the TCP mode"
     ORIGIN = "G92 where the position is not known"
 
 
@@ -243,6 +244,13 @@ def course(given: Blocks, spoiled: Bools) -> tuple[Course, list[str], Ints]:
         within = force[group] != 0
         lose(whole, within & given.motion, What.FRAME)
         leave(whole, np.concatenate([[False], within[1:] != within[:-1]]) if n else within, What.FRAME)
+    tip = force[Group.TCP]
+    if n and (tip != tip[0]).any():
+        # With the rotary axes at 0 the words mean the same with and without a TCP mode.
+        away = np.logical_or.accumulate(
+            (target[:, 3:] & ((value[:, 3:] != 0) | relative[:, 3:])).any(axis=1) | home
+        )
+        leave(linear, np.concatenate([[False], tip[1:] != tip[:-1]]) & away, What.TIP)
     sets = target & ~relative
     adds = target & relative
     return Course(np.where(target, value, 0.0), sets, adds, lost, left), reasons, reason

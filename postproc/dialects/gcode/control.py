@@ -156,7 +156,7 @@ def kept(event: Event) -> Frame:
 class Control:
     """One dialect of G-code.
 
-    codes: G number times ten -> what it says, M likewise; named: a word that stands alone -> the same;
+    codes: G number times ten -> what it says; also: what else some of them say; named: a word that stands alone -> the same;
     names: addresses of more than a letter -> their key; comment: pattern of comments (and of strings, group 1, which
     are none); line: takes a line apart that is not plain words; start: what is in force before anything is said.
     endings: M codes after which nothing is read; cycle_apart: G80 goes back to the move that was in force before the
@@ -172,6 +172,7 @@ class Control:
 
     name: str
     codes: Mapping[int, Code]
+    also: Mapping[int, tuple[Code, ...]] = field(default_factory=dict, kw_only=True)
     line: Callable[[bytes, int], Line]
     comment: bytes
     named: Mapping[bytes, Code] = field(default_factory=dict)

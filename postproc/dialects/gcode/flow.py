@@ -30,11 +30,12 @@ class Doubt(IntEnum):
 @dataclass(frozen=True, eq=False)
 class Flow:
     """doubt (B,) Doubt; last (B,): the last block of the doubtful stretch that the block is in, itself elsewhere;
-    forget (B,): before it other code ran that was not read; tape (B,): belongs to the program."""
+    forget (B,): before it other code ran that was not read; calls (B,): runs it; tape (B,): belongs to the program."""
 
     doubt: Ints
     last: Ints
     forget: Bools
+    calls: Bools
     tape: Bools
 
 
@@ -66,7 +67,7 @@ def follow(text: Text, control: Control, once: Ints) -> Flow:
     if len(ends):
         rest = doubt[ends[0] + 1 :]
         rest[rest != Doubt.PROGRAM] = Doubt.ENDED
-    return Flow(doubt, _last(doubt), forget[:-1], tape)
+    return Flow(doubt, _last(doubt), forget[:-1], forget[1:], tape)
 
 
 def _tape(text: Text, n: int) -> Bools:

@@ -17,7 +17,7 @@ _TOKEN = re.compile(
     + rb")(?![\d.#\[])|(?P<sign>[-+]?[ \t]*)(?P<open>[#\[]"
     rb"|[A-Za-z]{2,5}[ \t]*\[))"
     rb"|(?P<assign>#)"
-    rb"|(?P<corner>,[ \t]*[A-Za-z])"
+    rb"|(?P<corner>,[ \t]*[A-Za-z][ \t]*(?:" + _NUMBER + rb")?)"
     rb"|(?P<check>\*[ \t]*\d+[ \t]*\Z)"
 )
 _HEAD = re.compile(rb"[ \t]*(?:(?P<tape>%)|(?P<deleted>/)[ \t]*\d?|(?P<program>:)[ \t]*(?P<digits>\d+))")
@@ -42,7 +42,7 @@ HARMLESS = (b"EXCLUDE_OBJECT", b"SET_", b"TIMELAPSE", b"POPEN", b"PCLOS", b"DPRN
 
 
 def line(text: bytes, offset: int) -> Line:
-    """Takes one line apart, comments blanked; ``offset``: where it begins in the file."""
+    """Takes one line apart, comments blanked; ``offset`` is added to all places."""
     words: list[tuple[int, int, int, int, float, int]] = []
     notes: list[Note] = []
 

@@ -85,6 +85,9 @@ def judged(
     refuse(force[Group.AXIAL] != 0, "GCO016", "the target is reached as the axes go (PTP)")
     for group, message in FRAMED.items():
         refuse(force[group] != 0, "GCO010", f"the words are {message}")
+    air = moves.kind == Kind.PTP
+    refuse(air & (base < 0), "GCO003", "rapid: the work offset is not known, or the program itself writes it")
+    refuse(air & (tool < 0), "GCO003", "rapid: no tool is loaded, or its number is not known")
     refuse(base < 0, "GCO014", "the work offset is not known, or the program itself writes it")
     refuse(tool < 0, "GCO015", "no tool is loaded, or its number is not known")
     refuse(force[Group.UNITS] < 0, "GCO002", "mm or inch is not known")
@@ -173,7 +176,7 @@ def pinned(document: Document, given: Blocks, moves: Motions, way: Course, doubt
     shifting = modal.has(Once.SHIFT) & given.has(*AXES)
     for at, message in (
         (np.flatnonzero(shifting), "G92 sets the origin at this end point"),
-        (np.flatnonzero(modal.flow.forget) - 1, "code that was not read may build on this end point"),
+        (np.flatnonzero(modal.flow.calls), "code that was not read may build on this end point"),
         (
             np.flatnonzero(given.noted("unknown")),
             "a block that is not understood may build on it",

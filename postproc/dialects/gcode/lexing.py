@@ -7,12 +7,13 @@ apart together, as arrays; only what is left comes to the control's own ``line``
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.dialects.gcode.control import Control, Line
+from postproc.dialects.gcode.control import Control
 from postproc.dialects.gcode.words import Blocks, How, Note, Text, Words
 
 BOM = b"\xef\xbb\xbf"
@@ -43,9 +44,8 @@ def lex(raw: bytes, control: Control) -> Text:
     plain, odd, ends = _plain(letters, _CLASS[blanked])
     starts = np.concatenate([[0], ends[:-1] + 1])
     clean = blanked.tobytes()
-    taken = [control.line(clean[starts[i] : ends[i]], int(starts[i])) for i in odd]
-    text = _joined(letters, plain, odd, taken, starts, ends)
-    return Text(*text, comments)
+    other = _taken([clean[starts[i] : ends[i]] for i in odd], np.array(odd, dtype=np.int64), starts, control)
+    return Text(*_joined(letters, plain, other, starts, ends), comments)
 
 
 def _comments(raw: bytes, pattern: bytes) -> Ints:
@@ -69,14 +69,17 @@ def _blanked(letters: Bytes, comments: Ints, marked: bool) -> Bytes:
     return blanked
 
 
+@dataclass(frozen=True, eq=False)
 class _Plain:
-    """Words of plain lines; ``line`` counts the ends of lines before a word."""
+    """Columns as in Words; ``line`` counts the ends of lines before a word."""
 
-    def __init__(
-        self, at: Ints, start: Ints, stop: Ints, key: Ints, value: Floats, how: Ints, line: Ints
-    ) -> None:
-        self.at, self.start, self.stop, self.key = at, start, stop, key
-        self.value, self.how, self.line = value, how, line
+    at: Ints
+    start: Ints
+    stop: Ints
+    key: Ints
+    value: Floats
+    how: Ints
+    line: Ints
 
 
 def _plain(letters: Bytes, kinds: Bytes) -> tuple[_Plain, list[int], Ints]:
@@ -169,32 +172,74 @@ def _values(letters: Bytes, start: Ints, stop: Ints) -> Floats:
     return np.fromstring(text, dtype=np.float64, sep=" ") if len(start) else np.empty(0)
 
 
+@dataclass(frozen=True, eq=False)
+class _Other:
+    """Words of the other lines; notes: of which line, what it says and where; lines with notes or a slash."""
+
+    words: _Plain
+    notes: list[tuple[int, Note]]
+    said: Ints
+    deleted: Ints
+
+
+def _taken(texts: list[bytes], rows: Ints, starts: Ints, control: Control) -> _Other:
+    """The lines that are not plain, each text taken apart once; ``rows``: their numbers."""
+    number: dict[bytes, int] = {}
+    which = np.array([number.setdefault(text, len(number)) for text in texts], dtype=np.int64)
+    lines = [control.line(text, 0) for text in number]
+    counts = np.array([len(line.words) for line in lines], dtype=np.int64)
+    flat = [word for line in lines for word in line.words]
+    columns = zip(*flat, strict=True) if flat else [()] * 6
+    at, key, start, stop, value, how = (
+        np.array(column, dtype=np.float64 if i == 4 else np.int64) for i, column in enumerate(columns)
+    )
+    # The words of each line, one after the other: those of its text, moved to where it begins.
+    many = counts[which] if len(lines) else which
+    first = (np.cumsum(counts) - counts)[which] if len(lines) else which
+    own = np.repeat(first - (np.cumsum(many) - many), many) + np.arange(many.sum())
+    offset = np.repeat(starts[rows], many)
+    words = _Plain(
+        at[own] + offset,
+        np.where(start[own] < 0, -1, start[own] + offset),
+        stop[own] + offset,
+        key[own],
+        value[own],
+        how[own],
+        np.repeat(rows, many),
+    )
+    speaks = np.array([bool(line.notes) for line in lines], dtype=np.bool_)
+    slashed = np.array([line.deleted for line in lines], dtype=np.bool_)
+    noted = np.flatnonzero(speaks[which]) if len(lines) else which
+    notes = [
+        (row, Note(0, note.kind, note.text, note.at + begin))
+        for row, begin, text in zip(
+            rows[noted].tolist(), starts[rows[noted]].tolist(), which[noted].tolist(), strict=True
+        )
+        for note in lines[text].notes
+    ]
+    deleted = rows[slashed[which]] if len(lines) else rows
+    return _Other(words, notes, np.union1d(rows[noted], deleted).astype(np.int64), deleted)
+
+
 def _joined(
-    letters: Bytes, plain: _Plain, odd: list[int], taken: list[Line], starts: Ints, ends: Ints
+    letters: Bytes, plain: _Plain, other: _Other, starts: Ints, ends: Ints
 ) -> tuple[Words, Blocks, tuple[Note, ...]]:
     """Words of plain and of other lines in one order; lines without words and notes are no blocks."""
-    flat = [(*word, row) for row, line in zip(odd, taken, strict=True) for word in line.words]
-    extra: list[tuple[int | float, ...]] = list(zip(*flat, strict=True)) if flat else [()] * 7
-    at, key, start, stop, value, how, row = (np.array(column) for column in extra)
-    order = np.argsort(np.concatenate([plain.at, at]), kind="stable")
-
-    def merged(one: Ints | Floats, two: Ints | Floats) -> Ints:
-        return np.concatenate([one, two])[order].astype(np.int64)
-
-    lines = merged(plain.line, row)
-    said = [row for row, line in zip(odd, taken, strict=True) if line.notes or line.deleted]
-    used = np.union1d(lines, np.array(said, dtype=np.int64)).astype(np.int64)
+    extra = other.words
+    order = np.argsort(np.concatenate([plain.at, extra.at]), kind="stable")
+    lines = np.concatenate([plain.line, extra.line])[order]
+    used = np.union1d(lines, other.said).astype(np.int64)
     words = Words(
-        at=merged(plain.at, at),
-        start=merged(plain.start, start),
-        stop=merged(plain.stop, stop),
-        key=merged(plain.key, key),
-        value=np.concatenate([plain.value, value.astype(np.float64)])[order],
-        how=merged(plain.how, how),
+        at=np.concatenate([plain.at, extra.at])[order],
+        start=np.concatenate([plain.start, extra.start])[order],
+        stop=np.concatenate([plain.stop, extra.stop])[order],
+        key=np.concatenate([plain.key, extra.key])[order],
+        value=np.concatenate([plain.value, extra.value])[order],
+        how=np.concatenate([plain.how, extra.how])[order],
         block=np.searchsorted(used, lines),
     )
     deleted = np.zeros(len(starts), np.bool_)
-    deleted[[row for row, line in zip(odd, taken, strict=True) if line.deleted]] = True
+    deleted[other.deleted] = True
     feeds = np.flatnonzero(letters == 10)
     code = starts[used].copy()
     code[words.block] = np.maximum(words.stop, words.at + 1)
@@ -205,9 +250,9 @@ def _joined(
         code=code,
         deleted=deleted[used],
     )
+    where = np.searchsorted(used, np.array([row for row, _ in other.notes], dtype=np.int64)).tolist()
     notes = tuple(
-        note._replace(block=int(np.searchsorted(used, row)))
-        for row, line in zip(odd, taken, strict=True)
-        for note in line.notes
+        Note(block, note.kind, note.text, note.at)
+        for block, (_, note) in zip(where, other.notes, strict=True)
     )
     return words, blocks, notes

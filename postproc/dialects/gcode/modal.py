@@ -109,7 +109,13 @@ def modal(text: Text, control: Control) -> Modal:
         if one == Group.MOTION:
             force[one] = _moves(fill, blocks[own], values[own], control.cycle_apart)
         else:
-            force[one] = fill(blocks[own], values[own])
+            said, meant = own.copy(), values.copy()
+            for code, others in control.also.items():
+                for other in others:
+                    if other.group == one:
+                        said |= at == code
+                        meant[at == code] = other.value
+            force[one] = fill(blocks[said], meant[said])
     verb, twice = _verbs(rows, blocks, values, groups == Group.MOTION, n)
     states = {one: np.unique(blocks[groups == one]) for one in Group}
     return Modal(force, once, verb, unknown, twice, flow, states)

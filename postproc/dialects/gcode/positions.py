@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -49,8 +50,7 @@ class Positions:
     def in_base(self) -> Floats:
         """(B, 6) the ends in the base."""
         result = np.empty_like(self.end)
-        edges = np.flatnonzero(np.diff(self.frame, prepend=-1))
-        for i, j in zip(edges, [*edges[1:], len(self.frame)], strict=True):
+        for i, j in pairwise([*np.flatnonzero(np.diff(self.frame, prepend=-1)).tolist(), len(self.frame)]):
             result[i:j] = self.frames[self.frame[i]].to_base(self.end[i:j])
         return result
 

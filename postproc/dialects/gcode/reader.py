@@ -49,7 +49,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: Settings =
     frame_of_base, frame_of_tool, frames = references(base, tool[rows], text.blocks.line[rows])
     said = remarks(document, text, text.blocks.line[rows])
     place = moves.place.copy()
-    place[given.modal.flow.doubt[rows] != 0] = np.nan
+    place[(given.modal.flow.doubt[rows] != 0) | np.isnan(place).any(axis=1)] = np.nan
     path = Toolpath(
         kind=moves.kind,
         position=place,

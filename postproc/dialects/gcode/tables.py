@@ -58,10 +58,17 @@ _COMMON = _codes(
     (Group.NONE, 0, (9,)),
 )
 
+_TIP = {
+    **dict.fromkeys((430, 490), (Code(Group.TCP, 0), Code(Group.LENGTHS, 0))),
+    **dict.fromkeys((434, 435, 2340), (Code(Group.LENGTH, 1),)),
+}
+"""G43 and G49 end the modes that G43.1 and G43.4 begin."""
+
 LINUXCNC = Control(
     name="linuxcnc",
     line=general.line,
     comment=COMMENT,
+    also=_TIP,
     codes={
         **_COMMON,
         **_codes(
@@ -84,6 +91,7 @@ FANUC = Control(
     name="fanuc",
     line=general.line,
     comment=COMMENT,
+    also=_TIP,
     codes={
         **_COMMON,
         **_codes(
