@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 from postproc.dialects.krl.expressions import Value, index_text
 from postproc.dialects.krl.lexing import (
@@ -300,10 +301,15 @@ def _keep(run: Run, name: bytes, path: bytes, value: Value) -> None:
     """Stores a value; a number only where no other program can change it."""
     if not isinstance(value, (Target, Unclear)):
         if not run.trusted(name):
-            value = Unclear("KRL002", f"{shown(name)} is not declared in this module, others may change it")
+            value = _untrusted(name)
         else:
             value = run.converted(name, value) if not path.startswith(b".") else value
     run.variables.set(name, path, value)
+
+
+@lru_cache(maxsize=1024)
+def _untrusted(name: bytes) -> Unclear:
+    return Unclear("KRL002", f"{shown(name)} is not declared in this module, others may change it")
 
 
 def _value(run: Run, text: bytes, at: int) -> Value:

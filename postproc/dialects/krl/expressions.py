@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from functools import lru_cache
 
 from postproc.dialects.krl.lexing import NAME, number
 from postproc.dialects.krl.spatial import product
@@ -28,6 +29,7 @@ _TOKEN = re.compile(
     + NAME
     + rb")|(?P<op>==|<>|<=|>=|[-+*/:()\[\],.<>{}]))"
 )
+_NAME = re.compile(NAME + rb"\Z")
 _COMPARISONS = {
     b"==": lambda a, b: a == b, b"<>": lambda a, b: a != b, b"<": lambda a, b: a < b,
     b">": lambda a, b: a > b, b"<=": lambda a, b: a <= b, b">=": lambda a, b: a >= b,
@@ -63,6 +65,9 @@ def evaluate(text: bytes, lookup: Lookup) -> Value:
     plain = number(text) if len(text) < 40 else None
     if plain is not None:
         return plain if b"." in text or (b"e" in text.lower() and b"'" not in text) else int(plain)
+    if _NAME.match(text) and text.upper() not in _SYSTEM:
+        value = lookup(text.upper(), b"")
+        return value if value is not None else _no_constant(text)
     try:
         parser = _Parser(text, lookup)
         value = parser.comparison(0)
@@ -89,6 +94,11 @@ def index_text(text: bytes, lookup: Lookup) -> bytes | None:
             return None
         found.append(b"%d" % value)
     return b",".join(found)
+
+
+@lru_cache(maxsize=1024)
+def _no_constant(name: bytes) -> Unclear:
+    return Unclear("KRL002", f"{shown(name)} is not a constant of the program")
 
 
 class _Parser:
@@ -295,7 +305,7 @@ class _Parser:
             path += b"[" + b",".join(indices) + b"]"
         value = self.lookup(name, path)
         if value is None:
-            raise self._unknown(f"{shown(name + path)} is not a constant of the program")
+            raise _Unknown(_no_constant(name + path))
         if isinstance(value, Unclear):
             raise _Unknown(value)
         return value

@@ -315,7 +315,7 @@ class Flow:
             return pc + 1
         if opened.followed:
             return block.end
-        opened.sources |= run.state.sources
+        opened.sources = run.rows.joined(opened.sources | run.state.sources)
         run.variables.undo(opened.mark)
         run.state = opened.entry.copy()
         return pc + 1
@@ -336,7 +336,7 @@ class Flow:
             run.state = opened.entry
             word = block.word.decode("latin-1")
             run.forget(block.effects, f"after the {word} block of lines {block.line} to {item.line}")
-            run.state.sources = sources
+            run.state.sources = run.rows.joined(sources)
         elif opened.counter is not None:
             name, value, last, step = opened.counter
             value += step
@@ -416,7 +416,9 @@ class Flow:
             return
         effects = {"point", "base", "tool", "feed", "apo", "mode", *run.survey.effects}
         run.forget(effects, f"after the label {shown(name)} in line {item.line}")
-        run.state.sources |= {b"label " + name}
+        mark = b"label %d " % begin + name
+        run.rows.sources[mark] |= run.state.sources
+        run.state.sources = frozenset([mark])
         run.tell(
             "KRL020",
             f"a GOTO leads to {shown(name)}: base, tool and position are not known from here on",
@@ -440,7 +442,8 @@ class Flow:
                 self.doubts.labels.add((routine.begin, name))
                 self.doubts.passed.update(o.block.begin for o in open_blocks if o.block.word in LOOPS)
                 raise Restart
-        run.rows.sources[b"label " + name] |= run.state.sources
+        begin = routine.begin if routine is not None else -1
+        run.rows.sources[b"label %d " % begin + name] |= run.state.sources
         return pc + 1
 
     def _open_in_routine(self) -> list[Open]:

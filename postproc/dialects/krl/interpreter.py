@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from postproc.dialects.dialect import Program
 from postproc.dialects.krl.data import Declarations, at_the_start, read_data
@@ -25,6 +27,19 @@ _MARKER = re.compile(rb"^(?:\xef\xbb\xbf)?([ \t]*;COMPENSATED by compensate [^\r
 _MOTION = Statement("motion", b"", b"", 0, 0)
 
 
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Nothing that a reading makes refers back to itself; the collector would only walk over it again and again."""
+    running = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if running:
+            gc.enable()
+
+
+@_no_collection()
 def read(documents: tuple[Document, ...], references: Sequence[Document] = (), fast: bool = True) -> Program:
     """Reads a program; ``fast=False`` takes the general way for the common lines too, with the same result.
 

@@ -184,7 +184,7 @@ def _arc(
     run: Run, statement: Statement, parts: Parts, first: Operand, reason: Reason | None, blend: float
 ) -> None:  # fmt: skip
     code, state = statement.code, run.state
-    points, angle, span = parts.points[1:], None, None
+    points, angle, span = list(parts.points[1:]), None, None
     has_angle = bool(points) and _CIRCLE_ANGLE.match(code[slice(*points[-1])]) is not None
     if has_angle:
         begin, end = points.pop()
@@ -332,8 +332,10 @@ def _enter(
         rows.variables[row] = operand.variable
         if stated.locked:
             rows.locked[row] = stated.locked
-    if any(item.block.word in SPLINES for item in run.stack) or kind == Kind.SPL:
+    if kind == Kind.SPL or (run.stack and any(item.block.word in SPLINES for item in run.stack)):
         rows.whole[row] = "it is part of a spline"
+    elif statement.line in run.survey.inline:
+        rows.whole[row] = "it is an inline form"
     elif run.triggered:
         rows.whole[row] = "a TRIGGER before it counts from it"
     run.triggered = False

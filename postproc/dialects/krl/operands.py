@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import chain
 
 from postproc.dialects.krl.expressions import index_text
 from postproc.dialects.krl.lexing import NAME, identifiers
@@ -24,14 +26,14 @@ _LAST_SLUR = re.compile(rb"[ \t,]C_(DIS|VEL|ORI|PTP|SPL)[ \t]*\Z", re.I)
 _HOME = re.compile(rb"X?HOME[1-5]?\Z")
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Parts:
     """A motion statement taken apart; offsets in its code.  points: begin and end of what stands between commas; slurs:
     approximation words; reference: begin and end of #BASE or #TOOL; clause: WITH and what follows; odd: what has no
     meaning there."""
 
-    points: list[tuple[int, int]]
-    slurs: list[bytes]
+    points: tuple[tuple[int, int], ...]
+    slurs: tuple[bytes, ...]
     reference: tuple[int, int] | None = None
     clause: bytes = b""
     odd: bytes = b""
@@ -51,51 +53,49 @@ class Operand:
     builds: bool = False
 
 
+@lru_cache(maxsize=4096)
 def take_apart(code: bytes, begin: int) -> Parts:
     """The parts of a motion statement, whose word ends at ``begin``."""
-    parts = Parts([], [])
-    at: int | None = begin  # where the open point begins
-    depth, behind = 0, begin
-
-    def close(stop: int) -> None:
-        nonlocal at
-        if at is None:
-            if code[behind:stop].strip():
-                parts.odd = parts.odd or code[behind:stop].strip()
-        else:
-            text = code[at:stop]
-            left = at + len(text) - len(text.lstrip(b" \t"))
-            right = at + len(text.rstrip(b" \t"))
-            if right > left:
-                parts.points.append((left, right))
-            at = None
-
-    for mark in _MARK.finditer(code, begin):
-        token = mark[0]
-        if token in b"{([":
+    points: list[tuple[int, int]] = []
+    slurs: list[bytes] = []
+    reference: tuple[int, int] | None = None
+    clause = odd = b""
+    is_open, at = True, begin  # whether a point is open, and behind what
+    depth = 0
+    for mark in chain(_MARK.finditer(code, begin), (None,)):
+        token = b"" if mark is None else mark[0]
+        if mark is None:
+            pass
+        elif token in b"{([":
             depth += 1
+            continue
         elif token in b"})]":
             depth -= 1
+            continue
         elif depth > 0 or token.startswith(b'"'):
             continue
-        else:
-            close(mark.start())
-            behind = mark.end()
-            if token == b",":
-                at = behind
-            elif token.startswith(b"#"):
-                parts.reference = mark.span()
-            elif token.upper() == b"WITH":
-                parts.clause = code[behind:]
-                found = _LAST_SLUR.search(parts.clause)
-                if found:
-                    parts.slurs.append(b"C_" + found[1].upper())
-                    parts.clause = parts.clause[: found.start()]
-                return parts
-            else:
-                parts.slurs.append(token.upper())
-    close(len(code))
-    return parts
+        text = code[at : len(code) if mark is None else mark.start()]
+        inner = text.strip(b" \t")
+        if inner and is_open:
+            left = at + text.find(inner)
+            points.append((left, left + len(inner)))
+        elif inner:
+            odd = odd or inner
+        if mark is None:
+            break
+        is_open, at = token == b",", mark.end()
+        if token.startswith(b"#"):
+            reference = mark.span()
+        elif token.upper() == b"WITH":
+            clause = code[at:]
+            found = _LAST_SLUR.search(clause)
+            if found:
+                slurs.append(b"C_" + found[1].upper())
+                clause = clause[: found.start()]
+            break
+        elif token != b",":
+            slurs.append(token.upper())
+    return Parts(tuple(points), tuple(slurs), reference, clause, odd)
 
 
 def operand_at(run: Run, code: bytes, at: int, place: tuple[int, int]) -> Operand:

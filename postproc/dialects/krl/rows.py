@@ -19,6 +19,9 @@ from postproc.toolpath import Annotation, Kind
 
 NAN = float("nan")
 NAN6: Numbers = (NAN,) * 6
+FEW = 8
+"""Places where the robot may come from that are kept apart."""
+
 NO_ARC = (NAN,) * 7
 
 
@@ -132,6 +135,14 @@ class Rows:
         if reason is not None:
             self.ranges.append((first, self.count, reason))
         return self.count - 1
+
+    def joined(self, sources: frozenset[Source]) -> frozenset[Source]:
+        """The same rows and marks, as one mark where they are many."""
+        if len(sources) <= FEW:
+            return sources
+        mark = b"join %d" % len(self.sources)
+        self.sources[mark] |= sources
+        return frozenset([mark])
 
     def truncate(self, count: int) -> None:
         """Takes the rows from ``count`` on out again."""

@@ -66,6 +66,8 @@ _CALLING = frozenset(["assignment", "call", "open", "close", "return"])
 
 _DONE_LATER = re.compile(rb"\bDO[ \t]+(" + NAME + rb")", re.I)
 _COUNTER = re.compile(rb"FOR[ \t]+(" + NAME + rb")[ \t]*=", re.I)
+_INLINE = re.compile(rb";[ \t]*FOLD[ \t]+(?:S?(?:PTP|LIN|CIRC)|SPL)(?![A-Za-z0-9_])", re.I)
+_FOLD = re.compile(rb";[ \t]*(END)?FOLD(?![A-Za-z0-9_])", re.I)
 _KEYS = frozenset([*COMPONENTS, *AXES, *EXTERNAL, b"S", b"T"])
 
 _BAS = re.compile(rb"[ \t]*#[ \t]*([A-Za-z_][A-Za-z0-9_]*)[ \t]*(?:,[ \t]*(.*?)[ \t]*)?\Z", re.S)
@@ -131,7 +133,7 @@ class Survey:
     ``routine_at``: index of the DEF -> routine; ``unclosed``: (line, what) of blocks without an end and ends without a
     begin; ``assigned``: names that the program assigns as a whole, or with ``.X`` behind them a component of; ``read``:
     names that code reads, other than as the target of a motion; ``later``: names that run or change at a time of their
-    own (interrupts, triggers); ``jumps``: begin of the routine and name of every label that a GOTO names; ``effects``:
+    own (interrupts, triggers); ``inline``: lines of motions in the fold of an inline form; ``jumps``: begin of the routine and name of every label that a GOTO names; ``effects``:
     all that the program changes anywhere.
     """
 
@@ -143,6 +145,7 @@ class Survey:
     later: set[bytes] = field(default_factory=set)
     jumps: set[tuple[int, bytes]] = field(default_factory=set)
     effects: Effects = field(default_factory=set)
+    inline: set[int] = field(default_factory=set)
     unclosed: list[tuple[int, str]] = field(default_factory=list)
 
     @property
@@ -181,12 +184,18 @@ class _Surveyor:
         self.stack: list[Block] = []
         self.buried = 0  # blocks deeper than DEEPEST that are open
         self.routine: Routine | None = None
+        self.folds: list[bool] = []  # those that are open, and whether it is that of an inline form
+        self.inline = 0
 
     def take(self, index: int, statement: Statement) -> None:
         kind, stack = statement.kind, self.stack
         if kind == "motion":
             if stack and not _stays(statement.code):
                 stack[-1].effects.add("point")
+            if self.inline:
+                self.found.inline.add(statement.line)
+        elif kind == "comment":
+            self._fold(statement.comment)
         elif kind == "def":
             self._routine(index, statement)
         elif kind == "end":
@@ -214,8 +223,18 @@ class _Surveyor:
         elif kind == "label" and isinstance(statement.said, bytes):
             if self.routine is not None:
                 self.routine.labels.setdefault(statement.said, (index, tuple(stack[1:])))
-        elif kind != "comment":
+        else:
             self.note(statement)
+
+    def _fold(self, comment: bytes) -> None:
+        found = _FOLD.match(comment)
+        if found is None:
+            return
+        if not found[1]:
+            self.folds.append(_INLINE.match(comment) is not None)
+            self.inline += self.folds[-1]
+        elif self.folds:
+            self.inline -= self.folds.pop()
 
     def _routine(self, index: int, statement: Statement) -> None:
         if self.stack:
