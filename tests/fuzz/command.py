@@ -25,6 +25,8 @@ from postproc.units import DEG
 
 LIMIT_S = 30.0
 """Seconds after which a run hangs."""
+BASE_S, PER_MB_S = 1.0, 2.0
+"""Seconds that reading may take: a constant, and for each 10^6 bytes."""
 SLOWEST = 5
 SETTINGS = Settings(orientation=np.array([0.0, 0.0, 180.0 * DEG]))
 
@@ -71,8 +73,8 @@ def sources(folder: Path) -> list[Source]:
     return found
 
 
-def run(source: Source, seed: int, number: int, only: tuple[str, ...] = ()) -> Run:
-    """One mutant of a program; ``seed`` and ``number`` say which."""
+def run(source: Source, seed: int, number: int, only: tuple[str, ...] = (), timed: bool = True) -> Run:
+    """One mutant of a program; ``seed`` and ``number`` say which; ``timed``: being slow is a failure."""
     random = np.random.default_rng([seed, number])
     documents = list(source.documents)
     which = 0 if len(documents) == 1 or random.random() < 0.7 else 1
@@ -86,6 +88,9 @@ def run(source: Source, seed: int, number: int, only: tuple[str, ...] = ()) -> R
     try:
         seen = examined(source.dialect, mutant, random, SETTINGS)
         seconds, motions, moved = seen.seconds, seen.motions, seen.moved
+        size = sum(len(document.raw) for document in mutant)
+        if timed and seconds > BASE_S + PER_MB_S * size / 1e6:
+            raise Broken(f"reading {size} bytes took {seconds:.1f} s")
     except Broken as broken:
         failure, place = str(broken), "held"
     except Exception as error:

@@ -21,9 +21,6 @@ HALF_MM = 0.50001e-3
 ANGLES = 3 * 0.50001e-3
 """[deg] half a step in each of three angles."""
 
-BASE_S, PER_MB_S = 1.0, 2.0
-"""Seconds that reading may take: a constant, and for each 10^6 bytes."""
-
 
 class Broken(Exception):
     """Something that must hold does not."""
@@ -48,9 +45,6 @@ def examined(
     begin = time.process_time()
     program = dialect.read(documents, settings)
     seconds = time.process_time() - begin
-    size = sum(len(document.raw) for document in documents)
-    if seconds > BASE_S + PER_MB_S * size / 1e6:
-        raise Broken(f"reading {size} bytes took {seconds:.1f} s")
     path = program.toolpath
     for finding in program.findings:
         if finding.line > len(documents[0].line_starts) and len(documents) == 1:
@@ -116,13 +110,15 @@ def movable(path: Toolpath) -> Bools:
 
 
 def dividable(path: Toolpath) -> Bools:
-    """(N,) the straight motions, and plane arcs, that another one may be inserted before."""
+    """(N,) the straight motions, and plane arcs of no more than a turn and a half, that another one may be inserted
+    before."""
     free = path.known & ((path.kind == Kind.LIN) | (path.kind == Kind.CIRC)) & (path.anchor < 0)
     free[[*path.refused, *path.whole]] = False
     arcs = np.flatnonzero(path.kind == Kind.CIRC)
     before = np.maximum(arcs - 1, 0)
     advance = np.sum((path.position[arcs] - path.position[before]) * path.normal[arcs], axis=1)
     free[arcs] &= (np.abs(advance) < 1e-9) & (path.base[arcs] == path.base[before]) & (arcs > 0)
+    free[arcs] &= path.sweep[arcs] < 600 * DEG
     return free
 
 

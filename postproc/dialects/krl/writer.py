@@ -12,7 +12,7 @@ from postproc.dialects.dialect import Moved, Plan, Program, Writing
 from postproc.dialects.krl.chain import Chain
 from postproc.dialects.krl.components import LETTER, Components, Task, differs
 from postproc.dialects.krl.inserting import insertions
-from postproc.dialects.krl.targets import single_edits
+from postproc.dialects.krl.targets import FULL, single_edits
 from postproc.document import Edits
 from postproc.toolpath import Kind
 
@@ -23,7 +23,8 @@ BLOCK = 1 << 16
 def moved(program: Program, plan: Plan, writing: Writing) -> Moved:
     """The edits after which the program makes the motions of ``plan``.
 
-    Raises ValueError if a row is asked to move, or to be divided, that can not: a defect of the caller.
+    Raises ValueError if a row is asked to move, or to be divided, that can not, and for an inserted arc that sweeps
+    more than ``FULL``: defects of the caller.
     """
     task = Task(program, plan, writing)
     touched, way = _touched(task)
@@ -72,6 +73,9 @@ def _refuse_forbidden(task: Task, touched: Bools, way: Bools) -> None:
     if fixed_rows:
         raise ValueError(f"motions that can not be corrected were moved: rows {sorted(fixed_rows)[:5]}")
     whole = {row for row in (*path.refused, *path.whole) if task.inserted[row]}
+    turns = task.plan.sweep[~task.plan.own] > FULL
+    if turns.any():
+        raise ValueError("an inserted arc of nearly a turn: three points do not hold it")
     if whole:
         raise ValueError(f"motions that can not be divided were: rows {sorted(whole)[:5]}")
 
