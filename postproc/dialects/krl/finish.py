@@ -81,6 +81,7 @@ def finished(run: Run, text_called: Iterable[bytes]) -> tuple[Toolpath, Places, 
         locked=rows.locked,
         arcs=rows.arcs,
         relative=rows.relative,
+        inline=rows.inline,
     )
     return toolpath, places, [*_told(rows, table, refused), *_told_external(rows, table)]
 

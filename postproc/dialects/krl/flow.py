@@ -21,8 +21,16 @@ from postproc.dialects.krl.lexing import (
     value_end,
 )
 from postproc.dialects.krl.run import Open, Run
-from postproc.dialects.krl.state import State
-from postproc.dialects.krl.survey import HIDDEN, PATH_FROM_FILE, Block, Routine, functions_of, is_harmless
+from postproc.dialects.krl.state import Form, State
+from postproc.dialects.krl.survey import (
+    HIDDEN,
+    INLINE,
+    PATH_FROM_FILE,
+    Block,
+    Routine,
+    functions_of,
+    is_harmless,
+)
 from postproc.dialects.krl.target import Unclear, shown
 from postproc.dialects.krl.variables import Entry
 from postproc.toolpath import Annotation
@@ -186,6 +194,10 @@ class Flow:
 
     def _comment(self, item: Statement) -> None:
         run = self.run
+        if run.survey.inline and item.kind == "comment" and INLINE.match(item.comment):
+            state = run.state
+            at = run.document.raw.rfind(b"\n", 0, item.at) + 1
+            state.form = Form(at, (state.base, state.tool), state.feed)
         text = item.comment[1:].decode("latin-1").strip()
         note = Annotation(len(run.rows), text, item.line)
         if _ANNOTATION.match(item.comment):

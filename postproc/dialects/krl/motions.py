@@ -9,7 +9,7 @@ from postproc.dialects.krl.assignments import with_clause
 from postproc.dialects.krl.bulk import Bulk
 from postproc.dialects.krl.lexing import LONGEST, LOOPS, SPLINES, Statement, identifiers
 from postproc.dialects.krl.operands import Operand, Parts, operand_at, take_apart
-from postproc.dialects.krl.places import Auxiliary, Relative
+from postproc.dialects.krl.places import Auxiliary, InlineForm, Relative
 from postproc.dialects.krl.rows import NAN6, NO_ARC, Reason, Row, index, refusal, way_of
 from postproc.dialects.krl.run import Run
 from postproc.dialects.krl.spatial import Arc, Numbers, Vector, arc, rotation, turned
@@ -334,8 +334,8 @@ def _enter(
             rows.locked[row] = stated.locked
     if kind == Kind.SPL or (run.stack and any(item.block.word in SPLINES for item in run.stack)):
         rows.whole[row] = "it is part of a spline"
-    elif statement.line in run.survey.inline:
-        rows.whole[row] = "it is an inline form"
+    elif statement.line in run.survey.inline and not _in_form(run, row):
+        rows.whole[row] = "it is an inline form that sets another base or tool"
     elif run.triggered:
         rows.whole[row] = "a TRIGGER before it counts from it"
     run.triggered = False
@@ -348,6 +348,15 @@ def _enter(
         state.anchor, state.point_frames = anchor, (state.base, state.tool)
     state.sources = frozenset([row])
     return row
+
+
+def _in_form(run: Run, row: int) -> bool:
+    """Notes the inline form to which a motion belongs; gives whether its base and tool are in force before it."""
+    state, form = run.state, run.state.form
+    if form is None:
+        return False
+    run.rows.inline[row] = InlineForm(form.at, form.feed)
+    return form.frames == (state.base, state.tool) and not run.triggered
 
 
 def _inherits(stated: Target | None, relative: bool) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.arrays import Floats
 from postproc.dialects.krl.bulk import Bulk
-from postproc.dialects.krl.places import Auxiliary, Relative, Variable
+from postproc.dialects.krl.places import Auxiliary, InlineForm, Relative, Variable
 from postproc.dialects.krl.spatial import Arc, Numbers
 from postproc.dialects.krl.state import Anchor, Frame, Source, State
 from postproc.dialects.krl.target import NOWHERE, Target, Unclear
@@ -99,6 +99,7 @@ class Rows:
     arcs: dict[int, Auxiliary] = field(default_factory=dict)
     relative: dict[int, Relative] = field(default_factory=dict)
     whole: dict[int, str] = field(default_factory=dict)
+    inline: dict[int, InlineForm] = field(default_factory=dict)
     slurred: dict[int, float] = field(default_factory=dict)
     builds_on: dict[int, frozenset[Source]] = field(default_factory=dict)
     reads: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
@@ -154,7 +155,7 @@ class Rows:
                 self.chunks.append(chunk[: count - self.count])
                 self.count = count
         for sparse in (
-            self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative, self.whole,
+            self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative, self.whole, self.inline,
             self.slurred, self.builds_on,
         ):  # fmt: skip
             while sparse and next(reversed(sparse)) >= count:

@@ -69,12 +69,22 @@ NO_BASE = Unclear("KRL005", "no $BASE was set before it")
 NO_TOOL = Unclear("KRL005", "no $TOOL was set before it")
 
 
+@dataclass(frozen=True, slots=True)
+class Form:
+    """The begin of the last inline form: where its fold stands, and base, tool and feed that are in force there."""
+
+    at: int
+    frames: tuple[Frame | Unclear, Frame | Unclear]
+    feed: float
+
+
 @dataclass(slots=True)
 class State:
     """Everything that a motion's meaning depends on besides variables.
 
     feed [m/s], blend [mm] ($APO.CDIS): NaN where not known; point: X..C of the last end point [mm, deg], stated in
-    ``point_frames``; axes [deg]: those of the last end point, where it was programmed so.
+    ``point_frames``; axes [deg]: those of the last end point, where it was programmed so; form: the inline form that
+    was entered last.
     """
 
     base: Frame | Unclear = NO_BASE
@@ -91,6 +101,7 @@ class State:
     frames_record: Record | None = None
     path_record: Record | None = None
     axis_record: Record | None = None
+    form: Form | None = None
 
     def copy(self) -> State:
         return replace(self)

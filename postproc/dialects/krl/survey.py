@@ -66,7 +66,7 @@ _CALLING = frozenset(["assignment", "call", "open", "close", "return"])
 
 _DONE_LATER = re.compile(rb"\bDO[ \t]+(" + NAME + rb")", re.I)
 _COUNTER = re.compile(rb"FOR[ \t]+(" + NAME + rb")[ \t]*=", re.I)
-_INLINE = re.compile(rb";[ \t]*FOLD[ \t]+(?:S?(?:PTP|LIN|CIRC)|SPL)(?![A-Za-z0-9_])", re.I)
+INLINE = re.compile(rb";[ \t]*FOLD[ \t]+(?:S?(?:PTP|LIN|CIRC)|SPL)(?![A-Za-z0-9_])", re.I)
 _FOLD = re.compile(rb";[ \t]*(END)?FOLD(?![A-Za-z0-9_])", re.I)
 _KEYS = frozenset([*COMPONENTS, *AXES, *EXTERNAL, b"S", b"T"])
 
@@ -133,8 +133,8 @@ class Survey:
     ``routine_at``: index of the DEF -> routine; ``unclosed``: (line, what) of blocks without an end and ends without a
     begin; ``assigned``: names that the program assigns as a whole, or with ``.X`` behind them a component of; ``read``:
     names that code reads, other than as the target of a motion; ``later``: names that run or change at a time of their
-    own (interrupts, triggers); ``inline``: lines of motions in the fold of an inline form; ``jumps``: begin of the routine and name of every label that a GOTO names; ``effects``:
-    all that the program changes anywhere.
+    own (interrupts, triggers); ``inline``: lines of motions in the fold of an inline form; ``jumps``: begin of the
+    routine and name of every label that a GOTO names; ``effects``: all that the program changes anywhere.
     """
 
     events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
@@ -231,7 +231,7 @@ class _Surveyor:
         if found is None:
             return
         if not found[1]:
-            self.folds.append(_INLINE.match(comment) is not None)
+            self.folds.append(INLINE.match(comment) is not None)
             self.inline += self.folds[-1]
         elif self.folds:
             self.inline -= self.folds.pop()
