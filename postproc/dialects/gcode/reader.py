@@ -216,6 +216,8 @@ def _whole(given: Blocks, rows: Ints) -> dict[int, str]:
     word, usual = given.control.turns
     if word in given.columns:
         more |= given.number(word) > usual
+    # Machine axes: what is inserted has no words for them.
+    more |= given.has(*(key(letter) for letter in "ABC")) & (modal.force[Group.TCP] != 1)
     timed = modal.force[Group.FEED] == Feed.INVERSE_TIME
     found: dict[int, str] = {}
     for mask, why in (

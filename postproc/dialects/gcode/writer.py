@@ -122,14 +122,16 @@ def _positions(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet) -
     path, places, text, row = program.toolpath, program.text, motions.text, motions.row
     source = np.where(motions.own[:, None], text.units(row, path.position[row]), np.nan)
     own, relative = _stated_columns(motions, AXES)
+    begin = places.begin[row] / places.scale[row, None]
     wanted = Wanted(
-        text.units(row, plan.position),
+        _reached(program, plan, motions, begin),
         source,
         own,
         relative,
         sheet.decimals[:, AXES],
         _fixed(program, motions, plan),
         _closed(program, plan, motions, sheet),
+        begin,
     )
     into = Followed.nothing(wanted)
     other = np.zeros(len(row), dtype=bool)
@@ -145,6 +147,26 @@ def _positions(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet) -
         follow(wanted, start, a, b, into)
     sheet.write[:, AXES], sheet.number[:, AXES] = into.write, into.number
     return into
+
+
+def _reached(program: Program, plan: Plan, motions: _Motions, begin: Floats) -> Floats:
+    """(M, 3) where the motions end, in their frames; of refused ones what the motion behind knows of it."""
+    places, row = program.text, motions.row
+    wanted = motions.text.units(row, plan.position)
+    same = np.zeros(len(row), dtype=bool)
+    same[:-1] = True
+    for state in (places.frame, places.scale):
+        same[:-1] &= state[row[1:]] == state[row[:-1]]
+    behind = np.roll(begin, -1, axis=0)
+    return np.where(same[:, None] & np.isnan(wanted), behind, wanted)
+
+
+def _before(values: Floats, orient: Ints) -> Floats:
+    """(M, 3) the numbers in force before the motions, NaN where they mean something else."""
+    before = np.roll(values, 1, axis=0)
+    before[:1] = np.nan
+    before[1:][orient[1:] != orient[:-1]] = np.nan
+    return before
 
 
 def _closed(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet) -> Bools:
@@ -190,6 +212,7 @@ def _orientations(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet
         sheet.decimals[:, TURNED],
         _fixed(program, motions, plan) | (orient < 0),
         np.zeros(values.shape, dtype=bool),
+        _before(source, orient),
     )
     into = Followed.nothing(wanted)
     bounds = [0, *(np.flatnonzero(np.diff(orient)) + 1).tolist(), len(row)]
@@ -211,6 +234,9 @@ def _arcs(
     path, places, text = program.toolpath, program.text, motions.text
     convert, bad = np.zeros(len(plan), dtype=bool), np.zeros(len(plan), dtype=bool)
     arc = (path.kind[motions.row] == Kind.CIRC) & ~motions.link & np.isfinite(plan.sweep)
+    lost = np.isfinite(path.sweep[motions.row]) & ~motions.link & np.isnan(plan.sweep)
+    if lost.any():
+        raise ValueError(f"arcs without a way: rows {motions.row[lost][:5].tolist()}")
     m = np.flatnonzero(arc & ~_fixed(program, motions, plan))
     row = motions.row[m]
     centre = text.units(row, plan.centre[m])

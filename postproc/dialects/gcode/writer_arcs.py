@@ -15,9 +15,12 @@ WELL = np.radians([167.0, 193.0, 300.0])
 """Sweeps up to the first and between the others leave an arc given by its radius well determined: between the first
 two the centre moves by more than nine times what the radius is rounded by, beyond the last it turns with the ends."""
 
+NEAR = 1.0
+"""Written steps by which the inside of a written arc may be elsewhere than planned before a digit is added."""
+
 FAR = 2.0
-"""Written steps by which the inside of a written arc may be elsewhere than planned, or its radii differ; twice as many
-for an arc through a point, which can not advance along its normal evenly."""
+"""Written steps by which the inside of a written arc may be elsewhere than planned at all, or its radii differ; twice
+as many for an arc through a point, which can not advance along its normal evenly."""
 
 
 class Form(IntEnum):
@@ -87,11 +90,12 @@ def write_arcs(arcs: Arcs) -> WrittenArcs:
     decimals[:, 3] += by_radius & (arcs.sweep > np.radians(120.0))
 
     number, write = _kept(wanted, arcs.own, decimals)
-    unequal = by_centre & (_mismatch(arcs, number) > 0.5 * 10.0 ** -decimals[:, :3].max(axis=1))
-    decimals[unequal, :3] += 1
-    number[unequal], write[unequal] = (
-        part[unequal] for part in _kept(wanted, np.where(write, np.nan, arcs.own), decimals)
-    )
+    # Rounded centres and points leave radii that differ, or another way: a digit more where that counts.
+    off, unequal = _missed(arcs, number, through, by_radius)
+    finer = ~by_radius & ((off > NEAR) | (unequal > 0.5))
+    decimals[finer, :3] += 1
+    kept = _kept(wanted, np.where(write, np.nan, arcs.own), decimals)
+    number[finer], write[finer] = (part[finer] for part in kept)
     # An absent word is zero (or inherits): it is written where that is not meant.
     default = np.where(arcs.relative, 0.0, arcs.begin)
     absent = np.isnan(arcs.own[:, :3]) & (np.abs(wanted[:, :3] - default) <= 0.5 * 10.0 ** -decimals[:, :3])
@@ -99,7 +103,9 @@ def write_arcs(arcs: Arcs) -> WrittenArcs:
     write[:, :3] &= ~absent
     number[:, :3] = np.where(absent, default, number[:, :3])
     write[:, :3] |= convert[:, None] & np.isfinite(wanted[:, :3])
-    return WrittenArcs(write, number, decimals, convert, _misread(arcs, number, through, by_radius))
+    off, unequal = _missed(arcs, number, through, by_radius)
+    bad = ~(off <= np.where(through, 2.0, 1.0) * FAR) | (unequal > FAR)
+    return WrittenArcs(write, number, decimals, convert, bad)
 
 
 def _well(sweep: Floats) -> Bools:
@@ -144,17 +150,14 @@ def _distance(arcs: Arcs, one: Floats, other: Floats) -> Floats:
     return np.asarray(np.linalg.norm(_in_plane(arcs, one - other), axis=1))
 
 
-def _mismatch(arcs: Arcs, number: Floats) -> Floats:
-    centre = _centre(arcs, number)
-    return np.abs(_distance(arcs, arcs.begin, centre) - _distance(arcs, arcs.end, centre))
-
-
-def _misread(arcs: Arcs, number: Floats, through: Bools, by_radius: Bools) -> Bools:
-    """(K,) whether the written numbers are read as another arc than the planned one: points inside are elsewhere."""
+def _missed(arcs: Arcs, number: Floats, through: Bools, by_radius: Bools) -> tuple[Floats, Floats]:
+    """(K,) how far the way that the written numbers state is from the planned one, NaN where it is none or turns
+    otherwise; (K,) how much the radii at begin and end differ.  In written steps."""
     count = len(arcs.sweep)
     normal = np.zeros((count, 3))
     normal[np.arange(count), PLANES[arcs.plane, 2]] = np.where(arcs.clockwise, -1.0, 1.0)
-    centre = np.where(by_radius[:, None], _by_radius(arcs, normal, number[:, 3]), _centre(arcs, number))
+    stated = _centre(arcs, number)
+    centre = np.where(by_radius[:, None], _by_radius(arcs, normal, number[:, 3]), stated)
     start, stop = arcs.begin - centre, arcs.end - centre
     across = np.sum(np.cross(start, stop) * normal, axis=1)
     along = np.sum(start * stop, axis=1) - np.sum(start * normal, axis=1) * np.sum(stop * normal, axis=1)
@@ -173,10 +176,9 @@ def _misread(arcs: Arcs, number: Floats, through: Bools, by_radius: Bools) -> Bo
         meant = on_arc(arcs.begin, arcs.end, arcs.centre, arcs.normal, arcs.sweep, at)
         read = on_arc(arcs.begin, arcs.end, centre, normal, sweep, at)
         worst = np.maximum(worst, np.linalg.norm(meant - read, axis=1))
-    unequal = ~through & ~by_radius & (_mismatch(arcs, number) > FAR * step)
-    return (
-        unequal | ~(worst <= np.where(through, 2.0, 1.0) * FAR * step) | ~(np.abs(sweep - arcs.sweep) < np.pi)
-    )
+    worst[~(np.abs(sweep - arcs.sweep) < np.pi)] = np.nan
+    unequal = np.abs(_distance(arcs, arcs.begin, stated) - _distance(arcs, arcs.end, stated))
+    return worst / step, np.where(through | by_radius, 0.0, unequal / step)
 
 
 def _by_radius(arcs: Arcs, normal: Floats, radius: Floats) -> Floats:

@@ -19,7 +19,8 @@ class Wanted:
     wanted: where the motion is to end; source: where it ends in the source, NaN for what is inserted; own: the number
     that stands in its block, NaN where there is none; relative, decimals: see ``Stated``.  fixed (M,): its block must
     stay as it is.  closed (M, K): it has to end exactly where it begins, with as many decimals as that takes.
-    What is not known (NaN wanted) is left as it stands.
+    What is not known (NaN wanted) is left as it stands.  origin (M, K): where the motion begins in the source; a fixed
+    one that ends there inherits where the motion before came to.
     """
 
     wanted: Floats
@@ -29,6 +30,7 @@ class Wanted:
     decimals: Ints
     fixed: Bools
     closed: Bools
+    origin: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +69,7 @@ def _follow_column(motions: Wanted, start: float, a: int, b: int, column: int, i
         write = alone & known & ~(np.abs(want - own) <= half)
     number = np.where(write, _rounded(want, decimals), own)
     end = np.where(alone, number, want)
-    led = np.flatnonzero(~alone & ~motions.fixed[a:b] & known)
+    led = np.flatnonzero(~alone & (~motions.fixed[a:b] | np.isnan(own)) & known)
     if len(led):
         _follow_led(motions, start, a, b, column, led, half, write, number, end)
     into.end[a:b, column], into.write[a:b, column], into.number[a:b, column] = end, write, number
@@ -90,11 +92,16 @@ def _follow_led(
     wants, owns = motions.wanted[a:b, column].tolist(), motions.own[a:b, column].tolist()
     relatives, closed = motions.relative[a:b, column].tolist(), motions.closed[a:b, column].tolist()
     sources, halves = motions.source[a:b, column].tolist(), half.tolist()
+    origins = motions.origin[a:b, column].tolist()
     digits = motions.decimals[a:b, column].tolist()
-    ends = end.tolist()
+    ends, fixed = end.tolist(), motions.fixed[a:b].tolist()
     for k in led.tolist():
         begin = ends[k - 1] if k else start
         want, own, d, within = wants[k], owns[k], digits[k], halves[k]
+        if fixed[k]:
+            # Nothing is written; what it leaves out goes on as it is.
+            ends[k] = begin if begin == begin and abs(want - origins[k]) <= SLACK else want
+            continue
         if begin != begin and (relatives[k] or abs(want - sources[k]) <= within):
             continue  # not known where it begins, and not moved
         if closed[k] and begin == begin:
