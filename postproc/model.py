@@ -319,6 +319,11 @@ class StiffnessModel:
         return force, slope
 
     @cached_property
+    def slack(self) -> bool:
+        """Whether the robot stands, without a wrench, where its controller believes."""
+        return self.robot.nominal is self.robot.arm and all(term.effect.slack for term in self.terms)
+
+    @cached_property
     def _laws(self) -> list[tuple[ComplianceLaw, Values]]:
         return [(t.effect, t.values) for t in self.terms if isinstance(t.effect, ComplianceLaw)]
 

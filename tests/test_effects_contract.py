@@ -15,12 +15,15 @@ from effects_at_work import (
     sampled,
     with_terms,
 )
+from motions import milling_angles
 from plant import kr270, random_angles, random_tools, random_wrenches
 
 from postproc import model as model_module
 from postproc.effects import EFFECTS, ComplianceLaw, Conditions, EnergyLoad, Load, Offset, State
 from postproc.geometry import Poses, vector_from_rotation
+from postproc.model import StiffnessModel
 from postproc.robot.chain import Chain
+from postproc.robot.description import Value
 from postproc.units import UNITS
 
 NAMES = """
@@ -690,3 +693,21 @@ def test_a_stated_payload_weighs_as_one_of_the_effect():
     # without the effect, weights on the flange are nobody's business
     unsaid = base.equilibrium(q, wrench, tool, stated)
     assert np.array_equal(unsaid.coordinates, base.equilibrium(q, wrench, tool, given).coordinates)
+
+
+@pytest.mark.parametrize("name", sorted(EFFECTS))
+def test_what_is_slack_moves_nothing_without_a_wrench(name):
+    """The states of the model without a wrench are those of a rigid arm, or the effect does not say so."""
+    robot = kr270()
+    effect = EFFECTS[name](robot.joints)
+    rng = np.random.default_rng(8)
+    values = {p.name: Value(p.null + 0.3 * p.scale, None, None, "test") for p in effect.parameters}
+    model = replace(StiffnessModel.from_robot(robot), terms=()).added(effect, values)
+    q = milling_angles(20, rng)
+    there = model.equilibrium(q, np.zeros((20, 6)), Poses.identity()).pose
+    rigid = model.chain.flange(q)
+    stands = np.allclose(there.position, rigid.position, atol=1e-9) and np.allclose(
+        there.rotation, rigid.rotation, atol=1e-9
+    )
+    assert stands or not effect.slack
+    assert model.slack is effect.slack

@@ -26,6 +26,13 @@ from postproc.cli.common import Numbers, Out, ending, readings_options, result_o
     help="Draw the gap per pose before and after, what betrays the effect, and the evidence per candidate.",
 )
 @click.option(
+    "--page",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.html",
+    callback=ending(".html"),
+    help="All of it as one page for a browser; needs no network.",
+)
+@click.option(
     "--csv",
     "csv_to",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -42,6 +49,7 @@ def diagnose(
     tool: Numbers | None,
     next_poses: Path | None,
     picture: Path | None,
+    page: Path | None,
     csv_to: Path | None,
     strict: bool,
     json_to: str | None,
@@ -75,6 +83,7 @@ def diagnose(
         next_poses=next_poses,
         tool_mm_deg=tool,
         picture=picture,
+        page=page,
         csv=csv_to,
         json=out.json_file,
         strict=strict,

@@ -80,6 +80,13 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     help="Draw the residuals by joint, direction, load and order.",
 )
 @click.option(
+    "--page",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.html",
+    callback=ending(".html"),
+    help="All of it as one page for a browser; needs no network.",
+)
+@click.option(
     "--csv",
     "csv_to",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -102,6 +109,7 @@ def identify(
     folds: int,
     bootstrap: int | None,
     picture: Path | None,
+    page: Path | None,
     csv_to: Path | None,
     strict: bool,
     json_to: str | None,
@@ -141,6 +149,7 @@ def identify(
         bootstrap=bootstrap,
         tool_mm_deg=tool,
         picture=picture,
+        page=page,
         csv=csv_to,
         json=out.json_file,
         strict=strict,

@@ -77,6 +77,13 @@ def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numb
     help="Draw the map; of a box, slices along z.",
 )
 @click.option(
+    "--page",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.html",
+    callback=ending(".html"),
+    help="All of it as one page for a browser; needs no network.",
+)
+@click.option(
     "--csv",
     "csv_to",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -99,6 +106,7 @@ def map_(
     ignore_limits: bool,
     status: int | None,
     picture: Path | None,
+    page: Path | None,
     csv_to: Path | None,
     json_to: str | None,
     quiet: bool,
@@ -154,6 +162,7 @@ def map_(
         ignore_limits=ignore_limits,
         status=status,
         picture=picture,
+        page=page,
         csv=csv_to,
         json=out.json_file,
     )

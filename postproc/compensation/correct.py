@@ -119,6 +119,8 @@ def correct(task: Task) -> Result:
     findings += left_findings(task.file, path, cut, why)
     _warn_sides(task, done.q, rows_may, keeps, findings)
     _warn_singular(task, seen & forced, findings)
+    after, after_angle = before.copy(), before_angle.copy()
+    after[moved], after_angle[moved] = done.error[chosen], done.angle[chosen]
     result = Result(
         state,
         cut,
@@ -126,13 +128,15 @@ def correct(task: Task) -> Result:
         deflection,
         before,
         before_angle,
-        before,
-        before_angle,
+        after,
+        after_angle,
         iterations,
         history,
         tuple(findings),
     )
-    return with_residual(task, result, command)
+    # What the mirror found holds for the whole correction, and where it corrects all that shows.
+    whole = task.gain == 1.0 and task.turns(moved, command.rotation[moved]) is None
+    return result if whole else with_residual(task, result, command)
 
 
 def with_residual(task: Task, result: Result, command: Poses) -> Result:

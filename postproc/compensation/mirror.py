@@ -64,13 +64,15 @@ class Correction:
     """Result of the mirror iteration for N motions.
 
     command: TCP commands in the robot base; q (N, 6): their motor angles; history (K + 1, N) [m]: predicted position
-    error before and after each iteration, NaN once a motion is done; iterations (N,) used; reachable, settled,
-    converged (N,).
+    error before and after each iteration, NaN once a motion is done; error (N,) [m] and angle (N,) [rad]: the last of
+    them; iterations (N,) used; reachable, settled, converged (N,).
     """
 
     command: Poses
     q: Floats
     history: Floats
+    error: Floats
+    angle: Floats
     iterations: Ints
     reachable: Bools
     settled: Bools
@@ -105,6 +107,7 @@ def mirror(
     reachable, settled, converged = np.ones(n, bool), np.ones(n, bool), np.zeros(n, bool)
     history: list[Floats] = []
     last = np.full(n, np.inf)
+    final = np.full((2, n), np.nan)
     active = np.arange(n)
     for iteration in range(MAX_ITERATIONS + 1):
         here = predict(
@@ -126,6 +129,7 @@ def mirror(
         record = np.full(n, np.nan)
         record[active] = error
         history.append(record)
+        final[:, active] = error, angle
         iterations[active] = iteration
         done = good & (error <= POSITION_TOLERANCE) & (angle <= ANGLE_TOLERANCE)
         converged[active[done]] = True
@@ -138,7 +142,7 @@ def mirror(
         position[active] -= shift[going]
         rotation[active] = rotation_from_vector(-turn[going]) @ rotation[active]
     return Correction(
-        Poses(rotation, position), q, np.array(history), iterations, reachable, settled, converged
+        Poses(rotation, position), q, np.array(history), *final, iterations, reachable, settled, converged
     )
 
 

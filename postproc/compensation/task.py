@@ -73,7 +73,7 @@ class Task:
 
     def goal(self, rows: Ints, wanted: Poses) -> Poses:
         """Where the tool is to be: the wanted poses (K), or where the robot without force takes it."""
-        if not self.process:
+        if not self.process or self.model.slack:
             return wanted
         return self.real(rows, wanted, np.zeros((len(rows), 6))).pose
 

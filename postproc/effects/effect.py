@@ -123,7 +123,7 @@ class Effect:
     ``family``: what a controller may already correct (``geometric``, ``weight``), or ``elastic``, ``gear``.
     ``coordinates``: extra coordinates of the chain that it needs.  ``by_direction``: it asks how joints came to their
     place.  ``whole``: an arm that was never calibrated has it in all of its joints.  ``apart``: it may be there on one
-    joint and not on another.
+    joint and not on another.  ``slack``: without a wrench it moves nothing.
     """
 
     name: ClassVar[str]
@@ -131,6 +131,7 @@ class Effect:
     by_direction: ClassVar[bool] = False
     whole: ClassVar[bool] = False
     apart: ClassVar[bool] = True
+    slack: bool = False
     parameters: tuple[Parameter, ...]
     coordinates: tuple[str, ...] = ()
 
@@ -181,6 +182,8 @@ class ComplianceLaw(Effect, ABC):
 
 class LinearCompliance(ComplianceLaw):
     """theta_i = c_i tau_i: one parameter a coordinate of ``coordinates``, in that order."""
+
+    slack = True
 
     def rows(self, chain: Chain) -> Any:
         """Where the coordinates stand in the chain."""

@@ -61,6 +61,7 @@ class GravityCompensator(EnergyLoad):
         self.joint = joint
         self.joint_name = joints[joint].name
         self.preload = preload
+        self.slack = preload == "balanced"
         self.sign = sign
         self.zero = zero
         at, along = self.joint_name, "distance of the two ends along the joint axis"

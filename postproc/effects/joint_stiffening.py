@@ -20,6 +20,7 @@ class JointStiffening(EnergyLoad):
 
     name = "joint_stiffening"
     family = "elastic"
+    slack = True
 
     def __init__(self, joints: Sequence[Joint]) -> None:
         source = "cubic term of a gear's torsion curve"
