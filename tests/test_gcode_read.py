@@ -412,7 +412,7 @@ def test_any_bytes_are_read() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["", "\n", "%", "(", ";", "G", "X", "-", "\xef\xbb\xbf", "%\n%\n", "#", "[", "o", "/"]
+    "text", ["", "\n", "%", "(", ";", "G", "-", "\xef\xbb\xbf", "%\n%\n", "#", "[", "o", "/"]
 )
 def test_nothing_is_read_as_nothing(text: str) -> None:
     for dialect in ("linuxcnc", "fanuc"):

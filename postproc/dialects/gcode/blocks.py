@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -168,9 +169,13 @@ def blocks(text: Text, modal: Modal, control: Control, increments: bool) -> Bloc
 
 
 def _noted(text: Text) -> dict[str, Bools]:
-    found: dict[str, Bools] = {}
+    rows: defaultdict[str, list[int]] = defaultdict(list)
     for note in text.notes:
-        found.setdefault(note.kind, np.zeros(len(text.blocks), np.bool_))[note.block] = True
+        rows[note.kind].append(note.block)
+    found: dict[str, Bools] = {}
+    for kind, blocks in rows.items():
+        found[kind] = np.zeros(len(text.blocks), np.bool_)
+        found[kind][blocks] = True
     return found
 
 

@@ -14,6 +14,7 @@ from postproc.dialects.gcode.words import Text, key
 
 _GOTO = re.compile(r"(?:GOTO[BFC]?|REPEATB?)\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
 CALLS = (97, 98, 198)
+LOCAL = 97
 RETURNS = (99,)
 
 
@@ -66,7 +67,8 @@ def follow(text: Text, control: Control, once: Ints) -> Flow:
     ends = ends[(doubt[ends] == Doubt.NONE) & tape[ends]]
     if len(ends):
         rest = doubt[ends[0] + 1 :]
-        rest[rest != Doubt.PROGRAM] = Doubt.ENDED
+        # M97 runs what stands behind the end, as a subprogram.
+        rest[rest != Doubt.PROGRAM] = Doubt.PROGRAM if (codes == LOCAL).any() else Doubt.ENDED
     return Flow(doubt, _last(doubt), forget[:-1], forget[1:], tape)
 
 

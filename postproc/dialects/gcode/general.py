@@ -11,16 +11,18 @@ from postproc.dialects.gcode.words import How, Note
 _NUMBER = rb"[-+]?[ \t]*(?:\d[\d \t]*(?:\.[\d \t]*)?|\.[ \t]*\d[\d \t]*)"
 _TOKEN = re.compile(
     rb"[ \t\x0b\x0c]+"
+    rb"|(?P<slash>/[ \t]*[1-9]?(?!\d))"
     rb"|(?P<name>[A-Za-z_][A-Za-z_]+)"
     rb"|(?P<letter>[A-Za-z])[ \t]*(?:(?P<number>"
     + _NUMBER
     + rb")(?![\d.#\[])|(?P<sign>[-+]?[ \t]*)(?P<open>[#\[]"
     rb"|[A-Za-z]{2,5}[ \t]*\[))"
+    rb"|(?P<bare>[A-Za-z])(?![A-Za-z_0-9.\[#])"
     rb"|(?P<assign>#)"
     rb"|(?P<corner>,[ \t]*[A-Za-z][ \t]*(?:" + _NUMBER + rb")?)"
     rb"|(?P<check>\*[ \t]*\d+[ \t]*\Z)"
 )
-_HEAD = re.compile(rb"[ \t]*(?:(?P<tape>%)|(?P<deleted>/)[ \t]*\d?|(?P<program>:)[ \t]*(?P<digits>\d+))")
+_HEAD = re.compile(rb"[ \t]*(?:(?P<tape>%)|(?P<program>:[ \t]*\d+|<[^>]*>))")
 _FLOW = re.compile(
     rb"[ \t]*(?:N[ \t]*\d+[ \t]*)?(O[ \t]*(?:\d+|<[^>]*>|#[^ \t]*|\[[^\]]*\]))[ \t]*([A-Za-z]+)", re.I
 )
@@ -53,12 +55,11 @@ def line(text: bytes, offset: int) -> Line:
     head = _HEAD.match(text)
     if head is not None:
         place = head.end()
-        deleted = head["deleted"] is not None
         if head["tape"]:
             note("tape", b"%", head.start("tape"))
             return Line(words, notes, False)
         if head["program"]:
-            note("program", head["digits"], head.start("program"))
+            note("program", head["program"], head.start("program"))
     said = _TEXT.match(text, place)
     if said is not None:
         words.append((offset + said.start(1), ord("M"), -1, offset + said.end(1), 117.0, How.INTEGER))
@@ -69,6 +70,8 @@ def line(text: bytes, offset: int) -> Line:
         return Line(words, notes, deleted)
     while place < len(text):
         found = _TOKEN.match(text, place)
+        if found is None and _speaks(words):
+            break
         if found is None:
             note("unknown", text[place:].strip(), place)
             break
@@ -91,6 +94,11 @@ def line(text: bytes, offset: int) -> Line:
             at = offset + found.start("letter")
             letter = ord(found["letter"].upper())
             words.append((at, letter, offset + start, offset + place, math.nan, How.UNREAD))
+        elif kind == "slash":
+            deleted = True
+        elif kind == "bare":
+            at = offset + found.start("bare")
+            words.append((at, ord(found["bare"].upper()), -1, at + 1, math.nan, How.UNREAD))
         elif kind == "assign":
             target = _TARGET.match(text, found.start())
             note("assign", (target and target[1]) or b"", found.start())
@@ -99,7 +107,7 @@ def line(text: bytes, offset: int) -> Line:
             note("corner", text[found.start() :].strip(), found.start())
         elif kind == "name":
             word = found["name"].upper()
-            if word.startswith(HARMLESS):
+            if word.startswith(HARMLESS) or _speaks(words):
                 break
             if word in _JUMPS:
                 note("jump", text[found.start() :].strip(), found.start())
@@ -109,6 +117,12 @@ def line(text: bytes, offset: int) -> Line:
                 note("unknown", text[found.start() :].strip(), found.start())
             break
     return Line(words, notes, deleted)
+
+
+def _speaks(words: list[tuple[int, int, int, int, float, int]]) -> bool:
+    """Whether a line begins with an M code of a printer: what follows may be any text."""
+    codes = [(letter, value) for _, letter, _, _, value, _ in words[:2] if letter != ord("N")]
+    return bool(codes) and codes[0][0] == ord("M") and codes[0][1] >= 100
 
 
 def _expression(text: bytes, at: int) -> int:

@@ -18,7 +18,7 @@ from postproc.toolpath import Kind
 DOUBTS = {
     Doubt.DELETED: "the block begins with a slash: it may not run",
     Doubt.FLOW: "motion in a loop, branch or subprogram: it may run many times or never",
-    Doubt.PROGRAM: "motion of a second program in the file: it runs where that is called",
+    Doubt.PROGRAM: "motion of a subprogram in the file: it runs where that is called",
     Doubt.ENDED: "motion behind the end of the program",
 }
 ARCS = {

@@ -35,6 +35,10 @@ for _bytes, _class in (
 
 Bytes = NDArray[np.uint8]
 
+_UNTAPED = np.arange(256, dtype=np.uint8)
+_UNTAPED[[0, 2, 3, 4, 17, 18, 19, 20, 26]] = 32
+"""What tapes and serial lines leave between the characters says nothing."""
+
 
 def lex(raw: bytes, control: Control) -> Text:
     """The words, blocks and notes of a program; never raises on its content, in linear time."""
@@ -58,7 +62,7 @@ def _comments(raw: bytes, pattern: bytes) -> Ints:
 
 def _blanked(letters: Bytes, comments: Ints, marked: bool) -> Bytes:
     """The bytes with blanks in the place of comments and of the byte order mark."""
-    blanked = letters.copy()
+    blanked = _UNTAPED[letters]
     if marked:
         blanked[: len(BOM)] = 32
     if len(comments):
@@ -131,9 +135,9 @@ def _plain(letters: Bytes, kinds: Bytes) -> tuple[_Plain, list[int], Ints]:
     bad[kept[1:][lone & (this != _LETTER)]] = True
     if kind[kept[0]] == _DIGIT:
         bad[kept[0]] = True
-    odd = np.unique(line[bad & ~new])
     is_odd = np.zeros(int(new.sum()), np.bool_)
-    is_odd[odd] = True
+    is_odd[line[bad & ~new]] = True
+    odd = np.flatnonzero(is_odd)
 
     first = kept[:-1][(this == _LETTER) & ~is_odd[line[kept[:-1]]]]
     position = np.searchsorted(kept, first)
@@ -174,10 +178,11 @@ def _values(letters: Bytes, start: Ints, stop: Ints) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Other:
-    """Words of the other lines; notes: of which line, what it says and where; lines with notes or a slash."""
+    """Words of the other lines; notes: of which line, what it says, where that line begins; said: lines with notes or
+    a slash; deleted: those with a slash."""
 
     words: _Plain
-    notes: list[tuple[int, Note]]
+    notes: list[tuple[int, Note, int]]
     said: Ints
     deleted: Ints
 
@@ -211,14 +216,14 @@ def _taken(texts: list[bytes], rows: Ints, starts: Ints, control: Control) -> _O
     slashed = np.array([line.deleted for line in lines], dtype=np.bool_)
     noted = np.flatnonzero(speaks[which]) if len(lines) else which
     notes = [
-        (row, Note(0, note.kind, note.text, note.at + begin))
+        (row, note, begin)
         for row, begin, text in zip(
             rows[noted].tolist(), starts[rows[noted]].tolist(), which[noted].tolist(), strict=True
         )
         for note in lines[text].notes
     ]
     deleted = rows[slashed[which]] if len(lines) else rows
-    return _Other(words, notes, np.union1d(rows[noted], deleted).astype(np.int64), deleted)
+    return _Other(words, notes, np.concatenate([rows[noted], deleted]), deleted)
 
 
 def _joined(
@@ -228,7 +233,10 @@ def _joined(
     extra = other.words
     order = np.argsort(np.concatenate([plain.at, extra.at]), kind="stable")
     lines = np.concatenate([plain.line, extra.line])[order]
-    used = np.union1d(lines, other.said).astype(np.int64)
+    some = np.zeros(len(starts), np.bool_)
+    some[lines] = True
+    some[other.said] = True
+    used = np.flatnonzero(some)
     words = Words(
         at=np.concatenate([plain.at, extra.at])[order],
         start=np.concatenate([plain.start, extra.start])[order],
@@ -250,9 +258,9 @@ def _joined(
         code=code,
         deleted=deleted[used],
     )
-    where = np.searchsorted(used, np.array([row for row, _ in other.notes], dtype=np.int64)).tolist()
+    where = np.searchsorted(used, np.array([row for row, _, _ in other.notes], dtype=np.int64)).tolist()
     notes = tuple(
-        Note(block, note.kind, note.text, note.at)
-        for block, (_, note) in zip(where, other.notes, strict=True)
+        Note(block, note.kind, note.text, note.at + begin)
+        for block, (_, note, begin) in zip(where, other.notes, strict=True)
     )
     return words, blocks, notes

@@ -117,7 +117,7 @@ def modal(text: Text, control: Control) -> Modal:
                         meant[at == code] = other.value
             force[one] = fill(blocks[said], meant[said])
     verb, twice = _verbs(rows, blocks, values, groups == Group.MOTION, n)
-    states = {one: np.unique(blocks[groups == one]) for one in Group}
+    states = {one: _rows(n, blocks[groups == one]) for one in Group}
     return Modal(force, once, verb, unknown, twice, flow, states)
 
 
@@ -126,6 +126,13 @@ def _numbers(value: Floats) -> tuple[Ints, Bools]:
     fine = np.isfinite(tens) & (np.abs(tens) < 1e6)
     number = np.rint(np.where(fine, tens, -1.0)).astype(np.int64)
     return number, fine & (np.abs(np.where(fine, tens, 0.0) - number) < 1e-6)
+
+
+def _rows(n: int, rows: Ints) -> Ints:
+    """``rows`` ascending, each once."""
+    mask = np.zeros(n, np.bool_)
+    mask[rows] = True
+    return np.flatnonzero(mask)
 
 
 class _Fill:

@@ -36,7 +36,8 @@ def read(documents: tuple[Document, ...], control: Control, settings: Settings =
     given = blocks(text, modal(text, control), control, control.increments and settings.integer_words == "um")
     offset = spoiled(given)
     way, reasons, reason = course(given, offset.at)
-    where = positions(way, offsets.start(), _events(given), _change(given))
+    events = _events(given)
+    where = positions(way, offsets.start(), events, _change(given, events))
     tool, named = tools(given)
 
     rows = np.flatnonzero(given.motion)
@@ -103,12 +104,13 @@ def _events(given: Blocks) -> Ints:
     )
 
 
-def _change(given: Blocks) -> Callable[[int, Frame, Floats], Frame]:
+def _change(given: Blocks, events: Ints) -> Callable[[int, Frame, Floats], Frame]:
     """The frame behind a block that changes it; unknown where the block may not run."""
     words, change = given.text.words, given.control.frame
-    notes: dict[int, list[Note]] = {}
-    for note in given.text.notes:
-        notes.setdefault(note.block, []).append(note)
+    notes: dict[int, list[Note]] = {block: [] for block in events.tolist()}
+    for note in given.text.notes if notes else ():
+        if note.block in notes:
+            notes[note.block].append(note)
     first = np.searchsorted(words.block, np.arange(len(given) + 1))
 
     def changed(block: int, frame: Frame, position: Floats) -> Frame:

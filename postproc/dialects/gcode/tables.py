@@ -5,7 +5,8 @@ from __future__ import annotations
 from postproc.dialects.gcode import general, offsets
 from postproc.dialects.gcode.control import Code, Control, Feed, Group, Move, Once
 
-COMMENT = rb"\([^)\r\n]*\)?|;[^\r\n]*"
+COMMENT = rb"\((?:[^()\r\n]++|\([^()\r\n]*+\))*+\)?|;[^\r\n]*"
+"""Parentheses, one pair of which may hold others; or from a semicolon on."""
 
 
 def _codes(*entries: tuple[Group, int, tuple[float, ...]]) -> dict[int, Code]:
@@ -55,7 +56,21 @@ _COMMON = _codes(
     (Group.ONCE, Once.MACHINE, (53,)),
     (Group.ONCE, Once.SHIFT, (92,)),
     (Group.ONCE, Once.UNSHIFT, (92.1,)),
-    (Group.NONE, 0, (9,)),
+    (Group.NONE, 0, (9, 62, 63, 103, 187)),
+    # Codes of Fanuc that no other meaning in LinuxCNC stands against.
+    (Group.TURNED, 1, (68, 68.1, 68.2, 68.3, 68.4, 254)),
+    (Group.TURNED, 0, (69, 69.1, 255)),
+    (Group.SCALED, 1, (51,)),
+    (Group.SCALED, 0, (50,)),
+    (Group.MIRRORED, 1, (51.1, 101)),
+    (Group.MIRRORED, 0, (50.1, 100)),
+    (Group.POLAR, 1, (16,)),
+    (Group.POLAR, 0, (15,)),
+    (Group.MACRO, 1, (66, 66.1)),
+    (Group.MACRO, 0, (67,)),
+    (Group.OFFSET, 100, (54.1, 154)),
+    (Group.ONCE, Once.CALL, (65,)),
+    (Group.ONCE, Once.OTHER, (10.6, 53.1, 60)),
 )
 
 _TIP = {
@@ -95,28 +110,18 @@ FANUC = Control(
     codes={
         **_COMMON,
         **_codes(
-            (Group.NONE, 0, (5, 5.1, 8, 8.1, 62, 63, 64.1, 187, 61.2, 107.1, 13.1, 50.2, 69.3)),
+            (Group.NONE, 0, (5, 5.1, 8, 8.1, 64.1, 61.2, 107.1, 50.2, 69.3)),
             (
                 Group.MOTION,
                 Move.OTHER,
-                (2.2, 3.2, 2.3, 3.3, 2.4, 3.4, 12, 13, 12.1, 70, 71, 72, 75, 77, 78, 150),
+                (2.2, 3.2, 2.3, 3.3, 2.4, 3.4, 12, 13, 70, 71, 72, 75, 77, 78, 150),
             ),
             (Group.MOTION, Move.SPLINE, (6.2,)),
             (Group.TCP, 1, (43.4, 43.5, 234)),
             (Group.LENGTHS, 1, (43.1, 43.2, 43.3, 43.7, 44, 45, 46, 47, 48)),
-            (Group.TURNED, 1, (68, 68.1, 68.2, 68.3, 68.4, 254)),
-            (Group.TURNED, 0, (69, 69.1, 255)),
-            (Group.SCALED, 1, (51,)),
-            (Group.SCALED, 0, (50,)),
-            (Group.MIRRORED, 1, (51.1, 101)),
-            (Group.MIRRORED, 0, (50.1, 100)),
-            (Group.POLAR, 1, (16,)),
-            (Group.POLAR, 0, (15,)),
-            (Group.MACRO, 1, (66, 66.1)),
-            (Group.MACRO, 0, (67,)),
-            (Group.OFFSET, 100, (54.1, 154)),
-            (Group.ONCE, Once.CALL, (65,)),
-            (Group.ONCE, Once.OTHER, (10.6, 53.1, 60)),
+            *((Group.OFFSET, 101 + n, (110 + n,)) for n in range(20)),
+            (Group.FOREIGN, 1, (7.1, 107, 112, 12.1)),
+            (Group.FOREIGN, 0, (113, 13.1)),
         ),
     },
     frame=offsets.two_shifts,
