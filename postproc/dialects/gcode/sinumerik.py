@@ -188,7 +188,7 @@ CONTROL = Control(
 )
 """Sinumerik 840D, its own language (G290)."""
 
-_TOOL = re.compile(rb'\bT[ \t]*=[ \t]*("[^"\r\n]*")', re.I)
+_TOOL = re.compile(rb'(?<![A-Za-z_])T[ \t]*=[ \t]*("[^"\r\n]*")', re.I)
 _CLAIM = re.compile(
     rb"^[ \t]*(?:/\d?[ \t]*)?(?:N\d+[ \t]*)?(?:TRAORI|TRAFOOF|SUPA|MCALL|CYCLE8\d+[ \t]*\(|G7[01]0\b|G64[1-5]\b|"
     rb"G5[0-9][0-9]\b|CIP\b|A?TRANS\b|A?ROT\b|MSG[ \t]*\(|DEF[ \t]+(?:REAL|INT)\b|\$[PATM][A-Z]*_|T=\"|R\d+=|"

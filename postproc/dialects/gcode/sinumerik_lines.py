@@ -143,7 +143,7 @@ class _Taken:
         text = self.text
         if address == key("T"):
             string = _STRING.match(text, at)
-            if string is not None:
+            if string is not None and string[0] in self.tools:
                 tool = self.tools[string[0]]
                 self.note("tool", b"T=%s is tool %d of the cell" % (string[0], tool), place)
                 self.word(place, address, -1, string.end(), float(tool), How.INTEGER)
