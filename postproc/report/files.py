@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-
 import numpy as np
 
 from postproc.arrays import Floats
@@ -12,6 +9,7 @@ from postproc.compensation.correct import Result, State
 from postproc.compensation.division import Division
 from postproc.compensation.task import Task
 from postproc.geometry import abc_from_rotation, vector_from_rotation
+from postproc.report.columns import Numbers, Words, csv_bytes
 from postproc.toolpath import Kind, Role
 from postproc.units import DEG, MM
 
@@ -41,40 +39,23 @@ def corrections_csv(
         ("correction_rx_deg correction_ry_deg correction_rz_deg", turned, 6),
         ("error_after_mm", result.after[:, None] / MM, 6),
     ]
-    heads = ["line", "kind", "state", "cut"]
-    columns: list[list[str]] = [
-        [str(value) for value in path.line],
-        [Kind(value).name for value in path.kind],
-        [State(value).name.lower() for value in result.state],
-        ["" if value < 0 else str(value + 1) for value in result.cut],
+    columns: list[Numbers | Words] = [
+        Numbers("line", path.line.astype(float)),
+        Words("kind", path.kind, [kind.name for kind in Kind]),
+        Words("state", result.state, [state.name.lower() for state in State]),
+        Numbers("cut", np.where(result.cut < 0, np.nan, result.cut + 1.0)),
     ]
     for names, values, decimals in blocks:
         for name, column in zip(names.split(), values.T, strict=True):
-            heads.append(name)
-            columns.append(_texts(column, decimals))
+            columns.append(Numbers(name, column, decimals))
     if division is not None and way is not None:
-        counts = [
-            np.bincount(division.source[division.role == role], minlength=len(path))
-            for role in (Role.LINK, Role.PIECE)
-        ]
+        for name, role in (("links", Role.LINK), ("points", Role.PIECE)):
+            count = np.bincount(division.source[division.role == role], minlength=len(path))
+            columns.append(Numbers(name, count.astype(float)))
         on_way = np.full(len(path), -1.0)
         np.maximum.at(on_way, division.source, np.nan_to_num(way / MM, nan=-1.0))
-        heads += ["links", "points", "error_way_mm"]
-        columns += [[str(value) for value in count] for count in counts]
-        columns.append(_texts(np.where(on_way < 0, np.nan, on_way), 6))
-    heads.append("iterations")
-    columns.append([str(value) for value in result.iterations])
+        columns.append(Numbers("error_way_mm", np.where(on_way < 0, np.nan, on_way), 6))
+    columns.append(Numbers("iterations", result.iterations.astype(float)))
     for step, column in enumerate(result.history / MM):
-        heads.append(f"error_{step}_mm")
-        columns.append(_texts(column, 9))
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(heads)
-    writer.writerows(zip(*columns, strict=True))
-    return stream.getvalue().encode("ascii")
-
-
-def _texts(values: Floats, decimals: int) -> list[str]:
-    """Fixed decimals, empty for what is not known, no minus zero."""
-    rounded = np.round(values, decimals) + 0.0
-    return ["" if value != value else f"{value:.{decimals}f}" for value in rounded.tolist()]
+        columns.append(Numbers(f"error_{step}_mm", column, 9))
+    return csv_bytes(columns)
