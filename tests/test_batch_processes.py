@@ -19,6 +19,7 @@ from postproc.batch.locking import locked
 from postproc.batch.reading import code_digest, digest_of, readings
 from postproc.batch.running import run_here
 from postproc.batch.work import Task, work
+from postproc.findings import Refusal
 from postproc.report.batched import Outcome
 
 
@@ -103,6 +104,36 @@ def test_a_lock_waits_for_its_holder_and_survives_its_death(tmp_path):
         pass
     assert waited == [1]
     assert not path.exists()
+
+
+COUNT = """
+import sys
+from pathlib import Path
+from postproc.batch.locking import locked
+counter = Path(sys.argv[1])
+for _ in range(150):
+    with locked(counter.parent / "state" / "x.lock"):
+        number = int(counter.read_text())
+        counter.write_text(str(number + 1))
+"""
+
+
+def test_a_folder_that_takes_no_lock_is_told(tmp_path):
+    (tmp_path / "file").write_text("")
+    (tmp_path / "nowhere").symlink_to(tmp_path / "none" / "none")
+    for place in ("file", "nowhere"):
+        with pytest.raises(Refusal) as refusal, locked(tmp_path / place / "state" / "x.lock"):
+            pass
+        assert refusal.value.findings[0].code == "FIL004"
+
+
+def test_nobody_is_beside_the_holder_of_a_lock(tmp_path):
+    """Also while its file comes and goes: of every addition nothing is lost."""
+    counter = tmp_path / "counter"
+    counter.write_text("0")
+    adding = [subprocess.Popen([sys.executable, "-c", COUNT, str(counter)]) for _ in range(4)]
+    assert [process.wait() for process in adding] == [0, 0, 0, 0]
+    assert counter.read_text() == "600"
 
 
 def test_two_batches_in_one_folder_share_the_work(parts):

@@ -10,6 +10,9 @@ from pathlib import Path
 
 from postproc.findings import Finding, Refusal
 
+RACES = 1000
+"""Attempts to make a folder that others take away; it does not fail as often in a row but for another reason."""
+
 
 @contextlib.contextmanager
 def locked(path: Path, waits: Callable[[], None] = lambda: None) -> Iterator[None]:
@@ -36,11 +39,15 @@ def locked(path: Path, waits: Callable[[], None] = lambda: None) -> Iterator[Non
 
 
 def _acquired(path: Path, waits: Callable[[], None]) -> int:
+    races = 0
     while True:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
-        except FileNotFoundError:  # the last holder took the folders away
+        except (FileNotFoundError, FileExistsError):  # the last holder took the folders away just now
+            races += 1
+            if races > RACES:
+                raise
             continue
         try:
             try:
