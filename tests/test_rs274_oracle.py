@@ -26,7 +26,7 @@ needs_rs274 = pytest.mark.skipif(
 )
 CASES = Path(__file__).parent / "programs" / "linuxcnc"
 COUNT = int(os.environ.get("POSTPROC_RS274_PROGRAMS", "60"))
-NEAR = 1e-4
+NEAR = 1e-4 * (1 + 1e-6)
 _CALL = re.compile(r"^\s*\d+ N\S*\s+([A-Z0-9_]+)\(([^)]*)\)", re.M)
 _AXES = {"XY": (0, 1, 2), "XZ": (2, 0, 1), "YZ": (1, 2, 0)}
 

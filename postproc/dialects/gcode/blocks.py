@@ -226,7 +226,7 @@ def course(given: Blocks, spoiled: Bools) -> tuple[Course, list[str], Ints]:
     parallel = np.stack([given.of(axis) >= 0 for axis in SECOND], axis=1)
     both = np.concatenate([parallel, np.zeros((n, 3), np.bool_)], axis=1)
     if not given.control.further:
-        lose(both, parallel.any(axis=1) & given.motion, What.PARALLEL)
+        lose(both, parallel.any(axis=1) & given.motion & ~home, What.PARALLEL)
     lose(whole, other | (given.motion & (force[Group.MACRO] != 0)), What.OTHER)
     if cycle.any():
         # Words of a cycle give where it works; it ends at the depth that it began at, or at R.

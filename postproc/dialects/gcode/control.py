@@ -79,6 +79,7 @@ class Once(IntEnum):
     CALL = 10  # G65: the words are arguments
     PROBE = 11
     OTHER = 12  # its words are no targets of a motion
+    STORE = 14  # G28.1: stores the reference point, or seeks it with the axes that it names
     FRAME = 13  # a frame of this control (TRANS, ROT): Control.frame gives it
 
 
@@ -156,8 +157,8 @@ def kept(event: Event) -> Frame:
 class Control:
     """One dialect of G-code.
 
-    codes: G number times ten -> what it says; also: what else some of them say; named: a word that stands alone -> the same;
-    names: addresses of more than a letter -> their key; comment: pattern of comments (and of strings, group 1, which
+    codes: G number times ten -> what it says; also: what else some of them say; named: a word that stands alone ->
+    the same; names: addresses of more than a letter -> their key; comment: pattern of comments (and of strings, group 1, which
     are none); line: takes a line apart that is not plain words; start: what is in force before anything is said.
     endings: M codes after which nothing is read; cycle_apart: G80 goes back to the move that was in force before the
     cycle; increments: a length without a decimal point may count increments; turns: key of the word that gives the

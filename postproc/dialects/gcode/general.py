@@ -58,7 +58,8 @@ def line(text: bytes, offset: int) -> Line:
         if head["tape"]:
             note("tape", b"%", head.start("tape"))
             return Line(words, notes, False)
-        if head["program"]:
+        # With more behind it, it is the number of a block.
+        if head["program"] and not text[place:].strip():
             note("program", head["program"], head.start("program"))
     said = _TEXT.match(text, place)
     if said is not None:
@@ -97,8 +98,13 @@ def line(text: bytes, offset: int) -> Line:
         elif kind == "slash":
             deleted = True
         elif kind == "bare":
-            at = offset + found.start("bare")
-            words.append((at, ord(found["bare"].upper()), -1, at + 1, math.nan, How.UNREAD))
+            # G28 X Y of printers; behind an M code (M84 X Y) it is no axis.
+            at, codes = offset + found.start("bare"), [word[1] for word in words]
+            if ord("G") in codes:
+                words.append((at, ord(found["bare"].upper()), -1, at + 1, math.nan, How.UNREAD))
+            elif ord("M") not in codes:
+                note("unknown", text[found.start() :].strip(), found.start())
+                break
         elif kind == "assign":
             target = _TARGET.match(text, found.start())
             note("assign", (target and target[1]) or b"", found.start())

@@ -87,6 +87,9 @@ def modal(text: Text, control: Control) -> Modal:
     m_rows = np.flatnonzero(words.key == key("M"))
     once[words.block[m_rows[np.isin(words.value[m_rows], _ARGUMENTS)]]] |= 1 << Once.OTHER
     once[words.block[m_rows[words.value[m_rows] == 206]]] |= 1 << Once.SETTING
+    named = np.zeros(n, np.bool_)
+    named[words.block[np.isin(words.key, [key(letter) for letter in "XYZABC"])]] = True
+    once[((once & (1 << Once.STORE)) != 0) & named] |= 1 << Once.HOME
     unknown = np.full(n, -1)
     unknown[blocks[groups < 0]] = rows[groups < 0]
 
