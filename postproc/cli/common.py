@@ -87,7 +87,9 @@ def program_options(command: _Command) -> _Command:
                 "CSV (by line, s_mm or t_s), or the YAML of a cutting process.",
             ),
             click.option(
-                "--force-offset", is_flag=True, help="Take the mean of the force CSV in air off all its readings."
+                "--force-offset",
+                is_flag=True,
+                help="Take the mean of the force CSV in air off all its readings.",
             ),
             click.option("--robot", metavar="NAME|FILE", help="Robot instead of the cell's."),
             language_options,
@@ -143,6 +145,17 @@ def readings_options(command: _Command) -> _Command:
     ):
         command = decorate(command)
     return command
+
+
+def page_option(command: _Command) -> _Command:
+    """The result as a page."""
+    return click.option(
+        "--page",
+        type=click.Path(path_type=Path, dir_okay=False),
+        metavar="FILE.html",
+        callback=ending(".html"),
+        help="All of it as one page for a browser; needs no network.",
+    )(command)
 
 
 def result_options(command: _Command) -> _Command:

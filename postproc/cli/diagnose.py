@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Numbers, Out, ending, readings_options, result_options
+from postproc.cli.common import Numbers, Out, ending, page_option, readings_options, result_options
 
 
 @click.command()
@@ -25,13 +25,7 @@ from postproc.cli.common import Numbers, Out, ending, readings_options, result_o
     callback=ending(".png", ".svg"),
     help="Draw the gap per pose before and after, what betrays the effect, and the evidence per candidate.",
 )
-@click.option(
-    "--page",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.html",
-    callback=ending(".html"),
-    help="All of it as one page for a browser; needs no network.",
-)
+@page_option
 @click.option(
     "--csv",
     "csv_to",

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Numbers, Out, ending, readings_options, result_options
+from postproc.cli.common import Numbers, Out, ending, page_option, readings_options, result_options
 
 FEWEST_DRAWS = 20
 """Fewer say nothing of a spread."""
@@ -79,13 +79,7 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     callback=ending(".png", ".svg"),
     help="Draw the residuals by joint, direction, load and order.",
 )
-@click.option(
-    "--page",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.html",
-    callback=ending(".html"),
-    help="All of it as one page for a browser; needs no network.",
-)
+@page_option
 @click.option(
     "--csv",
     "csv_to",

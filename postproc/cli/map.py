@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import FAR, Numbers, Out, ending, number, numbers, result_options
+from postproc.cli.common import FAR, Numbers, Out, ending, number, numbers, page_option, result_options
 
 
 def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numbers:
@@ -76,13 +76,7 @@ def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numb
     callback=ending(".png", ".svg"),
     help="Draw the map; of a box, slices along z.",
 )
-@click.option(
-    "--page",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.html",
-    callback=ending(".html"),
-    help="All of it as one page for a browser; needs no network.",
-)
+@page_option
 @click.option(
     "--csv",
     "csv_to",
