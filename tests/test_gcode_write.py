@@ -113,6 +113,8 @@ def test_only_what_moved_is_written(text: str, by: tuple[float, float, float], r
         ("G1 X=1 Y=AC(2) Z=3", "G1 X=1.100 Y=AC(2.200) Z=3.300"),
         ("G1 X=IC(1) Y=IC( -2.5 ) Z3", "G1 X=IC(1.100) Y=IC( -2.300 ) Z3.300"),
         ("G1 X=10+2*3 Y2 Z=-1/4", "G1 X=16.100 Y2.200 Z=0.050"),
+        ("G1 X=IC( 1 ) ;(", "G1 X=IC( 1.100 ) Y0.200 Z0.300 ;("),
+        ("G1X=AC(1)", "G1X=AC(1.100)Y0.200Z0.300"),
         ("G91 G1 X=AC(1) Y2 Z3", "G91 G1 X=AC(1.100) Y2.200 Z3.300"),
     ],
 )
@@ -189,6 +191,27 @@ def test_inserted_blocks() -> None:
     assert inserted("g1x0f50\n  x10.f80\n")[1:] == ["  g1z5.500f80", "  x10.f80z5.000"]
     assert inserted("G1 X0 F50\nX10 F80\n", link=False)[1:] == ["G1 X5.000 F80", "X10 F80"]
     assert inserted("G01 X0 F50\nG91 X10\n")[1:] == ["G91 G1 Z0.500", "G91 X10 Z-0.500"]
+
+
+def test_an_inserted_block_always_moves() -> None:
+    """A piece that ends where the motion before did, and a link under G91."""
+    for text, line in (("G1 X0 F50\nX10\n", "G1 X0.000"), ("G1 X0 F50\nG91 X10\n", "G91 G1 X0.000")):
+        program = read(LINUXCNC, HEAD + text)
+        own = Plan.of(program.toolpath)
+        last = len(own) - 1
+        rows = [*range(last), last - 1, last]
+        plan = Plan(
+            np.array([*range(last), last, last]),
+            np.array([*[Role.OWN] * last, Role.PIECE, Role.OWN]),
+            own.position[rows],
+            own.rotation[rows],
+            own.centre[rows],
+            own.normal[rows],
+            own.sweep[rows],
+        )
+        raw = written(LINUXCNC, program, plan)
+        assert raw.decode().splitlines()[-2] == line
+        assert_reads_as(LINUXCNC, program, plan, raw)
 
 
 def test_an_arc_after_a_link_says_that_it_is_one() -> None:

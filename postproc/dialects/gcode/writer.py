@@ -53,6 +53,7 @@ def moved(program: Program, plan: Plan, writing: Writing) -> Moved:
     held |= {int(motions.row[m]): "GCW001" for m in np.flatnonzero(bad).tolist()}
     if held:
         return Moved((), {row: _finding(program, row, code) for row, code in held.items()})
+    _no_empty_block(motions, sheet, ends)
     present = motions.own[:, None] & (text.word[motions.row] >= 0)
     present[:, RADIUS] &= ~convert
     literals = _literals(places, text, motions, sheet, present)
@@ -276,6 +277,14 @@ def _arcs(
     sheet.write[m[written.convert], RADIUS] = False
     convert[m], bad[m] = written.convert, written.bad
     return convert, bad
+
+
+def _no_empty_block(motions: _Motions, sheet: _Sheet, ends: Followed) -> None:
+    """An inserted block without words would be no motion: it gets X."""
+    empty = np.flatnonzero(~motions.own & ~sheet.write.any(axis=1))
+    relative = motions.text.modal[motions.row[empty], 0]
+    sheet.write[empty, 0] = True
+    sheet.number[empty, 0] = np.where(relative, 0.0, ends.end[empty, 0])
 
 
 def _literals(places: Places, text: Stated, motions: _Motions, sheet: _Sheet, present: Bools) -> Edits:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -13,12 +13,14 @@ from postproc.arrays import Bools, Ints
 from postproc.dialects.dialect import Program, Role
 from postproc.dialects.gcode.control import Move
 from postproc.dialects.gcode.places import Places
-from postproc.dialects.gcode.words import key
+from postproc.dialects.gcode.words import How, key
 from postproc.dialects.gcode.writer_text import RADIUS, Stated
-from postproc.document import Edit, Span
+from postproc.document import Edit, Edits, Span, sums
 
 _HEAD = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*(?:/[ \t]*\d?[ \t]*)?)")
 _NAME = re.compile(rb"[A-Za-z_][A-Za-z0-9_]*")
+_NUMBER = key("N")
+_BEHIND = [ord(letter) for letter in ") \t"]
 _CLOSED = re.compile(rb"(?:[ \t]*\))*")
 _BLANK = re.compile(rb"[ \t]")
 
@@ -55,6 +57,24 @@ class Blocks:
         return not gaps or any(gaps)
 
     @cached_property
+    def _blanks(self) -> Ints:
+        """(size + 1,) blanks before each byte."""
+        raw = np.frombuffer(self.raw, np.uint8)
+        return sums((raw == 32) | (raw == 9))
+
+    def words_of(self, rows: Ints) -> tuple[Ints, Ints]:
+        """(n,) the first word of the blocks of rows (n,) that is no block number, and behind the last one."""
+        words = self.places.text.words
+        first, behind = (np.searchsorted(words.block, self.places.block[rows] + i) for i in (0, 1))
+        return first + (words.key[np.minimum(first, len(words) - 1)] == _NUMBER), behind
+
+    def gaps(self, rows: Ints, ends: Ints) -> Bools:
+        """(n,) whether the words of the blocks have blanks between; those with one word go by the program."""
+        first, behind = self.words_of(rows)
+        start = self.places.text.words.at[first]
+        return np.where(behind - first > 1, self._blanks[ends] > self._blanks[start], self.spaced)
+
+    @cached_property
     def two_digits(self) -> bool:
         """Whether the program writes G01 for G1."""
         verbs = self.places.verb[self.places.verb >= 0][:1].tolist()
@@ -62,26 +82,62 @@ class Blocks:
         return any(len(self.raw[int(words.start[v]) : int(words.stop[v])].strip()) > 1 for v in verbs)
 
 
-def insertions(blocks: Blocks) -> Iterator[Edit]:
-    """The edits that insert, in the order of the text; a converted R as well."""
-    wanted = set(blocks.missing) | set(np.flatnonzero(blocks.role != Role.OWN).tolist())
-    before: list[int] = []
-    for m in sorted(wanted | _owners(blocks)):
-        if blocks.role[m] != Role.OWN:
-            before.append(m)
-            continue
-        block = _Block(blocks, int(blocks.row[m]))
-        if before:
-            yield block.inserted(before)
-        yield from block.completed(m, before)
-        before = []
-
-
-def _owners(blocks: Blocks) -> set[int]:
-    """The own motions behind inserted ones."""
+def insertions(blocks: Blocks) -> Edits:
+    """The edits that insert; a converted R as well."""
     own = np.flatnonzero(blocks.role == Role.OWN)
-    inserted = np.flatnonzero(blocks.role != Role.OWN)
-    return set(own[np.searchsorted(own, inserted)].tolist())
+    inserted = np.flatnonzero(blocks.role != Role.OWN).tolist()
+    before: dict[int, list[int]] = {}
+    for m, owner in zip(inserted, own[np.searchsorted(own, inserted)].tolist(), strict=True):
+        before.setdefault(owner, []).append(m)
+    odd = set(before) | set(np.flatnonzero(blocks.convert).tolist())
+    plain = np.array(sorted(set(blocks.missing) - odd - set(inserted)), dtype=np.int64)
+    return Edits.joined(_completed(blocks, plain), _odd(blocks, sorted(odd), before))
+
+
+def _odd(blocks: Blocks, motions: list[int], before: Mapping[int, list[int]]) -> Iterator[Edit]:
+    for m in motions:
+        block = _Block(blocks, int(blocks.row[m]))
+        if m in before:
+            yield block.inserted(before[m])
+        if blocks.role[m] == Role.OWN:
+            yield from block.completed(m, before.get(m, []))
+
+
+def _completed(blocks: Blocks, motions: Ints) -> Edits:
+    """The words that blocks lack, behind their last ones."""
+    rows = blocks.row[motions]
+    first, _ = blocks.words_of(rows)
+    raw = np.frombuffer(blocks.raw, np.uint8)
+    start = blocks.places.text.words.at[first]
+    insert = blocks.places.insert[rows]
+    ends = insert.copy()
+    if np.isin(blocks.places.text.words.how, (How.ABSOLUTE, How.INCREMENTAL)).any():
+        for k in np.flatnonzero(np.isin(raw[np.minimum(insert, len(raw) - 1)], _BEHIND)).tolist():
+            ends[k] = _closed(blocks.raw, int(insert[k]))
+    gaps = blocks.gaps(rows, ends).tolist()
+    lower = (raw[start] > 96).tolist()
+    addresses = blocks.text.keys[rows].tolist()
+    texts = []
+    for k, m in enumerate(motions.tolist()):
+        gap, keys, small, numbers = b" " if gaps[k] else b"", addresses[k], lower[k], blocks.missing[m]
+        texts.append(
+            b"".join(gap + _address(keys[column], small) + numbers[column] for column in sorted(numbers))
+        )
+    bounds = sums(np.array([len(text) for text in texts], dtype=np.int64))
+    return Edits(np.zeros(len(motions), np.int8), ends, ends, b"".join(texts), bounds)
+
+
+def _closed(raw: bytes, at: int) -> int:
+    """Behind the brackets of AC( and IC( that close behind a number."""
+    found = _CLOSED.match(raw, at)
+    return found.end() if found else at
+
+
+@cache
+def _address(number: int, lower: bool) -> bytes:
+    letter = bytes([number & 0xFF])
+    text = letter if number < 256 else b"%s%d=" % (letter, (number >> 8) - 1)
+    return text.lower() if lower else text
 
 
 class _Block:
@@ -89,18 +145,15 @@ class _Block:
 
     def __init__(self, blocks: Blocks, row: int) -> None:
         self.blocks, self.row = blocks, row
-        places = blocks.places
+        places, rows = blocks.places, np.array([row])
         self.raw = blocks.raw
-        words, block = places.text.words, int(places.block[row])
-        low, high = np.searchsorted(words.block, [block, block + 1]).tolist()
-        self.words = [k for k in range(low, high) if words.key[k] != key("N")]
-        self.start = int(places.text.blocks.start[block])
-        # AC( and IC( are closed behind the number.
-        self.insert = _CLOSED.match(self.raw, int(places.insert[row])).end()  # type: ignore[union-attr]
-        code = self.raw[int(words.at[self.words[0]]) : self.insert]
-        several = len(self.words) > 1
-        self.gap = b" " if (_BLANK.search(code) is not None if several else blocks.spaced) else b""
-        self.lower = self.raw[int(words.at[self.words[-1]])] > 96
+        words = places.text.words
+        (first,), (behind,) = blocks.words_of(rows)
+        self.words = list(range(int(first), int(behind)))
+        self.start = int(places.text.blocks.start[places.block[row]])
+        self.insert = _closed(self.raw, int(places.insert[row]))
+        self.gap = b" " if blocks.gaps(rows, np.array([self.insert]))[0] else b""
+        self.lower = bool(self.raw[int(words.at[first])] > 96)
         self.verb = int(places.verb[row])
         self.move = int(places.move[row])
 
@@ -130,9 +183,7 @@ class _Block:
             own = self.raw[int(words.at[k]) : int(words.start[k])]
             if b"(" not in own:
                 return own
-        number = int(self.blocks.text.keys[self.row, column])
-        letter = bytes([number & 0xFF])
-        return self._cased(letter if number < 256 else b"%s%d=" % (letter, (number >> 8) - 1))
+        return _address(int(self.blocks.text.keys[self.row, column]), self.lower)
 
     def _stated(self, m: int) -> list[bytes]:
         numbers = self.blocks.missing.get(m, {})
