@@ -1,4 +1,4 @@
-"""python -m tests.fuzz FOLDER [--runs N] [--seed S] [--only MUTATION,..] [--keep FOLDER] [--mb BYTES]"""
+"""python -m tests.fuzz FOLDER [--runs N] [--seed S] [--dialect D] [--keep FOLDER] or python -m tests.fuzz --hostile"""
 
 import os
 import sys

@@ -16,6 +16,7 @@ from types import FrameType
 import numpy as np
 
 from fuzz.examine import Broken, examined
+from fuzz.hostile import hostile
 from fuzz.mutations import MUTATIONS, mutated
 from postproc.dialects import DIALECTS, detect
 from postproc.dialects.dialect import Dialect, Settings
@@ -27,6 +28,8 @@ LIMIT_S = 30.0
 """Seconds after which a run hangs."""
 BASE_S, PER_MB_S = 1.0, 2.0
 """Seconds that reading may take: a constant, and for each 10^6 bytes."""
+HURT_S = 2.0
+"""Seconds for a megabyte that is made to hurt."""
 SLOWEST = 5
 SETTINGS = Settings(orientation=np.array([0.0, 0.0, 180.0 * DEG]))
 
@@ -114,7 +117,10 @@ def _hangs(number: int, frame: FrameType | None) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
-    parser.add_argument("folder", type=Path, help="real programs")
+    parser.add_argument("folder", type=Path, nargs="?", help="real programs")
+    parser.add_argument(
+        "--hostile", action="store_true", help="instead: a megabyte of input that is made to hurt"
+    )
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", default="", help=f"mutations: {', '.join(MUTATIONS)}")
@@ -124,6 +130,10 @@ def main() -> int:
     )
     parser.add_argument("--keep", type=Path, help="where mutants that failed are written")
     said = parser.parse_args()
+    if said.hostile:
+        return _hurt(said.dialect)
+    if said.folder is None:
+        parser.error("name a folder of programs, or --hostile")
     found = [
         source
         for source in sources(said.folder)
@@ -158,6 +168,24 @@ def main() -> int:
             _keep(said.keep, first)
     print(f"{sum(map(len, failures.values()))} failures")
     return 1 if failures else 0
+
+
+def _hurt(only: str) -> int:
+    """Reads every hostile input with every dialect, and tells which took long or failed."""
+    bad = 0
+    for dialect in DIALECTS.values():
+        if dialect.name != (only or dialect.name):
+            continue
+        for name, raw in hostile(10**6).items():
+            source = Source(dialect, (Document(Path("a.src" if dialect.name == "krl" else "a.nc"), raw),))
+            done = run(source, 1, 0, only=("nothing",))
+            if done.failure or done.seconds > HURT_S:
+                bad += 1
+                print(
+                    f"{done.seconds:6.2f} s  {dialect.name:10} {name:24} {done.failure} {done.place}"[:160],
+                    flush=True,
+                )
+    return 1 if bad else 0
 
 
 def _sort(failure: str) -> str:

@@ -198,8 +198,8 @@ def _compare(path: Toolpath, plan: Plan, back: Toolpath) -> None:
 
 def _compare_ways(path: Toolpath, plan: Plan, back: Toolpath) -> None:
     """Arcs pass through the same places: half way, within what rounding their three points does."""
-    arcs = np.isfinite(plan.sweep)
-    if not np.array_equal(arcs, np.isfinite(back.sweep)):
+    arcs = np.isfinite(plan.sweep) & np.isfinite(plan.centre[:, 0])
+    if not np.array_equal(arcs, np.isfinite(back.sweep) & np.isfinite(back.centre[:, 0])):
         raise Broken("the way of an arc was lost or appeared")
     if not arcs.any():
         return
