@@ -72,7 +72,8 @@ def fixed(values: Floats, decimals: Ints, apart: Bools | None = None) -> tuple[b
         easy = whole < LARGEST
         if not easy.all():
             for row in rows[~easy].tolist():
-                text = _fixed(float(values[row]), count, bool(apart[row]))
+                text = fixed_one(float(values[row]), count)
+                text = b" " + text if apart[row] and not text.startswith(b"-") else text
                 lengths[row] = len(text)
                 parts.append((np.array([row]), np.frombuffer(text, np.uint8)))
             rows, whole = rows[easy], whole[easy]
@@ -112,8 +113,7 @@ def _letters(whole: Ints, negative: Bools, apart: Bools, count: int) -> tuple[ND
     return letters, shown
 
 
-def _fixed(value: float, decimals: int, apart: bool) -> bytes:
+def fixed_one(value: float, decimals: int) -> bytes:
+    """One number with its decimals, as ``fixed`` writes many."""
     text = f"{value:.{decimals}f}"
-    if text.startswith("-") and not text.strip("-0."):
-        text = text[1:]
-    return (" " + text if apart and not text.startswith("-") else text).encode()
+    return (text[1:] if text.startswith("-") and not text.strip("-0.") else text).encode()
