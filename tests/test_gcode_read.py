@@ -419,6 +419,13 @@ def test_nothing_is_read_as_nothing(text: str) -> None:
         assert len(read(text, dialect).toolpath) == 0
 
 
+def test_what_stands_outside_of_the_tape_is_no_program() -> None:
+    program = read("G20 T9 M6 FORCE\n%\nG0 X1 Y2 Z3\n%\nG1 X9 Y9 Z9\nG20\n")
+    np.testing.assert_allclose(ends(program), [[1, 2, 3]])
+    assert told(program) == ["GCO020", "GCO021"]
+    np.testing.assert_allclose(ends(read("T1 G21 G0 X1 Y2 Z3\n%\nG1 X9\n")), [[1, 2, 3]])
+
+
 def test_long_lines_are_read() -> None:
     for piece in ("X1", "[", "#", "1", "-", "G1 ", "(", "X[", "O", " ", "A=", "N1"):
         read(piece * 60_000 + "\nG1 X1\n")

@@ -158,17 +158,16 @@ class Control:
     """One dialect of G-code.
 
     codes: G number times ten -> what it says; also: what else some of them say; named: a word that stands alone ->
-    the same; names: addresses of more than a letter -> their key; comment: pattern of comments (and of strings, group 1, which
-    are none); line: takes a line apart that is not plain words; start: what is in force before anything is said.
-    endings: M codes after which nothing is read; cycle_apart: G80 goes back to the move that was in force before the
-    cycle; increments: a length without a decimal point may count increments; turns: key of the word that gives the
-    turns of an arc, and how many of them an arc without the word has.
-    frame: the frame behind a block with G52, G92 ... or Once.FRAME; columns: keys of further words of motions.
-    angles: what A, B, C do where a program uses all three, see ``orientation.Angles.sequence``; whole: they then give
-    the orientation of the tool itself, not what turns it from where it stands in the cell; vector, euler: keys of the
-    words of a tool vector and of angles that say where it points.
-    calls: keys of words that call a subprogram in a block without G and M; further: U, V, W are axes beside X, Y, Z,
-    and leave these as they are.
+    the same; names: addresses of more than a letter -> their key; comment: pattern of comments (and of strings,
+    group 1, which are none); line: takes a line apart that is not plain words; start: what is in force before
+    anything is said. endings: M codes after which nothing is read; cycle_apart: G80 goes back to the move that was
+    in force before the cycle; increments: a length without a decimal point may count increments; turns: key of the
+    word that gives the turns of an arc, and how many of them an arc without the word has. frame: the frame behind a
+    block with G52, G92 ... or Once.FRAME; columns: keys of further words of motions. angles: what A, B, C do where
+    a program uses all three, see ``orientation.Angles.sequence``; whole: they then give the orientation of the tool
+    itself, not what turns it from where it stands in the cell; vector, euler: keys of the words of a tool vector
+    and of angles that say where it points. calls: keys of words that call a subprogram in a block without G and M;
+    further: U, V, W are axes beside X, Y, Z, and leave these as they are.
     """
 
     name: str

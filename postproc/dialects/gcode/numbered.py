@@ -71,8 +71,10 @@ def tools(given: Blocks) -> tuple[Ints, bool]:
     """
     words, n = given.text.words, len(given)
     changes = words.block[np.flatnonzero((words.key == key("M")) & (words.value == TOOL_CHANGE))]
+    tape = given.modal.flow.tape
+    changes = changes[tape[changes]]
     number = given.number(key("T"))
-    named = given.of(key("T")) >= 0
+    named = (given.of(key("T")) >= 0) & tape
     if not len(changes):
         named &= number != 0
     if not named.any():

@@ -64,10 +64,9 @@ def told(
         tell(same, "SIN001", name)
     if not len(rows):
         return findings
-    units = np.isin(words.value, (20, 21, 70, 71, 700, 710)) & (words.key == key("G"))
     first = none.copy()
     first[rows[0]] = True
-    if not units.any():
+    if not modal.flow.tape[modal.states[Group.UNITS]].any():
         tell(first, "GCO020", "no code says mm or inch; mm is taken")
     if not named:
         tell(first, "GCO021", "the program names no tool; tool 1 of the cell is taken")
