@@ -142,7 +142,15 @@ def mirror(
         position[active] -= shift[going]
         rotation[active] = rotation_from_vector(-turn[going]) @ rotation[active]
     return Correction(
-        Poses(rotation, position), q, np.array(history), *final, iterations, reachable, settled, converged
+        Poses(rotation, position),
+        q,
+        np.array(history),
+        final[0],
+        final[1],
+        iterations,
+        reachable,
+        settled,
+        converged,
     )
 
 
