@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.arrays import Floats, Ints
 from postproc.dialects.krl.places import Places
@@ -14,7 +16,6 @@ from postproc.dialects.krl.run import Run
 from postproc.dialects.krl.state import Source
 from postproc.dialects.krl.survey import closure
 from postproc.findings import Finding
-from postproc.geometry import rotation_from_abc
 from postproc.toolpath import FrameRef, Toolpath
 from postproc.units import DEG, MM
 
@@ -25,46 +26,43 @@ SEVERAL = "its line runs several times"
 def finished(run: Run, text_called: Iterable[bytes]) -> tuple[Toolpath, Places, list[Finding]]:
     """``text_called``: routines that were called where it is not known that, or with what, they run."""
     rows = run.rows
+    elsewhere = _other_calls(run, text_called)
+    run.code.clear()  # the table takes up its arrays one after the other
     table = Table(rows)
-    _refuse_other_calls(run, table, text_called)
+    for begin, stop, reason in elsewhere:
+        for row in np.flatnonzero((table.line >= begin) & (table.line <= stop)).tolist():
+            rows.reasons.setdefault(row, reason)
     _lock(run)
     refused = _refused(rows, table)
-    base, tool, used = _used(table.base, table.tool, run.frames.refs())
+    table.base, table.tool, used = _used(table.base, table.tool, run.frames.refs())
+    table.blend *= MM
     n = len(rows)
-    anchor, given = np.full(n, -1), _blank((n, 6), rows.anchors)
-    for row, at in rows.anchors.items():
-        anchor[row] = at.row
-        given[row] = [np.nan if value is None else value for value in at.given]
-    axes, way = _blank((n, 6), table.axes), _blank((n, 7), table.ways)
-    for array, sparse in ((axes, table.axes), (way, table.ways)):
-        for row, values in sparse.items():
-            array[row] = values
-    if table.ways:
-        way[:, :3] *= MM
-        way[:, 6] *= DEG
-    whole = _whole(rows, table)
+    anchor, given = _sparse((n,), -1, {row: at.row for row, at in rows.anchors.items()}), _given(rows, n)
+    axes = _sparse((n, 6), np.nan, table.axes, DEG)
+    way = _sparse((n, 7), np.nan, table.ways, np.array([MM] * 3 + [1.0] * 3 + [DEG]))
     toolpath = Toolpath(
-        kind=table.kind,
-        position=table.values[:, :3] * MM,
-        rotation=rotation_from_abc(table.values[:, 3:] * DEG),
-        axes=axes * DEG if table.axes else axes,
-        feed=table.feed,
-        base=base,
-        tool=tool,
-        status=table.status,
-        turn=table.turn,
-        line=table.line,
+        kind=_kept(table.kind),
+        position=_kept(table.position),
+        rotation=_kept(table.rotation),
+        axes=axes,
+        feed=_kept(table.feed),
+        base=_kept(table.base),
+        tool=_kept(table.tool),
+        status=_kept(table.status),
+        turn=_kept(table.turn),
+        line=_kept(table.line),
         frames=used,
         refused=refused,
         pinned=_pinned(rows, table, refused),
         annotations=tuple(rows.annotations),
         anchor=anchor,
-        given=given * ([MM] * 3 + [DEG] * 3) if rows.anchors else given,
+        given=given,
         centre=way[:, :3],
         normal=way[:, 3:6],
         sweep=way[:, 6],
-        blend=table.blend * MM,
-        whole=whole,
+        blend=_kept(table.blend),
+        free_axis=np.broadcast_to(np.nan, (n, 3)),
+        whole=_whole(rows, table),
         comments=tuple(rows.comments),
     )
     _number_texts(rows, table)
@@ -86,32 +84,52 @@ def finished(run: Run, text_called: Iterable[bytes]) -> tuple[Toolpath, Places, 
     return toolpath, places, [*_told(rows, table, refused), *_told_external(rows, table)]
 
 
-def _blank(shape: tuple[int, ...], filled: object) -> Floats:
-    """NaN of a shape; without memory of its own where nothing will be filled in."""
-    return np.full(shape, np.nan) if filled else np.broadcast_to(np.nan, shape)
+def _kept(array: NDArray[Any]) -> NDArray[Any]:
+    """Read-only, so that it need not be copied."""
+    array.setflags(write=False)
+    return array
+
+
+def _sparse(
+    shape: tuple[int, ...], blank: float, filled: Mapping[int, Any], unit: float | Floats = 1
+) -> NDArray[Any]:
+    """``blank`` everywhere but in the rows that are filled; without memory of its own where none is."""
+    if not filled:
+        return np.broadcast_to(blank, shape)
+    array = np.full(shape, blank)
+    array[list(filled)] = list(filled.values())
+    return _kept(array * unit)
+
+
+def _given(rows: Rows, n: int) -> Floats:
+    known = {
+        row: [np.nan if value is None else value for value in at.given] for row, at in rows.anchors.items()
+    }
+    return _sparse((n, 6), np.nan, known, np.array([MM] * 3 + [DEG] * 3))
 
 
 def _used(base: Ints, tool: Ints, frames: tuple[FrameRef, ...]) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
     """The indices and frames without those that no motion has: nobody needs to know their pose."""
-    present = {int(i) for array in (base, tool) for i in np.unique(array)}
-    kept = [i for i in range(len(frames)) if i in present]
+    present = np.zeros(len(frames) + 1, bool)
+    present[base] = present[tool] = True  # the last entry is for those that are not known, -1
+    kept = np.flatnonzero(present[:-1]).tolist()
     renamed = np.full(len(frames) + 1, -1, dtype=np.int64)
     renamed[kept] = np.arange(len(kept))
     return renamed[base], renamed[tool], tuple(frames[i] for i in kept)
 
 
-def _refuse_other_calls(run: Run, table: Table, text_called: Iterable[bytes]) -> None:
-    """A routine that also runs where its values are not known can not be corrected for the calls that are followed."""
-    survey, rows = run.survey, run.rows
+def _other_calls(run: Run, text_called: Iterable[bytes]) -> list[tuple[int, int, Reason]]:
+    """First and last line of routines that also run where their values are not known: they can not be corrected for the
+    calls that are followed."""
+    survey = run.survey
+    found = []
     for name in closure(survey, [*text_called, *survey.later]):
-        if name not in run.followed:
-            continue
-        routine = survey.routines[name]
-        last = run.code[min(routine.end, len(run.code) - 1)]
-        inside = (table.line >= routine.line) & (table.line <= last.line)
-        reason = Reason("KRL015", run.why_walked(routine), f"def {routine.line}")
-        for row in np.flatnonzero(inside).tolist():
-            rows.reasons.setdefault(row, reason)
+        if name in run.followed:
+            routine = survey.routines[name]
+            last = run.code[min(routine.end, len(run.code) - 1)]
+            reason = Reason("KRL015", run.why_walked(routine), f"def {routine.line}")
+            found.append((routine.line, last.line, reason))
+    return found
 
 
 def _lock(run: Run) -> None:
@@ -133,7 +151,7 @@ def _root(name: bytes) -> bytes:
 def _whole(rows: Rows, table: Table) -> dict[int, str]:
     """Rows before which nothing can be inserted."""
     whole = dict(rows.whole)
-    if len(table.line):
+    if not (table.line[1:] > table.line[:-1]).all():
         ordered = np.sort(table.line)
         again = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
         if len(again):
@@ -175,12 +193,12 @@ def _number_texts(rows: Rows, table: Table) -> None:
 
 
 def _finder(rows: Rows, table: Table) -> Callable[[int, str, str], Finding]:
-    starts = np.array(rows.document.line_starts)
-    name = str(rows.document.path)
-    columns = table.motion[:, 0] - starts[table.line - 1] + 1
+    raw, name = rows.document.raw, str(rows.document.path)
 
     def finding(row: int, code: str, message: str) -> Finding:
-        return Finding(code, message, name, int(table.line[row]), int(columns[row]), HELP.get(code, ""))
+        at = int(table.motion[row, 0])
+        column = at - raw.rfind(b"\n", 0, at)
+        return Finding(code, message, name, int(table.line[row]), column, HELP.get(code, ""))
 
     return finding
 

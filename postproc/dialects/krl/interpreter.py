@@ -67,6 +67,7 @@ def read(documents: tuple[Document, ...], references: Sequence[Document] = (), f
             if reading == MOST_READINGS - 1:
                 doubts = _all_doubts(surveyed)
     _tell_structure(run)
+    marker_at = _marker_at(source, code)
     toolpath, places, refusals = finished(run, flow.text_called)
     findings = sorted([*run.findings, *refusals], key=lambda finding: (finding.line, finding.column))
     marker = _MARKER.search(source.raw)
@@ -77,7 +78,7 @@ def read(documents: tuple[Document, ...], references: Sequence[Document] = (), f
         text=places,
         findings=tuple(findings),
         marker=Span(0, *marker.span(1)) if marker else None,
-        marker_at=_marker_at(source, code),
+        marker_at=marker_at,
         names=tuple(_names(documents)),
     )
 

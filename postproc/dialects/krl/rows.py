@@ -15,7 +15,9 @@ from postproc.dialects.krl.spatial import Arc, Numbers
 from postproc.dialects.krl.state import Anchor, Frame, Source, State
 from postproc.dialects.krl.target import NOWHERE, Target, Unclear
 from postproc.document import Document
+from postproc.geometry import rotation_from_abc
 from postproc.toolpath import Annotation, Kind
+from postproc.units import DEG, MM
 
 NAN = float("nan")
 NAN6: Numbers = (NAN,) * 6
@@ -185,12 +187,16 @@ def way_of(arc: Arc | None) -> tuple[float, ...]:
 
 
 class Table:
-    """The entries of all rows as arrays; mm and deg.  ``loose``: numbers of the rows that were read alone."""
+    """The entries of all rows as arrays, which takes the rows' own away; rare lengths and angles are in mm and deg.
+
+    ``loose``: numbers of the rows that were read alone.
+    """
 
     def __init__(self, rows: Rows) -> None:
         n = len(rows)
         offsets: type[np.signedinteger] = np.int32 if len(rows.document.raw) < 2**31 - 1 else np.int64
-        self.values: Floats = np.empty((n, 6))
+        self.position: Floats = np.empty((n, 3))
+        self.rotation: Floats = np.empty((n, 3, 3))
         self.kind = np.empty(n, np.int64)
         self.line = np.empty(n, np.int64)
         self.status, self.turn = np.empty(n, np.int64), np.empty(n, np.int64)
@@ -207,14 +213,17 @@ class Table:
         self.loose: list[tuple[int, Row]] = []
         first_lot: dict[int, int] = {}
         at = 0
-        for chunk in rows.chunks:
+        rows.chunks.reverse()
+        while rows.chunks:
+            chunk = rows.chunks.pop()
             if isinstance(chunk, list):
                 self._fill(at, chunk)
                 at += len(chunk)
                 continue
             bulk = chunk.bulk
             part = slice(at, at + len(bulk))
-            self.values[part], self.start[part], self.stop[part] = bulk.values, bulk.start, bulk.stop
+            self._place(part, bulk.values)
+            self.start[part], self.stop[part] = bulk.start, bulk.stop
             self.kind[part] = np.where(bulk.is_line, Kind.LIN, Kind.PTP)
             self.line[part] = bulk.line + np.arange(len(bulk))
             self.status[part], self.turn[part] = bulk.status, bulk.turn
@@ -228,12 +237,16 @@ class Table:
         for row, blend in rows.slurred.items():
             self.blend[row] = blend
 
+    def _place(self, part: slice, values: Floats) -> None:
+        self.position[part] = values[:, :3] * MM
+        self.rotation[part] = rotation_from_abc(values[:, 3:] * DEG)
+
     def _fill(self, at: int, chunk: list[Row]) -> None:
         part = slice(at, at + len(chunk))
         self.loose += zip(range(at, at + len(chunk)), chunk, strict=True)
         targets = [row.target for row in chunk]
+        self._place(part, np.array([row.values for row in chunk]))
         for array, found in (
-            (self.values, [row.values for row in chunk]),
             (self.kind, [row.kind for row in chunk]),
             (self.line, [row.line for row in chunk]),
             (self.base, [row.base for row in chunk]),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from postproc.dialects.krl.bulk import Bulk
@@ -59,7 +58,7 @@ class Run:
     """
 
     document: Document
-    code: Sequence[Item]
+    code: list[Item]
     survey: Survey
     declarations: Declarations
     variables: Variables

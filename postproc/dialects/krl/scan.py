@@ -16,6 +16,9 @@ from postproc.dialects.krl.run import Item
 from postproc.dialects.krl.target import COMPONENTS, External, Target, parse
 from postproc.document import Document
 
+BLOCK = 1 << 26
+"""Bytes; the C library gives allocations above 32 MB back at once."""
+
 FEWEST, MOST = 8, 1 << 16
 """Lines of a run that are read together: with fewer it does not pay, with more it takes memory."""
 
@@ -42,15 +45,34 @@ _IN_NUMBER = np.zeros(256, bool)
 _IN_NUMBER[list(b"0123456789.+-")] = True
 
 
+class _Store:
+    """Keeps arrays in blocks so large that the system takes them back when nothing in them is used any more."""
+
+    def __init__(self) -> None:
+        self._block, self._used = np.empty(0, np.uint8), 0
+
+    def keep(self, array: NDArray[Any], dtype: type[np.generic] | None = None) -> NDArray[Any]:
+        """A copy, with values of another type if one is given."""
+        kind = np.dtype(dtype or array.dtype)
+        size = array.size * kind.itemsize
+        if self._used + size > len(self._block):
+            self._block, self._used = np.empty(max(BLOCK, size), np.uint8), 0
+        kept = self._block[self._used : self._used + size].view(kind).reshape(array.shape)
+        kept[...] = array
+        self._used += -(-size // 8) * 8
+        return kept
+
+
 def scan(document: Document, fast: bool) -> Iterator[Item]:
     """The statements of a program in the order of the text; ``fast``: runs of common lines as one."""
     raw = document.raw
+    store = _Store()
     line, place = 1, len(BOM) if document.raw.startswith(BOM) else 0
     for found in _RUN.finditer(raw, place) if fast else ():
         start, stop = found.span()
         yield from _lines(raw, line, place, start)
         line += raw.count(b"\n", place, start)
-        bulk = _bulk(raw, line, start, stop)
+        bulk = _bulk(raw, line, start, stop, store)
         yield bulk
         line += len(bulk)
         place = stop
@@ -67,7 +89,7 @@ def _lines(raw: bytes, line: int, start: int, stop: int) -> Iterator[Item]:
         start, line = end, line + 1
 
 
-def _bulk(raw: bytes, line: int, start: int, stop: int) -> Bulk:
+def _bulk(raw: bytes, line: int, start: int, stop: int, store: _Store) -> Bulk:
     """The common lines from byte ``start`` to ``stop``, whose number is ``line`` on."""
     text = np.frombuffer(raw, np.uint8, stop - start, start)
     ends = np.flatnonzero(text == 0x0A)
@@ -84,11 +106,19 @@ def _bulk(raw: bytes, line: int, start: int, stop: int) -> Bulk:
     slur, code = _approximations(raw, start, closing, ends)
     status, turn, external = _states(raw, start, stops[:, 5], closing)
     offset: type[np.signedinteger] = np.int32 if len(raw) < 2**31 - 1 else np.int64
-    motion = np.stack([word, opening, closing + 1, code], axis=1) + start
+    motion = np.stack([word, opening, closing + 1, code], axis=1)
     return Bulk(
-        line, (text[word] | 0x20) == ord("l"), _numbers(text, starts, stops), (starts + start).astype(offset),
-        (stops + start).astype(offset), motion.astype(offset), status, turn, slur, external,
-    )  # fmt: skip
+        line=line,
+        is_line=store.keep((text[word] | 0x20) == ord("l")),
+        values=store.keep(_numbers(text, starts, stops)),
+        start=store.keep(starts + start, offset),
+        stop=store.keep(stops + start, offset),
+        motion=store.keep(motion + start, offset),
+        status=status,
+        turn=turn,
+        slur=store.keep(slur),
+        external=external,
+    )
 
 
 def _numbers(text: NDArray[Any], starts: NDArray[Any], stops: NDArray[Any]) -> NDArray[np.float64]:
@@ -126,10 +156,11 @@ def _states(
     raw: bytes, start: int, behind: NDArray[Any], closing: NDArray[Any]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[tuple[int, External], ...]]:
     """S, T and the external axes of the lines, which stand between their last angle and the brace."""
-    status, turn = np.full(len(closing), -1), np.full(len(closing), -1)
     rows = np.flatnonzero(closing > behind)
     if not len(rows):
-        return status, turn, ()
+        none = np.broadcast_to(-1, len(closing))
+        return none, none, ()
+    status, turn = np.full(len(closing), -1), np.full(len(closing), -1)
     rests = [
         raw[a:b]
         for a, b in zip((behind[rows] + start).tolist(), (closing[rows] + start).tolist(), strict=True)
