@@ -125,6 +125,8 @@ def completed(folder: Path, *words: str) -> list[tuple[str, str]]:
         (["schema", "c"], [("plain", "cell")], ["robot"]),
         (["completion", ""], [("plain", "bash"), ("plain", "zsh"), ("plain", "fish")], []),
         (["predict", "pa"], [("file", "pa")], []),
+        (["robots", "kuka_"], [("plain", "kuka_kr270"), ("file", "kuka_")], ["ur5"]),
+        (["part.src", "--robot", "ur"], [("plain", "ur5")], ["kuka_kr270"]),
     ],
 )
 def test_words_are_completed(tmp_path, words, there, not_there):

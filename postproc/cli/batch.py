@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from postproc.cli.common import Out, language_options, result_options
+from postproc.cli.common import ROBOT, Out, language_options, result_options
 
 if TYPE_CHECKING:
     from postproc.batch.jobs import Jobs
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.option(
     "--force-offset", is_flag=True, help="Take the mean of each force CSV in air off all its readings."
 )
-@click.option("--robot", metavar="NAME|FILE", help="Robot instead of the cells'.")
+@click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Robot instead of the cells'.")
 @language_options
 @click.option("--gain", type=click.FloatRange(0.0, 1.0), help="Share of the correction that is applied [1].")
 @click.option(

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
 
 from postproc.findings import Finding, Refusal
 
@@ -24,6 +25,23 @@ FAR = 100_000.0
 """[mm] No arm is longer."""
 
 Numbers = tuple[float, ...]
+
+
+class _RobotName(click.ParamType):
+    """The name of a robot, or a robot file; a shell completes both."""
+
+    name = "robot"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        from postproc.robot.description import robot_files
+
+        names = [CompletionItem(name) for name in robot_files() if name.startswith(incomplete)]
+        return [*names, CompletionItem(incomplete, type="file")]
+
+
+ROBOT = _RobotName()
 
 
 def number(word: str, limit: float) -> float:
@@ -91,7 +109,7 @@ def program_options(command: _Command) -> _Command:
                 is_flag=True,
                 help="Take the mean of the force CSV in air off all its readings.",
             ),
-            click.option("--robot", metavar="NAME|FILE", help="Robot instead of the cell's."),
+            click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Robot instead of the cell's."),
             language_options,
             click.option("--strict", is_flag=True, help="Warnings count as errors."),
         )
@@ -125,7 +143,10 @@ def readings_options(command: _Command) -> _Command:
         (
             click.argument("data", type=click.Path(path_type=Path), nargs=-1, required=True),
             click.option(
-                "--robot", metavar="NAME|FILE", help="The robot [the one that the data name: # robot: NAME]."
+                "--robot",
+                type=ROBOT,
+                metavar="NAME|FILE",
+                help="The robot [the one that the data name: # robot: NAME].",
             ),
             click.option(
                 "-o",

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import FAR, Numbers, Out, ending, number, numbers, page_option, result_options
+from postproc.cli.common import FAR, ROBOT, Numbers, Out, ending, number, numbers, page_option, result_options
 
 
 def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numbers:
@@ -20,7 +20,7 @@ def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numb
 
 
 @click.command("map")
-@click.option("--robot", required=True, metavar="NAME|FILE", help="The robot.")
+@click.option("--robot", type=ROBOT, required=True, metavar="NAME|FILE", help="The robot.")
 @click.option(
     "--x", required=True, metavar="A:B", callback=_range, help="Range or one value, mm, robot base."
 )

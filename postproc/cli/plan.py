@@ -7,7 +7,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import FAR, Numbers, Out, ending, number, numbers, result_options, tool_place
+from postproc.cli.common import FAR, ROBOT, Numbers, Out, ending, number, numbers, result_options, tool_place
 from postproc.cli.identify import _words
 
 MOST = 200
@@ -87,7 +87,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
 
 
 @click.command()
-@click.option("--robot", required=True, metavar="NAME|FILE", help="The robot.")
+@click.option("--robot", type=ROBOT, required=True, metavar="NAME|FILE", help="The robot.")
 @click.option(
     "--effects",
     required=True,

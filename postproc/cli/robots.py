@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import click
 
-from postproc.cli.common import Out, result_options
+from postproc.cli.common import ROBOT, Out, result_options
 
 
 @click.command()
-@click.argument("name", required=False)
+@click.argument("name", type=ROBOT, required=False)
 @result_options
 def robots(name: str | None, json_to: str | None, quiet: bool, verbose: bool) -> None:
     """List the robots, or show one: geometry, effects, intervals and sources.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Out, language_options, result_options
+from postproc.cli.common import ROBOT, Out, language_options, result_options
 
 
 @click.command()
@@ -18,7 +18,7 @@ from postproc.cli.common import Out, language_options, result_options
 @click.option(
     "--force-offset", is_flag=True, help="Take the offset that a force log shows in air off its forces."
 )
-@click.option("--robot", metavar="NAME|FILE", help="Robot instead of the cell's.")
+@click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Robot instead of the cell's.")
 @language_options
 @click.option(
     "--step",
