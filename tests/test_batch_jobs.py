@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import inspect
 import os
+from dataclasses import fields
 
 import pytest
 from conftest import CELL, LINES
 
-from postproc.batch.jobs import jobs_of
+from postproc.api import compensate
+from postproc.batch.jobs import PROGRAM_KEYS, jobs_of
+from postproc.cli.batch import batch
 from postproc.findings import Refusal
+from postproc.workflows.preparation import Request
 
 PROGRAM = "\r\n".join(LINES)
 
@@ -114,6 +119,15 @@ def test_options_and_overrides(shop):
     assert [request.gain for request in requests.values()] == [0.5, 0.5, 0.25, 0.25]
     assert all(request.strict and request.cell == shop.folder / "cell.yaml" for request in requests.values())
     assert all(request.program.is_absolute() for request in requests.values())
+
+
+def test_every_option_of_the_main_job_is_there():
+    """In a job file, on the command line of a batch, and in the package's function."""
+    own = {"program", "output", "report", "json", "dry_run"}
+    wanted = {field.name for field in fields(Request)} - own
+    assert set(PROGRAM_KEYS) == wanted
+    assert wanted <= {parameter.name for parameter in batch.params}
+    assert wanted <= set(inspect.signature(compensate).parameters)
 
 
 def test_the_command_line_wins(shop, tmp_path):
