@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +10,12 @@ import pytest
 from gcode_writing import DOWN, WRITING, assert_reads_as, random_plan, read, round_trip, written
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_rs274_oracle import agree, canonical, needs_rs274
 
 from postproc.dialects.dialect import Plan, Role, Settings, Writing
 from postproc.dialects.gcode import DIALECTS
 from postproc.document import Document
-from postproc.geometry import rotation_from_vector
+from postproc.geometry import on_arc, rotation_from_vector
 from postproc.toolpath import Kind
 from postproc.units import DEG, MM
 
@@ -406,40 +406,11 @@ def test_any_number_of_decimals(text: str, seed: int, decimals: int) -> None:
     round_trip(LINUXCNC, text.encode(), seed, writing=Writing(decimals, decimals))
 
 
-def rs274(raw: bytes, folder: Path) -> list[list[float]] | None:
-    """The end points (mm or inch as the program says) that LinuxCNC's interpreter gives; None where it refuses."""
-    (folder / "tool.tbl").write_text("".join(f"T{n} P{n} D0.0 Z0.0 ;\n" for n in range(1, 20)))
-    variables = folder / "fresh.var"
-    variables.unlink(missing_ok=True)
-    variables.touch()
-    (folder / "part.ngc").write_bytes(raw)
-    done = subprocess.run(
-        ["rs274", "-g", "-n", "2", "-t", "tool.tbl", "-v", "fresh.var", "part.ngc"],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    if done.returncode or "error" in done.stderr.lower():
-        return None
-    found = []
-    for line in done.stdout.splitlines():
-        name, _, rest = line.partition("(")
-        name = name.split()[-1] if name.split() else ""
-        if name in ("STRAIGHT_FEED", "STRAIGHT_TRAVERSE", "ARC_FEED"):
-            found.append([name == "ARC_FEED", *(float(v) for v in rest.rstrip(")").split(","))])
-    return found
-
-
-HAS_RS274 = any((Path(folder) / "rs274").exists() for folder in os.environ.get("PATH", "").split(":"))
-
-
-@pytest.mark.skipif(not HAS_RS274, reason="rs274 (Debian package linuxcnc-uspace) is not installed")
+@needs_rs274
 @pytest.mark.parametrize("seed", range(40))
 def test_linuxcnc_reads_the_output_as_well(tmp_path: Path, seed: int) -> None:
-    """Where its interpreter takes the program, it takes the output, with the same number of lines and arcs as planned
-    and ends within the written digits."""
+    """Where its interpreter takes the program, it takes the output, with the lines and arcs, the ends and the ways that
+    were planned, within the written digits."""
     texts = [
         "G21 G90 G17 G54\nT1 M6\nG0 X0 Y0 Z5\nG1 Z-1 F100\nX10\nG2 X20 Y10 I10 J0\nX30 Y0 R10\nG3 X10 Y0 R-12\n"
         "G1 X0\nG18 G2 X10 Z-11 I0 K-10\nG19 G3 Y10 Z-1 J0 K10\nG91 G1 X1 Y1\nG17 G3 X5 Y5 I0 J5\nG90 G1 X3 Y3\nM2\n",
@@ -447,26 +418,41 @@ def test_linuxcnc_reads_the_output_as_well(tmp_path: Path, seed: int) -> None:
         "G21 G90 G17\nG0X0Y0Z0\nG1X10F100\nG3I-5J0Z-3\nX5Y5I-5\nG1X20Y20Z20\nG90.1\nG2X30Y30I30J20\nM2\n",
     ]
     raw = texts[seed % 3].encode()
-    before = rs274(raw, tmp_path)
-    assert before is not None
+    file = tmp_path / "part.ngc"
+    file.write_bytes(raw)
+    assert canonical(file, tmp_path) is not None
     program = read(LINUXCNC, raw)
     plan = random_plan(program, seed)
-    output = written(LINUXCNC, program, plan)
-    after = rs274(output, tmp_path)
-    assert after is not None, output.decode()
-    path = program.toolpath
-    meant = np.where(plan.role == Role.LINK, Kind.LIN, path.kind[plan.source]) == Kind.CIRC
-    assert [bool(motion[0]) for motion in after] == meant.tolist(), output.decode()
+    file.write_bytes(written(LINUXCNC, program, plan))
+    after = canonical(file, tmp_path)
+    assert after is not None, file.read_text()
+    kind = np.where(plan.role == Role.LINK, Kind.LIN, program.toolpath.kind[plan.source])
+    assert [motion.kind for motion in after] == kind.tolist()
     unit = program.text.scale[0]
-    ends = {0: (1, 2, 3)}
+    step = 10.0 ** -(WRITING.mm + (unit > 2 * MM)) * unit
     for m, motion in enumerate(after):
-        if motion[0]:
-            # end1, end2, centre, centre, turns, height: axes by plane.
-            plane = int(program.text.plane[plan.source[m]])
-            place = np.empty(3)
-            u, v, w = [(0, 1, 2), (2, 0, 1), (1, 2, 0)][plane]
-            place[u], place[v], place[w] = motion[1], motion[2], motion[6]
-        else:
-            place = np.array([motion[i] for i in ends[0]])
-        step = 10.0 ** -(WRITING.mm + (unit > 2 * MM))
-        assert np.abs(place - plan.position[m] / unit).max() <= 0.5 * step + 1e-4, (m, output.decode())
+        assert np.abs(motion.end - plan.position[m]).max() <= 0.5 * step + 1e-4 * unit
+        if motion.between is not None:
+            way = (
+                plan.position[[m - 1]],
+                plan.position[[m]],
+                plan.centre[[m]],
+                plan.normal[[m]],
+                plan.sweep[[m]],
+            )
+            for point, share in zip(motion.between, (1 / 3, 2 / 3), strict=True):
+                meant = on_arc(*way, np.array([share]))[0]
+                assert np.linalg.norm(point - meant) <= 2.5 * step + 2e-4 * unit
+
+
+@needs_rs274
+@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize(
+    "path", [path for path in CASES if path.parent.name == "linuxcnc"], ids=lambda path: path.stem
+)
+def test_what_linuxcnc_accepts_it_accepts_once_moved(tmp_path: Path, path: Path, seed: int) -> None:
+    if canonical(path, tmp_path) is None:
+        pytest.skip("rs274 does not accept it as it is")
+    output = tmp_path / "moved.ngc"
+    output.write_bytes(round_trip(LINUXCNC, path.read_bytes(), seed))
+    assert agree(output, tmp_path) > 0, output.read_text()
