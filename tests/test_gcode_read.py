@@ -315,6 +315,10 @@ def test_a_marked_program_shows_its_mark() -> None:
         ("G1 X5\nM98 P1\n", [1]),
         ("G1 X5\nM8\nwhat\n", [1]),
         ("G1 X5\nG1 X6\n", []),
+        ("G1 X5\nG1 X[#5420+1] Y0 Z0\n", [1]),
+        ("G1 X5\n#1=#<_x>\nG1 X6\n", [1]),
+        ("G1 X5\n#1=#54201\nG1 X6\n", []),
+        ("G1 X5\nG41 G2 X1 Y1 Z0 I1\n", [1]),
     ],
 )
 def test_ends_that_others_build_on_are_pinned(text: str, pins: list[int]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from postproc.arrays import Bools, Ints
@@ -28,6 +30,7 @@ ARCS = {
     5: "the plane of the arc is not known",
     6: "the three points of the arc lie on a line",
 }
+_POSITION = re.compile(rb"#[ \t]*+(?:50[0-6]\d|542\d|<_(?:abs_)?[xyzabcuvw]>|#|\[)(?!\d)", re.I)
 NUMBERS = (*AXES, *(key(letter) for letter in "IJKR"))
 
 
@@ -165,6 +168,8 @@ def pinned(document: Document, given: Blocks, moves: Motions, way: Course, doubt
     # Orientation words are inherited as well; an arc begins there.
     partial |= (moves.stand.orient >= 0) & ~moves.stand.stated
     partial |= ~np.isin(moves.kind, (Kind.LIN, Kind.PTP))
+    # What bends is bent by where it begins.
+    partial |= moves.kind == Kind.CIRC
     reaching = modal.has(Once.HOME, Once.MACHINE)[rows]
     building = np.flatnonzero((doubts.why >= 0) & partial & ~reaching)
     building = building[building > 0]
@@ -177,6 +182,7 @@ def pinned(document: Document, given: Blocks, moves: Motions, way: Course, doubt
     for at, message in (
         (np.flatnonzero(shifting), "G92 sets the origin at this end point"),
         (np.flatnonzero(modal.flow.calls), "code that was not read may build on this end point"),
+        (_reading(document, given) - 1, "a variable behind it reads the position that this motion reaches"),
         (
             np.flatnonzero(given.noted("unknown")),
             "a block that is not understood may build on it",
@@ -187,6 +193,12 @@ def pinned(document: Document, given: Blocks, moves: Motions, way: Course, doubt
         pins.refuse(_mask(n, before) & (doubts.why < 0), "GCO002", message)
     blocks = given.text.blocks
     return pins.done(document, blocks.line[rows], blocks.start[rows], blocks.start[rows])
+
+
+def _reading(document: Document, given: Blocks) -> Ints:
+    """Blocks with a variable that holds a position (#5001 to #5069, #5420 to #5428, #<_x>), or is itself computed."""
+    places = [found.start() for found in _POSITION.finditer(document.raw)]
+    return np.unique(np.searchsorted(given.text.blocks.start, places, side="right") - 1).astype(np.int64)
 
 
 def _mask(n: int, rows: Ints) -> Bools:
