@@ -75,10 +75,11 @@ _COMMON = _codes(
 )
 
 _TIP = {
-    **dict.fromkeys((430, 490), (Code(Group.TCP, 0), Code(Group.LENGTHS, 0))),
-    **dict.fromkeys((434, 435, 2340), (Code(Group.LENGTH, 1),)),
+    **dict.fromkeys((430, 490), (Code(Group.TCP, 0), Code(Group.LENGTHS, 0), Code(Group.FOREIGN, 0))),
+    **dict.fromkeys((434, 2340), (Code(Group.LENGTH, 1), Code(Group.FOREIGN, 0))),
+    435: (Code(Group.LENGTH, 1), Code(Group.FOREIGN, 1)),
 }
-"""G43 and G49 end the modes that G43.1 and G43.4 begin."""
+"""G43 and G49 end the modes that G43.1, G43.4 and G43.5 begin; under the last, I J K are a direction of the tool."""
 
 LINUXCNC = Control(
     name="linuxcnc",
