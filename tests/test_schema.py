@@ -227,6 +227,14 @@ def test_robot_files_are_valid(path):
     jsonschema.validate(loaded(path), schema_of("robot"))
 
 
+def test_the_job_file_of_the_samples_is_valid():
+    path = ROOT / "samples" / "night.yaml"
+    jsonschema.validate(loaded(path), schema_of("job"))
+    jobs = jobs_of([str(path)], {})
+    assert [job.name for job in jobs.jobs] == ["kr270_panel/panel.src", "kr270_taught/taught.src"]
+    assert [job.request.gain for job in jobs.jobs] == [1.0, 0.5]
+
+
 def test_every_key_is_described():
     assert set(cell_module.CELL) == set(KEYS)
     assert set(job_module.BATCH) == set(JOB_KEYS)
