@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
+from postproc.dialects.krl.effects import READS_POSITION, bas
 from postproc.dialects.krl.expressions import Value, index_text
 from postproc.dialects.krl.lexing import (
     SCALARS,
@@ -18,7 +19,6 @@ from postproc.dialects.krl.lexing import (
 from postproc.dialects.krl.rows import Reason
 from postproc.dialects.krl.run import Run
 from postproc.dialects.krl.state import NAN, ZERO, Frame, Record
-from postproc.dialects.krl.survey import READS_POSITION, bas
 from postproc.dialects.krl.target import AXES, COMPONENTS, EXTERNAL, Target, Unclear, fields, parse, shown
 
 _DATA = re.compile(rb"(BASE|TOOL)_DATA[ \t]*\[([^\]]*)\][ \t]*\Z", re.I)
@@ -31,14 +31,14 @@ DEFAULT_ROUNDING = 3.0
 """[mm] $APO.CDIS after BAS(#INITMOV,0): DEF_APO_CDIS of KUKA's bas.src."""
 
 
-def assign(run: Run, statement: Statement, said: Assignment) -> None:
-    """Takes up ``name[index].path = value``."""
+def assign(run: Run, statement: Statement, said: Assignment, here: bool = False) -> None:
+    """Takes up ``name[index].path = value``; ``here``: it holds for this motion only."""
     state = run.state
     if READS_POSITION.search(said.value):
         run.rows.reads.append((statement.line, state.sources))
     name = said.name
     if name in (b"$BASE", b"$TOOL"):
-        _set_frame(run, statement, name, _assigned_frame(run, name, said, statement.line))
+        _set_frame(run, statement, name, _assigned_frame(run, name, said, statement.line), here)
     elif name == b"$VEL":
         if said.path in (b"", b"CP"):
             _set_speed(run, said)
@@ -70,7 +70,7 @@ def with_clause(run: Run, statement: Statement, clause: bytes) -> Reason | None:
         said = assignment(clause[place:end].strip(), 0)
         if said is None:
             return Reason("KRL001", f"'{shown(clause[place:end])}' is not understood")
-        assign(run, statement, said)
+        assign(run, statement, said, here=True)
         place = end + 1
     return None
 
@@ -155,9 +155,13 @@ def _set_rounding(run: Run, said: Assignment) -> None:
         state.blend = _number(run, given, b"CDIS")
 
 
-def _set_frame(run: Run, statement: Statement, name: bytes, frame: Frame | Unclear) -> None:
+def _set_frame(
+    run: Run, statement: Statement, name: bytes, frame: Frame | Unclear, here: bool = False
+) -> None:
     label = name.decode()
-    if isinstance(frame, Unclear) and frame.code == "KRL012":
+    if isinstance(frame, Unclear) and frame.code == "KRL012" and here:
+        frame = Unclear("KRL012", f"{label}: {frame.message}")
+    elif isinstance(frame, Unclear) and frame.code == "KRL012":
         run.tell("KRL012", f"{label}: {frame.message}; motions after it are not corrected", statement)
         frame = Unclear("KRL005", f"{label} is not known since line {statement.line}")
     if name == b"$BASE":

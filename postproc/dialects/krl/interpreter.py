@@ -8,9 +8,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from postproc.dialects.dialect import Program
+from postproc.dialects.krl.blocks import Doubts
+from postproc.dialects.krl.calls import Restart
 from postproc.dialects.krl.data import Declarations, at_the_start, read_data
 from postproc.dialects.krl.finish import finished
-from postproc.dialects.krl.flow import Doubts, Flow, Restart
+from postproc.dialects.krl.flow import Flow
 from postproc.dialects.krl.lexing import BOM, Statement, lines, module_name
 from postproc.dialects.krl.rows import HELP, Rows
 from postproc.dialects.krl.run import Item, Run

@@ -7,15 +7,16 @@ from dataclasses import replace
 
 from postproc.dialects.krl.assignments import with_clause
 from postproc.dialects.krl.bulk import Bulk
+from postproc.dialects.krl.effects import HERE
 from postproc.dialects.krl.lexing import LONGEST, LOOPS, SPLINES, Statement, identifiers
 from postproc.dialects.krl.operands import Operand, Parts, operand_at, take_apart
+from postproc.dialects.krl.partial import anchored, filled, incomplete
 from postproc.dialects.krl.places import Auxiliary, InlineForm, Relative
 from postproc.dialects.krl.rows import NAN6, NO_ARC, Reason, Row, index, refusal, way_of
 from postproc.dialects.krl.run import Run
 from postproc.dialects.krl.spatial import Arc, Numbers, Vector, arc, rotation, turned
 from postproc.dialects.krl.state import NAN, Anchor, State
-from postproc.dialects.krl.survey import HERE
-from postproc.dialects.krl.target import Six, Target, Unclear, shown, six
+from postproc.dialects.krl.target import Target, Unclear, shown, six
 from postproc.document import Span
 from postproc.toolpath import Kind
 
@@ -290,20 +291,20 @@ def _enter(
     elif target.axes is not None:
         if kind is Kind.PTP:
             kind = Kind.AXIS
-            axes = _filled(target.axes, state.axes)
+            axes = filled(target.axes, state.axes)
         else:
             reason = reason or Reason("KRL001", "a straight line can not go to axis angles")
         if target.lost is not None:
             axes, reason = None, reason or refusal(target.lost, "")
         stated = replace(target.detached(), locked="")
     else:
-        values = _filled(target.values, state.point)
+        values = filled(target.values, state.point)
         if values is None and state.point_frames == (state.base, state.tool):
-            values, anchor = _anchored(target.values, state.anchor)
+            values, anchor = anchored(target.values, state.anchor)
         stated = target
     partial = stated is not None and bool(stated.missing) and not relative
     if partial and stated is not None and reason is None and anchor is None:
-        reason = _incomplete(state, stated, axes if kind is Kind.AXIS else values)
+        reason = incomplete(state, stated, axes if kind is Kind.AXIS else values)
     if partial and values is not None and state.point_frames not in (None, (state.base, state.tool)):
         values = None
     if values is not None and way is not None:
@@ -378,47 +379,6 @@ def _advance(
         state.axes = axes
     elif reason is None or reason.code != "KRL004" or state.anchor is not None:
         state.lose_point(f"after the motion in line {line}")
-
-
-def _filled(own: Six, before: Numbers | None) -> Numbers | None:
-    """The components with the missing ones from the point before; None if that is not known."""
-    x, y, z, a, b, c = own
-    if (
-        x is not None and y is not None and z is not None
-        and a is not None and b is not None and c is not None
-    ):  # fmt: skip
-        return (x, y, z, a, b, c)
-    if before is None:
-        return None
-    u, v, w, d, e, f = (old if new is None else new for new, old in zip(own, before, strict=True))
-    return (u, v, w, d, e, f)
-
-
-def _anchored(own: Six, anchor: Anchor | None) -> tuple[Numbers | None, Anchor | None]:
-    """The components with those of ``anchor``: all six, or what is then still left to its axis motion.
-
-    Of A, B, C all three or none must be left: how the controller writes an orientation is its own choice.
-    """
-    if anchor is None:
-        return None, None
-    given = six([old if new is None else new for new, old in zip(own, anchor.given, strict=True)])
-    full = _filled(given, None)
-    if full is not None:
-        return full, None
-    open_angles = [value is None for value in given[3:]]
-    return None, Anchor(anchor.row, given) if all(open_angles) or not any(open_angles) else None
-
-
-def _incomplete(state: State, target: Target, values: Numbers | None) -> Reason | None:
-    names = ", ".join(target.missing)
-    if target.axes is None and state.point_frames not in (None, (state.base, state.tool)):
-        return Reason("KRL017", f"{names} left out, and base or tool changed since the point before")
-    if values is None:
-        why = state.point_lost
-        if target.axes is not None and not why.startswith("no motion"):
-            why = "the motion before it does not give the axes"
-        return Reason("KRL004", f"{names} left out, and the position is not known: {why}", why)
-    return None
 
 
 def _frames_missing(run: Run) -> Reason | None:

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
 
+from postproc.dialects.krl.effects import HERE, READS_POSITION
 from postproc.dialects.krl.expressions import index_text
 from postproc.dialects.krl.lexing import NAME, identifiers
 from postproc.dialects.krl.places import Variable
 from postproc.dialects.krl.run import Run
-from postproc.dialects.krl.survey import HERE, READS_POSITION
 from postproc.dialects.krl.target import Target, Unclear, parse, shown
 
 _NAMED = re.compile(

@@ -41,7 +41,8 @@ HELP = {
     "KRL002": "Write the target as numbers: LIN {X .., Y .., Z .., A .., B .., C ..}.",
     "KRL003": "Put the module's .dat beside its .src, declare the point there, or give the $config.dat that does.",
     "KRL004": "Write all of X, Y, Z, A, B, C in the first Cartesian motion after that.",
-    "KRL005": "Set $BASE and $TOOL before it: to numbers, to BASE_DATA[n] and TOOL_DATA[n], or with BAS.",
+    "KRL005": "Set $BASE and $TOOL before it, to numbers or to BASE_DATA[n] and TOOL_DATA[n]; give the $config.dat if"
+    " an FDAT of it does.",
     "KRL006": "Write the cut as a straight run of motions, outside of loops and branches that inputs decide.",
     "KRL008": "Write the motion and the one before it with absolute targets.",
     "KRL009": "Write the motion before the arc with all components, and the arc with three points apart.",

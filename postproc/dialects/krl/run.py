@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 
 from postproc.dialects.krl.bulk import Bulk
 from postproc.dialects.krl.data import Declarations
+from postproc.dialects.krl.effects import Effects
 from postproc.dialects.krl.expressions import Value, evaluate
 from postproc.dialects.krl.lexing import LOOPS, SCALARS, Statement
 from postproc.dialects.krl.rows import HELP, Rows
 from postproc.dialects.krl.state import ZERO, Frames, Source, State
-from postproc.dialects.krl.survey import Block, Effects, Routine, Survey
+from postproc.dialects.krl.survey import Block, Routine, Survey
 from postproc.dialects.krl.target import Unclear, known, shown
 from postproc.dialects.krl.variables import Entry, Variables
 from postproc.document import Document

@@ -1,0 +1,171 @@
+"""Jumps, and calls of the routines of a program."""
+
+from __future__ import annotations
+
+import re
+
+from postproc.dialects.krl.assignments import command
+from postproc.dialects.krl.blocks import Blocks
+from postproc.dialects.krl.effects import PATH_FROM_FILE, is_harmless
+from postproc.dialects.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, value_end
+from postproc.dialects.krl.run import Open
+from postproc.dialects.krl.survey import Routine
+from postproc.dialects.krl.target import shown
+from postproc.dialects.krl.variables import Entry
+
+MOST_CALLS = 30
+"""Calls inside of one another that are followed."""
+
+_PLAIN_NAME = re.compile(rb"[ \t]*(" + NAME + rb")[ \t]*(\[[ \t]*\d+[ \t]*\])?[ \t]*\Z")
+
+
+class Restart(Exception):
+    """What was taken for certain was not; ``Doubts`` knows it now."""
+
+
+class Calls(Blocks):
+    """Follows jumps and calls."""
+
+    def _label(self, item: Statement, name: bytes) -> None:
+        run = self.run
+        begin = run.routine.begin if run.routine is not None else -1
+        if (begin, name) not in self.doubts.labels:
+            return
+        effects = {"point", "base", "tool", "feed", "apo", "mode", *run.survey.effects}
+        run.forget(effects, f"after the label {shown(name)} in line {item.line}")
+        mark = b"label %d " % begin + name
+        run.rows.sources[mark] |= run.state.sources
+        run.state.sources = frozenset([mark])
+        run.tell(
+            "KRL020",
+            f"a GOTO leads to {shown(name)}: base, tool and position are not known from here on",
+            item,
+        )
+
+    def _goto(self, pc: int, name: bytes) -> int:
+        run, routine = self.run, self.run.routine
+        target = routine.labels.get(name) if routine is not None else None
+        if target is not None and routine is not None:
+            at, blocks = target
+            open_blocks = self._open_in_routine()
+            inside = [opened for opened in open_blocks if opened.block in blocks]
+            certain = not run.unsure and not self.doubts.plain and [o.block for o in inside] == list(blocks)
+            if certain:
+                while run.stack and run.stack[-1] in open_blocks and run.stack[-1] not in inside:
+                    self._pop()
+                self.jumped = self.jumped or at <= pc
+                return at
+            if (routine.begin, name) not in self.doubts.labels:
+                self.doubts.labels.add((routine.begin, name))
+                self.doubts.passed.update(o.block.begin for o in open_blocks if o.block.word in LOOPS)
+                raise Restart
+        begin = routine.begin if routine is not None else -1
+        run.rows.sources[b"label %d " % begin + name] |= run.state.sources
+        return pc + 1
+
+    def _open_in_routine(self) -> list[Open]:
+        found: list[Open] = []
+        for opened in reversed(self.run.stack):
+            if opened.back >= 0:
+                break
+            found.append(opened)
+        return found[::-1]
+
+    def _exit(self, pc: int) -> int:
+        run = self.run
+        loop = next((o for o in reversed(self._open_in_routine()) if o.block.word in LOOPS), None)
+        if loop is None or not loop.followed:
+            return pc + 1
+        if run.unsure:
+            return self._abort(loop)
+        while run.stack[-1] is not loop:
+            self._pop()
+        self._pop()
+        return loop.block.end + 1
+
+    def _leave(self, pc: int, kind: str) -> int | None:
+        run = self.run
+        call = next((opened for opened in reversed(run.stack) if opened.back >= 0), None)
+        if kind == "return" and run.unsure:
+            return pc + 1 if call is None else self._abort(call)
+        if call is None:
+            return None if run.routine is not None else pc + 1
+        while run.stack[-1] is not call:
+            self._pop()
+        self._pop()
+        back = [(run.variables.get(inner), name, path) for inner, name, path in call.returned]
+        for name, entry in call.saved:
+            run.variables.replace(name, entry)
+        run.routine = call.routine
+        for value, name, path in back:
+            if value is not None:
+                run.variables.set(name, path, value)
+        return call.back
+
+    def _call(self, pc: int, item: Statement, said: Call) -> int:
+        run = self.run
+        if said.name == b"BAS":
+            command(run, item, said.arguments)
+            return pc + 1
+        routine = run.survey.routines.get(said.name)
+        known = routine is not None and not (run.unsure or self.doubts.plain or routine.is_main)
+        if (
+            routine is None
+            or not known
+            or routine.is_function
+            or routine.begin in self.doubts.passed
+            or said.name in run.survey.later
+            or sum(opened.back >= 0 for opened in run.stack) >= MOST_CALLS
+        ):
+            run.mentioned |= identifiers(said.arguments)
+            self._called(item, said.name, said.arguments)
+            return pc + 1
+        return self._enter_call(pc, said, routine)
+
+    def _enter_call(self, pc: int, said: Call, routine: Routine) -> int:
+        run, variables = self.run, self.run.variables
+        texts = []
+        place = 0
+        while place < len(said.arguments):
+            end = value_end(said.arguments, place)
+            texts.append(said.arguments[place:end].strip())
+            place = end + 1
+        given: dict[bytes, Entry] = {}
+        returned = []
+        for (name, comes_back), text in zip(routine.parameters, texts, strict=False):
+            value = run.value(text) if text else None
+            given[name] = {} if value is None else {b"": value}
+            found = _PLAIN_NAME.match(text)
+            if comes_back and found:
+                path = (found[2] or b"").replace(b" ", b"").replace(b"\t", b"")
+                returned.append((name, found[1].upper(), path))
+        opened = self._push(routine, True)
+        opened.back, opened.returned = pc + 1, tuple(returned)
+        own = run.routine.types if run.routine is not None else {}
+        names = dict.fromkeys([*own, *routine.types])
+        self.spent += len(names)
+        opened.saved = tuple((name, variables.replace(name, given.get(name))) for name in names)
+        run.routine = routine
+        run.followed[routine.name] = None
+        return routine.begin + 1
+
+    def _called(self, item: Statement, name: bytes, given: bytes) -> None:
+        """Takes up that a routine or function ran; the names in ``given`` may come back from it changed."""
+        run = self.run
+        words = identifiers(given)
+        called = shown(name)
+        why = f"after the call of {called} in line {item.line}"
+        routine = run.survey.routines.get(name)
+        if routine is not None:
+            run.rows.sources[b"routine %d" % routine.line] |= run.state.sources
+            self.text_called.add(name)
+            run.forget(routine.effects | words, why)
+            return
+        if is_harmless(name):
+            return
+        run.forget({"point", *words}, why)
+        if name.startswith(PATH_FROM_FILE):
+            run.tell("KRL021", f"{called} reads its path from a file; nothing of that is corrected", item)
+        else:
+            message = f"{called} was not read: after it the position is not known; base and tool are taken as unchanged"
+            run.tell("KRL010", message, item)
