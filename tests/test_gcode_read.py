@@ -442,6 +442,20 @@ def test_keys_of_words() -> None:
     assert lex(b"X12.\n", FANUC).words.how.tolist() == [How.NUMBER]
 
 
+@pytest.mark.parametrize(
+    ("text", "motions"),
+    [
+        ("G4 X1.5", 0), ("G4 P1.", 0), ("G4 P1. X5.", 1), ("G4 X1. Y1.", 1), ("G10 L2 P2 X1. Y2.", 0), ("G92 X1.", 0),
+        ("G52 X1.", 0), ("G65 P1 X5.", 0), ("G68 X0. Y0. R5.", 0), ("G51 X1. P2.", 0), ("G50 X5.", 0), ("G28", 1),
+        ("G28 X0.", 1), ("G53", 0), ("G53 X1.", 1), ("M206 X5.", 0), ("F5.", 0), ("M8", 0), ("X5.", 1), ("G60 X5.", 1),
+        ("G1", 0), ("G2 I5. J0.", 1), ("I5.", 0), ("G2 I5.\nI5. J0.", 2), ("G54 X5.", 1), ("G43 Z5. H1", 1), ("G66 P1 X5.", 0),
+    ],
+)  # fmt: skip
+def test_which_blocks_are_motions(text: str, motions: int) -> None:
+    for dialect in ("linuxcnc", "fanuc"):
+        assert len(body(text + "\n", dialect).toolpath) == 1 + motions
+
+
 def test_what_rapids_are() -> None:
     kinds = body("G1 X1\nG0 X2\nG2 X3 I.5\nG81 Z-1 R1\n").toolpath.kind
     assert [Kind(kind).name for kind in kinds] == ["PTP", "LIN", "PTP", "CIRC", "OTHER"]

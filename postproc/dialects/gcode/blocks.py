@@ -128,9 +128,15 @@ class Blocks:
     def motion(self) -> Bools:
         """(B,) the block moves the machine."""
         modal = self.modal
-        silent = modal.has(Once.DWELL, Once.SETTING, Once.CALL, Once.OTHER, *CHANGES)
-        arc = np.isin(self.move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH)) & (modal.verb >= 0)
-        arc &= self.has(*(key(letter) for letter in "IJKR"), *(one for one in THROUGH if one in self.columns))
+        silent = modal.has(Once.SETTING, Once.CALL, Once.OTHER, *CHANGES)
+        # G4 X1.5 is a time; beside P, or with another axis, the words are a motion.
+        moving = self.has(key("P"), *AXES[1:], *SECOND[1:])
+        silent |= modal.has(Once.DWELL) & ~moving
+        arc = np.isin(self.move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH))
+        centre = self.has(
+            *(key(letter) for letter in "IJK"), *(one for one in THROUGH if one in self.columns)
+        )
+        arc &= centre | ((modal.verb >= 0) & self.has(key("R")))
         return modal.flow.tape & ((self.axis | arc) & ~silent | modal.has(Once.HOME))
 
     @cached_property

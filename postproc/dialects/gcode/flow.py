@@ -13,7 +13,8 @@ from postproc.dialects.gcode.control import Control, Once
 from postproc.dialects.gcode.words import Text, key
 
 _GOTO = re.compile(r"(?:GOTO[BFC]?|REPEATB?)\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
-CALLS = (97, 98, 198)
+CALLS = (72, 97, 98, 198)
+"""M72 of LinuxCNC brings back modes that M70 has saved."""
 LOCAL = 97
 RETURNS = (99,)
 

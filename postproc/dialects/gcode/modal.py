@@ -84,6 +84,10 @@ def modal(text: Text, control: Control) -> Modal:
     once = np.zeros(n, np.int64)
     for code in Once:
         once[blocks[(groups == Group.ONCE) & (values == code)]] |= 1 << code
+    for code, others in control.also.items():
+        for other in others:
+            if other.group == Group.ONCE:
+                once[blocks[inside & (number == code)]] |= 1 << other.value
     m_rows = np.flatnonzero(words.key == key("M"))
     once[words.block[m_rows[np.isin(words.value[m_rows], _ARGUMENTS)]]] |= 1 << Once.OTHER
     once[words.block[m_rows[words.value[m_rows] == 206]]] |= 1 << Once.SETTING
@@ -116,8 +120,8 @@ def modal(text: Text, control: Control) -> Modal:
             for code, others in control.also.items():
                 for other in others:
                     if other.group == one:
-                        said |= at == code
-                        meant[at == code] = other.value
+                        said |= inside & (number == code)
+                        meant[inside & (number == code)] = other.value
             force[one] = fill(blocks[said], meant[said])
     verb, twice = _verbs(rows, blocks, values, groups == Group.MOTION, n)
     states = {one: _rows(n, blocks[groups == one]) for one in Group}

@@ -11,6 +11,7 @@ from postproc.dialects.gcode.blocks import Blocks
 from postproc.dialects.gcode.control import Group, Once
 from postproc.dialects.gcode.flow import Doubt
 from postproc.dialects.gcode.words import key
+from postproc.geometry import Poses
 from postproc.toolpath import FrameRef
 
 TOOL_CHANGE = 6
@@ -107,6 +108,8 @@ def references(base: Ints, tool: Ints, line: Ints) -> tuple[Ints, Ints, tuple[Fr
         for i, name in enumerate(names.tolist()):
             if name >= 0:
                 index[i] = len(frames)
-                frames.append(FrameRef(name, None, int(line[first[i]])))
+                # Base 0 is no offset (G500): the control's own coordinates.
+                pose = Poses.identity() if numbers is base and name == 0 else None
+                frames.append(FrameRef(name, pose, int(line[first[i]])))
         columns.append(index[inverse] if len(numbers) else np.empty(0, np.int64))
     return columns[0], columns[1], tuple(frames)

@@ -71,7 +71,7 @@ _COMMON = _codes(
     (Group.MACRO, 0, (67,)),
     (Group.OFFSET, 100, (54.1, 154)),
     (Group.ONCE, Once.CALL, (65,)),
-    (Group.ONCE, Once.OTHER, (10.6, 53.1, 60)),
+    (Group.ONCE, Once.OTHER, (10.6, 53.1)),
 )
 
 _TIP = {
@@ -81,11 +81,19 @@ _TIP = {
 }
 """G43 and G49 end the modes that G43.1, G43.4 and G43.5 begin; under the last, I J K are a direction of the tool."""
 
+_ARGUMENTS = {
+    **dict.fromkeys(
+        (71, 431, 510, 511, 501, 660, 661, 680, 681, 682, 683, 684, 1070), (Code(Group.ONCE, Once.OTHER),)
+    ),
+    500: (Code(Group.ONCE, Once.SHIFT),),
+}
+"""Codes whose axis words are no targets; G50 X Z of lathes sets coordinates as G92 does."""
+
 LINUXCNC = Control(
     name="linuxcnc",
     line=general.line,
     comment=COMMENT,
-    also=_TIP,
+    also={**_TIP, **_ARGUMENTS},
     codes={
         **_COMMON,
         **_codes(
@@ -108,7 +116,7 @@ FANUC = Control(
     name="fanuc",
     line=general.line,
     comment=COMMENT,
-    also=_TIP,
+    also={**_TIP, **_ARGUMENTS},
     codes={
         **_COMMON,
         **_codes(
