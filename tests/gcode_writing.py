@@ -210,10 +210,7 @@ def assert_reads_as(
     known = np.isfinite(plan.position).all(axis=1)
     np.testing.assert_array_equal(np.isfinite(path.position).all(axis=1), known)
     off = np.abs(path.position - plan.position)[known]
-    turned = (
-        np.abs(program.text.frames.rotation[program.text.frame[source]] - np.eye(3)).max(axis=(1, 2)) > 1e-9
-    )
-    reach = half * np.where(turned, np.sqrt(3), 1.0)
+    reach = half
     # A closed circle ends where the motion before did, in the digits of that.
     with np.errstate(invalid="ignore"):
         reach = np.where(plan.sweep > 6, np.maximum(reach, np.roll(half, 1)), reach)

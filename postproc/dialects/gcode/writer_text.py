@@ -125,9 +125,11 @@ def _keys(places: Places, orient: Ints, through: Bools) -> Ints:
 
 
 def _least(program: Program, orient: Ints, writing: Writing) -> Ints:
-    """(N, 10) the least decimals: one more in inches."""
+    """(N, 10) the least decimals: one more in inches, and in turned coordinates, whose roundings add up in the base."""
     places = program.text
-    lengths = writing.mm + (places.scale > 2 * MM)
+    rotation = np.abs(places.frames.rotation)
+    turned = (np.minimum(rotation, np.abs(rotation - 1.0)) > 1e-9).any(axis=(1, 2))
+    lengths = writing.mm + (places.scale > 2 * MM) + turned[places.frame]
     least = np.repeat(lengths[:, None], COLUMNS, axis=1)
     angles = np.array(
         [writing.deg if o.angles else writing.deg + VECTOR_DECIMALS for o in places.orientations] + [0]
