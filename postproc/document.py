@@ -260,11 +260,6 @@ def _covered(start: NDArray[Any], stop: NDArray[Any], size: int) -> NDArray[np.b
     return np.cumsum(change[:-1], dtype=np.int8).view(np.bool_)
 
 
-def in_order(edits: Iterable[Edit]) -> list[Edit]:
-    """Edits by place; stable, so two insertions at one place keep their order."""
-    return sorted(edits, key=lambda edit: (edit.span.start, edit.span.stop))
-
-
 def undone(written: bytes, original: bytes, edits: Iterable[Edit]) -> bool:
     """Whether ``written`` is ``original`` in every byte that no edit covers, and each edit's text in its place.
 

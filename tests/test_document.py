@@ -9,7 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.document import BLOCK, Document, Edit, Edits, Span, apply, in_order, undone
+from postproc.document import BLOCK, Document, Edit, Edits, Span, apply, undone
+
+
+def in_order(edits: list[Edit]) -> list[Edit]:
+    """By place; stable."""
+    return sorted(edits, key=lambda edit: (edit.span.start, edit.span.stop))
 
 
 def document(raw: bytes) -> Document:
@@ -75,7 +80,7 @@ def test_overlap_is_an_error() -> None:
 def test_insertions_at_one_place_keep_their_order_and_stand_before_a_replacement_there() -> None:
     edits = [Edit(Span(0, 1, 2), b"B"), Edit(Span(0, 1, 1), b"1"), Edit(Span(0, 1, 1), b"2")]
     assert apply(document(b"abc"), edits) == b"a12Bc"
-    assert [edit.text for edit in in_order(edits)] == [b"1", b"2", b"B"]
+    assert [edit.text for edit in Edits.joined(edits)] == [b"1", b"2", b"B"]
 
 
 def test_an_insertion_may_touch_the_end_of_a_replacement() -> None:

@@ -11,7 +11,7 @@ from fuzz.examine import examined
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from postproc.dialects.dialect import Moved, Plan, Program, Role, Writing
+from postproc.dialects.dialect import Moved, Plan, Program, Role, Settings, Writing
 from postproc.dialects.krl import KrlDialect
 from postproc.document import Document, apply, undone
 from postproc.geometry import rotation_from_vector
@@ -156,7 +156,7 @@ def test_a_relative_motion_behind_a_moved_point_ends_where_it_did() -> None:
     lines, _ = written(program, plan(program, r0=(0.5, 0, 0)))
     assert lines == [
         "LIN {X 1.500,Y 2,Z 3,A 4,B 5,C 6}",
-        "LIN {X 1.000,Y 2.000,Z 13.250,A 4.000,B 5.000,C 6.000} C_DIS ;up",
+        "LIN {X 1.000,Y 2.000,Z 13.250,A 4,B 5,C 6} C_DIS ;up",
         "LIN_REL {X 1}",
     ]
 
@@ -173,7 +173,7 @@ def test_a_moved_relative_motion_leaves_the_next_where_it_is() -> None:
     program = read(START + "LIN_REL {Z 10}\nLIN_REL {Z 10}\nLIN_REL {Z 10}\n")
     lines, _ = written(program, plan(program, r1=(0, 0.5, 0)))
     assert lines[3] == "LIN_REL {Z 10}"
-    assert lines[2] == "LIN {X 1.000,Y 2.000,Z 23.000,A 4.000,B 5.000,C 6.000}"
+    assert lines[2] == "LIN {X 1.000,Y 2.000,Z 23.000,A 4,B 5,C 6}"
 
 
 def test_a_component_that_is_assigned_is_edited_there() -> None:
@@ -334,8 +334,8 @@ def test_a_relative_motion_behind_a_piece_is_absolute() -> None:
     program = read(START + "LIN_REL {X 8} C_DIS\n")
     lines, _ = written(program, divided(program, 1, (Role.PIECE, (4.25, 2, 3))))
     assert lines[1:] == [
-        "LIN {X 4.250,Y 2.000,Z 3.000,A 4.000,B 5.000,C 6.000} C_DIS",
-        "LIN {X 9.000,Y 2.000,Z 3.000,A 4.000,B 5.000,C 6.000} C_DIS",
+        "LIN {X 4.250,Y 2.000,Z 3.000,A 4,B 5,C 6} C_DIS",
+        "LIN {X 9.000,Y 2.000,Z 3.000,A 4,B 5,C 6} C_DIS",
     ]
 
 
@@ -425,3 +425,54 @@ def test_programs_of_all_sorts_make_the_motions_of_random_plans(
         for name, raw in (("part.src", text), ("part.dat", f"DEFDAT part\n{data}ENDDAT\n"))
     )
     examined(KRL, documents, np.random.default_rng(seed))
+
+
+def test_a_point_of_a_file_that_is_never_written_gives_way_to_an_aggregate() -> None:
+    config = "DEFDAT $CONFIG\nDECL GLOBAL E6POS XSAFE={X 1,Y 2,Z 3,A 4,B 5,C 6,S 2,T 35}\nENDDAT\n"
+    references = Settings(references=(Document(Path("$config.dat"), config.encode()),))
+    program = KRL.read((Document(Path("part.src"), (HEAD + "LIN XSAFE C_DIS\nEND\n").encode()),), references)
+    assert not program.toolpath.refused
+    for own_points in ("inline", "dat"):
+        found = KRL.moved(program, plan(program, r0=(0, 0, 1)), Writing(3, 3, own_points))
+        (edit,) = found.edits
+        assert edit.text.startswith(b"{X 1")
+        assert b"Z 4.000," in edit.text
+        assert edit.text.endswith(b",S 2,T 35}")
+        after = apply(program.documents[0], found.edits).splitlines()[3]
+        assert after.startswith(b"LIN {X 1")
+        assert after.endswith(b"} C_DIS")
+
+
+def test_pieces_of_the_first_line_stand_behind_a_byte_order_mark() -> None:
+    raw = b"\xef\xbb\xbfLIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\r\nLIN {X 2}"
+    settings = b"BAS(#BASE,1)\r\nBAS(#TOOL,1)\r\n"
+    program = KRL.read((Document(Path("part.src"), raw),))
+    assert len(program.toolpath) == 2
+    if 0 in program.toolpath.refused:
+        program = KRL.read((Document(Path("part.src"), raw[:3] + settings + raw[3:]),))
+    found = KRL.moved(program, divided(program, 0, (Role.PIECE, (0, 2, 3))), Writing(3, 3))
+    after = apply(program.documents[0], found.edits)
+    assert after.startswith(b"\xef\xbb\xbf")
+    assert after.count(b"\xef\xbb\xbf") == 1
+    assert after.endswith(b"LIN {X 0.000,Y 2,Z 3,A 4,B 5,C 6}\r\nLIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\r\nLIN {X 2}")
+
+
+def test_a_list_of_partial_points_is_completed_where_a_neighbour_moves() -> None:
+    """As a slicer writes them: X, Y, Z only, in many lines."""
+    random = np.random.default_rng(7)
+    rows = random.normal(0, 100, (300, 3)).tolist()
+    program = read(
+        START + "".join("LIN {{X {:.2f}, Y {:.3f}, Z {:.0f}}} c_vel\n".format(*row) for row in rows)
+    )
+    path = program.toolpath
+    free = random.random(len(path)) < 0.5
+    position = path.position + free[:, None] * random.normal(0, 2e-4, (len(path), 3))
+    turned = rotation_from_vector(free[:, None] * random.normal(0, 1e-3, (len(path), 3))) @ path.rotation
+    wanted = dataclasses.replace(Plan.of(path), position=position, rotation=turned)
+    lines, _ = written(program, wanted)
+    assert len(lines) == len(path)
+    still = ~free & ~np.roll(free, 1)
+    source = program.documents[0].raw.decode().splitlines()[3:-1]
+    assert all(lines[row] == source[row] for row in np.flatnonzero(still).tolist())
+    changed = np.flatnonzero(free).tolist()
+    assert all(f"{key} " in lines[row] for row in changed for key in "XYZABC")

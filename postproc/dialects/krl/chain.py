@@ -13,7 +13,7 @@ BLOCK = 1 << 14
 SLACK = 1.000001
 """What doubles are off by, on half a step."""
 EXACT = 1e-9
-"""[deg] A turn that does not count, however far the tool goes along its axes."""
+"""[mm, deg] What does not count, however much of it a way along tool axes or an arc makes."""
 
 
 class Chain:
@@ -34,6 +34,7 @@ class Chain:
         self.renewed = np.zeros(len(touched), dtype=bool)
         self.deviation: Floats = np.zeros((len(touched), 6) if self.depends.any() else (0, 6))
         self._changed = np.zeros(len(touched), dtype=bool)
+        self._inexact = np.zeros(len(touched), dtype=bool)
 
     def written(self, rows: Ints, said: Components, wanted: Floats, kept: Bools) -> None:
         """Takes up rows (K,) that depend on no other: what they say, and are to say (K, 6)."""
@@ -100,6 +101,7 @@ class Chain:
                 last = [t if i in inherits and i not in wrong else f
                         for i, (t, f) in enumerate(zip(taken, fresh[k], strict=True))]  # fmt: skip
             self._changed[row] = any(abs(value) > h for value, h in zip(last, half, strict=True))
+            self._inexact[row] = any(abs(value) > EXACT for value in last)
             self.deviation[row] = last
         return last, at
 
@@ -108,7 +110,8 @@ class Chain:
         arcs = np.zeros(len(way), dtype=bool)
         known = [row for row in self.task.places.arcs if np.isfinite(self.task.path.sweep[row])]
         arcs[known] = True
-        before = np.roll(self._changed, 1)
+        # Where an arc with CA ends follows from where it begins.
+        before = np.roll(self._changed, 1) | (np.roll(self._inexact, 1) & self.task.has_angle)
         before[:1] = False
         moves = way | self.touched | before | (self.task.inserted > 0)
         return np.asarray(self.completed.any(axis=1) | self.renewed | (arcs & moves & ~self._refused))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -13,15 +12,13 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.dialects.decimals import fixed_one, literals
 from postproc.dialects.krl.arcs import half_way, on_arcs
-from postproc.dialects.krl.components import KEYS, LETTER, Task, other_literal
+from postproc.dialects.krl.components import Task, other_literal
+from postproc.dialects.krl.in_place import completion
 from postproc.dialects.krl.own_points import Lines
 from postproc.dialects.krl.places import Auxiliary, Variable
 from postproc.document import Edit, Span
 from postproc.findings import Finding
 from postproc.units import DEG, MM
-
-_KEY = re.compile(rb"[A-Za-z]")
-_LAST_KEY = re.compile(rb"[A-Za-z](?=[^A-Za-z]*\Z)")
 
 FULL = math.radians(340.0)
 """Arcs that sweep more keep their CA: a circle through points that are close to each other would not hold."""
@@ -30,6 +27,8 @@ FINER = 2
 
 Spot = tuple[int, int]
 """Document and offset of a literal."""
+Via = tuple[list[float], list[int]]
+"""Values [mm] and decimals of an auxiliary point, as the text gives it."""
 
 
 @dataclass(slots=True)
@@ -99,6 +98,7 @@ def _targets(task: Task, rows: Ints, completed: Bools, lines: Lines) -> Iterator
     finer = np.where(kept_angle[:, None] & (np.arange(6) < 3), FINER, 0)
     said = replace(said, decimals=said.decimals + finer)
     kept, steps = said.kept(wanted), said.half_step
+    said_vias = _said_vias(task, [row for row in rows.tolist() if row in places.arcs])
     for k, row in enumerate(rows.tolist()):
         texts = task.texts(said, wanted, kept, k)
         arc = places.arcs.get(row)
@@ -121,7 +121,8 @@ def _targets(task: Task, rows: Ints, completed: Bools, lines: Lines) -> Iterator
             continue
         if arc.has_angle:
             _change_angle(task, row, arc, bool(kept_angle[k]), lines)
-        auxiliary = _auxiliary(task, row, arc, via, FINER if kept_angle[k] else 0, texts[3:])
+        finer_by = FINER if kept_angle[k] else 0
+        auxiliary = _auxiliary(task, row, arc, said_vias[row], via, finer_by, texts[3:])
         if auxiliary.missing or auxiliary.anew():
             yield auxiliary
 
@@ -144,18 +145,10 @@ def _arc_points(task: Task, rows: Ints, wanted: Floats) -> tuple[Floats, Bools]:
 
 
 def _auxiliary(
-    task: Task, row: int, arc: Auxiliary, via: list[float], finer: int, angles: list[bytes]
+    task: Task, row: int, arc: Auxiliary, said: Via, via: list[float], finer: int, angles: list[bytes]
 ) -> Target:
     """The auxiliary point; ``angles``: A, B, C as written, that an own point gets besides (they do not count)."""
-    least = int(task.least[0])
-    own, decimals = [math.inf] * 3, [least] * 3
-    for i in range(3):
-        if arc.start[i] >= 0:
-            value, written = literals(
-                task.raws[arc.file[i]], np.array([arc.start[i]]), np.array([arc.stop[i]]), other_literal
-            )
-            own[i], decimals[i] = float(value[0]), max(int(written[0]), least)
-    decimals = [count + finer for count in decimals]
+    own, decimals = said[0], [count + finer for count in said[1]]
     steps = [0.5 * 10.0**-count for count in decimals]
     texts = [fixed_one(value, count) for value, count in zip(via, decimals, strict=True)]
     left_out = [i for i in range(3) if arc.start[i] < 0]
@@ -163,6 +156,21 @@ def _auxiliary(
         row, list(arc.start), list(arc.stop), list(arc.file), own, via, steps, [*texts, *angles],
         left_out, left_out, arc.insert, arc.home, arc.operand, arc.variable, arc.text, arc.locked, True,
     )  # fmt: skip
+
+
+def _said_vias(task: Task, rows: list[int]) -> dict[int, Via]:
+    """Values [mm] and decimals of the auxiliary points of rows, as the text gives them."""
+    arcs = [task.places.arcs[row] for row in rows]
+    start, stop, file = (
+        np.array([getattr(arc, name) for arc in arcs], np.int64).reshape(-1, 3)
+        for name in ("start", "stop", "file")
+    )
+    values, decimals = np.full(start.shape, math.inf), np.full(start.shape, int(task.least[0]))
+    for index, raw in enumerate(task.raws):
+        here = (start >= 0) & (file == index)
+        values[here], written = literals(raw, start[here], stop[here], other_literal)
+        decimals[here] = np.maximum(written, decimals[here])
+    return dict(zip(rows, zip(values.tolist(), decimals.tolist(), strict=True), strict=True))
 
 
 def _change_angle(task: Task, row: int, arc: Auxiliary, stays: bool, lines: Lines) -> None:
@@ -195,13 +203,12 @@ def _users(task: Task, needed: dict[int, list[Target]]) -> dict[int, dict[Spot, 
             if places.start[row, i] >= 0:
                 spot = (int(places.file[row, i]), int(places.start[row, i]))
                 users[int(places.text[row])][spot] = float(said.own[k, i])
-    for row, arc in places.arcs.items():
-        if arc.text in needed and (row, True) not in moving:
-            for i in range(3):
-                if arc.start[i] >= 0:
-                    raw = task.raws[arc.file[i]]
-                    value, _ = literals(raw, np.array([arc.start[i]]), np.array([arc.stop[i]]), other_literal)
-                    users[arc.text][arc.file[i], arc.start[i]] = float(value[0])
+    kept = [row for row, arc in places.arcs.items() if arc.text in needed and (row, True) not in moving]
+    for row, (values, _) in _said_vias(task, kept).items():
+        arc = places.arcs[row]
+        for i in range(3):
+            if arc.start[i] >= 0:
+                users[arc.text][arc.file[i], arc.start[i]] = values[i]
     return users
 
 
@@ -226,7 +233,7 @@ def _of_one_text(task: Task, targets: list[Target], said: dict[Spot, float], lin
                     span = Span(spot[0], spot[1], target.stop[i])
                     edits.append(lines.replaced(span, target.texts[i]))
         if target.missing:
-            edits.append(_completed(task, target))
+            edits.append(completion(task, target.home, target.insert, target.texts, target.missing))
     return edits
 
 
@@ -247,19 +254,6 @@ def _why_own(task: Task, target: Target, computed: bool, shared: bool, said: dic
         for i, spot in target.spots()
     )
     return "" if same else f"{shown} serves several motions with different corrections"
-
-
-def _completed(task: Task, target: Target) -> Edit:
-    """The insertion of what an aggregate leaves out, behind its last component or before its first one."""
-    raw, at = task.documents[target.home].raw, target.insert
-    first = bool(LETTER[raw[at]])
-    key = _KEY.match(raw, at) if first else _LAST_KEY.search(raw, max(at - 80, 0), at)
-    lower = key is not None and key[0].islower()
-    words = [
-        (KEYS[i].lower() if lower else KEYS[i]).encode() + b" " + target.texts[i] for i in target.missing
-    ]
-    text = b",".join(words) + b"," if first else b"," + b",".join(words)
-    return Edit(Span(target.home, at, at), text)
 
 
 def _apart(one: float, other: float, component: int) -> float:

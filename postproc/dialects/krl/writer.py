@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.dialects.decimals import fixed
+from postproc.arrays import Bools, Ints
 from postproc.dialects.dialect import Moved, Plan, Program, Writing
 from postproc.dialects.krl.chain import Chain
-from postproc.dialects.krl.components import LETTER, Components, Task, differs
+from postproc.dialects.krl.components import Task, differs
+from postproc.dialects.krl.in_place import literal_edits, partial_edits
 from postproc.dialects.krl.inserting import insertions
 from postproc.dialects.krl.targets import FULL, single_edits
 from postproc.document import Edits
@@ -29,7 +29,8 @@ def moved(program: Program, plan: Plan, writing: Writing) -> Moved:
     task = Task(program, plan, writing)
     touched, way = _touched(task)
     _refuse_forbidden(task, touched, way)
-    plain = touched & _plain(task)
+    private = _private(task)
+    plain = touched & _plain(task, private)
     chain = Chain(task, touched)
     parts: list[Edits] = []
     for rows in _blocks(np.flatnonzero(touched & ~chain.depends)):
@@ -40,9 +41,12 @@ def moved(program: Program, plan: Plan, writing: Writing) -> Moved:
         chain.written(rows, said, wanted, kept)
         simple = plain[rows]
         if simple.any():
-            parts.append(_literal_edits(task, said, wanted, ~kept & simple[:, None]))
+            parts.append(literal_edits(task, said, wanted, ~kept & simple[:, None]))
     chain.follow()
-    singly = np.flatnonzero((touched & ~plain) | chain.again(way))
+    again = (touched & ~plain) | chain.again(way)
+    partial = again & _partial(task, private)
+    parts += partial_edits(task, np.flatnonzero(partial), chain.completed)
+    singly = np.flatnonzero(again & ~partial)
     single, held = single_edits(task, singly, chain.completed)
     if held:
         return Moved((), held)
@@ -80,28 +84,34 @@ def _refuse_forbidden(task: Task, touched: Bools, way: Bools) -> None:
         raise ValueError(f"motions that can not be divided were: rows {sorted(whole)[:5]}")
 
 
-def _plain(task: Task) -> Bools:
-    """(N,) rows whose target are six literals that nothing else uses."""
+def _private(task: Task) -> Bools:
+    """(N,) rows whose literals nothing else uses."""
     places = task.places
-    plain = (places.start >= 0).all(axis=1) & ~task.is_relative
-    plain[[*places.locked, *places.arcs]] = False
-    used = np.bincount(places.text, minlength=len(plain))
-    for arc in places.arcs.values():
-        if arc.text < len(used):
-            used[arc.text] += 1
-    return np.asarray(plain & (used[places.text] == 1))
+    vias = np.array([arc.text for arc in places.arcs.values()], np.int64)
+    used = np.bincount(np.concatenate([places.text, vias]), minlength=1)
+    private = used[places.text] == 1
+    private[list(places.locked)] = False
+    return np.asarray(private)
 
 
-def _literal_edits(task: Task, said: Components, wanted: Floats, chosen: Bools) -> Edits:
-    """Edits of the ``chosen`` (K, 6) literals to the ``wanted`` (K, 6) values."""
-    start, stop, file = said.start[chosen], said.stop[chosen], said.file[chosen]
-    before = np.zeros(len(start), np.uint8)
-    for index, raw in enumerate(task.raws):
-        here = file == index
-        before[here] = raw[start[here] - 1]
-    # "Z- 30" is Z and a number, "Z30.1" would be a name.
-    texts, ends = fixed(wanted[chosen], said.decimals[chosen], LETTER[before])
-    return Edits(file, start, stop, texts, ends)
+def _plain(task: Task, private: Bools) -> Bools:
+    """(N,) rows whose target are six literals that nothing else uses."""
+    plain = private & (task.places.start >= 0).all(axis=1) & ~task.is_relative
+    plain[list(task.places.arcs)] = False
+    return np.asarray(plain)
+
+
+def _partial(task: Task, private: Bools) -> Bools:
+    """(N,) rows whose target is an aggregate in a line that runs once; it leaves out components of the row before."""
+    places = task.places
+    left_out = (places.inherits[:, None] >> np.arange(6, dtype=np.uint8)) & 1 == 1
+    partial = private & task.is_inline & (places.inherits > 0) & (places.home == 0)
+    partial &= ((places.start >= 0) | left_out).all(axis=1)
+    words = places.motion[:, 0]
+    if (words[1:] <= words[:-1]).any():
+        _, where, counts = np.unique(words, return_inverse=True, return_counts=True)
+        partial &= counts[where] == 1
+    return np.asarray(partial)
 
 
 def _blocks(rows: Ints) -> Iterator[Ints]:

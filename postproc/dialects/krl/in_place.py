@@ -1,0 +1,66 @@
+"""Edits of targets in place: their literals, and what their aggregates leave out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.dialects.decimals import fixed
+from postproc.dialects.krl.components import KEYS, LETTER, Components, Task
+from postproc.document import Edit, Edits, Span
+
+BLOCK = 1 << 14
+"""Rows that are written at a time."""
+
+_KEY = re.compile(rb"[A-Za-z]")
+_LAST_KEY = re.compile(rb"[A-Za-z](?=[^A-Za-z]*\Z)")
+
+
+def literal_edits(task: Task, said: Components, wanted: Floats, chosen: Bools) -> Edits:
+    """Edits of the ``chosen`` (K, 6) literals to the ``wanted`` (K, 6) values."""
+    start, stop, file = said.start[chosen], said.stop[chosen], said.file[chosen]
+    before = np.zeros(len(start), np.uint8)
+    for index, raw in enumerate(task.raws):
+        here = file == index
+        before[here] = raw[start[here] - 1]
+    # "Z- 30" is Z and a number, "Z30.1" would be a name.
+    texts, ends = fixed(wanted[chosen], said.decimals[chosen], LETTER[before])
+    return Edits(file, start, stop, texts, ends)
+
+
+def completion(task: Task, home: int, at: int, texts: Sequence[bytes], missing: Sequence[int]) -> Edit:
+    """The insertion of the ``missing`` of six components into an aggregate: behind its last one or before its first."""
+    raw = task.documents[home].raw
+    first = bool(LETTER[raw[at]])
+    key = _KEY.match(raw, at) if first else _LAST_KEY.search(raw, max(at - 80, 0), at)
+    keys = KEYS.lower() if key is not None and key[0].islower() else KEYS
+    words = b",".join([keys[i].encode() + b" " + texts[i] for i in missing])
+    return Edit(Span(home, at, at), words + b"," if first else b"," + words)
+
+
+def partial_edits(task: Task, rows: Ints, completed: Bools) -> Iterator[Edits]:
+    """Edits of partial targets (K,) in their lines; completed (N, 6): the components that they get."""
+    for low in range(0, len(rows), BLOCK):
+        block = rows[low : low + BLOCK]
+        said, there = task.components(block), task.own[block]
+        wanted = task.wanted(block, said.own, task.plan.position[there], task.plan.rotation[there])
+        kept = said.kept(wanted)
+        yield literal_edits(task, said, wanted, ~kept & (task.places.start[block] >= 0))
+        home, insert = task.places.home[block].tolist(), task.places.insert[block].tolist()
+        gets = completed[block]
+        chosen = np.flatnonzero(gets.any(axis=1)).tolist()
+        yield Edits.joined(
+            [
+                completion(
+                    task,
+                    home[k],
+                    insert[k],
+                    task.texts(said, wanted, kept, k),
+                    np.flatnonzero(gets[k]).tolist(),
+                )
+                for k in chosen
+            ]
+        )
