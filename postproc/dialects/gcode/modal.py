@@ -106,6 +106,11 @@ def modal(text: Text, control: Control) -> Modal:
         values = np.where(numbered, np.where(fine, 100 + np.where(fine, given, 0), UNKNOWN), values).astype(
             np.int64
         )
+    selecting = (number == 150) & (groups == Group.POLAR) & (last_of(words, key("H"), n)[blocks] >= 0)
+    if selecting.any():
+        # An Okuma: G15 H selects the offset, and G54 to G59 with an H are lengths of tools.
+        groups = np.where(selecting, Group.OFFSET, groups)
+        values = np.where(groups == Group.OFFSET, UNKNOWN, values)
     start = {**_START, **control.start}
     force: dict[Group, Ints] = {}
     for one in Group:
