@@ -114,6 +114,9 @@ def operand_at(run: Run, code: bytes, at: int, place: tuple[int, int]) -> Operan
             return Operand(target, begin, end, None, isinstance(target, Unclear))
         if close < 0 or b"{" in text[1:close]:
             return Operand(Unclear("KRL001", "its braces do not close"), begin, end, None, True)
+        if text[close + 1 :].lstrip()[:1] not in (b":", b"+", b"-", b"*", b"/"):
+            why = f"'{shown(text[close + 1 :])}' is not understood"
+            return Operand(Unclear("KRL001", why), begin, end, None, True)
         return _computed(run, text, begin, end)
     found = _NAMED.match(text)
     if found is None:
