@@ -100,7 +100,7 @@ def _stretches(text: Text, n: int, forget: Bools) -> list[tuple[int, int]]:
     """Ranges of blocks that are loops, branches, subprograms or lie under a jump; calls are put into ``forget``."""
     found: list[tuple[int, int]] = []
     stack: list[tuple[int, str]] = []
-    labels: dict[str, int] = {}
+    labels: dict[str, int] | None = None
     for note in text.notes:
         if note.kind == "call":
             forget[note.block + 1] = True
@@ -115,7 +115,7 @@ def _stretches(text: Text, n: int, forget: Bools) -> list[tuple[int, int]]:
             goto = _GOTO.search(note.text)
             if goto is None:
                 continue
-            labels = labels or _labels(text)
+            labels = _labels(text) if labels is None else labels
             ends = [labels.get(name.upper().lstrip("N0") or "0") for name in goto.groups() if name]
             if not ends or None in ends:
                 found.append((0, n))
