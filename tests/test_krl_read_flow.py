@@ -144,10 +144,27 @@ def test_motions_that_never_run_come_last() -> None:
 
 
 def test_a_long_flow_is_given_up_and_the_rest_is_read() -> None:
-    found = body("FOR i=1 TO 1000000\nLIN {X i}\nENDFOR\nFOR i=1 TO 2\nLIN {X i}\nENDFOR\n" + FULL)
+    after = "FOR i=1 TO 2\nLIN {X i}\nENDFOR\n" + FULL
+    found = body("FOR i=1 TO 1000000\nLIN {X i}\nENDFOR\n" + FULL + after)
+    assert codes(found) == ["KRL006"]
+    assert [finding.code for finding in found.findings] == ["KRL024", "KRL006"]
+    assert xs(found) == [1, 1, 2, 1]
+    found = body("i=0\nREPEAT\ni=i+1\nLIN {X i}\nUNTIL i>9999\n" + after)
     assert codes(found) == ["KRL006", "KRL006"]
     assert "KRL024" in [finding.code for finding in found.findings]
-    assert len(found.toolpath) == 4
+
+
+def test_a_long_loop_that_moves_nothing_is_passed_over() -> None:
+    found = body("FOR i=1 TO 100000\n$OUT[i]=FALSE\nENDFOR\nLIN {X 5}\n")
+    assert xs(found) == [5]
+    assert not found.findings
+
+
+def test_what_runs_once_in_calls_is_not_limited() -> None:
+    subs = "".join(f"DEF s{k}()\n{FULL * 9}$OUT[1]=TRUE\n{'LIN {X 7}' + chr(10)}END\n" for k in range(3000))
+    found = body("".join(f"s{k}()\n" for k in range(3000)), subs)
+    assert not found.findings
+    assert len(found.toolpath) == 1 + 10 * 3000
 
 
 def test_a_jump_back_for_ever_is_given_up() -> None:

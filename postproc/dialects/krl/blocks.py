@@ -13,6 +13,9 @@ from postproc.dialects.krl.survey import Block
 from postproc.dialects.krl.target import Unclear
 from postproc.toolpath import Annotation
 
+BUDGET = 20_000
+"""Statements of a file that are followed again, in loops, jumps and calls."""
+
 AFTER_FOR = Unclear("KRL002", "what a counter is behind its FOR is not documented")
 
 _REPEATED = LOOPS | {b"DEF"}
@@ -42,14 +45,15 @@ class Doubts:
 class Blocks:
     """Enters, leaves and takes back blocks.
 
-    spent: statements that were followed in loops and calls; jumped: a GOTO led back, so that every line may run again;
-    repeating: loops and calls that are followed and open; text_called: routines that were called where it is not known
-    that, or with what, they run.
+    spent: statements that were followed again; seen: those that were followed in loops and calls (index); jumped: a
+    GOTO led back, so that every line may run again; repeating: loops and calls that are followed and open; text_called:
+    routines that were called where it is not known that, or with what, they run.
     """
 
     def __init__(self, run: Run, doubts: Doubts) -> None:
         self.run, self.doubts = run, doubts
         self.spent = self.repeating = 0
+        self.seen = bytearray(len(run.code))
         self.jumped = False
         self.text_called: set[bytes] = set()
         self.comments: dict[int, Annotation] = {}
@@ -157,6 +161,10 @@ class Blocks:
         first, last, step = numbers
         if not (isinstance(first, int) and isinstance(last, int) and isinstance(step, int) and step):
             return None
+        if ((last - first) // step) * (block.end - block.begin) > BUDGET - self.spent:
+            if "point" in block.effects:
+                self._tell_length(item)
+            return None
         name = found[1].upper()
         opened = self._push(block, True)
         run.variables.set(name, b"", first)
@@ -166,6 +174,10 @@ class Blocks:
             return block.end + 1
         opened.counter = (name, first, last, step)
         return pc + 1
+
+    def _tell_length(self, item: Statement) -> None:
+        message = f"it runs more than the {BUDGET} statements that are followed again; it is passed over"
+        self.run.tell("KRL024", message, item)
 
     def _branch(self, pc: int, block: Block) -> int:
         run = self.run

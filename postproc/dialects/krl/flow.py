@@ -6,6 +6,7 @@ import re
 
 from postproc.dialects.krl import motions
 from postproc.dialects.krl.assignments import assign, declare
+from postproc.dialects.krl.blocks import BUDGET
 from postproc.dialects.krl.bulk import Bulk
 from postproc.dialects.krl.calls import Calls, Restart
 from postproc.dialects.krl.effects import HIDDEN, functions_of
@@ -13,9 +14,6 @@ from postproc.dialects.krl.lexing import Assignment, Call, Declared, Statement
 from postproc.dialects.krl.state import Form, State
 from postproc.dialects.krl.survey import INLINE, Routine
 from postproc.toolpath import Annotation
-
-BUDGET = 20_000
-"""Statements of a file that are followed inside of loops and called routines."""
 
 _ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 
@@ -86,7 +84,9 @@ class Flow(Calls):
         run = self.run
         item = run.code[pc]
         if self.repeating or self.jumped:
-            self.spent += len(item) if isinstance(item, Bulk) else 1
+            if self.seen[pc]:
+                self.spent += len(item) if isinstance(item, Bulk) else 1
+            self.seen[pc] = 1
             if self.spent > BUDGET and not self.doubts.plain:
                 return self._give_up(pc)
         if isinstance(item, Bulk):
@@ -153,7 +153,5 @@ class Flow(Calls):
         at = self._abort(outermost)
         item = run.code[at]
         assert isinstance(item, Statement)
-        run.tell(
-            "KRL024", f"more than {BUDGET} statements run in loops and calls; the rest is not followed", item
-        )
+        self._tell_length(item)
         return at
