@@ -476,3 +476,60 @@ def test_a_list_of_partial_points_is_completed_where_a_neighbour_moves() -> None
     assert all(lines[row] == source[row] for row in np.flatnonzero(still).tolist())
     changed = np.flatnonzero(free).tolist()
     assert all(f"{key} " in lines[row] for row in changed for key in "XYZABC")
+
+
+def test_what_is_taken_over_is_judged_by_the_digits_that_are_written() -> None:
+    program = read(START + "LIN_REL {X 0.0004}\nLIN {Y 9}\nLIN {Y 10}\n")
+    lines, _ = written(program, plan(program, r0=(0, 1, 0), r2=(0.0003, 0, 0)))
+    assert lines[1] == "LIN {X 1.000,Y 2.000,Z 3.000,A 4,B 5,C 6}"
+    assert lines[2] == "LIN {Y 9,X 1.001}"
+    assert lines[3] == "LIN {Y 10,X 1.000}"
+
+
+def test_an_arc_with_an_angle_ends_where_it_did_when_its_begin_is_rounded() -> None:
+    program = read(FLAT + "LIN_REL {X 0.0004}\nCIRC {X 0.5,Y 0.1,Z 0},{X 1,Y 0,Z 0,A 0,B 0,C 0},CA 200\n")
+    lines, _ = written(program, plan(program, r0=(0, 0, 1)))
+    assert lines[1].startswith("LIN {X 0.000,")
+    assert "CA" not in lines[2]
+
+
+def test_angles_that_are_taken_over_are_completed_together() -> None:
+    program = read(START + "LIN {X 9}\n")
+    turn = rotation_from_vector(np.array([[0, 0, 0.1 * DEG], [0, 0, 0]]))
+    wanted = dataclasses.replace(Plan.of(program.toolpath), rotation=turn @ program.toolpath.rotation)
+    lines, _ = written(program, wanted)
+    assert lines == ["LIN {X 1,Y 2,Z 3,A 4.100,B 5,C 6}", "LIN {X 9,A 4,B 5,C 6}"]
+
+
+def test_a_partial_point_behind_an_arc_with_an_angle_takes_its_orientation() -> None:
+    program = read(FLAT + "CIRC {X 10,Y 10,Z 0},{X 20,Y 0,Z 0,A 1.25,B 2,C 3},CA 90\nLIN {Z 5}\n")
+    lines, _ = written(program, plan(program, r2=(0, 0, 1)))
+    assert lines[1].endswith(",CA 90")
+    assert lines[2] == "LIN {Z 6.000,X 10.000,Y 10.000,A 1.25,B 2,C 3}"
+
+
+def test_an_auxiliary_point_stays_where_its_arc_stays() -> None:
+    data = "DECL E6POS M={X 10,Y 10,Z 0,A 0,B 0,C 0}\n"
+    program = read(FLAT + "CIRC M,{X 20,Y 0,Z 0,A 0,B 0,C 0}\nLIN M\n", data)
+    lines, after = written(program, plan(program, r2=(1, 0, 0)))
+    assert lines[2] == "LIN {X 11.000,Y 10,Z 0,A 0,B 0,C 0}"
+    assert after == [data.strip()]
+
+
+@pytest.mark.parametrize(
+    ("line", "data"),
+    [("HIGH = XP1.Z + 5\n", POINT), ("", POINT.replace("DECL", "DECL GLOBAL"))],
+    ids=["read by other code", "global"],
+)
+def test_a_point_that_others_may_read_stays(line: str, data: str) -> None:
+    program = read(line + "LIN XP1\n", data)
+    lines, after = written(program, plan(program, r0=(0, 0, 1)))
+    assert lines[-1] == "LIN {X 1.5,Y 2,Z 4.000,A 4,B 5,C 6,S 2,T 35,E1 7.0}"
+    assert after == [data.strip()]
+    assert held(program, plan(program, r0=(0, 0, 1)), "refuse").held.keys() == {0}
+
+
+def test_an_aggregate_that_runs_several_times_is_not_completed_for_one_of_them() -> None:
+    program = read(START + "FOR I=1 TO 2\nLIN {E1 5.0}\nLIN {X 7}\nENDFOR\n")
+    assert len(program.toolpath) == 5
+    assert held(program, plan(program, r0=(0, 0, 1))).held.keys() == {1}

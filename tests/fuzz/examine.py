@@ -18,6 +18,8 @@ from postproc.units import DEG, MM
 WRITING = Writing(mm=3, deg=3)
 HALF_MM = 0.50001e-3
 """Half of a written step [mm], and what doubles are off by."""
+FARTHEST = 1e4
+"""[m] of a target or a centre."""
 ANGLES = 3 * 0.50001e-3
 """[deg] half a step in each of three angles."""
 
@@ -106,7 +108,13 @@ def movable(path: Toolpath) -> Bools:
     """(N,) the motions that may be planned elsewhere."""
     free = path.known & (path.kind != Kind.AXIS) & (path.anchor < 0)
     free[[*path.refused, *path.pinned]] = False
-    return free
+    # Beyond it doubles do not hold the digits that are written.
+    with np.errstate(invalid="ignore"):
+        return (
+            free
+            & (np.abs(path.position).max(axis=1) < FARTHEST)
+            & ~(np.abs(path.centre).max(axis=1) > FARTHEST)
+        )
 
 
 def dividable(path: Toolpath) -> Bools:

@@ -33,12 +33,10 @@ class Chain:
         self.completed = np.zeros((len(touched), 6), dtype=bool)
         self.renewed = np.zeros(len(touched), dtype=bool)
         self.deviation: Floats = np.zeros((len(touched), 6) if self.depends.any() else (0, 6))
-        self._changed = np.zeros(len(touched), dtype=bool)
         self._inexact = np.zeros(len(touched), dtype=bool)
 
     def written(self, rows: Ints, said: Components, wanted: Floats, kept: Bools) -> None:
         """Takes up rows (K,) that depend on no other: what they say, and are to say (K, 6)."""
-        self._changed[rows] = (~kept).any(axis=1)
         if len(self.deviation):
             self.deviation[rows] = _deviation(said, wanted, kept)
 
@@ -100,7 +98,6 @@ class Chain:
                     self.completed[row, i] = True
                 last = [t if i in inherits and i not in wrong else f
                         for i, (t, f) in enumerate(zip(taken, fresh[k], strict=True))]  # fmt: skip
-            self._changed[row] = any(abs(value) > h for value, h in zip(last, half, strict=True))
             self._inexact[row] = any(abs(value) > EXACT for value in last)
             self.deviation[row] = last
         return last, at
@@ -111,8 +108,8 @@ class Chain:
         known = [row for row in self.task.places.arcs if np.isfinite(self.task.path.sweep[row])]
         arcs[known] = True
         # Where an arc with CA ends follows from where it begins.
-        before = np.roll(self._changed, 1) | (np.roll(self._inexact, 1) & self.task.has_angle)
-        before[:1] = False
+        before = np.zeros(len(way), dtype=bool)
+        before[1:] = self._inexact[:-1] & self.task.has_angle[1:]
         moves = way | self.touched | before | (self.task.inserted > 0)
         return np.asarray(self.completed.any(axis=1) | self.renewed | (arcs & moves & ~self._refused))
 

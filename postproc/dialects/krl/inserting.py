@@ -84,7 +84,7 @@ def _line(task: Task, motion: int, said: Components, wanted: Floats, kept: Bools
     elif arc is not None:
         via = half_way(task.plan, np.array([motion]))[0].tolist()
         target = aggregate([fixed_one(value, int(task.least[0])) for value in via], b"") + b"," + target
-    indent = raw[raw.rfind(b"\n", 0, at) + 1 : at].removeprefix(b"\xef\xbb\xbf")
+    indent = raw[raw.rfind(b"\n", 0, at) + 1 : at]
     return (indent if not indent.strip() else b"") + word + b" " + target + behind + newline
 
 
