@@ -59,8 +59,11 @@ def follow(text: Text, control: Control, once: Ints) -> Flow:
         coded[words.block[np.isin(words.key, (key("G"), key("M")))]] = True
         named = words.block[np.isin(words.key, list(control.calls))]
         forget[named[~coded[named]] + 1] = True
+    edge = np.zeros(n + 1, np.int64)
     for begin, end in _stretches(text, n, forget):
-        doubt[begin:end] = Doubt.FLOW
+        edge[begin] += 1
+        edge[end] -= 1
+    doubt[np.cumsum(edge)[:n] > 0] = Doubt.FLOW
     programs = _programs(text)
     if len(programs) > 1:
         doubt[programs[1] :] = Doubt.PROGRAM
