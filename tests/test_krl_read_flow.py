@@ -108,6 +108,11 @@ def test_a_caller_does_not_see_what_is_local_to_a_routine() -> None:
         ("sub()\nIF $IN[1] THEN\nsub()\nENDIF\n", "DEF sub()\nLIN {X 5}\nEND\n", ["KRL015"]),
         ("sub()\n", "DEF sub()\nIF $IN[1] THEN\nRETURN\nENDIF\nLIN {X 5}\nEND\n", ["KRL015"]),
         ("INTERRUPT DECL 2 WHEN $IN[1] DO sub()\nsub()\n", "DEF sub()\nLIN {X 5}\nEND\n", ["KRL015"]),
+        (
+            "INTERRUPT DECL 2 WHEN $IN[1] DO sub()\nr=5\nLIN {X r}\n",
+            "DEF sub()\ndeep()\nEND\nDEF deep()\nr=9\nEND\n",
+            ["KRL002"],
+        ),
         ("IF i==1 THEN\nLIN {X 5}\nENDIF\n", "", ["KRL006"]),
         ("i=1\nIF i==2 THEN\nLIN {X 5}\nENDIF\n", "", ["KRL023"]),
         ("i=1\nIF i==2 THEN\nLIN {X 5}\nELSEIF i==1 THEN\nLIN {X 6}\nENDIF\n", "", ["KRL006", "KRL006"]),

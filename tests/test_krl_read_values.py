@@ -236,6 +236,7 @@ def test_comments_on_lines_of_their_own_are_kept_once() -> None:
 CONFIG = """DEFDAT $CONFIG PUBLIC
 DECL GLOBAL E6POS XAWAY={X 1,Y 1,Z 1,A 0,B 0,C 0,S 2,T 3}
 DECL REAL DEF_VEL_CP=2.0
+DECL REAL level=5.0
 DECL FRAME BASE_DATA[2]
 BASE_DATA[1]={X 5,Y 5,Z 5,A 0,B 0,C 0}
 ENDDAT
@@ -249,6 +250,10 @@ def test_points_of_another_file_are_known_and_never_edited() -> None:
     assert (program.text.start[0] == -1).all()
     assert program.text.variables[0].words == b"S 2,T 3"
     assert program.toolpath.frames[0].pose is None  # what BASE_DATA holds is the cell's to say
+
+
+def test_a_number_of_another_file_may_change() -> None:
+    assert codes(body("LIN {X level,Y 0,Z 0,A 0,B 0,C 0}\n", config=CONFIG)) == {0: "KRL002"}
 
 
 def test_the_modules_own_point_goes_before_that_of_another_file() -> None:

@@ -19,6 +19,9 @@ from postproc.dialects.krl.target import AXES, COMPONENTS, EXTERNAL, NAN, Target
 from postproc.dialects.krl.variables import Entry
 from postproc.document import Document, Span
 
+_DEFAULTS = b"DEF_"
+"""Begin of the names that KUKA's bas.src takes its defaults from; other numbers of other files may change."""
+
 _FRAME_TABLES = (b"BASE_DATA", b"TOOL_DATA")
 """What they hold is the cell's to say."""
 
@@ -69,7 +72,7 @@ def read_data(result: Declarations, document: Document, file: int) -> None:
                     result.records[key] = fields(said.value)
                 elif result.types.get(root, b"FRAME") in POINT_TYPES:
                     _add(result, key, read_point(said.value.rstrip(), said.at, file, line), span, foreign)
-            elif key is not None and result.types.get(key.split(b"[")[0]) in SCALARS:
+            elif key is not None and not foreign and result.types.get(key.split(b"[")[0]) in SCALARS:
                 _add(result, key, _constant(said.value.rstrip()), span, foreign)
 
 
@@ -94,7 +97,7 @@ def _declare(
             _add(result, key, point, span, foreign)
     elif value.startswith(b"{") and identifiers(value):
         _members(result, root, key[len(root) :], value, line)
-    elif value and said.type in SCALARS and (foreign or not said.is_global):
+    elif value and said.type in SCALARS and (root.startswith(_DEFAULTS) if foreign else not said.is_global):
         _add(result, key, _constant(value), span, foreign)
 
 

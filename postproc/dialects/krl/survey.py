@@ -268,6 +268,11 @@ def survey(statements: Iterable[tuple[int, Statement]]) -> Survey:
         found.unclosed.append((stack[0].line, "DEF has no END"))
     surveyor._close_all(index)
     _settle(found, surveyor.blocks)
+    for name in closure(found, found.later):
+        effects = found.routines[name].effects
+        found.later.update(effect for effect in effects if isinstance(effect, bytes))
+        if "all" in effects:
+            found.later.update(name.partition(b".")[0] for name in found.assigned)
     return found
 
 
