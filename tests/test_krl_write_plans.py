@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from postproc.dialects.dialect import Moved, Plan, Program, Role, Settings, Writing
 from postproc.dialects.krl import KrlDialect
+from postproc.dialects.krl.chain import BLOCK
 from postproc.document import Document, apply, undone
 from postproc.geometry import rotation_from_vector
 from postproc.units import DEG, MM
@@ -533,3 +534,13 @@ def test_an_aggregate_that_runs_several_times_is_not_completed_for_one_of_them()
     program = read(START + "FOR I=1 TO 2\nLIN {E1 5.0}\nLIN {X 7}\nENDFOR\n")
     assert len(program.toolpath) == 5
     assert held(program, plan(program, r0=(0, 0, 1))).held.keys() == {1}
+
+
+def test_a_change_is_followed_over_the_blocks_that_rows_are_taken_in() -> None:
+    count = BLOCK + 3
+    program = read(START + "".join(f"LIN {{Y {i}}}\n" for i in range(count)))
+    lines, _ = written(program, plan(program, **{f"r{BLOCK}": (0.5, 0, 0)}))
+    source = program.documents[0].raw.decode().splitlines()[3:-1]
+    assert lines[BLOCK] == f"LIN {{Y {BLOCK - 1},X 1.500,Z 3,A 4,B 5,C 6}}"
+    assert lines[BLOCK + 1] == f"LIN {{Y {BLOCK},X 1}}"
+    assert lines[:BLOCK] + lines[BLOCK + 2 :] == source[:BLOCK] + source[BLOCK + 2 :]
