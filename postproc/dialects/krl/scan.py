@@ -38,7 +38,7 @@ _LINE = (
     + _B
     + rb"(?:C_(?:DIS|VEL|ORI|PTP)"
     + _B
-    + rb")?+\r?\n"
+    + rb")?+(?:;(?![ \t]*(?:FORCE|COMPENSATE))[^\r\n{}]*+)?+\r?\n"
 )  # fmt: skip
 _RUN = re.compile(rb"^(?:%s){%d,%d}+" % (_LINE, FEWEST, MOST), re.I | re.M)
 _IN_NUMBER = np.zeros(256, bool)
@@ -147,9 +147,9 @@ def _approximations(
 
 
 def _approximation(rest: bytes) -> tuple[int, int]:
-    word = rest.strip(b" \t\r")
-    kind = 0 if not word else 1 if word.upper() == b"C_DIS" else 2
-    return kind, len(rest.rstrip(b" \t\r"))
+    code = rest.partition(b";")[0].rstrip(b" \t\r")
+    word = code.strip(b" \t")
+    return 0 if not word else 1 if word.upper() == b"C_DIS" else 2, len(code)
 
 
 def _states(
