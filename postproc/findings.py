@@ -154,7 +154,7 @@ CODES: dict[str, Code] = {
         "One that carries the robot or the workpiece puts both elsewhere than the cell says; make sure that none does.",
     ),
     "KRL023": Code(
-        "info",
+        "warning",
         "motion never runs",
         "The flow that the program's constants give does not lead there; it is kept as it is.",
     ),
