@@ -254,3 +254,25 @@ def test_at_the_pole_rotary_axes_are_not_written() -> None:
     assert rotary.writable(np.array([[np.nan, 1.0, 20.0], [np.nan, 30.0, 20.0]])).tolist() == [False, True]
     text = "G54 G71 G90\nT1\nTRAORI\nG0 X0 Y0 Z0 B1 C20\nG1 X1 B30 F100\n"
     assert read(SINUMERIK, text).toolpath.oriented.tolist() == [False, True]
+
+
+HOSTILE = [
+    "X=(",
+    "MSG(1)",
+    "FNORM ",
+    "G" + " " * 20000,
+    "A[",
+    "((((",
+    "X=AC(",
+    "#CS ",
+    "X1 ",
+    "$P_UIFR[1]=1 ",
+    "CR=5 ",
+]
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+@pytest.mark.parametrize("dialect", [SINUMERIK, KUKA], ids=lambda dialect: dialect.name)
+def test_long_lines_are_taken_apart_in_linear_time(dialect, text: str) -> None:
+    """A quadratic reader would need minutes for such a line."""
+    read(dialect, "G54 G71 T1\nG0 X0 Y0 Z0\n" + text * (300000 // len(text)))

@@ -141,4 +141,4 @@ _CLAIM = re.compile(rb"^[ \t]*(?:N[ \t]*\d+[ \t]*)?#[ \t]*(?:TRAFO|MCS|PTP|HSC|C
 
 def claims(raw: bytes) -> bool:
     """Whether a file is for KUKA.CNC: by its # commands."""
-    return _CLAIM.search(raw[: 1 << 20]) is not None
+    return _CLAIM.search(raw[:65536]) is not None

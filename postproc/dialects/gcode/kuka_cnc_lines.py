@@ -17,9 +17,9 @@ _FLOW = re.compile(
     re.I,
 )
 _ADDRESS = re.compile(rb"([A-Za-z])([0-9]{0,3})[ \t]*=[ \t]*")
-_WORD = re.compile(rb"([A-Za-z])[ \t]*([-+]?[ \t]*(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)", re.I)
+_WORD = re.compile(rb"([A-Za-z])[ \t]*((?:[-+][ \t]*)?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)", re.I)
 _NAME = re.compile(rb"[A-Za-z_][A-Za-z_.][A-Za-z0-9_.]*")
-_NUMBER = re.compile(rb"[-+]?[ \t]*(?:\d+\.?\d*|\.\d+)")
+_NUMBER = re.compile(rb"(?:[-+][ \t]*)?(?:\d+\.?\d*|\.\d+)")
 
 WEIGHTS = frozenset(
     (100.0, 101.0, 102.0, 129.0, 130.0, 131.0, 132.0, 133.0, 134.0, 135.0, 136.0, 137.0, 231.0, 233.0, 234.0)

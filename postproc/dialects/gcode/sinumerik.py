@@ -16,6 +16,9 @@ from postproc.units import DEG
 
 COMMENT = rb'("[^"\r\n]*"?)|;[^\r\n]*'
 
+BEGIN = 65536
+"""Bytes from the begin of a file that are looked at to tell whose it is."""
+
 FIRST_NAME = 1000
 """Codes of names are numbers from here on."""
 
@@ -192,7 +195,7 @@ _TOOL = re.compile(rb'(?<![A-Za-z_])T[ \t]*=[ \t]*("[^"\r\n]*")', re.I)
 _CLAIM = re.compile(
     rb"^[ \t]*(?:/\d?[ \t]*)?(?:N\d+[ \t]*)?(?:TRAORI|TRAFOOF|SUPA|MCALL|CYCLE8\d+[ \t]*\(|G7[01]0\b|G64[1-5]\b|"
     rb"G5[0-9][0-9]\b|CIP\b|A?TRANS\b|A?ROT\b|MSG[ \t]*\(|DEF[ \t]+(?:REAL|INT)\b|\$[PATM][A-Z]*_|T=\"|R\d+=|"
-    rb"%_N_|STOPRE|FNORM|DYN[A-Z]+\b|FFWON|SOFT\b|COMPCAD|G\d+[^;(\r\n]*(?:\bCR=|[A-C]3=|=AC\(|=IC\(|TURN=))",
+    rb"%_N_|STOPRE|FNORM|DYN[A-Z]+\b|FFWON|SOFT\b|COMPCAD|G\d{1,3}[^;(\r\n]*(?:\bCR=|[A-C]3=|=AC\(|=IC\(|TURN=))",
     re.I | re.M,
 )
 
@@ -208,4 +211,4 @@ def with_tools(raw: bytes) -> Control:
 
 def claims(suffix: str, raw: bytes) -> bool:
     """Whether a file is for a Sinumerik: by its name, or by words that no other control has."""
-    return suffix.lower() in (".mpf", ".spf") or _CLAIM.search(raw[: 1 << 20]) is not None
+    return suffix.lower() in (".mpf", ".spf") or _CLAIM.search(raw[:BEGIN]) is not None

@@ -46,8 +46,9 @@ _HEAD = re.compile(
 _LABEL = re.compile(rb"([A-Za-z_][A-Za-z0-9_]+)[ \t]*:(?!=)")
 _NAME = re.compile(rb"[A-Za-z_$][A-Za-z_$][A-Za-z0-9_$]*")
 _ADDRESS = re.compile(rb"([A-Za-z])([0-9]{0,3})[ \t]*=[ \t]*")
-_NUMBER = rb"[-+]?[ \t]*(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?"
+_NUMBER = rb"(?:[-+][ \t]*)?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?"
 _WORD = re.compile(rb"([A-Za-z])[ \t]*(" + _NUMBER + rb")", re.I)
+_ASSIGNED = re.compile(rb"[ \t]*=(?!=)[ \t]*")
 _INDEX = re.compile(rb"[ \t]*\[")
 _PROGRAM = re.compile(rb"[ \t]*%[ \t]*([A-Za-z0-9_]*)")
 _HOWS = {
@@ -170,14 +171,10 @@ class _Taken:
         text = self.text
         index = _INDEX.match(text, end)
         stop = bracket_end(text, index.end() - 1) if index is not None else end
-        rest = text[stop:].lstrip(b" \t")
-        assigned = rest.startswith(b"=") and not rest.startswith(b"==")
-        if assigned and not name.startswith(b"$"):
-            behind = text.index(b"=", stop) + 1
-            while behind < len(text) and text[behind] in b" \t":
-                behind += 1
-            return self.assigned(name, place, behind)
-        if name.startswith(b"$") or assigned:
+        assigned = _ASSIGNED.match(text, stop)
+        if assigned is not None and not name.startswith(b"$"):
+            return self.assigned(name, place, assigned.end())
+        if name.startswith(b"$"):
             self.note("base" if name.startswith(b"$P_UIFR") else "assign", b"<" + text[place:].strip(), place)
             return len(text)
         if name in self.names:
@@ -190,9 +187,9 @@ class _Taken:
 
     def assigned(self, name: bytes, place: int, behind: int) -> int:
         """``NAME=`` or ``NAME[..]=``."""
-        close = expression_end(self.text, behind)
         if name in NAMED_WORDS:
             return self.value(place, NAMED_WORDS[name], behind)
+        close = expression_end(self.text, behind)
         if name in ACTIONS:
             # It acts before the motion, as S and M do.
             self.word(place, key("S"), -1, close, math.nan, How.UNREAD)
