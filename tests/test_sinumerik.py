@@ -143,8 +143,6 @@ PIECES = st.sampled_from(
         "TRANS ",
         "ROT RPL=",
         "MCALL",
-    ]
-    + [
         "CYCLE81(",
         '"',
         ";",
@@ -161,8 +159,19 @@ PIECES = st.sampled_from(
         "]",
         "#CS ON[1]",
         "#MCS ON",
+        "$IF",
+        "$P_UIFR[1]=",
+        "IF ",
+        "GOTOF A",
+        "A:",
+        "REPEAT",
+        "TRAORI",
+        "-1.5",
+        "EX",
+        ".5",
+        "'H1'",
+        " ",
     ]
-    + ["$IF", "$P_UIFR[1]=", "IF ", "GOTOF A", "A:", "REPEAT", "TRAORI", "-1.5", "EX", ".5", "'H1'", " "]
 )
 
 
