@@ -55,9 +55,9 @@ def product(first: Numbers, second: Numbers) -> Numbers:
     if not any(second[3:]):
         a, b, c = first[3:]
     else:
-        columns = tuple(zip(*rotation(*second[3:]), strict=True))
-        rows = [tuple(_dot(row, column) for column in columns) for row in r]
-        a, b, c = angles(tuple(rows))  # type: ignore[arg-type]
+        u, v, w = zip(*rotation(*second[3:]), strict=True)
+        first_row, second_row, third_row = ((_dot(row, u), _dot(row, v), _dot(row, w)) for row in r)
+        a, b, c = angles((first_row, second_row, third_row))
     return first[0] + x, first[1] + y, first[2] + z, a, b, c
 
 

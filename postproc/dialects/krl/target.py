@@ -84,6 +84,8 @@ class Target:
 
     def detached(self) -> Target:
         """The value without its places: a copy of it."""
+        if self.start is NOWHERE and self.home < 0 and not self.locked:
+            return self
         return replace(self, start=NOWHERE, stop=NOWHERE, file=NOWHERE, insert=-1, home=-1, locked="")
 
     def component(self, key: bytes) -> float | None:
