@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from postproc.dialects.gcode import DIALECTS
 from postproc.dialects.gcode.orientation import UP, Angles, Vector, swing
 from postproc.dialects.gcode.sinumerik_expression import constant, expression_end
-from postproc.document import Document
+from postproc.document import Document, apply
 from postproc.findings import CODES
 from postproc.geometry import rotation_from_abc, rotation_from_vector, vector_from_rotation
 from postproc.units import DEG, MM
@@ -285,3 +285,15 @@ HOSTILE = [
 def test_long_lines_are_taken_apart_in_linear_time(dialect, text: str) -> None:
     """A quadratic reader would need minutes for such a line."""
     read(dialect, "G54 G71 T1\nG0 X0 Y0 Z0\n" + text * (300000 // len(text)))
+
+
+def test_the_mark_goes_behind_the_head_of_an_archive_file() -> None:
+    raw = b"%_N_PART_MPF\n;$PATH=/_N_WKS_DIR\nN10 G54 G71\nT1\nG0 X0 Y0 Z0\n"
+    for dialect, text, line in ((SINUMERIK, raw, 2), (KUKA, b"% program\n\nG54 G71 T1\nG0 X0\n", 1)):
+        found = read(dialect, text)
+        marked = apply(found.documents[0], [dialect.marked(found, "(x)")])
+        assert marked.splitlines()[line] == b";COMPENSATED by compensate [x]"
+        again = read(dialect, marked)
+        assert again.marker is not None
+        assert apply(again.documents[0], [dialect.marked(again, "(x)")]) == marked
+        assert len(again.toolpath) == len(found.toolpath)
