@@ -391,7 +391,7 @@ def lines(draw: st.DrawFn) -> str:
                 f"CIRC {point('XYZ')},{point()}",
                 f"CIRC P{draw(st.integers(1, 3))},{point()}",
                 f"CIRC {point('XYZ')},P{draw(st.integers(1, 3))} C_DIS",
-                f"CIRC {point()},{point()},CA {draw(st.integers(-330, 330))}",
+                f"CIRC {point()},{point()},CA {draw(st.integers(-420, 420))}",
                 f"P{draw(st.integers(1, 3))}.{draw(st.sampled_from('XYZ'))} = {draw(NUMBER)}",
                 f"P{draw(st.integers(1, 3))} = {point()}",
                 f"FOR I=1 TO 2\nLIN {point()}\nENDFOR",

@@ -217,7 +217,10 @@ def _compare_ways(path: Toolpath, plan: Plan, back: Toolpath) -> None:
         radius = end[arcs] - some.centre[arcs]
         middles.append(some.centre[arcs] + (turn @ radius[..., None])[..., 0])
     off = np.zeros(len(plan))
-    off[arcs] = np.abs(middles[0] - middles[1]).max(axis=1) / MM
+    # Begin and end that are close to each other hold the middle opposite to them less well.
+    lever = np.maximum(1.0, 0.5 / np.maximum(np.abs(np.sin(plan.sweep[arcs] / 2)), 1e-3))
+    lever = np.where(plan.sweep[arcs] < np.pi, 1.0, lever)
+    off[arcs] = np.abs(middles[0] - middles[1]).max(axis=1) / MM / lever
     _within(off, 4 * HALF_MM, "mm half way of an arc", path, plan)
 
 

@@ -20,7 +20,7 @@ from postproc.document import Edit, Span
 from postproc.findings import Finding
 from postproc.units import DEG, MM
 
-FULL = math.radians(340.0)
+FULL = math.radians(300.0)
 """Arcs that sweep more keep their CA: a circle through points that are close to each other would not hold."""
 FINER = 2
 """More decimals for the points of such a circle: what they are off by grows along it."""
