@@ -287,6 +287,11 @@ CODES: dict[str, Code] = {
         "The program uses a base or tool number that neither it nor the cell gives.",
     ),
     "CEL003": Code("error", "robot is not known", "No robot file has this name."),
+    "CEL004": Code(
+        "error",
+        "orientation is missing",
+        "A three-axis program says positions only; `orientation:` of the cell says how the tool stands.",
+    ),
     "ROB001": Code(
         "error",
         "robot file would lose its URDF",

@@ -72,12 +72,17 @@ class Toolpath:
     Arcs (CIRC; NaN elsewhere), in the programmed base: ``centre`` (N, 3) [m], ``normal`` (N, 3) unit vector, ``sweep``
     (N,) > 0 [rad] counter-clockwise seen from the tip of the normal.  The way at the share t is the begin, turned
     about the centre by t * sweep, and moved along the normal by its share of what begin and end lie apart there.
+    ``any_plane`` (N,): the text gives an arc by three points, which may lie in any plane but leave no advance; False:
+    it lies in a plane that the program selects (its normal stays, an advance along it is possible).
     ``whole``: row -> why no motion can be inserted before it (a spline, a TRIGGER, a line that runs many times).
     ``blend`` (N,) [m]: the controller may leave the path that far before the end point (approximation); 0 where it
     stops or passes exactly, NaN where the distance is not known.
     ``oriented`` (N,): the text programs the orientation and it can be written; else it is given from outside and only
     the position can be corrected.  ``free_axis`` (N, 3): unit vector in tool axes about which the text does not say how
     the tool is turned (tool vectors, two rotary axes); NaN where it gives the whole orientation.
+    ``runs`` (N,): the motion follows the one before it; False for motions of which it is not known whether, or where,
+    they run: these come last.  ``branches``: a jump may lead into another configuration of the robot (KRL's S);
+    without, no motion does.
     ``annotations``: comments that speak to this tool; ``comments``: all others that stand on a line of their own.
     """
 
@@ -103,6 +108,9 @@ class Toolpath:
     blend: Floats = field(default_factory=lambda: np.empty(0))
     oriented: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     free_axis: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    runs: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
+    any_plane: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
+    branches: bool = True
     whole: Mapping[int, str] = field(default_factory=dict)
     comments: tuple[Annotation, ...] = ()
 
@@ -121,7 +129,11 @@ class Toolpath:
             object.__setattr__(self, "oriented", np.ones(n, np.bool_))
         if not len(self.free_axis):
             object.__setattr__(self, "free_axis", np.full((n, 3), np.nan))
-        object.__setattr__(self, "oriented", frozen(self.oriented, (n,), np.bool_))
+        for name in ("runs", "any_plane"):
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, np.ones(n, np.bool_))
+        for name in ("oriented", "runs", "any_plane"):
+            object.__setattr__(self, name, frozen(getattr(self, name), (n,), np.bool_))
         shapes = {"position": (n, 3), "rotation": (n, 3, 3), "axes": (n, 6), "feed": (n,), "given": (n, 6)}
         shapes |= {"centre": (n, 3), "normal": (n, 3), "sweep": (n,), "blend": (n,), "free_axis": (n, 3)}
         for name, shape in shapes.items():

@@ -40,11 +40,16 @@ def dense(task, division, samples=41):
     return worst
 
 
-def in_even_pieces(task, count, planar=False):
+def planar_only(task):
+    """The same task where arcs lie in a plane that the program selects."""
+    n = len(task.toolpath)
+    return replace(task, toolpath=replace(task.toolpath, any_plane=np.zeros(n, bool)))
+
+
+def in_even_pieces(task, count):
     """The error of a way in ``count`` even pieces, whatever it is."""
     result = correct(task)
-    limits = replace(FREE, planar=planar)
-    search = _Search(task, result, limits)
+    search = _Search(task, result, FREE)
     search.link()
     pieces, _ = search._pieces(np.arange(1), np.array([count]))
     return errors_between(task, pieces)[0].max()
@@ -53,22 +58,22 @@ def in_even_pieces(task, count, planar=False):
 @pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize("build", [line, circle], ids=["800 mm line", "600 mm circle"])
 def test_points_are_inserted_where_the_ends_are_not_enough(build, planar, capsys):
-    task = build()
+    task = planar_only(build()) if planar else build()
     least = 1 if build is line else 2
-    ends_only = in_even_pieces(task, least, planar)
+    ends_only = in_even_pieces(task, least)
     assert ends_only > 0.05 * MM
-    _, division = divided(task, replace(FREE, planar=planar))
+    _, division = divided(task)
     ours = int(np.sum((division.source == 2) & ~division.links))
     assert dense(task, division).max() <= task.tolerance
 
     # two others: halving, and a fixed distance that suffices wherever the same force may act
     halved = least
-    while in_even_pieces(task, halved, planar) > ROOM * task.tolerance:
+    while in_even_pieces(task, halved) > ROOM * task.tolerance:
         halved *= 2
     length = task.ways.length[2]
     fixed = next(
         step for step in (100, 50, 40, 30, 25, 20, 15, 10, 5, 2, 1)
-        if in_even_pieces(task, int(np.ceil(length / (step * MM))), planar) <= ROOM * task.tolerance
+        if in_even_pieces(task, int(np.ceil(length / (step * MM)))) <= ROOM * task.tolerance
     )  # fmt: skip
     stepped = int(np.ceil(length / (fixed * MM)))
     with capsys.disabled():
@@ -79,7 +84,7 @@ def test_points_are_inserted_where_the_ends_are_not_enough(build, planar, capsys
         )
     assert ours <= halved
     assert ours <= stepped
-    assert ours == least or in_even_pieces(task, ours - 1, planar) > ROOM * task.tolerance
+    assert ours == least or in_even_pieces(task, ours - 1) > ROOM * task.tolerance
 
 
 def test_error_falls_with_the_square_of_the_length_on_lines():
@@ -158,8 +163,8 @@ def test_half_a_correction_has_the_points_of_the_whole():
 
 
 def test_arcs_in_their_plane_keep_their_normal_and_advance():
-    task = circle(sweep=4.0, rise=0.05)
-    _, division = divided(task, replace(FREE, planar=True))
+    task = planar_only(circle(sweep=4.0, rise=0.05))
+    _, division = divided(task)
     arcs = np.isfinite(division.sweep)
     assert arcs.sum() >= 1
     np.testing.assert_array_equal(division.normal[arcs], np.tile([0.0, 0.0, 1.0], (arcs.sum(), 1)))

@@ -614,6 +614,9 @@ def test_cuts_are_the_runs_of_forced_motions():
     assert cuts_of(scope).tolist() == [0, 0, -1, 1, -1, -1, 2]
     assert cuts_of(np.zeros(3, bool)).tolist() == [-1, -1, -1]
     assert cuts_of(np.zeros(0, bool)).tolist() == []
+    # what does not follow is a cut of its own
+    runs = np.array([True, True, True, True, False, False, True])
+    assert cuts_of(np.ones(7, bool), runs).tolist() == [0, 0, 0, 0, 1, 1, 2]
 
 
 def test_spread_reaches_the_cut_and_no_farther():

@@ -44,12 +44,17 @@ class Pieces:
 
     @staticmethod
     def round(
-        rows: Ints, first: Floats, last: Floats, begin: Poses, via: Poses, end: Poses, planar: Floats | None
+        rows: Ints, first: Floats, last: Floats, begin: Poses, via: Poses, end: Poses, normal: Floats
     ) -> Pieces:
-        """Arcs through ``via``; ``planar`` (K, 3): about these normals, with what is left along them in proportion."""
+        """Arcs through ``via``; about ``normal`` (K, 3), with what is left along it in proportion, or where that is NaN
+        in the plane of the three points."""
         points = begin.position, via.position, end.position
-        arc = arc_through(*points) if planar is None else arc_in_plane(*points, planar)
-        return Pieces(rows, first, last, begin, end, *arc)
+        free = np.isnan(normal[:, :1])
+        centre, axis, sweep = (
+            np.where(free if one.ndim > 1 else free[:, 0], one, other)
+            for one, other in zip(arc_through(*points), arc_in_plane(*points, normal), strict=True)
+        )
+        return Pieces(rows, first, last, begin, end, centre, axis, sweep)
 
     def __len__(self) -> int:
         return len(self.rows)

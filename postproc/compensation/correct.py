@@ -60,7 +60,7 @@ def correct(task: Task) -> Result:
     scope = forced if task.process else forced | cartesian
     # In air every motion stands for itself; a cut stands and falls as a whole.
     cut = (
-        cuts_of(scope)
+        cuts_of(scope, path.runs)
         if task.process
         else np.where(scope, np.cumsum(scope & ~(forced & _shifted(forced))) - 1, -1)
     )

@@ -14,12 +14,14 @@ from postproc.toolpath import Toolpath
 _SWITCH = re.compile(r"COMPENSATE\s+(ON|OFF)(?![A-Z0-9_])", re.IGNORECASE)
 
 
-def cuts_of(in_scope: Bools) -> Ints:
+def cuts_of(in_scope: Bools, runs: Bools | None = None) -> Ints:
     """(N,) number of the cut that a motion belongs to, from 0; -1 for motions outside of any.
 
-    ``in_scope`` (N,): the motion carries force.
+    ``in_scope`` (N,): the motion carries force.  ``runs`` (N,): as of a Toolpath; where it changes another cut begins.
     """
     begins = in_scope & ~np.concatenate([[False], in_scope[:-1]])
+    if runs is not None:
+        begins[1:] |= in_scope[1:] & (runs[1:] != runs[:-1])
     return np.where(in_scope, np.cumsum(begins) - 1, -1)
 
 

@@ -39,12 +39,11 @@ points with the third power at least; where to look first for the number that is
 @dataclass(frozen=True)
 class Limits:
     """What may be inserted.  keep: nothing; min_segment [m]: no piece is shorter; max_growth: the output has at most
-    so many times the motions of the input; planar: arcs keep their normal."""
+    so many times the motions of the input."""
 
     keep: bool = False
     min_segment: float = 1.0 * MM
     max_growth: float = 2.0
-    planar: bool = False
 
 
 @dataclass(frozen=True)
@@ -288,7 +287,7 @@ class _Search:
         if len(bent):
             via = self._copied(self.task.ways.at(at[bent], 0.5 * (first + last)[bent]))
             self._aim(via, np.arange(len(bent)), at[bent], 0.5 * (first + last)[bent])
-            normal = self.task.ways.normal[at[bent]] if self.limits.planar else None
+            normal = _normals(self.task, at[bent])
             arcs = Pieces.round(at[bent], first[bent], last[bent], begin[bent], via, end[bent], normal)
             for name in ("centre", "normal", "sweep"):
                 values = getattr(pieces, name).copy()
@@ -348,10 +347,15 @@ class _Search:
         found = Division(
             source, role, share, command, centre, normal, sweep, moved, tuple(self.findings), self.held
         )
-        return found if task.gain == 1.0 else _scaled(task, found, self.limits.planar)
+        return found if task.gain == 1.0 else _scaled(task, found)
 
 
-def _scaled(task: Task, division: Division, planar: bool) -> Division:
+def _normals(task: Task, rows: Ints) -> Floats:
+    """(K, 3) about which the arcs ``rows`` (K,) have to turn; NaN where any plane will do."""
+    return np.where(task.toolpath.any_plane[rows, None], np.nan, task.ways.normal[rows])
+
+
+def _scaled(task: Task, division: Division) -> Division:
     """The division with the share ``gain`` of every correction."""
     rows = np.flatnonzero(division.moved)
     source = division.source[rows]
@@ -371,7 +375,7 @@ def _scaled(task: Task, division: Division, planar: bool) -> Division:
     middle = 0.5 * (before.first + before.last)[bent]
     wanted = ways.at(division.source[bent], middle)
     via = partly(wanted, before[bent].at(np.full(len(bent), 0.5)), task.gain)
-    normal = ways.normal[division.source[bent]] if planar else None
+    normal = _normals(task, division.source[bent])
     part = after[bent]
     arcs = Pieces.round(part.rows, part.first, part.last, part.begin, via, part.end, normal)
     for name in ("centre", "normal", "sweep"):

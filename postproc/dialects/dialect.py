@@ -76,11 +76,6 @@ class Dialect(Protocol):
     @property
     def name(self) -> str: ...
 
-    @property
-    def arcs_in_plane(self) -> bool:
-        """An arc lies in a plane that the program selects (its normal stays, an advance along it is possible); else it
-        is given by three points: any plane, no advance."""
-
     def claims(self, path: Path, raw: bytes) -> bool:
         """Whether a file of this name and content is of this dialect."""
 

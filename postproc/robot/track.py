@@ -144,7 +144,7 @@ def _branches(
     if isinstance(robot.nominal, SerialArm):
         stated = np.zeros_like(stated)
     # A path motion keeps its branch wherever it leads; only a jump to an unknown place loses it.
-    lost = (jump | (toolpath.kind == Kind.OTHER)) & ~on_axes & ~cartesian
+    lost = toolpath.branches & (jump | (toolpath.kind == Kind.OTHER)) & ~on_axes & ~cartesian
     home = _home(toolpath)
     value = np.full(len(toolpath) + 1, -1)
     value[0] = -1 if start is None else status_of(robot.nominal, start[None])[0]

@@ -155,6 +155,7 @@ def prepare(request: Request) -> Prepared:
     frames = frames_of(cell, path, request.program)
     force = wrenches(request.program, path, frames, cell, request.force, request.force_offset)
     _missing_points(program, force)
+    _missing_orientation(request, path, force, cell)
     base, tool = frames.base_in_robot, frames.tool_in_flange
     wanted = base @ path.target_in_base
     track = follow(robot, path, wanted @ tool.inverse(), _start(cell, robot))
@@ -265,6 +266,23 @@ def _missing_points(program: Program, force: Wrenches) -> None:
                 first.line,
                 first.column,
                 help="copy the .dat of the module beside its .src",
+            )
+        )
+
+
+def _missing_orientation(request: Request, path: Toolpath, force: Wrenches, cell: Cell) -> None:
+    """Refuse cuts of a program that says positions only, in a cell that does not say how the tool stands."""
+    lost = force.carries & ~path.oriented & np.isfinite(path.position).all(axis=1)
+    lost &= ~np.isfinite(path.rotation[:, 0, 0])
+    if lost.any():
+        row = int(np.argmax(lost))
+        raise Refusal(
+            Finding(
+                "CEL004",
+                f"the program says no orientation, and the cell {cell.path} does not either",
+                str(request.program),
+                int(path.line[row]),
+                help="add the tool's orientation in the base to the cell: orientation: {a: 0, b: 0, c: 180}",
             )
         )
 

@@ -145,7 +145,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
 def _corrected(request: Request, ready: Prepared) -> tuple[Task, Result, Division, Plan, Moved]:
     """The correction and its edits; what can not be divided or written as planned stays, and the rest is made anew."""
     task, cell = ready.task, ready.cell
-    allowed = Limits(request.keep_points, cell.min_segment, cell.max_growth, ready.dialect.arcs_in_plane)
+    allowed = Limits(request.keep_points, cell.min_segment, cell.max_growth)
     writing = written_as(cell, request.own_points)
     while True:
         result = correct(task)

@@ -26,7 +26,6 @@ class GcodeDialect:
     control: Control
     semicolon: bool = False
     prepared: Callable[[bytes], Control] | None = None
-    arcs_in_plane: bool = True
 
     @property
     def name(self) -> str:

@@ -74,6 +74,8 @@ def read(documents: tuple[Document, ...], control: Control, settings: Settings =
         comments=said.comments,
         oriented=moves.stand.oriented,
         free_axis=moves.stand.free_axis,
+        any_plane=_by_point(given, rows),
+        branches=False,
     )
     findings = [*refused.told(), *told(document, given, rows, tool, named, settings)]
     return Program(
@@ -157,11 +159,16 @@ def _motions(given: Blocks, where: Positions, rows: Ints, turned: Floats | None)
     return Motions.of(rows, move, kind, plane, begin, end, where, ways, pose)
 
 
+def _by_point(given: Blocks, rows: Ints) -> Bools:
+    """(N,) arcs, if they are some, that a point on their way gives."""
+    words = given.has(*THROUGH)[rows] if THROUGH[0] in given.columns else np.zeros(len(rows), np.bool_)
+    return np.asarray(words | (given.move[rows] == Move.THROUGH))
+
+
 def _arcs(given: Blocks, rows: Ints, begin: Floats, end: Floats, plane: Ints, bent: Bools) -> Arcs:
     n = len(rows)
     result = Arcs(np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan), np.zeros(n, np.int64))
-    between = given.has(*THROUGH)[rows] if THROUGH[0] in given.columns else np.zeros(n, np.bool_)
-    between |= given.move[rows] == Move.THROUGH
+    between = _by_point(given, rows)
     word, usual = given.control.turns
     turns = np.zeros(n)
     if word in given.columns:

@@ -20,7 +20,6 @@ class KrlDialect:
     """KRL as a ``Dialect``."""
 
     name = "krl"
-    arcs_in_plane = False
 
     def claims(self, path: Path, raw: bytes) -> bool:
         return path.suffix.lower() == ".src" or _CLAIM.search(raw) is not None

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Bools, Floats, Ints
 from postproc.dialects.krl.places import Places
 from postproc.dialects.krl.rows import HELP, Reason, Rows, Table
 from postproc.dialects.krl.run import Run
@@ -64,6 +64,7 @@ def finished(run: Run, text_called: Iterable[bytes]) -> tuple[Toolpath, Places, 
         free_axis=np.broadcast_to(np.nan, (n, 3)),
         whole=_whole(rows, table),
         comments=tuple(rows.comments),
+        runs=_runs(rows, n),
     )
     _number_texts(rows, table)
     places = Places(
@@ -146,6 +147,14 @@ def _lock(run: Run) -> None:
 
 def _root(name: bytes) -> bytes:
     return name.partition(b".")[0].partition(b"[")[0]
+
+
+def _runs(rows: Rows, n: int) -> Bools:
+    """(N,) all but the motions that never run, or stand in routines of which it is not known when they do."""
+    runs = np.ones(n, np.bool_)
+    for first, last in rows.apart:
+        runs[first : last + 1] = False
+    return runs
 
 
 def _whole(rows: Rows, table: Table) -> dict[int, str]:

@@ -50,6 +50,8 @@ def move_bulk(run: Run, bulk: Bulk) -> None:
     state = run.state
     reason = _structure(run) or _frames_missing(run)
     last = run.rows.add_bulk(bulk, state, reason)
+    if _apart(run):
+        run.rows.apart.append((last + 1 - len(bulk.values), last))
     x, y, z, a, b, c = bulk.values[-1].tolist()
     state.point, state.point_frames, state.axes, state.anchor = (
         (x, y, z, a, b, c),
@@ -329,6 +331,8 @@ def _enter(
     )  # fmt: skip
     if reason is not None:
         rows.reasons[row] = reason
+    if _apart(run):
+        rows.apart.append((row, row))
     if operand.variable is not None and stated is not None:
         rows.variables[row] = operand.variable
         if stated.locked:
@@ -391,6 +395,11 @@ def _frames_missing(run: Run) -> Reason | None:
         if isinstance(frame, Unclear):
             return refusal(frame, "", frame.message)
     return None
+
+
+def _apart(run: Run) -> bool:
+    """Whether the motion does not follow the one before it: it never runs, or nobody knows when."""
+    return run.idle or (run.walked and run.routine is not None and not run.routine.is_main)
 
 
 def _structure(run: Run) -> Reason | None:

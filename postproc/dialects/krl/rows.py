@@ -102,6 +102,7 @@ class Rows:
     arcs: dict[int, Auxiliary] = field(default_factory=dict)
     relative: dict[int, Relative] = field(default_factory=dict)
     whole: dict[int, str] = field(default_factory=dict)
+    apart: list[tuple[int, int]] = field(default_factory=list)
     inline: dict[int, InlineForm] = field(default_factory=dict)
     slurred: dict[int, float] = field(default_factory=dict)
     builds_on: dict[int, frozenset[Source]] = field(default_factory=dict)
