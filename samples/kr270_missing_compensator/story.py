@@ -18,6 +18,7 @@ from plant import Plant, kr270  # noqa: E402
 
 from postproc.cli.main import run  # noqa: E402
 from postproc.model import StiffnessModel  # noqa: E402
+from postproc.verification import matched  # noqa: E402
 from postproc.workflows.preparation import Request, prepare  # noqa: E402
 
 PANEL = HERE.parent / "kr270_panel"
@@ -36,11 +37,12 @@ def cut(program: Path, plant: Plant) -> np.ndarray:
     """[mm] how far the tool is from the original path at the end of cutting motions, forces against none."""
     wanted = prepare(Request(PANEL / "panel.src", force="", cell=HERE / "cell.yaml")).task
     sent = prepare(Request(program, force="", cell=HERE / "cell.yaml")).task
+    ends = matched(wanted, sent)  # motions may have been inserted
     rows = np.flatnonzero(wanted.carries)[::EVERY]
     away = []
     for row in rows:
         tool = wanted.tool[row]
-        loaded = plant.rest(sent.track.q[row], wanted.wrench[row], tool)
+        loaded = plant.rest(sent.track.q[ends[row]], wanted.wrench[row], tool)
         touched = plant.rest(wanted.track.q[row], np.zeros(6), tool)
         away.append(np.linalg.norm(loaded.position - touched.position) * 1e3)
     return np.array(away)
