@@ -9,6 +9,7 @@ from test_forces import DOWN, FRAMES, cell_of, codes, path_of, refused, run
 from test_milling import ALLOY, MM, cut_of
 
 from postproc.forces.milling import Coefficients, mean_force
+from postproc.forces.operations import join
 from postproc.forces.process import read_process
 from postproc.geometry import rotation_from_abc
 from postproc.toolpath import Annotation, FrameRef, Kind
@@ -137,6 +138,17 @@ def test_of_two_names_the_longer_counts_and_it_holds_to_the_next(tmp_path):
     told = [f.message for f in result.findings if f.code == "FRC015"]
     assert told[0].startswith("operation 'POCKET': 2 motions in lines 15 to 16")
     assert told[1].startswith("operation 'POCKET WALL': 3 motions in lines 11 to 13")
+
+
+def test_a_name_ends_with_the_tool(tmp_path):
+    """Behind a change of tool only a new name, or the tool itself, says what is cut."""
+    read = read_process(
+        process(tmp_path, "operations:" + OPERATION.format(by="name: FACE") + OPERATION.format(by="tool: 7"))
+    )
+    path = program([(1, "FACE")], tool=[1, 1, 1, 1, 2, 2, 2], frames=(*FRAMES, FrameRef(7, None, 5)))
+    assert join(read, path).tolist() == [-1, 0, 0, 0, 1, 1, 1]
+    back = program([(1, "FACE")], tool=[1, 1, 1, 1, 2, 1, 1], frames=(*FRAMES, FrameRef(7, None, 5)))
+    assert join(read, back).tolist() == [-1, 0, 0, 0, 1, -1, -1]
 
 
 def test_a_cut_behind_a_comment_without_a_name_is_told(tmp_path):

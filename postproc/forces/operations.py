@@ -73,8 +73,8 @@ def process_forces(
 def join(operations: Sequence[Operation], toolpath: Toolpath) -> Ints:
     """(N,) the operation of every motion, -1 without one; lines count before names, names before tools.
 
-    A name holds from its comment to the next comment with a name of the process; of two names in one comment the longer
-    counts.  A name has to stand there as whole words; case and blanks do not matter.
+    A name holds from its comment to the next comment with a name of the process, or to the next change of tool; of two
+    names in one comment the longer counts.  A name has to stand there as whole words; case and blanks do not matter.
     """
     n = len(toolpath)
     found = np.full(n, -1)
@@ -90,7 +90,10 @@ def join(operations: Sequence[Operation], toolpath: Toolpath) -> Ints:
         if match >= 0:
             rows.append(comment.row)
             which.append(match)
-    by_name = np.array(which)[np.searchsorted(np.array(rows), np.arange(n), side="right") - 1]
+    place = np.searchsorted(np.array(rows), np.arange(n), side="right") - 1
+    changes = np.append(0, np.cumsum(tool[1:] != tool[:-1]))[:n]
+    held = changes[np.maximum(np.array(rows)[place], 0)] == changes
+    by_name = np.where(held, np.array(which)[place], -1)
     found = np.where(by_name >= 0, by_name, found)
     for index, operation in enumerate(operations):
         if operation.lines[1]:
