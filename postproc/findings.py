@@ -262,7 +262,7 @@ CODES: dict[str, Code] = {
     "GCW001": Code(
         "warning",
         "arc can not be written",
-        "No numbers of the block's form state the corrected arc: a circle that no longer closes, an arc shorter than a digit.",
+        "No numbers state the corrected arc: a circle that no longer closes, an arc shorter than a digit.",
     ),
     "GCW002": Code(
         "warning",

@@ -40,7 +40,9 @@ def test_panel(compensate, sample):
     after = (program.parent / "compensated" / "panel.src").read_bytes().split(b"\r\n")
     marker = [line for line in after if line.startswith(b";COMPENSATED ")]
     assert len(marker) == 1
-    assert after.index(marker[0]) == before.index(next(line for line in before if line.startswith(b"DEF "))) + 1
+    assert (
+        after.index(marker[0]) == before.index(next(line for line in before if line.startswith(b"DEF "))) + 1
+    )
     assert report["inserted"] <= 0.3 * report["motions"]
     after = without_inserted(after, report)
     assert len(before) == len(after)
