@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from postproc.findings import Finding, Refusal
@@ -17,35 +18,46 @@ def publish(files: Mapping[Path, bytes], last: Path | None = None) -> None:
 
     Every file is written whole beside its place and synced before the first one is renamed into it.  ``last``, the
     program itself, is taken away first and comes last: at any moment it is absent or belongs to its companions.
-    Folders are made as needed.  Raises Refusal FIL004 when the disk or its rights do not allow it; the files that
-    were there before are then there again.
+    Folders are made as needed.  A name that is a link is replaced; what it leads to is left alone.  Of runs that write
+    into one folder at once each waits for the one before it, so what is there is of one of them; what one that was
+    killed left half-written of these files is taken away.  Raises Refusal FIL004 when the disk or its rights do not
+    allow it; the files that were there before are then there again.
     """
+    with contextlib.ExitStack() as held:
+        _publish(files, last, held)
+
+
+def _publish(files: Mapping[Path, bytes], last: Path | None, held: contextlib.ExitStack) -> None:
     ready: dict[Path, Path] = {}
     spare: dict[Path, Path] = {}
     placed: list[Path] = []
     at = next(iter(files), Path())
     try:
-        for at, content in files.items():
+        for at in files:
             if at.is_dir() and not at.is_symlink():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             at.parent.mkdir(parents=True, exist_ok=True)
+        if _alone({path.parent for path in files}, held):
+            _sweep(files)
+        for at, content in files.items():
             ready[at] = _written_beside(at, content)
         order = sorted(files, key=lambda path: path == last)
+        # noted before it is done: an interrupt may come between the two
         for at in reversed(order):
-            if at.exists():
-                aside = at.with_name(f"{ready[at].name}.old")
-                os.replace(at, aside)
-                spare[at] = aside
+            if os.path.lexists(at):
+                spare[at] = at.with_name(f"{ready[at].name}.old")
+                os.replace(at, spare[at])
         for at in order:
-            os.replace(ready[at], at)
             placed.append(at)
+            os.replace(ready[at], at)
         for folder in {path.parent for path in files}:
             _sync_folder(folder)
     except BaseException as error:
-        for path in placed:
-            with contextlib.suppress(OSError):
-                path.unlink()
-        for path, old in spare.items():
+        for path in reversed(placed):
+            if not ready[path].exists():
+                with contextlib.suppress(OSError):
+                    path.unlink()
+        for path, old in reversed(spare.items()):
             with contextlib.suppress(OSError):
                 os.replace(old, path)
         spare.clear()
@@ -64,6 +76,40 @@ def publish(files: Mapping[Path, bytes], last: Path | None = None) -> None:
         for path in [*ready.values(), *spare.values()]:
             with contextlib.suppress(OSError):
                 path.unlink()
+
+
+def _alone(folders: Iterable[Path], held: contextlib.ExitStack) -> bool:
+    """Keep other writers out of ``folders`` until ``held`` is closed or this process dies; False where the system or
+    the file system has no such locks."""
+    try:
+        import fcntl
+    except ImportError:
+        return False
+    handles: dict[tuple[int, int], int] = {}
+    try:
+        for folder in folders:
+            handle = os.open(folder, os.O_RDONLY)
+            held.callback(os.close, handle)
+            stat = os.fstat(handle)
+            handles[stat.st_dev, stat.st_ino] = handle  # one folder may have two names
+        for _, handle in sorted(handles.items()):  # all in one order: no two wait for each other
+            fcntl.flock(handle, fcntl.LOCK_EX)
+    except OSError:
+        return False
+    return True
+
+
+def _sweep(files: Iterable[Path]) -> None:
+    """Take away temporary files of ``files``: nobody but a killed run can have left them."""
+    names: dict[Path, list[str]] = {}
+    for path in files:
+        names.setdefault(path.parent, []).append(re.escape(path.name))
+    for folder, own in names.items():
+        temporary = re.compile(rf"\.({'|'.join(own)})\.[a-z0-9_]{{8}}\.tmp(\.old)?")
+        with contextlib.suppress(OSError):
+            for entry in list(os.scandir(folder)):
+                if temporary.fullmatch(entry.name):
+                    os.unlink(entry.path)
 
 
 def _written_beside(path: Path, content: bytes) -> Path:

@@ -19,6 +19,8 @@ from postproc.findings import Finding, Refusal, nearest
 
 MAX_BYTES = 4_000_000
 MAX_DEPTH = 20
+MAX_NODES = 100_000
+"""Values, lists and mappings: PyYAML takes 20 us and 500 bytes for each."""
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
 _NULLS = ("", "~", "null", "Null", "NULL")
 _FLAGS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
@@ -63,7 +65,9 @@ class Section:
     def error(self, code: str, message: str, key: str | None = None, help: str = "") -> Refusal:
         """A Refusal that points at ``key`` (at the section itself without one)."""
         node = self._keys.get(key) if key is not None else None
-        line, column = (node.start_mark.line + 1, node.start_mark.column + 1) if node else (self.line, self.column)
+        line, column = (
+            (node.start_mark.line + 1, node.start_mark.column + 1) if node else (self.line, self.column)
+        )
         name = self._path(key) if key is not None else self.where
         text = f"{name}: {message}" if name else message
         return Refusal(Finding(code, text, str(self.file), line, column, help))
@@ -213,7 +217,8 @@ def read(path: Path) -> bytes:
 def parsed(raw: bytes, path: Path) -> Section:
     """The top mapping of the YAML text ``raw``, as that of the file ``path``.
 
-    Raises Refusal: FIL002 (empty), YML001 (no YAML, no mapping, too large, aliases, tags, too deep).
+    Raises Refusal: FIL002 (empty), YML001 (no YAML, no mapping, too large, too many values, aliases,
+    tags, too deep).
     """
     if len(raw) > MAX_BYTES:
         raise Refusal(Finding("YML001", f"larger than {MAX_BYTES} bytes", str(path)))
@@ -267,8 +272,11 @@ def _checked(path: Path, events: Iterable[yaml.Event]) -> Iterator[yaml.Event]:
 
     The depth is counted here because PyYAML's scanner takes time by its square, and the composer the stack.
     """
-    depth = 0
+    depth = nodes = 0
     for event in events:
+        nodes += isinstance(event, yaml.NodeEvent)
+        if nodes > MAX_NODES:
+            raise Refusal(_finding(path, event, "YML001", f"more than {MAX_NODES} values"))
         if isinstance(event, yaml.AliasEvent):
             raise Refusal(_finding(path, event, "YML001", "aliases (*name) are not allowed"))
         if getattr(event, "tag", None) is not None:

@@ -11,7 +11,17 @@ VARIABLE = "_COMPENSATE_COMPLETE"
 
 
 class Commands(click.Group):
-    """A group with a default command: to complete, a first word that is no command is a program."""
+    """A group with a default command: to complete, a first word that is no command is a program.
+
+    A Ctrl-C ends every command with exit code 130, as a shell expects.
+    """
+
+    def invoke(self, ctx: click.Context) -> object:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo("interrupted", err=True)
+            raise SystemExit(130) from None
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
