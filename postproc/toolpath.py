@@ -81,7 +81,8 @@ class Toolpath:
     the position can be corrected.  ``free_axis`` (N, 3): unit vector in tool axes about which the text does not say how
     the tool is turned (tool vectors, two rotary axes); NaN where it gives the whole orientation.
     ``runs`` (N,): the motion follows the one before it; False for motions of which it is not known whether, or where,
-    they run: these come last.  ``branches``: a jump may lead into another configuration of the robot (KRL's S);
+    they run: these come last.  ``timed`` (N,): the text gives the time that the motion takes: its feed follows from its
+    length (G93).  ``branches``: a jump may lead into another configuration of the robot (KRL's S);
     without, no motion does.
     ``annotations``: comments that speak to this tool; ``comments``: all others that stand on a line of their own.
     """
@@ -110,6 +111,7 @@ class Toolpath:
     free_axis: Floats = field(default_factory=lambda: np.empty((0, 3)))
     runs: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     any_plane: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
+    timed: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     branches: bool = True
     whole: Mapping[int, str] = field(default_factory=dict)
     comments: tuple[Annotation, ...] = ()
@@ -132,7 +134,9 @@ class Toolpath:
         for name in ("runs", "any_plane"):
             if not len(getattr(self, name)):
                 object.__setattr__(self, name, np.ones(n, np.bool_))
-        for name in ("oriented", "runs", "any_plane"):
+        if not len(self.timed):
+            object.__setattr__(self, "timed", np.zeros(n, np.bool_))
+        for name in ("oriented", "runs", "any_plane", "timed"):
             object.__setattr__(self, name, frozen(getattr(self, name), (n,), np.bool_))
         shapes = {"position": (n, 3), "rotation": (n, 3, 3), "axes": (n, 6), "feed": (n,), "given": (n, 6)}
         shapes |= {"centre": (n, 3), "normal": (n, 3), "sweep": (n,), "blend": (n,), "free_axis": (n, 3)}

@@ -185,7 +185,8 @@ def _hold(path: Toolpath, back: Toolpath, plan: Plan, writing: Writing, file: st
         ("status", own),
         ("turn", own),
         ("axes", own),
-        ("feed", path.kind[source] != Kind.PTP),
+        ("timed", own),
+        ("feed", (path.kind[source] != Kind.PTP) & ~path.timed[source]),
     ):
         before = getattr(path, name)[source].reshape(len(plan), -1)
         after = getattr(back, name).reshape(len(plan), -1)

@@ -179,12 +179,14 @@ def _compare(path: Toolpath, plan: Plan, back: Toolpath) -> None:
     if codes != again:
         differ = set(codes.items()) ^ set(again.items())
         raise Broken(f"other refusals: {sorted(differ)[:3]}")
-    for name in ("kind", "base", "tool", "axes", "feed", "status", "turn"):
+    for name in ("kind", "base", "tool", "axes", "feed", "status", "turn", "timed"):
         before, after = getattr(path, name)[source], getattr(back, name)
         if name in ("base", "tool"):
             before, after = _frames(path, before), _frames(back, after)
         same = (before == after) | ((before != before) & (after != after))
         same = same.all(axis=1) if same.ndim > 1 else same
+        if name == "feed":
+            same |= path.timed[source]
         if not same.all():
             m = int(np.argmin(same))
             raise Broken(f"the {name} of row {source[m]} (line {path.line[source[m]]}) changed")

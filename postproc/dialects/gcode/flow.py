@@ -32,13 +32,15 @@ class Doubt(IntEnum):
 @dataclass(frozen=True, eq=False)
 class Flow:
     """doubt (B,) Doubt; last (B,): the last block of the doubtful stretch that the block is in, itself elsewhere;
-    forget (B,): before it other code ran that was not read; calls (B,): runs it; tape (B,): belongs to the program."""
+    forget (B,): before it other code ran that was not read; calls (B,): runs it; tape (B,): belongs to the program;
+    entered (B,): a jump leads to it, past what stands before it."""
 
     doubt: Ints
     last: Ints
     forget: Bools
     calls: Bools
     tape: Bools
+    entered: Bools
 
 
 def follow(text: Text, control: Control, once: Ints) -> Flow:
@@ -60,7 +62,8 @@ def follow(text: Text, control: Control, once: Ints) -> Flow:
         named = words.block[np.isin(words.key, list(control.calls))]
         forget[named[~coded[named]] + 1] = True
     edge = np.zeros(n + 1, np.int64)
-    for begin, end in _stretches(text, n, forget):
+    entered = np.zeros(n, np.bool_)
+    for begin, end in _stretches(text, n, forget, entered):
         edge[begin] += 1
         edge[end] -= 1
     doubt[np.cumsum(edge)[:n] > 0] = Doubt.FLOW
@@ -73,7 +76,7 @@ def follow(text: Text, control: Control, once: Ints) -> Flow:
         rest = doubt[ends[0] + 1 :]
         # M97 runs what stands behind the end, as a subprogram.
         rest[rest != Doubt.PROGRAM] = Doubt.PROGRAM if (codes == LOCAL).any() else Doubt.ENDED
-    return Flow(doubt, _last(doubt), forget[:-1], forget[1:], tape)
+    return Flow(doubt, _last(doubt), forget[:-1], forget[1:], tape, entered)
 
 
 def _tape(text: Text, n: int) -> Bools:
@@ -99,8 +102,9 @@ def _programs(text: Text) -> list[int]:
     return sorted({*plain.tolist(), *noted})
 
 
-def _stretches(text: Text, n: int, forget: Bools) -> list[tuple[int, int]]:
-    """Ranges of blocks that are loops, branches, subprograms or lie under a jump; calls are put into ``forget``."""
+def _stretches(text: Text, n: int, forget: Bools, entered: Bools) -> list[tuple[int, int]]:
+    """Ranges of blocks that are loops, branches, subprograms or lie under a jump; calls are put into ``forget``, where
+    jumps lead to into ``entered``."""
     found: list[tuple[int, int]] = []
     stack: list[tuple[int, str]] = []
     labels: dict[str, int] | None = None
@@ -125,6 +129,7 @@ def _stretches(text: Text, n: int, forget: Bools) -> list[tuple[int, int]]:
             else:
                 at = [note.block, *(end for end in ends if end is not None)]
                 found.append((min(at), max([note.block + 1, *at])))
+                entered[at[1:]] = True
     if stack:
         found.append((stack[0][0], n))
     return found

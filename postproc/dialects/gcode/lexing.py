@@ -19,6 +19,10 @@ from postproc.dialects.gcode.words import Blocks, How, Note, Text, Words
 BOM = b"\xef\xbb\xbf"
 LONGEST = 40
 """Bytes of a number; what is longer is none."""
+FARTHEST = 1e7
+"""Units of a coordinate; with a greater one doubles do not hold the digits that are written, and it is not read."""
+COORDINATES = np.frombuffer(b"XYZABCIJKRUVWE", np.uint8).astype(np.int64)
+"""Letters of what is or makes a coordinate."""
 
 _BLANK, _NEWLINE, _LETTER, _DIGIT, _DOT, _SIGN, _EQUALS, _OTHER = range(8)
 _CLASS = np.full(256, _OTHER, dtype=np.uint8)
@@ -237,13 +241,18 @@ def _joined(
     some[lines] = True
     some[other.said] = True
     used = np.flatnonzero(some)
+    key = np.concatenate([plain.key, extra.key])[order]
+    value = np.concatenate([plain.value, extra.value])[order]
+    how = np.concatenate([plain.how, extra.how])[order]
+    far = (np.abs(value) > FARTHEST) & np.isin(key & 0xFF, COORDINATES)
+    value[far], how[far] = np.nan, How.UNREAD
     words = Words(
         at=np.concatenate([plain.at, extra.at])[order],
         start=np.concatenate([plain.start, extra.start])[order],
         stop=np.concatenate([plain.stop, extra.stop])[order],
-        key=np.concatenate([plain.key, extra.key])[order],
-        value=np.concatenate([plain.value, extra.value])[order],
-        how=np.concatenate([plain.how, extra.how])[order],
+        key=key,
+        value=value,
+        how=how,
         block=np.searchsorted(used, lines),
     )
     deleted = np.zeros(len(starts), np.bool_)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from postproc.dialects.gcode.comments import remarks
 from postproc.dialects.gcode.control import Control, Event, Feed, Frame, Group, Move, Once
 from postproc.dialects.gcode.feeds import feeds
 from postproc.dialects.gcode.judging import judged, pinned
-from postproc.dialects.gcode.lexing import lex
+from postproc.dialects.gcode.lexing import FARTHEST, lex
 from postproc.dialects.gcode.modal import modal
 from postproc.dialects.gcode.motions import Motions
 from postproc.dialects.gcode.numbered import references, spoiled, tools
@@ -27,6 +28,7 @@ from postproc.dialects.gcode.words import How, Note, Text, key
 from postproc.document import Document
 from postproc.geometry import Poses, rotation_from_abc
 from postproc.toolpath import Kind, Toolpath
+from postproc.units import MM
 
 
 def read(documents: tuple[Document, ...], control: Control, settings: Settings = PLAIN) -> Program:
@@ -75,6 +77,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: Settings =
         oriented=moves.stand.oriented,
         free_axis=moves.stand.free_axis,
         any_plane=_by_point(given, rows),
+        timed=given.modal.force[Group.FEED][rows] == Feed.INVERSE_TIME,
         branches=False,
     )
     findings = [*refused.told(), *told(document, given, rows, tool, named, settings)]
@@ -136,6 +139,7 @@ def _change(given: Blocks, events: Ints) -> Callable[[int, Frame, Floats], Frame
             position,
         )
         after = change(event)
+        after = replace(after, shift=np.where(np.abs(after.shift) > FARTHEST * MM, np.nan, after.shift))
         if given.modal.flow.doubt[block]:
             same = (after.shift == frame.shift) | (np.isnan(after.shift) & np.isnan(frame.shift))
             return Frame(after.turn, np.where(same, frame.shift, np.nan), after.memory)
@@ -232,6 +236,7 @@ def _whole(given: Blocks, rows: Ints) -> dict[int, str]:
     for mask, why in (
         (timed, "F is the time of the whole block (G93)"),
         (more, "its block says more than the motion"),
+        (modal.flow.entered, "a jump leads to its block"),
     ):
         found.update(dict.fromkeys(np.flatnonzero(mask[rows]).tolist(), why))
     return found

@@ -138,7 +138,7 @@ def _positions(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet) -
     other = np.zeros(len(row), dtype=bool)
     for state in (places.frame, places.scale, path.base):
         other[1:] |= state[row[1:]] != state[row[:-1]]
-    bounds = [0, *np.flatnonzero(other).tolist(), len(row)]
+    bounds = [0, *np.flatnonzero(other).tolist(), len(row)] if len(row) else []
     start = np.full(3, np.nan)
     for a, b in pairwise(bounds):
         if a and path.base[row[a]] == path.base[row[a - 1]]:

@@ -80,7 +80,8 @@ def stated(program: Program, writing: Writing) -> Stated:
     value = np.where(word >= 0, words.value[word], np.nan) if len(words) else np.full(word.shape, np.nan)
     counted = np.ones(word.shape)
     lengths = np.r_[0:3, 6:10]
-    counted[:, lengths] = (places.increment / places.scale)[:, None]
+    # Where mm or inch is not known, neither is the increment.
+    counted[:, lengths] = np.nan_to_num(places.increment / places.scale, nan=1.0)[:, None]
     integer = how == How.INTEGER
     value[integer] *= counted[integer]
     modal = _modal(places, orient, through)
@@ -125,11 +126,13 @@ def _keys(places: Places, orient: Ints, through: Bools) -> Ints:
 
 
 def _least(program: Program, orient: Ints, writing: Writing) -> Ints:
-    """(N, 10) the least decimals: one more in inches, and in turned coordinates, whose roundings add up in the base."""
+    """(N, 10) the least decimals: those of which a step in the program's unit is no more than one of mm; one more in
+    turned coordinates, whose roundings add up in the base."""
     places = program.text
     rotation = np.abs(places.frames.rotation)
     turned = (np.minimum(rotation, np.abs(rotation - 1.0)) > 1e-9).any(axis=(1, 2))
-    lengths = writing.mm + (places.scale > 2 * MM) + turned[places.frame]
+    finer = np.ceil(np.log10(np.nan_to_num(places.scale / MM, nan=1.0)) - 1e-9).astype(np.int64)
+    lengths = writing.mm + finer + turned[places.frame]
     least = np.repeat(lengths[:, None], COLUMNS, axis=1)
     angles = np.array(
         [writing.deg if o.angles else writing.deg + VECTOR_DECIMALS for o in places.orientations] + [0]
