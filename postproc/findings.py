@@ -25,7 +25,7 @@ CODES: dict[str, Code] = {
     # files
     "FIL001": Code("error", "file can not be read", "The path, or the right to read it, is wrong."),
     "FIL002": Code("error", "file is empty", "There is nothing to compensate."),
-    "FIL003": Code("error", "file is no text", "It holds NUL bytes: a binary file, or text in UTF-16."),
+    "FIL003": Code("error", "file is no text", "It holds NUL bytes (binary, or UTF-16) or endless lines."),
     "FIL004": Code(
         "error", "file can not be written", "Nothing of this program was written; free the folder or disk."
     ),

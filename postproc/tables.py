@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats, Ints, frozen
+from postproc.files import read_file
 from postproc.findings import Finding, Refusal, nearest
 
 _LINE_END = re.compile(r"\r\n|\n|\r")
@@ -55,7 +56,8 @@ class Table:
         for name in self.columns:
             if name not in allowed:
                 raise self.header_error(
-                    f"unknown column {name!r}{nearest(name, allowed)}", "columns: " + ", ".join(allowed)
+                    f"unknown column {name[:40]!r}{nearest(name[:40], allowed)}",
+                    "columns: " + ", ".join(allowed),
                 )
 
     def texts(self, name: str) -> Sequence[str]:
@@ -134,10 +136,12 @@ def read_table(path: Path, code: str) -> Table:
     separator = _separator(kept[0])
     rows = _cells(path, code, kept, lines, separator)
     names = [name.strip().lower() for name in rows[0]]
+    seen: set[str] = set()
     for index, name in enumerate(names, start=1):
-        if not name or (name in names[: index - 1]):
-            what = "has no name" if not name else f"has the name {name!r} of one before it"
+        if not name or name in seen:
+            what = "has no name" if not name else f"has the name {name[:40]!r} of one before it"
             raise Refusal(Finding(code, f"column {index} of the header {what}", str(path), lines[0]))
+        seen.add(name)
     if len(rows) == 1:
         raise Refusal(Finding(code, "there is a header, but no rows", str(path), lines[0]))
     for number, row in zip(lines, rows, strict=True):
@@ -185,10 +189,7 @@ def finite_number(text: str) -> float | None:
 
 
 def _bytes(path: Path) -> bytes:
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
+    raw = read_file(path)
     if b"\0" in raw:
         raise Refusal(Finding("FIL003", "holds NUL bytes; save it as plain text (UTF-8)", str(path)))
     return raw
@@ -247,9 +248,13 @@ def _wrong_count(
     path: Path, code: str, number: int, row: list[str], names: list[str], separator: str
 ) -> Finding:
     if len(row) < len(names):
-        message = f"{len(row)} cells where the header has {len(names)}: column {names[len(row)]} is missing"
+        message = (
+            f"{len(row)} cells where the header has {len(names)}: column {names[len(row)][:40]} is missing"
+        )
         help = ""
     else:
-        message = f"{len(row)} cells where the header has {len(names)}: too many after column {names[-1]}"
+        message = (
+            f"{len(row)} cells where the header has {len(names)}: too many after column {names[-1][:40]}"
+        )
         help = "a decimal comma needs semicolons between the cells" if separator == "," else ""
     return Finding(code, message, str(path), number, help=help)

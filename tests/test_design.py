@@ -38,6 +38,7 @@ ROOMS = {
     "yamlfile": 1,
     "tables": 1,
     "publish": 1,
+    "files": 1,
     "findings": 0,
     "units": 0,
     "arrays": 0,
@@ -52,6 +53,7 @@ ONE_FLOOR = {
     ("toolpath", "geometry"),
     ("measurements", "tables"),
     ("measurements", "geometry"),
+    ("tables", "files"),
 }
 """Neighbours on one floor, from -> to."""
 

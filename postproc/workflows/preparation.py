@@ -15,6 +15,7 @@ from postproc.dialects import DIALECTS, detect
 from postproc.dialects.dialect import Dialect, Program, Settings
 from postproc.document import Document
 from postproc.effects import Conditions
+from postproc.files import read_file
 from postproc.findings import Finding, Refusal, nearest
 from postproc.forces import Wrenches, is_no_force, wrenches
 from postproc.model import StiffnessModel, approach
@@ -23,6 +24,9 @@ from postproc.robot.geometries import SerialArm
 from postproc.robot.track import Track, all_axes, follow, nominal_flange
 from postproc.toolpath import Kind, Toolpath
 from postproc.units import DEG, MM
+
+MAX_LINE = 1_000_000
+"""Bytes: no controller writes lines of a hundredth of it, and a line is held in memory as many times its length."""
 
 Stage = Callable[[str], None]
 """Is told the name of each stage as it begins."""
@@ -117,13 +121,16 @@ def near_cell(program: Path) -> Cell | None:
 
 
 def read_document(path: Path) -> Document:
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
-    if b"\0" in raw:
-        at = raw.index(b"\0")
+    """A file of a program.  Raises Refusal FIL001 (not readable), FIL003 (no text)."""
+    raw = read_file(path)
+    at = raw.find(b"\0")
+    if at >= 0:
         raise Refusal(Finding("FIL003", f"NUL at byte {at}: no text of a program", str(path)))
+    for at in range(0, len(raw) - MAX_LINE + 1, MAX_LINE):
+        if raw.find(b"\n", at, at + MAX_LINE) < 0:
+            line = raw.count(b"\n", 0, at) + 1
+            message = f"a line of more than {MAX_LINE} bytes: no text of a program"
+            raise Refusal(Finding("FIL003", message, str(path), line))
     return Document(path, raw)
 
 
