@@ -2,7 +2,8 @@
 
 A header row, then rows with as many cells.  Comma, semicolon or tab, whichever gives the header most cells;
 where it is not the comma, a decimal comma is understood.  Blank lines and lines that begin with ``#`` are skipped,
-above the header also those that a spreadsheet has put in quotes.
+above the header also those that a spreadsheet has put in quotes.  An apostrophe before = + - @, by which a spreadsheet
+is told that a cell is no formula, is not part of the cell.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ _LINE_END = re.compile(r"\r\n|\n|\r")
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
 _NUMBER_CHARACTERS = frozenset("0123456789+-.eE")
 _NOTHING = ' \t;,"'  # a spreadsheet writes its empty rows as separators alone
+_FORMULA = re.compile(r"'*[=+\-@]")
 _MISSING = frozenset(("", "-", "nan", "n/a"))
 
 
@@ -147,8 +149,9 @@ def read_table(path: Path, code: str) -> Table:
     for number, row in zip(lines, rows, strict=True):
         if len(row) != len(names):
             raise Refusal(_wrong_count(path, code, number, row, names, separator))
+    quoted = b"'" in raw
     columns = {
-        name: list(map(str.strip, cells))
+        name: [_as_text(cell.strip()) for cell in cells] if quoted else list(map(str.strip, cells))
         for name, cells in zip(names, zip(*rows[1:], strict=True), strict=True)
     }
     return Table(
@@ -181,6 +184,17 @@ def comments_above(path: Path) -> tuple[tuple[int, str], ...]:
 def is_missing(cell: str) -> bool:
     """Whether a cell is empty, or says that there is nothing: ``-``, ``nan``, ``n/a`` in any case."""
     return cell.lower() in _MISSING
+
+
+def as_cell(text: str) -> str:
+    """``text`` as a spreadsheet takes for no formula, with an apostrophe before its = + - @; ``read_table`` takes it
+    off.  Numbers stay as they are."""
+    return f"'{text}" if _FORMULA.match(text) and finite_number(text) is None else text
+
+
+def _as_text(cell: str) -> str:
+    """What ``as_cell`` was given."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
 def finite_number(text: str) -> float | None:

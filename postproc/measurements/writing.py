@@ -14,6 +14,7 @@ from postproc.geometry import Poses, abc_from_rotation
 from postproc.measurements.comments import FRAMES
 from postproc.measurements.header import RESERVED, WRENCH, direction_columns, value_columns
 from postproc.measurements.readings import Readings, joint_units
+from postproc.tables import as_cell
 from postproc.units import DEG, MM
 
 _PLAIN = re.compile(r"[A-Za-z_][\w.-]*")
@@ -35,7 +36,9 @@ def measurements_csv(readings: Readings, about: Sequence[str] = ()) -> bytes:
         ids = np.where(single, repeat.max(initial=-1) + np.cumsum(single), repeat)
         columns["REPEAT"] = [str(number + 1) for number in ids]
     stream = io.StringIO()
-    stream.writelines(f"# {comment}\n" for comment in comments)
+    for comment in comments:  # in quotes where a spreadsheet would cut a cell with a formula out of it
+        quote = '"' if re.search(r"[,;\t]\s*[=+@-]", comment) else ""
+        stream.write(f"{quote}# {comment}{quote}\n")
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(zip(*columns.values(), strict=True))
@@ -80,9 +83,9 @@ def _state(readings: Readings) -> dict[str, list[str]]:
     if readings.temperature is not None:
         columns["TEMP"] = _fixed(readings.temperature, 3)
     if readings.targets:
-        columns["TARGET"] = [readings.targets[index] for index in readings.target]
+        columns["TARGET"] = [as_cell(readings.targets[index]) for index in readings.target]
     if readings.sessions != ("",):
-        columns["SESSION"] = [readings.sessions[index] for index in readings.session]
+        columns["SESSION"] = [as_cell(readings.sessions[index]) for index in readings.session]
     return columns
 
 

@@ -19,6 +19,7 @@ from postproc.identification.campaign import Campaign
 from postproc.identification.noise import Noise
 from postproc.measurements import Readings
 from postproc.report.workspace import _texts
+from postproc.tables import as_cell
 from postproc.units import DEG, MM
 
 PARTS, EACH = 8, 10
@@ -103,11 +104,11 @@ def residuals_csv(
     readings = campaign.readings
     places = [readings.where(row) for row in range(len(readings))]
     columns: dict[str, Sequence[str]] = {
-        "file": [file for file, _ in places],
+        "file": [as_cell(file) for file, _ in places],
         "line": [str(line) for _, line in places],
         "pose": [str(number) for number in poses_in_order(campaign.pose)],
-        "target": [campaign.targets[k] for k in readings.target],
-        "session": [readings.sessions[k] for k in readings.session],
+        "target": [as_cell(campaign.targets[k]) for k in readings.target],
+        "session": [as_cell(readings.sessions[k]) for k in readings.session],
     }
     for joint in joint_variables(readings):
         columns[f"{joint.name}_{joint.unit}"] = _texts(joint.values, 6)
