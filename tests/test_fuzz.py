@@ -20,7 +20,7 @@ from postproc.dialects.dialect import Dialect
 from postproc.document import Document, Edit, Span
 
 TESTS = Path(__file__).parent
-HELD = {name: dialect for name, dialect in DIALECTS.items() if name == "krl"}
+HELD = DIALECTS
 """Dialects of which all mutants must hold."""
 LARGEST = 40_000
 SIZE = 100_000

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 
 from postproc.dialects.gcode.control import Line
-from postproc.dialects.gcode.sinumerik_expression import bracket_end, constant, expression_end
+from postproc.dialects.gcode.sinumerik_expression import bracket_end, constant, expression_end, is_open
 from postproc.dialects.gcode.words import How, Note, key
 
 _HEAD = re.compile(rb"[ \t\x0b\x0c]*(?P<slash>/[ \t]*\d?[ \t]*)?(?:[Nn:][ \t]*\d+)?[ \t]*")
@@ -88,6 +88,8 @@ class Lines:
                 place = plain.end()
             else:
                 place = self._rest(text, place, words, note)
+        if words and is_open(text):
+            note("unknown", text.strip(), 0)
         return Line(words, notes, deleted)
 
     def _command(self, text: bytes, place: int, command, word, note) -> None:  # type: ignore[no-untyped-def]

@@ -29,7 +29,8 @@ class Places:
     frame (N,): row in ``frames``, the programmed coordinates in the base: base = frame @ (number * scale).
     begin (N, 3) [m]: where the motion begins, in its ``frame``; NaN where not known.
     orient (N,): row in ``orientations``, what the orientation words mean there, -1 where none are in force;
-    turned_values (N, 3): the numbers of these words in force at the end of the motion, NaN where not known.
+    turned_values, turned_before (N, 3): the numbers of these words in force at the end of the motion, and just before
+    its block; NaN where not known.
     feed_mode (N,) Feed: F of INVERSE_TIME belongs to the whole motion.
     """
 
@@ -51,6 +52,7 @@ class Places:
     orient: Ints
     orientations: tuple[Orientation, ...]
     turned_values: Floats
+    turned_before: Floats
     feed_mode: Ints
 
     def __len__(self) -> int:

@@ -271,6 +271,7 @@ def _places(given: Blocks, where: Positions, moves: Motions) -> Places:
         orient=moves.stand.orient,
         orientations=moves.stand.orientations,
         turned_values=moves.stand.values,
+        turned_before=moves.stand.before,
         feed_mode=force[Group.FEED][rows],
     )
 

@@ -7,6 +7,7 @@ import re
 
 _NUMBER = re.compile(rb"[ \t]*((?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)[ \t]*", re.I)
 _OPERAND = re.compile(rb"'[^']*'|[0-9.]+(?:EX[-+]?[0-9]+)?|[$A-Za-z_][$A-Za-z0-9_]*", re.I)
+_CLOSED = re.compile(rb'"[^"]*"')
 _DEEPEST = 20
 _LONGEST = 200
 
@@ -47,6 +48,12 @@ def expression_end(text: bytes, at: int) -> int:
         else:
             return place
     return size
+
+
+def is_open(text: bytes) -> bool:
+    """Whether a string or a bracket does not close: what is put behind such a line would belong to it."""
+    rest = _CLOSED.sub(b"", text)
+    return b'"' in rest or any(rest.count(a) > rest.count(b) for a, b in ((b"(", b")"), (b"[", b"]")))
 
 
 def bracket_end(text: bytes, at: int) -> int:

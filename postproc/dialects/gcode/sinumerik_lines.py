@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 
 from postproc.dialects.gcode.control import Line
-from postproc.dialects.gcode.sinumerik_expression import bracket_end, constant, expression_end
+from postproc.dialects.gcode.sinumerik_expression import bracket_end, constant, expression_end, is_open
 from postproc.dialects.gcode.words import NAMES, How, Note, key
 
 TURN, RPL = NAMES, NAMES + 1
@@ -99,6 +99,8 @@ class _Taken:
                 place += 1
                 continue
             place = self.token(place)
+        if self.words and is_open(self.text):
+            self.note("unknown", self.text[head.end() if head else 0 :].strip(), 0)
         return Line(self.words, self.notes, self.deleted)
 
     def note(self, kind: str, said: bytes, at: int) -> None:

@@ -35,7 +35,7 @@ _SEQUENCES = {EULER: ((2, 0), (0, 1), (2, 2)), RPY: ((2, 2), (1, 1), (0, 0))}
 class Stand:
     """rotation (N, 3, 3); oriented (N,): the words can be written; free_axis (N, 3): as in a Toolpath; wrong (N,):
     0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one.  orient (N,), orientations,
-    values (N, 3): as in Places.  stated (N,): the block itself states the whole orientation in force."""
+    values, before (N, 3): as in Places.  stated (N,): the block itself states the whole orientation in force."""
 
     rotation: Floats
     oriented: Bools
@@ -44,6 +44,7 @@ class Stand:
     orient: Ints
     orientations: tuple[Orientation, ...]
     values: Floats
+    before: Floats
     stated: Bools
 
 
@@ -65,6 +66,7 @@ def stands(given: Blocks, where: Positions, rows: Ints, rapid: Bools, turned: Fl
         np.full(n, -1),
         (),
         np.full((n, 3), np.nan),
+        np.full((n, 3), np.nan),
         np.zeros(n, np.bool_),
     )
     if not used.any() and not (kind > ROTARY).any():
@@ -82,6 +84,13 @@ def stands(given: Blocks, where: Positions, rows: Ints, rapid: Bools, turned: Fl
         values = _values(given, where, one, rows[here], stating[rows[here]], turned, turns, used, orientation)
         shifted = np.array([frame.shift[3:].any() for frame in where.frames])[where.frame[rows[here]]]
         result.values[here] = values
+        ahead = here[(rows[here] > 0) & ((one == ROTARY) | (kind[rows[here] - 1] == one))]
+        block = rows[ahead]
+        if one == ROTARY:
+            result.before[ahead] = np.where(used, where.begin[block, 3:] / DEG, np.nan)
+        else:
+            said = stating[block - 1]
+            result.before[ahead] = _values(given, where, one, block, said, turned, turns, used, orientation)
         present = np.stack(
             [given.of(address)[rows[here]] >= 0 for address in orientation.words if address >= 0], axis=1
         )

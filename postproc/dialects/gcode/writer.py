@@ -110,6 +110,12 @@ def _fixed(program: Program, motions: _Motions, plan: Plan) -> Bools:
     return np.asarray(fixed_rows[motions.row] | np.isnan(plan.position[:, 0]))
 
 
+def _resumed(motions: _Motions, origin: Floats, ends: Floats) -> Bools:
+    """(M, K) the first motions of rows that begin elsewhere than ``ends`` (M, K), where the row before ends."""
+    first = np.append(True, motions.row[1:] != motions.row[:-1])[: len(motions.row)]
+    return Wanted.resumed(origin, np.where(first[:, None] & (motions.row > 0)[:, None], ends, np.nan))
+
+
 def _stated_columns(motions: _Motions, columns: slice) -> tuple[Floats, Bools]:
     """The numbers of the own blocks, NaN else; whether a number there is an increment."""
     text, row = motions.text, motions.row
@@ -133,6 +139,7 @@ def _positions(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet) -
         _fixed(program, motions, plan),
         _closed(program, plan, motions, sheet),
         begin,
+        _resumed(motions, begin, text.units(row, path.position[row - 1])),
     )
     into = Followed.nothing(wanted)
     other = np.zeros(len(row), dtype=bool)
@@ -160,14 +167,6 @@ def _reached(program: Program, plan: Plan, motions: _Motions, begin: Floats) -> 
         same[:-1] &= state[row[1:]] == state[row[:-1]]
     behind = np.roll(begin, -1, axis=0)
     return np.where(same[:, None] & np.isnan(wanted), behind, wanted)
-
-
-def _before(values: Floats, orient: Ints) -> Floats:
-    """(M, 3) the numbers in force before the motions, NaN where they mean something else."""
-    before = np.roll(values, 1, axis=0)
-    before[:1] = np.nan
-    before[1:][orient[1:] != orient[:-1]] = np.nan
-    return before
 
 
 def _closed(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet) -> Bools:
@@ -205,6 +204,8 @@ def _orientations(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet
         used = np.array(orientation.words) >= 0
         held |= {int(row[m]): "GCW002" for m in rows[np.isnan(values[rows][:, used]).any(axis=1)].tolist()}
     own, relative = _stated_columns(motions, TURNED)
+    same = places.orient[row - 1] == orient
+    before = np.where(same[:, None], places.turned_values[row - 1], np.nan)
     wanted = Wanted(
         values,
         np.where(motions.own[:, None], source, np.nan),
@@ -213,7 +214,8 @@ def _orientations(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet
         sheet.decimals[:, TURNED],
         _fixed(program, motions, plan) | (orient < 0),
         np.zeros(values.shape, dtype=bool),
-        _before(source, orient),
+        places.turned_before[row],
+        _resumed(motions, places.turned_before[row], before),
     )
     into = Followed.nothing(wanted)
     bounds = [0, *(np.flatnonzero(np.diff(orient)) + 1).tolist(), len(row)]

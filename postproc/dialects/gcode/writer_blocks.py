@@ -20,6 +20,7 @@ from postproc.document import Edit, Edits, Span, sums
 _HEAD = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*(?:/[ \t]*\d?[ \t]*)?)")
 _NAME = re.compile(rb"[A-Za-z_][A-Za-z0-9_]*")
 _NUMBER = key("N")
+_LETTERS = list(b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_")
 _BEHIND = [ord(letter) for letter in ") \t"]
 _CLOSED = re.compile(rb"(?:[ \t]*\))*")
 _BLANK = re.compile(rb"[ \t]")
@@ -72,7 +73,10 @@ class Blocks:
         """(n,) whether the words of the blocks have blanks between; those with one word go by the program."""
         first, behind = self.words_of(rows)
         start = self.places.text.words.at[first]
-        return np.where(behind - first > 1, self._blanks[ends] > self._blanks[start], self.spaced)
+        spaced = np.where(behind - first > 1, self._blanks[ends] > self._blanks[start], self.spaced)
+        # What follows a name without a blank would belong to it.
+        raw = np.frombuffer(self.raw, np.uint8)
+        return np.asarray(spaced | np.isin(raw[ends - 1], _LETTERS))
 
     @cached_property
     def two_digits(self) -> bool:

@@ -20,7 +20,8 @@ class Wanted:
     that stands in its block, NaN where there is none; relative, decimals: see ``Stated``.  fixed (M,): its block must
     stay as it is.  closed (M, K): it has to end exactly where it begins, with as many decimals as that takes.
     What is not known (NaN wanted) is left as it stands.  origin (M, K): where the motion begins in the source; a fixed
-    one that ends there inherits where the motion before came to.
+    one that ends there inherits where the motion before came to.  resumes (M, K): it begins there whatever the motion
+    before does: what stands between says it, or leaves it unknown (NaN).
     """
 
     wanted: Floats
@@ -31,6 +32,13 @@ class Wanted:
     fixed: Bools
     closed: Bools
     origin: Floats
+    resumes: Bools
+
+    @staticmethod
+    def resumed(origin: Floats, before: Floats) -> Bools:
+        """Where motions begin elsewhere than the one ``before`` (M, K) ends in the source; NaN says nothing."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.isfinite(before) & ~(np.abs(origin - before) <= 1e-6))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +81,14 @@ def _follow_column(motions: Wanted, start: float, a: int, b: int, column: int, i
     if len(led):
         _follow_led(motions, start, a, b, column, led, half, write, number, end)
     into.end[a:b, column], into.write[a:b, column], into.number[a:b, column] = end, write, number
-    into.begin[a, column], into.begin[a + 1 : b, column] = start, end[:-1]
+    _begun(motions, start, a, b, slice(column, column + 1), into)
+
+
+def _begun(motions: Wanted, start: Floats | float, a: int, b: int, columns: slice, into: Followed) -> None:
+    begin = into.begin[a:b, columns]
+    begin[0], begin[1:] = start, into.end[a : b - 1, columns]
+    resumes = motions.resumes[a:b, columns]
+    begin[resumes] = motions.origin[a:b, columns][resumes]
 
 
 def _follow_led(
@@ -92,11 +107,11 @@ def _follow_led(
     wants, owns = motions.wanted[a:b, column].tolist(), motions.own[a:b, column].tolist()
     relatives, closed = motions.relative[a:b, column].tolist(), motions.closed[a:b, column].tolist()
     sources, halves = motions.source[a:b, column].tolist(), half.tolist()
-    origins = motions.origin[a:b, column].tolist()
+    origins, resumes = motions.origin[a:b, column].tolist(), motions.resumes[a:b, column].tolist()
     digits = motions.decimals[a:b, column].tolist()
     ends, fixed = end.tolist(), motions.fixed[a:b].tolist()
     for k in led.tolist():
-        begin = ends[k - 1] if k else start
+        begin = origins[k] if resumes[k] else ends[k - 1] if k else start
         want, own, d, within = wants[k], owns[k], digits[k], halves[k]
         if fixed[k]:
             # Nothing is written; what it leaves out goes on as it is.
@@ -146,7 +161,7 @@ def follow_whole(motions: Wanted, start: Floats, a: int, b: int, into: Followed,
     end = np.where(present[:, None], np.nan_to_num(number), want)
     write = changed
     for k in np.flatnonzero(~has & ~motions.fixed[a:b] & np.isfinite(want).all(axis=1)).tolist():
-        begin = end[k - 1] if k else start
+        begin = np.where(motions.resumes[a + k], motions.origin[a + k], end[k - 1] if k else start)
         source = motions.source[a + k]
         known = np.isfinite(begin).all()
         other = begin if known else source
@@ -156,7 +171,7 @@ def follow_whole(motions: Wanted, start: Floats, a: int, b: int, into: Followed,
         number[k] = end[k] = _rounded(want[k], motions.decimals[a + k])
         write[k] = True
     into.end[a:b], into.write[a:b], into.number[a:b] = end, write, number
-    into.begin[a], into.begin[a + 1 : b] = start, end[:-1]
+    _begun(motions, start, a, b, slice(None), into)
 
 
 def _unit(values: Floats) -> Floats:
