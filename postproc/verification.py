@@ -200,6 +200,23 @@ def _beside(
     """The tool (S, 3) [m] beside the wanted path, the share (S,) of the original's motion ``row`` (S,) where it is
     nearest, and the force (S,) [N] there."""
     command = _sampled(run, motion, share)
+    error, at, force = _nearest(original, row, command, guess)
+    # A tool that is a little ahead of an end may already be on the way of the next motion, or still on the one before.
+    goes_on = ~original.force.steps & original.ways.known & original.carries
+    goes_on &= np.append(False, original.carries[:-1])
+    for end, other in ((1.0, 1), (0.0, -1)):
+        vertex = row + (other == 1)  # the motion that begins where the two meet
+        some = np.flatnonzero((at == end) & (vertex < len(goes_on)))
+        some = some[goes_on[vertex[some]]]
+        if len(some):
+            there, _, _ = _nearest(original, row[some] + other, command[some], np.full(len(some), 1.0 - end))
+            closer = np.linalg.norm(there, axis=1) < np.linalg.norm(error[some], axis=1)
+            error[some[closer]] = there[closer]
+    return error, at, force
+
+
+def _nearest(original: Task, row: Ints, command: Poses, guess: Floats) -> tuple[Floats, Floats, Floats]:
+    """As ``_beside``, of the ways of ``row`` (S,) alone, with the controller sent to ``command`` (S)."""
     length = np.maximum(original.ways.length[row], 1e-9)
     at = np.clip(_projected(original, row, command.position, guess), 0.0, 1.0)
     error = np.full((len(row), 3), np.nan)
