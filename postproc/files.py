@@ -10,6 +10,9 @@ from postproc.findings import Finding, Refusal
 MAX_BYTES = 1_000_000_000
 """Sixteen million motions; offsets in a program are held in 32 bits."""
 
+MAX_LINE = 1_000_000
+"""Bytes: no controller and no table has lines of a hundredth of it, and in memory a line is many times its length."""
+
 
 def read_file(path: Path) -> bytes:
     """The bytes of a file.  Raises Refusal FIL001: not readable, a pipe or a device, larger than ``MAX_BYTES``."""

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats, Ints, frozen
-from postproc.files import read_file
+from postproc.files import MAX_LINE, read_file
 from postproc.findings import Finding, Refusal, nearest
 
 _LINE_END = re.compile(r"\r\n|\n|\r")
@@ -126,6 +126,8 @@ def read_table(path: Path, code: str) -> Table:
     lines: list[int] = []
     kept: list[str] = []
     for number, line in enumerate(_LINE_END.split(_text(raw)), start=1):
+        if len(line) > MAX_LINE:
+            raise Refusal(Finding(code, f"a line of more than {MAX_LINE} characters", str(path), number))
         comment = _comment(line, above=not kept)
         if comment is not None:
             comments.append((number, comment))

@@ -15,7 +15,7 @@ from postproc.dialects import DIALECTS, detect
 from postproc.dialects.dialect import Dialect, Program, Settings
 from postproc.document import Document
 from postproc.effects import Conditions
-from postproc.files import read_file
+from postproc.files import MAX_LINE, read_file
 from postproc.findings import Finding, Refusal, nearest
 from postproc.forces import Wrenches, is_no_force, wrenches
 from postproc.model import StiffnessModel, approach
@@ -24,9 +24,6 @@ from postproc.robot.geometries import SerialArm
 from postproc.robot.track import Track, all_axes, follow, nominal_flange
 from postproc.toolpath import Kind, Toolpath
 from postproc.units import DEG, MM
-
-MAX_LINE = 1_000_000
-"""Bytes: no controller writes lines of a hundredth of it, and a line is held in memory as many times its length."""
 
 Stage = Callable[[str], None]
 """Is told the name of each stage as it begins."""

@@ -50,7 +50,7 @@ def predict(request: Request, stage: Stage = silent) -> Report:
         shown = request.report / f"{request.program.stem}.prediction.html"
     names = [*files, *pages, *([shown] if shown else [])]
     report = replace(report, outputs=tuple(str(path) for path in names))
-    _not_over_inputs(ready, report.outputs)
+    _not_over_inputs(request, ready, report.outputs)
     if shown:
         links = beside(shown, {"deflections (CSV)": names[0], "result (JSON)": pages[-1]})
         files[shown] = program_page(page_data(ready.task, result, report, ready.program.documents), links)
@@ -109,7 +109,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     if report.exit == 1:
         raise Refusal(*report.findings)
     report = replace(report, outputs=tuple(str(path) for path in (*paths, *names)))
-    _not_over_inputs(ready, report.outputs)
+    _not_over_inputs(request, ready, report.outputs)
     if request.dry_run:
         return replace(report, outputs=())
     diff = b"".join(
@@ -238,9 +238,13 @@ def _output_paths(program: Program, target: Path) -> list[Path]:
     return [target, *(target.with_name(target.stem + p.suffix if renamed else p.name) for p in companions)]
 
 
-def _not_over_inputs(ready: Prepared, outputs: Sequence[str]) -> None:
-    inputs = {document.path.resolve() for document in ready.program.documents}
-    inputs |= {ready.cell.path.resolve(), ready.robot.path.resolve()}
+def _not_over_inputs(request: Request, ready: Prepared, outputs: Sequence[str]) -> None:
+    cell = ready.cell
+    inputs = {document.path.resolve() for document in (*ready.program.documents, *ready.settings.references)}
+    inputs |= {cell.path.resolve(), ready.robot.path.resolve()}
+    # a force may be a file or be said in numbers, which name none
+    inputs |= {Path(request.force or "").resolve()}
+    inputs |= {(cell.path.parent / (said or "")).resolve() for said in (cell.force, cell.process)}
     for output in outputs:
         if Path(output).resolve() in inputs:
             raise Refusal(Finding("FIL007", "this output is an input of the same run", output))
