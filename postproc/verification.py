@@ -28,6 +28,9 @@ CHUNK = 20_000
 STEPS = 4
 """Newton's steps to the place on the path that is nearest to the tool."""
 
+STATES, LEAST_WIDTH = 50_000_000, 256
+"""Numbers that the matching of motions keeps, and how many extra motions it holds in view at least."""
+
 NEAR = 1e-4
 """[m] A motion that ends within this of where a motion of the original begins is a link to it."""
 
@@ -119,22 +122,31 @@ def _expected(original: Task) -> Floats:
 
 def _alignment(original: Task, expected: Floats, run: Task, rows: Ints, begin: int, more: int) -> Ints:
     """(n,) which rows of ``run``, counted from ``begin``, end where ``rows`` (n,) end; ``more`` of them are extra, and
-    the last one is not."""
+    the last one is not.
+
+    Dynamic programming over the number of extra rows so far, of which no more than ``width`` are held in view at once:
+    all of them but in very long programs.
+    """
     n = len(rows)
+    width = min(more + 1, max(LEAST_WIDTH, STATES // n))
     place = run.wanted.position[begin : begin + n + more]
-    came = np.zeros((n, more + 1), np.int32)
-    total = np.zeros(more + 1)
+    came, low = np.zeros((n, width), np.int32), np.zeros(n, np.int64)
+    total, first = np.zeros(width), 0
     for i, row in enumerate(rows.tolist()):
+        here = min(max(first, first + int(np.argmin(total)) - width // 4), more + 1 - width)
         goals = np.stack([original.wanted.position[row], expected[row]])
-        away = place[i : i + more + 1] - goals[:, None]
+        away = place[i + here : i + here + width] - goals[:, None]
         cost = np.nan_to_num(np.einsum("gij,gij->gi", away, away).min(axis=0))
         best = np.minimum.accumulate(total)
-        came[i] = np.maximum.accumulate(np.where(total <= best, np.arange(more + 1), 0))
-        total = best + cost
+        source = first + np.maximum.accumulate(np.where(total <= best, np.arange(width), 0))
+        # what is in view now, from what was in view before: the best with no more extra rows
+        seen = np.minimum(np.arange(here, here + width) - first, width - 1)
+        came[i], low[i] = source[seen], here
+        total, first = best[seen] + cost, here
     offset, at = np.empty(n, np.int64), more
     for i in range(n - 1, -1, -1):
         offset[i] = at
-        at = int(came[i, at])
+        at = int(came[i, at - low[i]])
     return np.arange(n) + offset
 
 

@@ -13,7 +13,7 @@ from postproc.compensation.correct import correct
 from postproc.compensation.division import Limits, divide
 from postproc.toolpath import Kind, Toolpath
 from postproc.units import MM
-from postproc.verification import Different, matched, simulate, worst_places
+from postproc.verification import Different, _alignment, matched, simulate, worst_places
 from postproc.workflows.preparation import Request, prepare
 from postproc.writing import planned
 
@@ -64,6 +64,24 @@ def test_a_correction_holds_on_another_way_of_looking(build):
     ends = after.distance[after.first | after.last]
     assert len(ends) == 2
     assert ends.max() <= task.tolerance
+
+
+def test_a_narrow_view_matches_the_same(monkeypatch):
+    task = circle(diameter=1.2, tolerance=1e-6)
+    run, division = as_run(task, Limits(max_growth=1000.0, min_segment=1e-3))
+    whole = matched(task, run)
+    np.testing.assert_array_equal(whole, np.flatnonzero(division.own))
+    rows = np.arange(1000)
+    more = 40
+    place = np.cumsum(np.tile([1e-3, 0, 0], (1000, 1)), axis=0)
+    extra = np.sort(np.random.default_rng(2).choice(999, more, replace=False))
+    longer = np.insert(place, extra, place[extra] + [0, 2e-3, 0], axis=0)
+    one = replace(task, wanted=replace(task.wanted, position=place))
+    other = replace(task, wanted=replace(task.wanted, position=longer))
+    monkeypatch.setattr("postproc.verification.STATES", 0)
+    monkeypatch.setattr("postproc.verification.LEAST_WIDTH", 8)
+    found = _alignment(one, place, other, rows, 0, more)
+    np.testing.assert_array_equal(longer[found], place)
 
 
 def test_without_points_of_its_own_the_middle_is_seen():
