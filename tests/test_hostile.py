@@ -308,47 +308,37 @@ def test_no_input_is_an_output(compensate, job, which):
 
 BANNED = frozenset(
     [
-        "pickle",
-        "dill",
-        "cloudpickle",
-        "shelve",
-        "marshal",
-        "joblib",
-        "subprocess",
-        "pty",
-        "ctypes",
-        "code",
-        "codeop",
-        "socket",
-        "socketserver",
-        "ssl",
-        "urllib.request",
-        "http",
-        "ftplib",
-        "smtplib",
-        "telnetlib",
-        "xmlrpc",
-        "requests",
-        "asyncio",
-        "webbrowser",
-        "distributed",
-        "dask",
+        *(
+            "pickle",
+            "dill",
+            "cloudpickle",
+            "shelve",
+            "marshal",
+            "joblib",
+            "subprocess",
+            "pty",
+            "ctypes",
+            "code",
+        ),
+        *(
+            "codeop",
+            "socket",
+            "socketserver",
+            "ssl",
+            "urllib.request",
+            "http",
+            "ftplib",
+            "smtplib",
+            "telnetlib",
+        ),
+        *("xmlrpc", "requests", "asyncio", "webbrowser", "distributed", "dask"),
     ]
 )
 CALLS = frozenset(["eval", "exec", "compile", "__import__"])
 ATTRIBUTES = frozenset(
     [
-        "system",
-        "popen",
-        "spawnl",
-        "spawnv",
-        "execv",
-        "execve",
-        "execl",
-        "unsafe_load",
-        "full_load",
-        "load_all",
-        "import_module",
+        *("system", "popen", "spawnl", "spawnv", "execv", "execve", "execl"),
+        *("unsafe_load", "full_load", "load_all", "import_module"),
     ]
 )
 ALLOWED = {("batch/cluster.py", "distributed"), ("__init__.py", "import_module")}
