@@ -187,7 +187,7 @@ def assert_reads_as(
     source = plan.source
     own = plan.role == Role.OWN
     link = plan.role == Role.LINK
-    step = np.where(program.text.scale[source] > 2 * MM, 0.1 * 25.4, 1.0) * 10.0**-writing.mm * MM
+    step = np.full(len(source), 10.0**-writing.mm * MM)
     half = 0.5 * step * (1 + 1e-3) + 1e-9
 
     kind = np.where(link, Kind.LIN, before.kind[source])

@@ -331,10 +331,20 @@ def test_ends_that_others_build_on_are_pinned(text: str, pins: list[int]) -> Non
         ("G1 X5 F100\n", False), ("G1 X5 M8\n", True), ("G1 X5 S1000\n", True), ("G1 X5 E2\n", True),
         ("G43 H1 G1 X5\n", True), ("N10 G17 G90 G1 X5\n", False), ("G93 G1 X5 F2\n", True),
         ("G2 X5 I1 J2 P1\n", False), ("G64 P0.1 G1 X5\n", True), ("G54 G1 X5\n", True),
+        ("T2 G1 X5\n", True),
     ],
 )  # fmt: skip
 def test_blocks_that_say_more_than_the_motion_are_whole(text: str, whole: bool) -> None:
     assert bool(body(text).toolpath.whole) == whole
+
+
+def test_nothing_goes_before_a_block_that_a_jump_leads_to() -> None:
+    text = "IF[#101GT3]GOTO60\nG1 X4 F100\nN60 G1 X6 Y0 Z0\nN70 X7\n"
+    path = body(text, "fanuc").toolpath
+    assert list(path.whole) == [len(path) - 2]
+    text = "GOTOF PAST\nG1 X4 F100\nPAST: G1 X6 Y0 Z0\nX7\n"
+    path = body(text, "sinumerik").toolpath
+    assert list(path.whole) == [len(path) - 2]
 
 
 def test_a_call_leaves_nothing_known_but_the_unit() -> None:

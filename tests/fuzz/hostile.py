@@ -43,5 +43,8 @@ def hostile(size: int) -> dict[str, bytes]:
         "modal codes": b"G90 G91 " * (size // 8),
         "arcs without a radius": b"G2 X1 Y1 I0 J0\n" * (size // 15),
         "program numbers": b"O1\nM98 P1\n" * (size // 10),
+        "names of tools": b'T="' * (size // 3),
+        "open increments": b"X=AC(" * (size // 5),
+        "lines of open increments": b"X=AC(\n" * (size // 6),
         "labels": b"N1 GOTOB N1\n" * (size // 12),
     }

@@ -122,6 +122,9 @@ def line(text: bytes, offset: int) -> Line:
             else:
                 note("unknown", text[found.start() :].strip(), found.start())
             break
+    if words and (text.count(b"[") > text.count(b"]") or text.rstrip().endswith(b"#")):
+        # What is put behind such a line would belong to its expression.
+        note("unknown", text.strip(), 0)
     return Line(words, notes, deleted)
 
 

@@ -75,7 +75,11 @@ def judged(
         "U, V, W: further axes, or steps of a lathe",
     )
     hows = np.stack([given.how(one)[rows] for one in NUMBERS], axis=1)
-    refuse(np.any(hows == How.UNREAD, axis=1), "GCO005", "a word is an expression, a variable or far beyond any machine")
+    refuse(
+        np.any(hows == How.UNREAD, axis=1),
+        "GCO005",
+        "a word is an expression, a variable or far beyond any machine",
+    )
     quiet = np.isin(moves.move, (-1, Move.NOTHING))
     refuse(quiet, "GCO018", "axis words, but no motion code is in force")
     refuse(moves.move == Move.CYCLE, "GCO008", "canned cycle: the motion is hidden in the block")

@@ -51,9 +51,13 @@ def expression_end(text: bytes, at: int) -> int:
 
 
 def is_open(text: bytes) -> bool:
-    """Whether a string or a bracket does not close: what is put behind such a line would belong to it."""
-    rest = _CLOSED.sub(b"", text)
-    return b'"' in rest or any(rest.count(a) > rest.count(b) for a, b in ((b"(", b")"), (b"[", b"]")))
+    """Whether a string, a bracket or a sum does not close: what is put behind such a line would belong to it."""
+    rest = _CLOSED.sub(b"", text).rstrip()
+    return (
+        b'"' in rest
+        or rest.endswith((b"=", b"+", b"-", b"*", b"/"))
+        or any(rest.count(a) > rest.count(b) for a, b in ((b"(", b")"), (b"[", b"]")))
+    )
 
 
 def bracket_end(text: bytes, at: int) -> int:
