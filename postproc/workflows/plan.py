@@ -384,7 +384,7 @@ def _about(request: PlanRequest, planned: Planned, readings: int) -> list[str]:
         for name, place in zip(offer.targets, offer.places / MM, strict=True):
             lines.append(f"reflector {name} about {place[0]:g} {place[1]:g} {place[2]:g} mm on the flange")
     if planned.setups.direction is not None:
-        lines.append("come to each pose with every axis in the sense of its DIR, 1 rising, -1 falling")
+        lines.append("come to each pose with every axis in the sense of its DIR: 1 rises and -1 falls")
     lines += [
         "go through the rows in this order, and measure the first pose once more at the end, where a drift would show",
         "what stands around the arm was not looked at, drive slowly to every pose for the first time",
