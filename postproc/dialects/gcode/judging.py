@@ -175,10 +175,12 @@ def pinned(document: Document, given: Blocks, moves: Motions, way: Course, doubt
     # What bends is bent by where it begins.
     partial |= moves.kind == Kind.CIRC
     reaching = modal.has(Once.HOME, Once.MACHINE)[rows]
-    building = np.flatnonzero((doubts.why >= 0) & partial & ~reaching)
+    refused = doubts.why >= 0
+    building = np.flatnonzero(refused & partial & ~reaching)
     building = building[building > 0]
+    building = building[~refused[building - 1]] - 1
     pins.refuse(
-        _mask(n, building[doubts.why[building - 1] < 0] - 1),
+        _mask(n, np.concatenate([building, _through(moves, way, refused, refused & ~reaching)])),
         "GCO002",
         "the motion behind it builds on this end point and is not corrected",
     )
@@ -197,6 +199,22 @@ def pinned(document: Document, given: Blocks, moves: Motions, way: Course, doubt
         pins.refuse(_mask(n, before) & (doubts.why < 0), "GCO002", message)
     blocks = given.text.blocks
     return pins.done(document, blocks.line[rows], blocks.start[rows], blocks.start[rows])
+
+
+def _through(moves: Motions, way: Course, refused: Bools, building: Bools) -> Ints:
+    """Motions from which ``building`` (N,) ones inherit a coordinate or the orientation through ``refused`` ones."""
+    rows, n = moves.block, len(moves.block)
+    stated = np.asarray(moves.stand.stated | (moves.stand.orient < 0))
+    found = []
+    for says, ends in (
+        *((way.sets[rows, axis], way.lost[rows, axis]) for axis in range(3)),
+        (stated, np.zeros(n, np.bool_)),
+    ):
+        last = np.maximum.accumulate(np.where(~refused | says | ends, np.arange(n), -1))
+        before = np.append(-1, last)[:n]
+        source = before[building & ~says & (before >= 0)]
+        found.append(source[~refused[source]])
+    return np.concatenate(found)
 
 
 def _reading(document: Document, given: Blocks) -> Ints:
