@@ -599,3 +599,14 @@ def test_programs_of_a_folder_read_the_same_on_both_ways() -> None:
     assert paths
     for path in paths:
         same(documents(path))
+
+
+def test_a_folder_that_can_not_be_listed_is_told(tmp_path, monkeypatch):
+    """A .dat that is not seen would be left behind, old, beside a new .src."""
+
+    def fails(_path):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "iterdir", fails)
+    with pytest.raises(Refusal, match="FIL001"):
+        KRL.companions(tmp_path / "part.src")

@@ -8,6 +8,7 @@ from pathlib import Path
 from postproc.dialects.dialect import PLAIN, Moved, Plan, Program, Settings, Writing
 from postproc.dialects.krl import interpreter, writer
 from postproc.document import Document, Edit
+from postproc.findings import Finding, Refusal
 
 _CLAIM = re.compile(
     rb"^(?:\xef\xbb\xbf)?[ \t]*(?:(?:GLOBAL[ \t]+)?DEF[ \t]+[A-Za-z_$][A-Za-z0-9_$]*[ \t]*(?:\(|;|\r?$)"
@@ -28,8 +29,9 @@ class KrlDialect:
         wanted = (path.stem.lower(), ".dat")
         try:
             beside = sorted(path.parent.iterdir())
-        except OSError:
-            return []
+        except OSError as error:
+            message = f"its folder can not be listed ({error.strerror}), and a .dat may belong to it"
+            raise Refusal(Finding("FIL001", message, str(path))) from None
         matches = [p for p in beside if (p.stem.lower(), p.suffix.lower()) == wanted and p.is_file()]
         # Where several differ by case only, the one spelt as the program is.
         return sorted(matches, key=lambda p: p.stem != path.stem)[:1]
