@@ -64,6 +64,22 @@ def test_numbers_beyond_any_machine_are_none(text: str) -> None:
     assert len(LINUXCNC.moved(program, Plan.of(path), WRITING).edits) == 0
 
 
+def test_a_coordinate_is_inherited_through_what_is_not_corrected() -> None:
+    for text, pins in (
+        ("G1 X1 Y1 Z1 F9\nG28 X0 Y0\nG1 X2 Y#1\n", [1]),
+        ("G1 X1 Y1 Z1 F9\nG28 Z0\nG1 X2 Y#1 Z#1\n", []),
+        ("G1 X1 Y1 Z1 F9\nG1 X#1 Y2\nG1 X3 Y#1\n", [1]),
+    ):
+        assert list(read(LINUXCNC, HEAD + text).toolpath.pinned) == pins, text
+
+
+def test_an_arc_without_an_end_has_no_way() -> None:
+    path = read(LINUXCNC, HEAD + "G2 X2 I1 F9\nM2\nG2 I3\n").toolpath
+    assert np.isnan(path.position[-1]).all()
+    assert np.isnan(path.sweep[-1])
+    assert np.isnan(path.centre[-1]).all()
+
+
 def test_far_frames_are_not_known() -> None:
     path = read(KUKA, ROBOT + "#CS DEF[1][0,1e20,0,0,0,0]\n#CS ON[1]\nG1 X0 Y0 Z0 A0 B0 C180\n").toolpath
     assert 0 in path.refused
