@@ -29,6 +29,8 @@ class KrlDialect:
         wanted = (path.stem.lower(), ".dat")
         try:
             beside = sorted(path.parent.iterdir())
+        except FileNotFoundError:
+            return []
         except OSError as error:
             message = f"its folder can not be listed ({error.strerror}), and a .dat may belong to it"
             raise Refusal(Finding("FIL001", message, str(path))) from None
