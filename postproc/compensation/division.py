@@ -398,7 +398,6 @@ def made(task: Task, division: Division) -> Pieces:
     )
     first = np.zeros(m)
     first[inner] = division.share[inner - 1]
-    first[division.links] = 0.0
     return Pieces(
         source,
         first,
