@@ -470,3 +470,10 @@ def test_which_blocks_are_motions(text: str, motions: int) -> None:
 def test_what_rapids_are() -> None:
     kinds = body("G1 X1\nG0 X2\nG2 X3 I.5\nG81 Z-1 R1\n").toolpath.kind
     assert [Kind(kind).name for kind in kinds] == ["PTP", "LIN", "PTP", "CIRC", "OTHER"]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("number", ["9" * 400, "99999999999999999999", "-3", ""])
+def test_an_offset_that_no_control_has_is_not_known(number: str) -> None:
+    program = read(f"G21 G90 G17 T1 M6\nG54.1 P{number}\nG0 X0. Y0. Z0.\nG1 X1. F100\n", "fanuc")
+    assert set(codes(program)) >= {1}

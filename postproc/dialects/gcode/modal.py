@@ -42,6 +42,9 @@ _ARGUMENTS = np.array(
 """M codes of printers whose X, Y, Z are settings."""
 _FORGOTTEN = (Group.MOTION, Group.PLANE, Group.DISTANCE, Group.ARCS, Group.FEED, Group.OFFSET)
 """What other code leaves in another state; that it leaves units or a tool radius in another one is not assumed."""
+_FARTHEST_OFFSET = 1e6
+"""No control numbers its offsets so far."""
+
 _START = {Group.MOTION: UNKNOWN, Group.OFFSET: 1, Group.PATH: 1}
 
 
@@ -102,7 +105,7 @@ def modal(text: Text, control: Control) -> Modal:
     if numbered.any():
         entry = last_of(words, key("P"), n)[blocks]
         given = words.value[np.maximum(entry, 0)]
-        fine = (entry >= 0) & np.isfinite(given)
+        fine = (entry >= 0) & (given >= 0) & (given < _FARTHEST_OFFSET)
         values = np.where(numbered, np.where(fine, 100 + np.where(fine, given, 0), UNKNOWN), values).astype(
             np.int64
         )
