@@ -133,11 +133,11 @@ def split_comment(line: bytes) -> tuple[bytes, bytes]:
 
 def identifiers(code: bytes) -> set[bytes]:
     """Every name that a piece of code mentions, upper case; enumeration words (#X) and strings are none."""
-    return {name.upper() for name in _IDENTIFIER.findall(without_strings(code))}
+    return {name.upper() for name in _IDENTIFIER.findall(without_strings(code))} if code else set()
 
 
 def without_strings(code: bytes) -> bytes:
-    return _STRING.sub(b"", code)
+    return _STRING.sub(b"", code) if b'"' in code else code
 
 
 def number(literal: bytes) -> float | None:
