@@ -39,6 +39,7 @@ ROOMS = {
     "tables": 1,
     "publish": 1,
     "files": 1,
+    "blocks": 0,
     "findings": 0,
     "units": 0,
     "arrays": 0,

@@ -15,6 +15,7 @@ from multiprocessing.process import BaseProcess
 from types import FrameType
 
 from postproc.batch.work import Task, failed, work
+from postproc.blocks import THREADS, cores
 from postproc.findings import Finding
 from postproc.report.batched import Outcome
 
@@ -30,11 +31,6 @@ Stages = Callable[[int, str], None]
 _SPAWN = multiprocessing.get_context("spawn")
 
 
-def cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def run_here(
     tasks: Sequence[Task], workers: int, stages: Stages
 ) -> Generator[tuple[int, Outcome], None, None]:
@@ -44,6 +40,7 @@ def run_here(
     """
     for name in SERIAL:
         os.environ.setdefault(name, "1")
+    os.environ.setdefault(THREADS, str(max(1, cores() // max(1, min(workers, len(tasks))))))
     waiting = deque(sorted(range(len(tasks)), key=lambda number: (-_size(tasks[number]), number)))
     attempts = [0] * len(tasks)
     pool = [_Worker() for _ in range(min(workers, len(tasks)))]

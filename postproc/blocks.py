@@ -1,0 +1,72 @@
+"""Many rows, block by block: arrays of a block stay in the cache, and the blocks go to all cores.
+
+numpy lets other threads run while it computes.  Blocks are cut by number of rows alone, so a result does not depend on
+how many threads there are.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+T = TypeVar("T")
+
+ROWS = 1 << 13
+"""Rows of a block."""
+
+THREADS = "POSTPROC_THREADS"
+"""Environment variable: threads at most; all cores without it."""
+
+MOST = 8
+"""Threads at most: what is not numpy's runs in one of them at a time."""
+
+_inside = threading.local()
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def threads() -> int:
+    """Threads that work on blocks."""
+    word = os.environ.get(THREADS, "")
+    return min(MOST, int(word) if word.isdecimal() and int(word) else cores())
+
+
+def blocks(count: int, rows: int = ROWS) -> list[slice]:
+    """The blocks of ``count`` rows."""
+    return [slice(begin, min(begin + rows, count)) for begin in range(0, count, rows)]
+
+
+def in_blocks(work: Callable[[slice], T], count: int, rows: int = ROWS) -> Iterator[T]:
+    """``work`` of every block of ``count`` rows, in their order.
+
+    Few blocks are ahead of the one that is asked for.  Inside of another block all is done where it is asked for.
+    What ``work`` raises is raised here; blocks that have not begun are then given up.
+    """
+    parts, workers = blocks(count, rows), threads()
+    if len(parts) < 2 or workers < 2 or getattr(_inside, "block", False):
+        yield from map(work, parts)
+        return
+
+    def within(part: slice) -> T:
+        _inside.block = True
+        return work(part)
+
+    with ThreadPoolExecutor(workers, "block") as pool:
+        ahead: deque[Future[T]] = deque()
+        try:
+            for part in parts:
+                ahead.append(pool.submit(within, part))
+                if len(ahead) > workers:
+                    yield ahead.popleft().result()
+            while ahead:
+                yield ahead.popleft().result()
+        finally:
+            for future in ahead:
+                future.cancel()
