@@ -15,6 +15,7 @@ import yaml
 from yaml.composer import Composer
 from yaml.resolver import Resolver
 
+from postproc.files import read_file
 from postproc.findings import Finding, Refusal, nearest
 
 MAX_BYTES = 4_000_000
@@ -207,11 +208,7 @@ def load(path: Path) -> Section:
 
 def read(path: Path) -> bytes:
     """The bytes of a YAML file.  Raises Refusal FIL001 where they can not be read."""
-    try:
-        with path.open("rb") as stream:
-            return stream.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
+    return read_file(path, MAX_BYTES)
 
 
 def parsed(raw: bytes, path: Path) -> Section:

@@ -39,6 +39,7 @@ ROOMS = {
     "tables": 1,
     "publish": 1,
     "files": 1,
+    "inputs": 1,
     "blocks": 0,
     "findings": 0,
     "units": 0,
@@ -55,6 +56,8 @@ ONE_FLOOR = {
     ("measurements", "tables"),
     ("measurements", "geometry"),
     ("tables", "files"),
+    ("yamlfile", "files"),
+    ("files", "inputs"),
 }
 """Neighbours on one floor, from -> to."""
 

@@ -10,6 +10,7 @@ from statistics import NormalDist
 import numpy as np
 
 from postproc.arrays import Floats, Ints, frozen
+from postproc.files import read_file
 from postproc.findings import Finding, Refusal, nearest
 from postproc.geometry import Poses
 from postproc.robot.geometries import Axis, Geometry, Joint, KukaVariant, SerialArm
@@ -212,7 +213,7 @@ def robot_of(raw: bytes, path: Path) -> Robot:
     limits = [(axis.lower, axis.upper) for axis in axes]
     digest = hashlib.sha256(raw)
     for other in others:
-        digest.update(other.read_bytes())
+        digest.update(read_file(other))
     return Robot(
         name=top.text("name"),
         maker_name=top.text("maker_name", ""),

@@ -16,6 +16,7 @@ from xml.parsers import expat
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.files import read_file
 from postproc.findings import Finding, Refusal, nearest
 from postproc.geometry import Poses, rotation_from_abc
 from postproc.robot.geometries import Link, frame_with_z
@@ -106,11 +107,7 @@ def _merged(path: Path, way: list[_Joint]) -> Arm:
 
 def _parse(path: Path) -> tuple[list[_Joint], dict[str, int]]:
     """All joints, and the lines of all links."""
-    try:
-        with path.open("rb") as stream:
-            raw = stream.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise Refusal(Finding("FIL001", f"can not be read: {error.strerror}", str(path))) from None
+    raw = read_file(path, MAX_BYTES)
     if len(raw) > MAX_BYTES:
         raise _wrong(path, 0, f"larger than {MAX_BYTES} bytes")
     joints: list[_Joint] = []

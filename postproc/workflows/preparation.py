@@ -18,6 +18,7 @@ from postproc.effects import Conditions
 from postproc.files import MAX_LINE, read_file
 from postproc.findings import Finding, Refusal, nearest
 from postproc.forces import Wrenches, is_no_force, wrenches
+from postproc.inputs import Inputs, noted
 from postproc.model import StiffnessModel, approach
 from postproc.robot.description import Robot, find_robot, load_robot
 from postproc.robot.geometries import SerialArm
@@ -64,6 +65,7 @@ class Prepared:
     wrenches: Wrenches
     task: Task
     findings: tuple[Finding, ...]
+    inputs: Inputs
 
 
 def silent(_stage: str) -> None:
@@ -133,6 +135,11 @@ def read_document(path: Path) -> Document:
 
 def prepare(request: Request) -> Prepared:
     """Read program, cell and robot, and find force and axes of every motion."""
+    with noted() as inputs:
+        return _prepared(request, inputs)
+
+
+def _prepared(request: Request, inputs: Inputs) -> Prepared:
     if not request.program.is_file():
         read_document(request.program)  # tells why
     cell = _cell(request)
@@ -188,7 +195,7 @@ def prepare(request: Request) -> Prepared:
         )
     if not isinstance(robot.nominal, SerialArm):
         findings += _disagreeing(request.program, path, track)
-    return Prepared(program, dialect, settings, cell, robot, model, force, task, tuple(findings))
+    return Prepared(program, dialect, settings, cell, robot, model, force, task, tuple(findings), inputs)
 
 
 def _disagreeing(program: Path, path: Toolpath, track: Track) -> list[Finding]:

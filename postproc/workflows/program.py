@@ -28,7 +28,7 @@ from postproc.report.page_data import page_data
 from postproc.report.report import Link, Report, Spread, Worst, exit_code, in_order_of_place, json_bytes
 from postproc.toolpath import Plan, Role
 from postproc.units import DEG, MM
-from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, read_document, silent
+from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, silent
 from postproc.writing import Written, planned, write, written_as
 
 WORST_PLACES = 5
@@ -50,10 +50,11 @@ def predict(request: Request, stage: Stage = silent) -> Report:
         shown = request.report / f"{request.program.stem}.prediction.html"
     names = [*files, *pages, *([shown] if shown else [])]
     report = replace(report, outputs=tuple(str(path) for path in names))
-    _not_over_inputs(request, ready, report.outputs)
+    _not_over_inputs(ready, report.outputs)
     if shown:
         links = beside(shown, {"deflections (CSV)": names[0], "result (JSON)": pages[-1]})
         files[shown] = program_page(page_data(ready.task, result, report, ready.program.documents), links)
+    ready.inputs.refuse_changed()
     publish({**files, **dict.fromkeys(pages, json_bytes(report))})
     return report
 
@@ -109,7 +110,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     if report.exit == 1:
         raise Refusal(*report.findings)
     report = replace(report, outputs=tuple(str(path) for path in (*paths, *names)))
-    _not_over_inputs(request, ready, report.outputs)
+    _not_over_inputs(ready, report.outputs)
     if request.dry_run:
         return replace(report, outputs=())
     diff = b"".join(
@@ -135,9 +136,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         ),
         **dict.fromkeys(names[4:], json_bytes(report)),
     }
-    for document in program.documents:
-        if read_document(document.path).digest != document.digest:
-            raise Refusal(Finding("FIL010", "the file changed while it was read", str(document.path)))
+    ready.inputs.refuse_changed()
     publish(files, last=target)
     return report
 
@@ -238,16 +237,11 @@ def _output_paths(program: Program, target: Path) -> list[Path]:
     return [target, *(target.with_name(target.stem + p.suffix if renamed else p.name) for p in companions)]
 
 
-def _not_over_inputs(request: Request, ready: Prepared, outputs: Sequence[str]) -> None:
+def _not_over_inputs(ready: Prepared, outputs: Sequence[str]) -> None:
     cell = ready.cell
-    inputs = {document.path.resolve() for document in (*ready.program.documents, *ready.settings.references)}
-    inputs |= {cell.path.resolve(), ready.robot.path.resolve()}
-    # a force may be a file or be said in numbers, which name none
-    inputs |= {Path(request.force or "").resolve()}
-    inputs |= {(cell.path.parent / (said or "")).resolve() for said in (cell.force, cell.process)}
-    for output in outputs:
-        if Path(output).resolve() in inputs:
-            raise Refusal(Finding("FIL007", "this output is an input of the same run", output))
+    # a force may be a file, read in this run or not, or be said in numbers, which name none
+    named = (cell.path.parent / said for said in (cell.force, cell.process) if said)
+    ready.inputs.refuse_outputs(map(Path, outputs), named)
     if len({Path(output).resolve() for output in outputs}) < len(outputs):
         raise Refusal(Finding("FIL007", "two outputs have one name", outputs[0]))
 

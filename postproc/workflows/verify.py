@@ -54,6 +54,9 @@ def verify(request: Request, compensated: Path, step: float = STEP, stage: Stage
         told,
         exit_code(told, request.strict),
     )
+    for inputs in (ready.inputs, other.inputs):
+        inputs.refuse_outputs([] if request.json is None else [request.json])
+        inputs.refuse_changed()
     if request.json is not None:
         publish({request.json: json_bytes(done)})
     return done

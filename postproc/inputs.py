@@ -1,0 +1,82 @@
+"""The files that a run has read: what was in each of them, and whether it still is.
+
+Whatever reads a file does so by ``files.read_file``, and that notes it here: no list of inputs is kept by hand, which
+would forget the file that a later version reads.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+from collections.abc import Iterable, Iterator
+from contextvars import ContextVar
+from pathlib import Path
+
+from postproc.findings import Finding, Refusal
+
+_noting: ContextVar[Inputs | None] = ContextVar("noting", default=None)
+
+
+class Inputs:
+    """``digests``: path, as it was named -> SHA-256 of what was read of it."""
+
+    def __init__(self) -> None:
+        self.digests: dict[Path, str] = {}
+
+    def refuse_changed(self) -> None:
+        """Refusal FIL010 for every file that no longer holds what was read, FIL001 for those that are gone."""
+        findings = []
+        for path, digest in self.digests.items():
+            try:
+                # by its bytes: its time may have been set back
+                same = path.is_file() and _digest_of(path) == digest
+                if not same:
+                    path.stat()
+            except OSError as error:
+                findings.append(Finding("FIL001", f"can not be read any more: {error.strerror}", str(path)))
+            else:
+                if not same:
+                    findings.append(_changed(path))
+        if findings:
+            raise Refusal(*findings)
+
+    def refuse_outputs(self, outputs: Iterable[Path], named: Iterable[Path] = ()) -> None:
+        """Refusal FIL007 for every output that is one of these files, or of those that are ``named`` and not read."""
+        inputs = {path.resolve() for path in (*self.digests, *named)}
+        findings = [
+            Finding("FIL007", "this output is an input of the same run", str(path))
+            for path in outputs
+            if path.resolve() in inputs
+        ]
+        if findings:
+            raise Refusal(*findings)
+
+
+@contextlib.contextmanager
+def noted() -> Iterator[Inputs]:
+    """Notes every file that is read inside of the ``with``, in this thread."""
+    inputs = Inputs()
+    before = _noting.set(inputs)
+    try:
+        yield inputs
+    finally:
+        _noting.reset(before)
+
+
+def note(path: Path, raw: bytes) -> None:
+    """``raw`` was read of ``path``.  Refusal FIL010 where an earlier reading gave something else."""
+    inputs = _noting.get()
+    if inputs is None:
+        return
+    digest = hashlib.sha256(raw).hexdigest()
+    if inputs.digests.setdefault(path, digest) != digest:
+        raise Refusal(_changed(path))
+
+
+def _digest_of(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _changed(path: Path) -> Finding:
+    return Finding("FIL010", "the file changed while it was read", str(path))
