@@ -1,114 +1,98 @@
 """Whole runs of the main job: ``python -m tests.benchmarks.program`` prints a table of time and memory by size.
 
 Each run is a process of its own, with start-up, reading back and all reports; the programs are a waving path over a
-part with a force for each motion, in KRL and, with one arc in five motions, in G-code.
+part with a force for each motion, in KRL and, with one arc in five motions, in G-code.  The exponent is that of the
+growth of processor time with the number of motions, from the size before and fitted over all from 10,000 on.
 """
 
 from __future__ import annotations
 
 import argparse
-import os
-import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
+from statistics import median
 
 import numpy as np
 
-CELL = """\
-robot: kuka_kr270
-tools:
-  1: {x: 120, y: 0, z: 250, a: 0, b: 30, c: 0, axis: +z}
-bases:
-  1: {x: 1500, y: -200, z: 600, a: 0, b: 0, c: 0}
-start: [0, -90, 90, 0, 45, 0]
-orientation: {a: 0, b: 0, c: 180}
-"""
+from tests.benchmarks.machine import heading
+from tests.benchmarks.parts import MAKERS, made_apart
+from tests.benchmarks.processes import Cost, compensation, cost_of
+
+SIZES = "1000,10000,100000"
+FITTED_FROM = 10_000
+EXPONENT = 1.05
+"""Goal of the growth."""
+
+WALL = {1_000_000: 20.0, 100_000: 3.0}
+"""[s] Goals by the clock for whole runs, by size."""
+
+MEMORY = {1_000_000: 1000.0}
+"""[MB] Goals."""
+
+SMALL, SMALL_WALL = 2000, 1.0
+HELP_WALL = 0.3
+TIMES = 5
 
 
-def path(count: int) -> np.ndarray:
-    """(count, 3) [mm]: a wave that moves on, some 6 mm between points."""
-    t = np.linspace(0, count / 50, count)
-    return np.stack(
-        [400 + 300 * np.cos(0.11 * t), 400 + 350 * np.sin(0.017 * t), np.full(count, -2.0)], axis=1
-    )
+def rows(language: str, sizes: list[int]) -> list[tuple[int, Cost]]:
+    """The cost of a run of each size, printed as it is known."""
+    found: list[tuple[int, Cost]] = []
+    for count in sizes:
+        with tempfile.TemporaryDirectory() as name:
+            cost = compensation(made_apart(Path(name), language, count))
+        growth = ""
+        if found:
+            before, less = found[-1]
+            growth = f"{np.log(cost.cpu / less.cpu) / np.log(count / before):9.2f}"
+        wanted = [f"{WALL[count]:g} s"] if count in WALL else []
+        wanted += [f"{MEMORY[count]:g} MB"] if count in MEMORY else []
+        print(
+            f"{language:6} {count:9d} {cost.wall:8.2f} {cost.cpu:8.2f} {1e6 * cost.cpu / count:12.1f}"
+            f" {cost.memory:6.0f} {growth:9}  {', '.join(wanted)}".rstrip(),
+            flush=True,
+        )
+        found.append((count, cost))
+    return found
 
 
-def forces(folder: Path, name: str, lines: np.ndarray) -> None:
-    """A force for each of the lines."""
-    table = np.column_stack([lines, -100 - 50 * np.cos(0.0022 * lines), 120 + 0.0 * lines, 60 + 0.0 * lines])
-    np.savetxt(folder / f"{name}.force.csv", table, "%d,%.2f,%.2f,%.2f", header="line,fx,fy,fz", comments="")
+def fitted(found: list[tuple[int, Cost]]) -> float | None:
+    """The exponent of processor time from ``FITTED_FROM`` motions on; None of fewer than two sizes."""
+    seen = [(count, cost.cpu) for count, cost in found if count >= FITTED_FROM]
+    if len(seen) < 2:
+        return None
+    return float(np.polyfit(*np.log(np.array(seen)).T, 1)[0])
 
 
-def krl(folder: Path, count: int) -> Path:
-    points = path(count)
-    x, y, _ = points[0].tolist()
-    head = [
-        "DEF big()",
-        "BAS(#INITMOV,0)",
-        "$BASE=BASE_DATA[1]",
-        "$TOOL=TOOL_DATA[1]",
-        "PTP {A1 0,A2 -90,A3 110,A4 0,A5 40,A6 0}",
-        "$VEL.CP=0.05",
-        f"LIN {{X {x:.3f},Y {y:.3f},Z 50.000,A 0.000,B 0.000,C 180.000}}",
-    ]
-    body = [
-        f"LIN {{X {x:.3f},Y {y:.3f},Z {z:.3f},A 0.000,B 0.000,C 180.000}} C_DIS"
-        for x, y, z in points.tolist()
-    ]
-    (folder / "big.src").write_text("\r\n".join([*head, *body, "LIN {Z 50.000}", "END", ""]))
-    forces(folder, "big", np.arange(count) + len(head) + 1)
-    return folder / "big.src"
-
-
-def gcode(folder: Path, count: int) -> Path:
-    points = path(count)
-    x, y, _ = points[0].tolist()
-    head = ["G21 G90 G17 G54", "T1 M6", f"G0 X{x:.3f} Y{y:.3f} Z50."]
-    body = [f"G1 X{x:.3f} Y{y:.3f} Z{z:.3f} F3000" for x, y, z in points.tolist()]
-    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    for i in range(4, count, 5):  # a flat arc of the same chord
-        x, y, z = points[i].tolist()
-        body[i] = f"G3 X{x:.3f} Y{y:.3f} Z{z:.3f} R{max(5 * step[i - 1], 10.0):.3f}"
-    (folder / "big.ngc").write_text("\n".join([*head, *body, "G0 Z50.", "M30", ""]))
-    forces(folder, "big", np.arange(count) + len(head) + 1)
-    return folder / "big.ngc"
-
-
-MAKERS: dict[str, Callable[[Path, int], Path]] = {"krl": krl, "gcode": gcode}
-
-
-def run(maker: Callable[[Path, int], Path], count: int) -> tuple[float, float, float]:
-    """Wall and processor time [s], and the largest memory [MB] of one run."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        (folder / "cell.yaml").write_text(CELL)
-        program = maker(folder, count)
-        begin = time.perf_counter()
-        process = subprocess.Popen([sys.executable, "-m", "postproc", str(program), "--force", "-q"])
-        _, status, usage = os.wait4(process.pid, 0)
-        wall = time.perf_counter() - begin
-        if os.waitstatus_to_exitcode(status) not in (0, 3):
-            raise SystemExit(f"{program.name} with {count} motions failed")
-        return wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+def walls(work: Callable[[], Cost]) -> float:
+    """[s] by the clock, the median of some."""
+    return median(work().wall for _ in range(TIMES))
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sizes", default="1000,10000,100000", help="motions, between commas")
-    sizes = [int(word) for word in parser.parse_args().sizes.split(",")]
-    print(f"{'':6} {'motions':>9} {'wall s':>8} {'cpu s':>8} {'us a motion':>12} {'MB':>6} {'exponent':>9}")
-    for language, maker in MAKERS.items():
-        before: tuple[int, float] | None = None
-        for count in sizes:
-            wall, cpu, memory = run(maker, count)
-            growth = "" if before is None else f"{np.log(cpu / before[1]) / np.log(count / before[0]):9.2f}"
+    parser.add_argument("--sizes", default=SIZES, help="motions, between commas [%(default)s]")
+    parser.add_argument("--languages", default=",".join(MAKERS), help="[%(default)s]")
+    asked = parser.parse_args()
+    sizes = sorted(int(word) for word in asked.sizes.split(","))
+    print(heading())
+    print(
+        f"{'':6} {'motions':>9} {'wall s':>8} {'cpu s':>8} {'us a motion':>12} {'MB':>6} {'exponent':>9}  wanted"
+    )
+    growths = {language: fitted(rows(language, sizes)) for language in asked.languages.split(",")}
+    for language, growth in growths.items():
+        if growth is not None:
             print(
-                f"{language:6} {count:9d} {wall:8.2f} {cpu:8.2f} {1e6 * cpu / count:12.1f} {memory:6.0f} {growth}"
+                f"{f'{language}, exponent from {max(FITTED_FROM, sizes[0])} to {sizes[-1]}':48} {growth:7.2f}"
+                f"    {EXPONENT:g}"
             )
-            before = (count, cpu)
+    with tempfile.TemporaryDirectory() as name:
+        small = made_apart(Path(name), "krl", SMALL)
+        seconds = walls(lambda: compensation(small))
+    print(f"{f'krl, {SMALL} motions, wall, median of {TIMES}':48} {seconds:7.2f} s  {SMALL_WALL:g} s")
+    seconds = walls(lambda: cost_of([sys.executable, "-m", "postproc", "--help"]))
+    print(f"{f'--help, wall, median of {TIMES}':48} {seconds:7.2f} s  {HELP_WALL:g} s")
 
 
 if __name__ == "__main__":

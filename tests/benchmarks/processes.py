@@ -1,0 +1,36 @@
+"""One process: how long it took, by the clock and by the processor, and its largest memory."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+
+class Cost(NamedTuple):
+    """Wall and processor time (user and system) [s], largest memory [MB]."""
+
+    wall: float
+    cpu: float
+    memory: float
+
+
+def cost_of(words: Sequence[object], good: Sequence[int] = (0,)) -> Cost:
+    """Run ``words``; raises SystemExit where it does not end with a code in ``good``."""
+    begin = time.perf_counter()
+    process = subprocess.Popen([str(word) for word in words], stdout=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    wall = time.perf_counter() - begin
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode not in good:
+        raise SystemExit(f"{' '.join(map(str, words))} ended with {process.returncode}")
+    return Cost(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024 / 1e6)
+
+
+def compensation(program: Path) -> Cost:
+    """The main job as a user starts it: all reports, and what was written is read back."""
+    return cost_of([sys.executable, "-m", "postproc", program, "--force", "-q"], (0, 3))

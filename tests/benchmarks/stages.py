@@ -1,0 +1,165 @@
+"""What share of a whole run each stage has: ``python -m tests.benchmarks.stages`` prints a table.
+
+The run is the command's own, in this process, with reading back and all reports.  Every few milliseconds of processor
+time its stack is looked at: the time since the last look, of all threads, goes to the stage of the innermost function
+that has one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+from types import FrameType
+
+from tests.benchmarks.machine import heading
+from tests.benchmarks.parts import MAKERS, made_apart
+
+EVERY = 0.002
+"""[s] of processor time between two looks."""
+
+HOT = 12
+"""Functions in the second table."""
+
+ORDER = (
+    "start-up",
+    "read",
+    "frames",
+    "forces",
+    "inverse kinematics",
+    "equilibrium",
+    "mirror",
+    "between",
+    "write",
+    "read back",
+    "reports",
+    "files",
+    "else",
+)
+
+FUNCTIONS = {("writing.py", "planned"): "write", ("document.py", "apply"): "write"}
+"""The stage of functions whose file has another one, or none."""
+
+FILES = {
+    "dialects/": "read",
+    "document.py": "read",
+    "files.py": "read",
+    "cell.py": "frames",
+    "workflows/preparation.py": "frames",
+    "forces/": "forces",
+    "robot/inverse.py": "inverse kinematics",
+    "robot/newton.py": "inverse kinematics",
+    "robot/track.py": "inverse kinematics",
+    "robot/chain.py": "equilibrium",
+    "effects/": "equilibrium",
+    "model.py": "equilibrium",
+    "compensation/between.py": "between",
+    "compensation/division.py": "between",
+    "compensation/ways.py": "between",
+    "compensation/limits.py": "between",
+    "compensation/": "mirror",
+    "writing.py": "read back",
+    "report/": "reports",
+    "workflows/program.py": "reports",
+    "publish.py": "files",
+}
+"""The stage of a file or folder of the package; the first that fits."""
+
+
+class Looks:
+    """Processor time [s] by stage and by function, and the memory [MB] seen in each stage."""
+
+    def __init__(self, package: Path) -> None:
+        self.package = f"{package}{os.sep}"
+        self.stages: Counter[str] = Counter()
+        self.functions: Counter[str] = Counter()
+        self.memory: Counter[str] = Counter()
+        self.last = 0.0
+
+    def look(self, _signal: int, frame: FrameType | None) -> None:
+        now = time.process_time()
+        stage, function = self.place(frame)
+        self.stages[stage] += now - self.last
+        self.functions[function] += now - self.last
+        self.memory[stage] = max(self.memory[stage], resident())
+        self.last = now
+
+    def place(self, frame: FrameType | None) -> tuple[str, str]:
+        """The stage, and the innermost function of the package."""
+        stage, function, stack = "", "", []
+        while frame is not None:
+            code = frame.f_code
+            if code.co_filename.startswith("<frozen importlib"):
+                return "start-up", "imports"
+            if code.co_filename.startswith(self.package):
+                file = code.co_filename.removeprefix(self.package)
+                stack.append((file, code.co_name))
+                function = function or f"{file} {code.co_qualname}"
+                stage = stage or stage_of(file, code.co_name)
+            frame = frame.f_back
+        if stage == "read" and any(name == "moved" for _, name in stack):
+            stage = "write"
+        elif stage == "read" and any(file == "writing.py" for file, _ in stack):
+            stage = "read back"
+        return stage or "else", function or "else"
+
+
+def stage_of(file: str, function: str) -> str:
+    own = FUNCTIONS.get((file, function))
+    return own or next((stage for name, stage in FILES.items() if file.startswith(name)), "")
+
+
+def resident() -> float:
+    """[MB] memory of this process now."""
+    with open("/proc/self/statm") as stream:
+        return int(stream.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def looked_at(program: Path) -> Looks:
+    import postproc
+    from postproc.cli.main import run
+
+    looks = Looks(Path(postproc.__file__).parent)
+    signal.signal(signal.SIGPROF, looks.look)
+    signal.setitimer(signal.ITIMER_PROF, EVERY, EVERY)
+    try:
+        run([str(program), "--force", "-q"])
+    except SystemExit as end:
+        if end.code not in (0, 3, None):
+            raise
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        looks.look(0, None)
+    return looks
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--size", type=int, default=100_000, help="motions [%(default)s]")
+    parser.add_argument("--language", choices=MAKERS, default="krl")
+    asked = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        program = made_apart(Path(name), asked.language, asked.size)
+        begin = time.perf_counter()
+        looks = looked_at(program)
+        wall = time.perf_counter() - begin
+    total = sum(looks.stages.values())
+    print(f"{heading()}\n{asked.size} motions, {asked.language}: {wall:.2f} s, processor {total:.2f} s")
+    print(f"\n{'stage':20} {'cpu s':>7} {'share':>7} {'us a motion':>12} {'MB':>6}")
+    for stage in ORDER:
+        if looks.stages[stage]:
+            line = (looks.stages[stage], 100 * looks.stages[stage] / total)
+            motion = 1e6 * looks.stages[stage] / asked.size
+            print(f"{stage:20} {line[0]:7.2f} {line[1]:5.1f} % {motion:12.2f} {looks.memory[stage]:6.0f}")
+    print(f"\n{'function':60} {'cpu s':>7} {'share':>7}")
+    for function, seconds in looks.functions.most_common(HOT):
+        print(f"{function:60} {seconds:7.2f} {100 * seconds / total:5.1f} %")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
