@@ -8,6 +8,7 @@ edits are held as arrays, and spliced and taken out again in blocks.
 from __future__ import annotations
 
 import hashlib
+import io
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -20,8 +21,10 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Ints
 
-BLOCK = 1 << 22
-"""Bytes that are spliced, or compared, at a time."""
+_LF = 10
+
+BLOCK = 1 << 20
+"""Bytes that are spliced, compared, or searched at a time."""
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -49,15 +52,14 @@ class Document:
     raw: bytes
 
     @cached_property
-    def line_starts(self) -> list[int]:
+    def line_starts(self) -> NDArray[np.signedinteger]:
         """Offset of the first byte of every line (the byte after each LF; CRLF and LF alike)."""
-        starts = [0]
-        find = self.raw.find
-        at = find(b"\n")
-        while at >= 0:
-            starts.append(at + 1)
-            at = find(b"\n", at + 1)
-        return starts
+        letters, kind = np.frombuffer(self.raw, np.uint8), offset_type(len(self.raw))
+        parts = [np.zeros(1, kind)]
+        for at in range(0, len(letters), BLOCK):
+            found = np.flatnonzero(letters[at : at + BLOCK] == _LF)
+            parts.append((found + (at + 1)).astype(kind))
+        return np.concatenate(parts)
 
     @cached_property
     def newline(self) -> bytes:
@@ -73,7 +75,7 @@ class Document:
     def place(self, offset: int) -> tuple[int, int]:
         """Line and column, both from 1, of a byte."""
         line = bisect_right(self.line_starts, offset)
-        return line, offset - self.line_starts[line - 1] + 1
+        return line, offset - int(self.line_starts[line - 1]) + 1
 
     def line(self, number: int) -> bytes:
         """The bytes of a line (from 1) without its ending."""
@@ -85,7 +87,8 @@ class Document:
 class Edits(Sequence[Edit]):
     """K edits in order of place, as arrays; as a sequence it gives them as ``Edit``, which is slow for millions.
 
-    file, start, stop (K,): the spans; ends (K + 1,): text k is ``texts[ends[k]:ends[k + 1]]``.
+    file, start, stop (K,): the spans; ends (K + 1,): text k is ``texts[ends[k]:ends[k + 1]]``; offsets are of 32 bits
+    where they fit.
     """
 
     def __init__(
@@ -97,35 +100,53 @@ class Edits(Sequence[Edit]):
         ends: NDArray[Any],
     ) -> None:
         """Takes the edits in any order; those of one place (file, start, stop) stay in the order given."""
-        self.file, self.start, self.stop, self.texts, self.ends = file, start, stop, texts, ends
-        same = file[1:] == file[:-1]
-        later = (start[1:] > start[:-1]) | ((start[1:] == start[:-1]) & (stop[1:] >= stop[:-1]))
-        if not ((same & later) | (file[1:] > file[:-1])).all():
-            order = np.lexsort((stop, start, file))
-            lengths = np.diff(ends)[order]
-            self.file, self.start, self.stop = file[order], start[order], stop[order]
-            self.texts = gathered(texts, ends[:-1][order], lengths)
-            self.ends = sums(lengths)
+        self.file, self.start, self.stop = file.astype(np.int8, copy=False), _narrow(start), _narrow(stop)
+        self.texts, self.ends = texts, _narrow(ends)
+        if not self._ordered():
+            order = np.lexsort((self.stop, self.start, self.file))
+            self.file, self.start, self.stop = self.file[order], self.start[order], self.stop[order]
+            self.texts, self.ends = _rearranged(texts, self.ends, order)
+
+    def _ordered(self) -> bool:
+        """Whether the edits stand in order of place."""
+        file, start, stop = self.file, self.start, self.stop
+        later = stop[1:] >= stop[:-1]
+        later &= start[1:] == start[:-1]
+        later |= start[1:] > start[:-1]
+        later &= file[1:] == file[:-1]
+        later |= file[1:] > file[:-1]
+        return bool(later.all())
 
     @staticmethod
     def joined(*parts: Iterable[Edit]) -> Edits:
         """All edits of the parts; those of one place in the order of the parts."""
+        return Edits.collected(parts)
+
+    @staticmethod
+    def collected(parts: Iterable[Iterable[Edit]]) -> Edits:
+        """As ``joined``, of parts that are taken one after the other, and need not be there together."""
         arrays = [part if isinstance(part, Edits) else _as_arrays(part) for part in parts]
         if len(arrays) == 1:
             return arrays[0]
-        shifts = sums(np.array([len(part.texts) for part in arrays], dtype=np.int64))
-        ends = [part.ends[:-1] + shift for part, shift in zip(arrays, shifts.tolist(), strict=False)]
-        return Edits(
-            np.concatenate([np.empty(0, np.int8), *(part.file for part in arrays)]),
-            np.concatenate([np.empty(0, np.int32), *(part.start for part in arrays)]),
-            np.concatenate([np.empty(0, np.int32), *(part.stop for part in arrays)]),
-            b"".join(part.texts for part in arrays),
-            np.concatenate([*ends, shifts[-1:]]),
-        )
+        columns = [[part.file, part.start, part.stop, np.diff(part.ends)] for part in arrays]
+        texts = [part.texts for part in arrays]
+        del arrays
+        # Of what was there in parts, only one column is there as a whole as well.
+        blob = b"".join(texts)
+        texts.clear()
+        none = [np.empty(0, np.int8), *[np.empty(0, np.int32)] * 3]
+        whole: list[NDArray[Any]] = []
+        for blank in reversed(none):
+            whole.append(np.concatenate([blank, *(column.pop() for column in columns)]))
+        lengths, stop, start, file = whole
+        return Edits(file, start, stop, blob, sums(lengths))
 
     def of(self, file: int) -> Edits:
         """The edits of one document."""
-        low, high = np.searchsorted(self.file, [file, file + 1]).tolist()
+        bounds = np.array([file, file + 1], self.file.dtype)
+        low, high = np.searchsorted(self.file, bounds).tolist()
+        if low == 0 and high == len(self):
+            return self
         first, last = int(self.ends[low]), int(self.ends[high])
         return Edits(
             self.file[low:high],
@@ -175,6 +196,36 @@ def sums(lengths: NDArray[Any]) -> Ints:
     return ends
 
 
+def offset_type(size: int) -> type[np.signedinteger]:
+    """The type of offsets in so many bytes."""
+    return np.int32 if size < 2**31 else np.int64
+
+
+def _narrow(offsets: NDArray[Any]) -> NDArray[np.signedinteger]:
+    return offsets.astype(offset_type(int(offsets.max(initial=0))), copy=False)
+
+
+def _rearranged(texts: bytes, ends: NDArray[Any], order: Ints) -> tuple[bytes, NDArray[np.signedinteger]]:
+    """Texts in another order, and their new ends; those that stay together are taken together."""
+    runs = np.concatenate([[0], np.flatnonzero(np.diff(order) != 1) + 1, [len(order)]])
+    rearranged = _sized(len(texts))
+    for low in range(0, len(runs) - 1, BLOCK // 8):
+        bounds = runs[low : low + BLOCK // 8 + 1]
+        first, last = ends[order[bounds[:-1]]], ends[order[bounds[1:] - 1] + 1]
+        rearranged.write(b"".join([texts[a:b] for a, b in zip(first.tolist(), last.tolist(), strict=True)]))
+    return rearranged.getvalue(), _narrow(sums(np.diff(ends)[order]))
+
+
+def _sized(size: int) -> io.BytesIO:
+    """A buffer that is as large from the begin on: one that grows is there twice at times."""
+    buffer = io.BytesIO()
+    if size:
+        buffer.seek(size - 1)
+        buffer.write(b"\0")
+        buffer.seek(0)
+    return buffer
+
+
 def gathered(source: bytes | NDArray[np.uint8], start: NDArray[Any], lengths: NDArray[Any]) -> bytes:
     """The parts of ``source`` that begin at ``start`` (K,), one behind the other."""
     data = np.frombuffer(source, np.uint8) if isinstance(source, bytes) else source
@@ -201,26 +252,26 @@ def apply(document: Document, edits: Iterable[Edit]) -> bytes:
     wrong = _disorder(found, len(raw))
     if wrong >= 0:
         raise ValueError(f"edits overlap or leave the document at byte {int(found.start[wrong])}")
-    pieces: list[bytes] = []
-    at = 0
+    growth = int(found.ends[-1]) - int(found.stop.sum(dtype=np.int64) - found.start.sum(dtype=np.int64))
+    written, at = _sized(len(raw) + growth), 0
     for low, high in _blocks(found):
         begin, end = int(found.start[low]), int(found.stop[high - 1])
-        pieces.append(raw[at:begin])
+        written.write(memoryview(raw)[at:begin])
         texts = np.frombuffer(found.texts, np.uint8)[found.ends[low] : found.ends[high]]
         lengths = np.diff(found.ends[low : high + 1])
         start, stop = found.start[low:high] - begin, found.stop[low:high] - begin
-        pieces.append(
-            _spliced(np.frombuffer(raw, np.uint8)[begin:end], start, stop, texts, lengths).tobytes()
-        )
+        written.write(_spliced(np.frombuffer(raw, np.uint8)[begin:end], start, stop, texts, lengths))
         at = end
-    pieces.append(raw[at:])
-    return b"".join(pieces)
+    written.write(memoryview(raw)[at:])
+    return written.getvalue()
 
 
 def _disorder(edits: Edits, size: int) -> int:
     """The first edit that overlaps the one before it or leaves a document of ``size`` bytes; -1 if none does."""
-    before = np.concatenate([[0], edits.stop[:-1]])
-    wrong = (edits.start < before) | (edits.stop < edits.start) | (edits.stop > size)
+    wrong = edits.stop < edits.start
+    wrong |= edits.stop > size
+    wrong[1:] |= edits.start[1:] < edits.stop[:-1]
+    wrong[:1] |= edits.start[:1] < 0
     return int(np.argmax(wrong)) if wrong.any() else -1
 
 
@@ -228,8 +279,9 @@ def _blocks(edits: Edits) -> Iterator[tuple[int, int]]:
     """Ranges of edits that follow each other within few bytes."""
     low = 0
     while low < len(edits):
-        high = int(np.searchsorted(edits.start, int(edits.start[low]) + BLOCK, side="right"))
-        high = max(low + 1, min(high, low + BLOCK // 8))
+        high = min(low + BLOCK // 8, len(edits))
+        near = edits.start[low:high] <= int(edits.start[low]) + BLOCK
+        high = low + int(np.count_nonzero(near))
         yield low, high
         low = high
 
@@ -267,28 +319,26 @@ def undone(written: bytes, original: bytes, edits: Iterable[Edit]) -> bool:
     and compares.
     """
     found = Edits.joined(edits)
-    lengths = np.diff(found.ends)
     if _disorder(found, len(original)) >= 0:
         return False
-    shift = sums(lengths - (found.stop - found.start))
-    if len(written) != len(original) + int(shift[-1]):
-        return False
     new, old, texts = (np.frombuffer(part, np.uint8) for part in (written, original, found.texts))
-    at = 0
+    at = here = 0  # how far the original, and the written bytes, were compared
     for low, high in _blocks(found):
-        begin, end = int(found.start[low]), int(found.stop[high - 1])
-        moved = int(shift[low])
-        if written[at + moved : begin + moved] != original[at:begin]:
+        start, stop = found.start[low:high].astype(np.int64), found.stop[low:high].astype(np.int64)
+        begin, end = int(start[0]), int(stop[-1])
+        if not np.array_equal(new[here : here + begin - at], old[at:begin]):
             return False
-        # What stands between an edit and the next one, then the texts.
-        between = _offsets(
-            found.stop[low : high - 1], found.start[low + 1 : high] - found.stop[low : high - 1]
-        )
-        moves = np.repeat(shift[low + 1 : high], found.start[low + 1 : high] - found.stop[low : high - 1])
+        lengths = np.diff(found.ends[low : high + 1])
+        # How far behind its place in the original each edit, and what follows it, stands.
+        shift = here - at + sums(lengths - (stop - start))
+        if end + int(shift[-1]) > len(written):
+            return False
+        between = _offsets(stop[:-1], start[1:] - stop[:-1])
+        moves = np.repeat(shift[1:-1], start[1:] - stop[:-1])
         if not np.array_equal(new[between + moves], old[between]):
             return False
-        said = _offsets(found.start[low:high] + shift[low:high], lengths[low:high])
+        said = _offsets(start + shift[:-1], lengths)
         if not np.array_equal(new[said], texts[found.ends[low] : found.ends[high]]):
             return False
-        at = end
-    return written[at + int(shift[-1]) :] == original[at:]
+        at, here = end, end + int(shift[-1])
+    return np.array_equal(new[here:], old[at:])

@@ -112,9 +112,9 @@ def test_edits_of_several_documents_are_not_spliced_into_one() -> None:
 def test_a_million_edits_in_many_blocks() -> None:
     """Against joining slices one by one; with long stretches that no edit touches, and long texts."""
     random = np.random.default_rng(5)
-    raw = random.integers(0, 256, 3 * BLOCK, dtype=np.uint8).tobytes()
-    cuts = np.sort(random.choice(2 * BLOCK, 2 * 10**6, replace=False))
-    spans = [*zip(cuts[::2].tolist(), cuts[1::2].tolist(), strict=True), (3 * BLOCK - 1, 3 * BLOCK)]
+    raw = random.integers(0, 256, 12 * BLOCK, dtype=np.uint8).tobytes()
+    cuts = np.sort(random.choice(8 * BLOCK, 2 * 10**6, replace=False))
+    spans = [*zip(cuts[::2].tolist(), cuts[1::2].tolist(), strict=True), (12 * BLOCK - 1, 12 * BLOCK)]
     texts = [b"", b"x", b"1234.5", b"-0.001"]
     edits = [Edit(Span(0, a, b), texts[a % 4]) for a, b in spans]
     edits.append(Edit(Span(0, spans[5][1], spans[5][1]), bytes(BLOCK + 7)))
@@ -127,11 +127,36 @@ def test_a_million_edits_in_many_blocks() -> None:
     assert written == expected
     arrays = Edits.joined(edits)
     assert undone(written, raw, arrays)
+    mixed = random.permutation(len(edits) - 2).tolist()
+    parts = [[edits[k] for k in mixed[::2]], edits[-2:], [edits[k] for k in mixed[1::2]]]
+    same = Edits.collected(part for part in parts)
+    for one, other in zip(_arrays(arrays), _arrays(same), strict=True):
+        np.testing.assert_array_equal(one, other)
     kept = int(arrays.stop[7])
-    for at in (0, kept, len(written) - 1, BLOCK, 2 * BLOCK):
+    for at in (0, kept, len(written) - 1, BLOCK, 2 * BLOCK, 8 * BLOCK):
         wrong = bytearray(written)
         wrong[at] ^= 1
         assert not undone(bytes(wrong), raw, arrays)
+
+
+def _arrays(edits: Edits) -> tuple[object, ...]:
+    return edits.file, edits.start, edits.stop, edits.ends, np.frombuffer(edits.texts, np.uint8)
+
+
+def test_offsets_beyond_32_bits_are_kept() -> None:
+    far = 2**31 + 5
+    edits = Edits.joined([Edit(Span(0, far, far + 2), b"xy")], [Edit(Span(0, 7, 9), b"")])
+    assert [edit.span for edit in edits] == [Span(0, 7, 9), Span(0, far, far + 2)]
+    assert Edits.joined(edits.of(0), [Edit(Span(0, 1, 1), b"a")])[:][-1] == Edit(Span(0, far, far + 2), b"xy")
+
+
+def test_lines_begin_behind_breaks_at_the_seams_of_blocks() -> None:
+    raw = bytearray(b"x" * (2 * BLOCK + 3))
+    for at in (0, BLOCK - 1, BLOCK, 2 * BLOCK - 1, 2 * BLOCK, len(raw) - 1):
+        raw[at] = 10
+    assert document(bytes(raw)).line_starts.tolist() == [
+        0, 1, BLOCK, BLOCK + 1, 2 * BLOCK, 2 * BLOCK + 1, len(raw)
+    ]  # fmt: skip
 
 
 @given(st.lists(st.sampled_from([b"LIN", b"\r\n", b"\n", b"\r", b"\xff", b" "]), max_size=30))
