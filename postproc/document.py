@@ -13,6 +13,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import Any, overload
 
@@ -20,6 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Ints
+
+Offsets = NDArray[np.signedinteger]
+"""Byte offsets; 32 bits where they fit."""
 
 _LF = 10
 
@@ -52,7 +56,7 @@ class Document:
     raw: bytes
 
     @cached_property
-    def line_starts(self) -> NDArray[np.signedinteger]:
+    def line_starts(self) -> Offsets:
         """Offset of the first byte of every line (the byte after each LF; CRLF and LF alike)."""
         letters, kind = np.frombuffer(self.raw, np.uint8), offset_type(len(self.raw))
         parts = [np.zeros(1, kind)]
@@ -82,6 +86,29 @@ class Document:
         start = self.line_starts[number - 1]
         stop = self.line_starts[number] if number < len(self.line_starts) else len(self.raw)
         return self.raw[start:stop].rstrip(b"\r\n")
+
+
+class Store:
+    """Keeps arrays in blocks so large that the system takes them back when nothing in them is used any more."""
+
+    SIZE = 1 << 26
+    """Bytes; the C library gives allocations above 32 MB back at once, and what is not used takes no memory."""
+
+    def __init__(self) -> None:
+        self._block, self._used = np.empty(0, np.uint8), 0
+
+    def keep(self, array: NDArray[Any], dtype: type[np.generic] | None = None) -> NDArray[Any]:
+        """A copy, with values of another type if one is given; an array that is large is kept as it is."""
+        kind = np.dtype(dtype or array.dtype)
+        size = array.size * kind.itemsize
+        if size > self.SIZE // 8 and kind == array.dtype:
+            return array
+        if self._used + size > len(self._block):
+            self._block, self._used = np.empty(max(self.SIZE, size), np.uint8), 0
+        kept = self._block[self._used : self._used + size].view(kind).reshape(array.shape)
+        kept[...] = array
+        self._used += -(-size // 8) * 8
+        return kept
 
 
 class Edits(Sequence[Edit]):
@@ -125,21 +152,24 @@ class Edits(Sequence[Edit]):
     @staticmethod
     def collected(parts: Iterable[Iterable[Edit]]) -> Edits:
         """As ``joined``, of parts that are taken one after the other, and need not be there together."""
-        arrays = [part if isinstance(part, Edits) else _as_arrays(part) for part in parts]
-        if len(arrays) == 1:
-            return arrays[0]
-        columns = [[part.file, part.start, part.stop, np.diff(part.ends)] for part in arrays]
-        texts = [part.texts for part in arrays]
-        del arrays
-        # Of what was there in parts, only one column is there as a whole as well.
-        blob = b"".join(texts)
-        texts.clear()
-        none = [np.empty(0, np.int8), *[np.empty(0, np.int32)] * 3]
-        whole: list[NDArray[Any]] = []
-        for blank in reversed(none):
-            whole.append(np.concatenate([blank, *(column.pop() for column in columns)]))
-        lengths, stop, start, file = whole
-        return Edits(file, start, stop, blob, sums(lengths))
+        rest = iter(parts)
+        first, second = next(rest, ()), next(rest, None)
+        if second is None:
+            return first if isinstance(first, Edits) else _as_arrays(first)
+        store = Store(), Store(), Store(), Store(), Store()
+        columns: list[list[NDArray[Any]]] = [[], [], [], [], []]
+        for part in chain((first, second), rest):
+            edits = part if isinstance(part, Edits) else _as_arrays(part)
+            texts = np.frombuffer(edits.texts, np.uint8)
+            arrays = edits.file, edits.start, edits.stop, np.diff(edits.ends), texts
+            for column, kept, array in zip(columns, store, arrays, strict=True):
+                column.append(kept.keep(array))
+        # Of what is there in parts, only one column is there as a whole as well.
+        del store, first, second, arrays
+        blob = b"".join([column.data for column in columns.pop()])
+        ends = sums(np.concatenate(columns.pop()), offset_type(len(blob)))
+        stop, start, file = (np.concatenate(columns.pop()) for _ in range(3))
+        return Edits(file, start, stop, blob, ends)
 
     def of(self, file: int) -> Edits:
         """The edits of one document."""
@@ -189,23 +219,23 @@ def _as_arrays(edits: Iterable[Edit]) -> Edits:
     return Edits(spans[:, 0], spans[:, 1], spans[:, 2], b"".join(texts), ends)
 
 
-def sums(lengths: NDArray[Any]) -> Ints:
-    """(K + 1,) where parts of these lengths (K,) begin, and the last one ends."""
-    ends = np.zeros(len(lengths) + 1, dtype=np.int64)
-    np.cumsum(lengths, out=ends[1:])
-    return ends
-
-
 def offset_type(size: int) -> type[np.signedinteger]:
     """The type of offsets in so many bytes."""
     return np.int32 if size < 2**31 else np.int64
 
 
-def _narrow(offsets: NDArray[Any]) -> NDArray[np.signedinteger]:
+def sums(lengths: NDArray[Any], kind: type[np.signedinteger] = np.int64) -> Offsets:
+    """(K + 1,) where parts of these lengths (K,) begin, and the last one ends."""
+    ends = np.zeros(len(lengths) + 1, dtype=kind)
+    np.cumsum(lengths, out=ends[1:])
+    return ends
+
+
+def _narrow(offsets: NDArray[Any]) -> Offsets:
     return offsets.astype(offset_type(int(offsets.max(initial=0))), copy=False)
 
 
-def _rearranged(texts: bytes, ends: NDArray[Any], order: Ints) -> tuple[bytes, NDArray[np.signedinteger]]:
+def _rearranged(texts: bytes, ends: NDArray[Any], order: Ints) -> tuple[bytes, Offsets]:
     """Texts in another order, and their new ends; those that stay together are taken together."""
     runs = np.concatenate([[0], np.flatnonzero(np.diff(order) != 1) + 1, [len(order)]])
     rearranged = _sized(len(texts))
@@ -213,7 +243,7 @@ def _rearranged(texts: bytes, ends: NDArray[Any], order: Ints) -> tuple[bytes, N
         bounds = runs[low : low + BLOCK // 8 + 1]
         first, last = ends[order[bounds[:-1]]], ends[order[bounds[1:] - 1] + 1]
         rearranged.write(b"".join([texts[a:b] for a, b in zip(first.tolist(), last.tolist(), strict=True)]))
-    return rearranged.getvalue(), _narrow(sums(np.diff(ends)[order]))
+    return rearranged.getvalue(), sums(np.diff(ends)[order], offset_type(len(texts)))
 
 
 def _sized(size: int) -> io.BytesIO:
@@ -260,7 +290,7 @@ def apply(document: Document, edits: Iterable[Edit]) -> bytes:
         texts = np.frombuffer(found.texts, np.uint8)[found.ends[low] : found.ends[high]]
         lengths = np.diff(found.ends[low : high + 1])
         start, stop = found.start[low:high] - begin, found.stop[low:high] - begin
-        written.write(_spliced(np.frombuffer(raw, np.uint8)[begin:end], start, stop, texts, lengths))
+        written.write(_spliced(np.frombuffer(raw, np.uint8)[begin:end], start, stop, texts, lengths).data)
         at = end
     written.write(memoryview(raw)[at:])
     return written.getvalue()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -13,10 +13,11 @@ from postproc.dialects.krl.components import Task, differs
 from postproc.dialects.krl.in_place import literal_edits, partial_edits
 from postproc.dialects.krl.inserting import insertions
 from postproc.dialects.krl.targets import FULL, single_edits
-from postproc.document import Edits
+from postproc.document import Edit, Edits
+from postproc.findings import Finding
 from postproc.toolpath import Kind
 
-BLOCK = 1 << 16
+BLOCK = 1 << 14
 """Rows that are worked on at a time."""
 
 
@@ -29,28 +30,36 @@ def moved(program: Program, plan: Plan, writing: Writing) -> Moved:
     task = Task(program, plan, writing)
     touched, way = _touched(task)
     _refuse_forbidden(task, touched, way)
+    held: dict[int, Finding] = {}
+    edits = Edits.collected(_parts(task, touched, way, held))
+    return Moved((), held) if held else Moved(edits)
+
+
+def _parts(task: Task, touched: Bools, way: Bools, held: dict[int, Finding]) -> Iterator[Iterable[Edit]]:
+    """The edits, block by block; ``held`` takes up the rows that can not move as planned."""
     private = _private(task)
     plain = touched & _plain(task, private)
     chain = Chain(task, touched)
-    parts: list[Edits] = []
     for rows in _blocks(np.flatnonzero(touched & ~chain.depends)):
         said = task.components(rows)
         there = task.own[rows]
-        wanted = task.wanted(rows, said.own, plan.position[there], plan.rotation[there])
+        wanted = task.wanted(rows, said.own, task.plan.position[there], task.plan.rotation[there])
         kept = said.kept(wanted)
         chain.written(rows, said, wanted, kept)
         simple = plain[rows]
         if simple.any():
-            parts.append(literal_edits(task, said, wanted, ~kept & simple[:, None]))
+            yield literal_edits(task, said, wanted, ~kept & simple[:, None])
     chain.follow()
     again = (touched & ~plain) | chain.again(way)
     partial = again & _partial(task, private)
-    parts += partial_edits(task, np.flatnonzero(partial), chain.completed)
+    yield from partial_edits(task, np.flatnonzero(partial), chain.completed)
     singly = np.flatnonzero(again & ~partial)
-    single, held = single_edits(task, singly, chain.completed)
+    single, not_moved = single_edits(task, singly, chain.completed)
+    held.update(not_moved)
     if held:
-        return Moved((), held)
-    return Moved(Edits.joined(*parts, *insertions(task), single))
+        return
+    yield from insertions(task)
+    yield single
 
 
 def _touched(task: Task) -> tuple[Bools, Bools]:
@@ -61,11 +70,11 @@ def _touched(task: Task) -> tuple[Bools, Bools]:
         there = task.own[rows]
         touched[rows] = differs(plan.position[there], path.position[rows]).any(axis=1)
         touched[rows] |= differs(plan.rotation[there], path.rotation[rows]).any(axis=(1, 2))
-    arcs = np.flatnonzero(path.kind == Kind.CIRC)
-    there = task.own[arcs]
-    for new, old in ((plan.centre, path.centre), (plan.normal, path.normal), (plan.sweep, path.sweep)):
-        other = differs(new[there], old[arcs])
-        way[arcs] |= other.any(axis=1) if other.ndim > 1 else other
+    for rows in _blocks(np.flatnonzero(path.kind == Kind.CIRC)):
+        there = task.own[rows]
+        for new, old in ((plan.centre, path.centre), (plan.normal, path.normal), (plan.sweep, path.sweep)):
+            other = differs(new[there], old[rows])
+            way[rows] |= other.any(axis=1) if other.ndim > 1 else other
     return touched, way
 
 
