@@ -6,7 +6,6 @@ Time of this process, not of the clock; what is missing is the compensator, or n
 differences.
 """
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -20,8 +19,6 @@ from postproc.cli.main import run
 from postproc.measurements import measurements_csv
 
 POSES, SECONDS = 60, 5.0
-
-pytestmark = pytest.mark.benchmark(timer=time.process_time)
 
 
 @pytest.mark.parametrize("case", ["compensator", "nothing", "places"])

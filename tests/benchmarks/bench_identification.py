@@ -5,7 +5,6 @@
 Time of this process, not of the clock.
 """
 
-import time
 from dataclasses import replace
 from functools import cache
 
@@ -45,8 +44,6 @@ HARMONICS = """
 """
 
 TOOL = Poses(np.eye(3), np.array([0.1, 0.2, 0.3]))
-
-pytestmark = pytest.mark.benchmark(timer=time.process_time)
 
 
 @cache

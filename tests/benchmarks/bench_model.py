@@ -1,12 +1,5 @@
-"""What a pose costs: equilibrium, mirror loop, all effects.
+"""What a pose costs: inverse kinematics, equilibrium, linear deflection, mirror loop."""
 
-    OMP_NUM_THREADS=1 python -m pytest tests/benchmarks
-
-Time of this process, not of the clock: what else the machine does is not counted.  ``us_per_pose`` stands in the extra
-info of each case (``--benchmark-json FILE``) and in the table below the run.
-"""
-
-import time
 from functools import cache
 
 import numpy as np
@@ -18,29 +11,20 @@ from plant import SOFTER, kr270, random_tools, random_wrenches, with_compensator
 from postproc.compensation.mirror import mirror
 from postproc.effects import EFFECTS
 from postproc.model import NOTHING, StiffnessModel
-from postproc.robot.inverse import status_of
+from postproc.robot.inverse import inverse, status_of
 
-EQUILIBRIUM_US, MIRROR_US, ALL_TIMES = 4.0, 10.0, 10.0
-"""Goals: microseconds a pose on one core, and how many times the goal of the KR 270 all effects may take."""
-
-pytestmark = pytest.mark.benchmark(timer=time.process_time)
-
-TABLE: dict[str, float] = {}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def table():
-    yield
-    print("\n" + "\n".join(f"{name:44} {us:8.2f} us a pose" for name, us in TABLE.items()))
-    for tools in ("one tool", "a tool a pose"):
-        few, many = (TABLE.get(f"equilibrium, {tools}, {count}") for count in (10**5, 10**6))
-        if few and many:
-            print(f"{f'growth exponent from 1e5 to 1e6, {tools}':44} {1 + np.log10(many / few):8.2f}")
+COUNT = 2**15
 
 
 @cache
 def heavy():
     return StiffnessModel.from_robot(kr270())
+
+
+@cache
+def springs():
+    """Joints that give way, and no compensator."""
+    return heavy().without(["gravity_compensator"])
 
 
 @cache
@@ -60,48 +44,42 @@ def states(count):
     return milling_angles(count, rng), random_wrenches(count, rng), random_tools(count, rng), rng
 
 
-def measured(benchmark, name, count, work):
-    result = benchmark.pedantic(work, rounds=5 if count < 10**6 else 3, warmup_rounds=1)
-    TABLE[name] = benchmark.extra_info["us_per_pose"] = benchmark.stats.stats.min / count * 1e6
-    benchmark.extra_info["poses"] = count
-    return result
+def test_inverse(measured):
+    q, *_ = states(COUNT)
+    arm = kr270().nominal
+    flange, status = heavy().chain.flange(q), status_of(arm, q)
+    found = measured(lambda: inverse(arm, flange, status, q), COUNT)
+    assert np.abs(found.q - q).max() < 1e-9
 
 
-@pytest.mark.parametrize("count", [10**4, 10**5, 10**6])
+@pytest.mark.parametrize("count", [COUNT, 10 * COUNT])
 @pytest.mark.parametrize("tools", ["one tool", "a tool a pose"])
-def test_equilibrium_with_compensator(benchmark, count, tools):
+def test_equilibrium_with_compensator(measured, count, tools):
     q, wrench, tool, _ = states(count)
     tool = TOOL if tools == "one tool" else tool
-    rest = measured(
-        benchmark, f"equilibrium, {tools}, {count}", count, lambda: heavy().equilibrium(q, wrench, tool)
-    )
-    assert rest.converged.all()
+    assert measured(lambda: heavy().equilibrium(q, wrench, tool), count).converged.all()
 
 
-def test_mirror_loop(benchmark):
-    count = 10**5
-    q, wrench, _, _ = states(count)
-    model = heavy()
-    wanted = model.chain.flange(q) @ TOOL
-    status = status_of(model.robot.nominal, q)
-    done = measured(
-        benchmark,
-        f"mirror, {count}",
-        count,
-        lambda: mirror(model, wanted, wanted, TOOL, wrench, NOTHING, status, q),
-    )
-    assert done.converged.all()
+def test_equilibrium_of_springs(measured):
+    q, wrench, *_ = states(COUNT)
+    assert measured(lambda: springs().equilibrium(q, wrench, TOOL), COUNT).converged.all()
 
 
-def test_all_effects(benchmark):
-    count = 10**5
-    q, wrench, tool, rng = states(count)
-    given = conditions(count, rng)
-    rest = measured(
-        benchmark,
-        f"equilibrium, all effects, {count}",
-        count,
-        lambda: everything().equilibrium(q, wrench, tool, given),
-    )
+def test_equilibrium_with_all_effects(measured):
+    q, wrench, tool, rng = states(COUNT)
+    given = conditions(COUNT, rng)
+    rest = measured(lambda: everything().equilibrium(q, wrench, tool, given), COUNT)
     assert rest.converged.mean() > 0.99
-    benchmark.extra_info["coordinates"] = everything().chain.size
+
+
+def test_linear_deflection(measured):
+    q, wrench, *_ = states(COUNT)
+    assert np.isfinite(measured(lambda: springs().linear_deflection(q, wrench, TOOL), COUNT)).all()
+
+
+def test_mirror(measured):
+    q, wrench, *_ = states(COUNT)
+    model = heavy()
+    wanted, status = model.chain.flange(q) @ TOOL, status_of(model.robot.nominal, q)
+    done = measured(lambda: mirror(model, wanted, wanted, TOOL, wrench, NOTHING, status, q), COUNT)
+    assert done.converged.all()
