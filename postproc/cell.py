@@ -14,7 +14,7 @@ import numpy as np
 
 from postproc.arrays import Floats, Ints, frozen
 from postproc.findings import Finding, Refusal
-from postproc.geometry import Poses, vector_from_rotation
+from postproc.geometry import UNKNOWN, Poses, vector_from_rotation
 from postproc.toolpath import FrameRef, Toolpath
 from postproc.units import DEG, MM
 from postproc.yamlfile import Section, load
@@ -212,15 +212,12 @@ def frames_of(cell: Cell, toolpath: Toolpath, file: str | Path) -> Frames:
     )
 
 
-_UNKNOWN = Poses(np.full((3, 3), np.nan), np.full(3, np.nan))
-
-
 def _pose(frame: FrameRef, numbered: dict[int, Poses]) -> Poses:
     if frame.pose is not None:
         return frame.pose
     if frame.number == 0:  # $NULLFRAME
         return Poses.identity()
-    return _UNKNOWN if frame.number is None else numbered.get(frame.number, _UNKNOWN)
+    return UNKNOWN if frame.number is None else numbered.get(frame.number, UNKNOWN)
 
 
 def _spindle(frame: FrameRef, cell: Cell) -> Floats:
@@ -276,8 +273,8 @@ def _missing(
 
 def _per_row(poses: list[Poses], index: Ints) -> Poses:
     """The poses (N) that ``index`` (N,) picks; NaN for -1."""
-    rotations = np.array([pose.rotation for pose in [*poses, _UNKNOWN]])
-    positions = np.array([pose.position for pose in [*poses, _UNKNOWN]])
+    rotations = np.array([pose.rotation for pose in [*poses, UNKNOWN]])
+    positions = np.array([pose.position for pose in [*poses, UNKNOWN]])
     return Poses(_rows(rotations, index), _rows(positions, index))
 
 

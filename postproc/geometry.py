@@ -6,13 +6,14 @@ any leading shape and work without a loop over it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,58 @@ class Poses:
 
     def __len__(self) -> int:
         return len(self.position)
+
+    def shared(self, rows: Any) -> Poses:
+        """``self[rows]``; one pose where all N are held as one that is broadcast."""
+        same = len(self.position) and not self.position.strides[0] and not self.rotation.strides[0]
+        return self[0] if same else self[rows]
+
+    def copy(self) -> Poses:
+        """The same poses, to be changed."""
+        return Poses(self.rotation.copy(), self.position.copy())
+
+    def put(self, rows: Any, poses: Poses) -> None:
+        """Sets ``rows`` to ``poses``."""
+        self.rotation[rows], self.position[rows] = poses.rotation, poses.position
+
+
+UNKNOWN = Poses(np.full((3, 3), np.nan), np.full(3, np.nan))
+"""No pose."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseRows:
+    """``count`` poses that are made where they are asked for: ``made`` gives those of rows (K,).
+
+    A pose takes 96 bytes; of a million motions few are needed at a time.
+    """
+
+    count: int
+    made: Callable[[Ints], Poses]
+
+    def __getitem__(self, rows: Any) -> Poses:
+        """As of ``Poses``: by numbers of rows, a mask, or a slice."""
+        if isinstance(rows, slice):
+            rows = np.arange(*rows.indices(self.count))
+        rows = np.asarray(rows)
+        return self.made(np.flatnonzero(rows) if rows.dtype == np.bool_ else rows)
+
+    def __len__(self) -> int:
+        return self.count
+
+    @property
+    def position(self) -> Floats:
+        """(N, 3) [m] of all."""
+        return self[:].position
+
+    @property
+    def rotation(self) -> Floats:
+        """(N, 3, 3) of all."""
+        return self[:].rotation
+
+
+Placed = Poses | PoseRows
+"""Poses, by rows."""
 
 
 def rotation_from_abc(abc: ArrayLike) -> Floats:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from functools import cached_property
 
 import numpy as np
 
@@ -118,42 +119,42 @@ class Toolpath:
 
     def __post_init__(self) -> None:
         n = len(self.kind)
-        if not len(self.anchor):
-            object.__setattr__(self, "anchor", np.full(n, -1))
-            object.__setattr__(self, "given", np.full((n, 6), np.nan))
-        if not len(self.sweep):
-            object.__setattr__(self, "centre", np.full((n, 3), np.nan))
-            object.__setattr__(self, "normal", np.full((n, 3), np.nan))
-            object.__setattr__(self, "sweep", np.full(n, np.nan))
-        if not len(self.blend):
-            object.__setattr__(self, "blend", np.zeros(n))
-        if not len(self.oriented):
-            object.__setattr__(self, "oriented", np.ones(n, np.bool_))
-        if not len(self.free_axis):
-            object.__setattr__(self, "free_axis", np.full((n, 3), np.nan))
-        for name in ("runs", "any_plane"):
-            if not len(getattr(self, name)):
-                object.__setattr__(self, name, np.ones(n, np.bool_))
-        if not len(self.timed):
-            object.__setattr__(self, "timed", np.zeros(n, np.bool_))
-        for name in ("oriented", "runs", "any_plane", "timed"):
-            object.__setattr__(self, name, frozen(getattr(self, name), (n,), np.bool_))
-        shapes = {"position": (n, 3), "rotation": (n, 3, 3), "axes": (n, 6), "feed": (n,), "given": (n, 6)}
-        shapes |= {"centre": (n, 3), "normal": (n, 3), "sweep": (n,), "blend": (n,), "free_axis": (n, 3)}
-        for name, shape in shapes.items():
-            object.__setattr__(self, name, frozen(getattr(self, name), shape))
-        for name in ("kind", "base", "tool", "status", "turn", "line", "anchor"):
-            object.__setattr__(self, name, frozen(getattr(self, name), (n,), np.int64))
+        # (shape, type, what stands for all rows where nothing is given)
+        columns: dict[str, tuple[tuple[int, ...], type[np.generic], float | None]] = {
+            "kind": ((n,), np.int8, None),
+            **dict.fromkeys(("base", "tool", "status", "turn", "line"), ((n,), np.int32, None)),
+            "anchor": ((n,), np.int32, -1),
+            "position": ((n, 3), np.float64, None),
+            "rotation": ((n, 3, 3), np.float64, None),
+            "axes": ((n, 6), np.float64, None),
+            "feed": ((n,), np.float64, None),
+            "given": ((n, 6), np.float64, np.nan),
+            **dict.fromkeys(("centre", "normal", "free_axis"), ((n, 3), np.float64, np.nan)),
+            "sweep": ((n,), np.float64, np.nan),
+            "blend": ((n,), np.float64, 0.0),
+            **dict.fromkeys(("oriented", "runs", "any_plane"), ((n,), np.bool_, True)),
+            "timed": ((n,), np.bool_, False),
+        }
+        for name, (shape, dtype, default) in columns.items():
+            values = getattr(self, name)
+            if not len(values) and default is not None:
+                values = np.broadcast_to(np.asarray(default, dtype), shape)
+            object.__setattr__(self, name, frozen(values, shape, dtype))
 
     def __len__(self) -> int:
         return len(self.kind)
 
-    @property
+    @cached_property
     def known(self) -> Bools:
         """(N,) the Cartesian target, its base and its tool are known; of an arc its way as well."""
         pose = np.isfinite(self.position).all(axis=1) & np.isfinite(self.rotation[:, 0, 0])
         way = (self.kind != Kind.CIRC) | np.isfinite(self.sweep)
         return np.asarray(pose & way & (self.base >= 0) & (self.tool >= 0))
+
+    @cached_property
+    def on_axes(self) -> Bools:
+        """(N,) the target is stated by axis angles."""
+        return np.asarray(np.isfinite(self.axes).all(axis=1))
 
     @property
     def target_in_base(self) -> Poses:
@@ -254,8 +255,8 @@ class Plan:
         }
         for name, shape in shapes.items():
             object.__setattr__(self, name, frozen(getattr(self, name), shape))
-        for name in ("source", "role"):
-            object.__setattr__(self, name, frozen(getattr(self, name), (m,), np.int64))
+        for name, dtype in (("source", np.int32), ("role", np.int8)):
+            object.__setattr__(self, name, frozen(getattr(self, name), (m,), dtype))
 
     def __len__(self) -> int:
         return len(self.source)

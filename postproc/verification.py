@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.blocks import in_blocks
 from postproc.compensation.task import Task
 from postproc.geometry import Poses, on_arc, rotation_from_vector, vector_from_rotation
 from postproc.toolpath import Kind, Toolpath
@@ -21,9 +22,6 @@ STEP = 1.0 * MM
 
 LEAST = 5
 """Samples of a motion at least, its ends among them."""
-
-CHUNK = 20_000
-"""Samples that are simulated at once."""
 
 STEPS = 4
 """Newton's steps to the place on the path that is nearest to the tool."""
@@ -112,7 +110,7 @@ def matched(original: Task, run: Task) -> Ints:
 
 def _expected(original: Task) -> Floats:
     """(N, 3) [m] where a corrected row would about end: as far on the other side as the force moves the tool."""
-    place = original.wanted.position.copy()
+    place = original.wanted[:].position.copy()
     rows = np.flatnonzero(original.carries & original.toolpath.known & (original.track.status >= 0))
     wanted = original.wanted[rows]
     real = original.real(rows, wanted, original.wrench[rows]).pose.position
@@ -129,12 +127,12 @@ def _alignment(original: Task, expected: Floats, run: Task, rows: Ints, begin: i
     """
     n = len(rows)
     width = min(more + 1, max(LEAST_WIDTH, STATES // n))
-    place = run.wanted.position[begin : begin + n + more]
+    place, wanted = run.wanted[begin : begin + n + more].position, original.wanted[rows].position
     came, low = np.zeros((n, width), np.int32), np.zeros(n, np.int64)
     total, first = np.zeros(width), 0
     for i, row in enumerate(rows.tolist()):
         here = min(max(first, first + int(np.argmin(total)) - width // 4), more + 1 - width)
-        goals = np.stack([original.wanted.position[row], expected[row]])
+        goals = np.stack([wanted[i], expected[row]])
         away = place[i + here : i + here + width] - goals[:, None]
         cost = np.nan_to_num(np.einsum("gij,gij->gi", away, away).min(axis=0))
         best = np.minimum.accumulate(total)
@@ -171,12 +169,17 @@ def simulate(original: Task, run: Task, match: Ints, step: float = STEP) -> Simu
     begin = np.append(0, match[:-1] + 1)
     guess = (motion - begin[row] + share) / (match[row] - begin[row] + 1)
 
+    goes_on = ~original.force.steps & original.ways.known & original.carries
+    goes_on &= np.append(False, original.carries[:-1])
     error, nearest, force = np.empty((len(motion), 3)), np.empty(len(motion)), np.empty(len(motion))
-    for a in range(0, len(motion), CHUNK):
-        part = slice(a, a + CHUNK)
+
+    def looked(part: slice) -> None:
         error[part], nearest[part], force[part] = _beside(
-            original, run, motion[part], row[part], share[part], guess[part]
+            original, run, goes_on, motion[part], row[part], share[part], guess[part]
         )
+
+    for _ in in_blocks(looked, len(motion)):
+        pass
     at_end = number + 1 == np.repeat(count, count)
     is_link = _links(original, run, rows, owner, nearest[at_end])
     seen = np.isfinite(error[:, 0])
@@ -207,15 +210,13 @@ def _owners(match: Ints, count: int) -> Ints:
 
 
 def _beside(
-    original: Task, run: Task, motion: Ints, row: Ints, share: Floats, guess: Floats
+    original: Task, run: Task, goes_on: Bools, motion: Ints, row: Ints, share: Floats, guess: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """The tool (S, 3) [m] beside the wanted path, the share (S,) of the original's motion ``row`` (S,) where it is
-    nearest, and the force (S,) [N] there."""
+    nearest, and the force (S,) [N] there.  ``goes_on`` (N,): the cut and its force go on from the motion before."""
     command = _sampled(run, motion, share)
     error, at, force = _nearest(original, row, command, guess)
     # A tool that is a little ahead of an end may already be on the way of the next motion, or still on the one before.
-    goes_on = ~original.force.steps & original.ways.known & original.carries
-    goes_on &= np.append(False, original.carries[:-1])
     for end, other in ((1.0, 1), (0.0, -1)):
         vertex = row + (other == 1)  # the motion that begins where the two meet
         some = np.flatnonzero((at == end) & (vertex < len(goes_on)))
@@ -259,9 +260,7 @@ def _sampled(task: Task, rows: Ints, share: Floats) -> Poses:
     position[bent] = on_arc(
         begin.position[bent],
         end.position[bent],
-        ways.centre[at],
-        ways.normal[at],
-        ways.sweep[at],
+        *ways.circles(at),
         share[bent],
     )
     return Poses(rotation, position)
@@ -271,13 +270,13 @@ def _projected(task: Task, rows: Ints, place: Floats, guess: Floats) -> Floats:
     """(S,) the share of the ways of ``rows`` that is nearest to ``place`` (S, 3), not bounded; of the turns of an arc
     the one nearest to ``guess`` (S,)."""
     ways = task.ways
-    begin = ways.begin.position[rows]
-    step = ways.end.position[rows] - begin
+    begin = ways.begin[rows].position
+    step = ways.end[rows].position - begin
     square = np.maximum(np.sum(step**2, axis=1), 1e-18)
     share = np.sum((place - begin) * step, axis=1) / square
     bent = np.flatnonzero(ways.arc[rows])
     at = rows[bent]
-    normal, centre, sweep = ways.normal[at], ways.centre[at], ways.sweep[at]
+    centre, normal, sweep = ways.circles(at)
     out, here = begin[bent] - centre, place[bent] - centre
     angle = np.arctan2(
         np.sum(np.cross(out, here) * normal, axis=1),

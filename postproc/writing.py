@@ -12,6 +12,7 @@ import numpy as np
 
 from postproc import __version__
 from postproc.arrays import Bools, Floats, Ints
+from postproc.blocks import blocks, in_blocks
 from postproc.cell import Cell
 from postproc.compensation.between import errors_between
 from postproc.compensation.correct import Result, with_residual
@@ -20,7 +21,7 @@ from postproc.compensation.task import Task
 from postproc.dialects.dialect import Dialect, Moved, Program, Settings, Writing
 from postproc.document import Document, Edits, apply, undone
 from postproc.findings import Finding, Refusal
-from postproc.geometry import Poses, on_arc, vector_from_rotation
+from postproc.geometry import PoseRows, Poses, on_arc, vector_from_rotation
 from postproc.robot.description import Robot
 from postproc.toolpath import Kind, Plan, Role, Toolpath
 from postproc.units import DEG, MM
@@ -45,29 +46,36 @@ class Written:
 
 def planned(task: Task, division: Division) -> Plan:
     """A division in the programmed bases: what a dialect is to write."""
-    path, source = task.toolpath, division.source
-    to_base = task.base[source].inverse()
-    command = to_base @ division.command
-    moved = division.moved
-    turned = moved & path.oriented[source]
-    link = division.links
-    arc = np.isfinite(division.sweep)
-    centre = (to_base @ Poses(np.eye(3), division.centre)).position
-    normal = (to_base.rotation @ division.normal[..., None])[..., 0]
-    return Plan(
-        source,
-        division.role,
-        np.where(moved[:, None], command.position, path.position[source]),
-        np.where(turned[:, None, None], command.rotation, path.rotation[source]),
-        np.where(arc[:, None], centre, _kept(path.centre[source], moved | link)),
-        np.where(arc[:, None], normal, _kept(path.normal[source], moved | link)),
-        np.where(arc, division.sweep, _kept(path.sweep[source], moved | link)),
-    )
+    path, source, m = task.toolpath, division.source, len(division)
+    arcs = bool(np.isfinite(division.sweep).any() or np.isfinite(path.sweep).any())
+    position, rotation = np.empty((m, 3)), np.empty((m, 3, 3))
+    none = np.broadcast_to(np.nan, (m, 3))
+    centre, normal, sweep = (np.array(way) if arcs else way for way in (none, none, none[:, 0]))
 
+    def put(part: slice) -> None:
+        at, moved = source[part], division.moved[part]
+        to_base = task.base.shared(at).inverse()
+        command = to_base @ division.command[part]
+        turned = moved & path.oriented[at]
+        position[part] = np.where(moved[:, None], command.position, path.position[at])
+        rotation[part] = np.where(turned[:, None, None], command.rotation, path.rotation[at])
+        if not arcs:
+            return
+        arc, kept = np.isfinite(division.sweep[part]), ~moved & ~division.links[part]
+        there = (to_base @ Poses(np.eye(3), division.centre[part])).position
+        across = (to_base.rotation @ division.normal[part][..., None])[..., 0]
+        for whole, own, way in (
+            (centre, path.centre, there),
+            (normal, path.normal, across),
+            (sweep[:, None], path.sweep[:, None], division.sweep[part][:, None]),
+        ):
+            whole[part] = np.where(arc[:, None], way, np.where(kept[:, None], own[at], np.nan))
 
-def _kept(values: Floats, gone: Bools) -> Floats:
-    """``values`` (M, ...) with NaN where ``gone`` (M,)."""
-    return np.where(gone.reshape(-1, *[1] * (values.ndim - 1)), np.nan, values)
+    for _ in in_blocks(put, m):
+        pass
+    for array in (position, rotation):
+        array.setflags(write=False)
+    return Plan(source, division.role, position, rotation, centre, normal, sweep)
 
 
 def written_as(cell: Cell, own_points: str) -> Writing:
@@ -108,39 +116,46 @@ def write(
     back = completed(read.toolpath)
     _hold(program.toolpath, back, plan, writing, main.name)
     there = _as_written(task, division, back)
-    own = there.command[np.flatnonzero(division.own)]
-    return Written(edits, contents, with_residual(task, result, own), there, way_errors(task, result, there))
+    result = with_residual(task, result, there.own_command)
+    return Written(edits, contents, result, there, way_errors(task, result, there))
 
 
 def way_errors(task: Task, result: Result, division: Division) -> Floats:
     """(M,) [m] the largest distance from the wanted way inside of each corrected motion, NaN for all others."""
     errors = np.full(len(division), np.nan)
-    source = division.source
-    chosen = np.flatnonzero(result.corrected[source] & task.ways.known[source] & ~division.links)
-    if len(chosen):
-        pieces = made(task, division)[chosen]
+    source, links = division.source, division.links
+    chosen = np.flatnonzero(result.corrected[source] & task.ways.known[source] & ~links)
+
+    def looked(part: slice) -> None:
+        pieces = made(task, division, chosen[part])
         first = (pieces.first == 0.0) & task.steps(pieces.rows, result.corrected)
-        errors[chosen], _ = errors_between(task, pieces, first)
+        errors[chosen[part]], _ = errors_between(task, pieces, first)
+
+    for _ in in_blocks(looked, len(chosen)):
+        pass
     return errors
 
 
 def _as_written(task: Task, division: Division, back: Toolpath) -> Division:
     """The division with what its digits say."""
-    source = division.source
-    base = task.base[source]
-    there = base @ back.target_in_base
-    moved = division.moved
-    arc = np.isfinite(division.sweep)
-    return replace(
-        division,
-        command=Poses(
-            np.where(moved[:, None, None], there.rotation, division.command.rotation),
-            np.where(moved[:, None], there.position, division.command.position),
-        ),
-        centre=np.where(arc[:, None], (base @ Poses(np.eye(3), back.centre)).position, np.nan),
-        normal=np.where(arc[:, None], (base.rotation @ back.normal[..., None])[..., 0], np.nan),
-        sweep=np.where(arc, back.sweep, np.nan),
-    )
+    source, base = division.source, task.base
+
+    def command(rows: Ints) -> Poses:
+        found = division.command[rows]
+        moved = np.flatnonzero(division.moved[rows])
+        found.put(moved, base.shared(source[rows[moved]]) @ back.target_in_base[rows[moved]])
+        return found
+
+    there = replace(division, command=PoseRows(len(division), command))
+    bent = np.flatnonzero(np.isfinite(division.sweep))
+    if not len(bent):
+        return there
+    centre, normal, sweep = division.centre.copy(), division.normal.copy(), division.sweep.copy()
+    own = base[source[bent]]
+    centre[bent] = (own @ Poses(np.eye(3), back.centre[bent])).position
+    normal[bent] = (own.rotation @ back.normal[bent][..., None])[..., 0]
+    sweep[bent] = back.sweep[bent]
+    return replace(there, centre=centre, normal=normal, sweep=sweep)
 
 
 def _decimals(tolerance: float) -> int:
@@ -179,8 +194,8 @@ def _hold(path: Toolpath, back: Toolpath, plan: Plan, writing: Writing, file: st
         raise Refusal(Finding("FIL008", "other motions than before are not understood", file))
     link = plan.role == Role.LINK
     for name, rows in (
-        ("base", ~link | link),
-        ("tool", ~link | link),
+        ("base", None),
+        ("tool", None),
         ("kind", ~link),
         ("status", own),
         ("turn", own),
@@ -188,42 +203,54 @@ def _hold(path: Toolpath, back: Toolpath, plan: Plan, writing: Writing, file: st
         ("timed", own),
         ("feed", (path.kind[source] != Kind.PTP) & ~path.timed[source]),
     ):
-        before = getattr(path, name)[source].reshape(len(plan), -1)
-        after = getattr(back, name).reshape(len(plan), -1)
-        same = ((before == after) | ((before != before) & (after != after))).all(axis=1) | ~rows
-        if not same.all():
-            row = int(np.argmin(same))
-            raise Refusal(
-                Finding("FIL008", f"the {name} of a motion changed", file, int(path.line[source[row]]))
-            )
+        before, after = getattr(path, name), getattr(back, name)
+        for part in blocks(len(plan)):
+            one, other = before[source[part]], after[part]
+            same = (one == other) | ((one != one) & (other != other))
+            same = same.reshape(len(one), -1).all(axis=1)
+            if rows is not None:
+                same |= ~rows[part]
+            if not same.all():
+                row = part.start + int(np.argmin(same))
+                raise Refusal(
+                    Finding("FIL008", f"the {name} of a motion changed", file, int(path.line[source[row]]))
+                )
     if (back.kind[link] != Kind.LIN).any():
         raise Refusal(Finding("FIL008", "a link is no straight motion", file))
-    known = np.isfinite(plan.position[:, 0])
-    if not np.array_equal(np.isfinite(back.position[:, 0]), known):
+    for part in blocks(len(plan)):
+        _hold_targets(path, back, plan, part, writing, file)
+    _hold_arcs(path, back, plan, 10.0**-writing.mm, file)
+
+
+def _hold_targets(
+    path: Toolpath, back: Toolpath, plan: Plan, part: slice, writing: Writing, file: str
+) -> None:
+    source, position = plan.source[part], plan.position[part]
+    known = np.isfinite(position[:, 0])
+    if not np.array_equal(np.isfinite(back.position[part][:, 0]), known):
         raise Refusal(Finding("FIL008", "targets were lost or appeared", file))
     # Half a written step a coordinate; three angles add up.
     step_mm, step_deg = 10.0**-writing.mm, 10.0**-writing.deg
-    off = np.abs(back.position - plan.position).max(axis=1) / MM
-    angle = _angle(plan.rotation, back.rotation, path.free_axis[source]) / DEG
+    off = np.abs(back.position[part] - position).max(axis=1) / MM
+    angle = _angle(plan.rotation[part], back.rotation[part], path.free_axis[source]) / DEG
     _close(off > 0.5001 * step_mm, off, path, source, file, "mm from what was meant")
     _close(angle > 1.5001 * step_deg, angle, path, source, file, "deg from what was meant")
-    _hold_arcs(path, back, plan, step_mm, file)
 
 
 def _hold_arcs(path: Toolpath, back: Toolpath, plan: Plan, step_mm: float, file: str) -> None:
     arc = np.isfinite(plan.sweep)
     if not np.array_equal(np.isfinite(back.sweep), arc):
         raise Refusal(Finding("FIL008", "arcs were lost or appeared", file))
-    rows = np.flatnonzero(arc & np.append(False, np.isfinite(plan.position[:-1, 0])))
-    rows = rows[(plan.source[rows] > 0)]
+    rows = np.flatnonzero(arc)
+    rows = rows[(rows > 0) & (plan.source[rows] > 0)]
+    rows = rows[np.isfinite(plan.position[rows - 1, 0])]
     half = np.full(len(rows), 0.5)
     vias = [
         on_arc(p.position[rows - 1], p.position[rows], p.centre[rows], p.normal[rows], p.sweep[rows], half)
         for p in (plan, back)
     ]
-    off = np.zeros(len(plan))
-    off[rows] = np.abs(vias[1] - vias[0]).max(axis=1, initial=0.0) / MM
-    _close(off > FAR * step_mm, off, path, plan.source, file, "mm from the arc that was meant")
+    off = np.abs(vias[1] - vias[0]).max(axis=1, initial=0.0) / MM
+    _close(off > FAR * step_mm, off, path, plan.source[rows], file, "mm from the arc that was meant")
 
 
 def _close(wrong: Bools, off: Floats, path: Toolpath, source: Ints, file: str, words: str) -> None:

@@ -24,7 +24,7 @@ def divided(task, limits=FREE):
 
 def dense(task, division, samples=41):
     """(M,) [m] the largest distance from the wanted way inside of each motion, at ``samples`` shares of each."""
-    pieces = made(task, division)
+    pieces = made(task, division, np.arange(len(division)))
     chosen = np.flatnonzero(~division.links & np.isin(division.source, np.flatnonzero(task.carries)))
     worst = np.zeros(len(division))
     for share in np.linspace(0, 1, samples):
@@ -170,7 +170,7 @@ def test_arcs_in_their_plane_keep_their_normal_and_advance():
     np.testing.assert_array_equal(division.normal[arcs], np.tile([0.0, 0.0, 1.0], (arcs.sum(), 1)))
     assert dense(task, division).max() <= task.tolerance
     # begin, end and centre are those of one circle, seen along the normal
-    pieces = made(task, division)[np.flatnonzero(arcs)]
+    pieces = made(task, division, np.flatnonzero(arcs))
     out = [np.linalg.norm((p.position - pieces.centre)[:, :2], axis=1) for p in (pieces.begin, pieces.end)]
     np.testing.assert_allclose(out[0], out[1], atol=1e-12)
 

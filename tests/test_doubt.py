@@ -185,7 +185,7 @@ def test_deflection_and_residual_spread_as_drawn_robots(model, process, force):
     known = spreads(model, doubt.COVERAGE * force if force else None, True)
     names = [entry.name for entry in known.entries if entry.name != FORCE]
 
-    before, after = drawn(task, result.command, names, deviations(known), force)
+    before, after = drawn(task, result.command[:], names, deviations(known), force)
     told = doubt_of(task, result, doubt.COVERAGE * force if force else None)
 
     error, spread = spread_of(task, task.wanted, known)
@@ -197,7 +197,7 @@ def test_deflection_and_residual_spread_as_drawn_robots(model, process, force):
     assert told.worst == np.argmax(result.before)
     assert told.before == pytest.approx(1.96 * seen[told.worst], rel=WITHIN)
 
-    error, spread = spread_of(task, result.command, known)
+    error, spread = spread_of(task, result.command[:], known)
     assert np.linalg.norm(error, axis=1).max() < 2e-8
     seen = covariance_of(after)
     np.testing.assert_allclose(largest_deviation(seen), largest_deviation(spread), rtol=WITHIN)

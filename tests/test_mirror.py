@@ -584,14 +584,14 @@ def test_process_keeps_the_sag_and_absolute_removes_it():
 
     kept = correct(process)
     cut = np.flatnonzero(CARRIES)
-    shift, turn = difference(real(process, kept.command, process.wrench)[cut], sagged[cut])
+    shift, turn = difference(real(process, kept.command[:], process.wrench)[cut], sagged[cut])
     assert np.abs(shift).max() <= NANOMETRES_10
     assert np.abs(turn).max() <= NANOMETRES_10
     assert untouched(kept, process, ~CARRIES)
 
     removed = correct(absolute)
     assert removed.state.tolist() == [C] * 9
-    shift, turn = difference(real(absolute, removed.command, absolute.wrench), absolute.wanted)
+    shift, turn = difference(real(absolute, removed.command[:], absolute.wrench), absolute.wanted)
     assert np.abs(shift).max() <= NANOMETRES_10
     assert np.abs(turn).max() <= NANOMETRES_10
     np.testing.assert_allclose(removed.before[~CARRIES], sag[~CARRIES], rtol=1e-9)

@@ -11,6 +11,7 @@ from ways_at_work import circle, corner, line
 
 from postproc.compensation.correct import correct
 from postproc.compensation.division import Limits, divide
+from postproc.geometry import Poses
 from postproc.toolpath import Kind, Toolpath
 from postproc.units import MM
 from postproc.verification import Different, _alignment, matched, simulate, worst_places
@@ -76,8 +77,7 @@ def test_a_narrow_view_matches_the_same(monkeypatch):
     place = np.cumsum(np.tile([1e-3, 0, 0], (1000, 1)), axis=0)
     extra = np.sort(np.random.default_rng(2).choice(999, more, replace=False))
     longer = np.insert(place, extra, place[extra] + [0, 2e-3, 0], axis=0)
-    one = replace(task, wanted=replace(task.wanted, position=place))
-    other = replace(task, wanted=replace(task.wanted, position=longer))
+    one, other = (replace(task, wanted=Poses.from_abc(at, np.zeros_like(at))) for at in (place, longer))
     monkeypatch.setattr("postproc.verification.STATES", 0)
     monkeypatch.setattr("postproc.verification.LEAST_WIDTH", 8)
     found = _alignment(one, place, other, rows, 0, more)

@@ -99,9 +99,9 @@ def errors_between(task: Task, pieces: Pieces, from_begin: Bools | None = None) 
     long = (length > SHORT) | (np.linalg.norm(turn, axis=1) > LITTLE) | np.isfinite(pieces.sweep)
     off, angle = np.zeros(len(pieces)), np.zeros(len(pieces))
     for share in SHARES:
-        chosen = np.arange(len(pieces)) if share == 0.5 else np.flatnonzero(long)
+        chosen = np.flatnonzero(long | (share == 0.5))
         if len(chosen):
-            here = _errors(task, pieces[chosen], share)
+            here = _errors(task, pieces if len(chosen) == len(pieces) else pieces[chosen], share)
             off[chosen] = np.maximum(off[chosen], here[0])
             angle[chosen] = np.maximum(angle[chosen], here[1])
     if from_begin is not None and from_begin.any():

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import NamedTuple
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.blocks import blocks, in_blocks
 from postproc.compensation.cuts import cuts_of, left_findings, spread, switch_findings, switched_on
-from postproc.compensation.mirror import partly
+from postproc.compensation.mirror import Correction, difference
 from postproc.compensation.task import Task
 from postproc.findings import Finding, Refusal
-from postproc.geometry import Poses
+from postproc.geometry import Placed, PoseRows, Poses, rotation_from_vector
 from postproc.robot.track import near_singular, sides, singular_words
 from postproc.toolpath import Kind
 from postproc.units import DEG, MM
@@ -27,13 +29,15 @@ class State(IntEnum):
 
 @dataclass(frozen=True)
 class Result:
-    """state (N,) State; cut (N,), -1 in air; command: TCP commands in the robot base; before, after (N,) [m] predicted
-    position error, NaN where nothing is predicted, and before_angle, after_angle (N,) [rad]; deflection (N, 3) [m]
-    before; iterations (N,); history (K + 1, N) [m]; findings."""
+    """state (N,) State; cut (N,), -1 in air; command (N): TCP commands in the robot base; correction (N, 3) [m]: their
+    place minus the wanted one, 0 where nothing is corrected; before, after (N,) [m] predicted position error, NaN where
+    nothing is predicted, and before_angle, after_angle (N,) [rad]; deflection (N, 3) [m] before; iterations (N,);
+    history (K + 1, N) [m]; findings."""
 
     state: Ints
     cut: Ints
-    command: Poses
+    command: Placed
+    correction: Floats
     deflection: Floats
     before: Floats
     before_angle: Floats
@@ -55,7 +59,7 @@ def correct(task: Task) -> Result:
     larger than the cell allows (COR002).
     """
     path, track, n = task.toolpath, task.track, len(task.toolpath)
-    cartesian = path.known & ~np.isfinite(path.axes).all(axis=1)
+    cartesian = path.known & ~path.on_axes
     forced = task.carries
     scope = forced if task.process else forced | cartesian
     # In air every motion stands for itself; a cut stands and falls as a whole.
@@ -71,83 +75,186 @@ def correct(task: Task) -> Result:
     for row in np.flatnonzero(on & scope & spread(off, cut)):
         why.setdefault(int(row), _at(task, int(row), "COR004", "COMPENSATE is switched inside this cut"))
 
-    # What the force does, everywhere it can be predicted; then the correction, where it may be made.
-    seen = scope & cartesian & (track.status >= 0) & track.reachable
-    rows = np.flatnonzero(seen)
-    goal = task.goal(rows, task.wanted[rows])
-    here = task.real(rows, task.wanted[rows], task.wrench[rows])
-    deflection, before, before_angle = np.full((n, 3), np.nan), np.full(n, np.nan), np.full(n, np.nan)
-    shift, turn = task.seen(rows, here.pose, goal)
-    shift[~here.settled], turn[~here.settled] = np.nan, np.nan
-    deflection[rows], before[rows] = shift, np.linalg.norm(shift, axis=1)
-    before_angle[rows] = np.linalg.norm(turn, axis=1)
+    # What the force does, everywhere it can be predicted; the correction, where it may be made.
+    seen = np.flatnonzero(scope & cartesian & (track.status >= 0) & track.reachable)
+    may = on & ~spread(_in(why, n), cut)
+    found = _Found(n)
+    for block in in_blocks(lambda part: _tried(task, seen[part], may[seen[part]]), len(seen)):
+        found.put(block)
+    found.judged(task, why, findings)
+    keeps = found.tried & ~spread(_in(why, n), cut)
 
-    may = seen & on & ~spread(_in(why, n), cut)
-    rows_may = np.flatnonzero(may)
-    inside = np.searchsorted(rows, rows_may)
-    done = task.command(rows_may, task.wanted[rows_may], task.wrench[rows_may], goal[inside])
-    _judge(task, done.reachable, done.settled, done.converged, done.q, rows_may, why, findings)
-    keeps = may & ~spread(_in(why, n), cut)
-    chosen = keeps[rows_may]
-
-    rotation, position = task.wanted.rotation.copy(), task.wanted.position.copy()
-    share = partly(task.wanted[rows_may], done.command, task.gain)
-    moved = rows_may[chosen]
-    rotation[moved], position[moved] = share.rotation[chosen], share.position[chosen]
-    command = Poses(rotation, position)
-    size = np.linalg.norm(position - task.wanted.position, axis=1)
+    shift, turn = task.gain * found.shift, task.gain * found.turn
+    shift[~keeps], turn[~keeps] = 0.0, 0.0
+    size = np.linalg.norm(shift, axis=1)
     _refuse(
         task,
-        np.nan_to_num(size) > task.max_correction,
+        size > task.max_correction,
         "COR002",
-        f"the correction is {np.nanmax(size, initial=0.0) / MM:.2f} mm,"
+        f"the correction is {size.max(initial=0.0) / MM:.2f} mm,"
         f" more than max_correction ({task.max_correction / MM:g} mm)",
         "check force, base and tool; if it is meant, raise max_correction in the cell",
     )
 
-    state = np.full(n, State.AIR, np.int64)
+    state = np.full(n, State.AIR, np.int8)
     state[scope] = State.LEFT
     state[off] = State.OFF
     state[keeps] = State.CORRECTED
-    # What the mirror begins with is a first step from the wanted pose.
-    iterations, history = np.zeros(n, np.int64), np.full((len(done.history) + 1, n), np.nan)
-    iterations[rows_may], history[0, rows_may], history[1:, rows_may] = (
-        done.iterations + 1,
-        before[rows_may],
-        done.history,
-    )
     findings += left_findings(task.file, path, cut, why)
-    _warn_sides(task, done.q, rows_may, keeps, findings)
-    _warn_singular(task, seen & forced, findings)
-    after, after_angle = before.copy(), before_angle.copy()
-    after[moved], after_angle[moved] = done.error[chosen], done.angle[chosen]
+    found.warn_sides(task, keeps, findings)
+    _warn_singular(task, seen[forced[seen]], findings)
+    moved = np.flatnonzero(keeps)
+    after, after_angle = found.before.copy(), found.before_angle.copy()
+    after[moved], after_angle[moved] = found.error[moved], found.angle[moved]
     result = Result(
         state,
         cut,
-        command,
-        deflection,
-        before,
-        before_angle,
+        PoseRows(n, lambda rows: _moved(task.wanted[rows], shift[rows], turn[rows])),
+        shift,
+        found.deflection,
+        found.before,
+        found.before_angle,
         after,
         after_angle,
-        iterations,
-        history,
+        found.iterations,
+        found.history,
         tuple(findings),
     )
     # What the mirror found holds for the whole correction, and where it corrects all that shows.
-    whole = task.gain == 1.0 and task.turns(moved, command.rotation[moved]) is None
-    return result if whole else with_residual(task, result, command)
+    whole = task.gain == 1.0 and task.turn_freely(moved)
+    return result if whole else with_residual(task, result, result.command)
 
 
-def with_residual(task: Task, result: Result, command: Poses) -> Result:
+def _moved(wanted: Poses, shift: Floats, turn: Floats) -> Poses:
+    """``wanted`` (K), shifted by (K, 3) [m] and turned by (K, 3) [rad] in place."""
+    return Poses(rotation_from_vector(turn) @ wanted.rotation, wanted.position + shift)
+
+
+def with_residual(task: Task, result: Result, command: Placed) -> Result:
     """The result with its residual predicted for ``command``, the poses as they were really written."""
     rows = np.flatnonzero(result.corrected)
-    here = task.real(rows, command[rows], task.wrench[rows])
-    shift, turn = task.seen(rows, here.pose, task.goal(rows, task.wanted[rows]))
     after, after_angle = result.before.copy(), result.before_angle.copy()
-    after[rows] = np.where(here.reachable & here.settled, np.linalg.norm(shift, axis=1), np.inf)
-    after_angle[rows] = np.linalg.norm(turn, axis=1)
-    return replace(result, command=command, after=after, after_angle=after_angle)
+    correction = result.correction.copy()
+
+    def predicted(part: slice) -> None:
+        at = rows[part]
+        there, wanted = command[at], task.wanted[at]
+        here = task.real(at, there, task.wrench[at])
+        shift, turn = task.seen(at, here.pose, task.goal(at, wanted))
+        after[at] = np.where(here.reachable & here.settled, np.linalg.norm(shift, axis=1), np.inf)
+        after_angle[at] = np.linalg.norm(turn, axis=1)
+        correction[at] = there.position - wanted.position
+
+    for _ in in_blocks(predicted, len(rows)):
+        pass
+    return replace(result, command=command, correction=correction, after=after, after_angle=after_angle)
+
+
+class _Block(NamedTuple):
+    """What a block of motions is found to do.  rows (K,): all that were predicted, with deflection (K, 3) [m], before
+    (K,) [m] and before_angle [rad]; tried (T,): those of them that were corrected, by shift (T, 3) [m] and turn (T, 3)
+    [rad]; crossed (T,): to the other side of what S or T states; beyond (T,): the limits of an axis."""
+
+    rows: Ints
+    deflection: Floats
+    before: Floats
+    before_angle: Floats
+    tried: Ints
+    shift: Floats
+    turn: Floats
+    done: Correction
+    crossed: Bools
+    beyond: Bools
+
+
+def _tried(task: Task, rows: Ints, may: Bools) -> _Block:
+    """Predict the motions ``rows`` (K,), and correct those that ``may`` (K,) be."""
+    wanted, wrench = task.wanted[rows], task.wrench[rows]
+    goal = task.goal(rows, wanted)
+    here = task.real(rows, wanted, wrench)
+    shift, turn = task.seen(rows, here.pose, goal)
+    shift[~here.settled], turn[~here.settled] = np.nan, np.nan
+    tried, wanted = rows[may], wanted[may]
+    done = task.command(tried, wanted, wrench[may], goal[may])
+    path, robot = task.toolpath, task.model.robot
+    low, high = robot.limits.T
+    crossed = ((path.status[tried] >= 0) | (path.turn[tried] >= 0)) & (path.kind[tried] == Kind.PTP)
+    if crossed.any():
+        one, two = sides(robot, task.track.q[tried]), sides(robot, done.q)
+        crossed &= (one[0] != two[0]) | (one[1] != two[1])
+    return _Block(
+        rows,
+        shift,
+        np.linalg.norm(shift, axis=1),
+        np.linalg.norm(turn, axis=1),
+        tried,
+        *difference(done.command, wanted),
+        done,
+        crossed,
+        ((done.q < low) | (done.q > high)).any(axis=1),
+    )
+
+
+class _Found:
+    """What was found of all N motions, as in ``Result``; shift, turn (N, 3): whole corrections; tried (N,): those
+    that were corrected."""
+
+    def __init__(self, n: int) -> None:
+        self.tried = np.zeros(n, bool)
+        self.deflection = np.full((n, 3), np.nan)
+        self.before, self.before_angle = np.full(n, np.nan), np.full(n, np.nan)
+        self.shift, self.turn = np.zeros((n, 3)), np.zeros((n, 3))
+        self.error, self.angle = np.full(n, np.nan), np.full(n, np.nan)
+        self.iterations = np.zeros(n, np.int8)
+        self.history = np.full((1, n), np.nan)
+        self.failed: dict[str, list[Ints]] = {}
+        self.crossed: list[int] = []
+        self.axes: Floats = np.empty((0, 0))
+
+    def put(self, block: _Block) -> None:
+        """Takes what was found of a block."""
+        rows, tried, done = block.rows, block.tried, block.done
+        self.deflection[rows], self.before[rows] = block.deflection, block.before
+        self.before_angle[rows] = block.before_angle
+        self.tried[tried] = True
+        self.shift[tried], self.turn[tried] = block.shift, block.turn
+        self.error[tried], self.angle[tried] = done.error, done.angle
+        # What the mirror begins with is a first step from the wanted pose.
+        self.iterations[tried] = done.iterations + 1
+        more = len(done.history) + 1 - len(self.history)
+        if more > 0:
+            self.history = np.concatenate([self.history, np.full((more, self.history.shape[1]), np.nan)])
+        self.history[0, tried] = self.before[tried]
+        self.history[1 : len(done.history) + 1, tried] = done.history
+        self.crossed += tried[block.crossed].tolist()
+        for code, failed in (
+            ("COR009", ~done.reachable),
+            ("MOD002", ~done.settled),
+            ("COR001", ~done.converged),
+            ("COR008", block.beyond),
+        ):
+            self.failed.setdefault(code, []).append(tried[failed])
+        if block.beyond.any() and not len(self.axes):
+            self.axes = done.q[block.beyond][:1]
+
+    def judged(self, task: Task, why: dict[int, Finding], findings: list[Finding]) -> None:
+        """Notes why motions that were tried can not be corrected after all."""
+        words = {
+            "COR009": "the correction leads out of reach",
+            "MOD002": "the robot has no stable rest under this force",
+            "COR001": "the correction does not settle",
+            "COR008": "the correction brings " + (_axis_beyond(task, self.axes[0]) if len(self.axes) else ""),
+        }
+        for code, parts in self.failed.items():
+            rows = np.concatenate(parts)
+            _note(task, why, findings, rows[~_in(why, len(self.before))[rows]], code, words[code])
+
+    def warn_sides(self, task: Task, keeps: Bools, findings: list[Finding]) -> None:
+        """S and T stand verbatim in the text: they must still be those of the corrected pose."""
+        crossed = np.array([row for row in self.crossed if keeps[row]], np.int64)
+        if len(crossed):
+            message = "the corrected pose crosses the side that S or T states" + _more(task, crossed)
+            findings.append(_at(task, int(crossed[0]), "KIN006", message))
 
 
 def _held(task: Task, scope: Bools, tried: Bools, findings: list[Finding]) -> dict[int, Finding]:
@@ -158,7 +265,7 @@ def _held(task: Task, scope: Bools, tried: Bools, findings: list[Finding]) -> di
         stop = path.refused.get(int(row)) or path.pinned.get(int(row))
         if stop is not None:
             why[int(row)] = stop
-    cartesian = path.known & ~np.isfinite(path.axes).all(axis=1)
+    cartesian = path.known & ~path.on_axes
     for row in np.flatnonzero(tried & ~cartesian):
         why.setdefault(int(row), _at(task, int(row), "COR003", "its target is not known"))
     free = tried & cartesian & ~_in(why, n)
@@ -178,68 +285,39 @@ def _held(task: Task, scope: Bools, tried: Bools, findings: list[Finding]) -> di
     )
     beyond = track.reachable & ~track.within
     mask = free & beyond
-    _note(task, why, findings, mask, "KIN002", _which_axis(task, track.q, mask))
-    mask = free & ~track.reachable
-    _note(task, why, findings, mask, "KIN005", "the programmed pose is out of reach")
-    air = path.known & ~scope
-    _note(task, {}, findings, air & ~track.reachable, "KIN005", "the programmed pose is out of reach")
-    _note(task, {}, findings, ~scope & beyond, "KIN005", _which_axis(task, track.q, ~scope & beyond))
+    _note(task, why, findings, np.flatnonzero(mask), "KIN002", _which_axis(task, mask))
+    rows = np.flatnonzero(free & ~track.reachable)
+    _note(task, why, findings, rows, "KIN005", "the programmed pose is out of reach")
+    rows = np.flatnonzero(path.known & ~scope & ~track.reachable)
+    _note(task, {}, findings, rows, "KIN005", "the programmed pose is out of reach")
+    mask = ~scope & beyond
+    _note(task, {}, findings, np.flatnonzero(mask), "KIN005", _which_axis(task, mask))
     return why
 
 
-def _which_axis(task: Task, q: Floats, mask: Bools) -> str:
+def _which_axis(task: Task, mask: Bools) -> str:
     """The axis that is farthest beyond its limits at the first motion of ``mask``, in words."""
-    if not mask.any():
-        return ""
-    row = int(np.argmax(mask))
+    return _axis_beyond(task, task.track.q[np.argmax(mask)]) if mask.any() else ""
+
+
+def _axis_beyond(task: Task, q: Floats) -> str:
+    """The axis of ``q`` (n,) that is farthest beyond its limits, in words."""
     low, high = task.model.robot.limits.T
-    axis = int(np.argmax(np.maximum(low - q[row], q[row] - high)))
+    axis = int(np.argmax(np.maximum(low - q, q - high)))
     joint = task.model.robot.joints[axis]
     word, unit = ("deg", DEG) if joint.kind == "revolute" else ("mm", MM)
     return (
-        f"{joint.name} at {q[row, axis] / unit:.1f} {word},"
+        f"{joint.name} at {q[axis] / unit:.1f} {word},"
         f" limits {low[axis] / unit:g} .. {high[axis] / unit:g} {word}"
     )
 
 
-def _judge(
-    task: Task,
-    reachable: Bools,
-    settled: Bools,
-    converged: Bools,
-    q: Floats,
-    rows: Ints,
-    why: dict[int, Finding],
-    findings: list[Finding],
-) -> None:
-    """Why motions that were tried can not be corrected after all."""
-    n = len(task.toolpath)
-    low, high = task.model.robot.limits.T
-    beyond = ((q < low) | (q > high)).any(axis=1)
-    axes = np.full((n, q.shape[1]), np.nan)
-    axes[rows] = q
-    struck = np.zeros(n, bool)
-    struck[rows[beyond]] = True
-    reasons = (
-        (~reachable, "COR009", "the correction leads out of reach"),
-        (~settled, "MOD002", "the robot has no stable rest under this force"),
-        (~converged, "COR001", "the correction does not settle"),
-        (beyond, "COR008", "the correction brings " + _which_axis(task, axes, struck)),
-    )
-    for failed, code, message in reasons:
-        mask = np.zeros(n, bool)
-        mask[rows[failed]] = True
-        _note(task, why, findings, mask & ~_in(why, n), code, message)
-
-
 def _note(
-    task: Task, why: dict[int, Finding], findings: list[Finding], mask: Bools, code: str, message: str
+    task: Task, why: dict[int, Finding], findings: list[Finding], rows: Ints, code: str, message: str
 ) -> None:
-    """Say it once for all motions of ``mask``, and remember it for each."""
-    rows = np.flatnonzero(mask)
-    for row in rows:
-        why[int(row)] = _at(task, int(row), code, message)
+    """Say it once for all ``rows``, and remember it for each."""
     if len(rows):
+        why.update(dict.fromkeys(rows.tolist(), _at(task, int(rows[0]), code, message)))
         findings.append(_at(task, int(rows[0]), code, message + _more(task, rows)))
 
 
@@ -249,23 +327,12 @@ def _refuse(task: Task, mask: Bools, code: str, message: str, help: str) -> None
         raise Refusal(_at(task, int(rows[0]), code, message + _more(task, rows), help))
 
 
-def _warn_sides(task: Task, q: Floats, rows: Ints, keeps: Bools, findings: list[Finding]) -> None:
-    """S and T stand verbatim in the text: they must still be those of the corrected pose."""
-    path = task.toolpath
-    kept = keeps[rows] & ((path.status[rows] >= 0) | (path.turn[rows] >= 0)) & (path.kind[rows] == Kind.PTP)
-    robot = task.model.robot
-    before, after = sides(robot, task.track.q[rows[kept]]), sides(robot, q[kept])
-    crossed = rows[kept][(before[0] != after[0]) | (before[1] != after[1])]
-    if len(crossed):
-        message = "the corrected pose crosses the side that S or T states" + _more(task, crossed)
-        findings.append(_at(task, int(crossed[0]), "KIN006", message))
-
-
-def _warn_singular(task: Task, mask: Bools, findings: list[Finding]) -> None:
-    rows = np.flatnonzero(mask)
-    close = rows[near_singular(task.model.robot, task.track.q[rows])]
+def _warn_singular(task: Task, rows: Ints, findings: list[Finding]) -> None:
+    robot, q = task.model.robot, task.track.q
+    parts = [rows[part][near_singular(robot, q[rows[part]])] for part in blocks(len(rows))]
+    close = np.concatenate([rows[:0], *parts])
     if len(close):
-        message = singular_words(task.model.robot) + _more(task, close)
+        message = singular_words(robot) + _more(task, close)
         findings.append(_at(task, int(close[0]), "KIN003", message))
 
 

@@ -22,7 +22,7 @@ def cuts_of(in_scope: Bools, runs: Bools | None = None) -> Ints:
     begins = in_scope & ~np.concatenate([[False], in_scope[:-1]])
     if runs is not None:
         begins[1:] |= in_scope[1:] & (runs[1:] != runs[:-1])
-    return np.where(in_scope, np.cumsum(begins) - 1, -1)
+    return np.where(in_scope, np.cumsum(begins, dtype=np.int32) - 1, -1)
 
 
 def spread(blocked: Bools, cut: Ints) -> Bools:
@@ -61,20 +61,24 @@ def switch_findings(file: str, toolpath: Toolpath) -> list[Finding]:
 def left_findings(file: str, toolpath: Toolpath, cut: Ints, why: Mapping[int, Finding]) -> list[Finding]:
     """One finding for every cut that is left as it was, with the first reason in it."""
     findings = []
-    for number in np.unique(cut[sorted(why)]) if why else ():
-        if number < 0:
+    inside = np.flatnonzero(cut >= 0)
+    bounds = np.searchsorted(cut[inside], np.arange(cut.max(initial=-1) + 2))
+    told = -1
+    for row in sorted(why):
+        if cut[row] <= told:  # of another cut it would be a larger number
             continue
-        rows = np.flatnonzero(cut == number)
-        first = next(int(row) for row in rows if int(row) in why)
-        reason = why[first]
-        place = f"line {toolpath.line[first]}: " if toolpath.line[first] else ""
+        told = int(cut[row])
+        first, last = inside[bounds[told]], inside[bounds[told + 1] - 1]
+        reason = why[row]
+        place = f"line {toolpath.line[row]}: " if toolpath.line[row] else ""
         findings.append(
             Finding(
                 "COR003",
-                f"the cut of lines {toolpath.line[rows[0]]} to {toolpath.line[rows[-1]]} ({len(rows)} motions)"
+                f"the cut of lines {toolpath.line[first]} to {toolpath.line[last]}"
+                f" ({bounds[told + 1] - bounds[told]} motions)"
                 f" is left as it was; {place}{reason.code} {reason.message}",
                 file,
-                int(toolpath.line[rows[0]]),
+                int(toolpath.line[first]),
                 help=reason.help,
             )
         )

@@ -5,17 +5,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.blocks import ROWS, in_blocks
 from postproc.compensation.between import Pieces, errors_between
 from postproc.compensation.correct import Result, correct
 from postproc.compensation.mirror import partly
 from postproc.compensation.task import Task
 from postproc.compensation.ways import begins
 from postproc.findings import Finding
-from postproc.geometry import Poses
+from postproc.geometry import Placed, PoseRows, Poses
 from postproc.toolpath import Kind, Role
 from postproc.units import DEG, MM
 
@@ -50,7 +52,7 @@ class Limits:
 class Division:
     """M motions of the output for the N of the input, see ``Plan``.
 
-    source, role (M,); share (M,): of the source's way, where the motion ends; command: TCP poses in the robot base,
+    source, role (M,); share (M,): of the source's way, where the motion ends; command (M): TCP poses in the robot base,
     NaN where a target is not known; centre, normal (M, 3), sweep (M,): corrected arcs in the robot base, NaN for all
     others; moved (M,): the motion is another than in the input.  held: rows that can not be corrected after all, and
     why.
@@ -59,7 +61,7 @@ class Division:
     source: Ints
     role: Ints
     share: Floats
-    command: Poses
+    command: Placed
     centre: Floats
     normal: Floats
     sweep: Floats
@@ -73,6 +75,12 @@ class Division:
     @property
     def own(self) -> Bools:
         return np.asarray(self.role == Role.OWN)
+
+    @cached_property
+    def own_command(self) -> PoseRows:
+        """(N) where the motions of the input end."""
+        own = np.flatnonzero(self.own)
+        return PoseRows(len(own), lambda rows: self.command[own[rows]])
 
     @property
     def links(self) -> Bools:
@@ -97,8 +105,9 @@ def divide(task: Task, result: Result, limits: Limits) -> Division:
 
 
 class _Search:
-    """rows (R,): corrected motions whose way is known; of each the start (TCP command where its way begins), whether a
-    link leads there, and the number of pieces."""
+    """rows (R,): corrected motions whose way is known; of each whether a link leads to where its way begins, and the
+    number of pieces.  start_at (R,): the place among ``starts`` of the TCP command where a way begins that may get a
+    link, -1 of all others: they begin where the motion before them ends."""
 
     def __init__(self, task: Task, full: Result, limits: Limits) -> None:
         self.task, self.full, self.limits = task, full, limits
@@ -108,11 +117,12 @@ class _Search:
         self.entry = begins(full.command, path, task.tool, task.model.robot, task.track)
         self.free = np.full(self.n, not limits.keep)
         self.free[list(path.whole)] = False
-        self.start = self.entry[self.rows]
+        self.start_at = np.full(len(self.rows), -1, np.int32)
+        self.starts = self.entry[:0]
         self.linked = np.zeros(len(self.rows), bool)
         self.back = np.zeros(self.n, bool)
         self.step = np.zeros(len(self.rows))
-        self.count = np.ones(len(self.rows), np.int64)
+        self.count = np.ones(len(self.rows), np.int32)
         self.least = self.count
         self.error = np.zeros(len(self.rows))
         self.held: dict[int, Finding] = {}
@@ -122,56 +132,55 @@ class _Search:
 
     def link(self) -> None:
         """Where the correction steps at the begin of a motion under force, a link leads to where its own one begins."""
-        task, rows = self.task, self.rows
-        own = self._own_begins()
-        shift, turn = task.off(rows, own, self.entry[rows])
-        self.step = np.maximum(
-            np.linalg.norm(shift, axis=1) / task.tolerance,
-            np.linalg.norm(turn, axis=1) / task.tolerance_angle,
+        task, rows, corrected = self.task, self.rows, self.full.corrected
+        other = np.flatnonzero(
+            np.concatenate(
+                [rows[:0] > 0, *in_blocks(lambda part: task.steps(rows[part], corrected), len(rows))]
+            )
         )
+        self.starts = Poses(np.empty((len(other), 3, 3)), np.empty((len(other), 3)))
+        self.start_at[other] = np.arange(len(other))
+
+        def stepped(part: slice) -> None:
+            at = rows[other[part]]
+            own = self._commands(at, np.zeros(len(at)), "where this motion begins")
+            shift, turn = task.off(at, own, self.entry[at])
+            self.starts.put(part, own)
+            self.step[other[part]] = np.maximum(
+                np.linalg.norm(shift, axis=1) / task.tolerance,
+                np.linalg.norm(turn, axis=1) / task.tolerance_angle,
+            )
+
+        for _ in in_blocks(stepped, len(other)):
+            pass
         may = self.free[rows] & task.carries[rows]
-        self._start_at(own, may & (self.step > ROOM))
+        self.linked = may & (self.step > ROOM)
         some = np.flatnonzero(may & (self.step > STEP) & ~self.linked)
         if len(some):
-            late = np.zeros(len(rows), bool)
-            late[some] = self._errors(some, self._least()[some]) > 1.0
-            self._start_at(own, late)
+            self.linked[some[self._errors(some, self._least()[some]) > 1.0]] = True
         self._link_back()
 
-    def _start_at(self, own: Poses, linked: Bools) -> None:
-        self.linked = self.linked | linked
-        self.start = Poses(
-            np.where(linked[:, None, None], own.rotation, self.start.rotation),
-            np.where(linked[:, None], own.position, self.start.position),
-        )
+    def _start(self, chosen: Ints) -> Poses:
+        """The commands (A) where the ways of the motions ``chosen`` (A,) begin: behind a link, or where the motion
+        before them ends."""
+        found = self.entry[self.rows[chosen]]
+        linked = np.flatnonzero(self.linked[chosen])
+        if len(linked):
+            found.put(linked, self.starts[self.start_at[chosen[linked]]])
+        return found
 
     def _least(self) -> Ints:
         """(R,) pieces that a way has at least."""
         sweep = np.nan_to_num(self.task.ways.sweep[self.rows])
-        return np.where(sweep > WIDEST, np.ceil(sweep / np.pi), 1).astype(np.int64)
-
-    def _own_begins(self) -> Poses:
-        """The commands (R) by which the tool is where the ways begin, under the force of that motion there."""
-        task, rows = self.task, self.rows
-        wrench = task.force.along(rows, np.zeros(len(rows)))
-        found = Poses(self.start.rotation.copy(), self.start.position.copy())
-        other = np.flatnonzero(task.steps(rows, self.full.corrected))
-        if len(other):
-            at = rows[other]
-            begin = task.ways.begin[at]
-            done = task.command(at, begin, wrench[other], task.goal(at, begin))
-            bad = ~(done.reachable & done.settled & done.converged)
-            self._hold(at[bad], "COR009", "where this motion begins the correction leads out of reach")
-            found.rotation[other], found.position[other] = done.command.rotation, done.command.position
-        return found
+        return np.where(sweep > WIDEST, np.ceil(sweep / np.pi), 1).astype(np.int32)
 
     def _link_back(self) -> None:
         """An arc that is not corrected begins where it was programmed, even if the motion before it ends elsewhere."""
-        path, full = self.task.toolpath, self.full
+        path, full, ways = self.task.toolpath, self.full, self.task.ways
         arcs = np.flatnonzero((path.kind == Kind.CIRC) & ~full.corrected)
         arcs = arcs[arcs > 0]
-        arcs = arcs[full.corrected[arcs - 1] & np.isfinite(self.task.ways.begin.position[arcs, 0])]
-        away = np.linalg.norm(self.entry.position[arcs] - self.task.ways.begin.position[arcs], axis=1)
+        arcs = arcs[full.corrected[arcs - 1]]
+        away = np.linalg.norm(self.entry[arcs].position - ways.begin[arcs].position, axis=1)
         arcs = arcs[away > SAME]
         self.back[arcs[self.free[arcs]]] = True
         self._hold(
@@ -196,10 +205,11 @@ class _Search:
             self._hold(
                 rows[(least > 1) & ~can], "COR013", "an arc of nearly a full turn can not be divided here"
             )
-        most = np.maximum(least, np.floor(ways.length[rows] / self.limits.min_segment).astype(np.int64))
         # A motion that only turns the tool has no length to divide.
-        most = np.where(can, np.minimum(most, max(1, int(self.limits.max_growth * self.n)) + least), least)
-        fails, holds = least - 1, np.zeros(len(rows), np.int64)
+        most = np.floor(ways.length[rows] / self.limits.min_segment)
+        most = np.minimum(most, max(1, int(self.limits.max_growth * self.n)) + least)
+        most = np.where(can, np.maximum(least, most), least).astype(np.int32)
+        fails, holds = least - 1, np.zeros(len(rows), np.int32)
         ratio = np.zeros(len(rows))
         self.count, active = least.copy(), np.arange(len(rows))
         while len(active):
@@ -217,7 +227,7 @@ class _Search:
             power = 1.0 / np.where(arc[active], _ORDER[True], _ORDER[False])
             guess = np.ceil(np.maximum(fails[active], 1) * np.minimum(ratio[active], 1e6) ** power)
             top = np.where(holds[active] > 0, holds[active] - 1, most[active])
-            self.count[active] = np.clip(guess, fails[active] + 1, top).astype(np.int64)
+            self.count[active] = np.clip(guess, fails[active] + 1, top).astype(np.int32)
 
     def ration(self) -> None:
         """Where all together are more than may be inserted: links first, then points, the largest errors before."""
@@ -231,12 +241,7 @@ class _Search:
         unlinked = self.linked & ~paid
         more = np.where(unlinked, 0, self.count - self.least)
         self.count = self.least + self._first(more, self.error, spare - int(paid.sum()))
-        entry = self.entry[self.rows]
         self.linked = paid
-        self.start = Poses(
-            np.where(unlinked[:, None, None], entry.rotation, self.start.rotation),
-            np.where(unlinked[:, None], entry.position, self.start.position),
-        )
         left = np.flatnonzero(self.linked + self.count - self.least < wanted)
         first = int(self.rows[left[np.argmax(np.maximum(self.step, self.error)[left])]])
         self.findings.append(
@@ -262,12 +267,16 @@ class _Search:
     def _errors(self, chosen: Ints, count: Ints) -> Floats:
         """(A,) what is left between the points of the motions ``chosen`` (A,) in ``count`` (A,) even pieces, in parts
         of what may be left."""
-        pieces, owner = self._pieces(chosen, count)
-        off, angle = errors_between(self.task, pieces)
-        size = np.maximum(off / self.task.tolerance, angle / self.task.tolerance_angle) / ROOM
-        largest = np.zeros(len(chosen))
-        np.maximum.at(largest, owner, size)
-        return largest
+
+        def largest(part: slice) -> Floats:
+            pieces, owner = self._pieces(chosen[part], count[part])
+            off, angle = errors_between(self.task, pieces)
+            size = np.maximum(off / self.task.tolerance, angle / self.task.tolerance_angle) / ROOM
+            found = np.zeros(len(count[part]))
+            np.maximum.at(found, owner, size)
+            return found
+
+        return np.concatenate([np.empty(0), *in_blocks(largest, len(chosen), _rows(count))])
 
     def _pieces(self, chosen: Ints, count: Ints) -> tuple[Pieces, Ints]:
         """The pieces of the motions ``chosen``, and the place in ``chosen`` of each."""
@@ -275,18 +284,17 @@ class _Search:
         owner = np.repeat(np.arange(len(rows)), count)
         number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
         first, last = number / count[owner], (number + 1) / count[owner]
-        final = number + 1 == count[owner]
         at = rows[owner]
-        end = self._copied(self.full.command[at])
-        self._aim(end, np.flatnonzero(~final), at, last)
-        begin = self._copied(self.start[chosen[owner]])
+        end = self.full.command[at]
+        inner = np.flatnonzero(number + 1 < count[owner])
+        end.put(inner, self._commands(at[inner], last[inner]))
+        begin = self._start(chosen[owner])
         later = np.flatnonzero(number > 0)
-        begin.rotation[later], begin.position[later] = end.rotation[later - 1], end.position[later - 1]
+        begin.put(later, end[later - 1])
         pieces = Pieces.straight(at, first, last, begin, end)
         bent = np.flatnonzero(self.task.ways.arc[at])
         if len(bent):
-            via = self._copied(self.task.ways.at(at[bent], 0.5 * (first + last)[bent]))
-            self._aim(via, np.arange(len(bent)), at[bent], 0.5 * (first + last)[bent])
+            via = self._commands(at[bent], 0.5 * (first + last)[bent])
             normal = _normals(self.task, at[bent])
             arcs = Pieces.round(at[bent], first[bent], last[bent], begin[bent], via, end[bent], normal)
             for name in ("centre", "normal", "sweep"):
@@ -295,88 +303,123 @@ class _Search:
                 pieces = replace(pieces, **{name: values})
         return pieces, owner
 
-    def _aim(self, poses: Poses, places: Ints, rows: Ints, share: Floats) -> None:
-        """Sets ``poses`` at ``places`` to the commands for the shares of the ways there."""
-        if not len(places):
-            return
-        at, along = rows[places], share[places]
-        wanted = self.task.ways.at(at, along)
-        done = self.task.command(at, wanted, self.task.force.along(at, along), self.task.goal(at, wanted))
+    def _commands(self, rows: Ints, share: Floats, where: str = "on its way") -> Poses:
+        """The commands (K) by which the tool is at the shares (K,) of the ways of ``rows`` (K,), under the force
+        there."""
+        wanted = self.task.ways.at(rows, share)
+        if not len(rows):
+            return wanted
+        done = self.task.command(
+            rows, wanted, self.task.force.along(rows, share), self.task.goal(rows, wanted)
+        )
         bad = ~(done.reachable & done.settled & done.converged)
-        self._hold(at[bad], "COR009", "on its way the correction leads out of reach")
-        poses.rotation[places], poses.position[places] = done.command.rotation, done.command.position
-
-    @staticmethod
-    def _copied(poses: Poses) -> Poses:
-        return Poses(poses.rotation.copy(), poses.position.copy())
+        self._hold(rows[bad], "COR009", f"{where} the correction leads out of reach")
+        return done.command
 
     # the output
 
     def division(self) -> Division:
         task, n = self.task, self.n
-        pieces, _ = self._pieces(np.arange(len(self.rows)), self.count)
-        lost = self.task.ways.arc[pieces.rows] & ~np.isfinite(pieces.sweep)
-        self._hold(pieces.rows[lost], "COR013", "the corrected points of this arc lie on no circle")
-        count, linked = np.ones(n, np.int64), self.back.copy()
+        count, linked = np.ones(n, np.int32), self.back.copy()
         count[self.rows] = self.count
         linked[self.rows] = self.linked
         total = count + linked
-        source = np.repeat(np.arange(n), total)
-        number = np.arange(len(source)) - np.repeat(np.cumsum(total) - total, total)
+        source = np.repeat(np.arange(n, dtype=np.int32), total)
+        begin = np.cumsum(total) - total  # of the motions of each row
+        number = np.arange(len(source)) - begin[source]
         is_link = linked[source] & (number == 0)
-        role = np.where(is_link, Role.LINK, np.where(number + 1 == total[source], Role.OWN, Role.PIECE))
+        is_own = number + 1 == total[source]
+        role = np.where(is_link, Role.LINK, np.where(is_own, Role.OWN, Role.PIECE)).astype(np.int8)
         share = np.where(is_link, 0.0, (number + 1 - linked[source]) / count[source])
+        del number
 
-        command = self._copied(self.full.command[source])
-        corrected = np.zeros(n, bool)
-        corrected[self.rows] = True
-        divided = np.flatnonzero(corrected[source] & ~is_link)  # in the order of ``pieces``
-        command.rotation[divided], command.position[divided] = pieces.end.rotation, pieces.end.position
-        to = np.flatnonzero(is_link)
-        starts = self.task.ways.begin[source[to]]
-        mine = np.searchsorted(self.rows, source[to])
-        own = np.flatnonzero(corrected[source[to]])
-        starts = self._copied(starts)
-        starts.rotation[own] = self.start.rotation[mine[own]]
-        starts.position[own] = self.start.position[mine[own]]
-        command.rotation[to], command.position[to] = starts.rotation, starts.position
-        centre, normal = np.full((len(source), 3), np.nan), np.full((len(source), 3), np.nan)
-        sweep = np.full(len(source), np.nan)
-        centre[divided], normal[divided], sweep[divided] = pieces.centre, pieces.normal, pieces.sweep
-        moved = self.full.corrected[source] | is_link
-        found = Division(
-            source, role, share, command, centre, normal, sweep, moved, tuple(self.findings), self.held
+        inserted = np.flatnonzero(~is_own)
+        there = Poses(np.empty((len(inserted), 3, 3)), np.empty((len(inserted), 3)))
+        links = np.flatnonzero(is_link[inserted])
+        to = source[inserted[links]]
+        there.put(links, task.ways.begin[to])
+        mine = np.searchsorted(self.rows, to)
+        own = np.flatnonzero(self.full.corrected[to])
+        there.put(links[own], self.starts[self.start_at[mine[own]]])
+
+        arc = task.ways.arc[self.rows]
+        none = np.broadcast_to(np.nan, (len(source), 3))
+        ways = [none, none, none[:, 0]]
+        if arc.any():
+            ways = [way.copy() for way in ways]
+        chosen = np.flatnonzero((self.count > 1) | arc)
+        first = begin + linked
+
+        def divided(part: slice) -> None:
+            pieces, owner = self._pieces(chosen[part], self.count[chosen[part]])
+            lost = task.ways.arc[pieces.rows] & ~np.isfinite(pieces.sweep)
+            self._hold(pieces.rows[lost], "COR013", "the corrected points of this arc lie on no circle")
+            each = self.count[chosen[part]]
+            number = np.arange(len(owner)) - np.repeat(np.cumsum(each) - each, each)
+            place = first[pieces.rows] + number
+            inner = np.flatnonzero(number + 1 < each[owner])
+            there.put(np.searchsorted(inserted, place[inner]), pieces.end[inner])
+            if arc.any():
+                for way, values in zip(ways, (pieces.centre, pieces.normal, pieces.sweep), strict=True):
+                    way[place] = values
+
+        for _ in in_blocks(divided, len(chosen), _rows(self.count[chosen])):
+            pass
+
+        def command(rows: Ints) -> Poses:
+            found = self.full.command[source[rows]]
+            added = np.flatnonzero(~is_own[rows])
+            if len(added):
+                found.put(added, there[np.searchsorted(inserted, rows[added])])
+            return found
+
+        division = Division(
+            source,
+            role,
+            share,
+            PoseRows(len(source), command),
+            ways[0],
+            ways[1],
+            ways[2],
+            self.full.corrected[source] | is_link,
+            tuple(self.findings),
+            dict(sorted(self.held.items())),
         )
-        return found if task.gain == 1.0 else _scaled(task, found)
+        return division if task.gain == 1.0 else _scaled(task, division)
+
+
+def _rows(count: Ints) -> int:
+    """Motions of a block whose ``count`` (A,) pieces are about as many as the rows of one."""
+    return max(1, int(ROWS * len(count) / max(int(count.sum()), 1)))
 
 
 def _normals(task: Task, rows: Ints) -> Floats:
     """(K, 3) about which the arcs ``rows`` (K,) have to turn; NaN where any plane will do."""
-    return np.where(task.toolpath.any_plane[rows, None], np.nan, task.ways.normal[rows])
+    return np.where(task.toolpath.any_plane[rows, None], np.nan, task.ways.circles(rows)[1])
 
 
 def _scaled(task: Task, division: Division) -> Division:
     """The division with the share ``gain`` of every correction."""
-    rows = np.flatnonzero(division.moved)
-    source = division.source[rows]
-    ways = task.ways
-    wanted = Poses(task.wanted.rotation[source].copy(), task.wanted.position[source].copy())
-    on_way = np.flatnonzero(ways.known[source])
-    there = ways.at(source[on_way], division.share[rows][on_way])
-    wanted.rotation[on_way], wanted.position[on_way] = there.rotation, there.position
-    share = partly(wanted, division.command[rows], task.gain)
-    command = Poses(division.command.rotation.copy(), division.command.position.copy())
-    command.rotation[rows], command.position[rows] = share.rotation, share.position
-    scaled = replace(division, command=command)
+    source, ways = division.source, task.ways
+
+    def command(rows: Ints) -> Poses:
+        found = division.command[rows]
+        moved = np.flatnonzero(division.moved[rows])
+        at, share = source[rows[moved]], division.share[rows[moved]]
+        wanted = task.wanted[at].copy()
+        on_way = np.flatnonzero(ways.known[at])
+        wanted.put(on_way, ways.at(at[on_way], share[on_way]))
+        found.put(moved, partly(wanted, found[moved], task.gain))
+        return found
+
+    scaled = replace(division, command=PoseRows(len(division), command))
     bent = np.flatnonzero(np.isfinite(division.sweep))
     if not len(bent):
         return scaled
-    before, after = made(task, division), made(task, scaled)
-    middle = 0.5 * (before.first + before.last)[bent]
-    wanted = ways.at(division.source[bent], middle)
-    via = partly(wanted, before[bent].at(np.full(len(bent), 0.5)), task.gain)
-    normal = _normals(task, division.source[bent])
-    part = after[bent]
+    before, part = made(task, division, bent), made(task, scaled, bent)
+    wanted = ways.at(source[bent], 0.5 * (before.first + before.last))
+    via = partly(wanted, before.at(np.full(len(bent), 0.5)), task.gain)
+    normal = _normals(task, source[bent])
     arcs = Pieces.round(part.rows, part.first, part.last, part.begin, via, part.end, normal)
     for name in ("centre", "normal", "sweep"):
         values = getattr(scaled, name).copy()
@@ -385,26 +428,21 @@ def _scaled(task: Task, division: Division) -> Division:
     return scaled
 
 
-def made(task: Task, division: Division) -> Pieces:
-    """The M motions of a division as the controller makes them, links among them."""
-    source, m = division.source, len(division)
-    own = np.flatnonzero(division.own)
-    entry = begins(division.command[own], task.toolpath, task.tool, task.model.robot, task.track)
-    rotation, position = entry.rotation[source], entry.position[source]
-    inner = np.flatnonzero(source[1:] == source[:-1]) + 1
-    rotation[inner], position[inner] = (
-        division.command.rotation[inner - 1],
-        division.command.position[inner - 1],
-    )
-    first = np.zeros(m)
-    first[inner] = division.share[inner - 1]
+def made(task: Task, division: Division, motions: Ints) -> Pieces:
+    """Some ``motions`` (K,) of a division as the controller makes them, links among them."""
+    source = division.source[motions]
+    begin = begins(division.own_command, task.toolpath, task.tool, task.model.robot, task.track)[source]
+    first = np.zeros(len(motions))
+    inner = np.flatnonzero((motions > 0) & (division.source[motions - 1] == source))
+    begin.put(inner, division.command[motions[inner] - 1])
+    first[inner] = division.share[motions[inner] - 1]
     return Pieces(
         source,
         first,
-        division.share,
-        Poses(rotation, position),
-        division.command,
-        division.centre,
-        division.normal,
-        division.sweep,
+        division.share[motions],
+        begin,
+        division.command[motions],
+        division.centre[motions],
+        division.normal[motions],
+        division.sweep[motions],
     )

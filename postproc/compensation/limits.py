@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.blocks import in_blocks
 from postproc.compensation.correct import Result
 from postproc.compensation.division import Division
 from postproc.compensation.task import Task
@@ -28,83 +31,126 @@ def limits(task: Task, result: Result, division: Division) -> tuple[list[Finding
 
     Told is what the correction adds: what the program as it is does too is no news.
     """
-    source, robot = division.source, task.model.robot
-    rows = np.flatnonzero(division.moved & (task.track.status[source] >= 0))
+    rows = np.flatnonzero(division.moved & (task.track.status[division.source] >= 0))
     if not len(rows):
         return [], {}
-    at = source[rows]
-    flange = division.command[rows] @ task.tool[at].inverse()
-    q = inverse(robot.nominal, flange, task.track.status[at], task.track.q[at]).q
-    findings, held = _near(task, rows, at, q, division)
-    findings += _singular(task, at, q)
-    findings += _fast(task, division, rows, q)
-    findings += _rounded(task, result)
-    return findings, held
+    found = _Found(task, division)
+    for block in in_blocks(lambda part: _looked(task, division, rows, part), len(rows)):
+        found.put(block)
+    return [*found.findings(), *_rounded(task, result)], found.held
 
 
-def _near(
-    task: Task, rows: Ints, at: Ints, q: Floats, division: Division
-) -> tuple[list[Finding], dict[int, Finding]]:
-    """Axes that the correction brings near to a limit (told), and inserted motions beyond one (held)."""
+class _Block(NamedTuple):
+    """What is found of the motions ``rows`` (K,) of a division.  beyond (K,): an axis is, the number of which is axis
+    (K,); near (K, n) [rad, m]: what is left to a limit that the correction brings an axis close to, infinite elsewhere;
+    singular (K,): newly so; share (K, n): of the speed that an axis can have."""
+
+    rows: Ints
+    beyond: Bools
+    axis: Ints
+    near: Floats
+    singular: Bools
+    share: Floats
+
+
+def _looked(task: Task, division: Division, rows: Ints, part: slice) -> _Block:
+    """The motions ``rows[part]``; speeds need the one before them too."""
     robot = task.model.robot
+    more = part.start > 0
+    motions = rows[part.start - more : part.stop]
+    at, command = division.source[motions], division.command[motions]
+    flange = command @ task.tool.shared(at).inverse()
+    q = inverse(robot.nominal, flange, task.track.status[at], task.track.q[at]).q
+    share = _shares(task, division, motions, command.position, q)[int(more) :]
+    motions, at, q = motions[int(more) :], at[int(more) :], q[int(more) :]
     low, high = robot.limits.T
     before, after = (np.minimum(v - low, high - v) for v in (task.track.q[at], q))
-    held = {}
     beyond = (after < 0).any(axis=1)
-    for place in np.flatnonzero(beyond).tolist():
-        message = f"a motion inserted here brings {robot.joints[int(np.argmin(after[place]))].name} beyond its limit"
-        held[int(at[place])] = _at(task, int(at[place]), "COR008", message)
     close = np.array([CLOSE[joint.kind] for joint in robot.joints])
     near = (after < close) & (before >= close) & ~beyond[:, None]
-    if not near.any():
-        return [], held
-    place, axis = divmod(int(np.argmin(np.where(near, after, np.inf))), after.shape[1])
-    joint = robot.joints[axis]
-    unit, word = (DEG, "deg") if joint.kind == "revolute" else (MM, "mm")
-    message = f"the correction brings {joint.name} to {after[place, axis] / unit:.2f} {word} from its limit"
-    return [_at(task, int(at[place]), "KIN008", message + _more(near.any(axis=1)))], held
-
-
-def _singular(task: Task, at: Ints, q: Floats) -> list[Finding]:
-    robot = task.model.robot
-    new = near_singular(robot, q) & ~near_singular(robot, task.track.q[at])
-    if not new.any():
-        return []
-    message = f"the correction leads near to a singular posture ({singular_words(robot)})" + _more(new)
-    return [_at(task, int(at[np.argmax(new)]), "KIN003", message)]
-
-
-def _fast(task: Task, division: Division, rows: Ints, q: Floats) -> list[Finding]:
-    """Axes that have to move faster than they can, at the programmed feed between consecutive commands."""
-    speeds = task.model.robot.speeds
-    pairs = np.flatnonzero(rows[1:] == rows[:-1] + 1)
-    if not np.isfinite(speeds).any() or not len(pairs):
-        return []
-    first, last = rows[pairs], rows[pairs + 1]
-    feed = task.toolpath.feed[division.source[last]]
-    length = np.linalg.norm(division.command.position[last] - division.command.position[first], axis=1)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        pace = np.abs(q[pairs + 1] - q[pairs]) / (length / feed)[:, None]
-    share = np.where((length > _SHORT)[:, None] & np.isfinite(pace), pace / speeds, 0.0)
-    share = np.nan_to_num(share)
-    over = share.max(axis=1) > FAST
-    if not over.any():
-        return []
-    place = int(np.argmax(share.max(axis=1)))
-    axis = int(np.argmax(share[place]))
-    joint = task.model.robot.joints[axis]
-    unit, word = (DEG, "deg/s") if joint.kind == "revolute" else (MM, "mm/s")
-    message = (
-        f"{joint.name} has to move at {pace[place, axis] / unit:.1f} {word} at the programmed feed,"
-        f" it can {speeds[axis] / unit:g} {word}"
+    return _Block(
+        motions,
+        beyond,
+        np.argmin(after, axis=1),
+        np.where(near, after, np.inf),
+        near_singular(robot, q) & ~near_singular(robot, task.track.q[at]),
+        share,
     )
-    return [_at(task, int(division.source[last[place]]), "KIN009", message + _more(over))]
+
+
+def _shares(task: Task, division: Division, motions: Ints, place: Floats, q: Floats) -> Floats:
+    """(K, n) speeds that the axes ``q`` (K, n) need on the way from the command before, at the programmed feed, over
+    those that they can have; 0 where that is not known.  ``place`` (K, 3) [m] of the commands."""
+    speeds, share = task.model.robot.speeds, np.zeros(q.shape)
+    if len(motions) < 2 or not np.isfinite(speeds).any():
+        return share
+    feed = task.toolpath.feed[division.source[motions[1:]]]
+    length = np.linalg.norm(np.diff(place, axis=0), axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        pace = np.abs(np.diff(q, axis=0)) / (length / feed)[:, None]
+    sound = (np.diff(motions) == 1) & (length > _SHORT)
+    share[1:] = np.nan_to_num(np.where(sound[:, None] & np.isfinite(pace), pace / speeds, 0.0))
+    return share
+
+
+class _Found:
+    """What is told of all blocks: how many motions, and the worst of them."""
+
+    def __init__(self, task: Task, division: Division) -> None:
+        self.task, self.division = task, division
+        self.held: dict[int, Finding] = {}
+        self.near, self.nearest = 0, (np.inf, 0, 0)  # motions; what is left, motion, axis
+        self.singular, self.first = 0, 0
+        self.over, self.fastest = 0, (FAST, 0, 0)
+
+    def put(self, block: _Block) -> None:
+        joints, source = self.task.model.robot.joints, self.division.source
+        for k in np.flatnonzero(block.beyond).tolist():
+            message = f"a motion inserted here brings {joints[int(block.axis[k])].name} beyond its limit"
+            row = int(source[block.rows[k]])
+            self.held[row] = _at(self.task, row, "COR008", message)
+        k, axis = divmod(int(np.argmin(block.near)), block.near.shape[1])
+        self.near += int(np.isfinite(block.near).any(axis=1).sum())
+        self.nearest = min(self.nearest, (float(block.near[k, axis]), int(block.rows[k]), axis))
+        if block.singular.any() and not self.singular:
+            self.first = int(block.rows[np.argmax(block.singular)])
+        self.singular += int(block.singular.sum())
+        k, axis = divmod(int(np.argmax(block.share)), block.share.shape[1])
+        self.over += int((block.share.max(axis=1) > FAST).sum())
+        if block.share[k, axis] > self.fastest[0]:
+            self.fastest = float(block.share[k, axis]), int(block.rows[k]), axis
+
+    def findings(self) -> list[Finding]:
+        robot, told = self.task.model.robot, []
+        if self.near:
+            left, motion, axis = self.nearest
+            joint = robot.joints[axis]
+            unit, word = (DEG, "deg") if joint.kind == "revolute" else (MM, "mm")
+            message = f"the correction brings {joint.name} to {left / unit:.2f} {word} from its limit"
+            told.append(self._told("KIN008", motion, message, self.near))
+        if self.singular:
+            message = f"the correction leads near to a singular posture ({singular_words(robot)})"
+            told.append(self._told("KIN003", self.first, message, self.singular))
+        if self.over:
+            share, motion, axis = self.fastest
+            joint, speed = robot.joints[axis], robot.speeds[axis]
+            unit, word = (DEG, "deg/s") if joint.kind == "revolute" else (MM, "mm/s")
+            message = (
+                f"{joint.name} has to move at {share * speed / unit:.1f} {word} at the programmed feed,"
+                f" it can {speed / unit:g} {word}"
+            )
+            told.append(self._told("KIN009", motion, message, self.over))
+        return told
+
+    def _told(self, code: str, motion: int, message: str, count: int) -> Finding:
+        more = "" if count == 1 else f" ({count} motions)"
+        return _at(self.task, int(self.division.source[motion]), code, message + more)
 
 
 def _rounded(task: Task, result: Result) -> list[Finding]:
     """Corrected points that the controller rounds off by more than they were moved."""
     path = task.toolpath
-    size = np.linalg.norm(result.command.position - task.wanted.position, axis=1)
+    size = np.linalg.norm(result.correction, axis=1)
     rounds = result.corrected & ~(path.blend <= 0)
     more = rounds & ~(path.blend <= size)
     if not more.any():
@@ -116,11 +162,6 @@ def _rounded(task: Task, result: Result) -> list[Finding]:
         " there the controller passes beside them"
     )
     return [_at(task, int(np.argmax(more)), "COR015", message)]
-
-
-def _more(mask: Bools) -> str:
-    count = int(mask.sum())
-    return "" if count == 1 else f" ({count} motions)"
 
 
 def _at(task: Task, row: int, code: str, message: str) -> Finding:

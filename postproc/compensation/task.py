@@ -12,7 +12,7 @@ from postproc.compensation.mirror import Correction, Prediction, difference, mir
 from postproc.compensation.ways import Ways
 from postproc.effects import Conditions
 from postproc.forces import Wrenches
-from postproc.geometry import Poses
+from postproc.geometry import Placed, Poses
 from postproc.model import StiffnessModel
 from postproc.robot.inverse import inverse
 from postproc.robot.track import Track, nominal_flange
@@ -23,7 +23,7 @@ from postproc.toolpath import Toolpath
 class Task:
     """All that a correction needs, N motions.  Poses are in the robot base; NaN where a target is not known.
 
-    wanted: TCP targets; base, tool (N): the programmed base in the robot base, the TCP on the flange; force: the
+    wanted (N): TCP targets; base, tool (N): the programmed base in the robot base, the TCP on the flange; force: the
     wrench on the way of each motion; conditions (N): what else is known; ``process``: correct what the force does and
     leave what the robot does without it (a base that was touched off contains that); else everything is corrected.
     ``max_correction``, ``tolerance`` [m], ``tolerance_angle`` [rad].
@@ -33,7 +33,7 @@ class Task:
     toolpath: Toolpath
     model: StiffnessModel
     track: Track
-    wanted: Poses
+    wanted: Placed
     base: Poses
     tool: Poses
     force: Wrenches
@@ -64,7 +64,7 @@ class Task:
         return predict(
             self.model,
             command,
-            self.tool[rows],
+            self.tool.shared(rows),
             wrench,
             self.conditions.part(rows),
             self.track.status[rows],
@@ -84,7 +84,7 @@ class Task:
             self.model,
             wanted,
             goal,
-            self.tool[rows],
+            self.tool.shared(rows),
             wrench,
             self.conditions.part(rows),
             self.track.status[rows],
@@ -96,7 +96,7 @@ class Task:
     def _begin(self, rows: Ints, wanted: Poses, wrench: Floats, goal: Poses) -> tuple[Poses, Floats]:
         """Commands whose loaded joints stand where the goal is, and how far they are bent there; the wanted pose where
         that is out of reach, or far away."""
-        model, tool = self.model, self.tool[rows]
+        model, tool = self.model, self.tool.shared(rows)
         near, status, given = self.track.q[rows], self.track.status[rows], self.conditions.part(rows)
         there = inverse(model.robot.nominal, goal @ tool.inverse(), status, near)
         motors, bent = model.motors_at(np.where(there.reachable[:, None], there.q, near), wrench, tool, given)
@@ -108,12 +108,16 @@ class Task:
             np.where(good[:, None], begin.position, wanted.position),
         ), np.where(good[:, None], bent, 0.0)
 
+    def turn_freely(self, rows: Ints) -> bool:
+        """Whether the texts of all motions ``rows`` (K,) can express any orientation."""
+        path = self.toolpath
+        return bool(path.oriented[rows].all()) and not np.isfinite(path.free_axis[rows, 0]).any()
+
     def turns(self, rows: Ints, rotation: Floats) -> Floats | None:
         """(K, 3, 3) projection onto the rotation vectors, robot base axes, that the texts of motions ``rows`` (K,) at
         the orientations ``rotation`` (K, 3, 3) can express: none, those across the free axis, all; None if all can."""
         path = self.toolpath
-        free = np.isfinite(path.free_axis[rows, 0])
-        if path.oriented[rows].all() and not free.any():
+        if self.turn_freely(rows):
             return None
         axis = (rotation @ np.nan_to_num(path.free_axis[rows])[..., None])[..., 0]
         across = np.eye(3) - axis[:, :, None] * axis[:, None, :]

@@ -21,7 +21,7 @@ def corrections_csv(
     what was inserted before it, the largest error on its way (``way`` (M,) [m] of ``division``), history."""
     path = task.toolpath
     to_base = task.base.inverse()
-    moved = to_base @ result.command
+    moved = to_base @ result.command[:]
     shift = (moved.position - path.position) / MM
     turned = vector_from_rotation(np.swapaxes(path.rotation, -1, -2) @ moved.rotation) / DEG
     bent = (to_base.rotation @ result.deflection[..., None])[..., 0] / MM

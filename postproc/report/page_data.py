@@ -107,7 +107,7 @@ def page_data(
     corrected (a prediction)."""
     path, wanted, n = task.toolpath, task.wanted.position, len(task.toolpath)
     scope = result.state != State.AIR
-    shift = (task.base.inverse() @ result.command).position - path.position
+    shift = (task.base.inverse() @ result.command[:]).position - path.position
     between, inserted = np.full(n, np.nan), np.zeros(n, np.int64)
     if output is not None:
         source = output.division.source

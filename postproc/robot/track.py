@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.geometry import Poses, wrapped
+from postproc.blocks import in_blocks
+from postproc.geometry import Placed, Poses, wrapped
 from postproc.robot.chain import Chain
 from postproc.robot.description import Robot
 from postproc.robot.geometries import KukaLengths, KukaVariant, SerialArm
@@ -40,7 +41,7 @@ class Track:
     turn_holds: Bools
 
 
-def follow(robot: Robot, toolpath: Toolpath, flange: Poses, start: Floats | None) -> Track:
+def follow(robot: Robot, toolpath: Toolpath, flange: Placed, start: Floats | None) -> Track:
     """Joint values of all motions.  ``flange`` (N): targets of the flange in the robot base; ``start`` (n,) [rad, m]:
     values before the first motion, if known; they give an external joint, which a program does not state, its value.
 
@@ -55,9 +56,8 @@ def follow(robot: Robot, toolpath: Toolpath, flange: Poses, start: Floats | None
     n = len(toolpath)
     axes = all_axes(robot, toolpath.axes, start)
     on_axes = np.asarray(np.isfinite(axes).all(axis=1))
-    cartesian = np.asarray(
-        toolpath.known & np.isfinite(flange.position).all(axis=1) & ~np.isfinite(toolpath.axes).all(axis=1)
-    )
+    placed = in_blocks(lambda part: np.isfinite(flange[part].position).all(axis=1), n)
+    cartesian = np.concatenate([np.empty(0, bool), *placed]) & toolpath.known & ~toolpath.on_axes
     status = _branches(robot, toolpath, axes, on_axes, cartesian, start)
 
     q = np.full((n, len(robot.joints)), np.nan)
@@ -69,17 +69,23 @@ def follow(robot: Robot, toolpath: Toolpath, flange: Poses, start: Floats | None
         _follow_on(robot, toolpath, flange, on_axes, solve, start, q)
         reachable[solve] = np.isfinite(q[solve]).all(axis=1)
     else:
-        near = np.zeros((len(solve), q.shape[1]))
+        near = np.zeros(q.shape[1])
         if robot.external is not None and start is not None:
-            near[:, robot.external] = start[robot.external]
-        found = inverse(robot.nominal, flange[solve], status[solve], near)
-        q[solve] = found.q
-        reachable[solve] = found.reachable
+            near[robot.external] = start[robot.external]
+
+        def solved(part: slice) -> None:
+            rows = solve[part]
+            found = inverse(robot.nominal, flange[rows], status[rows], np.tile(near, (len(rows), 1)))
+            q[rows], reachable[rows] = found.q, found.reachable
+
+        for _ in in_blocks(solved, len(solve)):
+            pass
         _settle(robot.nominal, q, toolpath, on_axes, start)
-        bits = (toolpath.turn[:, None] >> np.arange(6)) & 1 == 1
-        arm = q[:, -6:]
+        stated = np.flatnonzero((toolpath.turn >= 0) & cartesian)
+        bits = (toolpath.turn[stated, None] >> np.arange(6)) & 1 == 1
+        arm = q[stated, -6:]
         wrong = (bits != (arm < 0)) & (np.abs(arm) > SIGN_MARGIN) & np.isfinite(arm)
-        turn_holds = ~((toolpath.turn >= 0) & cartesian & wrong.any(axis=1))
+        turn_holds[stated] = ~wrong.any(axis=1)
 
     low, high = robot.limits.T
     margin = 1e-9
@@ -101,7 +107,7 @@ def all_axes(robot: Robot, axes: Floats, start: Floats | None) -> Floats:
 def _follow_on(
     robot: Robot,
     toolpath: Toolpath,
-    flange: Poses,
+    flange: Placed,
     on_axes: Bools,
     solve: Ints,
     start: Floats | None,
@@ -146,7 +152,7 @@ def _branches(
     # A path motion keeps its branch wherever it leads; only a jump to an unknown place loses it.
     lost = toolpath.branches & (jump | (toolpath.kind == Kind.OTHER)) & ~on_axes & ~cartesian
     home = _home(toolpath)
-    value = np.full(len(toolpath) + 1, -1)
+    value = np.full(len(toolpath) + 1, -1, np.int8)
     value[0] = -1 if start is None else status_of(robot.nominal, start[None])[0]
     value[1:][on_axes] = status_of(robot.nominal, axes[on_axes])
     value[1:][stated] = toolpath.status[stated] & 7

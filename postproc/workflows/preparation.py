@@ -18,6 +18,7 @@ from postproc.effects import Conditions
 from postproc.files import MAX_LINE, read_file
 from postproc.findings import Finding, Refusal, nearest
 from postproc.forces import Wrenches, is_no_force, wrenches
+from postproc.geometry import PoseRows
 from postproc.inputs import Inputs, noted
 from postproc.model import StiffnessModel, approach
 from postproc.robot.description import Robot, find_robot, load_robot
@@ -168,8 +169,9 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     _missing_points(program, force)
     _missing_orientation(request, path, force, cell)
     base, tool = frames.base_in_robot, frames.tool_in_flange
-    wanted = base @ path.target_in_base
-    track = follow(robot, path, wanted @ tool.inverse(), _start(cell, robot))
+    wanted = PoseRows(len(path), lambda rows: base.shared(rows) @ path.target_in_base[rows])
+    flange = PoseRows(len(path), lambda rows: wanted[rows] @ tool.shared(rows).inverse())
+    track = follow(robot, path, flange, _start(cell, robot))
     task = Task(
         file=str(request.program),
         toolpath=path,
@@ -250,13 +252,20 @@ def _conditions(
                     help="add the tool to the cell, with its axis",
                 )
             )
-    mass, com = np.zeros(len(path)), np.zeros((len(path), 3))
-    for row, frame in enumerate(path.frames):
-        tool = cell.tools.get(frame.number or 0)
-        if tool is not None and tool.mass is not None and tool.com is not None:
-            mass[path.tool == row], com[path.tool == row] = tool.mass, tool.com
+    weighs = any(tool.mass is not None and tool.com is not None for tool in cell.tools.values())
+    mass, com = np.broadcast_to(0.0, (len(path),)), np.broadcast_to(0.0, (len(path), 3))
+    if weighs:
+        mass, com = mass.copy(), com.copy()
+        for row, frame in enumerate(path.frames):
+            tool = cell.tools.get(frame.number or 0)
+            if tool is not None and tool.mass is not None and tool.com is not None:
+                mass[path.tool == row], com[path.tool == row] = tool.mass, tool.com
+    directed = any(term.effect.by_direction for term in model.terms)
     return Conditions(
-        spindle=spindle, direction=np.nan_to_num(approach(q)), payload_mass=mass, payload_com=com
+        spindle=spindle,
+        direction=np.nan_to_num(approach(q)) if directed else None,
+        payload_mass=mass,
+        payload_com=com,
     )
 
 

@@ -255,7 +255,7 @@ def _report(
 ) -> Report:
     task, corrected = ready.task, written is not None
     scope = result.state != State.AIR
-    size = np.linalg.norm(result.command.position - task.wanted.position, axis=1)
+    size = np.linalg.norm(result.correction, axis=1)
     force = np.linalg.norm(task.wrench[:, :3], axis=1)
     order = np.argsort(-np.nan_to_num(np.where(scope, result.before, -1.0), nan=-1.0), kind="stable")
     worst = tuple(
@@ -306,7 +306,7 @@ def _report(
 
 def _links(task: Task, division: Division) -> tuple[Link, ...]:
     links = np.flatnonzero(division.links)
-    ways = made(task, division)[links]
+    ways = made(task, division, links)
     length = np.linalg.norm(ways.end.position - ways.begin.position, axis=1) / MM
     lines = task.toolpath.line[division.source[links]]
     return tuple(Link(int(line), float(mm)) for line, mm in zip(lines, length, strict=True))
