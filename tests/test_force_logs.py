@@ -15,7 +15,7 @@ from postproc.cell import frames_of
 from postproc.findings import Finding, Refusal
 from postproc.forces import wrenches
 from postproc.forces.logs import read_log
-from postproc.tables import Table
+from postproc.tables import read_table
 from postproc.toolpath import Kind
 
 # lines 10 to 14: a PTP, then 100, 200 and 50 mm along +x
@@ -341,7 +341,7 @@ def test_an_empty_program_has_no_log(tmp_path):
 
 @settings(max_examples=40, deadline=None)
 @given(st.integers(0, 2**32 - 1))
-def test_the_line_of_each_motion_keeps_the_mean_of_its_samples(seed):
+def test_the_line_of_each_motion_keeps_the_mean_of_its_samples(tmp_path_factory, seed):
     """Even samples, as many in both halves: what the line carries along the motion is what was measured there."""
     rng = np.random.default_rng(seed)
     length = rng.integers(3, 40, 6) * 2  # samples per motion, 1 mm apart, in the middle of each mm
@@ -350,14 +350,10 @@ def test_the_line_of_each_motion_keeps_the_mean_of_its_samples(seed):
     s = np.arange(ends[-1]) + 0.5
     force = np.cumsum(rng.normal(size=len(s))) * 10 + 300 * np.sin(s / 30)
     columns = {"s_mm": s, "fx": force, "fy": 0 * s, "fz": 0 * s}
-    table = Table(
-        Path("l.csv"),
-        "FRC003",
-        {k: [repr(float(v)) for v in c] for k, c in columns.items()},
-        np.arange(2, len(s) + 2),
-        1,
-        ",",
-    )
+    rows = zip(*(map(repr, column.tolist()) for column in columns.values()), strict=True)
+    log = tmp_path_factory.getbasetemp() / "l.csv"
+    log.write_text("\n".join([",".join(columns), *map(",".join, rows)]))
+    table = read_table(log, "FRC003")
     stated, _ = read_log(table, "s_mm", path, frames_of(cell_of(), path, "part.src"), "part.src", False)
     mean = [force[a:b].mean() for a, b in pairwise(ends)]
     assert np.allclose(0.5 * (stated.begin + stated.values)[1:, 0], mean, atol=1e-9)

@@ -1,16 +1,21 @@
 """CSV tables: dialects of spreadsheets are understood, mistakes are told with line and column."""
 
+import csv
 import hashlib
+import math
+import re
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from postproc.files import MAX_LINE
 from postproc.findings import Finding, Refusal
 from postproc.tables import comments_above, finite_number, read_table
+from postproc.tables.cells import BLOCK, ROWS
 
 
 def write(folder: Path, text: str | bytes) -> Path:
@@ -184,3 +189,141 @@ def test_no_bytes_end_in_anything_but_a_refusal(tmp_path_factory, raw):
         table = read_table(path, "FRC003")
         for name in table.columns:
             assert len(table.numbers(name)) == len(table)
+
+
+# many lines at a time, and the lines that are not common
+
+CELLS = (
+    *("1", "2.5", "-3", "+4.", ".5", "1e3", "-1.5E-2", " 8", "9 ", "\t10", "00012", "-0", "5e-324", "0.1"),
+    *(
+        "1,5",
+        "",
+        "-",
+        "nan",
+        "n/a",
+        "x",
+        "1 2",
+        "1_0",
+        "inf",
+        "1e999",
+        "0x10",
+        "1-2",
+        ".",
+        "+",
+        "1e",
+        "1.2.3",
+    ),
+    *(
+        '"3"',
+        '"1,5"',
+        '"a""b"',
+        '"#2"',
+        '"',
+        'a"b',
+        '"x"y',
+        "'=1",
+        "'x",
+        "#1",
+        "ä",
+        "\xa07\xa0",
+        "\u0663",
+        "\x0b1",
+    ),
+    *("9007199254740993", "0.1234567890123456789", "1.7976931348623157e308", "0" * 40, "123456789.123456"),
+)
+NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
+
+
+def cell_by_cell(text: str, separator: str):
+    """Lines and cells of a table with a header, or the line that is wrong: by ``csv`` and line by line."""
+    lines, rows = [], []
+    for number, line in enumerate(re.split("\r\n|\n|\r", text), start=1):
+        if line.lstrip().startswith("#") or not line.strip(' \t;,"'):
+            continue
+        try:
+            (row,) = csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True)
+        except csv.Error:
+            return number
+        if rows and len(row) != len(rows[0]):
+            return number
+        lines.append(number)
+        rows.append([cell.strip() for cell in row])
+    return (lines[1:], rows[1:]) if len(rows) > 1 else lines[0]
+
+
+def number_of(cell: str, separator: str):
+    written = cell if separator == "," else cell.replace(",", ".", 1)
+    return float(written) if NUMBER.fullmatch(written) and abs(float(written)) < math.inf else None
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(
+        st.one_of(
+            st.lists(st.sampled_from(CELLS[:14]), min_size=3, max_size=3),
+            st.lists(st.sampled_from(CELLS), min_size=3, max_size=3),
+            st.lists(st.sampled_from(CELLS), max_size=5),
+            st.sampled_from([["# note"], [""], ["", ""], ["  "]]),
+        ),
+        max_size=12,
+    ),
+    st.sampled_from(",;\t"),
+    st.sampled_from(["\n", "\r\n", "\r"]),
+    st.booleans(),
+)
+def test_many_lines_are_read_as_one_by_one(tmp_path_factory, rows, separator, end, closed):
+    lines = [separator.join("abc"), *(separator.join(row) for row in rows)]
+    text = end.join(lines) + end * closed
+    path = tmp_path_factory.getbasetemp() / "many.csv"
+    path.write_bytes(text.encode())
+    expected = cell_by_cell(text, separator)
+    if isinstance(expected, int):
+        assert refused(path).line == expected
+        return
+    table = read_table(path, "FRC003")
+    assert table.lines.tolist() == expected[0]
+    for column, name in enumerate("abc"):
+        cells = [row[column] for row in expected[1]]
+        shown = [cell[1:] if re.match("'+[=+@-]", cell) else cell for cell in cells]
+        assert table.texts(name) == shown
+        assert [table.columns[name][row] for row in range(len(cells))] == shown
+        numbers = [number_of(cell, separator) for cell in shown]
+        if None in numbers:
+            assert refused(path, name).line == expected[0][numbers.index(None)]
+        else:
+            assert table.numbers(name).tobytes() == np.array(numbers).tobytes()
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_a_table_of_many_blocks(tmp_path, end):
+    """Lines that are not common stand at both ends of blocks of bytes and of rows."""
+    rows = [f"{number},{number / 7!r},{-number}.25" for number in range(5 * ROWS)]
+    rows[ROWS - 1] = f'"{ROWS - 1}",1,-2'
+    rows[ROWS] = f'{ROWS},"3",ä'
+    rows[2 * ROWS] = "# note"
+    text = "a,b,c" + end + end.join(rows)
+    assert len(text) > 2 * BLOCK
+    table = read_table(write(tmp_path, text), "FRC003")
+    assert table.comments == ((2 * ROWS + 2, "note"),)
+    kept = np.delete(np.arange(5 * ROWS), 2 * ROWS)
+    assert np.array_equal(table.lines, kept + 2)
+    assert np.array_equal(table.numbers("a"), kept)
+    b = kept / 7
+    b[ROWS - 1 : ROWS + 1] = 1, 3
+    assert np.array_equal(table.numbers("b"), b)
+    with pytest.raises(Refusal, match=f"file.csv:{ROWS + 2}: FRC003 column c: 'ä' is not a number"):
+        table.numbers("c")
+    assert table.texts("c")[ROWS - 1 : ROWS + 2] == ["-2", "ä", f"-{ROWS + 1}.25"]
+
+
+@pytest.mark.parametrize("number", [2, 40_000])
+def test_lines_that_are_too_long(tmp_path, number):
+    rows = ["1,2"] * 40_000
+    rows[number - 2] = "1," + " " * MAX_LINE + "2"
+    for text in ("a,b\n" + "\n".join(rows), "a,b\n" + "\n".join(rows[: number - 1])):
+        finding = refused(write(tmp_path, text))
+        assert (finding.code, finding.line) == ("FRC003", number)
+        assert "a line of more than" in finding.message
+    rows[number - 2] = "1," + " " * 200_000 + "2"
+    table = read_table(write(tmp_path, "a,b\n" + "\n".join(rows)), "FRC003")
+    assert table.numbers("b").tolist() == [2.0] * 40_000

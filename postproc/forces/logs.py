@@ -135,11 +135,8 @@ def _check_order(table: Table, column: str, place: Floats) -> None:
     back = np.flatnonzero(np.diff(place) < 0)
     if len(back):
         row = int(back[0]) + 1
-        raise table.error(
-            row,
-            column,
-            f"{table.texts(column)[row]} stands behind {table.texts(column)[row - 1]}; it must not go back",
-        )
+        cells = table.columns[column]
+        raise table.error(row, column, f"{cells[row]} stands behind {cells[row - 1]}; it must not go back")
 
 
 def _one_frame(table: Table) -> int:

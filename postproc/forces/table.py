@@ -51,7 +51,7 @@ def read_channels(table: Table) -> Floats:
             if len(beyond):
                 row = int(beyond[0])
                 raise table.error(
-                    row, name, f"{table.texts(name)[row][:40]!r} is beyond {LARGEST:g} N or N m"
+                    row, name, f"{table.columns[name][row][:40]!r} is beyond {LARGEST:g} N or N m"
                 )
     return values
 
@@ -104,7 +104,7 @@ def _lines(table: Table) -> Ints:
     numbers = table.numbers("line")
     wrong = np.flatnonzero((numbers != np.floor(numbers)) | (numbers < 1) | (numbers > 2**53))
     if len(wrong):
-        shown = table.texts("line")[wrong[0]]
+        shown = table.columns["line"][int(wrong[0])]
         raise table.error(int(wrong[0]), "line", f"{shown!r} is not a line number", "whole numbers from 1")
     lines = numbers.astype(np.int64)
     order = np.argsort(lines, kind="stable")
@@ -119,16 +119,17 @@ def _lines(table: Table) -> Ints:
 def read_frames(table: Table) -> Ints:
     """(rows,) the frame of each row, an index into FRAMES; Refusal FRC003 where it is none."""
     if "frame" not in table:
-        return np.full(len(table), BASE)
-    texts = table.texts("frame")
-    known = {"": BASE}
-    for row, text in enumerate(texts):
-        if text not in known:
+        return np.broadcast_to(np.int8(BASE), len(table))
+    known, frames = {"": BASE}, bytearray()
+    for row, text in enumerate(table.columns["frame"]):
+        frame = known.get(text)
+        if frame is None:
             try:
-                known[text] = parse_frame(text.removeprefix("@"))
+                frame = known[text] = parse_frame(text.removeprefix("@"))
             except NotAForce as error:
                 raise table.error(row, "frame", str(error)) from None
-    return np.array([known[text] for text in texts], dtype=np.int64)
+        frames.append(frame)
+    return np.frombuffer(bytes(frames), np.int8)
 
 
 def _no_motion(table: Table, lines: Ints, rows: Ints, toolpath: Toolpath, program: str) -> list[Finding]:

@@ -1,0 +1,220 @@
+"""The cells below the header: where they lie in the bytes of the file, found and read for many lines at a time.
+
+A common line has as many cells as the header and neither quotes nor anything that is not ASCII.  All others go to the
+reader of single lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.tables.lines import NOTHING, Lines
+from postproc.tables.spelling import as_text
+
+BLOCK = 1 << 20
+"""Bytes at a time; more than a line may have."""
+
+ROWS = 1 << 14
+"""Rows at a time."""
+
+_LONGEST = 1 << 12
+"""Bytes of a common line."""
+
+_LONG = 32
+"""Letters of a number that is read in bulk."""
+
+_SEPARATOR, _LINE_END, _OTHER, _SOMETHING = 1, 2, 4, 8
+_NO_NUMBER = ord("x")
+_POINT = bytes(code if code in b"0123456789+-.eE" else _NO_NUMBER for code in range(256))
+"""Letters of numbers, and all others as one that is none."""
+
+_COMMA = _POINT.replace(b",", b".")
+
+Other = Callable[[int, int, int], Sequence[str] | None]
+"""Reads a line that is not common, of the bytes from .. to and the number: its cells, None where it is no row."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Where the cells of R rows and C columns lie in ``raw``.
+
+    begin (R,): of the rows; ends (R, C): of the cells; each begins behind the separator before it.  number (R,): line
+    of the file, from 1.  others: row -> its cells, of lines that are not common.
+    """
+
+    raw: bytes
+    begin: NDArray[np.int32]
+    ends: NDArray[np.int32]
+    number: Ints
+    others: Mapping[int, Sequence[str]]
+
+    @cached_property
+    def apostrophes(self) -> bool:
+        """Whether any cell can hold one."""
+        return b"'" in self.raw
+
+    def bounds(self, column: int, rows: slice) -> tuple[Ints, Ints]:
+        """Where the cells of a column begin and end, blanks around them left out; an empty one for ``others``."""
+        data = np.frombuffer(self.raw, np.uint8)
+        start = self.begin[rows] if column == 0 else self.ends[rows, column - 1] + 1
+        start, stop = start.astype(np.int64), self.ends[rows, column].astype(np.int64)
+        while (blank := (start < stop) & (data[np.minimum(start, len(data) - 1)] <= 0x20)).any():
+            start += blank
+        while (blank := (start < stop) & (data[stop - 1] <= 0x20)).any():
+            stop -= blank
+        return start, stop
+
+
+class Column(Sequence[str]):
+    """The cells of one column as text, blanks stripped."""
+
+    def __init__(self, cells: Cells, column: int) -> None:
+        self.cells, self.column = cells, column
+
+    def __len__(self) -> int:
+        return len(self.cells.number)
+
+    @overload
+    def __getitem__(self, row: int) -> str: ...
+    @overload
+    def __getitem__(self, row: slice) -> list[str]: ...
+    def __getitem__(self, row: int | slice) -> str | list[str]:
+        if isinstance(row, slice):
+            return [self[at] for at in range(*row.indices(len(self)))]
+        at = range(len(self))[row]
+        return next(iter(self._texts(slice(at, at + 1))))
+
+    def __iter__(self) -> Iterator[str]:
+        for rows in _blocks(len(self)):
+            yield from self._texts(rows)
+
+    def _texts(self, rows: slice) -> list[str]:
+        raw = self.cells.raw
+        start, stop = self.cells.bounds(self.column, rows)
+        texts = [raw[a:b].decode("ascii") for a, b in zip(start.tolist(), stop.tolist(), strict=True)]
+        for row in self.cells.others.keys() & set(range(rows.start, rows.stop)):
+            texts[row - rows.start] = self.cells.others[row][self.column].strip()
+        return list(map(as_text, texts)) if self.cells.apostrophes else texts
+
+    def numbers(self, one: Callable[[int], float], comma: bool) -> Floats:
+        """(R,) the cells as ``float`` reads them, with a decimal ``comma`` or without one.
+
+        one: reads the cell of a row that is no plain number.
+        """
+        values = np.empty(len(self))
+        for rows in _blocks(len(self)):
+            found, plain = self._plain(rows, comma)
+            for at in np.flatnonzero(~plain).tolist():
+                found[at] = one(rows.start + at)
+            values[rows] = found
+        return values
+
+    def _plain(self, rows: slice, comma: bool) -> tuple[Floats, Bools]:
+        """Values of some rows, and which of them are numbers in the letters that numbers have."""
+        start, stop = self.cells.bounds(self.column, rows)
+        length = stop - start
+        plain = (length > 0) & (length <= _LONG)
+        length[~plain] = 0
+        place = np.arange(int(length.max(initial=1)) + 1)  # one blank at least behind each
+        inside = place < length[:, None]
+        data = np.frombuffer(self.cells.raw, np.uint8)
+        letters = data[np.minimum(start[:, None] + place, len(data) - 1)]
+        known = _COMMA if comma else _POINT
+        letters = np.frombuffer(letters.tobytes().translate(known), np.uint8).reshape(letters.shape)
+        plain &= ~((letters == _NO_NUMBER) & inside).any(axis=1)
+        inside &= plain[:, None]
+        letters = np.where(inside, letters, np.uint8(0x20))
+        letters[~plain, 0] = ord("0")
+        try:
+            # nothing but these letters: float() takes what is a number and nothing else
+            found = np.array(list(map(float, letters.tobytes().split())))
+        except ValueError:
+            return np.empty(len(plain)), np.zeros_like(plain)
+        return found, plain & np.isfinite(found)
+
+
+def find_cells(lines: Lines, begin: int, number: int, separator: str, columns: int, other: Other) -> Cells:
+    """The cells of the lines from byte ``begin`` on, the first of which has this ``number``.
+
+    Raises what ``other`` raises, and Refusal where a line is longer than any table's.
+    """
+    raw, kinds = lines.raw, _kinds(separator)
+    parts: list[tuple[NDArray[np.int32], NDArray[np.int32], Ints]] = []
+    others: dict[int, Sequence[str]] = {}
+    count = 0
+    while begin < len(raw):
+        stop = _cut(lines, begin, number)
+        text = raw[begin:stop].replace(b"\r\n", b" \n")
+        if not text.endswith((b"\n", b"\r")):
+            text += b"\n"  # the last line
+        kind = np.frombuffer(text.translate(kinds), np.uint8)
+        ends = np.flatnonzero(kind & (_SEPARATOR | _LINE_END))
+        last = np.flatnonzero(kind[ends] & _LINE_END)
+        closing = ends[last]
+        opening = np.append(0, closing[:-1] + 1)
+        has = np.bitwise_or.reduceat(kind, opening)
+        short = closing - opening <= _LONGEST
+        common = (np.diff(last, prepend=-1) == columns) & (has & (_OTHER | _SOMETHING) == _SOMETHING) & short
+        rows = common.copy()
+        found = []
+        for at in np.flatnonzero(~common & ((has & (_OTHER | _SOMETHING) != 0) | ~short)).tolist():
+            start, end = begin + int(opening[at]), begin + int(closing[at])
+            cells = other(start, end - (raw[end - 1 : end + 1] == b"\r\n"), number + at)
+            if cells is not None:
+                rows[at] = True
+                found.append((at, cells))
+        index = np.flatnonzero(rows)
+        where = np.maximum(last[index][:, None] + np.arange(1 - columns, 1), 0)
+        cell_ends = (ends[where] + begin).astype(np.int32)
+        row_begin = (opening[index] + begin).astype(np.int32)
+        for at, cells in found:
+            row = int(np.searchsorted(index, at))
+            others[count + row] = cells
+            cell_ends[row], row_begin[row] = 0, 0
+        parts.append((row_begin, cell_ends, index + number))
+        count += len(index)
+        number += len(closing)
+        begin = stop
+    parts = parts or [(np.empty(0, np.int32), np.empty((0, columns), np.int32), np.empty(0, np.int64))]
+    begins, cells_end, numbers = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return Cells(raw, begins, cells_end, numbers, others)
+
+
+def _cut(lines: Lines, begin: int, number: int) -> int:
+    """The end of the last line that ends within a block."""
+    raw, stop = lines.raw, begin + BLOCK
+    if stop >= len(raw):
+        return len(raw)
+    end = raw.rfind(b"\n", begin, stop)
+    if end < 0:
+        end = raw.rfind(b"\r", begin, stop - 1)  # not the first half of \r\n
+    if end < 0:
+        raise lines.too_long(number)
+    return end + 1
+
+
+def _kinds(separator: str) -> bytes:
+    """Byte -> what it is in a line."""
+    kinds = [_SOMETHING if 0x20 < code < 0x7F else _OTHER for code in range(256)]
+    for letter in NOTHING:
+        kinds[ord(letter)] = 0
+    for letter, kind in (
+        ('"', _OTHER),
+        ("#", _OTHER),
+        (separator, _SEPARATOR),
+        ("\n", _LINE_END),
+        ("\r", _LINE_END),
+    ):
+        kinds[ord(letter)] = kind
+    return bytes(kinds)
+
+
+def _blocks(count: int) -> list[slice]:
+    return [slice(begin, min(begin + ROWS, count)) for begin in range(0, count, ROWS)]
