@@ -12,8 +12,11 @@ from pathlib import Path
 
 from postproc.findings import Finding, Refusal
 
+Content = bytes | Iterable[bytes]
+"""Of a file: as a whole, or in parts that are made while it is written."""
 
-def publish(files: Mapping[Path, bytes], last: Path | None = None) -> None:
+
+def publish(files: Mapping[Path, Content], last: Path | None = None) -> None:
     """Write all of ``files`` or none.
 
     Every file is written whole beside its place and synced before the first one is renamed into it.  ``last``, the
@@ -27,7 +30,7 @@ def publish(files: Mapping[Path, bytes], last: Path | None = None) -> None:
         _publish(files, last, held)
 
 
-def _publish(files: Mapping[Path, bytes], last: Path | None, held: contextlib.ExitStack) -> None:
+def _publish(files: Mapping[Path, Content], last: Path | None, held: contextlib.ExitStack) -> None:
     ready: dict[Path, Path] = {}
     spare: dict[Path, Path] = {}
     placed: list[Path] = []
@@ -112,12 +115,12 @@ def _sweep(files: Iterable[Path]) -> None:
                     os.unlink(entry.path)
 
 
-def _written_beside(path: Path, content: bytes) -> Path:
+def _written_beside(path: Path, content: Content) -> Path:
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
     temporary = Path(name)
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
+            stream.writelines([content] if isinstance(content, bytes) else content)
             stream.flush()
             os.fsync(stream.fileno())
         temporary.chmod(0o666 & ~_umask())

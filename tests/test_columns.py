@@ -8,26 +8,40 @@ import io
 import numpy as np
 import pytest
 
-from postproc.report import columns
-from postproc.report.columns import Numbers, Words, csv_bytes
+from postproc.report.columns import Numbers, Words, csv_parts
 
 
 @pytest.mark.parametrize("rows", [0, 1, 7, 1000])
-def test_it_is_what_the_csv_module_writes(rows, monkeypatch):
-    monkeypatch.setattr(columns, "ROWS", 300)  # several parts
+def test_it_is_what_the_csv_module_writes(rows):
     rng = np.random.default_rng(4)
     small = rng.normal(size=rows) * 10.0 ** rng.integers(-9, 7, rows)
     small[rng.random(rows) < 0.2] = np.nan
     small[rng.random(rows) < 0.1] = 0.0
     small[rng.random(rows) < 0.1] = -1e-9
-    codes, words = rng.integers(0, 3, rows), ["LIN", "", "CIRC"]
-    made = csv_bytes(
-        [Numbers("line", np.arange(rows) + 1.0), Numbers("x_mm", small, 6), Words("kind", codes, words)]
-    )
+    codes, words = rng.integers(0, 3, rows), ["LIN", "", "CIRC", "LONGER"]
+    large = rng.integers(-(10**6), 10**6, rows) * np.where(rng.random(rows) < 0.1, 1e14, 0.125)
+    none = np.full(rows, np.nan)
+
+    def columns(part):
+        return [
+            Numbers("line", np.arange(rows)[part] + 1.0),
+            Numbers("x_mm", small[part], 6),
+            Words("kind", codes[part], words),
+            Numbers("large", large[part], 9),
+            Numbers("one", np.full(rows, -2.5)[part], 3),
+            Numbers("none", none[part], 3),
+            Numbers("bound", np.where(small > 0, np.inf, -np.inf)[part], 3),
+        ]
+
+    made = b"".join(csv_parts(columns, rows, 300))  # several parts
     stream = io.StringIO()
     table = csv.writer(stream, lineterminator="\n")
-    table.writerow(["line", "x_mm", "kind"])
+    table.writerow(["line", "x_mm", "kind", "large", "one", "none", "bound"])
+
+    def text(value, decimals):
+        return "" if np.isnan(value) else f"{round(float(value), decimals) + 0.0:.{decimals}f}"
+
     for row in range(rows):
-        text = "" if np.isnan(small[row]) else f"{round(float(small[row]), 6) + 0.0:.6f}"
-        table.writerow([row + 1, text, words[codes[row]]])
+        texts = text(small[row], 6), words[codes[row]], text(large[row], 9)
+        table.writerow([row + 1, *texts, "-2.500", "", ""])
     assert made.decode() == stream.getvalue()

@@ -5,11 +5,19 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from postproc.document import Document, Edit, Span, apply
+from postproc.report import diff as diff_module
 from postproc.report.diff import CONTEXT, unified_diff
+
+
+def diff_of(raw: bytes, edits: list[Edit], names: tuple[str, str] = ("a", "b")) -> bytes:
+    document = Document(Path(names[0]), raw)
+    return b"".join(unified_diff(document, names[1], edits, apply(document, edits)))
+
 
 HEAD = re.compile(rb"@@ -(\d+),(\d+) \+(\d+),(\d+) @@\n")
 OPEN_END = b"\\ No newline at end of file\n"
@@ -58,19 +66,27 @@ def patched(raw: bytes, diff: bytes, back: bool = False) -> bytes:
 @st.composite
 def edited(draw: st.DrawFn) -> tuple[bytes, list[Edit]]:
     raw = b"".join(draw(st.lists(st.sampled_from([b"a", b"b", b"\n", b"x\n", b"y\r\n"]), max_size=60)))
-    cuts = sorted(draw(st.lists(st.integers(0, len(raw)), max_size=8, unique=True)))
+    cuts = sorted(draw(st.lists(st.integers(0, len(raw)), max_size=16)))
     pairs = list(zip(cuts[::2], cuts[1::2], strict=False))
     text = st.sampled_from([b"", b"1", b"new\n", b"\r\nnew", b"two\nlines\n", b"2\n3"])
     return raw, [Edit(Span(0, a, draw(st.sampled_from((a, b)))), draw(text)) for a, b in pairs]
 
 
 @settings(max_examples=400, deadline=None)
-@given(edited())
-def test_a_diff_applied_is_the_output_and_taken_back_the_source(case: tuple[bytes, list[Edit]]) -> None:
+@given(edited(), st.sampled_from([(1, 1), (2, 3), (diff_module.EDITS, diff_module.BLOCKS)]))
+def test_a_diff_applied_is_the_output_and_taken_back_the_source(
+    case: tuple[bytes, list[Edit]], sizes: tuple[int, int]
+) -> None:
     raw, edits = case
-    document = Document(Path("a.src"), raw)
-    written = apply(document, edits)
-    diff = unified_diff(document, "b.src", edits)
+    with pytest.MonkeyPatch.context() as patch:  # in many parts, and in one
+        patch.setattr(diff_module, "EDITS", sizes[0])
+        patch.setattr(diff_module, "BLOCKS", sizes[1])
+        _applied(raw, edits)
+
+
+def _applied(raw: bytes, edits: list[Edit]) -> None:
+    written = apply(Document(Path("a.src"), raw), edits)
+    diff = diff_of(raw, edits)
     if not edits:
         assert diff == b""
         return
@@ -83,7 +99,7 @@ def test_a_changed_line_stands_before_its_new_form_with_three_lines_around() -> 
     at = raw.index(b"line 10")
     edits = [Edit(Span(0, at, at + 4), b"LINE"), Edit(Span(0, at + 9, at + 9), b"new\r\n"),
              Edit(Span(0, at + 9, at + 13), b"LINE")]  # fmt: skip
-    diff = unified_diff(Document(Path("a.src"), raw), "b.src", edits)
+    diff = diff_of(raw, edits, ("a.src", "b.src"))
     assert diff.replace(b"\r", b"").splitlines()[:6] == [
         b"--- a.src",
         b"+++ b.src",
@@ -101,9 +117,9 @@ def test_changes_far_apart_are_hunks_of_their_own() -> None:
     raw = b"x\n" * 40
     for gap, count in ((2 * CONTEXT, 1), (2 * CONTEXT + 1, 2)):
         edits = [Edit(Span(0, 20, 21), b"y"), Edit(Span(0, 20 + 2 * (gap + 1), 21 + 2 * (gap + 1)), b"y")]
-        assert len(hunks(unified_diff(Document(Path("a"), raw), "b", edits))) == count
+        assert len(hunks(diff_of(raw, edits))) == count
 
 
 def test_a_missing_newline_at_the_end_is_told() -> None:
-    diff = unified_diff(Document(Path("a"), b"x\ny"), "b", [Edit(Span(0, 2, 3), b"z")])
+    diff = diff_of(b"x\ny", [Edit(Span(0, 2, 3), b"z")])
     assert diff.endswith(b"-y\n" + OPEN_END + b"+z\n" + OPEN_END)

@@ -55,6 +55,34 @@ def test_a_name_that_is_a_folder(tmp_path):
     assert not (tmp_path / "a.dat").exists()
 
 
+def test_parts_are_made_while_they_are_written(tmp_path):
+    def parts():
+        for number in range(3):
+            # what was made is not held until all is there
+            temporary = [path for path in tmp_path.iterdir() if path.suffix == ".tmp"]
+            assert max(path.stat().st_size for path in temporary) >= 100_000 * number
+            assert not (tmp_path / "a.csv").exists()
+            yield b"%d" % number * 100_000
+
+    publish({tmp_path / "a.csv": parts(), tmp_path / "a.src": b"src"}, last=tmp_path / "a.src")
+    assert (tmp_path / "a.csv").read_bytes() == b"".join(b"%d" % number * 100_000 for number in range(3))
+    assert names(tmp_path) == ["a.csv", "a.src"]
+
+
+@pytest.mark.parametrize("error", [ValueError("no"), KeyboardInterrupt()])
+def test_parts_that_can_not_be_made_leave_nothing(tmp_path, error):
+    (tmp_path / "a.csv").write_bytes(b"old")
+
+    def parts():
+        yield b"new"
+        raise error
+
+    with pytest.raises(type(error)):
+        publish({tmp_path / "a.src": b"src", tmp_path / "a.csv": parts()}, last=tmp_path / "a.src")
+    assert names(tmp_path) == ["a.csv"]
+    assert (tmp_path / "a.csv").read_bytes() == b"old"
+
+
 LOOP = """
 import sys
 from pathlib import Path

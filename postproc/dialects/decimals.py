@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,12 @@ LARGEST = 2.0**53
 MOST_DECIMALS = 12
 _LONGEST = 16
 """Digits of a number below LARGEST."""
+
+Fours = NDArray[np.uint32]
+"""Letters by fours, in the order in which they stand in memory; a zero is no letter."""
+
+BLOCK = 1 << 14
+"""Numbers that are written at a time."""
 
 
 def literals(
@@ -62,55 +69,119 @@ def fixed(values: Floats, decimals: Ints, apart: Bools | None = None) -> tuple[b
 
     No minus zero; no point without decimals.  apart (K,): a blank stands before a number that has no minus.
     """
-    apart = np.zeros(len(values), dtype=bool) if apart is None else apart
-    lengths = np.zeros(len(values), dtype=np.int64)
-    parts: list[tuple[Ints, NDArray[np.uint8]]] = []
-    used = np.flatnonzero(np.bincount(decimals)) if len(decimals) else np.empty(0, np.int64)
-    for count in used.tolist():
-        rows = np.flatnonzero(decimals == count) if len(used) > 1 else np.arange(len(values))
-        whole = np.rint(np.abs(values[rows]) * 10.0**count)
-        easy = whole < LARGEST
-        if not easy.all():
-            for row in rows[~easy].tolist():
-                text = fixed_one(float(values[row]), count)
-                text = b" " + text if apart[row] and not text.startswith(b"-") else text
-                lengths[row] = len(text)
-                parts.append((np.array([row]), np.frombuffer(text, np.uint8)))
-            rows, whole = rows[easy], whole[easy]
-        letters, shown = _letters(whole.astype(np.int64), values[rows] < 0, apart[rows], count)
-        lengths[rows] = shown.sum(axis=1)
-        parts.append((rows, letters[shown]))
-    ends = sums(lengths)
-    if len(parts) == 1:
-        return parts[0][1].tobytes(), ends
-    result = np.empty(int(ends[-1]), np.uint8)
-    for rows, letters in parts:
-        own = lengths[rows]
-        at = np.arange(len(letters)) + np.repeat(ends[rows] - sums(own)[:-1], own)
-        result[at] = letters
-    return result.tobytes(), ends
+    texts, lengths = [], np.zeros(len(values), dtype=np.int64)
+    for low in range(0, len(values), BLOCK):
+        block = slice(low, low + BLOCK)
+        columns = _of_any_decimals(values[block], decimals[block])
+        if apart is not None:
+            columns[0][apart[block] & (columns[0] == 0)] = fours(b" ")
+        for column in columns:
+            lengths[block] += _count(column)
+        texts.append(text_of(columns))
+    return b"".join(texts), sums(lengths)
 
 
-def _letters(whole: Ints, negative: Bools, apart: Bools, count: int) -> tuple[NDArray[np.uint8], Bools]:
-    """(K, W) letters of whole / 10^count, and which of them are part of the text."""
-    digits = max(len(str(int(whole.max(initial=0)))), count + 1)
-    width = 1 + digits + (1 if count else 0)
-    letters = np.empty((len(whole), width), np.uint8)
-    shown = np.ones((len(whole), width), dtype=bool)
-    minus = negative & (whole > 0)
-    letters[:, 0] = np.where(minus, 45, 32)
-    shown[:, 0] = minus | apart
-    column, rest = width - 1, whole
-    for place in range(digits):
-        if place == count and count:
-            letters[:, column] = 46
-            column -= 1
-        if place > count:
-            shown[:, column] = rest > 0
-        rest, digit = np.divmod(rest, 10)
-        letters[:, column] = digit + 48
-        column -= 1
-    return letters, shown
+def _of_any_decimals(values: Floats, decimals: Ints) -> list[Fours]:
+    """The letters of numbers (K,) with as many decimals each (K,)."""
+    used = np.flatnonzero(np.bincount(decimals)).tolist()
+    if len(used) == 1:
+        return number_letters(values, used[0])
+    columns: list[Fours] = []
+    for count in used:
+        rows = np.flatnonzero(decimals == count)
+        for place, part in enumerate(number_letters(values[rows], count)):
+            if place == len(columns):
+                columns.append(np.zeros(len(values), np.uint32))
+            columns[place][rows] = part
+    return columns
+
+
+def number_letters(values: Floats, decimals: int, before: bytes = b"") -> list[Fours]:
+    """Numbers (K,) with ``decimals`` after the point, as columns (K,) of fours; nothing of one that is not finite.
+
+    ``before``: a letter that stands before each.
+    """
+    known = np.isfinite(values)
+    every = bool(known.all())
+    size = np.abs(values if every else np.where(known, values, 0.0))
+    whole = np.rint(size * 10.0**decimals)
+    minus = (values < 0) & (whole > 0) & known
+    hard = np.flatnonzero(whole >= LARGEST)
+    whole[hard] = 0.0
+    columns = _digits(whole.astype(np.int64), decimals)
+    for row in hard.tolist():
+        text = fixed_one(float(size[row]), decimals)
+        for place in range(max(len(columns), -(-len(text) // 4))):
+            if place == len(columns):
+                columns.append(np.zeros(len(values), np.uint32))
+            columns[place][row] = fours(text[4 * place : 4 * place + 4])
+    if not every:
+        for column in columns:
+            column[~known] = 0
+    return [np.where(minus, fours(before + b"-"), fours(before)), *columns]
+
+
+def _digits(whole: Ints, decimals: int) -> list[Fours]:
+    """The letters (K,) of whole / 10^decimals."""
+    columns: list[Fours] = []
+    ends = [0, *range(3, decimals, 4), decimals]  # the first four of decimals begins with the point
+    rest = whole
+    for begin, end in zip(ends[-2::-1], ends[:0:-1], strict=True):
+        if end:
+            rest, part = _parted(rest, 10 ** (end - begin))
+            columns.append(_decimals(end - begin, begin == 0)[part])
+    last = True
+    while True:
+        rest, part = _parted(rest, 10**4)
+        further = bool(rest.any())
+        if further:
+            part += 10**4 * (rest > 0)
+        columns.append(_whole(last)[part])
+        if not further:
+            return columns[::-1]
+        last = False
+
+
+def _parted(whole: Ints, size: int) -> tuple[Ints, Ints]:
+    rest = whole // size
+    return rest, whole - size * rest
+
+
+@cache
+def _decimals(digits: int, pointed: bool) -> Fours:
+    """Of the numbers 0 .. 10^digits - 1 all digits, behind a point or not."""
+    table = np.zeros((10**digits, 4), np.uint8)
+    table[:, 0] = ord(".")
+    begin = int(pointed)
+    powers = 10 ** np.arange(digits)[::-1]
+    table[:, begin : begin + digits] = np.arange(10**digits)[:, None] // powers % 10 + ord("0")
+    return table.view(np.uint32)[:, 0]
+
+
+@cache
+def _whole(last: bool) -> Fours:
+    """Of the numbers 0 .. 9999 the digits without leading zeros, a zero of 0 only where they are the ``last`` ones of
+    a number; behind them all four digits of each."""
+    every = _decimals(4, False)
+    shown = np.arange(10**4)[:, None] >= [1000, 100, 10, 0 if last else 1]
+    return np.concatenate([(every.view(np.uint8).reshape(-1, 4) * shown).view(np.uint32)[:, 0], every])
+
+
+def fours(text: bytes) -> np.uint32:
+    """Up to four letters as one of ``Fours``."""
+    return np.frombuffer(text.ljust(4, b"\0"), np.uint32)[0]
+
+
+def text_of(columns: Sequence[Fours]) -> bytes:
+    """The letters of the rows of columns (K,), one row behind the other."""
+    every = np.stack(columns, axis=1).view(np.uint8).ravel()
+    return every.compress(every != 0).tobytes()
+
+
+def _count(letters: Fours) -> NDArray[np.uint8]:
+    """How many letters each four has; none of them has its highest bit."""
+    there = (letters + np.uint32(0x7F7F7F7F) >> 7) & 0x01010101
+    return (there * np.uint32(0x01010101) >> 24).astype(np.uint8)
 
 
 def fixed_one(value: float, decimals: int) -> bytes:

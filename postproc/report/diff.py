@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 import os
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.arrays import Bools, Ints
-from postproc.document import Document, Edit, Edits, apply, sums
+from postproc.blocks import in_blocks
+from postproc.document import Document, Edit, Edits, gathered, sums
 
 CONTEXT = 3
 """Lines shown around a change, as diff -u does."""
 
+EDITS = 1 << 16
+"""Edits that are looked at together, at least."""
+
+BLOCKS = 1 << 12
+"""Blocks that are written together."""
+
 _LF = 10
+_OPEN = b"\n\\ No newline at end of file\n"
+_SIGNS = b" -+"
 
 
 @dataclass(frozen=True, eq=False)
 class _Blocks:
-    """Stretches of lines that edits touch: old lines ``first .. last`` (from 0; of an inserted whole line, last is
+    """Stretches of lines that edits touch (B,): old lines ``first .. last`` (from 0; of an inserted whole line, last is
     first - 1) become the new lines from ``new``, ``count`` of them."""
 
     first: Ints
@@ -27,88 +37,178 @@ class _Blocks:
     new: Ints
     count: Ints
 
+    def __getitem__(self, rows: slice) -> _Blocks:
+        return _Blocks(self.first[rows], self.last[rows], self.new[rows], self.count[rows])
 
-def unified_diff(document: Document, name: str, edits: Iterable[Edit]) -> bytes:
-    """The change of one document; every changed line stands before its new form (lines keep their bytes, CR
-    included)."""
+    def __len__(self) -> int:
+        return len(self.first)
+
+
+@dataclass(frozen=True, eq=False)
+class _Hunks:
+    """Blocks with the lines around them (H,): ``at`` (H + 1,) numbers of their first blocks, and that of all; old lines
+    from ``top``, ``old`` of them, become the new ones from ``new_top``, ``new`` of them."""
+
+    at: Ints
+    top: Ints
+    old: Ints
+    new_top: Ints
+    new: Ints
+
+
+def unified_diff(document: Document, name: str, edits: Iterable[Edit], written: bytes) -> Iterator[bytes]:
+    """The change of one document into ``written`` by ``edits``, in parts; every changed line stands before its new form
+    (lines keep their bytes, CR included)."""
     found = Edits.joined(edits)
     if not found:
-        return b""
-    written = apply(document, found)
-    old, new = _Lines(document.raw), _Lines(written)
-    blocks = _blocks(document.raw, old, found)
-    out = [b"--- %s\n+++ %s\n" % (os.fsencode(document.path.name), os.fsencode(name))]
-    far = np.flatnonzero(blocks.first[1:] - blocks.last[:-1] - 1 > 2 * CONTEXT) + 1
-    for low, high in zip([0, *far.tolist()], [*far.tolist(), len(blocks.first)], strict=True):
-        out += _hunk(old, new, blocks, low, high)
-    return b"".join(out)
+        return
+    old, new = _Lines(document), _Lines(Document(document.path, written))
+    blocks = _blocks(old, new, found)
+    hunks = _hunks(old, blocks)
+    yield b"--- %s\n+++ %s\n" % (os.fsencode(document.path.name), os.fsencode(name))
+    yield from in_blocks(lambda rows: _part(old, new, hunks, blocks, rows), len(blocks), BLOCKS)
 
 
 class _Lines:
-    """The lines of a text, with their endings."""
+    """The lines of a text, with their endings; one without an ending has what diff says of it."""
 
-    def __init__(self, raw: bytes) -> None:
-        self.raw = raw
-        ends = np.flatnonzero(np.frombuffer(raw, np.uint8) == _LF) + 1
-        self.starts: Ints = np.concatenate([[0], ends])
-        self._bounds = [*self.starts.tolist(), len(raw)]
-        self.count = len(self._bounds) - (2 if self._bounds[-2] == len(raw) else 1)
+    def __init__(self, document: Document) -> None:
+        self.raw, self.starts = document.raw, document.line_starts
+        self._open = int(self.starts[-1]) < len(self.raw)
+        self.bounds = np.append(self.starts, len(self.raw) + len(_OPEN)) if self._open else self.starts
+        self.count = len(self.bounds) - 1
 
     def of(self, offsets: Ints) -> Ints:
-        """The lines, from 0, that hold these bytes."""
-        return np.searchsorted(self.starts, offsets, side="right") - 1
+        """The lines (K,), from 0, that hold these bytes (K,), which ascend."""
+        low, high = np.searchsorted(self.starts, [offsets[0], offsets[-1]], side="right")
+        begin = np.searchsorted(offsets, self.starts[low:high])
+        return low - 1 + np.cumsum(np.bincount(begin, minlength=len(offsets)))
 
-    def some(self, first: int, last: int, sign: bytes) -> Iterator[bytes]:
-        """Lines first .. last that there are, behind a sign."""
-        bounds, raw = self._bounds, self.raw
-        for i in range(first, min(last, self.count - 1) + 1):
-            line = sign + raw[bounds[i] : bounds[i + 1]]
-            yield line if line.endswith(b"\n") else line + b"\n\\ No newline at end of file\n"
+    def part(self, first: int, stop: int) -> tuple[bytes, Ints]:
+        """The lines first .. stop - 1, and where in them each begins and the last one ends."""
+        bounds = self.bounds[first : stop + 1]
+        text = self.raw[int(bounds[0]) : int(bounds[-1])]
+        return text + _OPEN if self._open and stop == self.count else text, bounds - bounds[0]
 
 
-def _blocks(raw: bytes, lines: _Lines, edits: Edits) -> _Blocks:
-    start, stop = edits.start.astype(np.int64), edits.stop.astype(np.int64)
-    first, last = lines.of(start), lines.of(np.maximum(start, stop - 1))
-    texts = np.frombuffer(edits.texts, np.uint8)
-    breaks = sums(texts == _LF)
-    growth = breaks[edits.ends[1:]] - breaks[edits.ends[:-1]]
-    growth -= lines.of(stop) - first
-    filled = edits.ends[1:] > edits.ends[:-1]
-    ends_line = ~filled
-    ends_line[filled] = texts[edits.ends[1:][filled] - 1] == _LF
-    at_begin = start == lines.starts[first]
+def _blocks(old: _Lines, new: _Lines, edits: Edits) -> _Blocks:
+    """All blocks; of those at the end of a text the line behind its last ending is none."""
+    parts = [_touched(old, edits, low, high) for low, high in _apart(old.raw, edits)]
+    first, last, grown = np.concatenate(parts, axis=1)
+    begin = (first + sums(grown)[:-1]).astype(np.int32)
+    stop = np.minimum(begin + last - first + 1 + grown, new.count)
+    return _Blocks(first, np.minimum(last, old.count - 1), begin, stop - begin)
+
+
+def _apart(raw: bytes, edits: Edits) -> Iterator[tuple[int, int]]:
+    """Ranges of edits none of which touches a line of another one."""
+    low = 0
+    while low < len(edits):
+        high = low + EDITS
+        while high < len(edits):
+            line = raw.find(b"\n", int(edits.stop[high - 1])) + 1 or len(raw) + 1
+            behind = bisect_left(edits.start, line)
+            if behind == high:
+                break
+            high = behind
+        high = min(high, len(edits))
+        yield low, high
+        low = high
+
+
+def _touched(old: _Lines, edits: Edits, low: int, high: int) -> Ints:
+    """(3, B) first and last line of the blocks of the edits low .. high - 1, and the lines by which each grows."""
+    at, last = _joined(old, edits, low, high)
+    start, stop, ends = edits.start[at], edits.stop[last], edits.ends[np.append(at, high)]
+    first, behind = old.of(start), old.of(stop)
+    cut, at_begin, to_begin = stop > start, old.starts[first] == start, old.starts[behind] == stop
+    ended, emptied = _ended(edits.texts, ends[:-1], ends[1:]), ends[1:] == ends[:-1]
+    last = np.where(cut & to_begin, behind - 1, behind)
+    breaks = np.flatnonzero(np.frombuffer(edits.texts, np.uint8)[ends[0] : ends[-1]] == _LF) + int(ends[0])
+    growth = np.diff(np.searchsorted(breaks, ends)) - (behind - first)
     # Whole lines that are inserted touch no line; a line whose ending goes, joins the one behind it.
-    whole: Bools = (start == stop) & at_begin & ends_line & filled
-    joined = (stop > start) & (lines.starts[lines.of(stop)] == stop) & ~(ends_line & (filled | at_begin))
-    last = np.where(joined, lines.of(stop), last)
+    whole = ~cut & at_begin & ended
+    joined = cut & to_begin & ~(ended | (emptied & at_begin))
+    last = np.where(joined, behind, last)
     last = np.where(whole, first - 1, last)
     reached = np.maximum.accumulate(last)
     begins = np.ones(len(start), dtype=bool)
-    begins[1:] = whole[1:] | whole[:-1] | (first[1:] > reached[:-1])
+    begins[1:] = first[1:] > reached[:-1]
     at = np.flatnonzero(begins)
-    grown = np.add.reduceat(growth, at)
-    first, last = first[at], np.maximum.reduceat(last, at)
-    return _Blocks(first, last, first + sums(grown)[:-1], last - first + 1 + grown)
+    lines = np.stack([first[at], np.maximum.reduceat(last, at), np.add.reduceat(growth, at)])
+    return lines.astype(np.int32)
 
 
-def _hunk(old: _Lines, new: _Lines, blocks: _Blocks, low: int, high: int) -> list[bytes]:
-    """The hunk of the blocks low .. high - 1."""
-    first, last, begin, count = (
-        part[low:high].tolist() for part in (blocks.first, blocks.last, blocks.new, blocks.count)
+def _joined(old: _Lines, edits: Edits, low: int, high: int) -> tuple[Ints, Ints]:
+    """Runs of edits that abut: their first ones and their last ones.  A run ends where a line does on both sides."""
+    parted = edits.start[low + 1 : high] > edits.stop[low : high - 1]
+    k = np.flatnonzero(~parted) + low + 1
+    start = edits.start[k]
+    line = np.searchsorted(old.starts, start, side="right") - 1
+    parted[k - low - 1] = (old.starts[line] == start) & _ended(edits.texts, edits.ends[k - 1], edits.ends[k])
+    begin = np.flatnonzero(parted) + low + 1
+    return np.append(low, begin), np.append(begin, high) - 1
+
+
+def _ended(texts: bytes, begin: Ints, end: Ints) -> Bools:
+    """(K,) whether each of these parts of ``texts`` ends a line; an empty one does not."""
+    found = end > begin
+    found[found] = np.frombuffer(texts, np.uint8)[end[found] - 1] == _LF
+    return found
+
+
+def _hunks(old: _Lines, blocks: _Blocks) -> _Hunks:
+    far = np.flatnonzero(blocks.first[1:] - blocks.last[:-1] - 1 > 2 * CONTEXT) + 1
+    at = np.concatenate([[0], far, [len(blocks)]])
+    top = np.maximum(blocks.first[at[:-1]] - CONTEXT, 0)
+    end = np.minimum(blocks.last[at[1:] - 1] + CONTEXT, old.count - 1)
+    grown = np.add.reduceat(blocks.count - (blocks.last - blocks.first + 1), at[:-1])
+    count = end - top + 1
+    return _Hunks(at, top, count, top + blocks.new[at[:-1]] - blocks.first[at[:-1]], count + grown)
+
+
+def _part(old: _Lines, new: _Lines, hunks: _Hunks, blocks: _Blocks, rows: slice) -> bytes:
+    """The text of some blocks: of each the head of its hunk, the lines before it, its old ones and its new ones, and
+    the lines behind it; a head before the first of a hunk only, lines behind it after the last."""
+    here, number = blocks[rows], np.arange(rows.start, rows.stop)
+    hunk = np.searchsorted(hunks.at, number, side="right") - 1
+    begins, ends = hunks.at[hunk] == number, hunks.at[hunk + 1] == number + 1
+    before = np.where(begins, hunks.top[hunk], blocks.last[number - 1] + 1)
+    stop = np.where(ends, hunks.top[hunk] + hunks.old[hunk], here.last + 1)
+    heads = _heads(hunks, hunk[begins])
+    old_text, old_bounds = old.part(before[0], stop[-1])
+    new_text, new_bounds = new.part(here.new[0], here.new[-1] + here.count[-1])
+    # All lines of the part in one table, and the place of each run of lines in it.
+    texts = (_SIGNS, b"".join(heads), old_text, new_text)
+    at = sums(np.array([len(text) for text in texts]))
+    bounds = (sums(np.array([len(head) for head in heads], np.int64)), old_bounds, new_bounds)
+    table = np.concatenate([own + begin for own, begin in zip(bounds, at[1:-1], strict=True)])
+    to_old = len(heads) + 1 - before[0]
+    to_new = len(heads) + 1 + len(old_bounds) - here.new[0]
+    first = np.stack(
+        [
+            np.cumsum(begins) - 1,
+            before + to_old,
+            here.first + to_old,
+            here.new + to_new,
+            here.last + 1 + to_old,
+        ],
+        axis=1,
+    ).ravel()
+    count = np.stack(
+        [begins, here.first - before, here.last - here.first + 1, here.count, stop - here.last - 1], axis=1
+    ).ravel()
+    place = sums(count)
+    line = np.arange(place[-1]) + np.repeat(first - place[:-1], count)
+    sign, signed = (np.repeat(np.tile(each, len(here)), count) for each in ([0, 0, 1, 2, 0], [0, 1, 1, 1, 1]))
+    return gathered(
+        b"".join(texts),
+        np.stack([sign, table[line]], axis=1).ravel(),
+        np.stack([signed, table[line + 1] - table[line]], axis=1).ravel(),
     )
-    top = max(0, first[0] - CONTEXT)
-    end = min(old.count - 1, last[-1] + CONTEXT)
-    body: list[bytes] = []
-    at = top
-    for one, final, there, many in zip(first, last, begin, count, strict=True):
-        body += old.some(at, one - 1, b" ")
-        body += old.some(one, final, b"-")
-        body += new.some(there, there + many - 1, b"+")
-        at = final + 1
-    body += old.some(at, end, b" ")
-    removed = sum(line.startswith(b"-") for line in body)
-    added = sum(line.startswith(b"+") for line in body)
-    same = len(body) - removed - added
-    shift = begin[0] - first[0]
-    head = b"@@ -%d,%d +%d,%d @@\n" % (top + 1, same + removed, top + 1 + shift, same + added)
-    return [head, *body]
+
+
+def _heads(hunks: _Hunks, chosen: Ints) -> list[bytes]:
+    columns = (hunks.top + 1, hunks.old, hunks.new_top + 1, hunks.new)
+    numbers = zip(*(column[chosen].tolist() for column in columns), strict=True)
+    return [b"@@ -%d,%d +%d,%d @@\n" % four for four in numbers]

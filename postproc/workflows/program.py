@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from postproc.compensation.limits import limits
 from postproc.compensation.task import Task
 from postproc.dialects.dialect import Moved, Program
 from postproc.findings import Finding, Refusal
-from postproc.publish import publish
+from postproc.publish import Content, publish
 from postproc.report.diff import unified_diff
 from postproc.report.files import corrections_csv
 from postproc.report.page import beside, program_page
@@ -41,7 +42,7 @@ def predict(request: Request, stage: Stage = silent) -> Report:
     result = correct(replace(ready.task, gain=0.0))
     findings = in_order_of_place([*ready.findings, *result.findings])
     report = _report(request, ready, result, findings)
-    files: dict[Path, bytes] = {}
+    files: dict[Path, Content] = {}
     pages = [] if request.json is None else [request.json]
     shown: Path | None = None
     if request.report:
@@ -113,11 +114,11 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     _not_over_inputs(ready, report.outputs)
     if request.dry_run:
         return replace(report, outputs=())
-    diff = b"".join(
-        unified_diff(document, path.name, edits.of(index))
-        for index, (document, path) in enumerate(zip(program.documents, outputs, strict=True))
+    diff = chain.from_iterable(
+        unified_diff(document, path.name, edits.of(index), outputs[path])
+        for index, (document, path) in enumerate(zip(program.documents, paths, strict=True))
     )
-    files = {
+    files: dict[Path, Content] = {
         **outputs,
         names[0]: json_bytes(report),
         names[1]: corrections_csv(task, result, written.division, written.between),
