@@ -32,7 +32,6 @@ SIZES = {
     "N m": 10.0,
     "N/m": 2e6,
     "m/N": 2e-8,
-    "N m/rad": 1e6,
     "rad/(N m)": 1e-7,
     "N m/rad3": 1e11,
     "N/m3": 1e15,

@@ -1,0 +1,142 @@
+"""One mutant against its tests: in a process of its own, forked where all that is slow to import is there already."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import hypothesis
+import pytest
+
+LIMIT_S, LIMIT_TIMES = 5.0, 10.0
+"""Processor seconds that a test may take: a constant, and so many times what it takes unmutated."""
+WALL_S = 900.0
+MEMORY = 8 << 30
+HEAVY = (
+    "numpy",
+    "scipy.linalg",
+    "scipy.optimize",
+    "scipy.spatial.transform",
+    "scipy.stats",
+    "scipy.sparse.linalg",
+    "pinocchio",
+    "matplotlib.figure",
+    "yaml",
+    "click",
+    "rich.console",
+    "jinja2",
+)
+NO_TESTS = 5
+FAILED = 1
+
+
+def warm() -> None:
+    """Imports what every judgement needs and no mutant touches."""
+    for name in HEAVY:
+        __import__(name)
+    # what fails is not made smaller, and nothing hangs on the speed of this machine
+    phases = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
+    hypothesis.settings.register_profile(
+        "mutation", deadline=None, phases=phases, derandomize=True, database=None
+    )
+    hypothesis.settings.load_profile("mutation")
+
+
+class _Chosen:
+    """Runs the chosen tests, in the given order, each with a limit; notes the first that fails."""
+
+    def __init__(self, seconds: dict[str, float], note: Path) -> None:
+        self.place = {name: place for place, name in enumerate(seconds)}
+        self.seconds = seconds
+        self.note = note
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        chosen = {item.nodeid: item for item in items if item.nodeid in self.place}
+        items[:] = sorted(chosen.values(), key=lambda item: self.place[item.nodeid])
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
+        self.note.write_text(item.nodeid)
+        signal.setitimer(signal.ITIMER_PROF, LIMIT_S + LIMIT_TIMES * self.seconds[item.nodeid])
+        return (yield)
+
+
+def _child(tree: Path, seconds: dict[str, float], note: Path, words: Path) -> None:
+    """Never returns: the exit code is pytest's."""
+    code = 70
+    try:
+        os.setsid()
+        out = os.open(words, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        os.dup2(out, 1)
+        os.dup2(out, 2)
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+        for number in (signal.SIGPROF, signal.SIGTERM):
+            signal.signal(number, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_PROF, 60.0)
+        stay(tree)
+        os.environ["PYTHONDONTWRITEBYTECODE"] = "1"  # a mutant leaves no byte code behind
+        sys.dont_write_bytecode = True
+        files = list(dict.fromkeys(name.split("::")[0] for name in seconds))
+        options = [
+            "-x",
+            "-q",
+            "--tb=line",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "no:benchmark",
+            "-p",
+            "no:randomly",
+        ]
+        code = int(pytest.main([*files, *options], plugins=[_Chosen(seconds, note)]))
+    finally:
+        sys.stdout.flush()
+        os._exit(code)
+
+
+def stay(tree: Path) -> None:
+    """From here on the tree's package and tests are imported, also by commands that the tests start."""
+    home = Path(__file__).parent.parent
+    sys.path[:] = [str(tree), *(name for name in sys.path if name and Path(name) not in (home, home.parent))]
+    os.environ["PYTHONPATH"] = str(tree)
+    os.chdir(tree)
+
+
+def judge(tree: Path, seconds: dict[str, float], folder: Path) -> tuple[str, str]:
+    """("killed" | "timeout" | "survived", the test at which it ended): tests -> processor seconds, in their order."""
+    note, words = folder / "note", folder / "words"
+    note.write_text("import")
+    pid = os.fork()
+    if pid == 0:
+        _child(tree, seconds, note, words)
+    end = time.monotonic() + WALL_S
+    nap = 0.005
+    done = 0
+    try:
+        while not done and time.monotonic() < end:
+            time.sleep(nap)
+            nap = min(2 * nap, 0.05)
+            done, status = os.waitpid(pid, os.WNOHANG)
+    finally:
+        if not done:
+            os.killpg(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
+    return verdict(status, words) if done else "timeout", note.read_text()
+
+
+def verdict(status: int, words: Path) -> str:
+    if os.WIFSIGNALED(status):
+        return "timeout" if os.WTERMSIG(status) == signal.SIGPROF else "killed"
+    code: Any = os.WEXITSTATUS(status)
+    if code == 0:
+        return "survived"
+    if code == NO_TESTS or code in (3, 4, 70):
+        raise RuntimeError(f"the tests did not run (pytest {code}): see {words}")
+    return "killed"

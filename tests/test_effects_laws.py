@@ -1,0 +1,351 @@
+"""Laws of what an effect says of itself: bounds, sizes, units, options, the forms in which it is looked for."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from effects_at_work import conditions, elastic, made, nulls, random_arm, with_terms
+from plant import kr270, random_angles, random_tools, random_wrenches
+
+from postproc.effects import EFFECTS, Conditions, Offset, State
+from postproc.findings import Refusal
+from postproc.geometry import Poses
+from postproc.yamlfile import parsed
+
+ARMS = {
+    "kr270": lambda: kr270().joints,
+    "any six": lambda: random_arm(np.random.default_rng(6)),
+    "on a linear axis": lambda: random_arm(np.random.default_rng(7), "prrrrrr"),
+}
+arms = pytest.mark.parametrize("arm", ARMS)
+names = pytest.mark.parametrize("name", EFFECTS)
+
+
+def digits_of(number):
+    """The decimal digits that count, and the power of ten: 0.02 is (2, -2)."""
+    mantissa, _, power = f"{number:.12e}".partition("e")
+    digits = mantissa.replace(".", "").rstrip("0")
+    return int(digits or "0"), int(power)
+
+
+def options(text):
+    return parsed(text.encode(), Path("options.yaml"))
+
+
+# Bounds and sizes
+
+
+def has_one_sign(effect, parameter):
+    """Compliances, stiffnesses, masses, gaps, and the lengths of a spring."""
+    return (
+        parameter.unit in ("m/N", "rad/(N m)", "N/m", "N m/rad3", "N/m3", "kg")
+        or effect.family == "gear"
+        or parameter.name in ("s0", "L")
+    )
+
+
+@arms
+@names
+def test_bounds_are_round_and_even_about_the_null(name, arm):
+    """A quantity that may have either sign has the same room on both sides; one that may not begins at its null."""
+    effect = made(name, ARMS[arm]())
+    for p in effect.parameters:
+        assert p.null == 0.0
+        assert p.lower == (0.0 if has_one_sign(effect, p) else -p.upper), p
+        assert digits_of(p.upper)[0] in (1, 2, 5), p
+
+
+@arms
+@names
+def test_sizes_are_round_and_within_the_bounds(name, arm):
+    for p in made(name, ARMS[arm]()).parameters:
+        assert digits_of(p.scale)[0] in (1, 2, 3, 5, 6), p
+        assert 0.0 < p.scale <= p.upper, p
+
+
+UNITS_OF_SIZE = {
+    "1": (-5, -1),
+    "m": (-4, 0),
+    "rad": (-5, -2),
+    "kg": (0, 3),
+    "kg m": (0, 3),
+    "N": (0, 3),
+    "N m": (0, 3),
+}
+"""Unit -> the powers of ten between which something is felt on an arm, and leaves it standing."""
+
+
+@names
+def test_sizes_are_of_the_order_of_an_arm(name):
+    for p in made(name, kr270().joints).parameters:
+        if p.unit in UNITS_OF_SIZE:
+            low, high = UNITS_OF_SIZE[p.unit]
+            assert 10.0**low <= p.scale <= 10.0**high, p
+
+
+@names
+def test_sizes_are_felt_and_leave_the_arm_standing(name):
+    """Under a heavy load an effect of one size moves the tool by 1 um to 100 mm."""
+    rng = np.random.default_rng(30)
+    base = elastic(kr270(), rng)
+    effect = made(name, base.robot.joints)
+    q, wrench, tool = random_angles(kr270(), 10, rng), 5 * random_wrenches(10, rng), random_tools(10, rng)
+    given = conditions(10, rng)
+    sizes = {p.name: p.scale for p in effect.parameters}
+    without = with_terms(base, (effect, nulls(effect))).equilibrium(q, wrench, tool, given)
+    moved = with_terms(base, (effect, sizes)).equilibrium(q, wrench, tool, given)
+    assert moved.converged.all()
+    way = np.linalg.norm(moved.pose.position - without.pose.position, axis=1).max()
+    assert 1e-6 < way < 0.1
+
+
+def test_a_size_is_that_of_the_unit_where_none_is_said():
+    """Masses, forces and angles have one size wherever they occur."""
+    seen = {}
+    for name in EFFECTS:
+        for p in made(name, kr270().joints).parameters:
+            if not p.size:
+                assert seen.setdefault(p.unit, p.scale) == p.scale
+            else:
+                assert p.scale == p.size
+
+
+# Units
+
+
+TURNS = ("rx", "ry", "rz")
+
+
+@arms
+@names
+def test_units_are_those_of_the_coordinates(name, arm):
+    """An offset of a turn is an angle, one of a shift a length; compliances are that per moment or force."""
+    joints = {joint.name: joint for joint in ARMS[arm]()}
+    effect = made(name, tuple(joints.values()))
+    for p in effect.parameters:
+        turning = p.joint and joints[p.joint].kind == "revolute"
+        match p.unit:
+            case "rad" | "m" if effect.family == "geometric" and len(effect.coordinates) == len(
+                effect.parameters
+            ):
+                coordinate = effect.coordinates[effect.parameters.index(p)]
+                assert (p.unit == "rad") == (coordinate.rpartition(".")[2] in TURNS), p
+            case "rad/(N m)" | "m/N" if effect.coordinates and name != "tool_compliance":
+                coordinate = effect.coordinates[effect.parameters.index(p)]
+                assert (p.unit == "rad/(N m)") == (coordinate.rpartition(".")[2] in TURNS), p
+            case "rad" | "rad/(N m)" | "N m/rad3" if p.joint:
+                assert turning or name == "link_geometry", p
+            case "m/N" | "N/m3":
+                assert not turning, p
+
+
+@arms
+@names
+def test_a_number_in_a_name_is_that_of_the_joint(name, arm):
+    """c3 is of the third joint, r54 of the fifth: counted from one."""
+    joints = ARMS[arm]()
+    number = {joint.name: str(i) for i, joint in enumerate(joints, 1)}
+    for p in made(name, joints).parameters:
+        counted = p.name.partition("_")[0].lstrip("abcdefghijklmnopqrstuvwxyz")[:1]
+        if counted.isdigit() and p.joint and name != "gravity_compensator":
+            assert counted == number[p.joint], p
+
+
+# Options
+
+
+@names
+def test_options_come_back_as_they_are_described(name):
+    """Every form in which an effect is looked for can be said in a robot file."""
+    joints = kr270().joints
+    for form in (EFFECTS[name](joints), *EFFECTS[name].variants(joints)):
+        said = "".join(f"{key}: {value}\n" for key, value in form.described().items())
+        again = EFFECTS[name].from_options(options(said or "{}"), joints)
+        assert again.described() == form.described()
+        assert again.parameters == form.parameters
+        assert again.coordinates == form.coordinates
+
+
+@names
+def test_options_that_are_not_there_are_refused(name):
+    with pytest.raises(Refusal):
+        EFFECTS[name].from_options(options("no_such_option: 1"), kr270().joints)
+
+
+@pytest.mark.parametrize(
+    ("name", "option", "default", "low", "high", "rest"),
+    [
+        ("backlash", "friction", 20.0, 0.1, 1e5, ""),
+        ("gravity_compensator", "zero_deg", 0.0, -360.0, 360.0, "joint: A2\n"),
+    ],
+)
+def test_numbers_of_options_have_bounds_that_still_hold(name, option, default, low, high, rest):
+    joints = kr270().joints
+
+    def read(text):
+        return EFFECTS[name].from_options(options(rest + text), joints).described()[option]
+
+    assert read("" if rest else "{}") == pytest.approx(default)
+    assert EFFECTS[name](joints).described()[option] == pytest.approx(default)
+    for number in (low, high):
+        assert read(f"{option}: {number!r}") == pytest.approx(number, rel=1e-15)
+        beyond = number + math.copysign(1e-6 * abs(number), number - default)
+        with pytest.raises(Refusal) as refused:
+            read(f"{option}: {beyond!r}")
+        assert refused.value.findings[0].line == len(rest.splitlines()) + 1
+
+
+@pytest.mark.parametrize("said", ["[0]", "[-0.5]", "[1, 1]", "[2, 1, 2]", "[1, -1]"])
+def test_harmonics_are_positive_and_each_once(said):
+    with pytest.raises(Refusal) as refused:
+        EFFECTS["transmission_error"].from_options(options(f"harmonics: {said}"), kr270().joints)
+    assert refused.value.findings[0].code == "YML004"
+
+
+@pytest.mark.parametrize("said", [[1.0], [0.5], [1.0, 2.0, 17.5]])
+def test_harmonics_are_those_that_are_said(said):
+    effect = EFFECTS["transmission_error"].from_options(options(f"harmonics: {said}"), kr270().joints)
+    assert effect.described() == {"harmonics": said}
+
+
+# Forms
+
+
+def test_a_compensator_is_looked_for_across_the_second_turning_joint():
+    """The shoulder, whatever carries the arm; an arm with one turning joint has none."""
+    form = EFFECTS["gravity_compensator"]
+    for kinds, joint in (("rrrrrr", "J2"), ("prrrrrr", "J3"), ("rr", "J2"), ("rpr", "J3"), ("pprr", "J4")):
+        (found,) = form.variants(random_arm(np.random.default_rng(8), kinds))
+        assert found.described() == {"joint": joint, "preload": "balanced", "sign": "energy", "zero_deg": 0.0}
+    for kinds in ("r", "ppr", "pp"):
+        assert form.variants(random_arm(np.random.default_rng(8), kinds)) == ()
+
+
+def test_a_compensator_that_is_described_is_at_its_joint():
+    form, joints = EFFECTS["gravity_compensator"], kr270().joints
+    for name in (None, *(joint.name for joint in joints)):
+        found = form.of_mechanism(joints, name, {"zero": 0.25})
+        assert found.described()["joint"] == (name or joints[1].name)
+        assert found.zero == 0.25
+    assert form.of_mechanism(joints, None, {}).zero == 0.0
+
+
+def test_a_gear_is_looked_for_with_one_wave_a_turn_and_with_two():
+    found = EFFECTS["transmission_error"].variants(kr270().joints)
+    assert [form.described() for form in found] == [{"harmonics": [1.0]}, {"harmonics": [2.0]}]
+
+
+def test_growth_is_looked_for_with_the_temperature_and_with_the_time():
+    found = EFFECTS["thermal_growth"].variants(kr270().joints)
+    assert [form.described() for form in found] == [{"variable": "temperature"}, {"variable": "time"}]
+    assert [{p.unit for p in form.parameters} for form in found] == [{"m/K"}, {"m/s"}]
+
+
+def test_a_link_without_length_does_not_grow():
+    """Joints that stand at one place have nothing between them; a micrometre is something."""
+    joints = list(random_arm(np.random.default_rng(9)))
+    for number, length in ((1, 0.0), (3, 1e-6)):
+        place = joints[number].placement
+        joints[number] = type(joints[number])(
+            joints[number].name, Poses(place.rotation, np.array([0.0, length, 0.0])), -2.5, 2.5, "revolute"
+        )
+    assert [p.name for p in made("thermal_growth", joints).parameters] == ["g1", "g3", "g4", "g5", "g6"]
+
+
+# What acts
+
+
+@pytest.mark.parametrize("missing", ["payload_mass", "payload_com"])
+def test_a_weight_without_its_centre_is_not_guessed(missing):
+    rng = np.random.default_rng(31)
+    base = elastic(kr270(), rng)
+    payload = made("payload", base.robot.joints)
+    model = with_terms(base, (payload, nulls(payload)))
+    q, wrench, tool = random_angles(kr270(), 5, rng), random_wrenches(5, rng), random_tools(5, rng)
+    stated = {"payload_mass": np.full(5, 40.0), "payload_com": np.full((5, 3), 0.1)}
+    without = model.equilibrium(q, wrench, tool, Conditions())
+    one = model.equilibrium(q, wrench, tool, Conditions(**{**stated, missing: None}))
+    assert np.array_equal(one.coordinates, without.coordinates)
+    both = model.equilibrium(q, wrench, tool, Conditions(**stated))
+    assert not np.array_equal(both.coordinates, without.coordinates)
+
+
+@pytest.mark.parametrize("name", [name for name, effect in EFFECTS.items() if issubclass(effect, Offset)])
+def test_offsets_are_linear_in_their_parameters(name):
+    """Values of two parameters act as each alone, added; each does something."""
+    rng = np.random.default_rng(32)
+    base = elastic(kr270(), rng).without(families=["elastic"])
+    effect = made(name, base.robot.joints)
+    q = random_angles(kr270(), 6, rng)
+    given = conditions(6, rng)
+
+    def offset(values):
+        chain = with_terms(base, (effect, values)).chain
+        out = np.zeros((chain.size, 6))
+        effect.add_offset(values, chain, q.T, given, out)
+        return out
+
+    every = {p.name: float(rng.uniform(-1, 1)) for p in effect.parameters}
+    total = sum(offset(nulls(effect) | {name: value}) for name, value in every.items())
+    np.testing.assert_allclose(offset(every), total, atol=1e-14)
+    for p in effect.parameters:
+        one = offset(nulls(effect) | {p.name: 1.0})
+        assert one.any(), p.name
+        np.testing.assert_allclose(offset(nulls(effect) | {p.name: -2.0}), -2.0 * one, atol=1e-14)
+
+
+# What an effect says of itself
+
+
+def test_flags_are_said_where_they_hold():
+    said = {
+        "whole": {"joint_compliance", "joint_offset", "link_geometry"},
+        "by_direction": {"backlash", "hysteresis"},
+    }
+    for flag, those in said.items():
+        assert {name for name, effect in EFFECTS.items() if getattr(effect, flag)} == those
+    assert {name for name, effect in EFFECTS.items() if not effect.apart} == {"link_gravity"}
+
+
+@names
+def test_only_effects_by_direction_ask_how_joints_came(name):
+    rng = np.random.default_rng(33)
+    base = elastic(kr270(), rng)
+    effect = made(name, base.robot.joints)
+    model = with_terms(base, (effect, {p.name: p.scale for p in effect.parameters}))
+    q, wrench, tool = random_angles(kr270(), 8, rng), random_wrenches(8, rng), random_tools(8, rng)
+    given = conditions(8, rng)
+    other = replace(given, direction=-given.direction)
+    one, two = (model.equilibrium(q, wrench, tool, came).coordinates for came in (given, other))
+    assert np.array_equal(one, two) != effect.by_direction
+
+
+@pytest.mark.parametrize("preload", ["balanced", "acting"])
+def test_the_force_of_a_spring_is_the_gradient_of_its_energy_in_both_preloads(preload):
+    """Acting: -dU/dq of the spring itself; balanced: less its torque at rest, which the energy then holds as well."""
+    rng = np.random.default_rng(34)
+    robot = kr270()
+    spring = EFFECTS["gravity_compensator"](robot.joints, preload=preload)
+    values = {"K_c": 2e4, "s0": 0.4, "L": 0.5, "a_x": 0.3, "a_y": -0.2, "h": 0.1}
+    chain = with_terms(elastic(robot, rng), (spring, values)).chain
+    rest = rng.uniform(-0.4, 0.4, (chain.size, 9))
+    row, step = chain.motor_rows[1], 1e-6
+
+    def at(moved):
+        there = rest.copy()
+        there[row] += moved
+        none = np.zeros((6, 9))
+        return State(chain, np.zeros(3), rest[chain.motors], rest, there, None, none, Conditions())
+
+    def force(moved):
+        out = np.zeros_like(rest), np.zeros_like(rest)
+        spring.add_force(values, at(moved), *out)
+        return out[0][row]
+
+    bent = rng.uniform(-0.2, 0.2, 9)
+    slope = (spring.energy(values, at(bent + step)) - spring.energy(values, at(bent - step))) / (2 * step)
+    np.testing.assert_allclose(force(bent), -slope, rtol=1e-6)
+    assert np.any(force(0 * bent)) == (preload == "acting")
+    assert spring.slack == (preload == "balanced")
