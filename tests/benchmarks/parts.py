@@ -30,11 +30,10 @@ Maker = Callable[[Path, int], Path]
 
 
 def path(count: int) -> np.ndarray:
-    """(count, 3) [mm]: a wave that moves on, some 6 mm between points."""
-    t = np.linspace(0, count / 50, count)
-    return np.stack(
-        [400 + 300 * np.cos(0.11 * t), 400 + 350 * np.sin(0.017 * t), np.full(count, -2.0)], axis=1
-    )
+    """(count, 3) [mm]: an ellipse that moves to and fro, 0.06 to 0.7 mm between points and never none."""
+    t = np.arange(count) / 50
+    y = 400 + 60 * np.sin(0.11 * t) + 200 * np.sin(0.017 * t)
+    return np.stack([400 + 300 * np.cos(0.11 * t), y, np.full(count, -2.0)], axis=1)
 
 
 def forces(folder: Path, lines: np.ndarray) -> None:

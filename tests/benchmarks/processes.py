@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -31,6 +32,13 @@ def cost_of(words: Sequence[object], good: Sequence[int] = (0,)) -> Cost:
     return Cost(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024 / 1e6)
 
 
-def compensation(program: Path) -> Cost:
-    """The main job as a user starts it: all reports, and what was written is read back."""
-    return cost_of([sys.executable, "-m", "postproc", program, "--force", "-q"], (0, 3))
+def compensation(program: Path, count: int) -> Cost:
+    """The main job as a user starts it: all reports, and what was written is read back.
+
+    Raises SystemExit where fewer than ``count`` motions were corrected: it would not be the cost of correcting them.
+    """
+    cost = cost_of([sys.executable, "-m", "postproc", program, "--force", "-q"], (0, 3))
+    report = json.loads((program.parent / "compensated" / f"{program.stem}.report.json").read_bytes())
+    if report["corrected"] < count:
+        raise SystemExit(f"{program.name}: {report['corrected']} of {count} motions were corrected: void")
+    return cost

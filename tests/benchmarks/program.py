@@ -41,7 +41,7 @@ def rows(language: str, sizes: list[int]) -> list[tuple[int, Cost]]:
     found: list[tuple[int, Cost]] = []
     for count in sizes:
         with tempfile.TemporaryDirectory() as name:
-            cost = compensation(made_apart(Path(name), language, count))
+            cost = compensation(made_apart(Path(name), language, count), count)
         growth = ""
         if found:
             before, less = found[-1]
@@ -89,7 +89,7 @@ def main() -> None:
             )
     with tempfile.TemporaryDirectory() as name:
         small = made_apart(Path(name), "krl", SMALL)
-        seconds = walls(lambda: compensation(small))
+        seconds = walls(lambda: compensation(small, SMALL))
     print(f"{f'krl, {SMALL} motions, wall, median of {TIMES}':48} {seconds:7.2f} s  {SMALL_WALL:g} s")
     seconds = walls(lambda: cost_of([sys.executable, "-m", "postproc", "--help"]))
     print(f"{f'--help, wall, median of {TIMES}':48} {seconds:7.2f} s  {HELP_WALL:g} s")

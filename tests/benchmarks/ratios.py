@@ -1,13 +1,13 @@
 """How many times as fast as plain ways to the same result: ``python -m tests.benchmarks.ratios`` prints a table.
 
 Both sides of a row are measured in the same run, one after the other several times; their medians count.  A pose is
-processor time of one thread; where two results are not equal the comparison is void.
+processor time of one thread; where two results are not equal the comparison is void.  BLAS has one thread everywhere.
 
 - mirror loop: ``compensation.mirror`` against the plain loop over Pinocchio calls of ``tests/benchmarks/loop.py``.
 - linear deflection: forward kinematics, Jacobian and J K^-1 J^T F, against roboticstoolbox-python, which is installed
   into a virtual environment of its own (``--toolbox`` names the Python of one that is there already).
 - whole run: the command, in a process with start-up, reading back and all reports, against
-  ``tests/benchmarks/floor.py``; on all cores by the clock, and by the processor.
+  ``tests/benchmarks/floor.py``; by the clock, on all cores, and by the processor.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def whole_run(count: int, times: int, folder: Path) -> None:
     floor = [sys.executable, "-m", "tests.benchmarks.floor", program, folder / "floor.src"]
     costs = []
     for _ in range(times):
-        costs.append((compensation(program), cost_of(floor)))
+        costs.append((compensation(program, count), cost_of(floor)))
         shutil.rmtree(folder / "compensated")
     for name, field in (("clock", "wall"), ("processor", "cpu")):
         ours, other = (median(getattr(pair[i], field) for pair in costs) for i in (0, 1))
@@ -195,15 +195,17 @@ def main() -> None:
     parser.add_argument("--sizes", default="100000,1000000", help="motions of whole runs [%(default)s]")
     asked = parser.parse_args()
     print(f"{heading()}\n{HEADINGS}")
-    states = States()
-    mirror_loop(states)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         python = asked.toolbox or toolbox(folder / "venv")
+        os.environ["POSTPROC_THREADS"] = "1"
+        states = States()
+        mirror_loop(states)
         if python is None:
             print("linear deflection: not measured, roboticstoolbox-python can not be installed here")
         else:
             linear_deflection(states, python, folder)
+        del os.environ["POSTPROC_THREADS"]
         for count in map(int, asked.sizes.split(",") if asked.sizes else []):
             whole_run(count, 1 if count >= 10**6 else 3, folder / str(count))
 

@@ -1,8 +1,8 @@
 """What share of a whole run each stage has: ``python -m tests.benchmarks.stages`` prints a table.
 
-The run is the command's own, in this process, with reading back and all reports.  Every few milliseconds of processor
-time its stack is looked at: the time since the last look, of all threads, goes to the stage of the innermost function
-that has one.
+The run is the command's own, in this process and one thread, with reading back and all reports.  Every few milliseconds
+of processor time its stack is looked at: the time since the last look goes to the stage of the innermost function that
+has one.
 """
 
 from __future__ import annotations
@@ -121,6 +121,7 @@ def resident() -> float:
 
 
 def looked_at(program: Path) -> Looks:
+    os.environ["POSTPROC_THREADS"] = "1"  # what other threads do has no stack here
     import postproc
     from postproc.cli.main import run
 
