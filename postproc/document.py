@@ -91,7 +91,7 @@ class Document:
 class Store:
     """Keeps arrays in blocks so large that the system takes them back when nothing in them is used any more."""
 
-    SIZE = 1 << 26
+    SIZE = 33 << 20
     """Bytes; the C library gives allocations above 32 MB back at once, and what is not used takes no memory."""
 
     def __init__(self) -> None:

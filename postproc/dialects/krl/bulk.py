@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats
 from postproc.dialects.krl.target import External
 
 
@@ -28,8 +28,8 @@ class Bulk:
     start: NDArray[Any]
     stop: NDArray[Any]
     motion: NDArray[Any]
-    status: Ints
-    turn: Ints
+    status: NDArray[np.int32]
+    turn: NDArray[np.int32]
     slur: NDArray[np.int8]
     external: tuple[tuple[int, External], ...] = ()
 

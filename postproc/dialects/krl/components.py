@@ -106,7 +106,8 @@ class Task:
     @cached_property
     def _aggregates(self) -> tuple[Ints, Ints]:
         """The aggregates that components can be inserted into, in order, and how many rows use each."""
-        return np.unique(self.places.insert * len(self.raws) + self.places.home, return_counts=True)
+        keys = self.places.insert.astype(np.int64) * len(self.raws) + self.places.home
+        return np.unique(keys, return_counts=True)
 
     def uses_of(self, home: int, insert: int) -> int:
         """How many rows take components from the aggregate with this place of insertion."""

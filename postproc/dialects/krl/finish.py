@@ -37,9 +37,9 @@ def finished(run: Run, text_called: Iterable[bytes]) -> tuple[Toolpath, Places, 
     table.base, table.tool, used = _used(table.base, table.tool, run.frames.refs())
     table.blend *= MM
     n = len(rows)
-    anchor, given = _sparse((n,), -1, {row: at.row for row, at in rows.anchors.items()}), _given(rows, n)
+    anchor = _sparse((n,), np.int32(-1), {row: at.row for row, at in rows.anchors.items()})
+    given = _given(rows, n)
     axes = _sparse((n, 6), np.nan, table.axes, DEG)
-    way = _sparse((n, 7), np.nan, table.ways, np.array([MM] * 3 + [1.0] * 3 + [DEG]))
     toolpath = Toolpath(
         kind=_kept(table.kind),
         position=_kept(table.position),
@@ -57,9 +57,9 @@ def finished(run: Run, text_called: Iterable[bytes]) -> tuple[Toolpath, Places, 
         annotations=tuple(rows.annotations),
         anchor=anchor,
         given=given,
-        centre=way[:, :3],
-        normal=way[:, 3:6],
-        sweep=way[:, 6],
+        centre=_sparse((n, 3), np.nan, {row: way[:3] for row, way in table.ways.items()}, MM),
+        normal=_sparse((n, 3), np.nan, {row: way[3:6] for row, way in table.ways.items()}),
+        sweep=_sparse((n,), np.nan, {row: way[6] for row, way in table.ways.items()}, DEG),
         blend=_kept(table.blend),
         free_axis=np.broadcast_to(np.nan, (n, 3)),
         whole=_whole(rows, table),
@@ -92,7 +92,7 @@ def _kept(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def _sparse(
-    shape: tuple[int, ...], blank: float, filled: Mapping[int, Any], unit: float | Floats = 1
+    shape: tuple[int, ...], blank: float | np.int32, filled: Mapping[int, Any], unit: float | Floats = 1
 ) -> NDArray[Any]:
     """``blank`` everywhere but in the rows that are filled; without memory of its own where none is."""
     if not filled:
@@ -114,7 +114,7 @@ def _used(base: Ints, tool: Ints, frames: tuple[FrameRef, ...]) -> tuple[Ints, I
     present = np.zeros(len(frames) + 1, bool)
     present[base] = present[tool] = True  # the last entry is for those that are not known, -1
     kept = np.flatnonzero(present[:-1]).tolist()
-    renamed = np.full(len(frames) + 1, -1, dtype=np.int64)
+    renamed = np.full(len(frames) + 1, -1, dtype=np.int32)
     renamed[kept] = np.arange(len(kept))
     return renamed[base], renamed[tool], tuple(frames[i] for i in kept)
 

@@ -13,7 +13,7 @@ from postproc.dialects.dialect import Role
 from postproc.dialects.krl.arcs import half_way
 from postproc.dialects.krl.components import LETTER, Components, Task
 from postproc.dialects.krl.own_points import aggregate, carried
-from postproc.document import Edit, Edits, Span, gathered, sums
+from postproc.document import Edit, Edits, Offsets, Span, gathered, sums
 
 BLOCK = 1 << 15
 """Motions that are written at a time."""
@@ -52,9 +52,9 @@ def insertions(task: Task) -> Iterator[Edits]:
         yield Edits.joined(single)
 
 
-def _line_begins(task: Task) -> Ints:
+def _line_begins(task: Task) -> Offsets:
     """Offsets at which the lines of the program begin, behind a byte order mark."""
-    begins = np.concatenate([[0], np.flatnonzero(task.raws[0] == 10) + 1])
+    begins = task.documents[0].line_starts.copy()
     if task.documents[0].raw.startswith(b"\xef\xbb\xbf"):
         begins[0] = 3
     return begins

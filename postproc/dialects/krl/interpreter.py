@@ -25,7 +25,9 @@ from postproc.findings import Finding
 MOST_READINGS = 3
 """Readings in which jumps are followed that turned out to be uncertain; then none is followed."""
 
-_MARKER = re.compile(rb"^(?:\xef\xbb\xbf)?([ \t]*;COMPENSATED by compensate [^\r\n]*)", re.M)
+_TCP = re.compile(rb"#[Tt][Cc][Pp]")
+_MARK = b";COMPENSATED by compensate "
+_MARKER = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*" + _MARK + rb"[^\r\n]*)")
 _MOTION = Statement("motion", b"", b"", 0, 0)
 
 
@@ -55,7 +57,7 @@ def read(documents: tuple[Document, ...], references: Sequence[Document] = (), f
         read_data(declarations, document, file)
     for document in references:
         read_data(declarations, document, -1)
-    has_tcp = any(b"#TCP" in document.raw.upper() for document in documents)
+    has_tcp = any(_TCP.search(document.raw) for document in documents)
     doubts = Doubts()
     for reading in range(MOST_READINGS + 1):
         run = Run(
@@ -72,14 +74,13 @@ def read(documents: tuple[Document, ...], references: Sequence[Document] = (), f
     marker_at = _marker_at(source, code)
     toolpath, places, refusals = finished(run, flow.text_called)
     findings = sorted([*run.findings, *refusals], key=lambda finding: (finding.line, finding.column))
-    marker = _MARKER.search(source.raw)
     return Program(
         dialect="krl",
         documents=documents,
         toolpath=toolpath,
         text=places,
         findings=tuple(findings),
-        marker=Span(0, *marker.span(1)) if marker else None,
+        marker=_marker(source.raw),
         marker_at=marker_at,
         names=tuple(_names(documents)),
     )
@@ -108,6 +109,17 @@ def _tell_structure(run: Run) -> None:
     if not run.survey.has_routine:
         first = next((n for n, a, b in lines(run.document) if run.document.raw[a:b].strip()), 1)
         run.findings.append(Finding("KRL018", "the file has no DEF", name, first, 1))
+
+
+def _marker(raw: bytes) -> Span | None:
+    """The first line that is the comment of a compensated program."""
+    at = raw.find(_MARK)
+    while at >= 0:
+        found = _MARKER.match(raw, raw.rfind(b"\n", 0, at) + 1)
+        if found:
+            return Span(0, *found.span(1))
+        at = raw.find(_MARK, raw.find(b"\n", at) + 1 or len(raw))
+    return None
 
 
 def _marker_at(document: Document, code: Sequence[Item]) -> Span:

@@ -9,10 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Ints
-from postproc.document import Span
-
-Offsets = NDArray[np.signedinteger]
-"""Byte offsets; 32 bits where the documents allow it."""
+from postproc.document import Offsets, Span
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,59 +14,34 @@ from postproc.dialects.krl.bulk import Bulk
 from postproc.dialects.krl.lexing import BOM, statement
 from postproc.dialects.krl.run import Item
 from postproc.dialects.krl.target import COMPONENTS, External, Target, parse
-from postproc.document import Document
+from postproc.document import Document, Store, offset_type
 
-BLOCK = 1 << 26
-"""Bytes; the C library gives allocations above 32 MB back at once."""
-
-FEWEST, MOST = 8, 1 << 16
+FEWEST, MOST = 8, 1 << 14
 """Lines of a run that are read together: with fewer it does not pay, with more it takes memory."""
 
 _B = rb"[ \t]*+"
 _REAL = rb"[-+]?\d{1,15}+(?:\.\d{0,20}+)?+"
 _STATE = rb"(?:\d{1,9}+|'[Bb][01]{1,30}+')"
-_LINE = (
-    _B
-    + rb"(?:LIN|PTP)"
-    + _B
-    + rb"\{"
-    + (_B + rb",").join(_B + key + rb"[ \t]++" + _REAL for key in COMPONENTS)
-    + rb"(?:" + b"".join(_B + rb"," + _B + key + rb"(?=[ \t'])" + _B + _STATE for key in (b"S", b"T")) + rb")?+"
+_MORE = (
+    rb"(?:" + b"".join(_B + rb"," + _B + key + rb"(?=[ \t'])" + _B + _STATE for key in (b"S", b"T")) + rb")?+"
     + b"".join(rb"(?:" + _B + rb"," + _B + rb"E%d[ \t]++" % i + _REAL + rb")?+" for i in range(1, 7))
-    + _B
-    + rb"\}"
-    + _B
-    + rb"(?:C_(?:DIS|VEL|ORI|PTP)"
-    + _B
-    + rb")?+(?:;(?![ \t]*(?:FORCE|COMPENSATE))[^\r\n{}]*+)?+\r?\n"
+)  # fmt: skip
+_LINE = (
+    _B + rb"(?:LIN|PTP)" + _B + rb"\{"
+    + (_B + rb",").join(_B + key + rb"[ \t]++" + _REAL for key in COMPONENTS)
+    + rb"(?:" + _B + rb"\}|" + _MORE + _B + rb"\})"
+    + _B + rb"(?:C_(?:DIS|VEL|ORI|PTP)" + _B + rb")?+"
+    + rb"(?:;(?![ \t]*(?:FORCE|COMPENSATE))[^\r\n{}]*+)?+\r?\n"
 )  # fmt: skip
 _RUN = re.compile(rb"^(?:%s){%d,%d}+" % (_LINE, FEWEST, MOST), re.I | re.M)
 _IN_NUMBER = np.zeros(256, bool)
 _IN_NUMBER[list(b"0123456789.+-")] = True
 
 
-class _Store:
-    """Keeps arrays in blocks so large that the system takes them back when nothing in them is used any more."""
-
-    def __init__(self) -> None:
-        self._block, self._used = np.empty(0, np.uint8), 0
-
-    def keep(self, array: NDArray[Any], dtype: type[np.generic] | None = None) -> NDArray[Any]:
-        """A copy, with values of another type if one is given."""
-        kind = np.dtype(dtype or array.dtype)
-        size = array.size * kind.itemsize
-        if self._used + size > len(self._block):
-            self._block, self._used = np.empty(max(BLOCK, size), np.uint8), 0
-        kept = self._block[self._used : self._used + size].view(kind).reshape(array.shape)
-        kept[...] = array
-        self._used += -(-size // 8) * 8
-        return kept
-
-
 def scan(document: Document, fast: bool) -> Iterator[Item]:
     """The statements of a program in the order of the text; ``fast``: runs of common lines as one."""
     raw = document.raw
-    store = _Store()
+    store = Store()
     line, place = 1, len(BOM) if document.raw.startswith(BOM) else 0
     for found in _RUN.finditer(raw, place) if fast else ():
         start, stop = found.span()
@@ -89,7 +64,7 @@ def _lines(raw: bytes, line: int, start: int, stop: int) -> Iterator[Item]:
         start, line = end, line + 1
 
 
-def _bulk(raw: bytes, line: int, start: int, stop: int, store: _Store) -> Bulk:
+def _bulk(raw: bytes, line: int, start: int, stop: int, store: Store) -> Bulk:
     """The common lines from byte ``start`` to ``stop``, whose number is ``line`` on."""
     text = np.frombuffer(raw, np.uint8, stop - start, start)
     ends = np.flatnonzero(text == 0x0A)
@@ -103,9 +78,9 @@ def _bulk(raw: bytes, line: int, start: int, stop: int, store: _Store) -> Bulk:
     word = begins.copy()
     while (blank := text[word] <= 0x20).any():
         word += blank
-    slur, code = _approximations(raw, start, closing, ends)
+    slur, code = _approximations(text, closing)
     status, turn, external = _states(raw, start, stops[:, 5], closing)
-    offset: type[np.signedinteger] = np.int32 if len(raw) < 2**31 - 1 else np.int64
+    offset = offset_type(len(raw))
     motion = np.stack([word, opening, closing + 1, code], axis=1)
     return Bulk(
         line=line,
@@ -130,43 +105,34 @@ def _numbers(text: NDArray[Any], starts: NDArray[Any], stops: NDArray[Any]) -> N
     return np.fromstring(plain.tobytes().decode("ascii"), sep=" ").reshape(starts.shape)
 
 
-def _approximations(
-    raw: bytes, start: int, closing: NDArray[Any], ends: NDArray[Any]
-) -> tuple[NDArray[np.int8], NDArray[Any]]:
-    """Kind of the approximation (see ``Bulk.slur``), and where the code of the line ends."""
-    slur, code = np.zeros(len(ends), np.int8), closing + 1
-    rows = np.flatnonzero(ends > code)
-    rests = [
-        raw[a:b] for a, b in zip((code[rows] + start).tolist(), (ends[rows] + start).tolist(), strict=True)
-    ]
-    known = {rest: _approximation(rest) for rest in set(rests)}
-    found = np.array([known[rest] for rest in rests], np.int64).reshape(len(rests), 2)
-    slur[rows] = found[:, 0]
-    code[rows] += found[:, 1]
+def _approximations(text: NDArray[Any], closing: NDArray[Any]) -> tuple[NDArray[np.int8], NDArray[Any]]:
+    """Kind of the approximation (see ``Bulk.slur``) behind a brace, and where the code of the line ends."""
+    word = closing + 1
+    while (blank := (text[word] == 0x20) | (text[word] == 0x09)).any():
+        word += blank
+    there = (text[word] | 0x20) == ord("c")
+    rows = np.flatnonzero(there)
+    slur, code = np.zeros(len(closing), np.int8), closing + 1
+    slur[rows] = np.where((text[word[rows] + 2] | 0x20) == ord("d"), 1, 2)
+    code[rows] = word[rows] + len("C_DIS")
     return slur, code
-
-
-def _approximation(rest: bytes) -> tuple[int, int]:
-    code = rest.partition(b";")[0].rstrip(b" \t\r")
-    word = code.strip(b" \t")
-    return 0 if not word else 1 if word.upper() == b"C_DIS" else 2, len(code)
 
 
 def _states(
     raw: bytes, start: int, behind: NDArray[Any], closing: NDArray[Any]
-) -> tuple[NDArray[np.int64], NDArray[np.int64], tuple[tuple[int, External], ...]]:
+) -> tuple[NDArray[np.int32], NDArray[np.int32], tuple[tuple[int, External], ...]]:
     """S, T and the external axes of the lines, which stand between their last angle and the brace."""
     rows = np.flatnonzero(closing > behind)
     if not len(rows):
-        none = np.broadcast_to(-1, len(closing))
+        none = np.broadcast_to(np.int32(-1), len(closing))
         return none, none, ()
-    status, turn = np.full(len(closing), -1), np.full(len(closing), -1)
+    status, turn = np.full(len(closing), -1, np.int32), np.full(len(closing), -1, np.int32)
     rests = [
         raw[a:b]
         for a, b in zip((behind[rows] + start).tolist(), (closing[rows] + start).tolist(), strict=True)
     ]
     known = {rest: _state(rest) for rest in set(rests)}
-    found = np.array([known[rest][:2] for rest in rests], np.int64)
+    found = np.array([known[rest][:2] for rest in rests], np.int32)
     status[rows], turn[rows] = found[:, 0], found[:, 1]
     external: dict[External, int] = {}
     for row, rest in zip(rows.tolist(), rests, strict=True):
