@@ -34,3 +34,34 @@ def _is_frozen(values: ArrayLike, dtype: Any) -> TypeGuard[NDArray[Any]]:
     return bool(values.flags.owndata and values.flags.c_contiguous) or (
         values.size > 0 and not any(values.strides)
     )
+
+
+class FewRows:
+    """(N, k) numbers of which only few rows are known, kept alone; NaN in all others.  Read-only.
+
+    rows (R,): which are known, ascending; values (R, k).
+    """
+
+    def __init__(self, rows: Ints, values: Floats, count: int) -> None:
+        self.rows, self.values, self.shape = rows, values, (count, values.shape[1])
+
+    @staticmethod
+    def of(values: Floats | FewRows) -> FewRows:
+        """Of an array (N, k): the rows that hold a number."""
+        if isinstance(values, FewRows):
+            return values
+        rows = np.flatnonzero(np.isfinite(values).any(axis=1))
+        return FewRows(rows, frozen(values[rows]), len(values))
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, rows: Any) -> Floats:
+        """As of an array, by rows: a number, numbers, a mask or a slice."""
+        chosen = np.arange(len(self))[rows]
+        at = np.searchsorted(self.rows, chosen)
+        known = np.append(self.rows, -1)[at] == chosen
+        return np.append(self.values, np.full((1, self.shape[1]), np.nan), axis=0)[np.where(known, at, -1)]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.asarray(self[:], dtype)

@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, frozen
+from postproc.arrays import Bools, FewRows, Floats, Ints, frozen
 from postproc.findings import Finding
-from postproc.geometry import Poses, abc_from_rotation, rotation_from_abc
+from postproc.geometry import Placed, Poses, abc_from_rotation, rotation_from_abc
 from postproc.units import DEG, MM
 
 
@@ -91,7 +91,7 @@ class Toolpath:
     kind: Ints
     position: Floats
     rotation: Floats
-    axes: Floats
+    axes: FewRows | Floats
     feed: Floats
     base: Ints
     tool: Ints
@@ -126,7 +126,6 @@ class Toolpath:
             "anchor": ((n,), np.int32, -1),
             "position": ((n, 3), np.float64, None),
             "rotation": ((n, 3, 3), np.float64, None),
-            "axes": ((n, 6), np.float64, None),
             "feed": ((n,), np.float64, None),
             "given": ((n, 6), np.float64, np.nan),
             **dict.fromkeys(("centre", "normal", "free_axis"), ((n, 3), np.float64, np.nan)),
@@ -140,6 +139,9 @@ class Toolpath:
             if not len(values) and default is not None:
                 values = np.broadcast_to(np.asarray(default, dtype), shape)
             object.__setattr__(self, name, frozen(values, shape, dtype))
+        object.__setattr__(self, "axes", FewRows.of(self.axes))
+        if self.axes.shape != (n, 6):
+            raise ValueError(f"axes of shape {self.axes.shape}, {n} motions")
 
     def __len__(self) -> int:
         return len(self.kind)
@@ -154,19 +156,23 @@ class Toolpath:
     @cached_property
     def on_axes(self) -> Bools:
         """(N,) the target is stated by axis angles."""
-        return np.asarray(np.isfinite(self.axes).all(axis=1))
+        axes = FewRows.of(self.axes)
+        stated = np.zeros(len(self), np.bool_)
+        stated[axes.rows[np.isfinite(axes.values).all(axis=1)]] = True
+        return stated
 
     @property
     def target_in_base(self) -> Poses:
         return Poses(self.rotation, self.position)
 
-    def completed(self, reached: Poses) -> Toolpath:
+    def completed(self, reached: Placed) -> Toolpath:
         """The toolpath with its anchored targets known; ``reached`` (N): where the AXIS motion of ``anchor`` brings
         the TCP, in the base and with the tool of the row itself."""
         rows = np.flatnonzero(self.anchor >= 0)
         if not len(rows):
             return self
-        there = np.concatenate([reached.position[rows], abc_from_rotation(reached.rotation[rows])], axis=1)
+        end = reached[rows]
+        there = np.concatenate([end.position, abc_from_rotation(end.rotation)], axis=1)
         values = np.where(np.isnan(self.given[rows]), there, self.given[rows])
         position, rotation = self.position.copy(), self.rotation.copy()
         position[rows], rotation[rows] = values[:, :3], rotation_from_abc(values[:, 3:])
@@ -178,7 +184,7 @@ class Toolpath:
         for row in range(len(self)):
             kind = Kind(self.kind[row])
             words = [f"{self.line[row]}", kind.name]
-            if np.isfinite(self.axes[row, 0]):
+            if self.on_axes[row]:
                 words += [f"A{i + 1} {_number(a / DEG)}" for i, a in enumerate(self.axes[row])]
             elif self.anchor[row] >= 0:
                 words += [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,8 +18,8 @@ from postproc.compensation.between import errors_between
 from postproc.compensation.correct import Result, with_residual
 from postproc.compensation.division import Division, made
 from postproc.compensation.task import Task
-from postproc.dialects.dialect import Dialect, Moved, Program, Settings, Writing
-from postproc.document import Document, Edits, apply, undone
+from postproc.dialects.dialect import Dialect, Program, Settings, Writing
+from postproc.document import Document, Edit, Edits, apply, undone
 from postproc.findings import Finding, Refusal
 from postproc.geometry import PoseRows, Poses, on_arc, vector_from_rotation
 from postproc.robot.description import Robot
@@ -46,36 +46,49 @@ class Written:
 
 def planned(task: Task, division: Division) -> Plan:
     """A division in the programmed bases: what a dialect is to write."""
-    path, source, m = task.toolpath, division.source, len(division)
-    arcs = bool(np.isfinite(division.sweep).any() or np.isfinite(path.sweep).any())
+    m = len(division)
     position, rotation = np.empty((m, 3)), np.empty((m, 3, 3))
+    arcs = bool(np.isfinite(division.sweep).any() or np.isfinite(task.toolpath.sweep).any())
     none = np.broadcast_to(np.nan, (m, 3))
     centre, normal, sweep = (np.array(way) if arcs else way for way in (none, none, none[:, 0]))
 
-    def put(part: slice) -> None:
-        at, moved = source[part], division.moved[part]
-        to_base = task.base.shared(at).inverse()
-        command = to_base @ division.command[part]
-        turned = moved & path.oriented[at]
-        position[part] = np.where(moved[:, None], command.position, path.position[at])
-        rotation[part] = np.where(turned[:, None, None], command.rotation, path.rotation[at])
-        if not arcs:
-            return
-        arc, kept = np.isfinite(division.sweep[part]), ~moved & ~division.links[part]
-        there = (to_base @ Poses(np.eye(3), division.centre[part])).position
-        across = (to_base.rotation @ division.normal[part][..., None])[..., 0]
-        for whole, own, way in (
-            (centre, path.centre, there),
-            (normal, path.normal, across),
-            (sweep[:, None], path.sweep[:, None], division.sweep[part][:, None]),
-        ):
-            whole[part] = np.where(arc[:, None], way, np.where(kept[:, None], own[at], np.nan))
+    def put(rows: slice) -> None:
+        part = _planned(task, division, rows)
+        position[rows], rotation[rows] = part.position, part.rotation
+        if arcs:
+            centre[rows], normal[rows], sweep[rows] = part.centre, part.normal, part.sweep
 
     for _ in in_blocks(put, m):
         pass
-    for array in (position, rotation):
+    for array in (position, rotation, centre, normal, sweep):
         array.setflags(write=False)
-    return Plan(source, division.role, position, rotation, centre, normal, sweep)
+    return Plan(division.source, division.role, position, rotation, centre, normal, sweep)
+
+
+def _planned(task: Task, division: Division, rows: slice) -> Plan:
+    """Some motions of the plan."""
+    path, source, moved = task.toolpath, division.source[rows], division.moved[rows]
+    to_base = task.base.shared(source).inverse()
+    command = to_base @ division.command[rows]
+    turned = moved & path.oriented[source]
+    arc, kept = np.isfinite(division.sweep[rows]), ~moved & ~division.links[rows]
+    centre = (to_base @ Poses(np.eye(3), division.centre[rows])).position
+    normal = (to_base.rotation @ division.normal[rows][..., None])[..., 0]
+
+    def way(new: Floats, old: Floats) -> Floats:
+        more = (1,) * (new.ndim - 1)
+        stays = np.where(kept.reshape(-1, *more), old[source], np.nan)
+        return np.where(arc.reshape(-1, *more), new, stays)
+
+    return Plan(
+        source,
+        division.role[rows],
+        np.where(moved[:, None], command.position, path.position[source]),
+        np.where(turned[:, None, None], command.rotation, path.rotation[source]),
+        way(centre, path.centre),
+        way(normal, path.normal),
+        way(division.sweep[rows], path.sweep),
+    )
 
 
 def written_as(cell: Cell, own_points: str) -> Writing:
@@ -83,41 +96,51 @@ def written_as(cell: Cell, own_points: str) -> Writing:
     return Writing(_decimals(cell.tolerance / MM), _decimals(cell.tolerance_angle / DEG), own_points)
 
 
-def write(
-    program: Program,
-    dialect: Dialect,
-    task: Task,
-    result: Result,
-    division: Division,
-    plan: Plan,
-    moved: Moved,
-    writing: Writing,
-    settings: Settings,
-    robot: Robot,
-    stem: str,
-    completed: Callable[[Toolpath], Toolpath],
-) -> Written:
-    """Turn a plan's edits into files, under the module name ``stem``, and read them back.
+def edited(program: Program, dialect: Dialect, moved: Sequence[Edit], robot: Robot, stem: str) -> Edits:
+    """The edits that make the output: those of the motions, with its mark and the module name ``stem``.
 
-    ``completed``: fills in what a target that was read back leaves to the axis motion before it.
-    Raises Refusal FIL011 (no module name) and FIL008 (what was read back is not what was meant).
+    Raises Refusal FIL011 (no module name).
     """
-    edits = Edits.joined(moved.edits)
-    if len(edits):
-        edits = Edits.joined(edits, [dialect.marked(program, _mark(program, robot))])
+    more: list[Edit] = []
+    if len(moved):
+        more.append(dialect.marked(program, _mark(program, robot)))
     main = program.documents[0].path
     if stem != main.stem:
         if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,23}", stem):
             raise Refusal(Finding("FIL011", f"{stem!r} can not name a module", str(main)))
-        edits = Edits.joined(edits, dialect.renamed(program, stem))
-    contents = _contents(program, edits)
-    documents = zip(program.documents, contents, strict=True)
-    read = dialect.read(tuple(Document(document.path, raw) for document, raw in documents), settings)
-    back = completed(read.toolpath)
-    _hold(program.toolpath, back, plan, writing, main.name)
+        more += dialect.renamed(program, stem)
+    return Edits.joined(moved, more)
+
+
+def write(
+    documents: tuple[Document, ...],
+    dialect: Dialect,
+    task: Task,
+    result: Result,
+    division: Division,
+    edits: Edits,
+    writing: Writing,
+    settings: Settings,
+    completed: Callable[[Toolpath], Toolpath],
+) -> Written:
+    """Turn the edits of ``documents`` into files, and read them back.
+
+    ``completed``: fills in what a target that was read back leaves to the axis motion before it.
+    Raises Refusal FIL008 (what was read back is not what was meant).
+    """
+    contents = _contents(documents, edits)
+    back = completed(_read_back(documents, contents, dialect, settings))
+    _hold(task, division, back, writing, documents[0].path.name)
     there = _as_written(task, division, back)
     result = with_residual(task, result, there.own_command)
     return Written(edits, contents, result, there, way_errors(task, result, there))
+
+
+def _read_back(
+    documents: tuple[Document, ...], contents: tuple[bytes, ...], dialect: Dialect, settings: Settings
+) -> Toolpath:
+    pairs = zip(documents, contents, strict=True)
+    return dialect.read(tuple(Document(document.path, raw) for document, raw in pairs), settings).toolpath
 
 
 def way_errors(task: Task, result: Result, division: Division) -> Floats:
@@ -141,7 +164,7 @@ def _as_written(task: Task, division: Division, back: Toolpath) -> Division:
     source, base = division.source, task.base
 
     def command(rows: Ints) -> Poses:
-        found = division.command[rows]
+        found = task.wanted[source[rows]].copy()
         moved = np.flatnonzero(division.moved[rows])
         found.put(moved, base.shared(source[rows[moved]]) @ back.target_in_base[rows[moved]])
         return found
@@ -170,10 +193,10 @@ def _mark(program: Program, robot: Robot) -> str:
     return f"{__version__}, robot {robot.name} sha256:{robot.digest[:16]}, source sha256:{source[:16]}"
 
 
-def _contents(program: Program, edits: Edits) -> tuple[bytes, ...]:
+def _contents(documents: tuple[Document, ...], edits: Edits) -> tuple[bytes, ...]:
     """The bytes of every document with its edits.  Raises Refusal FIL008 if another byte changed."""
     contents = []
-    for index, document in enumerate(program.documents):
+    for index, document in enumerate(documents):
         own = edits.of(index)
         raw = apply(document, own)
         if not undone(raw, document.raw, own):
@@ -182,20 +205,27 @@ def _contents(program: Program, edits: Edits) -> tuple[bytes, ...]:
     return tuple(contents)
 
 
-def _hold(path: Toolpath, back: Toolpath, plan: Plan, writing: Writing, file: str) -> None:
+def _hold(task: Task, division: Division, back: Toolpath, writing: Writing, file: str) -> None:
     """The program read back is the one that was meant, motion by motion.  Raises Refusal FIL008."""
-    source, own = plan.source, plan.own
-    if len(back) != len(plan):
-        raise Refusal(Finding("FIL008", f"{len(plan)} motions became {len(back)}", file))
-    if not len(plan):
-        return
+    path, own = task.toolpath, division.own
+    if len(back) != len(division):
+        raise Refusal(Finding("FIL008", f"{len(division)} motions became {len(back)}", file))
     place = np.flatnonzero(own)
     if set(back.refused) != {int(place[row]) for row in path.refused}:
         raise Refusal(Finding("FIL008", "other motions than before are not understood", file))
-    link = plan.role == Role.LINK
-    for name, rows in (
-        ("base", None),
-        ("tool", None),
+    for rows in blocks(len(division)):
+        plan = _planned(task, division, rows)
+        _hold_texts(path, back, plan, rows, file)
+        _hold_targets(path, back, plan, rows, writing, file)
+    _hold_arcs(task, division, back, 10.0**-writing.mm, file)
+
+
+def _hold_texts(path: Toolpath, back: Toolpath, plan: Plan, rows: slice, file: str) -> None:
+    """What a motion says beside its target."""
+    source, own, link = plan.source, plan.own, plan.role == Role.LINK
+    for name, chosen in (
+        ("base", ~link | link),
+        ("tool", ~link | link),
         ("kind", ~link),
         ("status", own),
         ("turn", own),
@@ -203,54 +233,50 @@ def _hold(path: Toolpath, back: Toolpath, plan: Plan, writing: Writing, file: st
         ("timed", own),
         ("feed", (path.kind[source] != Kind.PTP) & ~path.timed[source]),
     ):
-        before, after = getattr(path, name), getattr(back, name)
-        for part in blocks(len(plan)):
-            one, other = before[source[part]], after[part]
-            same = (one == other) | ((one != one) & (other != other))
-            same = same.reshape(len(one), -1).all(axis=1)
-            if rows is not None:
-                same |= ~rows[part]
-            if not same.all():
-                row = part.start + int(np.argmin(same))
-                raise Refusal(
-                    Finding("FIL008", f"the {name} of a motion changed", file, int(path.line[source[row]]))
-                )
-    if (back.kind[link] != Kind.LIN).any():
+        before, after = getattr(path, name)[source], getattr(back, name)[rows]
+        same = (before == after) | ((before != before) & (after != after))
+        wrong = ~same.reshape(len(source), -1).all(axis=1) & chosen
+        if wrong.any():
+            line = int(path.line[source[np.argmax(wrong)]])
+            raise Refusal(Finding("FIL008", f"the {name} of a motion changed", file, line))
+    if (back.kind[rows][link] != Kind.LIN).any():
         raise Refusal(Finding("FIL008", "a link is no straight motion", file))
-    for part in blocks(len(plan)):
-        _hold_targets(path, back, plan, part, writing, file)
-    _hold_arcs(path, back, plan, 10.0**-writing.mm, file)
 
 
 def _hold_targets(
-    path: Toolpath, back: Toolpath, plan: Plan, part: slice, writing: Writing, file: str
+    path: Toolpath, back: Toolpath, plan: Plan, rows: slice, writing: Writing, file: str
 ) -> None:
-    source, position = plan.source[part], plan.position[part]
-    known = np.isfinite(position[:, 0])
-    if not np.array_equal(np.isfinite(back.position[part][:, 0]), known):
+    if not np.array_equal(np.isfinite(back.position[rows, 0]), np.isfinite(plan.position[:, 0])):
         raise Refusal(Finding("FIL008", "targets were lost or appeared", file))
     # Half a written step a coordinate; three angles add up.
     step_mm, step_deg = 10.0**-writing.mm, 10.0**-writing.deg
-    off = np.abs(back.position[part] - position).max(axis=1) / MM
-    angle = _angle(plan.rotation[part], back.rotation[part], path.free_axis[source]) / DEG
-    _close(off > 0.5001 * step_mm, off, path, source, file, "mm from what was meant")
-    _close(angle > 1.5001 * step_deg, angle, path, source, file, "deg from what was meant")
+    off = np.abs(back.position[rows] - plan.position).max(axis=1) / MM
+    angle = _angle(plan.rotation, back.rotation[rows], path.free_axis[plan.source]) / DEG
+    _close(off > 0.5001 * step_mm, off, path, plan.source, file, "mm from what was meant")
+    _close(angle > 1.5001 * step_deg, angle, path, plan.source, file, "deg from what was meant")
 
 
-def _hold_arcs(path: Toolpath, back: Toolpath, plan: Plan, step_mm: float, file: str) -> None:
-    arc = np.isfinite(plan.sweep)
+def _hold_arcs(task: Task, division: Division, back: Toolpath, step_mm: float, file: str) -> None:
+    path, source = task.toolpath, division.source
+    kept = ~division.moved & ~division.links
+    arc = np.isfinite(division.sweep) | (kept & np.isfinite(path.sweep[source]))
     if not np.array_equal(np.isfinite(back.sweep), arc):
         raise Refusal(Finding("FIL008", "arcs were lost or appeared", file))
-    rows = np.flatnonzero(arc)
-    rows = rows[(rows > 0) & (plan.source[rows] > 0)]
-    rows = rows[np.isfinite(plan.position[rows - 1, 0])]
-    half = np.full(len(rows), 0.5)
-    vias = [
-        on_arc(p.position[rows - 1], p.position[rows], p.centre[rows], p.normal[rows], p.sweep[rows], half)
-        for p in (plan, back)
-    ]
-    off = np.abs(vias[1] - vias[0]).max(axis=1, initial=0.0) / MM
-    _close(off > FAR * step_mm, off, path, plan.source[rows], file, "mm from the arc that was meant")
+    for rows in blocks(len(division)):
+        begin = max(rows.start - 1, 0)
+        plan = _planned(task, division, slice(begin, rows.stop))
+        at = np.flatnonzero(np.isfinite(plan.sweep))
+        at = at[(at > 0) & (plan.source[at] > 0)]
+        at = at[np.isfinite(plan.position[at - 1, 0])]
+        if not len(at):
+            continue
+        there, half = at + begin, np.full(len(at), 0.5)
+        one, other = (
+            on_arc(p.position[k - 1], p.position[k], p.centre[k], p.normal[k], p.sweep[k], half)
+            for p, k in ((plan, at), (back, there))
+        )
+        off = np.abs(other - one).max(axis=1) / MM
+        _close(off > FAR * step_mm, off, path, plan.source[at], file, "mm from the arc that was meant")
 
 
 def _close(wrong: Bools, off: Floats, path: Toolpath, source: Ints, file: str, words: str) -> None:

@@ -42,10 +42,9 @@ def corrected(job):
 
 def left_between(task, result):
     """(N,) [m] what is left on the way of each corrected motion where nothing is inserted, NaN for others."""
-    pieces = made(task, divide(task, result, Limits(keep=True)))
     rows = np.flatnonzero(result.corrected)
     found = np.full(len(task.toolpath), np.nan)
-    found[rows], _ = errors_between(task, pieces[rows])
+    found[rows], _ = errors_between(task, made(task, divide(task, result, Limits(keep=True)), rows))
     return found
 
 
@@ -57,8 +56,8 @@ def test_between_is_where_the_controller_passes(corrected):
         off = []
         for share in SHARES:
             wrench = (1 - share) * task.force.start[row] + share * task.force.values[row]
-            real = reached(task, row, passed(result.command, row, share), wrench)
-            goal = reached(task, row, passed(task.wanted, row, share), np.zeros(6))
+            real = reached(task, row, passed(result.command[:], row, share), wrench)
+            goal = reached(task, row, passed(task.wanted[:], row, share), np.zeros(6))
             off.append(np.linalg.norm(np.cross(real - goal, along)) / np.linalg.norm(along))
         assert found[row] == pytest.approx(max(off), rel=1e-6, abs=1e-12)
 

@@ -366,8 +366,10 @@ class _Search:
         for _ in in_blocks(divided, len(chosen), _rows(self.count[chosen])):
             pass
 
+        full = self.full.command
+
         def command(rows: Ints) -> Poses:
-            found = self.full.command[source[rows]]
+            found = full[source[rows]]
             added = np.flatnonzero(~is_own[rows])
             if len(added):
                 found.put(added, there[np.searchsorted(inserted, rows[added])])

@@ -54,14 +54,17 @@ def follow(robot: Robot, toolpath: Toolpath, flange: Placed, start: Floats | Non
     these have no way to its target within the limits.  A motion that can not be reached is passed over.
     """
     n = len(toolpath)
-    axes = all_axes(robot, toolpath.axes, start)
-    on_axes = np.asarray(np.isfinite(axes).all(axis=1))
+    rows = np.flatnonzero(toolpath.on_axes)
+    axes = all_axes(robot, toolpath.axes[rows], start)
+    on_axes = np.zeros(n, bool)
+    on_axes[rows] = np.isfinite(axes).all(axis=1)
+    axes = axes[on_axes[rows]]
     placed = in_blocks(lambda part: np.isfinite(flange[part].position).all(axis=1), n)
     cartesian = np.concatenate([np.empty(0, bool), *placed]) & toolpath.known & ~toolpath.on_axes
     status = _branches(robot, toolpath, axes, on_axes, cartesian, start)
 
     q = np.full((n, len(robot.joints)), np.nan)
-    q[on_axes] = axes[on_axes]
+    q[on_axes] = axes
     solve = np.flatnonzero(cartesian & (status >= 0))
     reachable = ~cartesian | (status < 0)
     turn_holds = np.ones(n, bool)
@@ -144,7 +147,7 @@ def _branches(
     cartesian: Bools,
     start: Floats | None,
 ) -> Ints:
-    """(N,) the branch in force at each motion."""
+    """(N,) the branch in force at each motion; ``axes`` (R, n): of the motions ``on_axes``."""
     jump = np.isin(toolpath.kind, (Kind.PTP, Kind.AXIS))
     stated = jump & cartesian & (toolpath.status >= 0)
     if isinstance(robot.nominal, SerialArm):
@@ -154,7 +157,7 @@ def _branches(
     home = _home(toolpath)
     value = np.full(len(toolpath) + 1, -1, np.int8)
     value[0] = -1 if start is None else status_of(robot.nominal, start[None])[0]
-    value[1:][on_axes] = status_of(robot.nominal, axes[on_axes])
+    value[1:][on_axes] = status_of(robot.nominal, axes)
     value[1:][stated] = toolpath.status[stated] & 7
     value[1:][home] = value[0]
     if robot.external is not None and start is None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Floats, Ints
 from postproc.cell import Cell, Frames, find_cell, frames_of, load_cell
 from postproc.compensation.task import Task
 from postproc.dialects import DIALECTS, detect
@@ -18,7 +18,7 @@ from postproc.effects import Conditions
 from postproc.files import MAX_LINE, read_file
 from postproc.findings import Finding, Refusal, nearest
 from postproc.forces import Wrenches, is_no_force, wrenches
-from postproc.geometry import PoseRows
+from postproc.geometry import PoseRows, Poses
 from postproc.inputs import Inputs, noted
 from postproc.model import StiffnessModel, approach
 from postproc.robot.description import Robot, find_robot, load_robot
@@ -326,7 +326,10 @@ def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpa
     if not len(rows):
         return path
     frames = frames_of(cell, path, program)
-    axes = np.zeros((len(path), 6))
-    axes[rows] = path.axes[path.anchor[rows]]
-    flange = nominal_flange(robot, all_axes(robot, axes, _start(cell, robot)))
-    return path.completed(frames.base_in_robot.inverse() @ flange @ frames.tool_in_flange)
+
+    def reached(rows: Ints) -> Poses:
+        axes = all_axes(robot, path.axes[path.anchor[rows]], _start(cell, robot))
+        flange = nominal_flange(robot, axes)
+        return frames.base_in_robot[rows].inverse() @ flange @ frames.tool_in_flange[rows]
+
+    return path.completed(PoseRows(len(path), reached))

@@ -20,6 +20,7 @@ from postproc.compensation.doubt import doubt_of
 from postproc.compensation.limits import limits
 from postproc.compensation.task import Task
 from postproc.dialects.dialect import Moved, Program
+from postproc.document import Edits
 from postproc.findings import Finding, Refusal
 from postproc.publish import Content, publish
 from postproc.report.diff import unified_diff
@@ -27,10 +28,10 @@ from postproc.report.files import corrections_csv
 from postproc.report.page import beside, program_page
 from postproc.report.page_data import page_data
 from postproc.report.report import Link, Report, Spread, Worst, exit_code, in_order_of_place, json_bytes
-from postproc.toolpath import Plan, Role
+from postproc.toolpath import Role
 from postproc.units import DEG, MM
 from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, silent
-from postproc.writing import Written, planned, write, written_as
+from postproc.writing import Written, edited, planned, write, written_as
 
 WORST_PLACES = 5
 
@@ -80,25 +81,25 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
             )
         )
     stage("correcting")
-    writing = written_as(ready.cell, request.own_points)
-    task, result, division, plan, moved = _corrected(request, ready)
-    stage("writing, and reading back")
     target = _target(request)
+    task, result, division, edits = _corrected(request, ready, target.stem)
+    stage("writing, and reading back")
+    program = replace(
+        program, text=None
+    )  # of a million motions a tenth of a gigabyte, and only writing needs it
+    ready = replace(ready, program=program)
     written = write(
-        program,
+        program.documents,
         ready.dialect,
         task,
         result,
         division,
-        plan,
-        moved,
-        writing,
+        edits,
+        written_as(ready.cell, request.own_points),
         ready.settings,
-        ready.robot,
-        target.stem,
         lambda path: completed(path, ready.cell, ready.robot, request.program),
     )
-    edits, result = written.edits, written.result
+    result = written.result
     findings = [*ready.findings, *result.findings, *division.findings, *_closing(request, ready, written)]
     paths = _output_paths(program, target)
     outputs = dict(zip(paths, written.contents, strict=True))
@@ -142,7 +143,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     return report
 
 
-def _corrected(request: Request, ready: Prepared) -> tuple[Task, Result, Division, Plan, Moved]:
+def _corrected(request: Request, ready: Prepared, stem: str) -> tuple[Task, Result, Division, Edits]:
     """The correction and its edits; what can not be divided or written as planned stays, and the rest is made anew."""
     task, cell = ready.task, ready.cell
     allowed = Limits(request.keep_points, cell.min_segment, cell.max_growth)
@@ -152,14 +153,14 @@ def _corrected(request: Request, ready: Prepared) -> tuple[Task, Result, Divisio
         division = divide(task, result, allowed)
         told, beyond = limits(task, result, division)
         division = replace(division, findings=(*division.findings, *told))
-        plan = planned(task, division)
         moved = Moved((), {**beyond, **division.held})
         if not moved.held:
-            moved = ready.dialect.moved(ready.program, plan, writing)
+            moved = ready.dialect.moved(ready.program, planned(task, division), writing)
         known = task.toolpath.refused
         held = {row: finding for row, finding in moved.held.items() if row not in known}
         if not moved.held:
-            return task, result, division, plan, moved
+            edits = edited(ready.program, ready.dialect, moved.edits, ready.robot, stem)
+            return task, result, division, edits
         if not held:
             raise ValueError("motions that stay as they are were held again")
         task = replace(task, toolpath=replace(task.toolpath, refused={**known, **held}))

@@ -180,7 +180,7 @@ def _compare(path: Toolpath, plan: Plan, back: Toolpath) -> None:
         differ = set(codes.items()) ^ set(again.items())
         raise Broken(f"other refusals: {sorted(differ)[:3]}")
     for name in ("kind", "base", "tool", "axes", "feed", "status", "turn", "timed"):
-        before, after = getattr(path, name)[source], getattr(back, name)
+        before, after = getattr(path, name)[source], getattr(back, name)[:]
         if name in ("base", "tool"):
             before, after = _frames(path, before), _frames(back, after)
         same = (before == after) | ((before != before) & (after != after))
