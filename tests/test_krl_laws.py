@@ -1,0 +1,196 @@
+"""Laws of KRL that hold for any program: where findings point, what runs, and that blocks of rows are seen nowhere."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fuzz.examine import dividable, movable, planned
+
+from postproc.dialects.dialect import Plan, Program, Settings, Writing
+from postproc.dialects.krl import KrlDialect
+from postproc.document import Document
+from postproc.units import MM
+
+KRL = KrlDialect()
+CASES = Path(__file__).parent / "programs" / "krl"
+GOOD = sorted(CASES.glob("*.src"))
+BAD = sorted((CASES / "bad").glob("*.src"))
+FRAMES = "BAS(#BASE,1)\nBAS(#TOOL,1)\n"
+ids = {"ids": lambda path: path.stem}
+
+
+def case(path: Path) -> Program:
+    config = path.with_suffix(".config.dat")
+    references = (Document(config, config.read_bytes()),) if config.exists() else ()
+    documents = tuple(Document(p, p.read_bytes()) for p in (path, *KRL.companions(path)))
+    return KRL.read(documents, Settings(references=references))
+
+
+def read(text: str) -> Program:
+    return KRL.read((Document(Path("part.src"), text.encode("latin-1")),))
+
+
+def body(text: str) -> Program:
+    return read(f"DEF part()\n{FRAMES}{text}END\n")
+
+
+def runs(program: Program) -> dict[int, bool]:
+    """Line -> whether the motions there are known to run, once or more."""
+    path = program.toolpath
+    return {int(line): bool(known) for line, known in zip(path.line, path.runs, strict=True)}
+
+
+@pytest.mark.parametrize("path", [*GOOD, *BAD], **ids)
+def test_findings_point_into_their_file(path: Path) -> None:
+    """At a character of the line, or the first column where the whole line is meant."""
+    program = case(path)
+    raws = {str(document.path): document for document in program.documents}
+    for finding in [*program.findings, *program.toolpath.refused.values()]:
+        document = raws[finding.file]
+        assert 1 <= finding.line <= len(document.line_starts)
+        line = document.line(finding.line).rstrip()
+        assert 1 <= finding.column <= max(len(line), 1), finding
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 5])
+@pytest.mark.parametrize("path", GOOD, **ids)
+def test_blocks_of_rows_do_not_matter(path: Path, size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Edits are the same bytes, in whatever blocks the rows are worked on."""
+    program = case(path)
+    rows = program.toolpath
+    n = len(rows)
+    random = np.random.default_rng(n)
+    free = movable(rows) & (random.random(n) < 0.6)
+    free[::7] = False
+    divided = np.flatnonzero(dividable(rows) & (random.random(n) < 0.2))
+    writing = Writing(mm=3, deg=3)
+    for _ in range(20):
+        shift, turn = random.normal(0, 0.2 * MM, (n, 3)), random.normal(0, 1e-3, (n, 3))
+        plan = planned(rows, free, shift, turn, divided)
+        found = KRL.moved(program, plan, writing)
+        if not found.held:
+            break
+        free[list(found.held)] = False
+        free[[row - 1 for row in found.held if row]] = False
+        divided = divided[~np.isin(divided, list(found.held))]
+    for name, module in list(sys.modules.items()):
+        if name.startswith("postproc.dialects") and isinstance(getattr(module, "BLOCK", None), int):
+            monkeypatch.setattr(module, "BLOCK", size)
+    again = KRL.moved(program, plan, writing)
+    assert list(again.edits) == list(found.edits)
+    assert again.held == found.held
+
+
+LINE = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 7])
+def test_no_motion_of_a_routine_that_nobody_calls_runs(count: int) -> None:
+    """Neither the first, nor the last, nor those between."""
+    text = f"DEF part()\n{FRAMES}{LINE}{LINE}END\nDEF lonely()\n{LINE * count}END\n"
+    found = runs(read(text))
+    assert found == {4: True, 5: True} | {8 + i: False for i in range(count)}
+
+
+@pytest.mark.parametrize("call", ["lonely()\n", "lonely()\nlonely()\n"])
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_all_motions_of_a_routine_that_is_called_run(call: str, count: int) -> None:
+    program = read(f"DEF part()\n{FRAMES}{LINE}{call}{LINE}END\nDEF lonely()\n{LINE * count}END\n")
+    assert program.toolpath.runs.all()
+    assert len(program.toolpath) == 2 + count * call.count("(")
+
+
+OPENS = {"IF n>1 THEN": "ENDIF", "LOOP": "ENDLOOP", "WHILE n>1": "ENDWHILE", "FOR i=1 TO 3": "ENDFOR"}
+
+
+@pytest.mark.parametrize("inner", OPENS)
+@pytest.mark.parametrize("outer", OPENS)
+def test_a_block_that_does_not_end_is_told_at_its_line(outer: str, inner: str) -> None:
+    """One finding, where it begins, in the first column; the block around it is closed as it says."""
+    program = body(f"DECL INT n,i\n{LINE}{outer}\n{LINE}{inner}\n{LINE}{OPENS[outer]}\n{LINE}")
+    line = 6 if outer == inner else 8  # the end belongs to the inner one
+    assert [(f.line, f.column) for f in program.findings if f.code == "KRL014"] == [(line, 1)]
+
+
+@pytest.mark.parametrize("style", [str.upper, str.lower])
+@pytest.mark.parametrize("said", ["X 11", "Y 12", "X 11,Y 12", "Z 13,A 4.5", "B 5.5,C 6.5", "S 2,X 11"])
+def test_what_is_completed_is_spelt_as_what_is_there(said: str, style) -> None:
+    """Components that a point gets have letters of the case of its own."""
+    text = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\nLIN {" + said + "}\nLIN {A 4,B 5,C 7}\n"
+    program = body(style(text))
+    path = program.toolpath
+    moved = path.position + np.array([[1.0, 2.0, 3.0], [0.1, 0.2, 0.3], [-1.0, -2.0, -3.0]]) * MM
+    found = KRL.moved(program, replace(Plan.of(path), position=moved), Writing(mm=3, deg=3))
+    assert not found.held
+    written = b"".join(edit.text for edit in found.edits).decode()
+    assert written == style(written)
+    assert any(character.isalpha() for character in written)
+
+
+INSIDE = """\
+DEF part()
+BAS(#BASE,1)
+BAS(#TOOL,1)
+IF TRUE THEN
+LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}
+sub()
+LIN {X 2}
+ENDIF
+LIN {X 3}
+END
+DEF sub()
+LIN {Y 10}
+IF TRUE THEN
+LIN {Y 11}
+GOTO out
+LIN {Y 99}
+ENDIF
+LIN {Y 98}
+out:
+LIN {Y 12}
+END
+"""
+
+
+def test_a_jump_leaves_the_blocks_of_its_routine_alone() -> None:
+    """Those of the caller stay open: what follows the call runs as it stands there."""
+    path = read(INSIDE).toolpath
+    reached = [(round(x, 9), round(y, 9)) for x, y, _ in path.position[path.runs] / MM]
+    assert reached == [(1, 2), (1, 10), (1, 11), (1, 12), (2, 12), (3, 12)]
+
+
+@pytest.mark.parametrize("before", [0, 1, 4])
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_exactly_the_motions_of_a_routine_that_an_interrupt_calls_too_are_left(
+    before: int, count: int
+) -> None:
+    """The routine is followed where the program calls it; from elsewhere it runs at positions that nobody knows."""
+    text = f"DEF part()\n{FRAMES}INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO sub()\nINTERRUPT ON 3\n"
+    text += LINE * before + f"other()\nsub()\n{LINE}END\nDEF other()\n{LINE}END\nDEF sub()\n{LINE * count}END\n"
+    program = read(text)
+    first = 5 + before + 4 + 3 + 2
+    left = {
+        int(program.toolpath.line[row]) for row, f in program.toolpath.refused.items() if f.code == "KRL015"
+    }
+    assert left == set(range(first, first + count))
+
+
+@pytest.mark.parametrize("motion", ["PTP $AXIS_ACT", "PTP $AXIS_ACT C_DIS", "LIN $POS_ACT C_DIS C_VEL"])
+def test_a_motion_to_where_the_robot_stands_loses_no_position(motion: str) -> None:
+    """Whether it runs or not, the next one begins where it would."""
+    program = body(f"{LINE}IF $IN[1]==TRUE THEN\n{motion}\nENDIF\nLIN {{X 5}}\n")
+    assert not program.toolpath.refused
+    np.testing.assert_allclose(program.toolpath.position[-1] / MM, [5.0, 2.0, 3.0])
+    lost = body(f"{LINE}IF $IN[1]==TRUE THEN\nPTP XHOME\nENDIF\nLIN {{X 5}}\n")
+    assert len(lost.toolpath) - 1 in lost.toolpath.refused
+
+
+@pytest.mark.parametrize(("said", "holds"), [("4.4", 4.0), ("4.5", 5.0), ("-4.5", -5.0), ("-4.4", -4.0)])
+def test_an_integer_variable_rounds_what_it_is_given(said: str, holds: float) -> None:
+    """To the nearest one, halves away from zero."""
+    program = body(f"DECL INT n\nDECL REAL r\nn={said}\nr={said}\nLIN {{X n,Y r,Z 3,A 4,B 5,C 6}}\n")
+    np.testing.assert_allclose(program.toolpath.position[0] / MM, [holds, float(said), 3.0])
