@@ -52,7 +52,7 @@ def random_plan(
     """Some motions moved by some tenths of a millimetre and turned where they can be, with pieces and links before
     some; arcs through the moved begin, middle and end; circles that nearly close are divided."""
     random = np.random.default_rng(seed)
-    path, through = program.toolpath, stated(program, WRITING).through
+    path, through = program.toolpath, stated(program.text.part(0, len(program.toolpath)), WRITING).through
     n = len(path)
     movable = free(path)
     moves = movable & (random.random(n) < share)

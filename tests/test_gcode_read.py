@@ -141,7 +141,8 @@ def test_both_lexers_read_the_same(path: Path) -> None:
 def test_places_are_where_the_numbers_stand(path: Path) -> None:
     """Of every absolute word: base = frame @ (number as it stands in the text, times its unit)."""
     program = case(path)
-    raw, places, toolpath = path.read_bytes(), program.text, program.toolpath
+    raw, toolpath = path.read_bytes(), program.toolpath
+    places = program.text.part(0, len(toolpath))
     for axis, letter in enumerate("XYZ"):
         words = places.column(letter)
         for row in np.flatnonzero(
@@ -416,7 +417,8 @@ def test_any_bytes_are_read() -> None:
         if run % 4 == 0:
             raw = bytearray(rng.choice(alphabet) for _ in range(rng.randint(0, 300)))
         program = read(bytes(raw), ("linuxcnc", "fanuc")[run % 2])
-        path, words = program.toolpath, program.text.text.words
+        path = program.toolpath
+        words = program.text.part(0, len(path)).text.words
         assert (words.stop <= len(raw)).all()
         assert (words.start >= -1).all()
         assert (np.diff(words.at) > 0).all()

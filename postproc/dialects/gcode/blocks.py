@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.dialects.gcode.control import Control, Group, Move, Once
 from postproc.dialects.gcode.flow import Doubt
+from postproc.dialects.gcode.force import everywhere, taken
 from postproc.dialects.gcode.modal import Modal
-from postproc.dialects.gcode.places import COLUMNS
 from postproc.dialects.gcode.positions import Course
-from postproc.dialects.gcode.words import How, Text, key
+from postproc.dialects.gcode.source import Column, Source
+from postproc.dialects.gcode.words import COLUMNS, How, key
 from postproc.units import DEG, MM
 
 INCH = 25.4 * MM
@@ -59,60 +61,119 @@ class What:
     ORIGIN = "G92 where the position is not known"
 
 
+class Reasons:
+    """What left coordinates unknown: numbers of texts, -1 for none; of every block the one that was told last."""
+
+    def __init__(self, count: int) -> None:
+        self.texts: list[str] = []
+        self.of = np.full(count, -1, np.int8)
+
+    def number(self, why: str) -> int:
+        if why not in self.texts:
+            self.texts.append(why)
+        return self.texts.index(why)
+
+
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """The blocks with their words in columns: word (B, K) row in text.words, -1 where absent.
+    """The blocks ``begin`` .. ``stop`` - 1 of a program; all rows count from ``begin``.
 
-    length, length_of_integer (B,) [m]: a unit of a length word with and without a decimal point.
+    columns: keys of words that say something of motions.  increments: lengths without a decimal point count
+    micrometres, or ten-thousandths of an inch.
     """
 
-    text: Text
+    source: Source
     modal: Modal
     control: Control
     columns: tuple[int, ...]
-    word: Ints
-    twice: Bools
-    length: Floats
-    length_of_integer: Floats
-    degrees_of_integer: float
-    notes: dict[str, Bools]
+    increments: bool
+    begin: int
+    stop: int
 
     def __len__(self) -> int:
-        return len(self.word)
+        return self.stop - self.begin
+
+    def part(self, begin: int, stop: int) -> Blocks:
+        """The blocks begin .. stop - 1 of a whole program."""
+        modal = self.modal.part(begin, stop)
+        return Blocks(self.source, modal, self.control, self.columns, self.increments, begin, stop)
+
+    @cached_property
+    def _whole(self) -> bool:
+        return len(self) == len(self.source.blocks)
+
+    def words(self, wanted: int) -> Column:
+        """All words with this key."""
+        column = self.source.column(wanted)
+        return column if self._whole else column.part(self.begin, self.stop)
+
+    def _dense(self, wanted: int, values: str, absent: float, dtype: Any) -> NDArray[Any]:
+        column = self.words(wanted)
+        if not len(column):
+            return everywhere(absent, len(self), dtype)
+        dense = np.full(len(self), absent, dtype)
+        dense[column.block] = getattr(column, values)
+        return dense
 
     def noted(self, *kinds: str) -> Bools:
         """(B,) blocks with a note of one of these kinds."""
         result = np.zeros(len(self), np.bool_)
         for kind in kinds:
-            if kind in self.notes:
-                result |= self.notes[kind]
+            rows = self.source.noted.get(kind)
+            if rows is not None:
+                result[rows[(rows >= self.begin) & (rows < self.stop)] - self.begin] = True
         return result
 
-    def of(self, wanted: int) -> Ints:
-        """(B,) row in text.words of the words with this key."""
-        return self.word[:, self.columns.index(wanted)]
-
     def has(self, *wanted: int) -> Bools:
-        return np.any(self.word[:, [self.columns.index(one) for one in wanted]] >= 0, axis=1)
+        """(B,) blocks with a word of one of these keys."""
+        mask = np.zeros(len(self), np.bool_)
+        for one in wanted:
+            mask[self.words(one).block] = True
+        return mask
 
     def number(self, wanted: int) -> Floats:
-        """(B,) the numbers as written, NaN where absent."""
-        rows = self.of(wanted)
-        return np.where(rows >= 0, np.append(self.text.words.value, np.nan)[rows], np.nan)
+        """(B,) the numbers as written, the last of a block; NaN where absent."""
+        return self._dense(wanted, "value", np.nan, np.float64)
+
+    def how(self, wanted: int) -> Ints:
+        """(B,) How, -1 where absent."""
+        return self._dense(wanted, "how", -1, np.int8)
+
+    def _scaled(self, wanted: int, unit: Floats | float, integer: Floats | float) -> Floats:
+        number = self.number(wanted)
+        if number.strides == (0,):
+            return number
+        return number * np.where(self.how(wanted) == How.INTEGER, integer, unit)
 
     def lengths(self, wanted: int) -> Floats:
         """(B,) [m], NaN where absent."""
-        rows = self.of(wanted)
-        integer = np.append(self.text.words.how, 0)[rows] == How.INTEGER
-        return self.number(wanted) * np.where(integer, self.length_of_integer, self.length)
+        return self._scaled(wanted, self.length, self.length_of_integer)
 
     def angles(self, wanted: int) -> Floats:
         """(B,) [rad], NaN where absent."""
-        integer = np.append(self.text.words.how, 0)[self.of(wanted)] == How.INTEGER
-        return self.number(wanted) * np.where(integer, self.degrees_of_integer, DEG)
+        return self._scaled(wanted, DEG, DEG * (1e-3 if self.increments else 1.0))
 
-    def how(self, wanted: int) -> Ints:
-        return np.append(self.text.words.how, -1)[self.of(wanted)]
+    @cached_property
+    def length(self) -> Floats:
+        """(B,) [m]: a unit of a length word with a decimal point."""
+        return taken(self.modal.force[Group.UNITS], np.array([MM, INCH, np.nan]))
+
+    @cached_property
+    def length_of_integer(self) -> Floats:
+        """(B,) [m]: a unit of a length word without."""
+        small = (
+            np.array([MM * 1e-3, INCH * 1e-4, np.nan]) if self.increments else np.array([MM, INCH, np.nan])
+        )
+        return taken(self.modal.force[Group.UNITS], small)
+
+    @cached_property
+    def twice(self) -> Bools:
+        """(B,) blocks in which a word stands twice."""
+        mask = np.zeros(len(self), np.bool_)
+        for one in self.columns:
+            block = self.words(one).block
+            mask[block[1:][block[1:] == block[:-1]]] = True
+        return mask
 
     @cached_property
     def move(self) -> Ints:
@@ -136,13 +197,18 @@ class Blocks:
         centre = self.has(
             *(key(letter) for letter in "IJK"), *(one for one in THROUGH if one in self.columns)
         )
-        arc &= centre | ((modal.verb >= 0) & self.has(key("R")))
+        arc &= centre | (modal.states & self.has(key("R")))
         return modal.flow.tape & ((self.axis | arc) & ~silent | modal.has(Once.HOME))
 
     @cached_property
     def machine(self) -> Bools:
         """(B,) motions that are not to a place in the base."""
         return self.motion & self.modal.has(Once.HOME, Once.MACHINE, Once.PROBE)
+
+    @cached_property
+    def present(self) -> Bools:
+        """(B, 6) the axes that have words."""
+        return np.stack([self.has(axis) for axis in AXES], axis=1)
 
     @cached_property
     def relative(self) -> Bools:
@@ -152,70 +218,56 @@ class Blocks:
         return (hows >= 0) & ((incremental & (hows != How.ABSOLUTE)) | (hows == How.INCREMENTAL))
 
 
-def blocks(text: Text, modal: Modal, control: Control, increments: bool) -> Blocks:
-    """``increments``: lengths without a decimal point count micrometres, or ten-thousandths of an inch."""
+def blocks(source: Source, modal: Modal, control: Control, increments: bool) -> Blocks:
+    """All blocks of a program."""
     columns = (*COLUMNS, *(key(letter) for letter in "STDHLQ"), *control.columns)
-    known = text.words.key < 1 << 17
-    lookup = np.full(1 << 17, -1)
-    lookup[list(columns)] = np.arange(len(columns))
-    column = np.where(known, lookup[np.where(known, text.words.key, 0)], -1)
-    rows = np.flatnonzero(column >= 0)
-    n, k = len(text.blocks), len(columns)
-    word = np.full((n, k), -1, dtype=np.int64)
-    word[text.words.block[rows], column[rows]] = rows
-    many = np.bincount(text.words.block[rows] * k + column[rows], minlength=n * k).reshape(n, k) > 1
-    inch = modal.force[Group.UNITS] == 1
-    length = np.where(inch, INCH, MM)
-    length[modal.force[Group.UNITS] < 0] = np.nan
-    integer = length * np.where(inch, 1e-4, 1e-3) if increments else length
-    return Blocks(
-        text, modal, control, columns, word, np.any(many, axis=1), length, integer,
-        DEG * (1e-3 if increments else 1.0), _noted(text),
-    )  # fmt: skip
+    return Blocks(source, modal, control, columns, increments, 0, len(source.blocks))
 
 
-def _noted(text: Text) -> dict[str, Bools]:
-    rows: defaultdict[str, list[int]] = defaultdict(list)
-    for note in text.notes:
-        rows[note.kind].append(note.block)
-    found: dict[str, Bools] = {}
-    for kind, blocks in rows.items():
-        found[kind] = np.zeros(len(text.blocks), np.bool_)
-        found[kind][blocks] = True
-    return found
+def _targets(given: Blocks) -> tuple[Bools, Floats, Bools]:
+    """(B, 6) words that are targets, their values [m, rad], and those of them that are differences."""
+    values = [given.lengths(axis) if i < 3 else given.angles(axis) for i, axis in enumerate(AXES)]
+    return (given.motion & ~given.machine)[:, None] & given.present, np.stack(values, axis=1), given.relative
 
 
-def course(given: Blocks, spoiled: Bools) -> tuple[Course, list[str], Ints]:
-    """What the blocks do to the coordinates; the reasons why they leave them unknown, and which of them each block has.
+def tilted(given: Blocks) -> Bools:
+    """(B,) of a whole program: blocks behind which rotary axes may be away from 0.
 
-    spoiled (B,): blocks before which the base became another one.
+    Without a change of the TCP mode that says nothing, and no block is named."""
+    tip = given.modal.force[Group.TCP]
+    if not len(tip) or (tip == tip[0]).all():
+        return everywhere(False, len(given))
+    target, value, relative = _targets(given)
+    home = given.motion & given.modal.has(Once.HOME)
+    return np.logical_or.accumulate(
+        (target[:, 3:] & ((value[:, 3:] != 0) | relative[:, 3:])).any(axis=1) | home
+    )
+
+
+def course(given: Blocks, spoiled: Bools, away: Bools, reasons: Reasons) -> Course:
+    """What the blocks do to the coordinates; why they leave them unknown is put into ``reasons``.
+
+    spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``.
     """
     modal, n = given.modal, len(given)
     force, flow = modal.force, modal.flow
-    present = np.stack([given.of(axis) >= 0 for axis in AXES], axis=1)
-    value = np.stack(
-        [given.lengths(axis) if i < 3 else given.angles(axis) for i, axis in enumerate(AXES)], axis=1
-    )
-    target = (given.motion & ~given.machine)[:, None] & present
-    relative = given.relative
+    present = given.present
+    target, value, relative = _targets(given)
     lost, left = np.zeros((n, 6), np.bool_), np.zeros((n, 6), np.bool_)
-    reasons: list[str] = []
-    reason = np.full(n, -1)
+    reason = reasons.of[given.begin : given.stop]
     linear = np.arange(6) < 3
 
     def lose(where: Bools, rows: Bools, why: str) -> None:
         """Leaves coordinates unknown behind ``rows``: those of ``where`` (B, 6) or (6,)."""
         if rows.any():
             lost[rows] |= np.broadcast_to(where, (n, 6))[rows]
-            reason[rows] = len(reasons)
-            reasons.append(why)
+            reason[rows] = reasons.number(why)
 
     def leave(where: Bools, rows: Bools, why: str) -> None:
         """Leaves coordinates unknown before ``rows``, unless they set them."""
         if rows.any():
             left[rows] |= where
-            reason[rows & (reason < 0)] = len(reasons)
-            reasons.append(why)
+            reason[rows & (reason < 0)] = reasons.number(why)
 
     whole = np.ones(6, np.bool_)
     move, cycle = given.move, given.motion & (given.move == Move.CYCLE)
@@ -227,11 +279,11 @@ def course(given: Blocks, spoiled: Bools) -> tuple[Course, list[str], Ints]:
     lose(present | ~np.any(present, axis=1)[:, None], home, What.REFERENCE)
     lose(present, given.motion & modal.has(Once.MACHINE), What.MACHINE)
     lose(whole, given.motion & modal.has(Once.PROBE), What.PROBE)
-    lose(whole, given.axis & (modal.unknown >= 0), What.CODE)
+    lose(whole, given.axis & modal.unknown, What.CODE)
     lose(whole, given.motion & given.twice, What.TWICE)
-    parallel = np.stack([given.of(axis) >= 0 for axis in SECOND], axis=1)
-    both = np.concatenate([parallel, np.zeros((n, 3), np.bool_)], axis=1)
-    if not given.control.further:
+    if not given.control.further and given.has(*SECOND).any():
+        parallel = np.stack([given.how(axis) >= 0 for axis in SECOND], axis=1)
+        both = np.concatenate([parallel, np.zeros((n, 3), np.bool_)], axis=1)
         lose(both, parallel.any(axis=1) & given.motion & ~home, What.PARALLEL)
     lose(whole, other | (given.motion & (force[Group.MACRO] != 0)), What.OTHER)
     if cycle.any():
@@ -248,20 +300,11 @@ def course(given: Blocks, spoiled: Bools) -> tuple[Course, list[str], Ints]:
     lose(whole, given.noted("corner", "axis", "polar"), What.OTHER)
     leave(whole, flow.forget, What.CALL)
 
-    base = force[Group.OFFSET]
-    changed = np.concatenate([[False], base[1:] != base[:-1]]) if n else np.zeros(0, np.bool_)
-    leave(linear, changed | spoiled, What.BASE)
+    leave(linear, modal.switched(Group.OFFSET) | spoiled, What.BASE)
     for group in FRAMED:
-        within = force[group] != 0
-        lose(whole, within & given.motion, What.FRAME)
-        leave(whole, np.concatenate([[False], within[1:] != within[:-1]]) if n else within, What.FRAME)
-    tip = force[Group.TCP]
-    if n and (tip != tip[0]).any():
-        # With the rotary axes at 0 the words mean the same with and without a TCP mode.
-        away = np.logical_or.accumulate(
-            (target[:, 3:] & ((value[:, 3:] != 0) | relative[:, 3:])).any(axis=1) | home
-        )
-        leave(linear, np.concatenate([[False], tip[1:] != tip[:-1]]) & away, What.TIP)
-    sets = target & ~relative
-    adds = target & relative
-    return Course(np.where(target, value, 0.0), sets, adds, lost, left), reasons, reason
+        if force[group].any() or modal.ahead[group]:
+            lose(whole, (force[group] != 0) & given.motion, What.FRAME)
+            leave(whole, modal.switched(group), What.FRAME)
+    # With the rotary axes at 0 the words mean the same with and without a TCP mode.
+    leave(linear, modal.switched(Group.TCP) & away, What.TIP)
+    return Course(np.where(target, value, 0.0), target & ~relative, target & relative, lost, left)

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.arrays import Ints
 from postproc.dialects.gcode.lexing import BOM
-from postproc.dialects.gcode.words import Text, key
+from postproc.dialects.gcode.source import Source
 from postproc.document import Document, Span
 from postproc.toolpath import Annotation
 
@@ -31,15 +31,13 @@ class Remarks(NamedTuple):
     marker_at: Span
 
 
-def remarks(document: Document, text: Text, line: Ints) -> Remarks:
+def remarks(document: Document, source: Source, line: Ints) -> Remarks:
     """``line`` (N,): lines of the motions, ascending."""
     raw, marker = document.raw, None
-    spans = text.comments
-    feeds = np.flatnonzero(np.frombuffer(raw, np.uint8) == 10)
-    lines = np.searchsorted(feeds, spans[:, 0]) + 1
+    spans = source.comments[:, :2]
+    lines = source.comments[:, 2]
     rows = np.searchsorted(line, lines)
-    wordy = text.words.block[text.words.key != key("N")]
-    alone = ~np.isin(lines, text.blocks.line[wordy])
+    alone = ~np.isin(lines, source.blocks.line[source.blocks.wordy]) if len(lines) else lines
     speaking, others = [], []
     for (start, stop), number, row, own in zip(
         spans.tolist(), lines.tolist(), rows.tolist(), alone.tolist(), strict=True

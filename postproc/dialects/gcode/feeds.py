@@ -7,30 +7,48 @@ import numpy as np
 from postproc.arrays import Floats, Ints
 from postproc.dialects.gcode.blocks import Blocks
 from postproc.dialects.gcode.control import Feed, Group, Once
+from postproc.dialects.gcode.source import Column
 from postproc.dialects.gcode.words import key
 
 
-def feeds(given: Blocks, rows: Ints, length: Floats) -> Floats:
-    """(N,) [m/s] of the motions in blocks ``rows``; NaN where it is not known.
+class Feeds:
+    """F and S of a program, as they hold on."""
 
-    G94: F length units a minute; G95: F length units a turn, S turns a minute; G93: the block takes 1/F minutes for its
-    ``length`` (N,) [m].
-    """
-    mode, n = given.modal.force[Group.FEED], len(given)
-    # F and S of a dwell are times (G4 F2).
-    dwell = given.modal.has(Once.DWELL)
-    number = given.number(key("F"))
-    stated = np.maximum.accumulate(np.where((given.of(key("F")) >= 0) & ~dwell, np.arange(n), -1))
-    at = np.maximum(stated, 0)
-    rate = np.where((stated >= 0) & (number[at] > 0), number[at] * given.length[at], np.nan)
-    # F means another thing in another mode, and has to be stated again there.
-    rate[mode[at] != mode] = np.nan
-    spindle = np.maximum.accumulate(np.where((given.of(key("S")) >= 0) & ~dwell, np.arange(n), -1))
-    turns = np.where(spindle >= 0, given.number(key("S"))[np.maximum(spindle, 0)], np.nan)
-    turns[given.modal.force[Group.SPINDLE] != 0] = np.nan
-    own = np.where(number > 0, number, np.nan)[rows]
-    here = mode[rows]
-    result = np.where(here == Feed.PER_TURN, rate[rows] * turns[rows], rate[rows])
-    result = np.where(here == Feed.INVERSE_TIME, np.where(length > 0, length, np.nan) * own, result)
-    result[here < 0] = np.nan
-    return np.asarray(result / 60.0)
+    def __init__(self, given: Blocks) -> None:
+        # F and S of a dwell are times (G4 F2).
+        self._dwell = given.modal.has(Once.DWELL)
+        self._force, self._given = given.modal.force, given
+        self._rate, self._spindle = (self._outside(given.words(key(letter))) for letter in "FS")
+
+    def _outside(self, column: Column) -> Column:
+        keep = ~self._dwell[column.block]
+        if keep.all():
+            return column
+        return Column(column.block[keep], column.value[keep], column.how[keep])
+
+    def of(self, blocks: Ints, length: Floats) -> Floats:
+        """(N,) [m/s] of the motions in blocks of the program (N,); NaN where it is not known.
+
+        G94: F length units a minute; G95: F length units a turn, S turns a minute; G93: the block takes 1/F minutes for
+        its ``length`` (N,) [m].
+        """
+        mode = self._force[Group.FEED]
+        here = mode[blocks]
+        at, number = _latest(self._rate, blocks)
+        rate = np.where(number > 0, number * self._given.length[at], np.nan)
+        # F means another thing in another mode, and has to be stated again there.
+        rate[mode[at] != here] = np.nan
+        _, turns = _latest(self._spindle, blocks)
+        turns[self._force[Group.SPINDLE][blocks] != 0] = np.nan
+        own = self._given.words(key("F")).last(blocks)
+        result = np.where(here == Feed.PER_TURN, rate * turns, rate)
+        timed = np.where(length > 0, length, np.nan) * np.where(own > 0, own, np.nan)
+        result = np.where(here == Feed.INVERSE_TIME, timed, result)
+        result[here < 0] = np.nan
+        return np.asarray(result / 60.0)
+
+
+def _latest(column: Column, blocks: Ints) -> tuple[Ints, Floats]:
+    """The blocks (N,) that state what holds in ``blocks`` (N,), and what; 0 and NaN where none does."""
+    at = np.searchsorted(column.block, blocks, side="right") - 1
+    return np.maximum(np.append(column.block, -1)[at], 0), np.append(column.value, np.nan)[at]

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 
 import numpy as np
 
 from postproc.arrays import Bools, Ints
-from postproc.dialects.gcode.blocks import AXES, FRAMED, SECOND, Blocks, What
+from postproc.dialects.gcode.blocks import AXES, FRAMED, SECOND, Blocks, Reasons, What
 from postproc.dialects.gcode.control import Group, Move, Once
 from postproc.dialects.gcode.flow import Doubt
 from postproc.dialects.gcode.motions import Motions
-from postproc.dialects.gcode.positions import Course, Positions
+from postproc.dialects.gcode.positions import Positions
 from postproc.dialects.gcode.refusals import Doubts, Refusals
 from postproc.dialects.gcode.words import How, key
 from postproc.document import Document
@@ -31,6 +32,20 @@ ARCS = {
     6: "the three points of the arc lie on a line",
 }
 _POSITION = re.compile(rb"#[ \t]*+(?:50[0-6]\d|542\d|<_(?:abs_)?[xyzabcuvw]>|#|\[)(?!\d)", re.I)
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """Of N motions, what others build on: block (N,); kind (N,) Kind; sets, lost (N, 3): the block states X, Y, Z, or
+    leaves them unknown; turned (N,): it states the orientation in force, if one is."""
+
+    block: Ints
+    kind: Ints
+    sets: Bools
+    lost: Bools
+    turned: Bools
+
+
 NUMBERS = (*AXES, *(key(letter) for letter in "IJKR"))
 
 
@@ -40,15 +55,14 @@ def judged(
     where: Positions,
     base: Ints,
     tool: Ints,
-    reasons: list[str],
-    reason: Ints,
-) -> Doubts:
-    """The motions that are refused.
+    reasons: Reasons,
+    doubts: Doubts,
+) -> None:
+    """Refuses motions of a part of the program.
 
-    base, tool (N,): numbers, -1 where unknown; reasons, reason: of ``course``.
+    base, tool (N,): numbers, -1 where unknown; reasons: of ``course``; doubts (N,): of these motions.
     """
     rows = moves.block
-    doubts = Doubts(len(rows))
     refuse, modal = doubts.refuse, given.modal
     force = {group: values[rows] for group, values in modal.force.items()}
     for doubt, message in DOUBTS.items():
@@ -74,9 +88,12 @@ def judged(
         "GCO016",
         "U, V, W: further axes, or steps of a lathe",
     )
-    hows = np.stack([given.how(one)[rows] for one in NUMBERS], axis=1)
+    unread = np.zeros(len(given), np.bool_)
+    for one in NUMBERS:
+        column = given.words(one)
+        unread[column.block[column.how == How.UNREAD]] = True
     refuse(
-        np.any(hows == How.UNREAD, axis=1),
+        unread[rows],
         "GCO005",
         "a word is an expression, a variable or far beyond any machine",
     )
@@ -98,7 +115,7 @@ def judged(
     refuse(base < 0, "GCO014", "the work offset is not known, or the program itself writes it")
     refuse(tool < 0, "GCO015", "no tool is loaded, or its number is not known")
     refuse(force[Group.UNITS] < 0, "GCO002", "mm or inch is not known")
-    _positions(given, moves, where, doubts, reasons, reason)
+    _positions(given, moves, where, doubts, reasons)
     for wrong, message in ARCS.items():
         refuse(moves.arcs.wrong == wrong, "GCO012", message)
     refuse(moves.arcs.wrong == 1, "GCO012", "where the arc begins is not known")
@@ -108,17 +125,14 @@ def judged(
         "a rotary axis away from 0, or not known, without a TCP mode: the machine's own geometry",
     )
     refuse(moves.stand.wrong == 2, "GCO013", "a rotary axis that the program names was not set yet")
-    return doubts
 
 
 def _codes(given: Blocks, rows: Ints, doubts: Doubts) -> None:
     """Refuses motions in blocks with a code that is not known, by that code."""
-    word = given.modal.unknown[rows]
-    some = np.flatnonzero(word >= 0)
+    some = np.flatnonzero(given.modal.unknown[rows])
     if len(some):
-        values, which = np.unique(
-            np.nan_to_num(given.text.words.value[word[some]], nan=-1.0), return_inverse=True
-        )
+        codes = given.modal.strange.last(rows[some], absent=-1.0)
+        values, which = np.unique(np.nan_to_num(codes, nan=-1.0), return_inverse=True)
         messages = [(named := code_name(value), f"{named} is not known here") for value in values.tolist()]
         doubts.refuse_each(some, [("GCO001", message, name) for name, message in messages], which)
 
@@ -127,9 +141,7 @@ def code_name(value: float) -> str:
     return f"G{value:.6g}" if value >= 0 else "the G code"
 
 
-def _positions(
-    given: Blocks, moves: Motions, where: Positions, doubts: Doubts, reasons: list[str], reason: Ints
-) -> None:
+def _positions(given: Blocks, moves: Motions, where: Positions, doubts: Doubts, reasons: Reasons) -> None:
     """Refuses motions whose end is not known, by what left it unknown."""
     rows = moves.block
     lost = np.isnan(moves.end[:, :3])
@@ -148,9 +160,9 @@ def _positions(
             why = (
                 "was never set before"
                 if cause < 0
-                else f"not known since line {given.text.blocks.line[cause]}"
+                else f"not known since line {given.source.blocks.line[cause]}"
             )
-            what = "" if cause < 0 or reason[cause] < 0 else reasons[reason[cause]]
+            what = "" if cause < 0 or reasons.of[cause] < 0 else reasons.texts[reasons.of[cause]]
             if cause >= 0 and not what:
                 what = What.ORIGIN
             message = f"{names}: {why}{f' ({what})' if what else ''}"
@@ -163,27 +175,25 @@ def _positions(
     )
 
 
-def pinned(document: Document, given: Blocks, moves: Motions, way: Course, doubts: Doubts) -> Refusals:
-    """Motions whose end a refused motion, an origin or other code builds on."""
-    rows, n = moves.block, len(moves.block)
+def pinned(document: Document, given: Blocks, built: Built, doubts: Doubts) -> Refusals:
+    """Motions whose end a refused motion, an origin or other code builds on; ``given``: the whole program."""
+    rows, n = built.block, len(built.block)
     pins = Doubts(n)
     modal = given.modal
-    partial = np.asarray(np.logical_not(np.all(way.sets[rows, :3], axis=1)))
-    # Orientation words are inherited as well; an arc begins there.
-    partial |= (moves.stand.orient >= 0) & ~moves.stand.stated
-    partial |= ~np.isin(moves.kind, (Kind.LIN, Kind.PTP))
-    # What bends is bent by where it begins.
-    partial |= moves.kind == Kind.CIRC
-    reaching = modal.has(Once.HOME, Once.MACHINE)[rows]
     refused = doubts.why >= 0
-    building = np.flatnonzero(refused & partial & ~reaching)
-    building = building[building > 0]
-    building = building[~refused[building - 1]] - 1
-    pins.refuse(
-        _mask(n, np.concatenate([building, _through(moves, way, refused, refused & ~reaching)])),
-        "GCO002",
-        "the motion behind it builds on this end point and is not corrected",
-    )
+    if refused.any():
+        partial = ~built.sets.all(axis=1)
+        # Orientation words are inherited as well; an arc begins there, and is bent by where it begins.
+        partial |= ~built.turned | ~np.isin(built.kind, (Kind.LIN, Kind.PTP))
+        reaching = modal.has(Once.HOME, Once.MACHINE)[rows]
+        building = np.flatnonzero(refused & partial & ~reaching)
+        building = building[building > 0]
+        building = building[~refused[building - 1]] - 1
+        pins.refuse(
+            _mask(n, np.concatenate([building, _through(built, refused, refused & ~reaching)])),
+            "GCO002",
+            "the motion behind it builds on this end point and is not corrected",
+        )
     shifting = modal.has(Once.SHIFT) & given.has(*AXES)
     for at, message in (
         (np.flatnonzero(shifting), "G92 sets the origin at this end point"),
@@ -197,19 +207,16 @@ def pinned(document: Document, given: Blocks, moves: Motions, way: Course, doubt
         before = np.searchsorted(rows, at, side="right") - 1
         before = before[before >= 0]
         pins.refuse(_mask(n, before) & (doubts.why < 0), "GCO002", message)
-    blocks = given.text.blocks
+    blocks = given.source.blocks
     return pins.done(document, blocks.line[rows], blocks.start[rows], blocks.start[rows])
 
 
-def _through(moves: Motions, way: Course, refused: Bools, building: Bools) -> Ints:
+def _through(built: Built, refused: Bools, building: Bools) -> Ints:
     """Motions from which ``building`` (N,) ones inherit a coordinate or the orientation through ``refused`` ones."""
-    rows, n = moves.block, len(moves.block)
-    stated = np.asarray(moves.stand.stated | (moves.stand.orient < 0))
+    n = len(built.block)
+    columns = ((built.sets[:, axis], built.lost[:, axis]) for axis in range(3))
     found = []
-    for says, ends in (
-        *((way.sets[rows, axis], way.lost[rows, axis]) for axis in range(3)),
-        (stated, np.zeros(n, np.bool_)),
-    ):
+    for says, ends in (*columns, (built.turned, np.zeros(n, np.bool_))):
         last = np.maximum.accumulate(np.where(~refused | says | ends, np.arange(n), -1))
         before = np.append(-1, last)[:n]
         source = before[building & ~says & (before >= 0)]
@@ -220,7 +227,7 @@ def _through(moves: Motions, way: Course, refused: Bools, building: Bools) -> In
 def _reading(document: Document, given: Blocks) -> Ints:
     """Blocks with a variable that holds a position (#5001 to #5069, #5420 to #5428, #<_x>), or is itself computed."""
     places = [found.start() for found in _POSITION.finditer(document.raw)]
-    return np.unique(np.searchsorted(given.text.blocks.start, places, side="right") - 1).astype(np.int64)
+    return np.unique(np.searchsorted(given.source.blocks.start, places, side="right") - 1).astype(np.int64)
 
 
 def _mask(n: int, rows: Ints) -> Bools:

@@ -44,24 +44,39 @@ _UNTAPED[[0, 2, 3, 4, 17, 18, 19, 20, 26]] = 32
 """What tapes and serial lines leave between the characters says nothing."""
 
 
-def lex(raw: bytes, control: Control) -> Text:
-    """The words, blocks and notes of a program; never raises on its content, in linear time."""
-    letters = np.frombuffer(raw, np.uint8)
-    comments = _comments(raw, control.comment)
-    blanked = _blanked(letters, comments, raw.startswith(BOM))
+def lex(raw: bytes, control: Control, begin: int = 0, end: int | None = None, line: int = 1) -> Text:
+    """The words, blocks and notes of ``raw[begin:end]``, which are whole lines, the first of them number ``line``.
+
+    Never raises on its content; in linear time.
+    """
+    end = len(raw) if end is None else end
+    letters = np.frombuffer(raw, np.uint8)[begin:end]
+    feeds = np.flatnonzero(letters == 10)
+    comments = _comments(raw, control.comment, begin, end)
+    blanked = _blanked(letters, comments, begin == 0 and raw.startswith(BOM))
     plain, odd, ends = _plain(letters, _CLASS[blanked])
     starts = np.concatenate([[0], ends[:-1] + 1])
     clean = blanked.tobytes()
     other = _taken([clean[starts[i] : ends[i]] for i in odd], np.array(odd, dtype=np.int64), starts, control)
-    return Text(*_joined(letters, plain, other, starts, ends), comments)
+    words, blocks, notes = _joined(feeds, plain, other, starts, ends)
+    if begin:
+        for places in (words.at, words.stop, blocks.start, blocks.stop, blocks.first, blocks.code):
+            places += begin
+        words.start[words.start >= 0] += begin
+        comments[:, :2] += begin
+        notes = tuple(Note(note.block, note.kind, note.text, note.at + begin) for note in notes)
+    blocks.line[:] += line
+    comments[:, 2] += line + np.searchsorted(feeds, comments[:, 0] - begin)
+    return Text(words, blocks, notes, comments)
 
 
-def _comments(raw: bytes, pattern: bytes) -> Ints:
-    """(C, 2) ranges of comments, delimiters included."""
+def _comments(raw: bytes, pattern: bytes, begin: int, end: int) -> Ints:
+    """(C, 3) ranges of comments from ``begin``, delimiters included; and 0."""
     compiled = re.compile(pattern, re.M)
     group = compiled.groups  # a string is group 1, and no comment
-    spans = [found.span() for found in compiled.finditer(raw) if not group or found[1] is None]
-    return np.array(spans, dtype=np.int64).reshape(-1, 2)
+    found = compiled.finditer(raw, begin, end)
+    spans = [(*one.span(), begin) for one in found if not group or one[1] is None]
+    return np.array(spans, dtype=np.int64).reshape(-1, 3) - begin
 
 
 def _blanked(letters: Bytes, comments: Ints, marked: bool) -> Bytes:
@@ -231,9 +246,10 @@ def _taken(texts: list[bytes], rows: Ints, starts: Ints, control: Control) -> _O
 
 
 def _joined(
-    letters: Bytes, plain: _Plain, other: _Other, starts: Ints, ends: Ints
+    feeds: Ints, plain: _Plain, other: _Other, starts: Ints, ends: Ints
 ) -> tuple[Words, Blocks, tuple[Note, ...]]:
-    """Words of plain and of other lines in one order; lines without words and notes are no blocks."""
+    """Words of plain and of other lines in one order; lines without words and notes are no blocks.  feeds: where LFs
+    are; lines are counted from 0."""
     extra = other.words
     order = np.argsort(np.concatenate([plain.at, extra.at]), kind="stable")
     lines = np.concatenate([plain.line, extra.line])[order]
@@ -257,13 +273,14 @@ def _joined(
     )
     deleted = np.zeros(len(starts), np.bool_)
     deleted[other.deleted] = True
-    feeds = np.flatnonzero(letters == 10)
-    code = starts[used].copy()
+    first, code = starts[used].copy(), starts[used].copy()
+    first[words.block[::-1]] = words.at[::-1]
     code[words.block] = np.maximum(words.stop, words.at + 1)
     blocks = Blocks(
         start=starts[used],
         stop=ends[used],
-        line=np.searchsorted(feeds, starts[used]) + 1,
+        line=np.searchsorted(feeds, starts[used]),
+        first=first,
         code=code,
         deleted=deleted[used],
     )

@@ -10,6 +10,7 @@ from postproc.arrays import Bools, Ints
 from postproc.dialects.gcode.blocks import Blocks
 from postproc.dialects.gcode.control import Group, Once
 from postproc.dialects.gcode.flow import Doubt
+from postproc.dialects.gcode.force import everywhere, in_force
 from postproc.dialects.gcode.words import key
 from postproc.geometry import Poses
 from postproc.toolpath import FrameRef
@@ -34,20 +35,25 @@ def spoiled(given: Blocks) -> Spoiled:
     """G10 L2, G10 L20, and variables that are offsets."""
     n = len(given)
     base = given.modal.force[Group.OFFSET]
-    at, bad = np.zeros(n + 1, np.bool_), np.zeros(n, np.bool_)
     events: list[tuple[int, int | None]] = []  # block, number of the base or None for all
     settings = np.flatnonzero(given.modal.has(Once.SETTING))
     if len(settings):
         kind, which = given.number(key("L"))[settings], given.number(key("P"))[settings]
-        for block, level, number in zip(settings.tolist(), kind.tolist(), which.tolist(), strict=True):
-            stated = given.of(key("L"))[block] >= 0
+        has = given.has(key("L"))[settings]
+        for block, level, number, stated in zip(
+            settings.tolist(), kind.tolist(), which.tolist(), has.tolist(), strict=True
+        ):
             if level in (2, 20):
                 events.append((block, None if np.isnan(number) else int(number) or int(base[block])))
             elif stated and np.isnan(level):
                 events.append((block, None))
-    for note in given.text.notes:
+    for note in given.source.notes:
         if note.kind == "assign" and _is_offset(note.text):
             events.append((note.block, None))
+    if not events:
+        no = everywhere(False, n)
+        return Spoiled(no, no)
+    at, bad = np.zeros(n + 1, np.bool_), np.zeros(n, np.bool_)
     first: dict[int | None, int] = {}
     for block, number in sorted(events, key=lambda event: event[0]):
         first.setdefault(number, block)
@@ -70,32 +76,21 @@ def tools(given: Blocks) -> tuple[Ints, bool]:
     T loads a tool at once, or with M6 in programs that have an M6.  T0 without M6 loads nothing.  A program without a
     tool works with number 1.
     """
-    words, n = given.text.words, len(given)
-    changes = words.block[np.flatnonzero((words.key == key("M")) & (words.value == TOOL_CHANGE))]
-    tape = given.modal.flow.tape
+    n, column, m = len(given), given.words(key("T")), given.words(key("M"))
+    changes = m.block[m.value == TOOL_CHANGE]
+    tape, sure = given.modal.flow.tape, given.modal.flow.doubt == Doubt.NONE
     changes = changes[tape[changes]]
-    number = given.number(key("T"))
-    named = (given.of(key("T")) >= 0) & tape
-    if not len(changes):
-        named &= number != 0
-    if not named.any():
-        return np.ones(n, np.int64), False
-    whole = (
-        np.isfinite(number) & (number > 0) & (number == np.floor(np.where(np.isfinite(number), number, 0.0)))
-    )
-    sure = given.modal.flow.doubt == Doubt.NONE
-    value = np.where(whole & sure & (number < 1e9), np.where(whole, number, 0), -1).astype(np.int64)
-    chosen = _filled(named, value)
+    # The last T of a block counts.
+    counts = np.append(column.block[1:] != column.block[:-1], True)[: len(column)] & tape[column.block]
+    named = np.flatnonzero(counts & ((column.value != 0) | (len(changes) > 0)))
+    if not len(named):
+        return everywhere(1, n, np.int32), False
+    block, number = column.block[named], column.value[named]
+    whole = (number > 0) & (number == np.floor(number)) & sure[block] & (number < 1e9)
+    chosen = in_force(n, block, np.where(whole, number, -1).astype(np.int32), -1, np.int32)
     if not len(changes):
         return chosen, True
-    loads = np.zeros(n, np.bool_)
-    loads[changes] = True
-    return _filled(loads, np.where(sure, chosen, -1)), True
-
-
-def _filled(where: Bools, value: Ints) -> Ints:
-    at = np.maximum.accumulate(np.where(where, np.arange(len(where)), -1))
-    return np.where(at >= 0, value[at], -1)
+    return in_force(n, changes, np.where(sure[changes], chosen[changes], -1), -1, np.int32), True
 
 
 def references(base: Ints, tool: Ints, line: Ints) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
@@ -103,13 +98,17 @@ def references(base: Ints, tool: Ints, line: Ints) -> tuple[Ints, Ints, tuple[Fr
     frames: list[FrameRef] = []
     columns = []
     for numbers in (base, tool):
-        names, first, inverse = np.unique(numbers, return_index=True, return_inverse=True)
-        index = np.full(len(names), -1)
+        starts = np.flatnonzero(np.diff(numbers, prepend=numbers[:1] - 1))
+        names, first = np.unique(numbers[starts], return_index=True)
+        index = np.full(len(names), -1, np.int32)
         for i, name in enumerate(names.tolist()):
             if name >= 0:
                 index[i] = len(frames)
                 # Base 0 is no offset (G500): the control's own coordinates.
                 pose = Poses.identity() if numbers is base and name == 0 else None
-                frames.append(FrameRef(name, pose, int(line[first[i]])))
-        columns.append(index[inverse] if len(numbers) else np.empty(0, np.int64))
+                frames.append(FrameRef(name, pose, int(line[starts[first[i]]])))
+        if len(names) == 1:
+            columns.append(everywhere(index[0], len(numbers)))
+        else:
+            columns.append(index[np.searchsorted(names, numbers)])
     return columns[0], columns[1], tuple(frames)

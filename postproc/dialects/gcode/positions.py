@@ -6,7 +6,7 @@ two changes of the frame it is solved for all blocks at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -36,16 +36,17 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class Positions:
-    """begin, end (B, 6) [m, rad]: programmed coordinates before and behind every block, in its frame.
+    """Of some blocks, begin, end (B, 6) [m, rad]: programmed coordinates before and behind every block, in its frame.
 
-    source (B, 6): the block that set, or lost, each coordinate; -1 where none did.  frame (B,): row in ``frames``.
+    source (B, 6): the block of the program that set, or lost, each coordinate; -1 where none did.
+    frame (B,): row in ``frames``.
     """
 
     begin: Floats
     end: Floats
     source: Ints
     frame: Ints
-    frames: tuple[Frame, ...]
+    frames: Sequence[Frame]
 
     def in_base(self) -> Floats:
         """(B, 6) the ends in the base."""
@@ -55,40 +56,60 @@ class Positions:
         return result
 
 
-def positions(
-    course: Course, first: Frame, events: Ints, change: Callable[[int, Frame, Floats], Frame]
-) -> Positions:
-    """The coordinates of every block.
+class Trace:
+    """Follows the coordinates of a program through its blocks, in their order."""
 
-    events (E,): blocks that change the frame (and move nothing), ascending; ``change`` (block, frame, position in the
-    base) gives the frame behind one.
-    """
-    n = len(course.value)
-    begin, end = np.empty((n, 6)), np.empty((n, 6))
-    source = np.empty((n, 6), np.int64)
-    number = np.empty(n, np.int64)
-    frames = [first]
-    here, origin, at = np.full(6, np.nan), np.full(6, -1), 0
-    for event in [*events[:MOST].tolist(), n]:
-        frame = frames[-1]
-        piece = slice(at, event)
-        number[piece] = len(frames) - 1
-        if event > at:
-            begin[piece], end[piece], source[piece] = _scan(course, piece, here, origin)
-            here, origin = end[event - 1], source[event - 1]
-        if event < n:
-            there = frame.to_base(here)
-            frames.append(change(event, frame, there))
-            here = frames[-1].from_base(there)
-            origin = np.where(np.isnan(here), event, origin)
-        at = event
-        if len(frames) > MOST:
-            frames.append(Frame(np.eye(3), np.full(6, np.nan)))
-            here = np.full(6, np.nan)
-    return Positions(begin, end, source, number, tuple(frames))
+    def __init__(self, first: Frame, events: Ints, change: Callable[[int, Frame, Floats], Frame]) -> None:
+        """events (E,): blocks that change the frame (and move nothing), ascending; ``change`` (block, frame, position
+        in the base) gives the frame behind one."""
+        self._events, self._change = events[:MOST], change
+        self.frames = [first]
+        self._here, self._origin = np.full(6, np.nan), np.full(6, -1)
+
+    def frame_of(self, blocks: Ints) -> Ints:
+        """Rows in ``frames`` of blocks (K,) that were followed."""
+        return np.searchsorted(self._events, blocks, side="right").astype(np.int16)
+
+    def follow(self, course: Course, begin: int) -> Positions:
+        """The next blocks, of which ``begin`` is the first."""
+        n = len(course.value)
+        found = Positions(
+            np.empty((n, 6)),
+            np.empty((n, 6)),
+            np.empty((n, 6), np.int32),
+            self.frame_of(np.arange(begin, begin + n)),
+            self.frames,
+        )
+        low, high = np.searchsorted(self._events, [begin, begin + n]).tolist()
+        at = 0
+        for event in (self._events[low:high] - begin).tolist():
+            self._scan(course, slice(at, event), begin, found)
+            self._turn(begin + event)
+            at = event
+        self._scan(course, slice(at, n), begin, found)
+        return found
+
+    def _turn(self, event: int) -> None:
+        """Goes on in the frame behind ``event``; behind too many nothing is known."""
+        there = self.frames[-1].to_base(self._here)
+        frame = self._change(event, self.frames[-1], there)
+        if len(self.frames) == MOST:
+            frame = Frame(np.eye(3), np.full(6, np.nan))
+        self.frames.append(frame)
+        self._here = frame.from_base(there)
+        self._origin = np.where(np.isnan(self._here), event, self._origin)
+
+    def _scan(self, course: Course, piece: slice, first: int, found: Positions) -> None:
+        if piece.stop > piece.start:
+            found.begin[piece], found.end[piece], found.source[piece] = _scan(
+                course, piece, self._here, self._origin, first
+            )
+            self._here, self._origin = found.end[piece.stop - 1].copy(), found.source[piece.stop - 1].copy()
 
 
-def _scan(course: Course, piece: slice, here: Floats, origin: Ints) -> tuple[Floats, Floats, Ints]:
+def _scan(
+    course: Course, piece: slice, here: Floats, origin: Ints, first: int
+) -> tuple[Floats, Floats, Ints]:
     value, sets, adds = course.value[piece], course.sets[piece], course.adds[piece]
     lost, left = course.lost[piece], course.left[piece] & ~course.sets[piece]
     gone = lost | left | (adds & np.isnan(value))
@@ -100,7 +121,7 @@ def _scan(course: Course, piece: slice, here: Floats, origin: Ints) -> tuple[Flo
     row = np.maximum(where, 0)
     column = np.arange(6)
     end = np.where(where >= 0, known[row, column] + (total - total[row, column]), here + total)
-    source = np.where(where >= 0, where + piece.start, origin)
+    source = np.where(where >= 0, where + (first + piece.start), origin)
     begin = np.concatenate([here[None], end[:-1]])
     begin[course.left[piece]] = np.nan
     return begin, end, source

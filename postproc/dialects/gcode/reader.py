@@ -4,81 +4,89 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.dialects.dialect import PLAIN, Program, Settings
 from postproc.dialects.gcode import offsets
 from postproc.dialects.gcode.arcs import Arcs, arcs, through
-from postproc.dialects.gcode.blocks import THROUGH, Blocks, blocks, course
+from postproc.dialects.gcode.blocks import THROUGH, Blocks, Reasons, blocks, course, tilted
 from postproc.dialects.gcode.comments import remarks
 from postproc.dialects.gcode.control import Control, Event, Feed, Frame, Group, Move, Once
-from postproc.dialects.gcode.feeds import feeds
-from postproc.dialects.gcode.judging import judged, pinned
-from postproc.dialects.gcode.lexing import FARTHEST, lex
+from postproc.dialects.gcode.feeds import Feeds
+from postproc.dialects.gcode.force import Rows, everywhere
+from postproc.dialects.gcode.judging import Built, judged, pinned
+from postproc.dialects.gcode.lexing import FARTHEST
 from postproc.dialects.gcode.modal import modal
 from postproc.dialects.gcode.motions import Motions
-from postproc.dialects.gcode.numbered import references, spoiled, tools
-from postproc.dialects.gcode.places import COLUMNS, Places
-from postproc.dialects.gcode.positions import Positions, positions
-from postproc.dialects.gcode.stands import stands
+from postproc.dialects.gcode.numbered import Spoiled, references, spoiled, tools
+from postproc.dialects.gcode.orientation import Orientation
+from postproc.dialects.gcode.places import STATE, Places
+from postproc.dialects.gcode.positions import Positions, Trace
+from postproc.dialects.gcode.refusals import Doubts
+from postproc.dialects.gcode.source import scan
+from postproc.dialects.gcode.stands import Stands
 from postproc.dialects.gcode.telling import told
-from postproc.dialects.gcode.words import How, Note, Text, key
+from postproc.dialects.gcode.words import How, Note, key
 from postproc.document import Document
 from postproc.geometry import Poses, rotation_from_abc
 from postproc.toolpath import Kind, Toolpath
 from postproc.units import MM
 
+PART = 1 << 14
+"""Blocks whose motions are worked out at a time."""
+
 
 def read(documents: tuple[Document, ...], control: Control, settings: Settings = PLAIN) -> Program:
     """Read a program; never raises on its content."""
     document = documents[0]
-    text = lex(document.raw, control)
-    given = blocks(text, modal(text, control), control, control.increments and settings.integer_words == "um")
+    source = scan(document.raw, control)
+    given = blocks(
+        source, modal(source, control), control, control.increments and settings.integer_words == "um"
+    )
+    rows = np.flatnonzero(given.motion).astype(np.int32)
     offset = spoiled(given)
-    way, reasons, reason = course(given, offset.at)
-    events = _events(given)
-    where = positions(way, offsets.start(), events, _change(given, events))
+    base = given.modal.force[Group.OFFSET]
+    base = (np.where(offset.bad, -1, base) if offset.bad.any() else base)[rows]
     tool, named = tools(given)
-
-    rows = np.flatnonzero(given.motion)
-    base = np.where(offset.bad, -1, given.modal.force[Group.OFFSET])[rows]
-    turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
-    moves = _motions(given, where, rows, turned)
-    doubts = judged(given, moves, where, base, tool[rows], reasons, reason)
-    start = text.blocks.start[rows]
-    refused = doubts.done(document, text.blocks.line[rows], start, _first(text)[rows])
-    frame_of_base, frame_of_tool, frames = references(base, tool[rows], text.blocks.line[rows])
-    said = remarks(document, text, text.blocks.line[rows])
-    place = moves.place.copy()
-    place[(given.modal.flow.doubt[rows] != 0) | np.isnan(place).any(axis=1)] = np.nan
-    placed = ~np.isnan(place[:, :1])
+    doubts = Doubts(len(rows))
+    found, built, frames, orientations = _followed(given, rows, offset, base, tool[rows], settings, doubts)
+    lines = source.blocks
+    line, start = lines.line[rows], lines.start[rows]
+    refused = doubts.done(document, line, start, lines.first[rows])
+    frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line)
+    said = remarks(document, source, line)
+    number = everywhere(-1, len(rows), np.int32)
+    state = {name: found.taken(name) for name in STATE}
+    timed = state["feed_mode"] == Feed.INVERSE_TIME
     path = Toolpath(
-        kind=moves.kind,
-        position=place,
-        rotation=moves.stand.rotation,
-        axes=np.full((len(rows), 6), np.nan),
-        feed=np.where(moves.kind == Kind.PTP, np.nan, feeds(given, rows, moves.length)),
+        kind=built.kind,
+        position=found.taken("place"),
+        rotation=found.taken("rotation"),
+        axes=everywhere(np.full(6, np.nan), len(rows)),
+        feed=found.taken("feed"),
         base=frame_of_base,
         tool=frame_of_tool,
-        status=np.full(len(rows), -1),
-        turn=np.full(len(rows), -1),
-        line=text.blocks.line[rows],
-        frames=frames,
+        status=number,
+        turn=number,
+        line=line,
+        frames=cell_frames,
         refused=refused,
-        pinned=pinned(document, given, moves, way, doubts),
+        pinned=pinned(document, given, built, doubts),
         annotations=said.annotations,
-        centre=np.where(placed, moves.centre, np.nan),
-        normal=np.where(placed, moves.normal, np.nan),
-        sweep=np.where(placed[:, 0], moves.arcs.sweep, np.nan),
-        blend=_blend(given, rows),
+        centre=found.taken("centre"),
+        normal=found.taken("normal"),
+        sweep=found.taken("sweep"),
+        blend=found.taken("blend"),
         whole=_whole(given, rows),
         comments=said.comments,
-        oriented=moves.stand.oriented,
-        free_axis=moves.stand.free_axis,
-        any_plane=_by_point(given, rows),
-        timed=given.modal.force[Group.FEED][rows] == Feed.INVERSE_TIME,
+        oriented=found.taken("oriented"),
+        free_axis=found.taken("free_axis"),
+        any_plane=found.taken("any_plane"),
+        timed=timed if timed.any() else everywhere(False, len(rows)),
         branches=False,
     )
     findings = [*refused.told(), *told(document, given, rows, tool, named, settings)]
@@ -86,7 +94,15 @@ def read(documents: tuple[Document, ...], control: Control, settings: Settings =
         control.name,
         documents,
         path,
-        _places(given, where, moves),
+        Places(
+            **state,
+            raw=document.raw,
+            control=control,
+            start=start,
+            stop=lines.stop[rows],
+            frames=frames,
+            orientations=orientations,
+        ),
         tuple(sorted(findings, key=lambda finding: finding.line)),
         said.marker,
         said.marker_at,
@@ -94,11 +110,74 @@ def read(documents: tuple[Document, ...], control: Control, settings: Settings =
     )
 
 
-def _first(text: Text) -> Ints:
-    """(B,) offset of the first word of every block, or of the block."""
-    first = text.blocks.start.copy()
-    first[text.words.block[::-1]] = text.words.at[::-1]
-    return first
+def _followed(
+    given: Blocks, rows: Ints, offset: Spoiled, base: Ints, tool: Ints, settings: Settings, doubts: Doubts
+) -> tuple[Rows, Built, Poses, tuple[Orientation, ...]]:
+    """The motions in the blocks ``rows`` (N,), part by part; base, tool (N,): numbers.
+
+    Gives their columns, what others build on, the frames of the program and what its orientation words mean.
+    """
+    turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
+    events = _events(given)
+    trace = Trace(offsets.start(), events, _change(given, events))
+    feeds, stands, away, reasons = Feeds(given), Stands(given, turned), tilted(given), Reasons(len(given))
+    allowed = _allowed(given)
+    found = Rows(len(rows))
+    for begin in range(0, max(len(given), 1), PART):
+        stop = min(begin + PART, len(given))
+        low, high = np.searchsorted(rows, [begin, stop]).tolist()
+        here, own = given.part(begin, stop), rows[low:high] - begin
+        way = course(here, offset.at[begin:stop], away[begin:stop], reasons)
+        where = trace.follow(way, begin)
+        moves = _motions(here, where, trace, own, stands)
+        judged(here, moves, where, base[low:high], tool[low:high], reasons, doubts.part(slice(low, high)))
+        found.put(
+            high - low,
+            **_columns(here, where, moves, feeds),
+            blend=_blend(here, own, allowed),
+            sets=way.sets[own, :3],
+            lost=way.lost[own, :3],
+        )
+    built = Built(rows, *(found.taken(name) for name in ("kind", "sets", "lost", "turned")))
+    frames = Poses(
+        np.array([frame.turn for frame in trace.frames]),
+        np.array([frame.shift[:3] for frame in trace.frames]),
+    )
+    return found, built, frames, tuple(stands.orientations)
+
+
+def _columns(given: Blocks, where: Positions, moves: Motions, feeds: Feeds) -> dict[str, NDArray[Any]]:
+    """What is kept of the motions of a part."""
+    rows, force, stand = moves.block, given.modal.force, moves.stand
+    place = moves.place.copy()
+    place[(given.modal.flow.doubt[rows] != 0) | np.isnan(place).any(axis=1)] = np.nan
+    placed = ~np.isnan(place[:, :1])
+    feed = feeds.of(rows + given.begin, moves.length)
+    return {
+        "kind": moves.kind,
+        "place": place,
+        "rotation": stand.rotation,
+        "feed": np.where(moves.kind == Kind.PTP, np.nan, feed),
+        "centre": np.where(placed, moves.centre, np.nan),
+        "normal": np.where(placed, moves.normal, np.nan),
+        "sweep": np.where(placed[:, 0], moves.arcs.sweep, np.nan),
+        "oriented": stand.oriented,
+        "free_axis": stand.free_axis,
+        "any_plane": _by_point(given, rows),
+        "turned": stand.stated | (stand.orient < 0),
+        "move": moves.move,
+        "plane": force[Group.PLANE][rows],
+        "incremental": force[Group.DISTANCE][rows] == 1,
+        "arc_absolute": force[Group.ARCS][rows] == 1,
+        "scale": given.length[rows],
+        "increment": given.length_of_integer[rows],
+        "frame": where.frame[rows],
+        "begin": moves.begin[:, :3],
+        "orient": stand.orient,
+        "turned_values": stand.values,
+        "turned_before": stand.before,
+        "feed_mode": force[Group.FEED][rows],
+    }
 
 
 def _events(given: Blocks) -> Ints:
@@ -112,36 +191,36 @@ def _events(given: Blocks) -> Ints:
 
 def _change(given: Blocks, events: Ints) -> Callable[[int, Frame, Floats], Frame]:
     """The frame behind a block that changes it; unknown where the block may not run."""
-    words, change = given.text.words, given.control.frame
+    change = given.control.frame
     notes: dict[int, list[Note]] = {block: [] for block in events.tolist()}
-    for note in given.text.notes if notes else ():
+    for note in given.source.notes if notes else ():
         if note.block in notes:
             notes[note.block].append(note)
-    first = np.searchsorted(words.block, np.arange(len(given) + 1))
+
+    keys = [one for one in given.columns if one in given.source.columns]
 
     def changed(block: int, frame: Frame, position: Floats) -> Frame:
-        rows = slice(int(first[block]), int(first[block + 1]))
-        keys, values, hows = words.key[rows].tolist(), words.value[rows].tolist(), words.how[rows].tolist()
-        small = given.length_of_integer[block] / given.length[block]
-        values = [
-            value * small if how == How.INTEGER else value for value, how in zip(values, hows, strict=True)
-        ]
-        codes = tuple(
-            value for one, value in zip(keys, words.value[rows].tolist(), strict=True) if one == key("G")
-        )
+        here = given.part(block, block + 1)
+        small = float(here.length_of_integer[0] / here.length[0])
+        words = {
+            one: float(column.value[-1] * (small if column.how[-1] == How.INTEGER else 1.0))
+            for one in keys
+            if len(column := here.words(one))
+        }
+        codes = tuple(here.words(key("G")).value.tolist())
         event = Event(
-            dict(zip(keys, values, strict=True)),
-            int(given.modal.once[block]),
-            tuple(notes.get(block, ())),
+            words,
+            int(here.modal.once[0]),
+            tuple(notes[block]),
             codes,
-            int(given.modal.force[Group.PLANE][block]),
-            float(given.length[block]),
+            int(here.modal.force[Group.PLANE][0]),
+            float(here.length[0]),
             frame,
             position,
         )
         after = change(event)
         after = replace(after, shift=np.where(np.abs(after.shift) > FARTHEST * MM, np.nan, after.shift))
-        if given.modal.flow.doubt[block]:
+        if here.modal.flow.doubt[0]:
             same = (after.shift == frame.shift) | (np.isnan(after.shift) & np.isnan(frame.shift))
             return Frame(after.turn, np.where(same, frame.shift, np.nan), after.memory)
         return after
@@ -149,7 +228,7 @@ def _change(given: Blocks, events: Ints) -> Callable[[int, Frame, Floats], Frame
     return changed
 
 
-def _motions(given: Blocks, where: Positions, rows: Ints, turned: Floats | None) -> Motions:
+def _motions(given: Blocks, where: Positions, trace: Trace, rows: Ints, stands: Stands) -> Motions:
     begin, end = where.begin[rows], where.end[rows]
     force, move = given.modal.force, given.move[rows]
     plane = force[Group.PLANE][rows]
@@ -159,8 +238,8 @@ def _motions(given: Blocks, where: Positions, rows: Ints, turned: Floats | None)
     kind[given.modal.has(Once.HOME)[rows]] = Kind.PTP
     kind[given.modal.has(Once.PROBE)[rows]] = Kind.LIN
     kind[force[Group.AXIAL][rows] != 0] = Kind.PTP
-    kind[given.modal.unknown[rows] >= 0] = Kind.OTHER
-    pose = stands(given, where, rows, kind == Kind.PTP, turned)
+    kind[given.modal.unknown[rows]] = Kind.OTHER
+    pose = stands.of(trace, where, rows, given.begin, kind == Kind.PTP)
     return Motions.of(rows, move, kind, plane, begin, end, where, ways, pose)
 
 
@@ -201,32 +280,26 @@ def _arcs(given: Blocks, rows: Ints, begin: Floats, end: Floats, plane: Ints, be
     return result
 
 
-def _blend(given: Blocks, rows: Ints) -> Floats:
-    """(N,) [m]: 0 in exact modes, what P of G64 allows, NaN where nothing bounds it."""
-    path = given.modal.force[Group.PATH]
-    code = np.isin(given.text.words.value, (64.0,)) & (given.text.words.key == key("G"))
-    says = np.zeros(len(given), np.bool_)
-    says[given.text.words.block[code]] = True
-    at = np.maximum.accumulate(np.where(says, np.arange(len(given)), -1))
-    allowed = np.where(at >= 0, given.lengths(key("P"))[np.maximum(at, 0)], np.nan)
-    return np.where(path == 0, 0.0, np.where(path == 1, allowed, np.nan))[rows]
+def _allowed(given: Blocks) -> tuple[Ints, Floats]:
+    """Blocks with a G64 (K,), and what its P allows [m] (K,), NaN where nothing bounds it."""
+    codes = given.words(key("G"))
+    says = codes.block[codes.value == 64.0]
+    return says, given.lengths(key("P"))[says] if len(says) else np.empty(0)
+
+
+def _blend(given: Blocks, rows: Ints, allowed: tuple[Ints, Floats]) -> Floats:
+    """(N,) [m]: 0 in exact modes, else as ``allowed``."""
+    path = given.modal.force[Group.PATH][rows]
+    at = np.searchsorted(allowed[0], rows + given.begin, side="right") - 1
+    return np.where(path == 0, 0.0, np.where(path == 1, np.append(allowed[1], np.nan)[at], np.nan))
 
 
 def _whole(given: Blocks, rows: Ints) -> dict[int, str]:
     """Motions before which nothing may be inserted, because their block says more than the motion."""
-    words, modal, n = given.text.words, given.modal, len(given)
-    more = given.has(*(key(letter) for letter in "ESTHDLQUVW")) | given.noted(
-        "assign", "corner", "axis", "polar"
-    )
-    more[words.block[np.isin(words.key, (key("M"), *given.control.columns)) & ~np.isin(words.key, _WAY)]] = (
-        True
-    )
-    codes = np.flatnonzero(words.key == key("G"))
-    said = np.bincount(words.block[codes], minlength=n)
-    silent = (modal.verb >= 0).astype(np.int64)
-    for group in (Group.PLANE, Group.DISTANCE, Group.ARCS, Group.UNITS):
-        silent[modal.states[group]] += 1
-    more |= said != silent
+    modal = given.modal
+    more = modal.more | given.noted("assign", "corner", "axis", "polar")
+    others = (one for one in given.control.columns if one not in _WAY)
+    more |= given.has(*(key(letter) for letter in "ESTHDLQUVWM"), *others)
     word, usual = given.control.turns
     if word in given.columns:
         more |= given.number(word) > usual
@@ -247,37 +320,7 @@ _WAY = tuple(key(letter, index) for letter in "ABCIJK" for index in (1, 2, 3))
 """Words of the way itself: the point between, orientations."""
 
 
-def _places(given: Blocks, where: Positions, moves: Motions) -> Places:
-    rows, force = moves.block, given.modal.force
-    columns = (*COLUMNS, *given.control.columns)
-    return Places(
-        text=given.text,
-        block=rows,
-        columns=columns,
-        word=given.word[rows][:, [given.columns.index(one) for one in columns]],
-        verb=given.modal.verb[rows],
-        insert=given.text.blocks.code[rows],
-        move=moves.move,
-        plane=moves.plane,
-        incremental=force[Group.DISTANCE][rows] == 1,
-        arc_absolute=force[Group.ARCS][rows] == 1,
-        scale=given.length[rows],
-        increment=given.length_of_integer[rows],
-        frame=where.frame[rows],
-        frames=Poses(
-            np.array([frame.turn for frame in where.frames]),
-            np.array([frame.shift[:3] for frame in where.frames]),
-        ),
-        begin=moves.begin[:, :3],
-        orient=moves.stand.orient,
-        orientations=moves.stand.orientations,
-        turned_values=moves.stand.values,
-        turned_before=moves.stand.before,
-        feed_mode=force[Group.FEED][rows],
-    )
-
-
-KINDS = np.full(len(Move) + 1, Kind.OTHER)
+KINDS = np.full(len(Move) + 1, Kind.OTHER, np.int8)
 KINDS[[Move.RAPID, Move.LINE, Move.CLOCKWISE, Move.COUNTER, Move.THROUGH]] = (
     Kind.PTP,
     Kind.LIN,

@@ -108,20 +108,31 @@ class Doubts:
 
     def __init__(self, n: int) -> None:
         self.reasons: list[Reason] = []
-        self.why = np.full(n, -1)
+        self.why = np.full(n, -1, np.int32)
+        self._number: dict[Reason, int] = {}
+
+    def part(self, rows: slice) -> Doubts:
+        """Those of some of the motions; what is refused there is refused here."""
+        part = Doubts(0)
+        part.reasons, part._number, part.why = self.reasons, self._number, self.why[rows]
+        return part
+
+    def _reason(self, reason: Reason) -> int:
+        if reason not in self._number:
+            self._number[reason] = len(self.reasons)
+            self.reasons.append(reason)
+        return self._number[reason]
 
     def refuse(self, rows: Bools, code: str, message: str, cause: str = "") -> None:
         """Refuses the motions of the mask ``rows`` that are not refused yet."""
-        rows = rows & (self.why < 0)
         if rows.any():
-            self.why[rows] = len(self.reasons)
-            self.reasons.append(Reason(code, message, cause or message))
+            self.why[rows & (self.why < 0)] = self._reason(Reason(code, message, cause or message))
 
     def refuse_each(self, rows: Ints, messages: list[tuple[str, str, str]], which: Ints) -> None:
         """Refuses ``rows`` for the reasons (code, message, cause) of number ``which``."""
+        numbers = np.array([self._reason(Reason(*message)) for message in messages])
         open_ = self.why[rows] < 0
-        self.why[rows[open_]] = len(self.reasons) + which[open_]
-        self.reasons += [Reason(*message) for message in messages]
+        self.why[rows[open_]] = numbers[which[open_]]
 
     def done(self, document: Document, line: Ints, start: Ints, at: Ints) -> Refusals:
         """line, start (N,): of the motions' lines, ``at`` where they begin there."""

@@ -17,8 +17,9 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.dialects.gcode.blocks import Blocks
 from postproc.dialects.gcode.control import Group
+from postproc.dialects.gcode.force import everywhere
 from postproc.dialects.gcode.orientation import Angles, Orientation, Vector
-from postproc.dialects.gcode.positions import Positions
+from postproc.dialects.gcode.positions import Positions, Trace
 from postproc.dialects.gcode.words import key
 from postproc.units import DEG
 
@@ -34,83 +35,130 @@ _SEQUENCES = {EULER: ((2, 0), (0, 1), (2, 2)), RPY: ((2, 2), (1, 1), (0, 0))}
 @dataclass(frozen=True, eq=False)
 class Stand:
     """rotation (N, 3, 3); oriented (N,): the words can be written; free_axis (N, 3): as in a Toolpath; wrong (N,):
-    0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one.  orient (N,), orientations,
-    values, before (N, 3): as in Places.  stated (N,): the block itself states the whole orientation in force."""
+    0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one.  orient (N,) row in
+    ``Stands.orientations``, -1 where none is in force; values, before (N, 3): as in Places.  stated (N,): the block
+    itself states the whole orientation in force."""
 
     rotation: Floats
     oriented: Bools
     free_axis: Floats
     wrong: Ints
     orient: Ints
-    orientations: tuple[Orientation, ...]
     values: Floats
     before: Floats
     stated: Bools
 
-
-def stands(given: Blocks, where: Positions, rows: Ints, rapid: Bools, turned: Floats | None) -> Stand:
-    """The orientation of the motions in the blocks ``rows`` (N,).
-
-    rapid (N,): air; turned (3, 3): the tool in the base at A = B = C = 0, None where nothing says it.
-    """
-    n = len(rows)
-    words = given.text.words.key
-    used = np.array([bool((words == one).any()) for one in _ROTARY_KEYS])
-    tcp = given.modal.force[Group.TCP] == 1
-    kind, stating = _kinds(given, tcp, bool(used.any()))
-    result = Stand(
-        np.full((n, 3, 3), np.nan) if turned is None else np.broadcast_to(turned, (n, 3, 3)).copy(),
-        np.zeros(n, np.bool_),
-        np.full((n, 3), np.nan),
-        np.zeros(n, np.int64),
-        np.full(n, -1),
-        (),
-        np.full((n, 3), np.nan),
-        np.full((n, 3), np.nan),
-        np.zeros(n, np.bool_),
-    )
-    if not used.any() and not (kind > ROTARY).any():
-        return result
-    _machine(where, rows, rapid, used, tcp[rows], kind[rows], result)
-    found: list[Orientation] = []
-    turns = np.array([frame.turn for frame in where.frames])
-    inside = tcp[rows] & (kind[rows] != _NOWHERE)
-    pairs = np.stack([kind[rows], np.where(kind[rows] == ROTARY, 0, where.frame[rows])], axis=1)
-    for one, number in np.unique(pairs[inside], axis=0).tolist():
-        here = np.flatnonzero(inside & (pairs == (one, number)).all(axis=1))
-        orientation = _orientation(given, one, turns[number], turned, used)
-        result.orient[here] = len(found)
-        found.append(orientation)
-        values = _values(given, where, one, rows[here], stating[rows[here]], turned, turns, used, orientation)
-        shifted = np.array([frame.shift[3:].any() for frame in where.frames])[where.frame[rows[here]]]
-        result.values[here] = values
-        ahead = here[(rows[here] > 0) & ((one == ROTARY) | (kind[rows[here] - 1] == one))]
-        block = rows[ahead]
-        if one == ROTARY:
-            result.before[ahead] = np.where(used, where.begin[block, 3:] / DEG, np.nan)
-        else:
-            said = stating[block - 1]
-            result.before[ahead] = _values(given, where, one, block, said, turned, turns, used, orientation)
-        present = np.stack(
-            [given.of(address)[rows[here]] >= 0 for address in orientation.words if address >= 0], axis=1
+    @staticmethod
+    def unsaid(count: int, turned: Floats | None) -> Stand:
+        """Of motions whose text says nothing of the orientation."""
+        nothing = everywhere(np.full(3, np.nan), count)
+        no = everywhere(False, count)
+        return Stand(
+            everywhere(np.full((3, 3), np.nan) if turned is None else turned, count),
+            no,
+            nothing,
+            everywhere(0, count, np.int8),
+            everywhere(-1, count, np.int16),
+            nothing,
+            nothing,
+            no,
         )
-        result.stated[here] = present.any(axis=1) if orientation.joint else present.all(axis=1)
-        columns = np.array(orientation.words) >= 0
-        known = np.isfinite(values[:, columns]).all(axis=1)
-        result.wrong[here[~known]] = 2
-        good = here[known]
-        result.rotation[here] = np.nan
-        result.rotation[good] = orientation.rotation(values[known])
-        result.oriented[good] = orientation.writable(values[known]) & ~shifted[known]
-        result.free_axis[good] = orientation.free_axis
-    return Stand(**{**result.__dict__, "orientations": tuple(found)})
+
+
+class Stands:
+    """The orientation of the motions of a program, which come block by block."""
+
+    def __init__(self, given: Blocks, turned: Floats | None) -> None:
+        """given: the whole program; turned (3, 3): the tool in the base at A = B = C = 0; None where none is said."""
+        self._given, self._turned = given, turned
+        self._tcp = given.modal.force[Group.TCP] == 1
+        self._used = np.array([len(given.words(one)) > 0 for one in _ROTARY_KEYS])
+        others = (*given.control.vector, *given.control.euler)
+        self._none = not self._used.any() and not any(len(given.words(one)) for one in others)
+        if not self._none:
+            self._kind, self._stating = _kinds(given, self._tcp, bool(self._used.any()))
+        self.orientations: list[Orientation] = []
+        self._number: dict[tuple[int, int], int] = {}
+
+    def of(self, trace: Trace, where: Positions, rows: Ints, first: int, rapid: Bools) -> Stand:
+        """Of motions in blocks ``rows`` (N,) of ``where``, which begins at block ``first``; rapid (N,): air."""
+        used = self._used
+        result = Stand.unsaid(len(rows), self._turned)
+        if self._none:
+            return result
+        result = Stand(**{name: np.array(column) for name, column in result.__dict__.items()})
+        blocks = rows + first
+        kind = self._kind[blocks]
+        _machine(where, rows, rapid, used, self._tcp[blocks], kind, result)
+        inside = self._tcp[blocks] & (kind != _NOWHERE)
+        pairs = np.stack([kind, np.where(kind == ROTARY, 0, where.frame[rows])], axis=1)
+        for one, frame in np.unique(pairs[inside], axis=0).tolist():
+            here = np.flatnonzero(inside & (pairs == (one, frame)).all(axis=1))
+            number = self._orientation(one, frame, where)
+            orientation = self.orientations[number]
+            result.orient[here] = number
+            turning = np.array([frame.shift[3:].any() for frame in where.frames])
+            shifted = turning[where.frame[rows[here]]]
+            ends = where.end[rows[here], 3:]
+            values = self._values(trace, one, blocks[here], ends, orientation)
+            result.values[here] = values
+            ahead = here[(blocks[here] > 0) & ((one == ROTARY) | (self._kind[blocks[here] - 1] == one))]
+            begins = where.begin[rows[ahead], 3:]
+            result.before[ahead] = self._values(trace, one, blocks[ahead], begins, orientation, 1)
+            given = self._given.part(first, first + len(where.frame))
+            present = np.stack(
+                [given.has(address)[rows[here]] for address in orientation.words if address >= 0], axis=1
+            )
+            result.stated[here] = present.any(axis=1) if orientation.joint else present.all(axis=1)
+            columns = np.array(orientation.words) >= 0
+            known = np.isfinite(values[:, columns]).all(axis=1)
+            result.wrong[here[~known]] = 2
+            good = here[known]
+            result.rotation[here] = np.nan
+            result.rotation[good] = orientation.rotation(values[known])
+            result.oriented[good] = orientation.writable(values[known]) & ~shifted[known]
+            result.free_axis[good] = orientation.free_axis
+        return result
+
+    def _orientation(self, kind: int, frame: int, where: Positions) -> int:
+        """Row in ``orientations`` of the meaning that the words of a kind have in a frame."""
+        if (kind, frame) not in self._number:
+            self._number[kind, frame] = len(self.orientations)
+            turn = where.frames[frame].turn
+            self.orientations.append(_orientation(self._given, kind, turn, self._turned, self._used))
+        return self._number[kind, frame]
+
+    def _values(
+        self,
+        trace: Trace,
+        kind: int,
+        blocks: Ints,
+        axes: Floats,
+        orientation: Orientation,
+        earlier: int = 0,
+    ) -> Floats:
+        """(n, 3) numbers in force at the end of ``blocks`` (n,), or ``earlier`` ones; ``axes`` (n, 3) [rad] there."""
+        if kind == ROTARY:
+            return np.where(self._used, axes / DEG, np.nan)
+        given = self._given
+        keys = given.control.vector if kind == VECTOR else given.control.euler
+        at = np.maximum(self._stating[blocks - earlier], 0)
+        values = np.stack([given.words(one).last(at, absent=0.0) for one in keys], axis=1)
+        # Stated in other coordinates: where it points stays.
+        stated, now = trace.frame_of(at), trace.frame_of(blocks)
+        for number in np.unique(stated).tolist():
+            other = np.flatnonzero((stated == number) & (now != number))
+            if len(other):
+                told = _orientation(given, kind, trace.frames[number].turn, self._turned, self._used)
+                values[other] = orientation.values(told.rotation(values[other]), values[other])
+        return np.asarray(values)
 
 
 def _kinds(given: Blocks, tcp: Bools, rotary: bool) -> tuple[Ints, Ints]:
     """(B,) what states the orientation in force, _NOWHERE where nothing known does; the block that states it."""
     n = len(given)
     control = given.control
-    stated = np.full(n, _NOWHERE)
+    stated = np.full(n, _NOWHERE, np.int8)
     marks = np.zeros(n, np.bool_)
     euler = given.modal.force[Group.EULER]
     for keys, kind in (
@@ -130,9 +178,9 @@ def _kinds(given: Blocks, tcp: Bools, rotary: bool) -> tuple[Ints, Ints]:
     # A vector does not outlast its mode; positions of rotary axes do.
     stated[lost] = _NOWHERE
     fresh = marks | lost | changed
-    at = np.maximum.accumulate(np.where(fresh, np.arange(n), -1))
-    kind = np.where(at >= 0, stated[np.maximum(at, 0)], _NOWHERE)
-    return np.where((kind == _NOWHERE) & rotary, ROTARY, kind), at
+    at = np.maximum.accumulate(np.where(fresh, np.arange(n, dtype=np.int32), np.int32(-1)))
+    kind = np.where(at >= 0, stated[np.maximum(at, 0)], np.int8(_NOWHERE))
+    return np.where((kind == _NOWHERE) & rotary, np.int8(ROTARY), kind), at
 
 
 def _machine(
@@ -161,31 +209,3 @@ def _orientation(given: Blocks, kind: int, turn: Floats, turned: Floats | None, 
         return Angles((a, b, c), control.angles, np.eye(3), tool)
     sequence = tuple((axis, axis) for axis in (2, 1, 0) if used[axis])
     return Angles((a, b, c), sequence, np.eye(3), turned, free_spin=True)
-
-
-def _values(
-    given: Blocks,
-    where: Positions,
-    kind: int,
-    blocks: Ints,
-    stating: Ints,
-    turned: Floats | None,
-    turns: Floats,
-    used: Bools,
-    orientation: Orientation,
-) -> Floats:
-    """(n, 3) numbers in force at the end of ``blocks`` (n,), of which ``stating`` (n,) state them."""
-    if kind == ROTARY:
-        return np.where(used, where.end[blocks, 3:] / DEG, np.nan)
-    keys = given.control.vector if kind == VECTOR else given.control.euler
-    at = np.maximum(stating, 0)
-    present = np.stack([given.of(one)[at] >= 0 for one in keys], axis=1)
-    numbers = np.stack([given.number(one)[at] for one in keys], axis=1)
-    values = np.where(present, numbers, 0.0)
-    # Stated in other coordinates: where it points stays.
-    for number in np.unique(where.frame[at]).tolist():
-        other = np.flatnonzero((where.frame[at] == number) & (where.frame[blocks] != number))
-        if len(other):
-            told = _orientation(given, kind, turns[number], turned, used)
-            values[other] = orientation.values(told.rotation(values[other]), values[other])
-    return np.asarray(values)

@@ -21,7 +21,7 @@ def told(
 ) -> list[Finding]:
     """Findings that belong to no motion; ``rows``: blocks of the motions; loaded (B,): number of the
     tool in force; ``named``: the program names one."""
-    blocks, modal, words = given.text.blocks, given.modal, given.text.words
+    blocks, modal = given.source.blocks, given.modal
     findings: list[Finding] = []
     live = modal.flow.tape & (modal.flow.doubt != Doubt.ENDED)
 
@@ -41,15 +41,16 @@ def told(
     motion = given.motion
     text = given.noted("unknown") & ~motion
     if text.any():
-        said = next(note.text for note in given.text.notes if note.kind == "unknown" and text[note.block])
+        said = next(note.text for note in given.source.notes if note.kind == "unknown" and text[note.block])
         tell(text, "GCO001", f"not understood: {said!r}")
-    strange = np.flatnonzero((modal.unknown >= 0) & ~motion & live)
-    for value in np.unique(np.nan_to_num(words.value[modal.unknown[strange]], nan=-1.0))[:100].tolist():
+    strange = modal.strange.block[~motion[modal.strange.block] & live[modal.strange.block]]
+    codes = np.nan_to_num(modal.strange.last(strange), nan=-1.0)
+    for value in np.unique(codes)[:100].tolist():
         same = none.copy()
-        same[strange] = np.nan_to_num(words.value[modal.unknown[strange]], nan=-1.0) == value
+        same[strange[codes == value]] = True
         tell(same, "GCO001", f"{code_name(value)} is not known here")
-    calls = none.copy()
-    calls[words.block[np.flatnonzero((words.key == key("M")) & np.isin(words.value, CALLS))]] = True
+    calls, m = none.copy(), given.words(key("M"))
+    calls[m.block[np.isin(m.value, CALLS)]] = True
     tell(calls | modal.has(Once.CALL) | given.noted("call"), "GCO007", "calls code that was not read")
     setting = modal.has(Once.SETTING) & given.has(*AXES, key("L"), key("P"), key("R"))
     tell(setting, "GCO024", "the program writes offsets or tools")
@@ -58,15 +59,15 @@ def told(
         "GCO024",
         "the program writes a work offset; the cell's base of its number is taken",
     )
-    for name in dict.fromkeys(note.text for note in given.text.notes if note.kind == "tool"):
+    for name in dict.fromkeys(note.text for note in given.source.notes if note.kind == "tool"):
         same = none.copy()
-        same[[note.block for note in given.text.notes if note.kind == "tool" and note.text == name]] = True
+        same[[note.block for note in given.source.notes if note.kind == "tool" and note.text == name]] = True
         tell(same, "SIN001", name)
     if not len(rows):
         return findings
     first = none.copy()
     first[rows[0]] = True
-    if not modal.flow.tape[modal.states[Group.UNITS]].any():
+    if not (modal.units & modal.flow.tape).any():
         tell(first, "GCO020", "no code says mm or inch; mm is taken")
     if not named:
         tell(first, "GCO021", "the program names no tool; tool 1 of the cell is taken")
@@ -89,15 +90,13 @@ def told(
 
 def _further(given: Blocks) -> Bools:
     """(B,) the first block in which an axis beside those that are read is not where it was first."""
-    words = given.text.words
-    letter, index = words.key % 256, words.key // 256
-    named = np.isin(letter, [key(one) for one in "XYZABCUVW"]) & (words.key < 1 << 14)
-    own = np.flatnonzero(
-        named & ~np.isin(words.key, given.columns) & (index > 0) | np.isin(words.key, SECOND)
-    )
     moving = np.zeros(len(given), np.bool_)
-    for one in np.unique(words.key[own]).tolist():
-        rows = own[words.key[own] == one]
-        away = rows[words.value[rows] != words.value[rows[0]]]
-        moving[words.block[away[:1]]] = True
+    for one, column in given.source.columns.items():
+        named = one % 256 in _LETTERS and one < 1 << 14 and one not in given.columns and one >= 256
+        if named or one in SECOND:
+            away = column.block[column.value != column.value[0]]
+            moving[away[:1]] = True
     return moving
+
+
+_LETTERS = frozenset(key(one) for one in "XYZABCUVW")

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple
 
-import numpy as np
-
 from postproc.arrays import Bools, Floats, Ints
 
 NAMES = 1 << 16
@@ -17,6 +15,10 @@ NAMES = 1 << 16
 def key(letter: str, index: int | None = None) -> int:
     """The key of an address: of ``X`` or, with an index, of ``A3=`` (an address with digits and an equals sign)."""
     return ord(letter) if index is None else ord(letter) + 256 * (index + 1)
+
+
+COLUMNS = tuple(key(letter) for letter in "XYZABCIJKRPFUVWE")
+"""Addresses of words that say something of motions; a control's own follow."""
 
 
 class How(IntEnum):
@@ -63,13 +65,14 @@ class Note(NamedTuple):
 class Blocks:
     """B blocks: the lines that have a word or a note.
 
-    start, stop (B,): bytes of the line, without its ending; line (B,): from 1; code (B,): where its code ends (behind
-    the last word, before a comment); deleted (B,): begins with a slash.
+    start, stop (B,): bytes of the line, without its ending; line (B,): from 1; first (B,): offset of the first word, or
+    start; code (B,): where its code ends (behind the last word, before a comment); deleted (B,): begins with a slash.
     """
 
     start: Ints
     stop: Ints
     line: Ints
+    first: Ints
     code: Ints
     deleted: Bools
 
@@ -79,17 +82,10 @@ class Blocks:
 
 @dataclass(frozen=True, eq=False)
 class Text:
-    """A program taken apart.  ``comments``: (C, 2) byte ranges of what stands inside of comments."""
+    """Lines taken apart; offsets and numbers of lines are those of the file.  ``comments``: (C, 3) byte ranges of
+    comments, and their lines."""
 
     words: Words
     blocks: Blocks
     notes: tuple[Note, ...]
     comments: Ints
-
-
-def last_of(words: Words, wanted: int, blocks: int) -> Ints:
-    """(B,) the last word with this key in every block; -1 where there is none."""
-    found = np.full(blocks, -1, dtype=np.int64)
-    rows = np.flatnonzero(words.key == wanted)
-    found[words.block[rows]] = rows
-    return found

@@ -11,9 +11,9 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.dialects.decimals import fixed
 from postproc.dialects.dialect import Moved, Plan, Program, Role, Writing
 from postproc.dialects.gcode.control import Move
-from postproc.dialects.gcode.places import Places
+from postproc.dialects.gcode.places import Part
 from postproc.dialects.gcode.writer_arcs import Arcs, Form, WrittenArcs, write_arcs
-from postproc.dialects.gcode.writer_blocks import Blocks, insertions
+from postproc.dialects.gcode.writer_blocks import Blocks, Style, insertions
 from postproc.dialects.gcode.writer_targets import Followed, Wanted, follow, follow_whole
 from postproc.dialects.gcode.writer_text import (
     AXES,
@@ -34,6 +34,9 @@ SAME = 1e-12
 
 TURN = 2 * np.pi
 
+ROWS = 1 << 14
+"""Motions of the program that are written at a time."""
+
 
 def moved(program: Program, plan: Plan, writing: Writing) -> Moved:
     """Edits after which the program makes the motions of ``plan`` (``Dialect.moved``).
@@ -42,32 +45,169 @@ def moved(program: Program, plan: Plan, writing: Writing) -> Moved:
     to I J K.  Rows whose arc no numbers of their form state, or whose orientation has no words, are held.  Raises
     ValueError where a row is asked to move, or to be divided, that may not: a defect of the caller.
     """
-    _allowed(program, plan)
-    places: Places = program.text
-    text = stated(program, writing)
-    motions = _Motions(plan.source, plan.role == Role.OWN, plan.role == Role.LINK, text)
-    sheet = _Sheet.empty(len(plan), text.decimals[plan.source])
-    ends = _positions(program, plan, motions, sheet)
-    held = _orientations(program, plan, motions, sheet)
-    convert, bad = _arcs(program, plan, motions, ends, sheet)
-    held |= {int(motions.row[m]): "GCW001" for m in np.flatnonzero(bad).tolist()}
+    path, style, forbidden = program.toolpath, Style.of(program), _Forbidden.of(program)
+    if not np.array_equal(plan.source[plan.role == Role.OWN], np.arange(len(path))):
+        raise ValueError("a plan has one own motion for every row")
+    held: dict[int, str] = {}
+    edits: list[Edits] = []
+    ends = Ends(np.full(3, np.nan), np.full(3, np.nan))
+    for begin in range(0, len(path), ROWS):
+        motions = Motions.of(program, plan, writing, begin, min(begin + ROWS, len(path)), forbidden.rows)
+        forbidden.check(motions, begin)
+        written, bad, ends = _written(style, motions, ends)
+        held |= {row + motions.first: code for row, code in bad.items()}
+        edits.append(written)
     if held:
         return Moved((), {row: _finding(program, row, code) for row, code in held.items()})
+    return Moved(Edits.joined(*edits))
+
+
+def _written(style: Style, motions: Motions, before: Ends) -> tuple[Edits, dict[int, str], Ends]:
+    """The edits of some motions; those that are held, and why; where the words stand behind the last of them."""
+    text, places = motions.text, motions.places
+    sheet = _Sheet.empty(len(motions), text.decimals[motions.row])
+    ends = _positions(motions, sheet, before.position)
+    held, turned = _orientations(motions, sheet, before.turned)
+    convert, bad = _arcs(motions, ends, sheet)
+    held |= {int(motions.row[m]): "GCW001" for m in np.flatnonzero(bad).tolist()}
+    after = Ends(ends.end[-1], turned)
+    if held:
+        return Edits.joined(()), held, after
     _no_empty_block(motions, sheet, ends)
     present = motions.own[:, None] & (text.word[motions.row] >= 0)
     present[:, RADIUS] &= ~convert
     literals = _literals(places, text, motions, sheet, present)
     missing = _texts(sheet, sheet.write & ~present)
-    blocks = Blocks(program, text, motions.row, plan.role, convert, missing)
-    return Moved(Edits.joined(literals, insertions(blocks)))
+    blocks = Blocks(style, places, text, motions.row, motions.role, convert, missing)
+    return Edits.joined(literals, insertions(blocks)), held, after
 
 
 @dataclass(frozen=True, eq=False)
-class _Motions:
+class Ends:
+    """Where the words of the axes, and those of the orientation, stand behind a motion (3,), as numbers of its frame;
+    NaN where not known."""
+
+    position: Floats
+    turned: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class _Forbidden:
+    """rows (N,): refused; still (N,): may not move; whole (N,): may not be divided."""
+
+    rows: Bools
+    still: Bools
+    whole: Bools
+
+    @staticmethod
+    def of(program: Program) -> _Forbidden:
+        path = program.toolpath
+        masks = [np.zeros(len(path), np.bool_) for _ in range(3)]
+        for mask, found in zip(masks, (path.refused, path.pinned, path.whole), strict=True):
+            mask[np.array([*found], dtype=np.int64)] = True
+        refused, fixed_, whole = masks
+        return _Forbidden(refused, refused | fixed_, refused | whole)
+
+    def check(self, motions: Motions, begin: int) -> None:
+        own = motions.own
+        rows = motions.row[own]
+        path = motions.path
+        shifted = _differs(motions.plan.position[own], path.position[rows])
+        shifted |= _differs(motions.plan.rotation[own], path.rotation[rows])
+        kept = np.flatnonzero(shifted & self.still[rows + motions.first]) + begin
+        if len(kept):
+            raise ValueError(f"motions that can not be corrected were moved: rows {kept[:5].tolist()}")
+        rows = motions.row[~own] + motions.first
+        divided = np.unique(rows[self.whole[rows]])
+        if len(divided):
+            raise ValueError(f"motions that can not be divided were: rows {divided[:5].tolist()}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Path:
+    """Rows of a Toolpath."""
+
+    kind: Ints
+    base: Ints
+    position: Floats
+    rotation: Floats
+    centre: Floats
+    sweep: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """Motions of a plan; before (3,): where the one ahead of them ends."""
+
+    position: Floats
+    rotation: Floats
+    centre: Floats
+    normal: Floats
+    sweep: Floats
+    before: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """M motions of a plan, and the rows that they stem from with the one ahead and the one behind them.
+
+    first: number of row 0 in the program; row (M,); last: the row behind them, -1 where there is none; role, own, link
+    (M,): of the plan; fixed (M,): the block must stay as it is.
+    """
+
+    places: Part
+    text: Stated
+    path: _Path
+    plan: _Plan
+    first: int
     row: Ints
+    last: int
+    role: Ints
     own: Bools
     link: Bools
-    text: Stated
+    fixed: Bools
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    @staticmethod
+    def of(program: Program, plan: Plan, writing: Writing, begin: int, stop: int, refused: Bools) -> Motions:
+        """The motions of the rows begin .. stop - 1."""
+        path = program.toolpath
+        first, behind = max(begin - 1, 0), min(stop + 1, len(path))
+        places = program.text.part(first, behind)
+        low, high = np.searchsorted(plan.source, [begin, stop]).tolist()
+        rows, motions = slice(first, behind), slice(low, high)
+        before = plan.position[low - 1 : low][0] if low else np.full(3, np.nan)
+        here = _Plan(
+            plan.position[motions],
+            plan.rotation[motions],
+            plan.centre[motions],
+            plan.normal[motions],
+            plan.sweep[motions],
+            before,
+        )
+        row, role = plan.source[motions] - first, plan.role[motions]
+        return Motions(
+            places,
+            stated(places, writing),
+            _Path(
+                path.kind[rows],
+                path.base[rows],
+                path.position[rows],
+                path.rotation[rows],
+                path.centre[rows],
+                path.sweep[rows],
+            ),
+            here,
+            first,
+            row,
+            stop - first if behind > stop else -1,
+            role,
+            role == Role.OWN,
+            role == Role.LINK,
+            refused[rows][row] | np.isnan(here.position[:, 0]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,33 +230,13 @@ def _differs(new: Floats, old: Floats) -> Bools:
     return np.asarray(~same.all(axis=tuple(range(1, same.ndim))))
 
 
-def _allowed(program: Program, plan: Plan) -> None:
-    path = program.toolpath
-    own = plan.role == Role.OWN
-    if not np.array_equal(plan.source[own], np.arange(len(path))):
-        raise ValueError("a plan has one own motion for every row")
-    shifted = _differs(plan.position[own], path.position) | _differs(plan.rotation[own], path.rotation)
-    kept = [row for row in (*path.refused, *path.pinned) if shifted[row]]
-    if kept:
-        raise ValueError(f"motions that can not be corrected were moved: rows {sorted(set(kept))[:5]}")
-    divided = np.intersect1d(plan.source[~own], np.array([*path.whole, *path.refused], dtype=np.int64))
-    if len(divided):
-        raise ValueError(f"motions that can not be divided were: rows {divided[:5].tolist()}")
-
-
-def _fixed(program: Program, motions: _Motions, plan: Plan) -> Bools:
-    fixed_rows = np.zeros(len(program.toolpath), dtype=bool)
-    fixed_rows[list(program.toolpath.refused)] = True
-    return np.asarray(fixed_rows[motions.row] | np.isnan(plan.position[:, 0]))
-
-
-def _resumed(motions: _Motions, origin: Floats, ends: Floats) -> Bools:
+def _resumed(motions: Motions, origin: Floats, ends: Floats) -> Bools:
     """(M, K) the first motions of rows that begin elsewhere than ``ends`` (M, K), where the row before ends."""
     first = np.append(True, motions.row[1:] != motions.row[:-1])[: len(motions.row)]
     return Wanted.resumed(origin, np.where(first[:, None] & (motions.row > 0)[:, None], ends, np.nan))
 
 
-def _stated_columns(motions: _Motions, columns: slice) -> tuple[Floats, Bools]:
+def _stated_columns(motions: Motions, columns: slice) -> tuple[Floats, Bools]:
     """The numbers of the own blocks, NaN else; whether a number there is an increment."""
     text, row = motions.text, motions.row
     own = np.where(motions.own[:, None], text.value[row, columns], np.nan)
@@ -124,63 +244,62 @@ def _stated_columns(motions: _Motions, columns: slice) -> tuple[Floats, Bools]:
     return own, np.where(np.isnan(own), text.modal[row, columns], text.relative[row, columns])
 
 
-def _positions(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet) -> Followed:
-    """Follows X Y Z; fills their columns of the sheet."""
-    path, places, text, row = program.toolpath, program.text, motions.text, motions.row
+def _positions(motions: Motions, sheet: _Sheet, before: Floats) -> Followed:
+    """Follows X Y Z from where the motion ahead ended; fills their columns of the sheet."""
+    path, places, text, row = motions.path, motions.places, motions.text, motions.row
     source = np.where(motions.own[:, None], text.units(row, path.position[row]), np.nan)
     own, relative = _stated_columns(motions, AXES)
     begin = places.begin[row] / places.scale[row, None]
     wanted = Wanted(
-        _reached(program, plan, motions, begin),
+        _reached(motions, begin),
         source,
         own,
         relative,
         sheet.decimals[:, AXES],
-        _fixed(program, motions, plan),
-        _closed(program, plan, motions, sheet),
+        motions.fixed,
+        _closed(motions, sheet),
         begin,
         _resumed(motions, begin, text.units(row, path.position[row - 1])),
     )
     into = Followed.nothing(wanted)
     other = np.zeros(len(row), dtype=bool)
     for state in (places.frame, places.scale, path.base):
-        other[1:] |= state[row[1:]] != state[row[:-1]]
-    bounds = [0, *np.flatnonzero(other).tolist(), len(row)] if len(row) else []
-    start = np.full(3, np.nan)
+        other |= state[row] != state[row - 1]
+    other[1:] &= row[1:] != row[:-1]
+    bounds = [0, *(np.flatnonzero(other[1:]) + 1).tolist(), len(row)]
     for a, b in pairwise(bounds):
-        if a and path.base[row[a]] == path.base[row[a - 1]]:
-            start = text.units(row[[a]], text.base(row[[a - 1]], into.end[[a - 1]]))[0]
-        elif a:
-            start = np.full(3, np.nan)
-        follow(wanted, start, a, b, into)
+        end = into.end[a - 1] if a else before
+        if row[a] == 0 or path.base[row[a]] != path.base[row[a] - 1]:
+            end = np.full(3, np.nan)
+        elif other[a]:
+            end = text.units(row[[a]], text.base(row[[a]] - 1, end[None]))[0]
+        follow(wanted, end, a, b, into)
     sheet.write[:, AXES], sheet.number[:, AXES] = into.write, into.number
     return into
 
 
-def _reached(program: Program, plan: Plan, motions: _Motions, begin: Floats) -> Floats:
+def _reached(motions: Motions, begin: Floats) -> Floats:
     """(M, 3) where the motions end, in their frames; of refused ones what the motion behind knows of it."""
-    places, row = program.text, motions.row
-    wanted = motions.text.units(row, plan.position)
-    same = np.zeros(len(row), dtype=bool)
-    same[:-1] = True
+    places, row = motions.places, motions.row
+    wanted = motions.text.units(row, motions.plan.position)
+    following = np.append(row[1:], motions.last)
+    same = following >= 0
     for state in (places.frame, places.scale):
-        same[:-1] &= state[row[1:]] == state[row[:-1]]
-    behind = np.roll(begin, -1, axis=0)
+        same &= state[following] == state[row]
+    behind = np.concatenate([begin[1:], places.begin[[motions.last]] / places.scale[motions.last]])
     return np.where(same[:, None] & np.isnan(wanted), behind, wanted)
 
 
-def _closed(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet) -> Bools:
+def _closed(motions: Motions, sheet: _Sheet) -> Bools:
     """(M, 3) the axes in which a full circle ends where it begins."""
-    closed = np.zeros((len(motions.row), 3), dtype=bool)
+    plan, closed = motions.plan, np.zeros((len(motions), 3), dtype=bool)
     with np.errstate(invalid="ignore"):
         full = (plan.sweep > 6.0) & (np.abs(plan.sweep - TURN * np.rint(plan.sweep / TURN)) < 0.01)
     circles = np.flatnonzero(full & ~motions.link)
-    circles = circles[circles > 0]
     row = motions.row[circles]
-    apart = np.abs(
-        motions.text.units(row, plan.position[circles]) - motions.text.units(row, plan.position[circles - 1])
-    )
-    axes = PLANES[program.text.plane[row], :2]
+    before = np.where(circles[:, None] > 0, plan.position[circles - 1], plan.before)
+    apart = np.abs(motions.text.units(row, plan.position[circles]) - motions.text.units(row, before))
+    axes = PLANES[motions.places.plane[row], :2]
     near = np.take_along_axis(apart, axes, axis=1)
     step = 10.0 ** -np.take_along_axis(sheet.decimals[circles, AXES], axes, axis=1)
     both = (near <= 0.5 * step).all(axis=1)
@@ -188,59 +307,61 @@ def _closed(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet) -> B
     return closed
 
 
-def _orientations(program: Program, plan: Plan, motions: _Motions, sheet: _Sheet) -> dict[int, str]:
-    """Follows the words of the orientations; rows whose orientation has no words are returned."""
-    path, places, row = program.toolpath, program.text, motions.row
-    orient = places.orient[row]
+def _orientations(motions: Motions, sheet: _Sheet, before: Floats) -> tuple[dict[int, str], Floats]:
+    """Follows the words of the orientations from where they stand; gives rows whose orientation has no words, and where
+    the words stand behind the motions."""
+    path, places, row = motions.path, motions.places, motions.row
+    orient, rotation = places.orient[row], motions.plan.rotation
     held: dict[int, str] = {}
     if (orient < 0).all():
-        return held
+        return held, np.full(3, np.nan)
     source = places.turned_values[row]
-    new = np.flatnonzero((orient >= 0) & (_differs(plan.rotation, path.rotation[row]) | ~motions.own))
+    new = np.flatnonzero((orient >= 0) & (_differs(rotation, path.rotation[row]) | ~motions.own))
     values = source.copy()
     for i, orientation in enumerate(places.orientations):
         rows = new[orient[new] == i]
-        values[rows] = orientation.values(plan.rotation[rows], source[rows])
-        used = np.array(orientation.words) >= 0
-        held |= {int(row[m]): "GCW002" for m in rows[np.isnan(values[rows][:, used]).any(axis=1)].tolist()}
+        if len(rows):
+            values[rows] = orientation.values(rotation[rows], source[rows])
+            used = np.array(orientation.words) >= 0
+            lost = rows[np.isnan(values[rows][:, used]).any(axis=1)]
+            held |= {int(row[m]): "GCW002" for m in lost.tolist()}
     own, relative = _stated_columns(motions, TURNED)
-    same = places.orient[row - 1] == orient
-    before = np.where(same[:, None], places.turned_values[row - 1], np.nan)
+    same = (places.orient[row - 1] == orient) & (row > 0)
+    ahead = np.where(same[:, None], places.turned_values[row - 1], np.nan)
     wanted = Wanted(
         values,
         np.where(motions.own[:, None], source, np.nan),
         own,
         relative,
         sheet.decimals[:, TURNED],
-        _fixed(program, motions, plan) | (orient < 0),
+        motions.fixed | (orient < 0),
         np.zeros(values.shape, dtype=bool),
         places.turned_before[row],
-        _resumed(motions, places.turned_before[row], before),
+        _resumed(motions, places.turned_before[row], ahead),
     )
     into = Followed.nothing(wanted)
     bounds = [0, *(np.flatnonzero(np.diff(orient)) + 1).tolist(), len(row)]
     for a, b in pairwise(bounds):
         if orient[a] >= 0:
-            unknown, orientation = np.full(3, np.nan), places.orientations[orient[a]]
+            start = before if a == 0 and same[0] else np.full(3, np.nan)
+            orientation = places.orientations[orient[a]]
             if orientation.joint:
-                follow_whole(wanted, unknown, a, b, into, not orientation.angles)
+                follow_whole(wanted, start, a, b, into, not orientation.angles)
             else:
-                follow(wanted, unknown, a, b, into)
+                follow(wanted, start, a, b, into)
     sheet.write[:, TURNED], sheet.number[:, TURNED] = into.write, into.number
-    return held
+    return held, into.end[-1]
 
 
-def _arcs(
-    program: Program, plan: Plan, motions: _Motions, ends: Followed, sheet: _Sheet
-) -> tuple[Bools, Bools]:
+def _arcs(motions: Motions, ends: Followed, sheet: _Sheet) -> tuple[Bools, Bools]:
     """Fills the columns of the arcs; (M,) those whose R gives way to I J K, and those that can not be stated."""
-    path, places, text = program.toolpath, program.text, motions.text
-    convert, bad = np.zeros(len(plan), dtype=bool), np.zeros(len(plan), dtype=bool)
+    path, places, text, plan = motions.path, motions.places, motions.text, motions.plan
+    convert, bad = np.zeros(len(motions), dtype=bool), np.zeros(len(motions), dtype=bool)
     arc = (path.kind[motions.row] == Kind.CIRC) & ~motions.link & np.isfinite(plan.sweep)
     lost = np.isfinite(path.sweep[motions.row]) & ~motions.link & np.isnan(plan.sweep)
     if lost.any():
-        raise ValueError(f"arcs without a way: rows {motions.row[lost][:5].tolist()}")
-    m = np.flatnonzero(arc & ~_fixed(program, motions, plan))
+        raise ValueError(f"arcs without a way: rows {(motions.row[lost] + motions.first)[:5].tolist()}")
+    m = np.flatnonzero(arc & ~motions.fixed)
     row = motions.row[m]
     centre = text.units(row, plan.centre[m])
     with np.errstate(invalid="ignore"):
@@ -281,7 +402,7 @@ def _arcs(
     return convert, bad
 
 
-def _no_empty_block(motions: _Motions, sheet: _Sheet, ends: Followed) -> None:
+def _no_empty_block(motions: Motions, sheet: _Sheet, ends: Followed) -> None:
     """An inserted block without words would be no motion: it gets X."""
     empty = np.flatnonzero(~motions.own & ~sheet.write.any(axis=1))
     relative = motions.text.modal[motions.row[empty], 0]
@@ -289,7 +410,7 @@ def _no_empty_block(motions: _Motions, sheet: _Sheet, ends: Followed) -> None:
     sheet.number[empty, 0] = np.where(relative, 0.0, ends.end[empty, 0])
 
 
-def _literals(places: Places, text: Stated, motions: _Motions, sheet: _Sheet, present: Bools) -> Edits:
+def _literals(places: Part, text: Stated, motions: Motions, sheet: _Sheet, present: Bools) -> Edits:
     """The numbers that are replaced where they stand."""
     m, column = np.nonzero(sheet.write & present)
     word = text.word[motions.row[m], column]

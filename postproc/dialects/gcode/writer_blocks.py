@@ -12,12 +12,16 @@ import numpy as np
 from postproc.arrays import Bools, Ints
 from postproc.dialects.dialect import Program, Role
 from postproc.dialects.gcode.control import Move
-from postproc.dialects.gcode.places import Places
+from postproc.dialects.gcode.lexing import lex
+from postproc.dialects.gcode.places import Part
 from postproc.dialects.gcode.words import How, key
 from postproc.dialects.gcode.writer_text import RADIUS, Stated
 from postproc.document import Edit, Edits, Span, sums
 
 _HEAD = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*(?:/[ \t]*\d?[ \t]*)?)")
+HEAD = 1 << 16
+"""Bytes from the begin of a file that say how it is written."""
+
 _NAME = re.compile(rb"[A-Za-z_][A-Za-z0-9_]*")
 _NUMBER = key("N")
 _LETTERS = list(b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_")
@@ -26,11 +30,39 @@ _CLOSED = re.compile(rb"(?:[ \t]*\))*")
 _BLANK = re.compile(rb"[ \t]")
 
 
+@dataclass(frozen=True)
+class Style:
+    """How a program is written: its newline; spaced: blocks have blanks between their words; two_digits: G01 for G1."""
+
+    newline: bytes
+    spaced: bool
+    two_digits: bool
+
+    @staticmethod
+    def of(program: Program) -> Style:
+        """By the first words of the program, and its first motion."""
+        document, places = program.documents[0], program.text
+        raw = document.raw
+        words = lex(raw, places.control, 0, raw.find(b"\n", HEAD) + 1 or None).words
+        gaps = [
+            raw[a:b]
+            for a, b in zip(words.stop[:200].tolist(), words.at[1:201].tolist(), strict=False)
+            if 0 <= a <= b and b"\n" not in raw[a:b]
+        ]
+        part = places.part(0, min(len(places), 200))
+        verbs = part.verb[part.verb >= 0][:1].tolist()
+        said = part.text.words
+        two = any(len(raw[int(said.start[v]) : int(said.stop[v])].strip()) > 1 for v in verbs)
+        return Style(document.newline, not gaps or any(gaps), two)
+
+
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """row, role (M,) as in the plan; convert (M,): I J K take the place of R; missing: motion -> column -> number."""
+    """Of M motions, row (M,) in ``places`` and ``text``, role (M,) as in the plan; convert (M,): I J K take the place
+    of R; missing: motion -> column -> number."""
 
-    program: Program
+    style: Style
+    places: Part
     text: Stated
     row: Ints
     role: Ints
@@ -38,29 +70,14 @@ class Blocks:
     missing: Mapping[int, Mapping[int, bytes]]
 
     @property
-    def places(self) -> Places:
-        places: Places = self.program.text
-        return places
-
-    @property
     def raw(self) -> bytes:
-        return self.program.documents[0].raw
-
-    @cached_property
-    def spaced(self) -> bool:
-        """Whether blocks of this program have blanks between their words."""
-        words = self.places.text.words
-        gaps = [
-            self.raw[a:b]
-            for a, b in zip(words.stop[:200].tolist(), words.at[1:201].tolist(), strict=False)
-            if 0 <= a <= b and b"\n" not in self.raw[a:b]
-        ]
-        return not gaps or any(gaps)
+        return self.places.raw
 
     @cached_property
     def _blanks(self) -> Ints:
-        """(size + 1,) blanks before each byte."""
-        raw = np.frombuffer(self.raw, np.uint8)
+        """Blanks before each byte of the lines."""
+        begin, end = self.places.span
+        raw = np.frombuffer(self.raw, np.uint8)[begin:end]
         return sums((raw == 32) | (raw == 9))
 
     def words_of(self, rows: Ints) -> tuple[Ints, Ints]:
@@ -73,17 +90,12 @@ class Blocks:
         """(n,) whether the words of the blocks have blanks between; those with one word go by the program."""
         first, behind = self.words_of(rows)
         start = self.places.text.words.at[first]
-        spaced = np.where(behind - first > 1, self._blanks[ends] > self._blanks[start], self.spaced)
+        begin = self.places.span[0]
+        blanks = self._blanks[ends - begin] > self._blanks[start - begin]
+        spaced = np.where(behind - first > 1, blanks, self.style.spaced)
         # What follows a name without a blank would belong to it.
         raw = np.frombuffer(self.raw, np.uint8)
         return np.asarray(spaced | np.isin(raw[ends - 1], _LETTERS))
-
-    @cached_property
-    def two_digits(self) -> bool:
-        """Whether the program writes G01 for G1."""
-        verbs = self.places.verb[self.places.verb >= 0][:1].tolist()
-        words = self.places.text.words
-        return any(len(self.raw[int(words.start[v]) : int(words.stop[v])].strip()) > 1 for v in verbs)
 
 
 def insertions(blocks: Blocks) -> Edits:
@@ -177,7 +189,7 @@ class _Block:
             return self._word(self.verb)
         if move == Move.THROUGH:
             return self._cased(b"CIP")
-        return self._cased(b"G%02d" % move if self.blocks.two_digits else b"G%d" % move)
+        return self._cased(b"G%02d" % move if self.blocks.style.two_digits else b"G%d" % move)
 
     def _address(self, column: int) -> bytes:
         """The address of a column, spelt as in the block if it is there."""
@@ -204,7 +216,7 @@ class _Block:
             words = [self._motion(Move.LINE if link else self.move), *self._stated(m)]
             if not lines:
                 words = [*self._modal(), *words, *self._feed()]
-            lines.append(lead + self.gap.join(words) + self.blocks.program.documents[0].newline)
+            lines.append(lead + self.gap.join(words) + self.blocks.style.newline)
         return Edit(Span(0, at, at), b"".join(lines))
 
     def _modal(self) -> list[bytes]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.dialects.dialect import Program, Writing
+from postproc.dialects.dialect import Writing
 from postproc.dialects.gcode.control import Move
-from postproc.dialects.gcode.places import Places
+from postproc.dialects.gcode.places import Part
 from postproc.dialects.gcode.words import NAMES, How, key
 from postproc.units import MM
 
@@ -62,11 +62,9 @@ class Stated:
         return np.asarray(back[..., 0] / self.scale[rows, None])
 
 
-def stated(program: Program, writing: Writing) -> Stated:
-    """The columns of a program that was read."""
-    places = program.text
-    n = len(program.toolpath)
-    orient = places.orient
+def stated(places: Part, writing: Writing) -> Stated:
+    """The columns of motions."""
+    n, orient = len(places), places.orient
     through = _through(places)
     keys = _keys(places, orient, through)
     index = {address: column for column, address in enumerate(places.columns)}
@@ -85,8 +83,8 @@ def stated(program: Program, writing: Writing) -> Stated:
     integer = how == How.INTEGER
     value[integer] *= counted[integer]
     modal = _modal(places, orient, through)
-    inverse = np.linalg.inv(places.frames.rotation)
-    decimals = np.maximum(_written_decimals(program, word), _least(program, orient, writing))
+    inverse = np.asarray(np.linalg.inv(places.frames.rotation), dtype=np.float64)
+    decimals = np.maximum(_written_decimals(places, word), _least(places, orient, writing))
     whole = integer & (counted != 1.0)
     # X10 of a control that counts in increments has the decimals of the increment.
     finest = np.ceil(-np.log10(np.where(whole, counted, 1.0)) - 1e-9).astype(np.int64)
@@ -105,7 +103,7 @@ def stated(program: Program, writing: Writing) -> Stated:
     )
 
 
-def _through(places: Places) -> Bools:
+def _through(places: Part) -> Bools:
     """(N,) arcs through a point: CIP, or G2 and G3 with I1=."""
     through = np.asarray(places.move == Move.THROUGH)
     for letter in "IJK":
@@ -114,7 +112,7 @@ def _through(places: Places) -> Bools:
     return through
 
 
-def _keys(places: Places, orient: Ints, through: Bools) -> Ints:
+def _keys(places: Part, orient: Ints, through: Bools) -> Ints:
     keys = np.full((len(orient), COLUMNS), -1)
     keys[:, AXES] = [key(letter) for letter in "XYZ"]
     keys[:, CENTRE] = [key(letter) for letter in "IJK"]
@@ -125,12 +123,11 @@ def _keys(places: Places, orient: Ints, through: Bools) -> Ints:
     return keys
 
 
-def _least(program: Program, orient: Ints, writing: Writing) -> Ints:
+def _least(places: Part, orient: Ints, writing: Writing) -> Ints:
     """(N, 10) the least decimals: those of which a step in the program's unit is no more than one of mm; one more in
     turned coordinates, whose roundings add up in the base."""
-    places = program.text
     rotation = np.abs(places.frames.rotation)
-    turned = (np.minimum(rotation, np.abs(rotation - 1.0)) > 1e-9).any(axis=(1, 2))
+    turned = np.any(np.minimum(rotation, np.abs(rotation - 1.0)) > 1e-9, axis=(1, 2))
     finer = np.ceil(np.log10(np.nan_to_num(places.scale / MM, nan=1.0)) - 1e-9).astype(np.int64)
     lengths = writing.mm + finer + turned[places.frame]
     least = np.repeat(lengths[:, None], COLUMNS, axis=1)
@@ -141,7 +138,7 @@ def _least(program: Program, orient: Ints, writing: Writing) -> Ints:
     return np.maximum(least, 1)
 
 
-def _modal(places: Places, orient: Ints, through: Bools) -> Bools:
+def _modal(places: Part, orient: Ints, through: Bools) -> Bools:
     """(N, 10) plain numbers are increments."""
     relative = np.zeros((len(orient), COLUMNS), dtype=bool)
     relative[:, AXES] = places.incremental[:, None]
@@ -151,9 +148,9 @@ def _modal(places: Places, orient: Ints, through: Bools) -> Bools:
     return relative
 
 
-def _turns(places: Places, index: dict[int, int]) -> Ints:
+def _turns(places: Part, index: dict[int, int]) -> Ints:
     """(N,) full turns beyond the first one or a part of it: P - 1, TURN=."""
-    turns = np.zeros(len(places.block), dtype=np.int64)
+    turns = np.zeros(len(places), dtype=np.int64)
     arc = (places.move == Move.CLOCKWISE) | (places.move == Move.COUNTER)
     for address, first in ((key("P"), 1), (TURN, 0)):
         if address in index:
@@ -163,13 +160,14 @@ def _turns(places: Places, index: dict[int, int]) -> Ints:
     return np.maximum(turns, 0)
 
 
-def _written_decimals(program: Program, word: Ints) -> Ints:
+def _written_decimals(places: Part, word: Ints) -> Ints:
     """(N, 10) digits behind the point of the numbers as they stand in the text."""
-    words = program.text.text.words
+    words = places.text.words
     if not len(words):
         return np.zeros(word.shape, dtype=np.int64)
-    raw = np.frombuffer(program.documents[0].raw, dtype=np.uint8)
-    points = np.append(np.flatnonzero(raw == ord(".")), len(raw))
+    begin, end = places.span
+    raw = np.frombuffer(places.raw, dtype=np.uint8)[begin:end]
+    points = np.append(np.flatnonzero(raw == ord(".")), len(raw)) + begin
     point = points[np.searchsorted(points, words.start)]
     behind = np.where(point < words.stop, words.stop - point - 1, 0)
     return np.where(word >= 0, behind[word], 0)

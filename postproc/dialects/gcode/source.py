@@ -1,0 +1,148 @@
+"""A whole program taken apart: all words of an address in one column, which a range of blocks takes its part of.
+
+Where a word stands is not kept: who writes lexes the lines again that are changed.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.arrays import Bools, Floats, Ints
+from postproc.dialects.gcode.control import Control
+from postproc.dialects.gcode.lexing import lex
+from postproc.dialects.gcode.words import Note, Text, key
+
+SIZE = 1 << 20
+"""Bytes that are lexed at a time."""
+
+_Arrays = tuple[NDArray[Any], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """The words of one key in the order of the text: block (W,), value (W,) as written, NaN if UNREAD, how (W,) How."""
+
+    block: Ints
+    value: Floats
+    how: Ints
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+    def part(self, begin: int, stop: int) -> Column:
+        """Those of the blocks begin .. stop - 1, counted from ``begin``."""
+        low, high = np.searchsorted(self.block, [begin, stop]).tolist()
+        return Column(self.block[low:high] - begin, self.value[low:high], self.how[low:high])
+
+    def last(self, blocks: Ints, absent: float = np.nan) -> Floats:
+        """(K,) the last values in blocks (K,)."""
+        at = np.searchsorted(self.block, blocks, side="right") - 1
+        there = np.append(self.block, -1)[at] == blocks
+        return np.where(there, np.append(self.value, absent)[at], absent)
+
+
+NONE = Column(np.empty(0, np.int32), np.empty(0), np.empty(0, np.int8))
+
+
+@dataclass(frozen=True, eq=False)
+class Lines:
+    """Of B blocks: start, stop, first, line, deleted as in ``words.Blocks``; wordy (B,): has a word beside N."""
+
+    start: Ints
+    stop: Ints
+    first: Ints
+    line: Ints
+    deleted: Bools
+    wordy: Bools
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """columns: key -> its words; comments (C, 3): as in ``words.Text``."""
+
+    columns: Mapping[int, Column]
+    blocks: Lines
+    notes: tuple[Note, ...]
+    comments: Ints
+
+    @cached_property
+    def noted(self) -> Mapping[str, Ints]:
+        """kind of note -> its blocks."""
+        rows: defaultdict[str, list[int]] = defaultdict(list)
+        for note in self.notes:
+            rows[note.kind].append(note.block)
+        return {kind: np.array(blocks) for kind, blocks in rows.items()}
+
+    def column(self, wanted: int) -> Column:
+        return self.columns.get(wanted, NONE)
+
+    def mask(self, *wanted: int) -> Bools:
+        """(B,) blocks with a word of one of these keys."""
+        mask = np.zeros(len(self.blocks), np.bool_)
+        for one in wanted:
+            mask[self.column(one).block] = True
+        return mask
+
+
+def scan(raw: bytes, control: Control) -> Source:
+    """A program taken apart, piece by piece."""
+    words: dict[int, list[_Arrays]] = defaultdict(list)
+    lines: list[_Arrays] = []
+    notes: list[Note] = []
+    comments: list[Ints] = []
+    blocks, line = 0, 1
+    for begin, end in _pieces(raw):
+        text = lex(raw, control, begin, end, line)
+        for one, column in _columns(text, blocks):
+            words[one].append(column)
+        lines.append(_lines(text))
+        notes += (note._replace(block=note.block + blocks) for note in text.notes)
+        comments.append(text.comments.astype(np.int32))
+        blocks += len(text.blocks)
+        line += raw.count(b"\n", begin, end)
+    columns = {one: Column(*_joined(words.pop(one))) for one in sorted(words)}
+    return Source(columns, Lines(*_joined(lines)), tuple(notes), np.concatenate(comments))
+
+
+def _pieces(raw: bytes) -> Iterator[tuple[int, int]]:
+    """Ranges of whole lines."""
+    begin = 0
+    while begin < len(raw) or not begin:
+        end = raw.find(b"\n", begin + SIZE) + 1 or len(raw)
+        yield begin, end
+        begin = end or 1
+
+
+def _columns(text: Text, before: int) -> Iterator[tuple[int, _Arrays]]:
+    words = text.words
+    block = (words.block + before).astype(np.int32)
+    how = words.how.astype(np.int8)
+    for one in np.flatnonzero(np.bincount(words.key)).tolist():
+        rows = np.flatnonzero(words.key == one)
+        yield one, (block[rows], words.value[rows], how[rows])
+
+
+def _lines(text: Text) -> _Arrays:
+    blocks = text.blocks
+    wordy = np.zeros(len(blocks), np.bool_)
+    wordy[text.words.block[text.words.key != key("N")]] = True
+    places = (blocks.start, blocks.stop, blocks.first, blocks.line)
+    return *(place.astype(np.int32) for place in places), blocks.deleted, wordy
+
+
+def _joined(parts: list[_Arrays]) -> Iterator[NDArray[Any]]:
+    """The columns of all parts, one after the other; what was joined is let go."""
+    columns = [list(column) for column in zip(*parts, strict=True)]
+    parts.clear()
+    while columns:
+        yield np.concatenate(columns.pop(0))
