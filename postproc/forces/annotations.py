@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import contextlib
 import re
+from collections.abc import Sequence
 
 import numpy as np
 
-from postproc.arrays import Bools
+from postproc.arrays import Bools, Ints
 from postproc.findings import Finding, Refusal
 from postproc.forces.stated import BASE, NotAForce, Stated, is_number_like, parse_force
 from postproc.toolpath import Annotation, Toolpath
@@ -48,24 +49,28 @@ def read_annotations(toolpath: Toolpath, file: str) -> tuple[Stated | None, tupl
         raise Refusal(*wrong)
     if not rows:
         return None, tuple(ignored)
-    # the last comment at or before each motion; entry 0 stands for none yet
-    chosen = np.searchsorted(np.array(rows), np.arange(len(toolpath)), side="right")
     values = np.array([_OFF[0], *(value for value, _ in forces)])
     frames = np.array([_OFF[1], *(frame for _, frame in forces)])
-    return Stated(values[chosen], frames[chosen]), tuple(ignored)
+    return Stated(values, frames, latest(rows, len(toolpath))), tuple(ignored)
 
 
 def marked_air(toolpath: Toolpath) -> Bools:
     """(N,) motions under FORCE OFF: air, whatever another source says of their force."""
-    rows, off = [-1], [False]
+    rows, off = [], [False]
     for annotation in sorted(toolpath.annotations, key=lambda a: a.row):
         with contextlib.suppress(NotAForce):
             force = _parse(annotation)
             if force is not None:
                 rows.append(annotation.row)
                 off.append(force == _OFF)
-    chosen = np.searchsorted(np.array(rows), np.arange(len(toolpath)), side="right") - 1
-    return np.array(off)[chosen]
+    return np.array(off)[latest(rows, len(toolpath))]
+
+
+def latest(rows: Sequence[int], count: int) -> Ints:
+    """(count,) how many of the ascending ``rows`` lie at or before each of ``count`` motions: the last one's number
+    from 1, 0 where there is none yet."""
+    lasts = np.diff(np.clip([0, *rows, count], 0, count))
+    return np.repeat(np.arange(len(rows) + 1, dtype=np.int32), lasts)
 
 
 def _parse(annotation: Annotation) -> tuple[tuple[float, ...], int] | None:

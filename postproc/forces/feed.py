@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.blocks import in_blocks
 from postproc.cell import Frames
 from postproc.findings import Finding, Refusal
 from postproc.forces.stated import FEED, Stated
@@ -17,11 +18,9 @@ ALONG_SPINDLE = 1 * DEG
 
 
 class FeedFrames:
-    """The feed frame at the begin and at the end of every motion, and on its way.
+    """The feed frame at the begin and at the end of N motions, and on their way, made for the rows that are asked for.
 
-    matters (N,): the force or the moment has a part across z, so that x and y are needed.  back (N, 2, 3): z.
-    ahead (N, 2, 3): what becomes x when it is projected across z: the motion's own tangent, or the x that stays where
-    it has none; NaN where there is none in the run.
+    matters (N,): the force or the moment has a part across z, so that x and y are needed.
     """
 
     def __init__(
@@ -35,42 +34,57 @@ class FeedFrames:
         file: str,
     ) -> None:
         self.way = way
-        asked = carries & (stated.frame == FEED)
+        asked = carries & (stated.frames == FEED)
         _check_spindle(asked & way.known, toolpath, frames, file)
-        spindle = np.einsum("nij,nj->ni", toolpath.rotation, frames.spindle_in_tool)
-        end = -np.einsum("nij,nj->ni", frames.base_in_robot.rotation, spindle)
-        begin = end.copy()
-        rows = np.flatnonzero(way.begins)
-        begin[rows] = end[rows - 1]
-        self.back = np.stack([begin, end], axis=1)
-
-        # begins and ends in turn, as the tool comes by them
-        tangent = self._tangents().reshape(-1, 3)
-        side = across(tangent, self.back.reshape(-1, 3))
-        own = np.repeat(carries, 2) & ~np.isnan(side[:, 0])
-        latest, coming = runs.latest(own), runs.coming(own)
-        source = np.where(latest >= 0, latest, coming)
-        ahead = np.where((source >= 0)[:, None], side[source], np.nan)
-        ahead[own] = tangent[own]
-        self.ahead = ahead.reshape(-1, 2, 3)
-
         # x and y matter only to a force or moment across z
-        sideways = [0, 1, 3, 4]
-        self.matters = np.any((stated.values[:, sideways] != 0) | (stated.begin[:, sideways] != 0), axis=1)
+        self.matters = stated.any((0, 1, 3, 4))
         needed = asked & way.known & self.matters
-        undefined = needed & np.isnan(across(self.ahead[:, 1], self.back[:, 1])[:, 0])
+
+        n = len(toolpath)
+        self._back = np.empty((n, 3))
+
+        def leant(rows: slice) -> None:
+            spindle = np.einsum("nij,nj->ni", toolpath.rotation[rows], frames.spindle_in_tool[rows])
+            turned = np.einsum("nij,nj->ni", frames.base_in_robot.rotation[rows], spindle)
+            np.negative(turned, out=self._back[rows])
+
+        for _ in in_blocks(leant, n):
+            pass
+
+        # begins and ends in turn, as the tool comes by them: which of them have a direction, and whose each takes
+        own = np.zeros((n, 2), bool)
+
+        def directed(rows: slice) -> None:
+            at = rows.start + np.flatnonzero(carries[rows])
+            for side in (0, 1):
+                own[at, side] = ~np.isnan(across(self._tangent(at, side), self.back(at, side))[:, 0])
+
+        if needed.any():
+            for _ in in_blocks(directed, n):
+                pass
+        self._own = own.reshape(-1)
+        latest, coming = runs.latest(self._own), runs.coming(self._own)
+        self._source = np.where(latest >= 0, latest, coming)
+
+        without = np.flatnonzero(needed & ~own[:, 1])
+        undefined = np.zeros(n, bool)
+
+        def lacking(part: slice) -> None:
+            at = without[part]
+            undefined[at] = np.isnan(across(self._ahead(at, 1), self.back(at, 1))[:, 0])
+
+        for _ in in_blocks(lacking, len(without)):
+            pass
         # a run with an unknown target is left as it is, whatever its force
-        unknown = np.append(0, np.cumsum(carries & ~way.known))
-        lost = np.flatnonzero(undefined & (unknown[runs.stop + 1] == unknown[runs.start]))
+        unknown = np.append(np.int32(0), np.cumsum(carries & ~way.known, dtype=np.int32))
+        lost = np.flatnonzero(undefined)
+        lost = lost[unknown[runs.stop[lost] + 1] == unknown[runs.start[lost]]]
         if len(lost):
             raise Refusal(_no_direction(lost, toolpath, file))
-        before, after = latest.reshape(-1, 2)[:, 1], coming.reshape(-1, 2)[:, 1]
-        lacks = needed & ~own.reshape(-1, 2)[:, 1] & ~undefined
+        lacks = without[~undefined[without]]
+        before, after = latest[2 * lacks + 1], coming[2 * lacks + 1]
         findings = []
-        kept, borrowed = (
-            np.flatnonzero(lacks & (before >= 0)),
-            np.flatnonzero(lacks & (before < 0) & (after >= 0)),
-        )
+        kept, borrowed = lacks[before >= 0], lacks[(before < 0) & (after >= 0)]
         if len(kept):
             what = f"motions without a direction across the spindle that keep the last one: {len(kept)}"
             findings.append(Finding("FRC010", what, file, int(toolpath.line[kept[0]])))
@@ -79,22 +93,42 @@ class FeedFrames:
             findings.append(Finding("FRC008", what, file, int(toolpath.line[borrowed[0]])))
         self.findings = tuple(findings)
 
-    def _tangents(self) -> Floats:
-        """(N, 2, 3) of each motion at its begin and end; that of an arc from inside where it lies along z there."""
-        tangent = self.way.direction.copy()
-        for side, inwards in ((0, 1), (1, -1)):
-            rows = np.flatnonzero(
-                self.way.arc & self.way.moved & np.isnan(across(tangent[:, side], self.back[:, side])[:, 0])
-            )
-            inside = side + inwards * np.minimum(0.5, 2 * ALONG_SPINDLE / self.way.sweep[rows])
-            tangent[rows, side] = self.way.tangent(rows, inside)
+    def back(self, rows: Ints, side: Ints | int) -> Floats:
+        """(M, 3) z of ``rows`` at their begin (``side`` 0) or end (1); of a begin that is not known that at the end."""
+        at = rows - ((np.asarray(side) == 0) & self.way.begins[rows])
+        return self._back.take(at, axis=0)
+
+    def _tangent(self, rows: Ints, side: Ints | int) -> Floats:
+        """(M, 3) of each motion at its begin or end; that of an arc from inside where it lies along z there."""
+        side = np.broadcast_to(side, len(rows))
+        tangent = self.way.tangent(rows, side.astype(float))
+        curved = np.flatnonzero(self.way.arc[rows] & self.way.moved[rows])
+        along = np.isnan(across(tangent[curved], self.back(rows[curved], side[curved]))[:, 0])
+        curved = curved[along]
+        if len(curved):
+            inwards = np.minimum(0.5, 2 * ALONG_SPINDLE / self.way.sweep[rows[curved]])
+            inside = side[curved] + np.where(side[curved] == 0, 1, -1) * inwards
+            tangent[curved] = self.way.tangent(rows[curved], inside)
         return tangent
+
+    def _ahead(self, rows: Ints, side: Ints | int) -> Floats:
+        """(M, 3) what becomes x when it is projected across z: the motion's own tangent, or the x that stays where it
+        has none; NaN where there is none in the run."""
+        at = 2 * rows + side
+        source = self._source[at].astype(np.int64)
+        row, end = np.divmod(np.maximum(source, 0), 2)
+        ahead = self._tangent(row, end)
+        others = np.flatnonzero(~self._own[at])
+        ahead[others] = across(ahead[others], self.back(row[others], end[others]))
+        ahead[source < 0] = np.nan
+        return ahead
 
     def end(self, rows: Ints, side: int) -> Floats:
         """(M, 3, 3) frames of ``rows`` at their begin (``side`` 0) or end (1): rows of the matrix are x, y, z."""
-        z = self.back[rows, side]
-        x = across(self.ahead[rows, side], z)
-        x[~self.matters[rows]] = 0.0
+        z = self.back(rows, side)
+        x = np.zeros_like(z)
+        matters = self.matters[rows]
+        x[matters] = across(self._ahead(rows[matters], side), z[matters])
         return np.stack([x, np.cross(z, x), z], axis=-2)
 
     def on_the_way(self, rows: Ints, fraction: Floats) -> Floats:
@@ -104,12 +138,13 @@ class FeedFrames:
         nearer end.
         """
         share = fraction[:, None]
-        z = (1 - share) * self.back[rows, 0] + share * self.back[rows, 1]
+        z = (1 - share) * self.back(rows, 0) + share * self.back(rows, 1)
         z /= np.linalg.norm(z, axis=1, keepdims=True)
         ahead = self.way.tangent(rows, fraction)
-        ahead = np.where(share <= 0, self.ahead[rows, 0], np.where(share >= 1, self.ahead[rows, 1], ahead))
-        along = np.isnan(across(ahead, z)[:, 0])
-        ahead[along] = self.ahead[rows[along], np.where(fraction[along] < 0.5, 0, 1)]
+        for ends, side in ((fraction <= 0, 0), (fraction >= 1, 1)):
+            ahead[ends] = self._ahead(rows[ends], side)
+        along = np.flatnonzero(np.isnan(across(ahead, z)[:, 0]))
+        ahead[along] = self._ahead(rows[along], np.where(fraction[along] < 0.5, 0, 1))
         x = across(ahead, z)
         return np.stack([x, np.cross(z, x), z], axis=-2)
 

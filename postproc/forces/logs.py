@@ -63,7 +63,7 @@ def read_log(
     """
     findings: list[Finding] = []
     if not len(toolpath):
-        return Stated(np.zeros((0, 6)), np.zeros(0, np.int64)), ()
+        return Stated(np.zeros((0, 6)), np.zeros(0, np.int8), np.zeros(0, np.int32)), ()
     scale = _scale(column, toolpath, frames, program, findings)
     place = table.numbers(column) * UNITS[column]
     _check_order(table, column, place)
@@ -78,7 +78,8 @@ def read_log(
     readings = Readings(owner[within], place[within], channels[within], scale.begin, scale.end)
     start, value, peak, error = resampled(readings)
     start[scale.air], value[scale.air], peak[scale.air] = 0.0, 0.0, np.nan
-    stated = Stated(value, np.full(len(toolpath), frame), start, peak=peak, error=error)
+    each = np.arange(len(toolpath), dtype=np.int32)
+    stated = Stated(value, np.full(len(toolpath), frame), each, start, peak=peak, error=error)
     findings += _told(table, readings, place, spacing, scale, stated, toolpath, program)
     return stated, tuple(findings)
 

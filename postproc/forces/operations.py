@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.blocks import in_blocks
 from postproc.cell import Frames
 from postproc.findings import Finding, Refusal
 from postproc.forces.annotations import marked_air
@@ -43,7 +44,7 @@ def process_forces(
     cutting = (joined >= 0) & ~is_air(toolpath) & ~marked_air(toolpath)
     rapid = np.array([operation.rapid for operation in operations])[joined]
     cutting &= ~(toolpath.feed >= rapid)
-    along = cutting & _along_spindle(toolpath, frames)
+    along = _along_spindle(cutting, toolpath, frames)
     approach = cutting & ~shifted(toolpath.kind != Kind.AXIS)
     if np.any(free := along | approach):
         what = (
@@ -55,19 +56,25 @@ def process_forces(
     findings += _passed_over(operations, joined, cutting, toolpath, program)
 
     n = len(toolpath)
-    values, ci95, peak = np.zeros((n, 6)), np.full(n, np.nan), np.full(n, np.nan)
+    values, row = [np.zeros((1, 6))], np.zeros(n, np.int32)
+    ci95, peak = np.full(n, np.nan), np.full(n, np.nan)
     for index, operation in enumerate(operations):
         rows = np.flatnonzero(cutting & (joined == index))
         if not len(rows):
             continue
         feed = operation.feed_per_tooth(toolpath.feed[rows])
-        values[rows, :3] = mean_force(operation.cut, feed)
         usual = float(np.median(feed))
         share = peak_share(operation.cut, usual)
-        peak[rows] = share * np.linalg.norm(values[rows, :3], axis=1)
+        different, which = np.unique(feed, return_inverse=True)
+        force = np.zeros((len(different), 6))
+        force[:, :3] = mean_force(operation.cut, different)
+        row[rows] = which + sum(map(len, values))
+        values.append(force)
+        peak[rows] = (share * np.linalg.norm(force[:, :3], axis=1))[which]
         ci95[rows] = np.nan if operation.material.ci95 is None else operation.material.ci95
         findings += _told(operation, rows, feed, usual, share, toolpath, path, program)
-    return Stated(values, np.full(n, FEED), ci95=ci95, peak=peak), tuple(findings)
+    stated = np.concatenate(values)
+    return Stated(stated, np.full(len(stated), FEED), row, ci95=ci95, peak=peak), tuple(findings)
 
 
 def join(operations: Sequence[Operation], toolpath: Toolpath) -> Ints:
@@ -111,14 +118,22 @@ def _longest(comment: Annotation, named: Sequence[tuple[str, int]]) -> int:
     return max(matches)[1] if matches else -1
 
 
-def _along_spindle(toolpath: Toolpath, frames: Frames) -> Bools:
-    """(N,) straight motions along the spindle axis at their end; False where one of them is not known."""
+def _along_spindle(cutting: Bools, toolpath: Toolpath, frames: Frames) -> Bools:
+    """(N,) straight motions, of those that are ``cutting``, along the spindle axis at their end; False where one of
+    them is not known."""
     way = Way(toolpath, frames)
-    spindle = np.einsum(
-        "nij,njk,nk->ni", frames.base_in_robot.rotation, toolpath.rotation, frames.spindle_in_tool
-    )
-    along = np.abs(np.einsum("ni,ni->n", way.direction[:, 1], spindle))
-    return np.asarray(~way.arc & (along >= np.cos(ALONG_SPINDLE)))
+    along = np.zeros(len(toolpath), bool)
+
+    def looked(part: slice) -> None:
+        rows = part.start + np.flatnonzero(cutting[part] & ~way.arc[part])
+        spindle = np.einsum("nij,nj->ni", toolpath.rotation[rows], frames.spindle_in_tool[rows])
+        spindle = np.einsum("nij,nj->ni", frames.base_in_robot.rotation[rows], spindle)
+        cosine = np.abs(np.einsum("ni,ni->n", way.tangent(rows, 1.0), spindle))
+        along[rows] = cosine >= np.cos(ALONG_SPINDLE)
+
+    for _ in in_blocks(looked, len(toolpath)):
+        pass
+    return along
 
 
 def _check_feed(

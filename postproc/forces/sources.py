@@ -68,8 +68,8 @@ class _Given:
             message = f"{name}: {error}" if spec in name else f"{name}: {spec[:60]!r}: {error}"
             help = f"{FORM}; or a CSV or YAML file"
             raise Refusal(Finding("FRC002", message, file, line, help=help)) from None
-        n = len(self.toolpath)
-        return Stated(np.tile(values, (n, 1)), np.full(n, frame)), (), spec
+        all_of_one = np.broadcast_to(np.int32(0), len(self.toolpath))
+        return Stated(np.array([values]), np.array([frame]), all_of_one), (), spec
 
     def table(self, path: Path) -> Told:
         table = read_table(path, "FRC003")

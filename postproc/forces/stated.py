@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -23,38 +25,58 @@ _NUMBER_LIKE = re.compile(r"[-+]?([.,]?[0-9]|nan\b|inf(inity)?\b)", re.IGNORECAS
 
 @dataclass(frozen=True, eq=False)
 class Stated:
-    """The wrench of each motion [N, N m] in the axes of ``frame`` (N,), an index into FRAMES.
+    """K stated wrenches [N, N m], each in the axes of its ``frame`` (K,), an index into FRAMES; and which of them each
+    of N motions has, ``row`` (N,).
 
-    ``values`` (N, 6): where the motion ends; ``start`` (N, 6): where it begins (the same where it is not given), linear
-    in between.  ``ci95`` (N,): half width of the 95 % interval of the force as a share of it; ``peak`` (N,) [N]: the
-    largest force on the way of the motion.  NaN where not known, None where known of no motion.  ``error`` (N,) [N]:
-    standard error of the force at the ends, where it was measured.
+    ``values`` (K, 6): where the motion ends; ``start`` (K, 6): where it begins (the same where it is not given), linear
+    in between.  Of the motions (N,): ``ci95``, half width of the 95 % interval of the force as a share of it; ``peak``
+    [N], the largest force on the way.  NaN where not known, None where known of no motion.  ``error`` [N]: standard
+    error of the force at the ends, where it was measured.
     """
 
     values: Floats
     frame: Ints
+    row: Ints
     start: Floats | None = None
     ci95: Floats | None = None
     peak: Floats | None = None
     error: Floats | None = None
 
     def __post_init__(self) -> None:
-        n = len(self.values)
-        object.__setattr__(self, "values", frozen(self.values, (n, 6)))
-        object.__setattr__(self, "frame", frozen(self.frame, (n,), np.int64))
-        for name, shape in (("start", (n, 6)), ("ci95", (n,)), ("peak", (n,)), ("error", (n,))):
+        k, n = len(self.values), len(self.row)
+        object.__setattr__(self, "values", frozen(self.values, (k, 6)))
+        object.__setattr__(self, "frame", frozen(self.frame, (k,), np.int8))
+        object.__setattr__(self, "row", frozen(self.row, (n,), np.int32))
+        for name, shape in (("start", (k, 6)), ("ci95", (n,)), ("peak", (n,)), ("error", (n,))):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name), shape))
 
     @property
     def begin(self) -> Floats:
-        """(N, 6) the wrench where each motion begins."""
+        """(K, 6) the wrench where a motion begins."""
         return self.values if self.start is None else self.start
+
+    def of(self, wrenches: Floats, rows: Ints) -> Floats:
+        """(M, 6) those of ``wrenches`` (K, 6) that the motions ``rows`` (M,) have."""
+        return wrenches.take(self.row[rows], axis=0)
+
+    @cached_property
+    def frames(self) -> Ints:
+        """(N,) the frame of each motion's wrench."""
+        return self.frame[self.row]
 
     @property
     def acts(self) -> Bools:
         """(N,) the motion has a force or a moment at either end."""
-        return np.any(self.values != 0, axis=1) | np.any(self.begin != 0, axis=1)
+        return self.any(range(6))
+
+    def any(self, channels: Sequence[int]) -> Bools:
+        """(N,) the motion has a part in one of the ``channels`` at either end."""
+        acts = np.zeros(len(self.values), bool)
+        for wrenches in (self.values, self.begin):
+            for channel in channels:
+                acts |= wrenches[:, channel] != 0
+        return acts[self.row]
 
 
 class NotAForce(ValueError):

@@ -41,13 +41,14 @@ def place_column(table: Table) -> str:
     return places[0]
 
 
-def read_channels(table: Table) -> Floats:
-    """(rows, 6) [N, N m]; moments that are not there are 0."""
-    values = np.zeros((len(table), 6))
+def read_channels(table: Table, spare: int = 0) -> Floats:
+    """(rows + spare, 6) [N, N m]; moments that are not there are 0, and so are ``spare`` rows at the end."""
+    values = np.zeros((len(table) + spare, 6))
     for index, name in enumerate(CHANNELS):
         if name in table:
-            values[:, index] = table.numbers(name)
-            beyond = np.flatnonzero(np.abs(values[:, index]) > LARGEST)
+            numbers = table.numbers(name)
+            values[: len(table), index] = numbers
+            beyond = np.flatnonzero(np.abs(numbers) > LARGEST)
             if len(beyond):
                 row = int(beyond[0])
                 raise table.error(
@@ -65,12 +66,11 @@ def read_force_table(
     line without a motion), FRC020 (no row of an air move).
     """
     findings: list[Finding] = []
-    lines = _lines(table)
-    values = read_channels(table)
-    frame = read_frames(table)
+    lines, order = _lines(table)
+    values = read_channels(table, spare=1)
+    frame = np.append(read_frames(table), np.int8(BASE))
 
     # every motion of the program finds its row: a line may hold several motions where a dialect allows it
-    order = np.argsort(lines, kind="stable")
     place = np.minimum(np.searchsorted(lines[order], toolpath.line), len(lines) - 1)
     row = order[place]
     found = lines[row] == toolpath.line
@@ -83,10 +83,11 @@ def read_force_table(
     in_air = np.zeros(len(table), bool)
     in_air[row[found & air]] = True
     if offset:
-        values = checked_gauge(table, values, in_air, offset, findings)
-    cut = found & ~air
-    stated = Stated(np.where(cut[:, None], values[row], 0.0), np.where(cut, frame[row], BASE))
-    lost = np.flatnonzero(found & air & np.any(values[row] != 0, axis=1))
+        values[:-1] = checked_gauge(table, values[:-1], in_air, offset, findings)
+    values.setflags(write=False)
+    stated = Stated(values, frame, np.where(found & ~air, row, len(table)))
+    lost = np.flatnonzero(found & air)
+    lost = lost[np.any(values[row[lost]] != 0, axis=1)]
     if len(lost) and not offset:
         first = lost[0]
         what = f"line {toolpath.line[first]} of {program} is an air move (PTP, G0 or FORCE OFF); its force was not used"
@@ -100,7 +101,8 @@ def read_force_table(
     return stated, tuple(findings)
 
 
-def _lines(table: Table) -> Ints:
+def _lines(table: Table) -> tuple[Ints, Ints]:
+    """(rows,) the line of the program that each row is for, and the rows in the order of these."""
     numbers = table.numbers("line")
     wrong = np.flatnonzero((numbers != np.floor(numbers)) | (numbers < 1) | (numbers > 2**53))
     if len(wrong):
@@ -113,7 +115,7 @@ def _lines(table: Table) -> Ints:
         first, second = order[twice[0]], order[twice[0] + 1]
         message = f"line {lines[second]} has a row already, in line {table.lines[first]} of this file"
         raise table.error(int(second), "line", message)
-    return lines
+    return lines, order
 
 
 def read_frames(table: Table) -> Ints:

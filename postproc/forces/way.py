@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.blocks import in_blocks
 from postproc.cell import Frames
 from postproc.geometry import Poses, rotation_from_vector
 from postproc.toolpath import Toolpath
@@ -21,83 +22,98 @@ _NO_MOVE = 1e-7  # m; a tenth of the last digit that programs write
 
 
 class Way:
-    """All in arrays over the motions.
+    """The way of N motions; what takes more than a few bytes a motion is made of the rows that are asked for.
 
     known (N,): target, base and tool are known.  begins (N,): the row before is known and has the same tool on the
     flange, so that its end pose is where this one begins.  moved (N,): the motion has a length, ``length`` (N,) [m],
-    0 where it has none or is not known.  direction (N, 2, 3): unit tangent at its begin and at its end, NaN without
-    one.  arc (N,): the motion is an arc of known begin; sweep (N,) [rad].
+    0 where it has none or is not known.  arc (N,): the motion is an arc of known begin; sweep (N,) [rad].
     """
 
     def __init__(self, toolpath: Toolpath, frames: Frames) -> None:
         n = len(toolpath)
-        base = frames.base_in_robot
-        end = base.position + np.einsum("nij,nj->ni", base.rotation, toolpath.position)
-        self.known = (
-            toolpath.known & np.isfinite(end[:, 0]) & np.isfinite(frames.tool_in_flange.position[:, 0])
-        )
-        begin = np.full((n, 3), np.nan)
-        begin[1:] = end[:-1]
-        other_tool = self._with_other_tool(toolpath, frames, begin)
-        self.begins = self.known & shifted(self.known) & ~other_tool
-
-        there = self.known & shifted(self.known)
-        step = end - begin
-        length = np.sqrt(np.einsum("ni,ni->n", step, step))
+        self._toolpath, self._base = toolpath, frames.base_in_robot
         self.sweep = toolpath.sweep
-        self.arc = there & np.isfinite(toolpath.sweep)
-        arcs = np.flatnonzero(self.arc)
-        self._lay(arcs, toolpath, base[arcs], begin[arcs], step[arcs])
-        length[arcs] = np.hypot(
-            self.sweep[arcs] * np.sqrt(np.einsum("ni,ni->n", self._radius, self._radius)), self._rise
-        )
-        self.moved = there & (length > _NO_MOVE)
-        self.length = np.where(self.moved, length, 0.0)
-        step[~self.moved] = np.nan
-        chord = step / np.where(self.moved, length, 1.0)[:, None]
-        self.direction = np.stack([chord, chord], axis=1)
-        arcs = np.flatnonzero(self.arc & self.moved)
-        for side in (0, 1):
-            self.direction[arcs, side] = self._bent(arcs, np.full(len(arcs), float(side)))
+        self._end = np.empty((n, 3))
 
-    def tangent(self, rows: Ints, fraction: Floats) -> Floats:
+        def placed(rows: slice) -> None:
+            base = frames.base_in_robot[rows]
+            turned = np.einsum("nij,nj->ni", base.rotation, toolpath.position[rows])
+            np.add(base.position, turned, out=self._end[rows])
+
+        for _ in in_blocks(placed, n):
+            pass
+        tool = np.isfinite(frames.tool_in_flange.position[:, 0])
+        self.known = toolpath.known & tool & np.isfinite(self._end[:, 0])
+        there = self.known & shifted(self.known)
+        self._changed, self._from = _with_other_tool(toolpath, frames)
+        self.begins = there.copy()
+        self.begins[self._changed] = False
+        self.arc = there & np.isfinite(toolpath.sweep)
+        self.moved, self.length = np.zeros(n, bool), np.zeros(n)
+
+        def measured(rows: slice) -> None:
+            begin, step = self._step(np.arange(rows.start, rows.stop))
+            length = np.sqrt(np.einsum("ni,ni->n", step, step))
+            bent = np.flatnonzero(self.arc[rows])
+            arcs = rows.start + bent
+            _, radius, rise = self._laid(arcs, begin[bent], step[bent])
+            length[bent] = np.hypot(self.sweep[arcs] * np.sqrt(np.einsum("ni,ni->n", radius, radius)), rise)
+            self.moved[rows] = there[rows] & (length > _NO_MOVE)
+            self.length[rows] = np.where(self.moved[rows], length, 0.0)
+
+        for _ in in_blocks(measured, n):
+            pass
+
+    def tangent(self, rows: Ints, fraction: Floats | float) -> Floats:
         """(K, 3) unit tangent of ``rows`` (K,) at the shares ``fraction`` (K,) of their way; NaN without one."""
-        found = self.direction[rows, 0]
+        begin, step = self._step(rows)
+        length = np.where(self.moved[rows], self.length[rows], np.nan)
+        found = step / length[:, None]
         curved = np.flatnonzero(self.arc[rows] & self.moved[rows])
-        found[curved] = self._bent(rows[curved], fraction[curved])
+        if len(curved):
+            arcs, share = rows[curved], np.broadcast_to(fraction, len(rows))[curved]
+            found[curved] = self._bent(arcs, share, begin[curved], step[curved])
         return found
 
-    def _lay(self, rows: Ints, toolpath: Toolpath, base: Poses, begin: Floats, step: Floats) -> None:
-        """The arcs ``rows`` (M,) in the robot root: normal, radius vector at the begin (M, 3), rise, sweep (M,)."""
-        self._place = np.full(len(toolpath), -1)
-        self._place[rows] = np.arange(len(rows))
-        self._normal = np.einsum("nij,nj->ni", base.rotation, toolpath.normal[rows])
-        centre = base.position + np.einsum("nij,nj->ni", base.rotation, toolpath.centre[rows])
-        out = begin - centre
-        self._radius = out - np.einsum("ni,ni->n", out, self._normal)[:, None] * self._normal
-        self._rise = np.einsum("ni,ni->n", step, self._normal)
+    def _step(self, rows: Ints) -> tuple[Floats, Floats]:
+        """(K, 3) [m] where motions begin, NaN where that is not known, and from there to their end."""
+        begin = self._end.take(np.maximum(rows - 1, 0), axis=0)
+        begin[rows == 0] = np.nan
+        if len(self._changed):
+            at = np.minimum(np.searchsorted(self._changed, rows), len(self._changed) - 1)
+            other = self._changed[at] == rows
+            begin[other] = self._from[at[other]]
+        return begin, self._end.take(rows, axis=0) - begin
 
-    def _bent(self, rows: Ints, fraction: Floats) -> Floats:
+    def _laid(self, rows: Ints, begin: Floats, step: Floats) -> tuple[Floats, Floats, Floats]:
+        """The arcs ``rows`` (M,) in the robot root: normal, radius vector at the begin (M, 3), rise (M,)."""
+        base, path = self._base, self._toolpath
+        rotation = base.rotation[rows]
+        normal = np.einsum("nij,nj->ni", rotation, path.normal[rows])
+        out = begin - (base.position[rows] + np.einsum("nij,nj->ni", rotation, path.centre[rows]))
+        radius = out - np.einsum("ni,ni->n", out, normal)[:, None] * normal
+        return normal, radius, np.asarray(np.einsum("ni,ni->n", step, normal))
+
+    def _bent(self, rows: Ints, fraction: Floats, begin: Floats, step: Floats) -> Floats:
         """The tangent of arcs with radius vector r, normal n, sweep s and rise h: s n x R(n, t s) r + h n."""
-        at = self._place[rows]
-        normal, sweep = self._normal[at], self.sweep[rows, None]
-        radius = rotation_from_vector(fraction[:, None] * sweep * normal) @ self._radius[at][..., None]
-        tangent = sweep * np.cross(normal, radius[..., 0]) + self._rise[at, None] * normal
+        normal, begun, rise = self._laid(rows, begin, step)
+        sweep = self.sweep[rows, None]
+        radius = rotation_from_vector(fraction[:, None] * sweep * normal) @ begun[..., None]
+        tangent = sweep * np.cross(normal, radius[..., 0]) + rise[:, None] * normal
         return np.asarray(tangent / np.linalg.norm(tangent, axis=1, keepdims=True))
 
-    def _with_other_tool(self, toolpath: Toolpath, frames: Frames, begin: Floats) -> Bools:
-        """Rows whose tool is another than the row's before; their ``begin`` becomes that of the new TCP."""
-        tool, base = frames.tool_in_flange, frames.base_in_robot
-        rows = np.flatnonzero(np.append(False, toolpath.tool[1:] != toolpath.tool[:-1]))
-        same = np.all(
-            np.isclose(tool.rotation[rows], tool.rotation[rows - 1], 0, 1e-12), axis=(1, 2)
-        ) & np.all(np.isclose(tool.position[rows], tool.position[rows - 1], 0, 1e-12), axis=1)
-        rows = rows[~same]
-        flange = base[rows - 1] @ toolpath.target_in_base[rows - 1] @ tool[rows - 1].inverse()
-        begin[rows] = (flange @ tool[rows]).position
-        other = np.zeros(len(toolpath), bool)
-        other[rows] = True
-        return other
+
+def _with_other_tool(toolpath: Toolpath, frames: Frames) -> tuple[Ints, Floats]:
+    """Rows (M,) whose tool is another than the row's before, and where its TCP is there (M, 3) [m]."""
+    tool, base = frames.tool_in_flange, frames.base_in_robot
+    rows = np.flatnonzero(np.append(False, toolpath.tool[1:] != toolpath.tool[:-1]))
+    same = np.all(np.isclose(tool.rotation[rows], tool.rotation[rows - 1], 0, 1e-12), axis=(1, 2)) & np.all(
+        np.isclose(tool.position[rows], tool.position[rows - 1], 0, 1e-12), axis=1
+    )
+    rows = rows[~same]
+    target = Poses(toolpath.rotation[rows - 1], toolpath.position[rows - 1])
+    flange = base[rows - 1] @ target @ tool[rows - 1].inverse()
+    return rows, (flange @ tool[rows]).position
 
 
 class Runs:
@@ -109,20 +125,28 @@ class Runs:
 
     def __init__(self, way: Way, carries: Bools) -> None:
         n = len(carries)
-        index = np.arange(n)
+        index = np.arange(n, dtype=np.int32)
         before = shifted(carries)
-        self.start = np.maximum.accumulate(np.where(carries & ~before, index, 0))
+        self.start = np.maximum.accumulate(np.where(carries & ~before, index, np.int32(0)))
         last = carries & ~np.append(carries[1:], False)
-        stop = np.minimum.accumulate(np.where(last, index, n)[::-1])[::-1]
-        self.stop = np.minimum(stop, n - 1)
+        stop = np.minimum.accumulate(np.where(last, index, np.int32(n))[::-1])[::-1]
+        self.stop = np.minimum(stop, np.int32(n - 1))
 
         # motions that only turn the tool do not hide the corner that they stand on: the last direction counts
         latest = self.latest(way.moved & carries)
-        heading = np.where((latest >= 0)[:, None], way.direction[latest, 1], np.nan)
-        cosine = np.full(n, np.nan)
-        cosine[1:] = np.einsum("ni,ni->n", heading[:-1], way.direction[1:, 0])
-        corner = cosine <= np.cos(SMOOTH_TURN)  # False where there is no turn to speak of
-        self.smooth = carries & before & way.begins & ~corner
+        self.smooth = carries & before & way.begins
+
+        def turned(rows: slice) -> None:
+            inner = rows.start + np.flatnonzero(self.smooth[rows])
+            lead = latest[inner - 1]
+            heading = np.where((lead >= 0)[:, None], way.tangent(np.maximum(lead, 0), 1.0), np.nan)
+            cosine = np.einsum("ni,ni->n", heading, way.tangent(inner, 0.0))
+            self.smooth[inner[cosine <= np.cos(SMOOTH_TURN)]] = (
+                False  # not where there is no turn to speak of
+            )
+
+        for _ in in_blocks(turned, n):
+            pass
 
     def latest(self, mask: Bools) -> Ints:
         """The last entry of ``mask`` at or before each, within its run; -1 if there is none.
@@ -130,15 +154,19 @@ class Runs:
         ``mask`` (N,) over the motions, or (2 N,) over their begins and ends in turn: the result counts alike.
         """
         sides = len(mask) // max(len(self.start), 1)
-        found = np.maximum.accumulate(np.where(mask, np.arange(len(mask)), -1))
-        return np.where(found >= sides * np.repeat(self.start, sides), found, -1)
+        index = np.arange(len(mask), dtype=np.int32)
+        found = np.maximum.accumulate(np.where(mask, index, np.int32(-1)))
+        found[found < np.repeat(np.int32(sides) * self.start, sides)] = -1
+        return found
 
     def coming(self, mask: Bools) -> Ints:
         """The next entry of ``mask`` at or after each, within its run; -1 if there is none."""
         n = len(mask)
         sides = n // max(len(self.start), 1)
-        found = np.minimum.accumulate(np.where(mask, np.arange(n), n)[::-1])[::-1]
-        return np.where(found < sides * np.repeat(self.stop + 1, sides), found, -1)
+        index = np.arange(n, dtype=np.int32)
+        found = np.minimum.accumulate(np.where(mask, index, np.int32(n))[::-1])[::-1]
+        found[found >= np.repeat(np.int32(sides) * (self.stop + np.int32(1)), sides)] = -1
+        return found
 
 
 def shifted(mask: Bools) -> Bools:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints, frozen
+from postproc.blocks import blocks, in_blocks
 from postproc.cell import Cell, Frames
 from postproc.findings import Finding
 from postproc.forces.feed import FeedFrames
@@ -55,8 +56,8 @@ class Wrenches:
 
     @staticmethod
     def zero(n: int, source: str = "none", findings: tuple[Finding, ...] = ()) -> Wrenches:
-        nothing = np.zeros((n, 6))
-        return Wrenches(nothing, nothing, np.zeros(n, bool), source, findings, np.zeros(n, bool))
+        nothing, never = np.broadcast_to(0.0, (n, 6)), np.broadcast_to(False, n)
+        return Wrenches(nothing, nothing, never, source, findings, never)
 
     def __len__(self) -> int:
         return len(self.values)
@@ -69,8 +70,10 @@ class Wrenches:
     @property
     def max_force(self) -> float:
         """The largest force [N] at either end of any motion."""
-        forces = np.concatenate([self.values[:, :3], self.start[:, :3]])
-        return float(np.sqrt(np.max(np.einsum("ni,ni->n", forces, forces), initial=0.0)))
+        if not self.any:
+            return 0.0
+        sides = (self.values, self.start)
+        return float(np.sqrt(max(_largest(side[rows]) for side in sides for rows in blocks(len(self)))))
 
     @property
     def peak_force(self) -> float:
@@ -95,32 +98,34 @@ class Wrenches:
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """The frames that turn on the way of arcs.  ``mask`` (N,): motions with such a frame; ``feed``: where the force is
-    stated in the feed frame (N,); begin, turn (N, 3, 3), (N, 3): tool in the robot where the motion begins, and how
-    the tool turns on the way, a rotation vector in its own axes there."""
+    """The frames that turn on the way of arcs.  ``mask`` (N,): motions with such a frame; ``feed`` (N,): where the
+    force is stated in the feed frame."""
 
     mask: Bools
     feed: Bools
     frames: FeedFrames | None
-    begin: Floats
-    turn: Floats
+    base_in_robot: Floats
+    tool_in_base: Floats
 
     def along(self, rows: Ints, fraction: Floats, start: Floats, values: Floats) -> Floats:
         """(K, 6) C(t) ((1 - t) C(0)^T start + t C(1)^T values) with the frame C in the robot's axes."""
-        first, here, last = (self._axes(rows, share) for share in (0 * fraction, fraction, 0 * fraction + 1))
+        # tool in the robot where the motion begins, and how it turns on the way, in its own axes there
+        begin, end = (self.base_in_robot[at] @ self.tool_in_base[at] for at in (rows - 1, rows))
+        turn = vector_from_rotation(np.swapaxes(begin, 1, 2) @ end)
+
+        def axes(share: Floats) -> Floats:
+            """(K, 3, 3): the rows of a matrix are the axes of the frame."""
+            found = np.swapaxes(begin @ rotation_from_vector(share[:, None] * turn), 1, 2)
+            chosen = np.flatnonzero(self.feed[rows])
+            if self.frames is not None and len(chosen):
+                found[chosen] = self.frames.on_the_way(rows[chosen], share[chosen])
+            return found
+
+        first, here, last = axes(0 * fraction), axes(fraction), axes(0 * fraction + 1)
         share = fraction[:, None, None]
         inside = (1 - share) * (start.reshape(-1, 2, 3) @ np.swapaxes(first, 1, 2))
         inside += share * (values.reshape(-1, 2, 3) @ np.swapaxes(last, 1, 2))
         return np.asarray((inside @ here).reshape(-1, 6))
-
-    def _axes(self, rows: Ints, fraction: Floats) -> Floats:
-        """(K, 3, 3): the rows of a matrix are the axes of the frame."""
-        rotation = self.begin[rows] @ rotation_from_vector(fraction[:, None] * self.turn[rows])
-        axes = np.swapaxes(rotation, 1, 2)
-        chosen = np.flatnonzero(self.feed[rows])
-        if self.frames is not None and len(chosen):
-            axes[chosen] = self.frames.on_the_way(rows[chosen], fraction[chosen])
-        return axes
 
 
 def is_air(toolpath: Toolpath) -> Bools:
@@ -149,47 +154,70 @@ def turned(
     way = Way(toolpath, frames)
     runs = Runs(way, carries)
     feed = None
-    if np.any(carries & (stated.frame == FEED)):
+    if np.any(carries & (stated.frames == FEED)):
         feed = FeedFrames(stated, toolpath, frames, way, runs, carries, file)
         findings = (*findings, *feed.findings)
     turn = _Turn(stated, toolpath, frames, cell, way, feed)
 
     n = len(toolpath)
-    rows = np.flatnonzero(carries)
-    own = np.zeros((n, 6))
-    own[rows] = turn.at_end(rows, stated.values)
-    placeholder = np.isnan(own[:, 0])
-    own[placeholder] = turn.unturned(np.flatnonzero(placeholder), stated.values)
+    values, start = np.zeros((n, 6)), np.zeros((n, 6))
+    placed, steps = np.zeros(n, bool), carries.copy()
 
-    # where no vertex is known to begin at, the end's pose has to serve
-    leaving = np.full((n, 6), np.nan)
-    begins = rows[way.begins[rows]]
-    leaving[begins] = turn.at_begin(begins, stated.begin)
-    lost = np.flatnonzero(carries & np.isnan(leaving[:, 0]))
-    instead = turn.at_end(lost, stated.begin)
-    unknown = np.isnan(instead[:, 0])
-    instead[unknown] = turn.unturned(lost[unknown], stated.begin)
-    values, start = own.copy(), np.where(carries[:, None], leaving, 0.0)
-    start[lost] = instead
+    def ended(part: slice) -> float:
+        """The wrenches of both sides of no vertex shared yet; the square of the largest force."""
+        rows = part.start + np.flatnonzero(carries[part])
+        own = turn.at_end(rows, stated.values)
+        unknown = np.isnan(own[:, 0])
+        own[unknown] = turn.unturned(rows[unknown], stated.values)
+        values[rows], placed[rows] = own, ~unknown
+        return _largest(own)
 
-    after = np.flatnonzero(runs.smooth & ~np.isnan(leaving[:, 0]) & ~np.roll(placeholder, 1))
-    error = np.zeros(n) if stated.error is None else stated.error
-    scatter = np.hypot(error[after - 1], error[after])
-    after = after[~_jumps(own[after - 1], leaving[after], own, scatter)]
-    shared = 0.5 * (own[after - 1] + leaving[after])
-    values[after - 1] = start[after] = shared
-    steps = carries.copy()
-    steps[after] = False
+    largest = float(np.sqrt(max(in_blocks(ended, n))))
+
+    def begun(part: slice) -> None:
+        rows = part.start + np.flatnonzero(carries[part])
+        # where no vertex is known to begin at, the end's pose has to serve
+        leaving = np.full((len(rows), 6), np.nan)
+        begins = way.begins[rows]
+        leaving[begins] = turn.at_begin(rows[begins], stated.begin)
+        lost = np.isnan(leaving[:, 0])
+        instead = turn.at_end(rows[lost], stated.begin)
+        unknown = np.isnan(instead[:, 0])
+        instead[unknown] = turn.unturned(rows[lost][unknown], stated.begin)
+        leaving[lost] = instead
+        start[rows] = leaving
+
+        shared = runs.smooth[rows] & ~lost & placed[rows - 1]
+        after, leaving = rows[shared], leaving[shared]
+        own = values[after - 1]
+        scatter = (
+            np.zeros(1) if stated.error is None else np.hypot(stated.error[after - 1], stated.error[after])
+        )
+        even = ~_jumps(own, leaving, largest, scatter)
+        after = after[even]
+        # no other vertex has these two
+        values[after - 1] = start[after] = 0.5 * (own[even] + leaving[even])
+        steps[after] = False
+
+    for _ in in_blocks(begun, n):
+        pass
+    for made in (values, start, steps):
+        made.setflags(write=False)
     return Wrenches(
         values, start, carries, source, findings, steps, turn.turning(carries), stated.ci95, stated.peak
     )
 
 
-def _jumps(one: Floats, two: Floats, program: Floats, scatter: Floats) -> Bools:
+def _largest(wrenches: Floats) -> float:
+    """The square of the largest force of (M, 6)."""
+    force = wrenches[:, :3]
+    return float(np.max(np.einsum("ni,ni->n", force, force), initial=0.0))
+
+
+def _jumps(one: Floats, two: Floats, largest: float, scatter: Floats) -> Bools:
     """(M,) whether the force between ``one`` and ``two`` (M, 6) changes by more than JUMP, and clear of its
-    ``scatter`` (M,) [N]."""
+    ``scatter`` (M,) [N]; ``largest`` [N]: of the program."""
     size = np.maximum(np.linalg.norm(one[:, :3], axis=1), np.linalg.norm(two[:, :3], axis=1))
-    largest = np.linalg.norm(program[:, :3], axis=1).max(initial=0.0)
     change = np.linalg.norm(two[:, :3] - one[:, :3], axis=1)
     return np.asarray(
         (change > np.maximum(JUMP * size, JUMP_OF_LARGEST * largest)) & (change > CLEAR * scatter)
@@ -208,7 +236,7 @@ class _Turn:
         way: Way,
         feed: FeedFrames | None,
     ) -> None:
-        self.frame = stated.frame
+        self.stated = stated
         self.base_in_robot = frames.base_in_robot.rotation
         self.tool_in_base = toolpath.rotation
         self.world_in_robot = cell.robot_base.rotation.T
@@ -216,7 +244,7 @@ class _Turn:
         self.feed = feed
 
     def at_end(self, rows: Ints, values: Floats) -> Floats:
-        """(M, 6) ``values`` (N, 6) of ``rows`` (M,) at their end poses; NaN where that can not be known."""
+        """(M, 6) ``values`` (K, 6) of ``rows`` (M,) at their end poses; NaN where that can not be known."""
         return self._turned(rows, values, 1)
 
     def at_begin(self, rows: Ints, values: Floats) -> Floats:
@@ -225,34 +253,31 @@ class _Turn:
 
     def unturned(self, rows: Ints, values: Floats) -> Floats:
         """(M, 6) for motions with an unknown pose: taken in the axes of their base, or of the robot."""
-        wrench = self._base(values[rows].reshape(-1, 2, 3), rows, 1).reshape(-1, 6)
-        return np.where(np.isnan(wrench), values[rows], wrench)
+        own = self.stated.of(values, rows)
+        wrench = self._base(own.reshape(-1, 2, 3), rows, 1).reshape(-1, 6)
+        return np.where(np.isnan(wrench), own, wrench)
 
     def turning(self, carries: Bools) -> Turning | None:
         """The frames that turn on the way of arcs, where there are any."""
-        framed = self.frame == TOOL
+        frame = self.stated.frames
+        framed = frame == TOOL
         if self.feed is not None:
-            framed |= (self.frame == FEED) & self.feed.matters
+            framed |= (frame == FEED) & self.feed.matters
         mask = carries & framed & self.way.arc & self.way.begins
-        rows = np.flatnonzero(mask)
-        if not len(rows):
+        if not mask.any():
             return None
-        n = len(mask)
-        begin, turn = np.broadcast_to(np.eye(3), (n, 3, 3)).copy(), np.zeros((n, 3))
-        begin[rows] = self.base_in_robot[rows - 1] @ self.tool_in_base[rows - 1]
-        end = self.base_in_robot[rows] @ self.tool_in_base[rows]
-        turn[rows] = vector_from_rotation(np.swapaxes(begin[rows], 1, 2) @ end)
-        return Turning(mask, self.frame == FEED, self.feed, begin, turn)
+        return Turning(mask, frame == FEED, self.feed, self.base_in_robot, self.tool_in_base)
 
     def _turned(self, rows: Ints, values: Floats, side: int) -> Floats:
-        wrench = np.empty((len(rows), 2, 3))
-        frame = self.frame[rows]
+        own = self.stated.of(values, rows).reshape(-1, 2, 3)
+        wrench = np.empty_like(own)
+        frame = self.stated.frames[rows]
         for code, turn in ((BASE, self._base), (WORLD, self._world), (TOOL, self._tool), (FEED, self._feed)):
             chosen = frame == code
             if len(rows) and np.all(chosen):
-                wrench = turn(values[rows].reshape(-1, 2, 3), rows, side)
+                wrench = turn(own, rows, side)
             elif np.any(chosen):
-                wrench[chosen] = turn(values[rows[chosen]].reshape(-1, 2, 3), rows[chosen], side)
+                wrench[chosen] = turn(own[chosen], rows[chosen], side)
         return wrench.reshape(-1, 6)
 
     def _base(self, pairs: Floats, rows: Ints, side: int) -> Floats:
