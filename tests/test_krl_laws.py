@@ -170,7 +170,9 @@ def test_exactly_the_motions_of_a_routine_that_an_interrupt_calls_too_are_left(
 ) -> None:
     """The routine is followed where the program calls it; from elsewhere it runs at positions that nobody knows."""
     text = f"DEF part()\n{FRAMES}INTERRUPT DECL 3 WHEN $IN[1]==TRUE DO sub()\nINTERRUPT ON 3\n"
-    text += LINE * before + f"other()\nsub()\n{LINE}END\nDEF other()\n{LINE}END\nDEF sub()\n{LINE * count}END\n"
+    text += (
+        LINE * before + f"other()\nsub()\n{LINE}END\nDEF other()\n{LINE}END\nDEF sub()\n{LINE * count}END\n"
+    )
     program = read(text)
     first = 5 + before + 4 + 3 + 2
     left = {
@@ -194,3 +196,27 @@ def test_an_integer_variable_rounds_what_it_is_given(said: str, holds: float) ->
     """To the nearest one, halves away from zero."""
     program = body(f"DECL INT n\nDECL REAL r\nn={said}\nr={said}\nLIN {{X n,Y r,Z 3,A 4,B 5,C 6}}\n")
     np.testing.assert_allclose(program.toolpath.position[0] / MM, [holds, float(said), 3.0])
+
+
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_exactly_the_motions_of_a_routine_that_is_also_called_in_a_block_not_followed_are_left(
+    count: int,
+) -> None:
+    calls = "sub()\nIF $IN[1]==TRUE THEN\nsub()\nENDIF\n"
+    program = read(f"DEF part()\n{FRAMES}{LINE}{calls}{LINE}END\nDEF sub()\n{LINE * count}END\n")
+    left = {int(program.toolpath.line[row]): f.code for row, f in program.toolpath.refused.items()}
+    assert left == {12 + i: "KRL015" for i in range(count)}
+
+
+@pytest.mark.parametrize("value", ["TRUE", "FALSE", '"word"', "#NAME"])
+@pytest.mark.parametrize("kind", ["INT", "REAL"])
+def test_a_number_is_not_made_of_what_is_none(kind: str, value: str) -> None:
+    program = body(f"DECL {kind} n\nn={value}\nLIN {{X n,Y 2,Z 3,A 4,B 5,C 6}}\n")
+    assert [f.code for f in program.toolpath.refused.values()] == ["KRL002"]
+
+
+def test_an_exit_ends_no_loop_of_the_caller() -> None:
+    path = read(
+        f"DEF part()\n{FRAMES}DECL INT i\nFOR i=1 TO 3\nsub()\nENDFOR\nEND\nDEF sub()\nEXIT\n{LINE}END\n"
+    )
+    assert path.toolpath.line.tolist() == [11, 11, 11]
