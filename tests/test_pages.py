@@ -27,7 +27,8 @@ from postproc.document import Document, Edit, Span, apply
 from postproc.findings import Finding
 from postproc.geometry import Poses
 from postproc.report.page import FOLDER, embedded, finding_rows, linked, program_page
-from postproc.report.page_data import Place, page_data, shown_rows, source_texts
+from postproc.report.page_data import Place, page_data, source_texts
+from postproc.report.page_rows import SHOWN, shown_rows, worst_rows
 from postproc.report.page_words import badge, left_over, program_verdict
 from postproc.report.report import Spread
 from postproc.toolpath import Role
@@ -58,9 +59,12 @@ def columns(page):
 @pytest.fixture(scope="module")
 def predicted(tmp_path_factory):
     """Task, result and report of a prediction, with which a page can be made of any arrays."""
-    folder = tmp_path_factory.mktemp("predicted")
+    return prediction(tmp_path_factory.mktemp("predicted"), LINES)
+
+
+def prediction(folder, lines):
     (folder / "cell.yaml").write_text(CELL + "force_ci95: 0.1\n")
-    (folder / "part.src").write_text("\n".join(LINES) + "\n")
+    (folder / "part.src").write_text("\n".join(lines) + "\n")
     request = Request(folder / "part.src", force="", report=folder / "out")
     ready = prepare(request)
     result = correct(replace(ready.task, gain=0.0))
@@ -75,30 +79,23 @@ def data(predicted):
     return page_data(predicted.task, predicted.result, predicted.report, predicted.documents)
 
 
-def many(data, n, rng):
-    """A program of n motions with a figure of its own in every row."""
-    cut = np.repeat(np.arange(-(-n // 97)), 97)[:n]
-    return replace(
-        data,
-        corrected=True,
-        line=np.arange(n) + 10,
-        kind=np.full(n, 2),
-        state=np.full(n, int(State.CORRECTED)),
-        cut=cut,
-        way=np.arange(n, dtype=float),
-        position=rng.normal(size=(n, 3)).cumsum(axis=0),
-        arcs=np.zeros(0, np.int64),
-        bends=np.zeros((0, 3, 3)),
-        force=rng.normal(size=(n, 3)),
-        deflection=rng.normal(size=(n, 3)),
-        correction=rng.normal(size=(n, 3)),
+def many(n, rng):
+    """Figures of n motions, and which of them are shown in figures of so many."""
+    figures = SimpleNamespace(
+        cut=np.repeat(np.arange(-(-n // 97)), 97)[:n],
         before=rng.random(n),
         after=rng.random(n),
         between=np.where(rng.random(n) < 0.5, rng.random(n), np.nan),
-        inserted=np.zeros(n, np.int64),
-        interval=rng.random(n),
-        places=(Place(n // 3, "", "LIN", ("LIN",)),),
+        correction=rng.normal(size=(n, 3)),
     )
+    size = np.linalg.norm(figures.correction, axis=1)
+    quantities = [(1, figures.before), (-1, figures.before), (1, figures.after), (-1, figures.after)]
+    quantities += [(1, figures.between), (1, size)]
+
+    def shown(limit):
+        return shown_rows(n, [n // 3], figures.cut[1:] != figures.cut[:-1], quantities, limit)
+
+    return figures, shown
 
 
 # Figures.
@@ -163,6 +160,7 @@ def test_a_band_between_motions_that_were_evaluated_is_interpolated(predicted):
     report = replace(predicted.report, doubt=few)
     data = page_data(predicted.task, predicted.result, report, predicted.documents)
     middle = first + 1
+    assert data.rows.tolist() == list(range(data.motions))
     share = 1 / (last - first)
     assert data.interval[middle] == pytest.approx(1.96 * (0.01 + share * 0.03))
     assert data.evaluated == 2
@@ -192,13 +190,16 @@ def test_inserted_motions_and_the_way_belong_to_their_motion(predicted):
 def test_arcs_are_drawn_by_points_on_them(predicted):
     """A quarter of a circle of 100 mm about the end point before, in the plane of the base."""
     task, row = predicted.task, int(np.flatnonzero(predicted.result.state != State.AIR)[2])
-    ways = task.ways
-    begin, end = ways.begin.position[row], ways.end.position[row]
+    ways, position = task.ways, np.zeros((len(task.toolpath), 3))
+    begin, end = ways.begin[[row]].position[0], ways.end[[row]].position[0]
     middle, half = 0.5 * (begin + end), 0.5 * np.linalg.norm(end - begin)
-    centre, normal, sweep = (np.array(v) for v in (ways.centre, ways.normal, ways.sweep))
-    centre[row], normal[row], sweep[row] = middle, [0, 0, 1], np.pi
+    base = task.base[row]
+    centre, normal, sweep = position * np.nan, position * np.nan, position[:, 0] * np.nan
+    centre[row] = (base.inverse() @ Poses(np.eye(3), middle)).position
+    normal[row], sweep[row] = base.rotation.T @ [0, 0, 1], np.pi
+    path = replace(task.toolpath, centre=centre, normal=normal, sweep=sweep)
     bent = replace(task)
-    bent.__dict__["ways"] = replace(ways, centre=centre, normal=normal, sweep=sweep)
+    bent.__dict__["ways"] = replace(ways, path=path)
     data = page_data(bent, predicted.result, predicted.report, predicted.documents)
     assert data.arcs.tolist() == [row]
     np.testing.assert_allclose(np.linalg.norm(data.bends[0] - middle / MM, axis=1), half / MM, rtol=1e-9)
@@ -212,43 +213,96 @@ def test_arcs_are_drawn_by_points_on_them(predicted):
 
 
 @pytest.mark.parametrize("n", [2, 999, 1000, 1001, 5000, 23_456])
-def test_no_extreme_is_left_out(data, n):
-    rng = np.random.default_rng(n)
-    big = many(data, n, rng)
-    rows = shown_rows(big, 1000)
+def test_no_extreme_is_left_out(n):
+    figures, shown = many(n, np.random.default_rng(n))
+    rows = shown(1000)
     assert len(rows) <= 1000
     assert (np.diff(rows) > 0).all()
     assert {0, n - 1, n // 3} <= set(rows.tolist())
     if n <= 1000:
         assert len(rows) == n
         return
-    for values in (big.before, -big.before, big.after, -big.after, big.between):
+    for values in (figures.before, -figures.before, figures.after, -figures.after, figures.between):
         assert int(np.nanargmax(values)) in rows
-    assert int(np.argmax(np.linalg.norm(big.correction, axis=1))) in rows
+    assert int(np.argmax(np.linalg.norm(figures.correction, axis=1))) in rows
     # and of every twentieth of the program its own
     for part in np.array_split(np.arange(n), 20):
-        shown = np.intersect1d(rows, part)
-        assert big.before[shown].max() >= np.quantile(big.before[part], 0.9)
-        assert len(shown) > 20
+        own = np.intersect1d(rows, part)
+        assert figures.before[own].max() >= np.quantile(figures.before[part], 0.9)
+        assert len(own) > 20
 
 
-def test_the_shape_stays_where_motions_are_left_out(data):
+def test_the_shape_stays_where_motions_are_left_out():
     """A circle of many motions is still one: no chord takes more than a few degrees."""
     n = 20_000
-    big = many(data, n, np.random.default_rng(1))
-    rows = shown_rows(big, 2000)
-    assert np.diff(rows).max() <= 2 * n / 1000
+    assert np.diff(many(n, np.random.default_rng(1))[1](2000)).max() <= 2 * n / 1000
+
+
+def test_where_many_motions_are_left_out_the_columns_are_those_of_the_shown(tmp_path):
+    at = LINES.index(";FORCE OFF")
+    more = [f"LIN {{X {400 + k % 7}, Y {k}}}" for k in range(300)]
+    long = prediction(tmp_path, [*LINES[:at], *more, *LINES[at:]])
+    n, task = len(long.task.toolpath), replace(long.task)
+    sweep = np.where(np.arange(n) % 3 == 0, 0.5, np.nan)
+    round_ = np.where(np.isfinite(sweep)[:, None], [0.0, 0.0, 1.0], np.nan)
+    path = replace(task.toolpath, centre=round_, normal=round_, sweep=sweep)
+    task.__dict__["ways"] = replace(long.task.ways, path=path)
+    every, few = (
+        page_data(task, long.result, long.report, long.documents, limit=limit) for limit in (n, 100)
+    )
+    assert few.motions == every.motions == len(every.rows) == n
+    assert 50 < len(few.rows) <= 100 < n
+    assert {0, n - 1, *every.rows[[place.row for place in every.places]].tolist()} <= set(few.rows.tolist())
+    for name in ("line", "kind", "state", "cut", "way", "position", "force", "deflection", "correction"):
+        np.testing.assert_array_equal(getattr(few, name), getattr(every, name)[few.rows], name)
+    for name in ("before", "after", "between", "inserted", "interval"):
+        np.testing.assert_array_equal(getattr(few, name), getattr(every, name)[few.rows], name)
+    assert [few.line[place.row] for place in few.places] == [every.line[place.row] for place in every.places]
+    assert [place.source for place in few.places] == [place.source for place in every.places]
+    # an arc is drawn where its begin is shown as well
+    rows = few.rows[few.arcs]
+    assert 5 < len(rows) < len(every.arcs)
+    assert (few.rows[few.arcs - 1] == rows - 1).all()
+    assert set(rows) == {row for row in every.rows[every.arcs] if {row - 1, row} <= set(few.rows)}
+    np.testing.assert_array_equal(few.bends, every.bends[np.isin(every.rows[every.arcs], rows)])
+
+
+def test_the_worst_are_the_largest_then_the_largest_of_each_cut_then_the_next():
+    before = np.array([np.nan, 1, 5, 5, 2, np.nan, 4, 3, np.nan, np.inf, 4])
+    after = np.array([np.nan, 0, 0, 0, 1, np.nan, 0, 0, np.nan, 0, 0])
+    cut = np.array([-1, 0, 0, 0, 0, -1, 1, 1, -1, 2, 2], np.int32)
+    result = SimpleNamespace(before=before, after=after, cut=cut)
+    between = np.where(np.arange(11) == 7, 0.5, np.nan)
+    rows = worst_rows(result, cut >= 0, between, True)
+    assert [row for row, _ in rows] == [2, 4, 7, 6, 10, 3, 1]
+    assert [why for _, why in rows[:5]] == [
+        "largest before", "largest after", "largest on the way after", "largest of cut 2", "largest of cut 3",
+    ]  # fmt: skip
+    assert [why for _, why in worst_rows(result, cut >= 0, between, False)[:1]] == ["largest before"]
+    assert worst_rows(result, cut >= 9, between, True) == []
 
 
 def test_a_page_of_many_motions_is_not_too_large(data):
-    big = many(data, 300_000, np.random.default_rng(2))
+    n, rng = 300_000, np.random.default_rng(2)
+    figures, shown = many(n, rng)
+    rows = shown(SHOWN)
+    nothing, vectors = np.zeros(len(rows)), rng.normal(size=(len(rows), 3))
+    big = replace(
+        data, corrected=True, motions=n, rows=rows, line=rows + 10, kind=np.full(len(rows), 2),
+        state=np.full(len(rows), int(State.CORRECTED)), cut=figures.cut[rows], way=rows / 1e3, position=vectors,
+        arcs=np.zeros(0, np.int64), bends=np.zeros((0, 3, 3)), force=vectors, deflection=vectors,
+        correction=figures.correction[rows], before=figures.before[rows], after=figures.after[rows],
+        between=figures.between[rows], inserted=nothing.astype(int), interval=nothing,
+        places=(Place(int(np.searchsorted(rows, n // 3)), "", "LIN", ("LIN",)),),
+    )  # fmt: skip
     page = program_page(big, {})
     assert len(page) < 15e6
     found, given_ = columns(page.decode())
-    assert given_["motions"] == 300_000
-    assert found["row"].tolist() == shown_rows(big).tolist()
-    np.testing.assert_allclose(found["before"], big.before[found["row"]], rtol=1e-6)
-    assert "of 300000 motions" in page.decode()
+    assert given_["motions"] == n
+    assert given_["places"] == [n // 3]
+    assert found["row"].tolist() == rows.tolist()
+    np.testing.assert_allclose(found["before"], figures.before[rows], rtol=1e-6)
+    assert f"{len(rows)} of 300000 motions" in page.decode()
 
 
 # Text.
@@ -339,7 +393,7 @@ def test_hostile_text_is_text_wherever_it_stands(data):
         digests={HOSTILE: HOSTILE},
         findings=(Finding("COR003", HOSTILE, HOSTILE, 3, help=HOSTILE),),
     )  # fmt: skip
-    places = (Place(int(data.cutting[0]), HOSTILE, HOSTILE, (HOSTILE,)),)
+    places = (Place(data.places[0].row, HOSTILE, HOSTILE, (HOSTILE,)),)
     hostile = replace(data, report=report, places=places, corrected=True)
     page = program_page(hostile, {HOSTILE: HOSTILE}).decode()
     seen = _Tags(page)

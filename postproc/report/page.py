@@ -24,7 +24,7 @@ from markupsafe import Markup
 from postproc import __version__
 from postproc.compensation.correct import State
 from postproc.findings import CODES, Finding
-from postproc.report.page_data import PageData, shown_rows
+from postproc.report.page_data import PageData
 from postproc.report.page_words import (
     badge,
     left_over,
@@ -50,7 +50,6 @@ _SEVERITY = {"info": ("i", "note"), "warning": ("!", "look"), "error": ("x", "er
 def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
     """The page of one program.  links: what is beside it, words -> relative path."""
     report = data.report
-    shown = shown_rows(data)
     return rendered(
         "program.html.j2",
         script=_script(SCRIPTS),
@@ -69,14 +68,14 @@ def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
         parameters=parameter_rows(report.model),
         digests=report.digests,
         links=linked(links),
-        shown=len(shown),
-        motions=len(data),
+        shown=len(data.rows),
+        motions=data.motions,
         goes=True,
         corrected=data.corrected,
         interval=bool(np.isfinite(data.interval).any()),
         evaluated=data.evaluated,
         lower_bound=report.doubt.lower_bound,
-        data=embedded(_figures(data, shown)),
+        data=embedded(_figures(data)),
     )
 
 
@@ -149,7 +148,7 @@ def _places(data: PageData) -> list[dict[str, object]]:
     force = np.linalg.norm(data.force, axis=1)
     return [
         {
-            "row": place.row,
+            "row": int(data.rows[place.row]),
             "line": int(data.line[place.row]),
             "cut": int(data.cut[place.row]) + 1,
             "why": place.why,
@@ -171,40 +170,36 @@ def _number(value: float, decimals: int) -> str:
     return f"{value:.{decimals}f}" if np.isfinite(value) else "–"
 
 
-def _figures(data: PageData, rows: np.ndarray) -> dict[str, object]:
-    """What the script draws: columns of the rows shown, and of the arcs whose begin is shown as well."""
-    place = np.searchsorted(rows, data.arcs)
-    place[place == len(rows)] = 0
-    whole = (rows[place] == data.arcs) & (rows[place - 1] == data.arcs - 1)
-    bends = data.bends[whole]
+def _figures(data: PageData) -> dict[str, object]:
+    """What the script draws."""
     columns = {
-        "row": (rows, "i4"),
-        "line": (data.line[rows], "i4"),
-        "cut": (data.cut[rows], "i4"),
-        "kind": (data.kind[rows], "u1"),
-        "state": (data.state[rows], "u1"),
-        "way": (data.way[rows], "f4"),
-        "position": (data.position[rows], "f4"),
-        "force": (data.force[rows], "f4"),
-        "deflection": (data.deflection[rows], "f4"),
-        "correction": (data.correction[rows], "f4"),
-        "before": (data.before[rows], "f4"),
-        "after": (data.after[rows], "f4"),
-        "between": (data.between[rows], "f4"),
-        "inserted": (data.inserted[rows], "i4"),
-        "interval": (data.interval[rows], "f4"),
-        "arc": (place[whole], "i4"),
-        "bends": (bends.reshape(-1, 3), "f4"),
+        "row": (data.rows, "i4"),
+        "line": (data.line, "i4"),
+        "cut": (data.cut, "i4"),
+        "kind": (data.kind, "u1"),
+        "state": (data.state, "u1"),
+        "way": (data.way, "f4"),
+        "position": (data.position, "f4"),
+        "force": (data.force, "f4"),
+        "deflection": (data.deflection, "f4"),
+        "correction": (data.correction, "f4"),
+        "before": (data.before, "f4"),
+        "after": (data.after, "f4"),
+        "between": (data.between, "f4"),
+        "inserted": (data.inserted, "i4"),
+        "interval": (data.interval, "f4"),
+        "arc": (data.arcs, "i4"),
+        "bends": (data.bends.reshape(-1, 3), "f4"),
     }
     return {
-        "count": len(rows),
-        "each": bends.shape[1],
-        "motions": len(data),
+        "count": len(data.rows),
+        "each": data.bends.shape[1],
+        "motions": data.motions,
         "corrected": data.corrected,
         "tolerance": data.tolerance,
         "kinds": [kind.name for kind in Kind],
         "states": [_STATES[state] for state in State],
-        "places": [place.row for place in data.places],
+        "places": [int(data.rows[place.row]) for place in data.places],
         "columns": {name: _column(values, form) for name, (values, form) in columns.items()},
     }
 

@@ -2,27 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.blocks import ROWS, in_blocks
 from postproc.compensation.correct import Result, State
 from postproc.compensation.division import Division
 from postproc.compensation.task import Task
 from postproc.document import Document, Edit, Edits, Span, apply
+from postproc.report.page_rows import SHOWN, shown_rows, worst_rows
 from postproc.report.report import Report
 from postproc.report.terminal import printable
 from postproc.robot.description import COVERAGE
 from postproc.units import MM
-
-PLACES = 12
-"""Worst places that the page tells, with their text."""
-
-SHOWN = 50_000
-"""Motions that the figures of a page show at most."""
 
 BENDS, EACH = 60_000, (3, 23)
 """Points that draw arcs, in all about so many; of each arc no fewer and no more."""
@@ -45,7 +42,7 @@ class Output(Protocol):
 
 @dataclass(frozen=True)
 class Place:
-    """A motion worth a look.  row: of the arrays; why: what makes it one; source, written: its text before and after,
+    """A motion worth a look.  row: of the columns; why: what makes it one; source, written: its text before and after,
     line by line; ``written`` is () where nothing was written."""
 
     row: int
@@ -56,15 +53,16 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class PageData:
-    """N motions of one program, mm and N.
+    """K motions of the ``motions`` of one program: those that figures and table show, mm and N.
 
-    report: figures, findings, model and digests.  tolerance: what the output may keep.  line, kind, state, cut (N,): as
-    in Toolpath and Result; cut -1 in air.  way (N,) [mm]: length of the cutting path to the end of each motion.
-    position (N, 3): wanted end point; arcs (K,): rows of arcs, and bends (K, B, 3) points on their way; force (N, 3)
-    [N]; deflection (N, 3) before: all in the robot base.  correction (N, 3): command minus wanted, in the axes of the
-    programmed base.  before, after (N,): predicted error at the end points; between (N,): the largest on the way there
-    after the correction.  inserted (N,): motions of the output before this one.
-    interval (N,): half width of the 95 % interval of a coordinate of the predicted place, in the direction in which it
+    report: figures, findings, model and digests.  tolerance: what the output may keep.  off: motions that are left
+    alone on the program's own word.  rows (K,): the motions shown, ascending.  line, kind, state, cut (K,): as in
+    Toolpath and Result; cut -1 in air.  way (K,) [mm]: length of the cutting path to the end of each motion.
+    position (K, 3): wanted end point; arcs (A,): which of the K are arcs from the one before, and bends (A, B, 3)
+    points on their way; force (K, 3) [N]; deflection (K, 3) before: all in the robot base.  correction (K, 3): command
+    minus wanted, in the axes of the programmed base.  before, after (K,): predicted error at the end points; between
+    (K,): the largest on the way there after the correction.  inserted (K,): motions of the output before this one.
+    interval (K,): half width of the 95 % interval of a coordinate of the predicted place, in the direction in which it
     is largest; evaluated: motions at which it was computed, between them it is interpolated.  NaN wherever a figure is
     not known.
     """
@@ -72,6 +70,9 @@ class PageData:
     report: Report
     corrected: bool
     tolerance: float
+    motions: int
+    off: int
+    rows: Ints
     line: Ints
     kind: Ints
     state: Ints
@@ -91,123 +92,113 @@ class PageData:
     evaluated: int
     places: tuple[Place, ...]
 
-    def __len__(self) -> int:
-        return len(self.line)
-
-    @property
-    def cutting(self) -> Ints:
-        """Rows that carry a force, or are corrected for what else the model knows."""
-        return np.flatnonzero(self.state != State.AIR)
-
 
 def page_data(
-    task: Task, result: Result, report: Report, documents: Sequence[Document], output: Output | None = None
+    task: Task,
+    result: Result,
+    report: Report,
+    documents: Sequence[Document],
+    output: Output | None = None,
+    limit: int = SHOWN,
 ) -> PageData:
-    """All that the page of ``result`` shows.  documents: of the program that was read; output: None where nothing is
-    corrected (a prediction)."""
-    path, wanted, n = task.toolpath, task.wanted.position, len(task.toolpath)
-    scope = result.state != State.AIR
-    shift = (task.base.inverse() @ result.command[:]).position - path.position
-    between, inserted = np.full(n, np.nan), np.zeros(n, np.int64)
+    """All that the page of ``result`` shows, ``limit`` motions at most.  documents: of the program that was read;
+    output: None where nothing is corrected (a prediction)."""
+    path, n = task.toolpath, len(task.toolpath)
+    state, cut, scope = result.state, result.cut, result.state != State.AIR
+    first = np.arange(n + 1)
+    between = np.full(n, np.nan)
     if output is not None:
-        source = output.division.source
-        np.fmax.at(between, source, output.between)
-        inserted = np.bincount(source, minlength=n) - 1
-    found = _worst(result, scope, between, output is not None)
+        first = np.searchsorted(output.division.source, first)
+        between = np.fmax.reduceat(output.between, first[:-1])
+    found = worst_rows(result, scope, between, output is not None)
+    before, after, between = (_known(values, scope) for values in (result.before, result.after, between))
+    size = np.sqrt(np.einsum("ni,ni->n", result.correction, result.correction))
+    turns = (cut[1:] != cut[:-1]) | (state[1:] != state[:-1])
+    quantities = [(1, before), (-1, before), (1, after), (-1, after), (1, between), (1, size)]
+    rows = shown_rows(n, [row for row, _ in found], turns, quantities, limit)
     lines = [int(path.line[row]) for row, _ in found]
     texts = source_texts(documents[0], lines, () if output is None else output.edits)
+    arcs, bends = _bends(task, rows)
     return PageData(
         report=report,
         corrected=output is not None,
         tolerance=task.tolerance / MM,
-        line=path.line,
-        kind=path.kind,
-        state=result.state,
-        cut=result.cut,
-        way=np.cumsum(np.where(scope, task.ways.length, 0.0)) / MM,
-        position=wanted / MM,
-        arcs=(arcs := np.flatnonzero(task.ways.known & task.ways.arc)),
-        bends=_bends(task, arcs),
-        force=task.wrench[:, :3],
-        deflection=result.deflection / MM,
-        correction=shift / MM,
-        before=_known(result.before, scope) / MM,
-        after=_known(result.after, scope) / MM,
-        between=_known(between, scope) / MM,
-        inserted=inserted,
-        interval=_interval(report, n, scope),
+        motions=n,
+        off=int(np.count_nonzero(state == State.OFF)),
+        rows=rows,
+        line=path.line[rows],
+        kind=path.kind[rows],
+        state=state[rows],
+        cut=cut[rows],
+        way=np.cumsum(np.where(scope, task.ways.length, 0.0))[rows] / MM,
+        position=_by_blocks(lambda some: task.wanted[some].position, rows) / MM,
+        arcs=arcs,
+        bends=bends,
+        force=task.wrench[rows, :3],
+        deflection=result.deflection[rows] / MM,
+        correction=_by_blocks(lambda some: _correction(task, result, some), rows) / MM,
+        before=before[rows] / MM,
+        after=after[rows] / MM,
+        between=between[rows] / MM,
+        inserted=first[rows + 1] - first[rows] - 1,
+        interval=np.where(scope[rows], _interval(report, rows), np.nan),
         evaluated=len(report.doubt.deviation),
         places=tuple(
-            Place(row, why, source, () if output is None else written)
+            Place(int(np.searchsorted(rows, row)), why, source, () if output is None else written)
             for (row, why), (source, written) in zip(found, texts, strict=True)
         ),
     )
 
 
-def _bends(task: Task, arcs: Ints) -> Floats:
-    """(K, B, 3) [mm] points evenly inside of the wanted arcs; few of each where there are many arcs."""
-    each = int(np.clip(BENDS // max(len(arcs), 1), *EACH))
-    share = np.tile(np.arange(1, each + 1) / (each + 1), len(arcs))
-    points = task.ways.at(np.repeat(arcs, each), share).position / MM
-    return np.asarray(points.reshape(len(arcs), each, 3))
+def _by_blocks(made: Callable[[Ints], Floats], rows: Ints, each: int = 1) -> Floats:
+    """(K each, 3) what ``made`` gives of ``rows`` (K,)."""
+    parts = in_blocks(lambda block: made(rows[block]), len(rows), ROWS // each)
+    return np.concatenate([np.empty((0, 3)), *parts])
 
 
-def shown_rows(data: PageData, limit: int = SHOWN) -> Ints:
-    """Rows that figures show: all, or at most ``limit`` of many.
+def _correction(task: Task, result: Result, rows: Ints) -> Floats:
+    command = task.base[rows].inverse() @ result.command[rows]
+    return command.position - task.toolpath.position[rows]
 
-    Half of them lie evenly along the program, for its shape.  Of each of many stretches of the program those with the
-    largest and smallest error before and after, the largest on the way and the largest correction are shown, so that
-    no extreme is lost; the worst places are, and the begin and end of cuts as long as there is room.
-    """
-    n = len(data)
-    if n <= limit:
-        return np.arange(n)
-    must = [np.array([0, n - 1, *(place.row for place in data.places)])]
-    turn = np.flatnonzero((data.cut[1:] != data.cut[:-1]) | (data.state[1:] != data.state[:-1]))
-    if 2 * len(turn) <= limit // 4:
-        must.append(np.concatenate([turn, turn + 1]))
-    kept = np.unique(np.concatenate(must))
-    size = np.linalg.norm(data.correction, axis=1)
-    quantities = (data.before, -data.before, data.after, -data.after, data.between, size)
-    room = limit - len(kept)
-    stretches = room // 2 // len(quantities)
-    of = np.arange(n) * stretches // n
-    last = np.append(np.flatnonzero(np.diff(of)), n - 1)
-    chosen = [kept, np.linspace(0, n - 1, room // 2).astype(np.int64)]
-    for values in quantities:
-        order = np.lexsort((np.nan_to_num(values, nan=-np.inf), of))
-        chosen.append(order[last])
-    return np.unique(np.concatenate(chosen))
+
+def _bends(task: Task, rows: Ints) -> tuple[Ints, Floats]:
+    """Which of ``rows`` (K,) are arcs of which the begin is among them as well (A,), and (A, B, 3) [mm] points evenly
+    inside of them; few of each where the program has many arcs."""
+    arc = task.ways.known & task.ways.arc
+    each = int(np.clip(BENDS // max(int(arc.sum()), 1), *EACH))
+    places = np.flatnonzero(arc[rows[1:]] & (np.diff(rows) == 1)) + 1
+    shares = np.arange(1, each + 1) / (each + 1)
+
+    def points(arcs: Ints) -> Floats:
+        return task.ways.at(np.repeat(arcs, each), np.tile(shares, len(arcs))).position / MM
+
+    return places, _by_blocks(points, rows[places], each).reshape(len(places), each, 3)
 
 
 def source_texts(
     document: Document, lines: Sequence[int], edits: Iterable[Edit]
 ) -> list[tuple[str, tuple[str, ...]]]:
     """The text of each of ``lines`` (from 1) before, and what the edits make of it; "" of a line that is not there."""
-    every = Edits.joined(edits)
-    there = [0 < line <= len(document.line_starts) for line in lines]
-    starts = np.unique(
-        [document.line_starts[line - 1] for line, is_ in zip(lines, there, strict=True) if is_]
-    )
-    stops = {int(start): document.raw.find(b"\n", start) + 1 or len(document.raw) for start in starts}
-    own: dict[int, list[Edit]] = {start: [] for start in stops}
-    if len(starts):
-        at = starts[np.maximum(np.searchsorted(starts, every.start, side="right") - 1, 0)]
-        end = np.array(list(stops.values()))[np.searchsorted(starts, at)]
-        for k in np.flatnonzero((every.file == 0) & (every.start >= at) & (every.start < end)):
-            edit, start = every[int(k)], int(at[k])
-            own[start].append(Edit(Span(0, edit.span.start - start, edit.span.stop - start), edit.text))
+    every, starts, raw = Edits.joined(edits), document.line_starts, document.raw
+    high = bisect_left(every.file, 1)
     told: list[tuple[str, tuple[str, ...]]] = []
-    for line, is_ in zip(lines, there, strict=True):
-        if not is_:
+    for line in lines:
+        if not 0 < line <= len(starts):
             told.append(("", ()))
             continue
-        start = document.line_starts[line - 1]
-        piece = Document(document.path, document.raw[start : stops[start]])
-        after = apply(piece, own[start]).splitlines()
+        start = int(starts[line - 1])
+        stop = raw.find(b"\n", start) + 1 or len(raw)
+        own = every[bisect_left(every.start, start, 0, high) : bisect_left(every.start, stop, 0, high)]
+        piece = Document(document.path, raw[start:stop])
+        after = apply(piece, [_moved(edit, start) for edit in own]).splitlines()
         more = [f"and {len(after) - LINES} more lines"] if len(after) > LINES else []
         told.append((_text(piece.raw.rstrip(b"\r\n")), tuple([_text(row) for row in after[-LINES:]] + more)))
     return told
+
+
+def _moved(edit: Edit, start: int) -> Edit:
+    """The edit in a piece of its document that begins at ``start``."""
+    return Edit(Span(0, edit.span.start - start, edit.span.stop - start), edit.text)
 
 
 def _text(raw: bytes) -> str:
@@ -219,38 +210,15 @@ def _text(raw: bytes) -> str:
     return printable(text.replace("\t", "    "))
 
 
-def _worst(result: Result, scope: Bools, between: Floats, corrected: bool) -> list[tuple[int, str]]:
-    """Rows of the largest errors with why: before, after, on the way; then the largest of each cut, and the next."""
-    before = np.where(scope & np.isfinite(result.before), result.before, -1.0)
-    order = np.argsort(-before, kind="stable")
-    order = order[before[order] >= 0]
-    if not len(order):
-        return []
-    found = {int(order[0]): "largest before"}
-    after = (("largest after", result.after), ("largest on the way after", between))
-    for why, values in after if corrected else ():
-        error = np.where(scope & np.isfinite(values), values, -1.0)
-        if error.max() > 0:
-            row = int(np.argmax(error))
-            found[row] = f"{found[row]}, {why}" if row in found else why
-    _, first = np.unique(result.cut[order], return_index=True)
-    for row in order[np.sort(first)]:
-        found.setdefault(int(row), f"largest of cut {result.cut[row] + 1}" if result.cut[row] >= 0 else "")
-    for row in order[: 2 * PLACES]:
-        found.setdefault(int(row), "")
-    return list(found.items())[:PLACES]
-
-
 def _known(values: Floats, scope: Bools) -> Floats:
     return np.where(scope & np.isfinite(values), values, np.nan)
 
 
-def _interval(report: Report, n: int, scope: Bools) -> Floats:
-    """(N,) [mm] half width at every cutting motion, between those that were evaluated interpolated."""
+def _interval(report: Report, rows: Ints) -> Floats:
+    """(K,) [mm] half width at ``rows`` (K,), between those that were evaluated interpolated."""
     doubt = report.doubt
     known = np.isfinite(doubt.deviation)
     if not known.any():
-        return np.full(n, np.nan)
-    rows = doubt.rows[: len(doubt.deviation)][known]
-    width = np.interp(np.arange(n), rows, COVERAGE * doubt.deviation[known] / MM)
-    return np.where(scope, width, np.nan)
+        return np.full(len(rows), np.nan)
+    evaluated = doubt.rows[: len(doubt.deviation)][known]
+    return np.interp(rows, evaluated, COVERAGE * doubt.deviation[known] / MM)

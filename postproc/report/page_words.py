@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from rich.text import Text
 
-from postproc.compensation.correct import State
 from postproc.compensation.doubt import Doubt
 from postproc.report.page_data import PageData
 from postproc.report.report import Report
@@ -96,9 +95,8 @@ def program_tiles(data: PageData) -> list[Tile]:
         )
     tiles.append(_how_sure(report))
     if data.corrected:
-        off = int((data.state == State.OFF).sum())
         note = f"of {count(report.cutting, 'cutting motion')}"
-        note += f"; {off} more on the program's own word" if off else ""
+        note += f"; {data.off} more on the program's own word" if data.off else ""
         tiles.append(Tile("left as it was", count(report.left, "motion"), note))
     return tiles
 
@@ -119,9 +117,8 @@ def left_over(data: PageData) -> list[str]:
         return []
     told = [f.message for f in data.report.findings if f.code == "COR003"]
     more = [f"and {len(told) - LEFT} more cuts, see the findings"] if len(told) > LEFT else []
-    off = int((data.state == State.OFF).sum())
-    own = [f"{count(off, 'motion')} between COMPENSATE OFF and ON, as the program says"] if off else []
-    return told[:LEFT] + more + own
+    off = f"{count(data.off, 'motion')} between COMPENSATE OFF and ON, as the program says"
+    return told[:LEFT] + more + ([off] if data.off else [])
 
 
 def program_facts(report: Report) -> list[tuple[str, str]]:
