@@ -126,6 +126,15 @@ def test_what_inputs_decide_is_refused(text: str, rest: str, expected: list[str]
     assert codes(found) == expected
 
 
+@pytest.mark.parametrize("first", ["", "IF $IN[1] THEN\n{}ENDIF\n", "{}"])
+@pytest.mark.parametrize("second", ["IF $IN[2] THEN\n{}ENDIF\n", "LOOP\n{}{}ENDLOOP\n", "out()\n"])
+def test_a_statement_that_stood_elsewhere_counts_in_its_block_too(first: str, second: str) -> None:
+    change = "BAS(#BASE,2)\n"
+    text = first.format(change) + "BAS(#BASE,1)\n" + FULL + second.format(change, change) + FULL
+    found = body(text, f"DEF out()\n{change}END\n" if "out" in second else "")
+    assert codes(found)[-1:] == ["KRL005"] or found.toolpath.base[-1] != found.toolpath.base[0]
+
+
 def test_rows_of_a_line_that_runs_several_times_are_whole() -> None:
     found = body("FOR i=1 TO 2\nLIN {X i}\nENDFOR\n" + FULL)
     assert list(found.toolpath.whole) == [1, 2]

@@ -7,6 +7,7 @@ assigns) or the name (bytes) of a variable that is assigned.
 from __future__ import annotations
 
 import re
+from collections.abc import Set
 
 from postproc.dialects.krl.lexing import (
     NAME,
@@ -17,6 +18,7 @@ from postproc.dialects.krl.lexing import (
     Declared,
     Statement,
     identifiers,
+    kept,
     without_strings,
 )
 from postproc.dialects.krl.target import AXES, COMPONENTS, EXTERNAL
@@ -91,20 +93,24 @@ def is_harmless(name: bytes) -> bool:
     return name in HARMLESS or name.startswith(HARMLESS_BEGIN)
 
 
-def functions_of(statement: Statement) -> list[bytes]:
+def functions_of(statement: Statement) -> tuple[bytes, ...]:
     """The functions that the expressions of a statement call, those of KRL itself left out; upper case."""
     if statement.kind not in _CALLING and statement.word != b"WAIT":
-        return []
+        return ()
     if b"(" not in statement.code or statement.word in SPLINES:
-        return []
-    code = without_strings(statement.code)
-    if isinstance(statement.said, Call):
-        code = without_strings(statement.said.arguments)
-    names = dict.fromkeys(name.upper() for name in _FUNCTION.findall(code))
-    return [name for name in names if name not in _WORDS]
+        return ()
+    said = statement.said
+    code = said.arguments if isinstance(said, Call) else statement.code
+    return _functions(code) if b"(" in code else ()
 
 
-def read_by(statement: Statement) -> set[bytes]:
+@kept
+def _functions(code: bytes) -> tuple[bytes, ...]:
+    names = dict.fromkeys(name.upper() for name in _FUNCTION.findall(without_strings(code)))
+    return tuple(name for name in names if name not in _WORDS)
+
+
+def read_by(statement: Statement) -> Set[bytes]:
     """Names that a statement reads."""
     said = statement.said
     if isinstance(said, Assignment):

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterator
+from functools import lru_cache, wraps
+from typing import NamedTuple, TypeVar
 
 from postproc.document import Document
 
+T = TypeVar("T")
 BOM = b"\xef\xbb\xbf"
 NAME = rb"[A-Za-z_$][A-Za-z0-9_$]*"
 
@@ -114,6 +116,17 @@ class Statement(NamedTuple):
     comment: bytes = b""
 
 
+def kept(function: Callable[[bytes], T]) -> Callable[[bytes], T]:
+    """A function of code that keeps what it gave for short pieces: some lines come again and again."""
+    cached = lru_cache(maxsize=1024)(function)
+
+    @wraps(function)
+    def short_or_long(code: bytes) -> T:
+        return cached(code) if len(code) <= 100 else function(code)
+
+    return short_or_long
+
+
 def keyed(name: bytes, index: bytes | None) -> bytes | None:
     """The name of a variable or of an array's element with a constant index; None for any other index."""
     if index is None:
@@ -131,9 +144,10 @@ def split_comment(line: bytes) -> tuple[bytes, bytes]:
     return (line, b"") if at < 0 else (line[:at], line[at:])
 
 
-def identifiers(code: bytes) -> set[bytes]:
+@kept
+def identifiers(code: bytes) -> frozenset[bytes]:
     """Every name that a piece of code mentions, upper case; enumeration words (#X) and strings are none."""
-    return {name.upper() for name in _IDENTIFIER.findall(without_strings(code))} if code else set()
+    return frozenset([name.upper() for name in _IDENTIFIER.findall(without_strings(code))])
 
 
 def without_strings(code: bytes) -> bytes:

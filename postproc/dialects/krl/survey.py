@@ -31,6 +31,9 @@ from postproc.dialects.krl.lexing import (
 MOST_EFFECTS = 200
 """Variables of one block; where it assigns more, all that the program assigns count as changed."""
 
+MOST_NOTED = 1000
+"""Statements of a block that are known again."""
+
 DEEPEST = 100
 """Nested blocks; what lies deeper is passed over as one."""
 
@@ -106,6 +109,8 @@ class _Surveyor:
         self.routine: Routine | None = None
         self.folds: list[bool] = []  # those that are open, and whether it is that of an inline form
         self.inline = 0
+        self.noted_in: Block | None = None
+        self.noted: set[bytes] = set()  # statements of that block, which say no more a second time
 
     def take(self, index: int, statement: Statement) -> None:
         kind, stack = statement.kind, self.stack
@@ -232,6 +237,14 @@ class _Surveyor:
     def note(self, statement: Statement) -> None:
         """Takes up what a statement that moves nothing changes and reads."""
         found, stack = self.found, self.stack
+        block = stack[-1] if stack else None
+        if block is not self.noted_in:
+            self.noted_in = block
+            self.noted.clear()
+        if statement.code in self.noted:
+            return
+        if len(self.noted) < MOST_NOTED:
+            self.noted.add(statement.code)
         effects, called = effects_of(statement)
         functions = functions_of(statement)
         if not all(map(is_harmless, functions)):
