@@ -70,3 +70,9 @@ def in_blocks(work: Callable[[slice], T], count: int, rows: int = ROWS) -> Itera
         finally:
             for future in ahead:
                 future.cancel()
+
+
+def each_block(work: Callable[[slice], None], count: int, rows: int = ROWS) -> None:
+    """``work`` of every block of ``count`` rows, which puts what it finds in its place."""
+    for _ in in_blocks(work, count, rows):
+        pass

@@ -35,13 +35,13 @@ class Poses:
     def __matmul__(self, other: Poses) -> Poses:
         """``a_in_w @ b_in_a`` is b in w; leading shapes broadcast."""
         return Poses(
-            self.rotation @ other.rotation,
-            self.position + (self.rotation @ other.position[..., None])[..., 0],
+            product(self.rotation, other.rotation),
+            self.position + turned(self.rotation, other.position),
         )
 
     def inverse(self) -> Poses:
         back = np.swapaxes(self.rotation, -1, -2)
-        return Poses(back, -(back @ self.position[..., None])[..., 0])
+        return Poses(back, -turned(back, self.position))
 
     def __getitem__(self, rows: Any) -> Poses:
         return Poses(self.rotation[rows], self.position[rows])
@@ -100,6 +100,22 @@ class PoseRows:
 
 Placed = Poses | PoseRows
 """Poses, by rows."""
+
+
+def product(one: Floats, other: Floats) -> Floats:
+    """one @ other of rotations (..., 3, 3): a single product of matrices where one of them is the same for all."""
+    if other.ndim == 2 < one.ndim:
+        return (one.reshape(-1, 3) @ other).reshape(one.shape)
+    if one.ndim == 2 < other.ndim:
+        return np.swapaxes(product(np.swapaxes(other, -1, -2), one.T), -1, -2)
+    return np.asarray(one @ other)
+
+
+def turned(rotation: Floats, vector: Floats) -> Floats:
+    """Vectors (..., 3) turned by rotations (..., 3, 3); leading shapes broadcast."""
+    if rotation.ndim == 2:
+        return np.asarray(vector @ rotation.T)
+    return np.einsum("...ij,...j->...i", rotation, vector)
 
 
 def rotation_from_abc(abc: ArrayLike) -> Floats:

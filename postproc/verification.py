@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.blocks import in_blocks
+from postproc.blocks import each_block
 from postproc.compensation.task import Task
 from postproc.geometry import Poses, on_arc, rotation_from_vector, vector_from_rotation
 from postproc.toolpath import Kind, Toolpath
@@ -178,8 +178,7 @@ def simulate(original: Task, run: Task, match: Ints, step: float = STEP) -> Simu
             original, run, goes_on, motion[part], row[part], share[part], guess[part]
         )
 
-    for _ in in_blocks(looked, len(motion)):
-        pass
+    each_block(looked, len(motion))
     at_end = number + 1 == np.repeat(count, count)
     is_link = _links(original, run, rows, owner, nearest[at_end])
     seen = np.isfinite(error[:, 0])

@@ -12,7 +12,7 @@ import numpy as np
 
 from postproc import __version__
 from postproc.arrays import Bools, Floats, Ints
-from postproc.blocks import blocks, in_blocks
+from postproc.blocks import blocks, each_block
 from postproc.cell import Cell
 from postproc.compensation.between import errors_between
 from postproc.compensation.correct import Result, with_residual
@@ -58,8 +58,7 @@ def planned(task: Task, division: Division) -> Plan:
         if arcs:
             centre[rows], normal[rows], sweep[rows] = part.centre, part.normal, part.sweep
 
-    for _ in in_blocks(put, m):
-        pass
+    each_block(put, m)
     for array in (position, rotation, centre, normal, sweep):
         array.setflags(write=False)
     return Plan(division.source, division.role, position, rotation, centre, normal, sweep)
@@ -154,8 +153,7 @@ def way_errors(task: Task, result: Result, division: Division) -> Floats:
         first = (pieces.first == 0.0) & task.steps(pieces.rows, result.corrected)
         errors[chosen[part]], _ = errors_between(task, pieces, first)
 
-    for _ in in_blocks(looked, len(chosen)):
-        pass
+    each_block(looked, len(chosen))
     return errors
 
 
@@ -213,10 +211,13 @@ def _hold(task: Task, division: Division, back: Toolpath, writing: Writing, file
     place = np.flatnonzero(own)
     if set(back.refused) != {int(place[row]) for row in path.refused}:
         raise Refusal(Finding("FIL008", "other motions than before are not understood", file))
-    for rows in blocks(len(division)):
+
+    def held(rows: slice) -> None:
         plan = _planned(task, division, rows)
         _hold_texts(path, back, plan, rows, file)
         _hold_targets(path, back, plan, rows, writing, file)
+
+    each_block(held, len(division))
     _hold_arcs(task, division, back, 10.0**-writing.mm, file)
 
 
@@ -262,7 +263,7 @@ def _hold_arcs(task: Task, division: Division, back: Toolpath, step_mm: float, f
     arc = np.isfinite(division.sweep) | (kept & np.isfinite(path.sweep[source]))
     if not np.array_equal(np.isfinite(back.sweep), arc):
         raise Refusal(Finding("FIL008", "arcs were lost or appeared", file))
-    for rows in blocks(len(division)):
+    for rows in blocks(len(division)) if arc.any() else ():
         begin = max(rows.start - 1, 0)
         plan = _planned(task, division, slice(begin, rows.stop))
         at = np.flatnonzero(np.isfinite(plan.sweep))

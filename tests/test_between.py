@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from postproc.compensation.between import SHARES, errors_between
 from postproc.compensation.correct import correct
 from postproc.compensation.division import Limits, divide, made
+from postproc.geometry import Poses
 from postproc.robot.inverse import inverse
 from postproc.workflows.preparation import Request, prepare
 
@@ -25,7 +26,7 @@ def reached(task, row, pose, wrench):
     tool = task.tool[row]
     rotation, position = pose
     flange_turn = rotation @ tool.rotation.T
-    flange = type(task.wanted)(flange_turn[None], (position - flange_turn @ tool.position)[None])
+    flange = Poses(flange_turn[None], (position - flange_turn @ tool.position)[None])
     q = inverse(task.model.robot.nominal, flange, task.track.status[[row]], task.track.q[[row]]).q
     return task.model.equilibrium(q, wrench[None], tool).pose.position[0]
 

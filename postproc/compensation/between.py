@@ -19,6 +19,10 @@ SHARES = (0.25, 0.5, 0.75)
 SHORT, LITTLE = 30 * MM, 3 * DEG
 """Of a piece that is shorter and turns by less the middle tells enough."""
 
+COARSE = 1e-8
+"""[rad, m] Last step of an equilibrium here.  What is left after it is less than a hundredth of that, a tenth of a
+nanometre at the tool."""
+
 
 @dataclass(frozen=True)
 class Pieces:
@@ -117,8 +121,8 @@ def _errors(task: Task, pieces: Pieces, share: float) -> tuple[Floats, Floats]:
     along = pieces.first + share * (pieces.last - pieces.first)
     wanted = task.ways.at(rows, along)
     wrench = task.force.along(rows, along)
-    real = task.real(rows, pieces.at(np.full(len(rows), share)), wrench)
-    shift, turn = task.off(rows, real.pose, task.goal(rows, wanted))
+    real = task.real(rows, pieces.at(np.full(len(rows), share)), wrench, COARSE)
+    shift, turn = task.off(rows, real.pose, task.goal(rows, wanted, COARSE))
     tangent = task.ways.tangent(rows, along)
     shift = shift - np.sum(shift * tangent, axis=1, keepdims=True) * tangent
     good = real.reachable & real.settled

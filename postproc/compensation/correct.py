@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.blocks import blocks, in_blocks
+from postproc.blocks import each_block, in_blocks
 from postproc.compensation.cuts import cuts_of, left_findings, spread, switch_findings, switched_on
 from postproc.compensation.mirror import Correction, difference
 from postproc.compensation.task import Task
@@ -145,8 +145,7 @@ def with_residual(task: Task, result: Result, command: Placed) -> Result:
         after_angle[at] = np.linalg.norm(turn, axis=1)
         correction[at] = there.position - wanted.position
 
-    for _ in in_blocks(predicted, len(rows)):
-        pass
+    each_block(predicted, len(rows))
     return replace(result, command=command, correction=correction, after=after, after_angle=after_angle)
 
 
@@ -329,7 +328,7 @@ def _refuse(task: Task, mask: Bools, code: str, message: str, help: str) -> None
 
 def _warn_singular(task: Task, rows: Ints, findings: list[Finding]) -> None:
     robot, q = task.model.robot, task.track.q
-    parts = [rows[part][near_singular(robot, q[rows[part]])] for part in blocks(len(rows))]
+    parts = in_blocks(lambda part: rows[part][near_singular(robot, q[rows[part]])], len(rows))
     close = np.concatenate([rows[:0], *parts])
     if len(close):
         message = singular_words(robot) + _more(task, close)

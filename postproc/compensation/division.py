@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.blocks import ROWS, in_blocks
+from postproc.blocks import ROWS, each_block, in_blocks
 from postproc.compensation.between import Pieces, errors_between
 from postproc.compensation.correct import Result, correct
 from postproc.compensation.mirror import partly
@@ -151,8 +151,7 @@ class _Search:
                 np.linalg.norm(turn, axis=1) / task.tolerance_angle,
             )
 
-        for _ in in_blocks(stepped, len(other)):
-            pass
+        each_block(stepped, len(other))
         may = self.free[rows] & task.carries[rows]
         self.linked = may & (self.step > ROOM)
         some = np.flatnonzero(may & (self.step > STEP) & ~self.linked)
@@ -363,8 +362,7 @@ class _Search:
                 for way, values in zip(ways, (pieces.centre, pieces.normal, pieces.sweep), strict=True):
                     way[place] = values
 
-        for _ in in_blocks(divided, len(chosen), _rows(self.count[chosen])):
-            pass
+        each_block(divided, len(chosen), _rows(self.count[chosen]))
 
         full = self.full.command
 

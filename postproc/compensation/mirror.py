@@ -15,7 +15,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.effects import Conditions
 from postproc.geometry import Poses, rotation_from_vector, vector_from_rotation
-from postproc.model import StiffnessModel
+from postproc.model import STEP_TOLERANCE, StiffnessModel
 from postproc.robot.inverse import inverse
 
 POSITION_TOLERANCE = 1e-8
@@ -48,14 +48,16 @@ def predict(
     status: Ints,
     near: Floats,
     start: Floats | None = None,
+    tolerance: float = STEP_TOLERANCE,
 ) -> Prediction:
     """The tool's pose when the controller is sent to ``command`` (N TCP poses in the robot base) under ``wrench``
     (N, 6), in the branch ``status`` (N,), with turns nearest to ``near`` (N, 6) [rad].
 
-    ``start`` (N, m): the displacement of a state nearby, to begin the equilibrium with.
+    ``start`` (N, m): the displacement of a state nearby, to begin the equilibrium with; ``tolerance`` [rad, m]: its
+    last step.
     """
     found = inverse(model.robot.nominal, command @ tool.inverse(), status, near)
-    rest = model.equilibrium(found.q, wrench, tool, conditions, start)
+    rest = model.equilibrium(found.q, wrench, tool, conditions, start, tolerance)
     return Prediction(rest.pose, found.q, rest.displacement, found.reachable, rest.converged)
 
 

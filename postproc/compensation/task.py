@@ -13,7 +13,7 @@ from postproc.compensation.ways import Ways
 from postproc.effects import Conditions
 from postproc.forces import Wrenches
 from postproc.geometry import Placed, Poses
-from postproc.model import StiffnessModel
+from postproc.model import STEP_TOLERANCE, StiffnessModel
 from postproc.robot.inverse import inverse
 from postproc.robot.track import Track, nominal_flange
 from postproc.toolpath import Toolpath
@@ -58,9 +58,11 @@ class Task:
     def ways(self) -> Ways:
         return Ways.of(self.toolpath, self.wanted, self.base, self.tool, self.model.robot, self.track)
 
-    def real(self, rows: Ints, command: Poses, wrench: Floats) -> Prediction:
+    def real(
+        self, rows: Ints, command: Poses, wrench: Floats, tolerance: float = STEP_TOLERANCE
+    ) -> Prediction:
         """Where the tool comes when the controller is sent to ``command`` (K) in motions ``rows`` (K,) under
-        ``wrench`` (K, 6)."""
+        ``wrench`` (K, 6).  ``tolerance`` [rad, m]: last step of the equilibrium."""
         return predict(
             self.model,
             command,
@@ -69,13 +71,14 @@ class Task:
             self.conditions.part(rows),
             self.track.status[rows],
             self.track.q[rows],
+            tolerance=tolerance,
         )
 
-    def goal(self, rows: Ints, wanted: Poses) -> Poses:
+    def goal(self, rows: Ints, wanted: Poses, tolerance: float = STEP_TOLERANCE) -> Poses:
         """Where the tool is to be: the wanted poses (K), or where the robot without force takes it."""
         if not self.process or self.model.slack:
             return wanted
-        return self.real(rows, wanted, np.zeros((len(rows), 6))).pose
+        return self.real(rows, wanted, np.zeros((len(rows), 6)), tolerance).pose
 
     def command(self, rows: Ints, wanted: Poses, wrench: Floats, goal: Poses) -> Correction:
         """The commands (K) that bring the tool to ``goal`` (K) in motions ``rows`` (K,)."""

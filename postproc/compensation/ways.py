@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.blocks import in_blocks
+from postproc.blocks import each_block
 from postproc.compensation.mirror import partly
 from postproc.geometry import UNKNOWN, Placed, PoseRows, Poses, on_arc
 from postproc.robot.description import Robot
@@ -53,8 +53,7 @@ class Ways:
                 way[bent] = np.hypot(radius * sweep, rise)
             length[block] = np.where(known[block], way, 0.0)
 
-        for _ in in_blocks(measured, n):
-            pass
+        each_block(measured, n)
         return ways
 
     @property

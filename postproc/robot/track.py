@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.blocks import in_blocks
+from postproc.blocks import each_block, in_blocks
 from postproc.geometry import Placed, Poses, wrapped
 from postproc.robot.chain import Chain
 from postproc.robot.description import Robot
@@ -81,8 +81,7 @@ def follow(robot: Robot, toolpath: Toolpath, flange: Placed, start: Floats | Non
             found = inverse(robot.nominal, flange[rows], status[rows], np.tile(near, (len(rows), 1)))
             q[rows], reachable[rows] = found.q, found.reachable
 
-        for _ in in_blocks(solved, len(solve)):
-            pass
+        each_block(solved, len(solve))
         _settle(robot.nominal, q, toolpath, on_axes, start)
         stated = np.flatnonzero((toolpath.turn >= 0) & cartesian)
         bits = (toolpath.turn[stated, None] >> np.arange(6)) & 1 == 1
