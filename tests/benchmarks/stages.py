@@ -49,6 +49,7 @@ FILES = {
     "dialects/": "read",
     "document.py": "read",
     "files.py": "read",
+    "inputs.py": "read",
     "cell.py": "frames",
     "workflows/preparation.py": "frames",
     "forces/": "forces",
