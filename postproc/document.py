@@ -129,20 +129,24 @@ class Edits(Sequence[Edit]):
         """Takes the edits in any order; those of one place (file, start, stop) stay in the order given."""
         self.file, self.start, self.stop = file.astype(np.int8, copy=False), _narrow(start), _narrow(stop)
         self.texts, self.ends = texts, _narrow(ends)
-        if not self._ordered():
-            order = np.lexsort((self.stop, self.start, self.file))
-            self.file, self.start, self.stop = self.file[order], self.start[order], self.stop[order]
-            self.texts, self.ends = _rearranged(texts, self.ends, order)
+        self._arrange()
 
-    def _ordered(self) -> bool:
-        """Whether the edits stand in order of place."""
+    def _arrange(self) -> None:
+        """Brings the edits in order of place, one column after the other."""
         file, start, stop = self.file, self.start, self.stop
         later = stop[1:] >= stop[:-1]
         later &= start[1:] == start[:-1]
         later |= start[1:] > start[:-1]
         later &= file[1:] == file[:-1]
         later |= file[1:] > file[:-1]
-        return bool(later.all())
+        if later.all():
+            return
+        order = np.lexsort((stop, start, file))
+        del file, start, stop
+        self.file = self.file[order]
+        self.start = self.start[order]
+        self.stop = self.stop[order]
+        self.texts, self.ends = _rearranged(self.texts, self.ends, order)
 
     @staticmethod
     def joined(*parts: Iterable[Edit]) -> Edits:
@@ -165,11 +169,15 @@ class Edits(Sequence[Edit]):
             for column, kept, array in zip(columns, store, arrays, strict=True):
                 column.append(kept.keep(array))
         # Of what is there in parts, only one column is there as a whole as well.
-        del store, first, second, arrays
-        blob = b"".join([column.data for column in columns.pop()])
-        ends = sums(np.concatenate(columns.pop()), offset_type(len(blob)))
-        stop, start, file = (np.concatenate(columns.pop()) for _ in range(3))
-        return Edits(file, start, stop, blob, ends)
+        del store, first, second, edits, texts, arrays, column, kept, array
+        all_of_them = Edits.__new__(Edits)
+        all_of_them.texts = b"".join([column.data for column in columns.pop()])
+        all_of_them.ends = sums(np.concatenate(columns.pop()), offset_type(len(all_of_them.texts)))
+        all_of_them.stop = np.concatenate(columns.pop())
+        all_of_them.start = np.concatenate(columns.pop())
+        all_of_them.file = np.concatenate(columns.pop())
+        all_of_them._arrange()
+        return all_of_them
 
     def of(self, file: int) -> Edits:
         """The edits of one document."""
@@ -237,13 +245,14 @@ def _narrow(offsets: NDArray[Any]) -> Offsets:
 
 def _rearranged(texts: bytes, ends: NDArray[Any], order: Ints) -> tuple[bytes, Offsets]:
     """Texts in another order, and their new ends; those that stay together are taken together."""
+    arranged = sums(np.diff(ends)[order], offset_type(len(texts)))
     runs = np.concatenate([[0], np.flatnonzero(np.diff(order) != 1) + 1, [len(order)]])
-    rearranged = _sized(len(texts))
+    rearranged, view = _sized(len(texts)), memoryview(texts)
     for low in range(0, len(runs) - 1, BLOCK // 8):
         bounds = runs[low : low + BLOCK // 8 + 1]
         first, last = ends[order[bounds[:-1]]], ends[order[bounds[1:] - 1] + 1]
-        rearranged.write(b"".join([texts[a:b] for a, b in zip(first.tolist(), last.tolist(), strict=True)]))
-    return rearranged.getvalue(), sums(np.diff(ends)[order], offset_type(len(texts)))
+        rearranged.writelines(view[a:b] for a, b in zip(first.tolist(), last.tolist(), strict=True))
+    return rearranged.getvalue(), arranged
 
 
 def _sized(size: int) -> io.BytesIO:
