@@ -1,0 +1,196 @@
+"""Laws of G-code that hold for any program: what codes mean, where words and findings stand, blocks of rows, and what
+of a Sinumerik is not read rather than misread."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gcode_writing import DOWN, WRITING, random_plan, read
+
+from postproc.dialects.dialect import Program, Settings
+from postproc.dialects.gcode import DIALECTS, kuka_cnc, sinumerik, source
+from postproc.dialects.gcode import reader as reader_module
+from postproc.dialects.gcode import writer as writer_module
+from postproc.dialects.gcode.control import Code, Control, Feed, Group, Move, Once
+from postproc.dialects.gcode.lexing import lex
+from postproc.dialects.gcode.tables import FANUC, LINUXCNC
+from postproc.dialects.gcode.words import How
+from postproc.document import Document
+from postproc.units import DEG
+
+ROOT = Path(__file__).parent / "programs"
+NAMES = {dialect.name: dialect for dialect in DIALECTS}
+CONTROLS: dict[str, tuple[Control, dict[bytes, tuple[float, ...]]]] = {
+    "linuxcnc": (LINUXCNC, {}),
+    "fanuc": (FANUC, {}),
+    "kuka_cnc": (kuka_cnc.CONTROL, kuka_cnc.NAMED),
+    "sinumerik": (sinumerik.CONTROL, sinumerik.NAMED),
+}
+CASES = [
+    path
+    for name in NAMES
+    for path in sorted((ROOT / name).rglob("*"))
+    if path.is_file() and path.suffix != ".dump"
+]
+cases = pytest.mark.parametrize("path", CASES, ids=lambda path: f"{path.parent.name}-{path.stem}")
+
+
+def dialect_of(path: Path):
+    return NAMES[next(part for part in reversed(path.parts) if part in NAMES)]
+
+
+def settings_of(path: Path) -> Settings:
+    return Settings(orientation=DOWN.orientation, integer_words="um" if "_um" in path.stem else "mm")
+
+
+def program(path: Path) -> Program:
+    return dialect_of(path).read((Document(path, path.read_bytes()),), settings_of(path))
+
+
+PLAIN = re.compile(rb"[-+]?[\d. \t]+")
+
+# Codes
+
+
+def meaning(code: Code) -> str:
+    """``MOTION LINE``, ``UNITS 1``"""
+    words = {Group.MOTION: Move, Group.ONCE: Once, Group.FEED: Feed}.get(code.group)
+    return f"{code.group.name} {words(code.value).name if words else code.value}"
+
+
+def listing(control: Control, named: dict[bytes, tuple[float, ...]]) -> list[str]:
+    """What each code of a control says, one meaning a line; and what is in force before anything is said."""
+    names: dict[int, str] = {
+        round(number * 10): name.decode() for name, numbers in named.items() for number in numbers
+    }
+    found: dict[str, list[int]] = {}
+    for number, code in control.codes.items():
+        found.setdefault(meaning(code), []).append(number)
+    for number, codes in control.also.items():
+        for code in codes:
+            found.setdefault(f"also {meaning(code)}", []).append(number)
+    lines = [
+        f"{what}: {' '.join(names.get(n, f'G{n / 10:g}') for n in sorted(found[what]))}"
+        for what in sorted(found)
+    ]
+    lines += [f"begins with {meaning(Code(group, value))}" for group, value in sorted(control.start.items())]
+    return [
+        *lines,
+        f"ends with {' '.join(f'M{n}' for n in sorted(control.endings))}",
+        f"turns {control.turns} cycle apart {control.cycle_apart} increments {control.increments} "
+        f"angles {control.angles} whole {control.whole} further {control.further}",
+    ]
+
+
+@pytest.mark.parametrize("name", CONTROLS)
+def test_codes_mean_what_is_listed(name: str) -> None:
+    """The list is read beside the manual of the control: what a code means changes there or nowhere."""
+    assert listing(*CONTROLS[name]) == (ROOT / "codes" / f"{name}.txt").read_text().splitlines()
+
+
+# Places
+
+
+@cases
+def test_words_stand_where_their_numbers_are(path: Path) -> None:
+    """A word begins with its address; its number's bytes are its value; one without a number has no place for it."""
+    raw = path.read_bytes()
+    control = sinumerik.with_tools(raw) if "sinumerik" in path.parts else CONTROLS[dialect_of(path).name][0]
+    text = lex(raw, control)
+    words, lines = text.words, text.blocks
+    for k in range(len(words)):
+        at, start, stop, block = (int(a[k]) for a in (words.at, words.start, words.stop, words.block))
+        assert lines.start[block] <= at < stop <= lines.stop[block]
+        assert start == -1 or at < start < stop or (start == at and raw[at : at + 1].isdigit())
+        if start >= 0 and PLAIN.fullmatch(raw[start:stop]):
+            assert float(raw[start:stop].translate(None, b" \t")) == words.value[k]
+        elif start < 0:
+            assert words.how[k] != How.NUMBER
+    feeds = np.flatnonzero(np.frombuffer(raw, np.uint8) == 10)
+    assert np.array_equal(lines.line, 1 + np.searchsorted(feeds, lines.start))
+
+
+@cases
+def test_findings_point_into_their_file(path: Path) -> None:
+    found = program(path)
+    document = found.documents[0]
+    for finding in [*found.findings, *found.toolpath.refused.values()]:
+        assert 1 <= finding.line <= len(document.line_starts)
+        assert 1 <= finding.column <= max(len(document.line(finding.line)), 1), finding
+
+
+# Blocks
+
+
+@cases
+def test_parts_do_not_matter(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read and written in parts of a few rows, a program is the same motions and the same edits."""
+    whole = program(path)
+    plan = random_plan(whole, 7)
+    edits = dialect_of(path).moved(whole, plan, WRITING)
+    for size in (1, 2, 3, 7):
+        monkeypatch.setattr(reader_module, "PART", size)
+        monkeypatch.setattr(writer_module, "ROWS", size)
+        monkeypatch.setattr(source, "SIZE", 16 * size)
+        part = program(path)
+        assert list(part.toolpath.dump()) == list(whole.toolpath.dump())
+        assert part.findings == whole.findings
+        again = dialect_of(path).moved(part, plan, WRITING)
+        assert list(again.edits) == list(edits.edits)
+        assert again.held == edits.held
+
+
+# Sinumerik: nothing is misread
+
+HEAD = "G71 G90 G17 G54 T1 D1\nTRAORI\nG0 X0 Y0 Z100 A3=0 B3=0 C3=1\nF1000\n"
+
+
+def body(text: str) -> Program:
+    return read(NAMES["sinumerik"], HEAD + text + "\n")
+
+
+def refused(found: Program) -> list[int]:
+    return sorted(found.toolpath.refused)
+
+
+@pytest.mark.parametrize("word", ["A1.5=1", "A-3=1", "A3 3=1", "3=1", "A=", "A3=", "X==1"])
+def test_an_address_that_is_none_is_not_read(word: str) -> None:
+    """It is told, and the motion stays as it is."""
+    found = body(f"G1 X1 Y2 Z3 {word}")
+    assert refused(found)[-1:] == [len(found.toolpath) - 1] or not found.toolpath.known[-1]
+    assert found.findings
+
+
+@pytest.mark.parametrize("angles", ["A2=10 B2=20 C2=30", "A2=0 B2=0 C2=0", "C2=5"])
+def test_angles_of_a_mode_that_is_not_read_turn_nothing(angles: str) -> None:
+    """ORIRPY2 takes them in another order: the orientation is not known; a tool vector is one in every mode."""
+    for mode, known in (("ORIEULER", True), ("ORIRPY", True), ("ORIRPY2", False)):
+        path = body(f"{mode}\nG1 X1 Y2 Z3 {angles}").toolpath
+        said = len(path) - 1 not in path.refused and bool(np.isfinite(path.rotation[-1]).all())
+        assert said == known, mode
+        vector = body(f"{mode}\nG1 X1 Y2 Z3 A3=0 B3=1 C3=1").toolpath
+        assert not vector.refused
+        np.testing.assert_allclose(vector.rotation[-1][:, 2], [0, -(0.5**0.5), -(0.5**0.5)], atol=1e-12)
+
+
+def test_angles_of_the_two_modes_that_are_read_turn_as_they_say() -> None:
+    turned = {
+        mode: body(f"{mode}\nG1 X1 A2=10 B2=20 C2=30").toolpath.rotation[-1]
+        for mode in ("ORIEULER", "ORIRPY")
+    }
+    assert not np.allclose(turned["ORIEULER"], turned["ORIRPY"], atol=5 * DEG)
+
+
+@pytest.mark.parametrize("turns", [0, 1, 2, 5])
+def test_turns_of_an_arc_are_those_said(turns: int) -> None:
+    """TURN= counts those beyond the first, P of LinuxCNC all of them."""
+    found = body(f"G1 X10 Y0 Z0\nG2 X10 Y0 I-10 J0 TURN={turns}\n").toolpath
+    assert abs(found.sweep[-1]) == pytest.approx(2 * np.pi * (turns + 1))
+    if turns:
+        other = read(
+            NAMES["linuxcnc"], f"G21 G90 G17 T1\nG0 X10 Y0 Z0\nF600\nG2 X10 Y0 I-10 J0 P{turns}\n"
+        ).toolpath
+        assert abs(other.sweep[-1]) == pytest.approx(2 * np.pi * turns)
