@@ -379,6 +379,7 @@ def _arcs(motions: Motions, ends: Followed, sheet: _Sheet) -> tuple[Bools, Bools
     normal = (text.inverse[row] @ plan.normal[m][..., None])[..., 0]
     normal *= np.sign(np.linalg.det(text.inverse[row]))[:, None]
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    before = text.units(row, np.where(m[:, None] > 0, plan.position[m - 1], plan.before))
     arcs = Arcs(
         ends.begin[m],
         ends.end[m],
@@ -392,6 +393,7 @@ def _arcs(motions: Motions, ends: Followed, sheet: _Sheet) -> tuple[Bools, Bools
         np.where(np.isnan(own[:, :3]), text.modal[row, CENTRE], text.relative[row, CENTRE]),
         own,
         sheet.decimals[np.ix_(m, columns)],
+        np.nan_to_num(np.abs(ends.begin[m] - before)).max(axis=1),
     )
     written: WrittenArcs = write_arcs(arcs)
     sheet.write[np.ix_(m, columns)] = written.write

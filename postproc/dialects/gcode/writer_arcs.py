@@ -37,7 +37,8 @@ class Arcs:
 
     begin, end (K, 3): as written.  centre, normal (K, 3), sweep (K,): as planned.  plane (K,); form (K,) Form;
     clockwise (K,) in the coordinates of the frame; turns (K,) full turns stated apart.  relative (K, 3): I J K are
-    from the begin.  own (K, 4): numbers that stand there for I J K R, NaN if none; decimals (K, 4).
+    from the begin.  own (K, 4): numbers that stand there for I J K R, NaN if none; decimals (K, 4).  off (K,): how far
+    the begin as written is from the planned one, more than half a step where it is written in a larger unit.
     """
 
     begin: Floats
@@ -52,6 +53,7 @@ class Arcs:
     relative: Bools
     own: Floats
     decimals: Ints
+    off: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +171,7 @@ def _missed(arcs: Arcs, number: Floats, through: Bools, by_radius: Bools) -> tup
         via = via + np.where(arcs.relative, arcs.begin, 0.0)
         way = arc_through(arcs.begin[through], via[through], arcs.end[through])
         centre[through], normal[through], sweep[through] = way
-    step = 10.0 ** -arcs.decimals[:, :3].min(axis=1)
+    step = np.maximum(10.0 ** -arcs.decimals[:, :3].min(axis=1), 2.0 * arcs.off)
     worst = np.zeros(count)
     for share in (0.25, 0.5, 0.75):
         at = np.full(count, share)
