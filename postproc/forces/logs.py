@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.blocks import blocks
 from postproc.cell import Frames
 from postproc.findings import Finding, Refusal
 from postproc.forces.annotations import marked_air
@@ -69,15 +70,21 @@ def read_log(
     _check_order(table, column, place)
     channels = read_channels(table)
     frame = _one_frame(table)
-    owner = np.clip(np.searchsorted(scale.end, place, side="right"), 0, len(toolpath) - 1)
-    within = (place >= 0) & (place <= scale.end[-1])
+    owner = np.minimum(np.searchsorted(scale.end, place, side="right"), len(toolpath) - 1).astype(np.int32)
+    # places ascend
+    within = slice(
+        *(int(np.searchsorted(place, *edge)) for edge in ((0.0, "left"), (scale.end[-1], "right")))
+    )
     spacing = _check_extent(table, place, scale, findings)
-    in_air = within & scale.air[owner]
+    in_air = np.zeros(len(place), bool)
+    in_air[within] = scale.air[owner[within]]
     channels = checked_gauge(table, channels, in_air, offset, findings)
 
     readings = Readings(owner[within], place[within], channels[within], scale.begin, scale.end)
     start, value, peak, error = resampled(readings)
     start[scale.air], value[scale.air], peak[scale.air] = 0.0, 0.0, np.nan
+    for made in (start, value):
+        made.setflags(write=False)
     each = np.arange(len(toolpath), dtype=np.int32)
     stated = Stated(value, np.full(len(toolpath), frame), each, start, peak=peak, error=error)
     findings += _told(table, readings, place, spacing, scale, stated, toolpath, program)
@@ -227,7 +234,10 @@ def _told(
         help = "a cut that begins or ends within a motion needs a point there"
         findings.append(Finding("FRC026", what, program, int(toolpath.line[worst]), help=help))
 
-    size = 0.5 * np.linalg.norm((stated.values + stated.begin)[:, :3], axis=1)
+    size = np.zeros(len(toolpath))
+    for part in blocks(len(toolpath)):
+        both = stated.values[part, :3] + stated.begin[part, :3]
+        size[part] = 0.5 * np.linalg.norm(both, axis=1)
     peaks = np.zeros(len(toolpath)) if stated.peak is None else stated.peak
     mean, peak = rows[np.argmax(size[rows])], rows[np.argmax(peaks[rows])]
     what = (
