@@ -11,7 +11,11 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
+import postproc.workflows.program  # noqa: F401  what a run loads is there before it is watched
 from postproc.cli.main import run
+
+KILLS = int(os.environ.get("POSTPROC_KILLS", "5"))
+"""How often a run is killed at random; with more than five everything else happens at more places too."""
 
 FORBIDDEN = frozenset(
     [

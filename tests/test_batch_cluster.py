@@ -118,8 +118,13 @@ def test_no_cluster_is_told_before_anything_begins(compensate, parts, monkeypatc
     assert done.code == 1
     assert json.loads(done.out)["findings"][0]["code"] == "BAT006"
     assert not (parts / "compensated").exists()
-    with pytest.raises(Refusal):
-        list(run_on_cluster([], "no address", lambda number, stage: None))
+
+
+@pytest.mark.parametrize("address", ["no address", "host", "tcp://host", "host:port", ":8786", "tcp://a/b:1"])
+def test_what_is_no_address_is_told_at_once(address):
+    with pytest.raises(Refusal) as refusal:
+        list(run_on_cluster([], address, lambda number, stage: None))
+    assert "is no address" in refusal.value.findings[0].message
 
 
 def test_a_cluster_without_workers_is_told(parts, monkeypatch):

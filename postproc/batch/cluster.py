@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import uuid
 from collections.abc import Generator, Sequence
 from concurrent.futures import CancelledError
@@ -17,6 +18,8 @@ from postproc.report.batched import Outcome
 PATIENCE = 30.0
 """[s] How long a cluster may be without a worker, and how long it takes to answer at first."""
 
+_ADDRESS = re.compile(r"([a-z]+://)?([^\s/:\[\]]+|\[[0-9A-Fa-f:.%a-z]+\]):[0-9]{1,5}/?")
+
 EXTRA = "pip install 'postproc[cluster]'"
 
 
@@ -29,6 +32,8 @@ def run_on_cluster(
     for longer than ``PATIENCE``, the tasks that are left fail.  Raises Refusal BAT006, before anything is done, where
     the cluster is not there, has no workers, or workers of another version.
     """
+    if not _ADDRESS.fullmatch(address):  # the client would wait for it, and end in a traceback
+        raise _unusable(f"{address!r} is no address of a scheduler", "such as tcp://127.0.0.1:8786")
     distributed = _distributed()
     try:
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from postproc.cli.common import ROBOT, Out, language_options, result_options
+from postproc.cli.ending import Stopped
 
 if TYPE_CHECKING:
     from postproc.batch.jobs import Jobs
@@ -158,9 +159,9 @@ def batch(
     try:
         with out.refusals("batch"), _watched(out) as watch:
             done = run_batch(request, watch)
-    except KeyboardInterrupt:
-        click.echo("interrupted; what is done is done: the same command goes on from there", err=True)
-        raise SystemExit(130) from None
+    except Stopped as end:
+        end.words = "interrupted; what is done is done: the same command goes on from there"
+        raise
     out.result(done.as_json(), written=not dry_run)
     if not out.quiet:
         show_batched(out.console(), done, verbose)

@@ -207,11 +207,9 @@ class Out:
         self.verbose = verbose
 
     def console(self, error: bool = False) -> Any:
-        from rich.console import Console
+        from postproc.cli.console import SafeConsole
 
-        stream = sys.stderr if error else sys.stdout
-        width = None if stream.isatty() else 160
-        return Console(file=stream, width=width, highlight=False)
+        return SafeConsole(sys.stderr if error else sys.stdout)
 
     @property
     def json_file(self) -> Path | None:

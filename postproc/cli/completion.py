@@ -11,17 +11,7 @@ VARIABLE = "_COMPENSATE_COMPLETE"
 
 
 class Commands(click.Group):
-    """A group with a default command: to complete, a first word that is no command is a program.
-
-    A Ctrl-C ends every command with exit code 130, as a shell expects.
-    """
-
-    def invoke(self, ctx: click.Context) -> object:
-        try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt:
-            click.echo("interrupted", err=True)
-            raise SystemExit(130) from None
+    """A group with a default command: to complete, a first word that is no command is a program."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -14,6 +14,7 @@ from postproc.cli.batch import batch
 from postproc.cli.check import check
 from postproc.cli.completion import Commands, completion
 from postproc.cli.diagnose import diagnose
+from postproc.cli.ending import ended_in_words
 from postproc.cli.identify import identify
 from postproc.cli.map import map_
 from postproc.cli.plan import plan
@@ -75,7 +76,8 @@ def run(argv: Sequence[str] | None = None) -> None:
         hint = nearest(words[0], COMMANDS)
         click.echo(f"Error: no command and no file {words[0]!r}{hint}", err=True)
         raise SystemExit(2)
-    main.main(args=normalized(words), prog_name="compensate")
+    with ended_in_words():
+        main.main(args=normalized(words), prog_name="compensate")
 
 
 def normalized(arguments: list[str]) -> list[str]:
