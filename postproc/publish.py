@@ -30,6 +30,17 @@ def publish(files: Mapping[Path, Content], last: Path | None = None) -> None:
         _publish(files, last, held)
 
 
+def sweep(files: Iterable[Path]) -> None:
+    """Take away what a run that was killed left half-written of ``files``.
+
+    Waits for runs that write into these folders now, as ``publish`` does; does nothing where there are no locks.
+    """
+    there = [path for path in files if path.parent.is_dir()]
+    with contextlib.ExitStack() as held:
+        if _alone({path.parent for path in there}, held):
+            _sweep(there)
+
+
 def _publish(files: Mapping[Path, Content], last: Path | None, held: contextlib.ExitStack) -> None:
     ready: dict[Path, Path] = {}
     spare: dict[Path, Path] = {}
@@ -103,7 +114,7 @@ def _alone(folders: Iterable[Path], held: contextlib.ExitStack) -> bool:
 
 
 def _sweep(files: Iterable[Path]) -> None:
-    """Take away temporary files of ``files``: nobody but a killed run can have left them."""
+    """Take away temporary files of ``files``: whoever holds their folders knows that a killed run has left them."""
     names: dict[Path, list[str]] = {}
     for path in files:
         names.setdefault(path.parent, []).append(re.escape(path.name))

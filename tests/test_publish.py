@@ -6,12 +6,13 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
 from postproc.findings import Refusal
-from postproc.publish import publish
+from postproc.publish import publish, sweep
 
 
 def names(folder) -> list[str]:
@@ -81,6 +82,40 @@ def test_parts_that_can_not_be_made_leave_nothing(tmp_path, error):
         publish({tmp_path / "a.src": b"src", tmp_path / "a.csv": parts()}, last=tmp_path / "a.src")
     assert names(tmp_path) == ["a.csv"]
     assert (tmp_path / "a.csv").read_bytes() == b"old"
+
+
+def test_what_a_killed_run_left_is_swept_and_nothing_else(tmp_path):
+    left = [tmp_path / f".a.src.abcd1234.tmp{end}" for end in ("", ".old")]
+    others = [
+        tmp_path / name for name in (".b.src.abcd1234.tmp", ".a.src.tmp", "a.src", ".a.src.abcd1234.tmp2")
+    ]
+    for path in (*left, *others):
+        path.write_bytes(b"x")
+    sweep([tmp_path / "a.src", tmp_path / "nowhere" / "a.src"])
+    assert names(tmp_path) == sorted(path.name for path in others)
+
+
+def test_a_file_that_is_being_written_is_not_swept(tmp_path):
+    path, begun, goes_on = tmp_path / "a.src", threading.Event(), threading.Event()
+
+    def parts():
+        yield b"new"
+        begun.set()
+        goes_on.wait()
+        yield b" and whole"
+
+    writer = threading.Thread(target=publish, args=({path: parts()},))
+    writer.start()
+    begun.wait()
+    sweeper = threading.Thread(target=sweep, args=([path],))
+    sweeper.start()
+    sweeper.join(0.3)
+    assert sweeper.is_alive()  # it waits for the writer
+    goes_on.set()
+    writer.join()
+    sweeper.join()
+    assert path.read_bytes() == b"new and whole"
+    assert names(tmp_path) == ["a.src"]
 
 
 LOOP = """

@@ -9,16 +9,15 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import re
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from postproc import publish
 from postproc.batch.jobs import Job
 from postproc.batch.reading import ABSENT, code_digest, digest_of
 from postproc.cell import find_cell
 from postproc.findings import Refusal
-from postproc.publish import publish
 
 STATE = ".compensate"
 """Folder of records and locks, in each folder of results."""
@@ -73,21 +72,12 @@ def load_record(job: Job) -> Record | None:
 
 def save_record(job: Job, record: Record) -> None:
     text = json.dumps(asdict(record), indent=1, allow_nan=False) + "\n"
-    publish({_path(job): text.encode()})
+    publish.publish({_path(job): text.encode()})
 
 
-def sweep(job: Job, outputs: Iterable[str] = ()) -> None:
-    """Take away what a run that was killed left half-written: temporary files of the job's own outputs.
-
-    Only under the job's lock, and only names that begin with its stem: what programs share may be in work elsewhere.
-    """
-    own = {Path(path) for path in outputs if Path(path).name.startswith(f"{job.target.stem}.")}
-    for path in {job.target, _path(job), *own}:
-        temporary = re.compile(rf"\.{re.escape(path.name)}\.[a-z0-9_]{{8}}\.tmp(\.old)?")
-        with contextlib.suppress(OSError):
-            for entry in list(os.scandir(path.parent)):
-                if temporary.fullmatch(entry.name):
-                    os.unlink(entry.path)
+def sweep(job: Job, outputs: Iterable[str]) -> None:
+    """Take away what a run that was killed left half-written of the job's outputs and its record."""
+    publish.sweep([job.target, _path(job), *map(Path, outputs)])
 
 
 def _path(job: Job) -> Path:

@@ -63,7 +63,6 @@ def _done_once(task: Task, told: Told, began: float) -> Outcome:
         return _outcome(job, UNCHANGED, before.result, began)
     with readings() as inputs:
         result = _compensated(job, told)
-    sweep(job, result["outputs"])  # type: ignore[arg-type]
     record = Record.of(job, inputs, result)
     if record is not None:
         save_record(job, record)
