@@ -69,8 +69,8 @@ def tree_of(folder: Path, revision: str) -> Path:
     return tree
 
 
-def cover_of(folder: Path, tree: Path) -> covered.Cover:
-    """What the suite covers, measured once a folder."""
+def cover_of(folder: Path, tree: Path, words: list[str]) -> covered.Cover:
+    """What the suite covers, or those of its files whose names hold one of ``words``; measured once a folder."""
     kept = folder / "cover.json"
     if not kept.exists():
         compileall.compile_dir(tree, quiet=1)
@@ -84,6 +84,7 @@ def cover_of(folder: Path, tree: Path) -> covered.Cover:
                     str(path.relative_to(tree))
                     for path in sorted((tree / "tests").glob("test_*.py"))
                     if not any(word in path.name for word in SLOW)
+                    and (not words or any(word in path.name for word in words))
                 ]
                 covered.cover(tree, [folders[0] for folders in ROOMS.values()], tests).save(kept)
                 code = 0
@@ -168,12 +169,15 @@ def main(words: list[str] | None = None) -> int:
         "--seconds", type=float, default=60.0, help="processor seconds of tests that one mutant meets"
     )
     parser.add_argument("--revision", default="HEAD")
+    parser.add_argument(
+        "--tests", nargs="*", default=[], metavar="WORD", help="only test files with such a word"
+    )
     asked = parser.parse_args(words)
     folder = asked.folder.resolve()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # the file that is mutated is put back
     tree = tree_of(folder, asked.revision)
     judging.warm()
-    judge = Judge(folder, tree, cover_of(folder, tree), asked.seconds)
+    judge = Judge(folder, tree, cover_of(folder, tree, asked.tests), asked.seconds)
     table = []
     for room in asked.room or ["effects", "compensation", "krl", "gcode"]:
         files = sorted(
