@@ -17,12 +17,10 @@ from numpy.typing import NDArray
 from postproc.arrays import Bools, Floats, Ints
 from postproc.dialects.gcode.control import Control
 from postproc.dialects.gcode.lexing import lex
-from postproc.dialects.gcode.words import Note, Text, key
+from postproc.dialects.gcode.words import Note, key
 
 SIZE = 1 << 20
 """Bytes that are lexed at a time."""
-
-_Arrays = tuple[NDArray[Any], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,24 +92,44 @@ class Source:
         return mask
 
 
+class _Growing:
+    """Columns that grow at their ends, in place: the parts of a long one would leave holes in the memory."""
+
+    def __init__(self, *types: Any) -> None:
+        self._types, self._bytes = types, [bytearray() for _ in types]
+
+    def add(self, *columns: NDArray[Any]) -> None:
+        for held, values, kind in zip(self._bytes, columns, self._types, strict=True):
+            held += np.ascontiguousarray(values, kind).data
+
+    def done(self) -> Iterator[NDArray[Any]]:
+        for held, kind in zip(self._bytes, self._types, strict=True):
+            yield np.frombuffer(held, kind)
+
+
 def scan(raw: bytes, control: Control) -> Source:
     """A program taken apart, piece by piece."""
-    words: dict[int, list[_Arrays]] = defaultdict(list)
-    lines: list[_Arrays] = []
+    words: dict[int, _Growing] = {}
+    lines = _Growing(np.int32, np.int32, np.int32, np.int32, np.bool_, np.bool_)
+    comments = _Growing(np.int32)
     notes: list[Note] = []
-    comments: list[Ints] = []
     blocks, line = 0, 1
     for begin, end in _pieces(raw):
         text = lex(raw, control, begin, end, line)
-        for one, column in _columns(text, blocks):
-            words[one].append(column)
-        lines.append(_lines(text))
+        for one in np.flatnonzero(np.bincount(text.words.key)).tolist():
+            rows = np.flatnonzero(text.words.key == one)
+            column = words.setdefault(one, _Growing(np.int32, np.float64, np.int8))
+            column.add(text.words.block[rows] + blocks, text.words.value[rows], text.words.how[rows])
+        here = text.blocks
+        wordy = np.zeros(len(here), np.bool_)
+        wordy[text.words.block[text.words.key != key("N")]] = True
+        lines.add(here.start, here.stop, here.first, here.line, here.deleted, wordy)
         notes += (note._replace(block=note.block + blocks) for note in text.notes)
-        comments.append(text.comments.astype(np.int32))
-        blocks += len(text.blocks)
+        comments.add(text.comments.reshape(-1))
+        blocks += len(here)
         line += raw.count(b"\n", begin, end)
-    columns = {one: Column(*_joined(words.pop(one))) for one in sorted(words)}
-    return Source(columns, Lines(*_joined(lines)), tuple(notes), np.concatenate(comments))
+    columns = {one: Column(*column.done()) for one, column in sorted(words.items())}
+    return Source(columns, Lines(*lines.done()), tuple(notes), next(comments.done()).reshape(-1, 3))
 
 
 def _pieces(raw: bytes) -> Iterator[tuple[int, int]]:
@@ -121,28 +139,3 @@ def _pieces(raw: bytes) -> Iterator[tuple[int, int]]:
         end = raw.find(b"\n", begin + SIZE) + 1 or len(raw)
         yield begin, end
         begin = end or 1
-
-
-def _columns(text: Text, before: int) -> Iterator[tuple[int, _Arrays]]:
-    words = text.words
-    block = (words.block + before).astype(np.int32)
-    how = words.how.astype(np.int8)
-    for one in np.flatnonzero(np.bincount(words.key)).tolist():
-        rows = np.flatnonzero(words.key == one)
-        yield one, (block[rows], words.value[rows], how[rows])
-
-
-def _lines(text: Text) -> _Arrays:
-    blocks = text.blocks
-    wordy = np.zeros(len(blocks), np.bool_)
-    wordy[text.words.block[text.words.key != key("N")]] = True
-    places = (blocks.start, blocks.stop, blocks.first, blocks.line)
-    return *(place.astype(np.int32) for place in places), blocks.deleted, wordy
-
-
-def _joined(parts: list[_Arrays]) -> Iterator[NDArray[Any]]:
-    """The columns of all parts, one after the other; what was joined is let go."""
-    columns = [list(column) for column in zip(*parts, strict=True)]
-    parts.clear()
-    while columns:
-        yield np.concatenate(columns.pop(0))
