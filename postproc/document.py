@@ -13,7 +13,7 @@ from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any, overload
 
@@ -160,24 +160,17 @@ class Edits(Sequence[Edit]):
         first, second = next(rest, ()), next(rest, None)
         if second is None:
             return first if isinstance(first, Edits) else _as_arrays(first)
-        store = Store(), Store(), Store(), Store(), Store()
-        columns: list[list[NDArray[Any]]] = [[], [], [], [], []]
-        for part in chain((first, second), rest):
-            edits = part if isinstance(part, Edits) else _as_arrays(part)
-            texts = np.frombuffer(edits.texts, np.uint8)
-            arrays = edits.file, edits.start, edits.stop, np.diff(edits.ends), texts
-            for column, kept, array in zip(columns, store, arrays, strict=True):
-                column.append(kept.keep(array))
         # Of what is there in parts, only one column is there as a whole as well.
-        del store, first, second, edits, texts, arrays, column, kept, array
-        all_of_them = Edits.__new__(Edits)
-        all_of_them.texts = b"".join([column.data for column in columns.pop()])
-        all_of_them.ends = sums(np.concatenate(columns.pop()), offset_type(len(all_of_them.texts)))
-        all_of_them.stop = np.concatenate(columns.pop())
-        all_of_them.start = np.concatenate(columns.pop())
-        all_of_them.file = np.concatenate(columns.pop())
-        all_of_them._arrange()
-        return all_of_them
+        columns = _in_columns(chain((first, second), rest))
+        del first, second
+        found = Edits.__new__(Edits)
+        found.texts = b"".join([column.data for column in columns.pop()])
+        found.ends = sums(np.concatenate(columns.pop()), offset_type(len(found.texts)))
+        found.stop = np.concatenate(columns.pop())
+        found.start = np.concatenate(columns.pop())
+        found.file = np.concatenate(columns.pop())
+        found._arrange()
+        return found
 
     def of(self, file: int) -> Edits:
         """The edits of one document."""
@@ -217,6 +210,29 @@ class Edits(Sequence[Edit]):
         return isinstance(other, Sequence) and list(self) == list(other)
 
     __hash__ = None  # type: ignore[assignment]
+
+
+def _in_columns(parts: Iterable[Iterable[Edit]]) -> list[list[NDArray[Any]]]:
+    """Documents, begins, ends, lengths of texts, and texts of the parts; in order of place where one part as a whole
+    stands before the other."""
+    store = Store(), Store(), Store(), Store(), Store()
+    kinds = np.int8, np.int32, np.int32, np.int32, np.uint8
+    columns: list[list[NDArray[Any]]] = [[np.empty(0, kind)] for kind in kinds]
+    spans = [(Span(-1, 0, 0), Span(-1, 0, 0))]
+    for part in parts:
+        edits = part if isinstance(part, Edits) else _as_arrays(part)
+        for file in range(int(edits.file[0]), int(edits.file[-1]) + 1) if len(edits) else ():
+            own = edits.of(file)
+            if not len(own):
+                continue
+            spans.append((own[0].span, own[-1].span))
+            arrays = own.file, own.start, own.stop, np.diff(own.ends), np.frombuffer(own.texts, np.uint8)
+            for column, kept, array in zip(columns, store, arrays, strict=True):
+                column.append(kept.keep(array))
+    order = sorted(range(len(spans)), key=spans.__getitem__)
+    if all(spans[a][1] < spans[b][0] for a, b in pairwise(order)):
+        return [[column[k] for k in order] for column in columns]
+    return columns
 
 
 def _as_arrays(edits: Iterable[Edit]) -> Edits:

@@ -35,14 +35,14 @@ class Chain:
         self.deviation: Floats = np.zeros((len(touched), 6) if self.depends.any() else (0, 6))
         self._inexact = np.zeros(len(touched), dtype=bool)
 
-    def written(self, rows: Ints, said: Components, wanted: Floats, kept: Bools) -> None:
-        """Takes up rows (K,) that depend on no other: what they say, and are to say (K, 6)."""
-        if len(self.deviation):
-            self.deviation[rows] = _deviation(said, wanted, kept)
-
     def follow(self) -> None:
         """Goes along the rows that depend on the one before."""
         dependent = np.flatnonzero(self.depends)
+        first = np.unique(dependent - 1)
+        first = first[(first >= 0) & self.touched[first] & ~self.depends[first]]
+        for low in range(0, len(first), BLOCK):
+            rows = first[low : low + BLOCK]
+            self.deviation[rows] = _deviation(*self.task.targets(rows))
         last, at = [0.0] * 6, -2
         for low in range(0, len(dependent), BLOCK):
             rows = dependent[low : low + BLOCK]
@@ -58,9 +58,7 @@ class Chain:
         self, rows: Ints, before: list[list[float]], last: list[float], at: int
     ) -> tuple[list[float], int]:
         task = self.task
-        said, there = task.components(rows), task.own[rows]
-        wanted = task.wanted(rows, said.own, task.plan.position[there], task.plan.rotation[there])
-        kept = said.kept(wanted)
+        said, wanted, kept = task.targets(rows)
         fresh: list[list[float]] = _deviation(said, wanted, kept).tolist()
         wish: list[list[float]] = _wrapped(wanted - said.own).tolist()
         half: list[float] = (0.5 * SLACK * 10.0**-task.least).tolist()

@@ -156,6 +156,12 @@ class Task:
         result[turned, 3:] = abc_from_rotation(rotation[turned], own[turned, 3:] * DEG) / DEG
         return result
 
+    def targets(self, rows: Ints) -> tuple[Components, Floats, Bools]:
+        """What the text says of rows (K,), what it is to say (K, 6) [mm, deg], and which of that it says already."""
+        said, there = self.components(rows), self.own[rows]
+        wanted = self.wanted(rows, said.own, self.plan.position[there], self.plan.rotation[there])
+        return said, wanted, said.kept(wanted)
+
     def texts(self, said: Components, wanted: Floats, kept: Bools, k: int) -> list[bytes]:
         """The six components of a motion as they are to be written: as they are, where they stay."""
         return [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -12,14 +12,17 @@ from postproc.dialects.decimals import fixed
 from postproc.dialects.krl.components import KEYS, LETTER, Components, Task
 from postproc.document import Edit, Edits, Span
 
-BLOCK = 1 << 14
-"""Rows that are written at a time."""
-
 _KEY = re.compile(rb"[A-Za-z]")
 _LAST_KEY = re.compile(rb"[A-Za-z](?=[^A-Za-z]*\Z)")
 
 
-def literal_edits(task: Task, said: Components, wanted: Floats, chosen: Bools) -> Edits:
+def literal_edits(task: Task, rows: Ints) -> Edits:
+    """Edits of rows (K,) whose targets are literals of their own: of those that change."""
+    said, wanted, kept = task.targets(rows)
+    return _edits(task, said, wanted, ~kept)
+
+
+def _edits(task: Task, said: Components, wanted: Floats, chosen: Bools) -> Edits:
     """Edits of the ``chosen`` (K, 6) literals to the ``wanted`` (K, 6) values."""
     start, stop, file = said.start[chosen], said.stop[chosen], said.file[chosen]
     before = np.zeros(len(start), np.uint8)
@@ -41,26 +44,18 @@ def completion(task: Task, home: int, at: int, texts: Sequence[bytes], missing: 
     return Edit(Span(home, at, at), words + b"," if first else b"," + words)
 
 
-def partial_edits(task: Task, rows: Ints, completed: Bools) -> Iterator[Edits]:
+def partial_edits(task: Task, rows: Ints, completed: Bools) -> Edits:
     """Edits of partial targets (K,) in their lines; completed (N, 6): the components that they get."""
-    for low in range(0, len(rows), BLOCK):
-        block = rows[low : low + BLOCK]
-        said, there = task.components(block), task.own[block]
-        wanted = task.wanted(block, said.own, task.plan.position[there], task.plan.rotation[there])
-        kept = said.kept(wanted)
-        yield literal_edits(task, said, wanted, ~kept & (task.places.start[block] >= 0))
-        home, insert = task.places.home[block].tolist(), task.places.insert[block].tolist()
-        gets = completed[block]
-        chosen = np.flatnonzero(gets.any(axis=1)).tolist()
-        yield Edits.joined(
-            [
-                completion(
-                    task,
-                    home[k],
-                    insert[k],
-                    task.texts(said, wanted, kept, k),
-                    np.flatnonzero(gets[k]).tolist(),
-                )
-                for k in chosen
-            ]
+    said, wanted, kept = task.targets(rows)
+    home, insert, gets = task.places.home[rows], task.places.insert[rows], completed[rows]
+    added = [
+        completion(
+            task,
+            int(home[k]),
+            int(insert[k]),
+            task.texts(said, wanted, kept, k),
+            np.flatnonzero(gets[k]).tolist(),
         )
+        for k in np.flatnonzero(gets.any(axis=1)).tolist()
+    ]
+    return Edits.joined(_edits(task, said, wanted, ~kept & (task.places.start[rows] >= 0)), added)

@@ -12,8 +12,9 @@ from postproc.dialects.decimals import fixed, fixed_one
 from postproc.dialects.dialect import Role
 from postproc.dialects.krl.arcs import half_way
 from postproc.dialects.krl.components import LETTER, Components, Task
+from postproc.dialects.krl.lexing import BOM
 from postproc.dialects.krl.own_points import aggregate, carried
-from postproc.document import Edit, Edits, Offsets, Span, gathered, sums
+from postproc.document import Edit, Edits, Span, gathered, sums
 
 BLOCK = 1 << 15
 """Motions that are written at a time."""
@@ -26,20 +27,21 @@ _CONDITIONS = re.compile(rb"\bWITH\b.*\Z", re.I | re.S)
 _WORD = re.compile(rb"[A-Za-z_]+")
 
 
-def insertions(task: Task) -> Iterator[Edits]:
-    """The edits that insert the motions of the plan that take no text of their own."""
-    chosen = np.flatnonzero(~task.plan.own)
-    if not len(chosen):
-        return
-    begins = _line_begins(task)
+def insertions(task: Task, among: Ints) -> Iterator[Edits]:
+    """The edits that insert motions of the plan before rows (K,) that follow each other."""
+    first, behind = int(task.own[among[0]] - task.inserted[among[0]]), int(task.own[among[-1]])
+    chosen = first + np.flatnonzero(task.plan.role[first:behind] != Role.OWN)
+    source = task.documents[0]
     for at in range(0, len(chosen), BLOCK):
         block = chosen[at : at + BLOCK]
         rows = task.plan.source[block]
         said = task.components(rows)
         wanted = task.wanted(rows, said.own, task.plan.position[block], task.plan.rotation[block])
         kept = said.kept(wanted)
-        line = np.searchsorted(begins, task.places.motion[rows, 0], side="right") - 1
-        start = begins[line]
+        line = np.searchsorted(source.line_starts, task.places.motion[rows, 0], side="right") - 1
+        start = source.line_starts[line]
+        if source.raw.startswith(BOM):
+            start[line == 0] = len(BOM)
         many = _copied(task, block, rows, start)
         # Motions of one row stay in their order.
         many &= ~np.isin(rows, rows[~many])
@@ -50,14 +52,6 @@ def insertions(task: Task) -> Iterator[Edits]:
         if many.any():
             yield _copies(task, rows[many], said.of(many), wanted[many], kept[many], start[many])
         yield Edits.joined(single)
-
-
-def _line_begins(task: Task) -> Offsets:
-    """Offsets at which the lines of the program begin, behind a byte order mark."""
-    begins = task.documents[0].line_starts.copy()
-    if task.documents[0].raw.startswith(b"\xef\xbb\xbf"):
-        begins[0] = 3
-    return begins
 
 
 def _line(task: Task, motion: int, said: Components, wanted: Floats, kept: Bools, k: int) -> bytes:

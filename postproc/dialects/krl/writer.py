@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from postproc.arrays import Bools, Ints
-from postproc.dialects.dialect import Moved, Plan, Program, Writing
+from postproc.dialects.dialect import Moved, Plan, Program, Role, Writing
 from postproc.dialects.krl.chain import Chain
 from postproc.dialects.krl.components import Task, differs
 from postproc.dialects.krl.in_place import literal_edits, partial_edits
@@ -36,29 +36,23 @@ def moved(program: Program, plan: Plan, writing: Writing) -> Moved:
 
 
 def _parts(task: Task, touched: Bools, way: Bools, held: dict[int, Finding]) -> Iterator[Iterable[Edit]]:
-    """The edits, block by block; ``held`` takes up the rows that can not move as planned."""
+    """The edits, nearly all in the order of their places; ``held`` takes up the rows that can not move as planned."""
     private = _private(task)
     plain = touched & _plain(task, private)
     chain = Chain(task, touched)
-    for rows in _blocks(np.flatnonzero(touched & ~chain.depends)):
-        said = task.components(rows)
-        there = task.own[rows]
-        wanted = task.wanted(rows, said.own, task.plan.position[there], task.plan.rotation[there])
-        kept = said.kept(wanted)
-        chain.written(rows, said, wanted, kept)
-        simple = plain[rows]
-        if simple.any():
-            yield literal_edits(task, said, wanted, ~kept & simple[:, None])
     chain.follow()
     again = (touched & ~plain) | chain.again(way)
     partial = again & _partial(task, private)
-    yield from partial_edits(task, np.flatnonzero(partial), chain.completed)
-    singly = np.flatnonzero(again & ~partial)
-    single, not_moved = single_edits(task, singly, chain.completed)
+    single, not_moved = single_edits(task, np.flatnonzero(again & ~partial), chain.completed)
     held.update(not_moved)
     if held:
         return
-    yield from insertions(task)
+    for rows in _blocks(np.arange(len(touched))):
+        yield Edits.joined(
+            literal_edits(task, rows[plain[rows] & ~chain.depends[rows]]),
+            partial_edits(task, rows[partial[rows]], chain.completed),
+            *insertions(task, rows),
+        )
     yield single
 
 
@@ -86,8 +80,8 @@ def _refuse_forbidden(task: Task, touched: Bools, way: Bools) -> None:
     if fixed_rows:
         raise ValueError(f"motions that can not be corrected were moved: rows {sorted(fixed_rows)[:5]}")
     whole = {row for row in (*path.refused, *path.whole) if task.inserted[row]}
-    turns = task.plan.sweep[~task.plan.own] > FULL
-    if turns.any():
+    inserted = _blocks(np.flatnonzero(task.plan.role != Role.OWN))
+    if any((task.plan.sweep[motions] > FULL).any() for motions in inserted):
         raise ValueError("an inserted arc of nearly a turn: three points do not hold it")
     if whole:
         raise ValueError(f"motions that can not be divided were: rows {sorted(whole)[:5]}")
