@@ -14,7 +14,7 @@ Bools = NDArray[np.bool_]
 
 def frozen(values: ArrayLike, shape: tuple[int, ...] | None = None, dtype: Any = np.float64) -> NDArray[Any]:
     """A read-only, C-ordered copy of ``values``; -1 in ``shape`` stands for any length.  What is read-only already and
-    owns its data, or is one value broadcast, is taken as it is.
+    owns its data, or is one row that stands for all, is taken as it is.
 
     Raises ValueError when the shape is another one: a defect of the program, never of its input.
     """
@@ -31,9 +31,19 @@ def frozen(values: ArrayLike, shape: tuple[int, ...] | None = None, dtype: Any =
 def _is_frozen(values: ArrayLike, dtype: Any) -> TypeGuard[NDArray[Any]]:
     if not isinstance(values, np.ndarray) or values.flags.writeable or values.dtype != dtype:
         return False
-    return bool(values.flags.owndata and values.flags.c_contiguous) or (
-        values.size > 0 and not any(values.strides)
-    )
+    one_for_all = values.ndim > 0 and values.size > 0 and values.strides[0] == 0
+    return one_for_all or bool(values.flags.owndata and values.flags.c_contiguous)
+
+
+def shared(array: NDArray[Any]) -> NDArray[Any]:
+    """The array, or where its rows are all the same one of them that stands for all; read-only."""
+    if len(array) < 2 or not array.strides[0]:
+        return array
+    for rows in (slice(0, 64), slice(None)):  # a look at the first tells most
+        part = array[rows]
+        if not ((part == array[0]) | ((part != part) & (array[0] != array[0]))).all():
+            return array
+    return np.broadcast_to(array[0].copy(), array.shape)
 
 
 class FewRows:

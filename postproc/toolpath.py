@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, FewRows, Floats, Ints, frozen
+from postproc.arrays import Bools, FewRows, Floats, Ints, frozen, shared
 from postproc.findings import Finding
 from postproc.geometry import Placed, Poses, abc_from_rotation, rotation_from_abc
 from postproc.units import DEG, MM
@@ -138,7 +138,7 @@ class Toolpath:
             values = getattr(self, name)
             if not len(values) and default is not None:
                 values = np.broadcast_to(np.asarray(default, dtype), shape)
-            object.__setattr__(self, name, frozen(values, shape, dtype))
+            object.__setattr__(self, name, shared(frozen(values, shape, dtype)))
         object.__setattr__(self, "axes", FewRows.of(self.axes))
         if self.axes.shape != (n, 6):
             raise ValueError(f"axes of shape {self.axes.shape}, {n} motions")

@@ -108,7 +108,7 @@ def edited(program: Program, dialect: Dialect, moved: Sequence[Edit], robot: Rob
         if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,23}", stem):
             raise Refusal(Finding("FIL011", f"{stem!r} can not name a module", str(main)))
         more += dialect.renamed(program, stem)
-    return Edits.joined(moved, more)
+    return Edits.joined(sorted(more, key=lambda edit: edit.span), moved)  # these stand first, mostly
 
 
 def write(

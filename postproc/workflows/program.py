@@ -99,7 +99,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         ready.settings,
         lambda path: completed(path, ready.cell, ready.robot, request.program),
     )
-    result = written.result
+    result, division = written.result, written.division
     findings = [*ready.findings, *result.findings, *division.findings, *_closing(request, ready, written)]
     paths = _output_paths(program, target)
     outputs = dict(zip(paths, written.contents, strict=True))
