@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, FewRows, Floats, Ints
 from postproc.dialects.krl.places import Places
 from postproc.dialects.krl.rows import HELP, Reason, Rows, Table
 from postproc.dialects.krl.run import Run
@@ -39,12 +39,12 @@ def finished(run: Run, text_called: Iterable[bytes]) -> tuple[Toolpath, Places, 
     n = len(rows)
     anchor = _sparse((n,), np.int32(-1), {row: at.row for row, at in rows.anchors.items()})
     given = _given(rows, n)
-    axes = _sparse((n, 6), np.nan, table.axes, DEG)
+    axes = np.array(list(table.axes.values())).reshape(-1, 6) * DEG
     toolpath = Toolpath(
         kind=_kept(table.kind),
         position=_kept(table.position),
         rotation=_kept(table.rotation),
-        axes=axes,
+        axes=FewRows(np.array(list(table.axes), np.int32), _kept(axes), n),
         feed=_kept(table.feed),
         base=_kept(table.base),
         tool=_kept(table.tool),
