@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,7 +11,7 @@ from postproc.arrays import Floats
 from postproc.compensation.correct import Result, State
 from postproc.compensation.division import Division
 from postproc.compensation.task import Task
-from postproc.geometry import abc_from_rotation, vector_from_rotation
+from postproc.geometry import abc_from_rotation, turned, vector_from_rotation
 from postproc.report.columns import Numbers, Words, csv_parts
 from postproc.toolpath import Kind, Role
 from postproc.units import DEG, MM
@@ -35,14 +36,13 @@ def corrections_csv(
 
 def _motion(rows: slice, task: Task, result: Result) -> list[Numbers | Words]:
     path, position, rotation = task.toolpath, task.toolpath.position[rows], task.toolpath.rotation[rows]
-    to_base = task.base[rows].inverse()
+    to_base = task.base.shared(rows).inverse()
     moved = to_base @ result.command[rows]
     shift = (moved.position - position) / MM
-    turned = vector_from_rotation(np.swapaxes(rotation, -1, -2) @ moved.rotation) / DEG
-    bent = (to_base.rotation @ result.deflection[rows, :, None])[..., 0] / MM
+    turn = vector_from_rotation(np.swapaxes(rotation, -1, -2) @ moved.rotation) / DEG
+    bent = turned(to_base.rotation, result.deflection[rows]) / MM
     wrench = task.wrench[rows]
-    force = (to_base.rotation @ wrench[:, :3, None])[..., 0]
-    moment = (to_base.rotation @ wrench[:, 3:, None])[..., 0]
+    force, moment = (turned(to_base.rotation, part) for part in (wrench[:, :3], wrench[:, 3:]))
     cut = result.cut[rows]
     blocks: list[tuple[str, Floats, int]] = [
         ("x_mm y_mm z_mm", position / MM, 6),
@@ -53,7 +53,7 @@ def _motion(rows: slice, task: Task, result: Result) -> list[Numbers | Words]:
         ("error_before_mm", result.before[rows, None] / MM, 6),
         ("correction_x_mm correction_y_mm correction_z_mm", shift, 6),
         ("correction_mm", np.linalg.norm(shift, axis=1, keepdims=True), 6),
-        ("correction_rx_deg correction_ry_deg correction_rz_deg", turned, 6),
+        ("correction_rx_deg correction_ry_deg correction_rz_deg", turn, 6),
         ("error_after_mm", result.after[rows, None] / MM, 6),
     ]
     return [
@@ -70,7 +70,7 @@ def _motion(rows: slice, task: Task, result: Result) -> list[Numbers | Words]:
 
 
 def _inserted(rows: slice, division: Division, way: Floats) -> list[Numbers | Words]:
-    low, high = np.searchsorted(division.source, [rows.start, rows.stop])
+    low, high = bisect_left(division.source, rows.start), bisect_left(division.source, rows.stop)
     source, count = division.source[low:high] - rows.start, rows.stop - rows.start
     largest = np.full(count, -np.inf)
     np.fmax.at(largest, source, way[low:high] / MM)

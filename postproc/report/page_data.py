@@ -157,7 +157,7 @@ def _by_blocks(made: Callable[[Ints], Floats], rows: Ints, each: int = 1) -> Flo
 
 
 def _correction(task: Task, result: Result, rows: Ints) -> Floats:
-    command = task.base[rows].inverse() @ result.command[rows]
+    command = task.base.shared(rows).inverse() @ result.command[rows]
     return command.position - task.toolpath.position[rows]
 
 
