@@ -1,0 +1,254 @@
+"""Laws of the correction: what is reported is what was done, what shows is what counts, and where it begins anew."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_mirror import CARRIES, FORCE, TOOL, Problem, full, program_angles, task
+from ways_at_work import circle, line
+
+from postproc.compensation.between import LITTLE, SHARES, SHORT, Pieces, errors_between
+from postproc.compensation.correct import correct, with_residual
+from postproc.compensation.division import Limits, divide, made
+from postproc.compensation.doubt import Unsure, _ForceShare, half_widths, length_quantile
+from postproc.compensation.mirror import difference, predict
+from postproc.forces import Wrenches
+from postproc.geometry import Poses, rotation_from_vector
+from postproc.model import NOTHING
+from postproc.toolpath import Kind
+
+FREE = Limits(max_growth=100.0)
+
+
+# What is reported
+
+
+@pytest.mark.parametrize("count", [1, 2, 40])
+def test_the_iteration_ends_when_no_motion_goes_on(count):
+    """Its history has one row before and one after each iteration of the motion that takes longest."""
+    done = Problem(full(), count).mirror()
+    assert len(done.history) == done.iterations.max() + 1
+    assert np.array_equal(np.isfinite(done.history).sum(axis=0), done.iterations + 1)
+
+
+@pytest.mark.parametrize("process", [True, False])
+def test_iterations_are_the_steps_of_the_history(process):
+    result = correct(task(process=process))
+    steps = np.isfinite(result.history).sum(axis=0)
+    rows = result.corrected
+    assert np.array_equal(steps[rows] - 1, result.iterations[rows])
+    assert (result.iterations[rows] >= 1).all()
+    np.testing.assert_array_equal(result.history[0][rows], result.before[rows])
+    assert not steps[~rows].any()
+    assert not result.iterations[~rows].any()
+
+
+Z, NONE = np.array([0.0, 0.0, 1.0]), np.full(3, np.nan)
+SAID = {
+    "any orientation": {},
+    "no orientation": {"oriented": np.zeros(9, bool)},
+    "free about z": {"free_axis": np.tile(Z, (9, 1))},
+    "one free about z": {"free_axis": np.where(np.arange(9)[:, None] == 2, Z, NONE)},
+    "one not oriented": {"oriented": np.arange(9) != 6},
+}
+
+
+@pytest.mark.parametrize("gain", [0.3, 1.0])
+@pytest.mark.parametrize("said", SAID)
+def test_what_is_left_is_what_the_robot_does_with_the_commands(said, gain):
+    """Position, and orientation but for a turn about a free axis, whatever of it the text can say."""
+    job = task(gain=gain, **SAID[said])
+    result = correct(job)
+    rows = np.flatnonzero(result.corrected)
+    assert len(rows) == 6
+    there = predict(
+        job.model,
+        result.command[rows],
+        TOOL,
+        job.wrench[rows],
+        NOTHING,
+        job.track.status[rows],
+        job.track.q[rows],
+    ).pose
+    wanted = job.wanted[rows]
+    shift, turn = difference(there, wanted)
+    free = np.nan_to_num(job.toolpath.free_axis[rows])
+    axis = (wanted.rotation @ free[..., None])[..., 0]
+    shows = turn - np.sum(turn * axis, axis=1)[:, None] * axis
+    np.testing.assert_allclose(result.after[rows], np.linalg.norm(shift, axis=1), atol=1e-9)
+    np.testing.assert_allclose(result.after_angle[rows], np.linalg.norm(shows, axis=1), atol=1e-9)
+    again = with_residual(job, result, result.command)
+    np.testing.assert_allclose(again.after[rows], result.after[rows], atol=1e-9)
+    np.testing.assert_allclose(again.after_angle[rows], result.after_angle[rows], atol=1e-9)
+    np.testing.assert_allclose(again.correction, result.correction, atol=1e-15)
+
+
+@pytest.mark.parametrize("said", SAID)
+def test_commands_turn_only_as_the_text_can_say(said):
+    job = task(**SAID[said])
+    result = correct(job)
+    rows = np.flatnonzero(result.corrected)
+    _, turn = difference(result.command[rows], job.wanted[rows])
+    oriented, free = job.toolpath.oriented[rows], np.nan_to_num(job.toolpath.free_axis[rows])
+    assert np.linalg.norm(turn[~oriented], axis=1).max(initial=0.0) == 0.0
+    whole = oriented & ~free.any(axis=1)
+    assert (np.linalg.norm(turn[whole], axis=1) > 1e-6).all()
+    axis = (job.wanted[rows].rotation @ free[..., None])[..., 0]
+    assert np.abs(np.sum(turn * axis, axis=1)[~whole]).max(initial=0.0) < 1e-6
+
+
+# S and T
+
+
+def crossing(words, sign):
+    """A PTP with A6 a hair above zero, which the correction takes below (sign 1) or not (-1)."""
+    q, model = program_angles(), full()
+    turned = model.chain.jacobian(q[1:2], TOOL)[0, 3:, 5]
+    wrench = np.where(CARRIES[:, None], FORCE, 0.0)
+    wrench[1] = sign * np.concatenate([np.zeros(3), 50.0 * turned])
+    q[1, 5] = 1e-6
+    kinds = [Kind.LIN, words.pop("kind", Kind.PTP)] + [Kind.LIN] * 7
+    return [f.code for f in correct(task(q, model=model, wrench=wrench, kind=kinds, **words)).findings]
+
+
+@pytest.mark.parametrize(("status", "turn"), [(2, 0b10), (-1, 0b10), (2, -1)])
+def test_a_side_that_is_said_and_crossed_is_told(status, turn):
+    """Whichever of S and T the motion says; one that says neither, or is no PTP, says no side."""
+    assert "KIN006" in crossing({"status": status, "turn": turn}, 1)
+    assert "KIN006" not in crossing({"status": status, "turn": turn}, -1)
+    assert "KIN006" not in crossing({"status": -1, "turn": -1}, 1)
+    assert "KIN006" not in crossing({"status": status, "turn": turn, "kind": Kind.LIN}, 1)
+
+
+# Between the points
+
+
+def lines(lengths, tilts=None):
+    """Straight pieces with the tool down, of ``lengths`` [m], turned by ``tilts`` [rad] along their way; all of the one
+    motion of a cut."""
+    job = line()
+    n = len(lengths)
+    rows, first = np.full(n, 2), np.linspace(0.1, 0.6, n)
+    last = first + np.asarray(lengths) / 0.8
+    begin, end = job.ways.at(rows, first), job.ways.at(rows, last)
+    if tilts is not None:
+        turn = rotation_from_vector(np.outer(tilts, [1.0, 0.0, 0.0]))
+        end = Poses(turn @ end.rotation, end.position)
+    return job, Pieces.straight(rows, first, last, begin, end)
+
+
+def looked_at(job, pieces, shares):
+    """(K,) the largest error beside the way at the shares, one after the other."""
+    worst = np.zeros(len(pieces))
+    for share in shares:
+        along = pieces.first + share * (pieces.last - pieces.first)
+        here = pieces.at(np.full(len(pieces), share))
+        real = job.real(pieces.rows, here, job.force.along(pieces.rows, along)).pose
+        shift = real.position - job.goal(pieces.rows, job.ways.at(pieces.rows, along)).position
+        way = job.ways.tangent(pieces.rows, along)
+        shift -= np.sum(shift * way, axis=1, keepdims=True) * way
+        worst = np.maximum(worst, np.linalg.norm(shift, axis=1))
+    return worst
+
+
+def test_long_pieces_are_looked_at_in_three_places_and_short_ones_in_the_middle():
+    job, pieces = lines([0.9 * SHORT, 1.1 * SHORT, 0.2, 0.9 * SHORT], [0.0, 0.0, 0.0, 1.1 * LITTLE])
+    off, _ = errors_between(job, pieces)
+    long = np.array([False, True, True, True])
+    middle, three = looked_at(job, pieces, [0.5]), looked_at(job, pieces, SHARES)
+    assert (three > middle + 1e-9).all()
+    np.testing.assert_allclose(off, np.where(long, three, middle), atol=2e-9)
+    begins, _ = errors_between(job, pieces, np.array([True, False, False, True]))
+    first = np.maximum(off, looked_at(job, pieces, [0.0]))
+    np.testing.assert_allclose(begins, np.where([True, False, False, True], first, off), atol=2e-9)
+
+
+def test_the_angle_between_is_that_from_the_wanted_orientation():
+    """Pieces that turn away, evenly: a quarter, a half, three quarters of it show."""
+    tilts = np.array([0.0, 0.5 * LITTLE, 2 * LITTLE])
+    job, pieces = lines([0.01, 0.01, 0.01], tilts)
+    _, angle = errors_between(job, pieces)
+    _, still = errors_between(job, lines([0.01, 0.01, 0.01])[1])
+    shares = np.array([0.5, 0.5, 0.75])
+    assert np.abs(angle - shares * tilts).max() <= still.max() + 1e-6
+
+
+@pytest.mark.parametrize("sweep", [np.pi / 2, np.pi, 2 * np.pi])
+def test_pieces_of_an_arc_go_on_from_each_other_the_way_it_turns(sweep):
+    """Their sweeps sum up to that of the arc, and none turns back."""
+    job = circle(sweep=sweep)
+    result = correct(job)
+    division = divide(job, result, FREE)
+    own = np.flatnonzero((division.source == 2) & ~division.links)
+    assert len(own) > 1
+    assert (division.sweep[own] > 0).all()
+    assert division.sweep[own].sum() == pytest.approx(sweep, abs=5e-3)
+    pieces = made(job, division, own)
+    np.testing.assert_allclose(pieces.begin.position[1:], pieces.end.position[:-1], atol=1e-12)
+    np.testing.assert_allclose(np.diff(pieces.last), pieces.last[0], atol=1e-12)
+    assert errors_between(job, pieces)[0].max() <= job.tolerance
+
+
+@pytest.mark.parametrize("growth", [1.0, 1.5, 2.0, 3.0, 5.0])
+def test_never_more_motions_than_may_be(growth):
+    """What is inserted stays within the limit, and it is told exactly where that leaves some with fewer."""
+    job = line(tolerance=2e-6)
+    result = correct(job)
+    whole, some = divide(job, result, FREE), divide(job, result, Limits(max_growth=growth))
+    assert len(some) <= growth * len(job.toolpath)
+    fewer = len(some) < len(whole)
+    told = [finding for finding in some.findings if finding.code == "COR014"]
+    assert bool(told) == fewer
+    for finding in told:
+        assert (
+            f"({growth:g}) allows {int(growth * len(job.toolpath)) - len(job.toolpath)}:" in finding.message
+        )
+        assert finding.line in job.toolpath.line
+
+
+# Where the correction begins anew
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.5, 1.0 + 1e-12, 1.0 + 1e-6, 2.0, 3.0, -1.0])
+def test_the_correction_begins_anew_where_the_force_is_another(factor):
+    """Twice the force is another one, and so is half of it; less than digits is none."""
+    job = task()
+    values = np.array(job.force.values)
+    begin = values.copy()
+    begin[6] = factor * values[5]
+    job = replace(job, force=Wrenches(values, begin, CARRIES, "test", (), np.zeros(9, bool)))
+    corrected = CARRIES.copy()
+    same = abs(factor - 1.0) < 1e-9
+    found = job.steps(np.flatnonzero(CARRIES), corrected)
+    assert found.tolist() == [True, False, False, True, not same, False]
+
+
+# Doubt
+
+
+def test_an_error_of_zero_has_the_doubt_of_its_deviation():
+    rng = np.random.default_rng(40)
+    root = rng.normal(size=(5, 3, 3)) * 1e-4
+    spread = root @ np.swapaxes(root, 1, 2)
+    error = np.zeros((5, 3))
+    error[3:] = rng.normal(size=(2, 3))
+    found = half_widths(error, spread)
+    np.testing.assert_array_equal(found[:3], length_quantile(spread)[:3])
+    unit = error[3:] / np.linalg.norm(error[3:], axis=1)[:, None]
+    along = np.sqrt(np.einsum("ni,nij,nj->n", unit, spread[3:], unit))
+    np.testing.assert_allclose(found[3:], 1.959964 * along, rtol=1e-4)
+    np.testing.assert_allclose(half_widths(2 * error[3:], spread[3:]), found[3:], rtol=1e-12)
+
+
+def test_only_the_force_counts_with_the_interval_of_each_motion():
+    """Parameters are as uncertain in one motion as in another, the first effect's as the last one's."""
+    moves = np.random.default_rng(41).normal(size=(4, 3, 4))
+    entries = [Unsure(str(i), i, "c", 1.0, 0.0, 2.0, 0.1) for i in (0, 1, 2)]
+    entries.append(Unsure("force", -1, "force", 1.0, -np.inf, np.inf, 0.1))
+    scale = np.array([0.0, 0.25, 0.5, 0.75, 1.0, 1.0])
+    rows = np.array([1, 3, 4, 0])
+    found = _ForceShare(0.2, scale, False, True).scaled(moves, entries, rows)
+    np.testing.assert_array_equal(found[:, :, :3], moves[:, :, :3])
+    np.testing.assert_allclose(found[:, :, 3], scale[rows][:, None] * moves[:, :, 3])
