@@ -1,25 +1,26 @@
 """What reading a motion costs: the text, its forces, all that predicts it, and the output read again."""
 
-from dataclasses import replace
-
 from postproc.document import Document
+
+
+def read(ready, contents):
+    """As if for the first time: a document remembers where its lines are."""
+    documents = tuple(
+        Document(document.path, raw if isinstance(raw, bytes) else b"".join(raw))
+        for document, raw in zip(ready.program.documents, contents, strict=True)
+    )
+    return ready.dialect.read(documents, ready.settings)
 
 
 def test_parse(work, measured):
     ready = work["prepare"].result
-    again = measured(lambda: ready.dialect.read(ready.program.documents, ready.settings))
-    assert len(again.toolpath) >= work.motions
+    contents = [document.raw for document in ready.program.documents]
+    assert len(measured(lambda: read(ready, contents)).toolpath) >= work.motions
 
 
 def test_read_again(work, measured):
-    ready = work["prepare"].result
-    contents = work["write"].result.contents
-    documents = tuple(
-        replace(document, raw=raw) if isinstance(raw, bytes) else Document(document.path, b"".join(raw))
-        for document, raw in zip(ready.program.documents, contents, strict=True)
-    )
-    again = measured(lambda: ready.dialect.read(documents, ready.settings))
-    assert len(again.toolpath) >= work.motions
+    ready, contents = work["prepare"].result, work["write"].result.contents
+    assert len(measured(lambda: read(ready, contents)).toolpath) >= work.motions
 
 
 def test_prepare(work, measured):
