@@ -94,12 +94,12 @@ function words(i) {
   const told = [`line ${motions.line[i]}: ${given.kinds[motions.kind[i]]}${cut}, ${given.states[motions.state[i]]}`];
   told.push(`at ${vector(motions.position, i, 2)} mm`);
   if (motions.state[i] === AIR) return told;
-  const wide = Number.isFinite(motions.interval[i]) ? ` ± ${number(motions.interval[i], 3)}` : '';
-  told.push(`error before ${number(motions.before[i], 3)}${wide} mm`);
+  const wide = (widths) => (Number.isFinite(widths[i]) ? ` ± ${number(widths[i], 3)}` : '');
+  told.push(`error before ${number(motions.before[i], 3)}${wide(motions.before_width)} mm`);
   if (given.corrected) {
     told.push(`correction X Y Z ${vector(motions.correction, i, 3)} mm`);
     const way = Number.isFinite(motions.between[i]) ? `, on the way ${number(motions.between[i], 4)} mm` : '';
-    told.push(`error after ${number(motions.after[i], 4)}${wide} mm${way}`);
+    told.push(`error after ${number(motions.after[i], 4)}${wide(motions.after_width)} mm${way}`);
     if (motions.inserted[i]) told.push(`${motions.inserted[i]} inserted before it`);
   }
   told.push(`force ${number(quantities.force.values[i], 0)} N (${vector(motions.force, i, 0)})`);

@@ -12,9 +12,9 @@ function start() {
   const space = new Space(byId('space'), byId('marks'), byId('tip'));
   hands(space);
   figures.push(space);
-  const errors = [{ name: 'before', values: motions.before, band: motions.interval, colour: (t) => t.before, dash: [7, 4], width: 1.7 }];
+  const errors = [{ name: 'before', values: motions.before, band: motions.before_width, colour: (t) => t.before, dash: [7, 4], width: 1.7 }];
   if (given.corrected) {
-    errors.push({ name: 'after', values: motions.after, band: motions.interval, colour: (t) => t.after, dash: [], width: 1.7 });
+    errors.push({ name: 'after', values: motions.after, band: motions.after_width, colour: (t) => t.after, dash: [], width: 1.7 });
     if (motions.between.some(Number.isFinite)) {
       errors.push({ name: 'after, on the way there', values: motions.between, colour: (t) => t.soft, dash: [2, 2], width: 1.2 });
     }
