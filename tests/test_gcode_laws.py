@@ -4,13 +4,14 @@ of a Sinumerik is not read rather than misread."""
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from gcode_writing import DOWN, WRITING, random_plan, read
 
-from postproc.dialects.dialect import Program, Settings
+from postproc.dialects.dialect import Plan, Program, Settings
 from postproc.dialects.gcode import DIALECTS, kuka_cnc, sinumerik, source
 from postproc.dialects.gcode import reader as reader_module
 from postproc.dialects.gcode import writer as writer_module
@@ -18,8 +19,9 @@ from postproc.dialects.gcode.control import Code, Control, Feed, Group, Move, On
 from postproc.dialects.gcode.lexing import lex
 from postproc.dialects.gcode.tables import FANUC, LINUXCNC
 from postproc.dialects.gcode.words import How
-from postproc.document import Document
-from postproc.units import DEG
+from postproc.document import Document, apply
+from postproc.geometry import rotation_from_vector
+from postproc.units import DEG, MM
 
 ROOT = Path(__file__).parent / "programs"
 NAMES = {dialect.name: dialect for dialect in DIALECTS}
@@ -194,3 +196,64 @@ def test_turns_of_an_arc_are_those_said(turns: int) -> None:
             NAMES["linuxcnc"], f"G21 G90 G17 T1\nG0 X10 Y0 Z0\nF600\nG2 X10 Y0 I-10 J0 P{turns}\n"
         ).toolpath
         assert abs(other.sweep[-1]) == pytest.approx(2 * np.pi * turns)
+
+
+# Digits
+
+SHARES = (0.1, 0.4, 0.49, 0.51, 0.55, 0.6, 0.7, 0.9, 1.0, 1.4, 1.6)
+"""Of a written step."""
+START = {
+    "linuxcnc": "G21 G90 G17 G54 T1\nG0 X0 Y0 Z0\n",
+    "fanuc": "G21 G90 G17 G54 T1\nG0 X0. Y0. Z0.\n",
+    "sinumerik": HEAD,
+    "kuka_cnc": "G71 G90 G17 G54 T1\nG0 X0 Y0 Z0 A0 B0 C180\n",
+}
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("share", SHARES)
+@pytest.mark.parametrize("name", NAMES)
+def test_a_number_changes_where_another_is_nearer(name: str, share: float, sign: int) -> None:
+    """Half of a written step and not less: what is read again is never farther than that from what was planned."""
+    found = read(NAMES[name], START[name] + "G1 X1. Y2. Z3. F1000\nG1 X4. Y5. Z6.\nG1 X7. Y8. Z9.\n")
+    step = 10.0**-WRITING.mm * MM
+    for axis in range(3):
+        position = found.toolpath.position.copy()
+        position[-2, axis] += sign * share * step
+        edits = NAMES[name].moved(found, replace(Plan.of(found.toolpath), position=position), WRITING)
+        assert not edits.held
+        assert bool(len(edits.edits)) == (share > 0.5)
+        raw = apply(found.documents[0], list(edits.edits))
+        again = read(NAMES[name], raw).toolpath.position
+        assert np.abs(again - position).max() <= 0.5001 * step
+
+
+@pytest.mark.parametrize("share", SHARES)
+def test_a_tool_vector_changes_where_another_is_nearer(share: float) -> None:
+    """It is written as one whole, in digits of its own: 1e-3 of it are a milliradian."""
+    found = body("G1 X1. Y2. Z3. A3=0 B3=0 C3=1\nG1 X4. Y5. Z6.\n")
+    step = 10.0**-WRITING.deg
+    for axis in ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0]):
+        rotation = found.toolpath.rotation.copy()
+        rotation[-2:] = rotation_from_vector(share * step * np.array(axis)) @ rotation[-2:]
+        edits = NAMES["sinumerik"].moved(found, replace(Plan.of(found.toolpath), rotation=rotation), WRITING)
+        assert not edits.held
+        again = read(NAMES["sinumerik"], apply(found.documents[0], list(edits.edits))).toolpath.rotation
+        apart = np.linalg.norm(np.cross(again[-2:, :, 2], rotation[-2:, :, 2]), axis=1)
+        assert apart.max() <= 0.5001 * step
+
+
+@pytest.mark.parametrize("words", ["A2=0 B2=0 C2=0", "A2=10 B2=20 C2=30"])
+@pytest.mark.parametrize("share", SHARES)
+def test_angles_change_where_others_are_nearer(words: str, share: float) -> None:
+    found = body(f"ORIRPY\nG1 X1. Y2. Z3. {words}\nG1 X4. Y5. Z6.\n")
+    step = 10.0**-WRITING.deg * DEG
+    for axis in np.eye(3):
+        rotation = found.toolpath.rotation.copy()
+        rotation[-2:] = rotation_from_vector(share * step * axis) @ rotation[-2:]
+        edits = NAMES["sinumerik"].moved(found, replace(Plan.of(found.toolpath), rotation=rotation), WRITING)
+        assert not edits.held
+        again = read(NAMES["sinumerik"], apply(found.documents[0], list(edits.edits))).toolpath.rotation
+        # The tool may spin: two of the three angles say where it points.
+        apart = np.linalg.norm(np.cross(again[-2:, :, 2], rotation[-2:, :, 2]), axis=1)
+        assert apart.max() <= 2 * 0.5001 * step
