@@ -21,7 +21,6 @@ from postproc.compensation.doubt import (
     covariances,
     doubt_of,
     half_widths,
-    largest_deviation,
     length_quantile,
     sensitivities,
     shares,
@@ -158,6 +157,11 @@ def deviations(known):
     return np.diag([entry.deviation for entry in known.entries if entry.name != FORCE])
 
 
+def largest_deviation(spread):
+    """Standard deviation in the direction in which it is largest."""
+    return np.sqrt(np.linalg.eigvalsh(spread)[:, -1])
+
+
 def spread_of(task, command, known):
     """The covariance that linear propagation gives, and the error of the model itself."""
     rows = np.arange(len(task.wanted))
@@ -201,7 +205,8 @@ def test_deflection_and_residual_spread_as_drawn_robots(model, process, force):
     assert np.linalg.norm(error, axis=1).max() < 2e-8
     seen = covariance_of(after)
     np.testing.assert_allclose(largest_deviation(seen), largest_deviation(spread), rtol=WITHIN)
-    np.testing.assert_allclose(told.deviation, largest_deviation(seen), rtol=WITHIN)
+    np.testing.assert_allclose(told.widths[:, 0], 1.96 * along, rtol=0.02)
+    np.testing.assert_allclose(told.widths[:, 1], half_widths(error, spread), rtol=1e-3)
     trace = np.trace(spread, axis1=1, axis2=2)
     assert (np.abs(seen - spread).max(axis=(1, 2)) < 2 * WITHIN * trace).all()
     below = np.quantile(np.linalg.norm(after, axis=2), 0.95, axis=0)
@@ -343,7 +348,7 @@ def test_intervals_of_zero_give_zero():
     task = job(every(paper(), 0.0), 4)
     told = doubt_of(task, correct(task), 0.0)
     assert (told.before, told.after, told.blame, told.lower_bound) == (0.0, 0.0, (), False)
-    assert not told.deviation.any()
+    assert not told.widths.any()
 
 
 def test_nothing_predicted_nothing_doubted():
@@ -404,7 +409,7 @@ def test_force_does_not_move_the_unloaded_robot():
     model = every(with_compensator(paper(), **SOFTER), 0.0)
     process, absolute = (job(model, 5, process=way) for way in (True, False))
     one, other = (doubt_of(task, correct(task), 0.2) for task in (process, absolute))
-    assert one.deviation == pytest.approx(other.deviation, rel=1e-2)
+    assert one.widths[:, 1] == pytest.approx(other.widths[:, 1], rel=1e-2)
 
 
 def test_a_sag_that_the_base_contains_is_not_in_doubt():

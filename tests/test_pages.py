@@ -149,20 +149,20 @@ def test_the_length_of_the_path_is_that_of_the_cuts(tmp_path):
 def test_the_band_is_the_doubt(predicted, data):
     doubt = predicted.report.doubt
     assert len(doubt.rows) > 3
-    np.testing.assert_allclose(data.interval[doubt.rows], 1.96 * doubt.deviation / MM, rtol=1e-12)
-    assert np.isnan(data.interval[predicted.result.state == State.AIR]).all()
+    np.testing.assert_allclose(data.widths[doubt.rows], doubt.widths / MM, rtol=1e-12)
+    assert np.isnan(data.widths[predicted.result.state == State.AIR]).all()
 
 
 def test_a_band_between_motions_that_were_evaluated_is_interpolated(predicted):
     doubt = predicted.report.doubt
     first, last = doubt.rows[0], doubt.rows[3]
-    few = replace(doubt, rows=np.array([first, last]), deviation=np.array([1e-5, 4e-5]))
+    few = replace(doubt, rows=np.array([first, last]), widths=np.array([[1e-5, 5e-5], [4e-5, np.nan]]))
     report = replace(predicted.report, doubt=few)
     data = page_data(predicted.task, predicted.result, report, predicted.documents)
     middle = first + 1
     assert data.rows.tolist() == list(range(data.motions))
     share = 1 / (last - first)
-    assert data.interval[middle] == pytest.approx(1.96 * (0.01 + share * 0.03))
+    assert data.widths[middle].tolist() == pytest.approx([0.01 + share * 0.03, 0.05])
     assert data.evaluated == 2
 
 
@@ -255,7 +255,7 @@ def test_where_many_motions_are_left_out_the_columns_are_those_of_the_shown(tmp_
     assert {0, n - 1, *every.rows[[place.row for place in every.places]].tolist()} <= set(few.rows.tolist())
     for name in ("line", "kind", "state", "cut", "way", "position", "force", "deflection", "correction"):
         np.testing.assert_array_equal(getattr(few, name), getattr(every, name)[few.rows], name)
-    for name in ("before", "after", "between", "inserted", "interval"):
+    for name in ("before", "after", "between", "inserted", "widths"):
         np.testing.assert_array_equal(getattr(few, name), getattr(every, name)[few.rows], name)
     assert [few.line[place.row] for place in few.places] == [every.line[place.row] for place in every.places]
     assert [place.source for place in few.places] == [place.source for place in every.places]
@@ -292,7 +292,7 @@ def test_a_page_of_many_motions_is_not_too_large(data):
         state=np.full(len(rows), int(State.CORRECTED)), cut=figures.cut[rows], way=rows / 1e3, position=vectors,
         arcs=np.zeros(0, np.int64), bends=np.zeros((0, 3, 3)), force=vectors, deflection=vectors,
         correction=figures.correction[rows], before=figures.before[rows], after=figures.after[rows],
-        between=figures.between[rows], inserted=nothing.astype(int), interval=nothing,
+        between=figures.between[rows], inserted=nothing.astype(int), widths=np.zeros((len(rows), 2)),
         places=(Place(int(np.searchsorted(rows, n // 3)), "", "LIN", ("LIN",)),),
     )  # fmt: skip
     page = program_page(big, {})

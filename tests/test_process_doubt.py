@@ -24,7 +24,7 @@ def test_the_same_share_in_all_motions_is_one_share():
     result = correct(task)
     one, each = doubt_of(task, result, 0.3), doubt_of(with_shares(task, [0.3] * 8), result)
     assert (each.before, each.after) == (pytest.approx(one.before), pytest.approx(one.after))
-    assert np.allclose(each.deviation, one.deviation)
+    assert np.allclose(each.widths, one.widths)
     assert each.tenth == one.tenth == ()
     assert not each.force_differs
     assert "force, one scale for all motions" in _doubt(each)
@@ -34,9 +34,9 @@ def test_every_operation_has_its_own_share():
     task = job(known(), 8)
     result = correct(task)
     told = doubt_of(with_shares(task, [0.5] * 4 + [0.1] * 4), result)
-    rough, fine = (doubt_of(task, result, share).deviation for share in (0.5, 0.1))
-    assert np.allclose(told.deviation[:4], rough[:4])
-    assert np.allclose(told.deviation[4:], fine[4:])
+    rough, fine = (doubt_of(task, result, share).widths for share in (0.5, 0.1))
+    assert np.allclose(told.widths[:4], rough[:4])
+    assert np.allclose(told.widths[4:], fine[4:])
     assert told.force_differs
     share = 0.5 if told.worst < 4 else 0.1
     assert told.before == pytest.approx(doubt_of(task, result, share).before)
@@ -56,8 +56,8 @@ def test_an_operation_without_an_interval_makes_a_lower_bound():
     told = doubt_of(with_shares(task, [0.5] * 4 + [np.nan] * 4), result)
     assert told.lower_bound
     assert [name for name, _ in told.tenth] == [FORCE]
-    assert np.allclose(told.deviation[:4], doubt_of(task, result, 0.5).deviation[:4])
-    assert np.allclose(told.deviation[4:], doubt_of(task, result, 0.0).deviation[4:])
+    assert np.allclose(told.widths[:4], doubt_of(task, result, 0.5).widths[:4])
+    assert np.allclose(told.widths[4:], doubt_of(task, result, 0.0).widths[4:])
     nothing = doubt_of(with_shares(task, [np.nan] * 8), result)
     assert [name for name, _ in nothing.tenth] == [FORCE]
 

@@ -160,14 +160,6 @@ def covariances(sensitivity: Floats, covariance: Floats) -> Floats:
     return np.asarray(sensitivity @ covariance @ np.swapaxes(sensitivity, 1, 2))
 
 
-def largest_deviation(spread: Floats) -> Floats:
-    """(N,) [m] standard deviation in the direction in which it is largest, of covariances (N, 3, 3)."""
-    known = np.isfinite(spread).all(axis=(1, 2))
-    found = np.full(len(spread), np.nan)
-    found[known] = np.sqrt(np.maximum(np.linalg.eigvalsh(spread[known])[:, -1], 0.0))
-    return found
-
-
 def half_widths(error: Floats, spread: Floats) -> Floats:
     """(N,) [m] half width of the 95 % interval of the length of ``error`` (N, 3) [m] with covariance ``spread``.
 
@@ -211,7 +203,7 @@ class Doubt:
     """The doubt of one program's prediction.
 
     before, after [m]: half width of the 95 % interval of the largest error; NaN where nothing is known.
-    rows (M,): motions evaluated; deviation (M,) [m]: standard deviation there, where it is largest of all directions.
+    rows (M,): motions evaluated; widths (M, 2) [m]: ``half_widths`` of the error there before and after.
     worst: row of the largest error before, -1 without any; there: ``blame`` (name, share of the variance), and
     ``tenth`` (name, [m] that 10 % of it would move the tool) of the figures without an interval, largest first.
     intervals: figures with one.  unstable: motions evaluated that have no stable rest within the intervals; they are
@@ -224,7 +216,7 @@ class Doubt:
     worst: int = -1
     before: float = np.nan
     after: float = np.nan
-    deviation: Floats = field(default_factory=lambda: np.zeros(0))
+    widths: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     blame: tuple[tuple[str, float], ...] = ()
     tenth: tuple[tuple[str, float], ...] = ()
     unstable: int = 0
@@ -275,13 +267,14 @@ def doubt_of(task: Task, result: Result, force_ci95: float | None = None) -> Dou
     moves = force.scaled(moves, known.entries, rows)
     spread = covariances(moves, known.covariance)
     size = np.linalg.norm(error, axis=1)
-    upper = size + half_widths(error, spread)
+    after = half_widths(error, spread)
+    upper = size + after
     sound = np.isfinite(upper)
     return replace(
         told,
         before=float(before[0]),
         after=float(upper[sound].max() - size[sound].max()) if sound.any() else np.nan,
-        deviation=largest_deviation(spread),
+        widths=np.stack([half_widths(result.deflection[rows], spread), after], axis=1),
         blame=blame if share.any() else (),
         unstable=int((~sound).sum()),
     )

@@ -72,7 +72,7 @@ def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
         motions=data.motions,
         goes=True,
         corrected=data.corrected,
-        interval=bool(np.isfinite(data.interval).any()),
+        interval=bool(np.isfinite(data.widths).any()),
         evaluated=data.evaluated,
         lower_bound=report.doubt.lower_bound,
         data=embedded(_figures(data)),
@@ -187,7 +187,8 @@ def _figures(data: PageData) -> dict[str, object]:
         "after": (data.after, "f4"),
         "between": (data.between, "f4"),
         "inserted": (data.inserted, "i4"),
-        "interval": (data.interval, "f4"),
+        "before_width": (data.widths[:, 0], "f4"),
+        "after_width": (data.widths[:, 1], "f4"),
         "arc": (data.arcs, "i4"),
         "bends": (data.bends.reshape(-1, 3), "f4"),
     }

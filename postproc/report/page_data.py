@@ -18,7 +18,6 @@ from postproc.document import Document, Edit, Edits, Span, apply
 from postproc.report.page_rows import SHOWN, shown_rows, worst_rows
 from postproc.report.report import Report
 from postproc.report.terminal import printable
-from postproc.robot.description import COVERAGE
 from postproc.units import MM
 
 BENDS, EACH = 60_000, (3, 23)
@@ -62,9 +61,8 @@ class PageData:
     points on their way; force (K, 3) [N]; deflection (K, 3) before: all in the robot base.  correction (K, 3): command
     minus wanted, in the axes of the programmed base.  before, after (K,): predicted error at the end points; between
     (K,): the largest on the way there after the correction.  inserted (K,): motions of the output before this one.
-    interval (K,): half width of the 95 % interval of a coordinate of the predicted place, in the direction in which it
-    is largest; evaluated: motions at which it was computed, between them it is interpolated.  NaN wherever a figure is
-    not known.
+    widths (K, 2): half widths of the 95 % intervals of before and after; evaluated: motions at which they were
+    computed, between them they are interpolated.  NaN wherever a figure is not known.
     """
 
     report: Report
@@ -88,7 +86,7 @@ class PageData:
     after: Floats
     between: Floats
     inserted: Ints
-    interval: Floats
+    widths: Floats
     evaluated: int
     places: tuple[Place, ...]
 
@@ -141,8 +139,8 @@ def page_data(
         after=after[rows] / MM,
         between=between[rows] / MM,
         inserted=first[rows + 1] - first[rows] - 1,
-        interval=np.where(scope[rows], _interval(report, rows), np.nan),
-        evaluated=len(report.doubt.deviation),
+        widths=np.where(scope[rows, None], _widths(report, rows), np.nan),
+        evaluated=len(report.doubt.widths),
         places=tuple(
             Place(int(np.searchsorted(rows, row)), why, source, () if output is None else written)
             for (row, why), (source, written) in zip(found, texts, strict=True)
@@ -214,11 +212,11 @@ def _known(values: Floats, scope: Bools) -> Floats:
     return np.where(scope & np.isfinite(values), values, np.nan)
 
 
-def _interval(report: Report, rows: Ints) -> Floats:
-    """(K,) [mm] half width at ``rows`` (K,), between those that were evaluated interpolated."""
-    doubt = report.doubt
-    known = np.isfinite(doubt.deviation)
-    if not known.any():
-        return np.full(len(rows), np.nan)
-    evaluated = doubt.rows[: len(doubt.deviation)][known]
-    return np.interp(rows, evaluated, COVERAGE * doubt.deviation[known] / MM)
+def _widths(report: Report, rows: Ints) -> Floats:
+    """(K, 2) [mm] half widths at ``rows`` (K,), between those that were evaluated interpolated."""
+    found, doubt = np.full((len(rows), 2), np.nan), report.doubt
+    for width, evaluated in zip(found.T, doubt.widths.T, strict=True):
+        known = np.isfinite(evaluated)
+        if known.any():
+            width[:] = np.interp(rows, doubt.rows[: len(known)][known], evaluated[known] / MM)
+    return found
