@@ -156,20 +156,27 @@ def abc_from_rotation(rotation: ArrayLike, near: ArrayLike | None = None) -> Flo
 
 def wrapped(angle: ArrayLike) -> Floats:
     """Angles brought into (-pi, pi]."""
-    return np.pi - np.mod(np.pi - np.asarray(angle, dtype=float), 2 * np.pi)
+    value = np.asarray(angle, dtype=float)
+    return value - 2 * np.pi * np.ceil((value - np.pi) / (2 * np.pi))
 
 
 def rotation_from_vector(vector: ArrayLike) -> Floats:
     """exp of rotation vectors (..., 3) [rad] (Rodrigues' formula)."""
     v = np.asarray(vector, dtype=float)
-    angle2 = np.sum(v * v, axis=-1)
+    x, y, z = np.moveaxis(v, -1, 0)
+    angle2 = x * x + y * y + z * z
     angle = np.sqrt(angle2)
     small = angle < 1e-4
     safe = np.where(small, 1.0, angle)
     first = np.where(small, 1 - angle2 / 6, np.sin(safe) / safe)
     second = np.where(small, 0.5 - angle2 / 24, (1 - np.cos(safe)) / (safe * safe))
-    k = skew(v)
-    return np.eye(3) + first[..., None, None] * k + second[..., None, None] * (k @ k)
+    # 1 + first [v]x + second [v]x [v]x, and [v]x [v]x = v v^T - |v|^2
+    found, rest = np.empty((*v.shape, 3)), 1 - second * angle2
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        found[..., i, i] = rest + second * v[..., i] * v[..., i]
+        even, odd = second * v[..., i] * v[..., j], first * v[..., k]
+        found[..., i, j], found[..., j, i] = even - odd, even + odd
+    return found
 
 
 def vector_from_rotation(rotation: ArrayLike) -> Floats:
@@ -178,11 +185,11 @@ def vector_from_rotation(rotation: ArrayLike) -> Floats:
     Near pi the axis is taken from the symmetric part, so that the result stays good to about 1e-8 there.
     """
     r = np.asarray(rotation, dtype=float)
-    odd = 0.5 * np.stack(
-        [r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], axis=-1
-    )
-    sine = np.linalg.norm(odd, axis=-1)
-    cosine = 0.5 * (np.trace(r, axis1=-2, axis2=-1) - 1.0)
+    odd = np.empty(r.shape[:-1])
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        odd[..., i] = 0.5 * (r[..., k, j] - r[..., j, k])
+    sine = np.sqrt(odd[..., 0] ** 2 + odd[..., 1] ** 2 + odd[..., 2] ** 2)
+    cosine = 0.5 * (r[..., 0, 0] + r[..., 1, 1] + r[..., 2, 2] - 1.0)
     angle = np.arctan2(sine, cosine)
     small = sine < 1e-7
     factor = np.where(small, 1.0, angle / np.where(small, 1.0, sine))

@@ -15,7 +15,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.effects import Conditions
 from postproc.geometry import Poses, rotation_from_vector, vector_from_rotation
-from postproc.model import STEP_TOLERANCE, StiffnessModel
+from postproc.model import StiffnessModel
 from postproc.robot.inverse import inverse
 
 POSITION_TOLERANCE = 1e-8
@@ -23,6 +23,9 @@ POSITION_TOLERANCE = 1e-8
 
 ANGLE_TOLERANCE = 1e-8
 """[rad]"""
+
+REST = 1e-10
+"""[rad, m] Last step of an equilibrium: what is left after it is a picometre or two at the tool."""
 
 MAX_ITERATIONS = 20
 
@@ -48,7 +51,7 @@ def predict(
     status: Ints,
     near: Floats,
     start: Floats | None = None,
-    tolerance: float = STEP_TOLERANCE,
+    tolerance: float = REST,
 ) -> Prediction:
     """The tool's pose when the controller is sent to ``command`` (N TCP poses in the robot base) under ``wrench``
     (N, 6), in the branch ``status`` (N,), with turns nearest to ``near`` (N, 6) [rad].

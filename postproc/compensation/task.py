@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.mirror import Correction, Prediction, difference, mirror, predict
+from postproc.compensation.mirror import REST, Correction, Prediction, difference, mirror, predict
 from postproc.compensation.ways import Ways
 from postproc.effects import Conditions
 from postproc.forces import Wrenches
 from postproc.geometry import Placed, Poses
-from postproc.model import STEP_TOLERANCE, StiffnessModel
+from postproc.model import StiffnessModel
 from postproc.robot.inverse import inverse
 from postproc.robot.track import Track, nominal_flange
 from postproc.toolpath import Toolpath
@@ -58,9 +58,7 @@ class Task:
     def ways(self) -> Ways:
         return Ways.of(self.toolpath, self.wanted, self.base, self.tool, self.model.robot, self.track)
 
-    def real(
-        self, rows: Ints, command: Poses, wrench: Floats, tolerance: float = STEP_TOLERANCE
-    ) -> Prediction:
+    def real(self, rows: Ints, command: Poses, wrench: Floats, tolerance: float = REST) -> Prediction:
         """Where the tool comes when the controller is sent to ``command`` (K) in motions ``rows`` (K,) under
         ``wrench`` (K, 6).  ``tolerance`` [rad, m]: last step of the equilibrium."""
         return predict(
@@ -74,7 +72,7 @@ class Task:
             tolerance=tolerance,
         )
 
-    def goal(self, rows: Ints, wanted: Poses, tolerance: float = STEP_TOLERANCE) -> Poses:
+    def goal(self, rows: Ints, wanted: Poses, tolerance: float = REST) -> Poses:
         """Where the tool is to be: the wanted poses (K), or where the robot without force takes it."""
         if not self.process or self.model.slack:
             return wanted

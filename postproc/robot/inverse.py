@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.geometry import Poses, rotation_from_vector, wrapped
+from postproc.geometry import Poses, wrapped
+from postproc.robot.chain import sine_and_cosine
 from postproc.robot.geometries import Geometry, KukaLengths, KukaVariant, SerialArm
 from postproc.robot.newton import inverse_near
 
-_UNTURN_FLANGE = np.round(rotation_from_vector([0.0, -np.pi / 2, 0.0]))
 _SINGULAR = 1e-9
 
 
@@ -71,43 +71,45 @@ def _closed_form(arm: KukaLengths, flange: Poses, status: Ints, near: Floats) ->
 
     A1 is that of ``near`` with the wrist over axis 1, A4 with A5 = 0.
     """
-    rotation = flange.rotation @ _UNTURN_FLANGE
-    centre = flange.position - arm.d6 * rotation[..., 0]
+    # columns (3, N) of the flange; its z points along the forearm where the wrist is straight
+    fx, fy, fz = np.ascontiguousarray(np.moveaxis(flange.rotation, (-2, -1), (1, 0)))
+    x, y, z = np.ascontiguousarray(flange.position.T) - arm.d6 * fz
     overhead, elbow, flipped = ((status >> bit) & 1 == 1 for bit in range(3))
-    x, y = centre[:, 0], centre[:, 1]
-    across = np.hypot(x, y)
-    a1 = np.where(across < _SINGULAR, near[:, 0], -np.arctan2(y, x) + np.where(overhead, np.pi, 0.0))
+    across = np.sqrt(x * x + y * y)
+    a1 = -np.arctan2(y, x) + np.where(overhead, np.pi, 0.0)
+    above = np.flatnonzero(across < _SINGULAR)
+    a1[above] = near[above, 0]
     forward = np.where(overhead, -across, across) - arm.a1
-    up = centre[:, 2] - arm.d1
+    up = z - arm.d1
 
     second = np.hypot(arm.d4, arm.a3)
     cosine = (forward**2 + up**2 - arm.a2**2 - second**2) / (2 * arm.a2 * second)
     reachable = np.abs(cosine) <= 1.0
     cosine = np.where(reachable, cosine, np.nan)
-    bend = np.where(elbow, 1.0, -1.0) * np.arctan2(np.sqrt((1 - cosine) * (1 + cosine)), cosine)
-    a2 = np.arctan2(-up, forward) - np.arctan2(second * np.sin(bend), arm.a2 + second * np.cos(bend))
-    a3 = bend - forearm_tilt(arm)
+    sine = np.where(elbow, 1.0, -1.0) * np.sqrt((1 - cosine) * (1 + cosine))
+    a2 = np.arctan2(-up, forward) - np.arctan2(second * sine, arm.a2 + second * cosine)
+    a3 = np.arctan2(sine, cosine) - forearm_tilt(arm)
 
-    # Wrist: M = Rx(-A4) Ry(A5) Rx(-A6), what is left of the rotation past the forearm.
-    s1, c1, s23, c23 = np.sin(a1), np.cos(a1), np.sin(a2 + a3), np.cos(a2 + a3)
-    r0, r1, r2 = rotation[:, 0], rotation[:, 1], rotation[:, 2]
-    level = c1[:, None] * r0 - s1[:, None] * r1
-    m0 = c23[:, None] * level - s23[:, None] * r2
-    m1 = s1[:, None] * r0 + c1[:, None] * r1
-    m2 = s23[:, None] * level + c23[:, None] * r2
-    sine = np.hypot(m0[:, 1], m0[:, 2])
+    # Wrist: M = Rx(-A4) Ry(A5) Rx(-A6), what is left of the rotation past the forearm; of its rows what is needed.
+    (s1, c1), (s23, c23) = sine_and_cosine(a1), sine_and_cosine(a2 + a3)
+    level = c1 * fz[0] - s1 * fz[1]
+    m00, m10, m20 = c23 * level - s23 * fz[2], s1 * fz[0] + c1 * fz[1], s23 * level + c23 * fz[2]
+    m01 = c23 * (c1 * fy[0] - s1 * fy[1]) - s23 * fy[2]
+    m02 = s23 * fx[2] - c23 * (c1 * fx[0] - s1 * fx[1])
+    slant = np.sqrt(m01 * m01 + m02 * m02)
     sign = np.where(flipped, -1.0, 1.0)
-    a5 = sign * np.arctan2(sine, m0[:, 0])
-    straight = sine < _SINGULAR
-    a4 = np.where(straight, near[:, 3], -np.arctan2(sign * m1[:, 0], -sign * m2[:, 0]))
-    a6 = np.where(
-        straight,
-        np.arctan2(m1[:, 2], m1[:, 1]) - near[:, 3],
-        -np.arctan2(sign * m0[:, 1], sign * m0[:, 2]),
-    )
-    q = np.stack([a1, a2, a3, a4, a5, a6], axis=1)
-    q[:, [0, 3, 5]] = near[:, [0, 3, 5]] + wrapped(q[:, [0, 3, 5]] - near[:, [0, 3, 5]])
-    q[:, [1, 2]] = wrapped(q[:, [1, 2]])
+    a4 = -np.arctan2(sign * m10, -sign * m20)
+    a5 = sign * np.arctan2(slant, m00)
+    a6 = -np.arctan2(sign * m01, sign * m02)
+    straight = np.flatnonzero(slant < _SINGULAR)
+    if len(straight):
+        at = near[straight, 3]
+        m11, m12 = ((s1 * axis[0] + c1 * axis[1])[straight] for axis in (fy, fx))
+        a4[straight], a6[straight] = at, np.arctan2(-m12, m11) - at
+    q = np.empty((len(a1), 6))
+    for axis, angle in ((0, a1), (3, a4), (5, a6)):
+        q[:, axis] = near[:, axis] + wrapped(angle - near[:, axis])
+    q[:, 1], q[:, 2], q[:, 4] = wrapped(a2), wrapped(a3), a5
     return Inverse(q, reachable & np.isfinite(q).all(axis=1))
 
 
