@@ -120,6 +120,7 @@ def test_the_quick_way_and_the_general_way_are_one(path: Path) -> None:
 
 def same(docs: tuple[Document, ...]) -> None:
     quick, general = interpreter.read(docs, fast=True), interpreter.read(docs, fast=False)
+    bare = interpreter.read(docs, places=False)
     assert list(quick.toolpath.dump()) == list(general.toolpath.dump())
     for name in (
         "position",
@@ -135,12 +136,15 @@ def same(docs: tuple[Document, ...]) -> None:
         "sweep",
     ):
         np.testing.assert_array_equal(getattr(quick.toolpath, name), getattr(general.toolpath, name))
+        np.testing.assert_array_equal(getattr(quick.toolpath, name), getattr(bare.toolpath, name))
     for name in ("start", "stop", "file", "insert", "home", "motion", "inherits", "text"):
         np.testing.assert_array_equal(getattr(quick.text, name), getattr(general.text, name))
-    assert quick.toolpath.whole == general.toolpath.whole
-    assert quick.findings == general.findings
-    assert quick.toolpath.refused == general.toolpath.refused
-    assert quick.toolpath.pinned == general.toolpath.pinned
+    assert bare.text is None
+    for other in (general, bare):
+        assert quick.toolpath.whole == other.toolpath.whole
+        assert quick.findings == other.findings
+        assert quick.toolpath.refused == other.toolpath.refused
+        assert quick.toolpath.pinned == other.toolpath.pinned
 
 
 COMMENTED = "LIN {X 1.5,Y -2.,Z +3,A 4,B 5.0,C 6} C_DIS ; layer 3, 'a' 1.5-\n"

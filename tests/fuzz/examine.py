@@ -95,7 +95,7 @@ def _moved(dialect: Dialect, program: Program, random: np.random.Generator, sett
         if not undone(raw, document.raw, edits):
             raise Broken("a byte changed that no edit covers")
         written.append(Document(document.path, raw))
-    _compare(path, plan, dialect.read(tuple(written), settings).toolpath)
+    _compare(path, plan, dialect.read(tuple(written), replace(settings, places=False)).toolpath)
     return int(free.sum())
 
 
@@ -219,8 +219,10 @@ def _compare_ways(path: Toolpath, plan: Plan, back: Toolpath) -> None:
         radius = end[arcs] - some.centre[arcs]
         middles.append(some.centre[arcs] + (turn @ radius[..., None])[..., 0])
     off = np.zeros(len(plan))
-    # Begin and end that are close to each other hold the middle opposite to them less well.
-    lever = np.maximum(1.0, 0.5 / np.maximum(np.abs(np.sin(plan.sweep[arcs] / 2)), 1e-3))
+    # Begin and end that are close to each other hold the middle opposite to them less well: its distance from the
+    # chord by the chord, (1 + |cos(sweep / 2)|) / (2 |sin(sweep / 2)|).
+    sine, cosine = (np.abs(turn(plan.sweep[arcs] / 2)) for turn in (np.sin, np.cos))
+    lever = np.maximum(1.0, 0.5 * (1.0 + cosine) / np.maximum(sine, 1e-3))
     lever = np.where(plan.sweep[arcs] < np.pi, 1.0, lever)
     off[arcs] = np.abs(middles[0] - middles[1]).max(axis=1) / MM / lever
     _within(off, 4 * HALF_MM, "mm half way of an arc", path, plan)

@@ -39,7 +39,7 @@ class KrlDialect:
         return sorted(matches, key=lambda p: p.stem != path.stem)[:1]
 
     def read(self, documents: tuple[Document, ...], settings: Settings = PLAIN) -> Program:
-        return interpreter.read(documents, settings.references)
+        return interpreter.read(documents, settings.references, places=settings.places)
 
     def moved(self, program: Program, plan: Plan, writing: Writing) -> Moved:
         return writer.moved(program, plan, writing)

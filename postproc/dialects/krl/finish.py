@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Bools, FewRows, Floats, Ints
 from postproc.dialects.krl.places import Places
-from postproc.dialects.krl.rows import HELP, Reason, Rows, Table
+from postproc.dialects.krl.rows import HELP, Reason, Rows
 from postproc.dialects.krl.run import Run
 from postproc.dialects.krl.state import Source
 from postproc.dialects.krl.survey import closure
+from postproc.dialects.krl.table import Spots, Table
 from postproc.findings import Finding
 from postproc.toolpath import FrameRef, Toolpath
 from postproc.units import DEG, MM
@@ -23,12 +24,15 @@ READ_TOO = "other code reads it too"
 SEVERAL = "its line runs several times"
 
 
-def finished(run: Run, text_called: Iterable[bytes]) -> tuple[Toolpath, Places, list[Finding]]:
-    """``text_called``: routines that were called where it is not known that, or with what, they run."""
+def finished(
+    run: Run, text_called: Iterable[bytes], places: bool
+) -> tuple[Toolpath, Places | None, list[Finding]]:
+    """``text_called``: routines that were called where it is not known that, or with what, they run; ``places``:
+    whether they are wanted."""
     rows = run.rows
     elsewhere = _other_calls(run, text_called)
     run.code.clear()  # the table takes up its arrays one after the other
-    table = Table(rows)
+    table = Table(rows, places)
     for begin, stop, reason in elsewhere:
         for row in np.flatnonzero((table.line >= begin) & (table.line <= stop)).tolist():
             rows.reasons.setdefault(row, reason)
@@ -66,23 +70,27 @@ def finished(run: Run, text_called: Iterable[bytes]) -> tuple[Toolpath, Places, 
         comments=tuple(rows.comments),
         runs=_runs(rows, n),
     )
-    _number_texts(rows, table)
-    places = Places(
-        start=table.start,
-        stop=table.stop,
-        file=table.file,
-        inherits=table.inherits,
-        insert=table.insert,
-        home=table.home,
-        motion=table.motion,
-        text=table.text,
+    found = None if table.spots is None else _places(rows, table, table.spots)
+    return toolpath, found, [*_told(rows, table, refused), *_told_external(rows, table)]
+
+
+def _places(rows: Rows, table: Table, spots: Spots) -> Places:
+    _number_texts(rows, table, spots)
+    return Places(
+        start=spots.start,
+        stop=spots.stop,
+        file=spots.file,
+        inherits=spots.inherits,
+        insert=spots.insert,
+        home=spots.home,
+        motion=spots.motion,
+        text=spots.text,
         variables=rows.variables,
         locked=rows.locked,
         arcs=rows.arcs,
         relative=rows.relative,
         inline=rows.inline,
     )
-    return toolpath, places, [*_told(rows, table, refused), *_told_external(rows, table)]
 
 
 def _kept(array: NDArray[Any]) -> NDArray[Any]:
@@ -169,7 +177,7 @@ def _whole(rows: Rows, table: Table) -> dict[int, str]:
     return dict(sorted(whole.items()))
 
 
-def _number_texts(rows: Rows, table: Table) -> None:
+def _number_texts(rows: Rows, table: Table, spots: Spots) -> None:
     """Gives the rows and auxiliary points that share a literal one number."""
     n = len(rows)
     parent: dict[int, int] = {}
@@ -196,7 +204,7 @@ def _number_texts(rows: Rows, table: Table) -> None:
         take(node, rows.arcs[row].file, rows.arcs[row].start)
     for node in list(parent):
         if node < n:
-            table.text[node] = top(node)
+            spots.text[node] = top(node)
     for row, node in nodes.items():
         rows.arcs[row] = replace(rows.arcs[row], text=top(node))
 
@@ -205,7 +213,7 @@ def _finder(rows: Rows, table: Table) -> Callable[[int, str, str], Finding]:
     raw, name = rows.document.raw, str(rows.document.path)
 
     def finding(row: int, code: str, message: str) -> Finding:
-        at = int(table.motion[row, 0])
+        at = int(table.word[row])
         column = at - raw.rfind(b"\n", 0, at)
         return Finding(code, message, name, int(table.line[row]), column, HELP.get(code, ""))
 

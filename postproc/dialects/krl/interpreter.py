@@ -44,10 +44,16 @@ def _no_collection() -> Iterator[None]:
 
 
 @_no_collection()
-def read(documents: tuple[Document, ...], references: Sequence[Document] = (), fast: bool = True) -> Program:
+def read(
+    documents: tuple[Document, ...],
+    references: Sequence[Document] = (),
+    fast: bool = True,
+    places: bool = True,
+) -> Program:
     """Reads a program; ``fast=False`` takes the general way for the common lines too, with the same result.
 
-    references: files that are read and never written, such as $config.dat.
+    references: files that are read and never written, such as $config.dat; places: whether the program is to be
+    written, else its ``text`` is None.
     """
     source = documents[0]
     code = list(scan(source, fast))
@@ -72,13 +78,13 @@ def read(documents: tuple[Document, ...], references: Sequence[Document] = (), f
                 doubts = _all_doubts(surveyed)
     _tell_structure(run)
     marker_at = _marker_at(source, code)
-    toolpath, places, refusals = finished(run, flow.text_called)
+    toolpath, text, refusals = finished(run, flow.text_called, places)
     findings = sorted([*run.findings, *refusals], key=lambda finding: (finding.line, finding.column))
     return Program(
         dialect="krl",
         documents=documents,
         toolpath=toolpath,
-        text=places,
+        text=text,
         findings=tuple(findings),
         marker=_marker(source.raw),
         marker_at=marker_at,

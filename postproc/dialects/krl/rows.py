@@ -1,4 +1,4 @@
-"""The motions as they are found, and what they become: a Toolpath, its places and its findings."""
+"""The motions as they are found, in their order, and why they are refused."""
 
 from __future__ import annotations
 
@@ -6,19 +6,13 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from postproc.arrays import Floats
 from postproc.dialects.krl.bulk import Bulk
 from postproc.dialects.krl.places import Auxiliary, InlineForm, Relative, Variable
 from postproc.dialects.krl.spatial import Arc, Numbers
 from postproc.dialects.krl.state import Anchor, Frame, Source, State
-from postproc.dialects.krl.target import NOWHERE, Target, Unclear
-from postproc.document import Document, offset_type
-from postproc.geometry import rotation_from_abc
-from postproc.toolpath import Annotation, Kind
-from postproc.units import DEG, MM
+from postproc.dialects.krl.target import Target, Unclear
+from postproc.document import Document
+from postproc.toolpath import Annotation
 
 NAN = float("nan")
 NAN6: Numbers = (NAN,) * 6
@@ -187,96 +181,3 @@ def refusal(unclear: Unclear, subject: str, cause: str = "") -> Reason:
 def way_of(arc: Arc | None) -> tuple[float, ...]:
     """Centre [mm], normal and sweep [deg] in a row."""
     return NO_ARC if arc is None else (*arc.centre, *arc.normal, arc.sweep)
-
-
-class Table:
-    """The entries of all rows as arrays, which takes the rows' own away; rare lengths and angles are in mm and deg.
-
-    ``loose``: numbers of the rows that were read alone.
-    """
-
-    def __init__(self, rows: Rows) -> None:
-        n = len(rows)
-        offsets = offset_type(len(rows.document.raw))
-        self.position: Floats = np.empty((n, 3))
-        self.rotation: Floats = np.empty((n, 3, 3))
-        self.kind = np.empty(n, np.int8)
-        self.line = np.empty(n, np.int32)
-        self.status, self.turn = (np.broadcast_to(np.int32(-1), n) for _ in range(2))
-        self.base, self.tool = np.empty(n, np.int32), np.empty(n, np.int32)
-        self.feed, self.blend = np.empty(n), np.empty(n)
-        self.motion = np.empty((n, 4), offsets)
-        self.start, self.stop = np.empty((n, 6), offsets), np.empty((n, 6), offsets)
-        self.file = np.zeros((n, 6), np.int8)
-        self.inherits = np.zeros(n, np.uint8)
-        self.insert, self.home = np.empty(n, offsets), np.zeros(n, np.int8)
-        self.text = np.arange(n, dtype=np.int32)
-        self.axes: dict[int, Numbers] = {}
-        self.ways: dict[int, tuple[float, ...]] = {}
-        self.loose: list[tuple[int, Row]] = []
-        first_lot: dict[int, int] = {}
-        at = 0
-        rows.chunks.reverse()
-        while rows.chunks:
-            chunk = rows.chunks.pop()
-            if isinstance(chunk, list):
-                self._fill(at, chunk)
-                at += len(chunk)
-                continue
-            bulk = chunk.bulk
-            part = slice(at, at + len(bulk))
-            self._place(part, bulk.values)
-            self.start[part], self.stop[part] = bulk.start, bulk.stop
-            self.kind[part] = np.where(bulk.is_line, Kind.LIN, Kind.PTP)
-            self.line[part] = bulk.line + np.arange(len(bulk))
-            self._state(part, bulk.status, bulk.turn)
-            self.base[part], self.tool[part] = chunk.base, chunk.tool
-            self.feed[part] = np.where(bulk.is_line, chunk.feed, NAN)
-            self.blend[part] = np.array([0.0, chunk.blend, NAN])[bulk.slur]
-            self.motion[part], self.insert[part] = bulk.motion, bulk.stop[:, 5]
-            first = first_lot.setdefault(id(bulk), at)
-            self.text[part] = np.arange(first, first + len(bulk))
-            at += len(bulk)
-        for row, blend in rows.slurred.items():
-            self.blend[row] = blend
-
-    def _state(self, part: slice, status: NDArray[np.int32], turn: NDArray[np.int32]) -> None:
-        """S and T; where no motion has them they take no memory."""
-        if not self.status.flags.writeable:
-            if (status < 0).all() and (turn < 0).all():
-                return
-            self.status, self.turn = self.status.copy(), self.turn.copy()
-        self.status[part], self.turn[part] = status, turn
-
-    def _place(self, part: slice, values: Floats) -> None:
-        self.position[part] = values[:, :3] * MM
-        self.rotation[part] = rotation_from_abc(values[:, 3:] * DEG)
-
-    def _fill(self, at: int, chunk: list[Row]) -> None:
-        part = slice(at, at + len(chunk))
-        self.loose += zip(range(at, at + len(chunk)), chunk, strict=True)
-        targets = [row.target for row in chunk]
-        self._place(part, np.array([row.values for row in chunk]))
-        states = np.array([(-1, -1) if t is None else (t.status, t.turn) for t in targets], np.int32)
-        self._state(part, states[:, 0], states[:, 1])
-        for array, found in (
-            (self.kind, [row.kind for row in chunk]),
-            (self.line, [row.line for row in chunk]),
-            (self.base, [row.base for row in chunk]),
-            (self.tool, [row.tool for row in chunk]),
-            (self.feed, [row.feed for row in chunk]),
-            (self.blend, [row.blend for row in chunk]),
-            (self.inherits, [row.inherits for row in chunk]),
-            (self.motion, [row.motion for row in chunk]),
-            (self.start, [NOWHERE if t is None else t.start for t in targets]),
-            (self.stop, [NOWHERE if t is None else t.stop for t in targets]),
-            (self.file, [NOWHERE if t is None else t.file for t in targets]),
-            (self.insert, [-1 if t is None else t.insert for t in targets]),
-            (self.home, [-1 if t is None else t.home for t in targets]),
-        ):
-            array[part] = found
-        for i, row in enumerate(chunk):
-            if row.axes is not NAN6:
-                self.axes[at + i] = row.axes
-            if row.way is not NO_ARC:
-                self.ways[at + i] = row.way
