@@ -13,6 +13,7 @@ from postproc.compensation.between import LITTLE, SHARES, SHORT, Pieces, errors_
 from postproc.compensation.correct import correct, with_residual
 from postproc.compensation.division import Limits, divide, made
 from postproc.compensation.doubt import Unsure, _ForceShare, half_widths, length_quantile
+from postproc.compensation.limits import limits
 from postproc.compensation.mirror import difference, predict
 from postproc.forces import Wrenches
 from postproc.geometry import Poses, rotation_from_vector
@@ -120,6 +121,34 @@ def test_a_side_that_is_said_and_crossed_is_told(status, turn):
     assert "KIN006" not in crossing({"status": status, "turn": turn}, -1)
     assert "KIN006" not in crossing({"status": -1, "turn": -1}, 1)
     assert "KIN006" not in crossing({"status": status, "turn": turn, "kind": Kind.LIN}, 1)
+
+
+# Numbers in words
+
+
+@pytest.mark.parametrize(("axis", "degrees"), [(0, 185.5), (0, -185.5), (3, 355.0), (5, -352.0)])
+def test_a_limit_is_told_as_it_is(axis, degrees):
+    """The axis, where it would be and between which limits, in degrees."""
+    q = program_angles()
+    q[2, axis] = np.radians(degrees)
+    job = task(q, max_correction=1.0)
+    job = replace(job, track=replace(job.track, q=q, within=np.arange(9) != 2))
+    (told,) = [f for f in correct(job).findings if f.code == "KIN002"]
+    low, high = np.degrees(job.model.robot.limits[axis])
+    name = job.model.robot.joints[axis].name
+    assert told.message == f"{name} at {degrees:.1f} deg, limits {low:g} .. {high:g} deg"
+    assert told.line == job.toolpath.line[2]
+
+
+def test_the_largest_rounding_of_those_that_count_is_told():
+    """Points that are not corrected, or rounded by less than they move, are none of them."""
+    blend = np.array([9e-3, 1e-5, 3e-3, np.nan, 8e-3, 4e-3, 1e-5, 0.0, 7e-3])
+    job = task(blend=blend)
+    result = correct(job)
+    found = limits(job, result, divide(job, result, Limits(keep=True)))[0]
+    (told,) = [f for f in found if f.code == "COR015"]
+    assert told.message.startswith("3 corrected points are approximated by up to 4 mm,")
+    assert told.line == job.toolpath.line[2]
 
 
 # Between the points
