@@ -51,7 +51,9 @@ def test_an_input_that_changes_under_way_leaves_no_record(parts, monkeypatch):
     def meddled(stage: str) -> None:
         (parts / "cell.yaml").write_text(CELL + "# another\n")
 
-    assert work(Task(job, code_digest()), meddled).state == "done"
+    outcome = work(Task(job, code_digest()), meddled)
+    assert (outcome.state, outcome.findings[0].code) == ("failed", "FIL010")
+    assert not (parts / "compensated" / "p0.src").exists()
     assert not (parts / "compensated" / ".compensate").exists()
     assert work(Task(job, code_digest())).state == "done"
     assert work(Task(job, code_digest())).state == "unchanged"

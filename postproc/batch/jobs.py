@@ -56,7 +56,7 @@ def jobs_of(words: Sequence[str], said: Said, output: Path | None = None, outsid
 
     ``said`` and ``output`` come from the command line too and win over the job file.  ``outside``: the job file may
     name programs and outputs beyond its folder.  Raises Refusal: YML... for the job file, BAT001 (nothing matched),
-    BAT002 (two programs, one output), BAT003 (outside), FIL007, CEL003, FRC002.
+    BAT002 (two programs, one output), BAT003 (outside, also by a link), FIL007, CEL003, FRC002.
     """
     files = [word for word in words if word.lower().endswith(JOB_FILE)]
     if files and len(words) > 1:
@@ -69,6 +69,8 @@ def jobs_of(words: Sequence[str], said: Said, output: Path | None = None, outsid
             raise Refusal(one.nothing(word))
     base = Path(os.path.commonpath([one.anchor for one in found]))
     root = base / FOLDER if output is None else Path(os.path.abspath(output))
+    if output is None and not is_inside(root, base):
+        raise Refusal(Finding("BAT003", f"{root} leads out of {base}", help=LED_AWAY))
     programs = _not_below(root, base, [path for one in found for path in one.programs])
     if not programs:
         raise Refusal(Finding("BAT001", "only results of an earlier run are here", str(root)))
@@ -124,6 +126,8 @@ def _of_file(path: Path, said: Said, output: Path | None, outside: bool) -> Jobs
     return Jobs(root, tuple(jobs), tuple(path for one in found for path in one.passed_over))
 
 
+LED_AWAY = "a link stands in the place of a folder of results; take it away, or name its end as the output"
+
 OUTSIDE = "programs and outputs of a job file lie in its folder or below; --allow-outside lifts that"
 
 
@@ -178,6 +182,8 @@ def _job(program: Path, base: Path, root: Path, options: Said, where: str | None
     there as it does below ``base``."""
     name = Path(os.path.relpath(program, base))
     target = root / (program.name if ".." in name.parts else name)
+    if where is None and not is_inside(target.parent, root):
+        raise Refusal(Finding("BAT003", f"{target.parent} leads out of {root}", help=LED_AWAY))
     if where is not None:
         target = Path(os.path.abspath(root / where))
         if where.endswith(("/", "\\")) or target.is_dir() or (program.suffix and not target.suffix):

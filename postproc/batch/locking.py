@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import fcntl
 import os
 from collections.abc import Callable, Iterator
@@ -43,7 +44,9 @@ def _acquired(path: Path, waits: Callable[[], None]) -> int:
     while True:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+            if path.parent.is_symlink():
+                raise NotADirectoryError(errno.ENOTDIR, "a link stands in the place of its folder")
+            handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
         except (FileNotFoundError, FileExistsError):  # the last holder took the folders away just now
             races += 1
             if races > RACES:

@@ -9,6 +9,7 @@ import contextlib
 import functools
 import hashlib
 import os
+import stat
 import sys
 import threading
 from collections.abc import Iterator
@@ -21,8 +22,10 @@ ABSENT = "absent"
 
 
 def digest_of(path: Path | str) -> str:
-    """SHA-256 of a file, or ``ABSENT``."""
+    """SHA-256 of a file, or ``ABSENT``, as of what is no file: a pipe and a device have no end."""
     try:
+        if not stat.S_ISREG(os.stat(path).st_mode):
+            return ABSENT
         with open(path, "rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError:

@@ -48,6 +48,15 @@ class Record:
             return None
         return Record(code_digest(), _options(job), _around(job), inputs, digests, result)
 
+    @property
+    def sound(self) -> bool:
+        """Whether it is what a run writes: the folder of results is open to everybody who may write there."""
+        texts = [self.code, *self.around] if isinstance(self.around, list) else [None]
+        for part in (self.options, self.inputs, self.outputs):
+            texts += [*part, *part.values()] if isinstance(part, dict) else [None]
+        whole = isinstance(self.result, dict) and isinstance(self.result.get("outputs"), list)
+        return whole and all(isinstance(text, str) for text in texts)
+
     def holds(self, job: Job) -> bool:
         """Whether doing the job again would give what is there."""
         return (
@@ -63,11 +72,13 @@ def lock_path(target: Path) -> Path:
 
 
 def load_record(job: Job) -> Record | None:
-    """The record of a job; None where there is none that can be read."""
+    """The record of a job; None where there is none that can be read, or something else stands in its place."""
+    path = _path(job)
     try:
-        return Record(**json.loads(_path(job).read_bytes()))
-    except (OSError, ValueError, TypeError):
+        record = Record(**json.loads(path.read_bytes())) if path.is_file() else None
+    except (OSError, ValueError, TypeError, RecursionError):
         return None
+    return record if record is not None and record.sound else None
 
 
 def save_record(job: Job, record: Record) -> None:

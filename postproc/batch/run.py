@@ -13,8 +13,8 @@ from postproc.batch.locking import locked
 from postproc.batch.reading import code_digest
 from postproc.batch.records import lock_path
 from postproc.batch.running import run_here
-from postproc.blocks import cores
 from postproc.batch.work import Task
+from postproc.blocks import cores
 from postproc.publish import publish
 from postproc.report.batched import Batched, Outcome, not_run, summary_json
 from postproc.report.batched_page import batch_page
