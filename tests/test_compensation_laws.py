@@ -103,9 +103,13 @@ def test_commands_turn_only_as_the_text_can_say(said):
 # S and T
 
 
-def crossing(words, sign):
+ELBOWS = {2: program_angles(), 0: np.radians([[5.0 + i, -60.0, -10.0, 10.0, 50.0, 20.0] for i in range(9)])}
+"""S -> angles that have it."""
+
+
+def crossing(q, words, sign):
     """A PTP with A6 a hair above zero, which the correction takes below (sign 1) or not (-1)."""
-    q, model = program_angles(), full()
+    q, model = q.copy(), full()
     turned = model.chain.jacobian(q[1:2], TOOL)[0, 3:, 5]
     wrench = np.where(CARRIES[:, None], FORCE, 0.0)
     wrench[1] = sign * np.concatenate([np.zeros(3), 50.0 * turned])
@@ -114,13 +118,17 @@ def crossing(words, sign):
     return [f.code for f in correct(task(q, model=model, wrench=wrench, kind=kinds, **words)).findings]
 
 
-@pytest.mark.parametrize(("status", "turn"), [(2, 0b10), (-1, 0b10), (2, -1)])
-def test_a_side_that_is_said_and_crossed_is_told(status, turn):
+@pytest.mark.parametrize("status", ELBOWS)
+@pytest.mark.parametrize("said", ["S", "T", "S and T"])
+def test_a_side_that_is_said_and_crossed_is_told(status, said):
     """Whichever of S and T the motion says; one that says neither, or is no PTP, says no side."""
-    assert "KIN006" in crossing({"status": status, "turn": turn}, 1)
-    assert "KIN006" not in crossing({"status": status, "turn": turn}, -1)
-    assert "KIN006" not in crossing({"status": -1, "turn": -1}, 1)
-    assert "KIN006" not in crossing({"status": status, "turn": turn, "kind": Kind.LIN}, 1)
+    q = ELBOWS[status]
+    turn = int(sum(1 << axis for axis in range(6) if q[1, axis] < 0))
+    words = {"status": status if "S" in said else -1, "turn": turn if "T" in said else -1}
+    assert "KIN006" in crossing(q, dict(words), 1)
+    assert "KIN006" not in crossing(q, dict(words), -1)
+    assert "KIN006" not in crossing(q, {"status": -1, "turn": -1}, 1)
+    assert "KIN006" not in crossing(q, {**words, "kind": Kind.LIN}, 1)
 
 
 # Numbers in words
