@@ -46,6 +46,14 @@ def shared(array: NDArray[Any]) -> NDArray[Any]:
     return np.broadcast_to(array[0].copy(), array.shape)
 
 
+def numbers(rows: Any, count: int) -> Ints:
+    """The numbers of ``rows`` of ``count``: given as such, or as a mask or a slice."""
+    if isinstance(rows, slice):
+        return np.arange(*rows.indices(count))
+    chosen = np.asarray(rows)
+    return np.flatnonzero(chosen) if chosen.dtype == np.bool_ else chosen
+
+
 class FewRows:
     """(N, k) numbers of which only few rows are known, kept alone; NaN in all others.  Read-only.
 
@@ -67,11 +75,14 @@ class FewRows:
         return self.shape[0]
 
     def __getitem__(self, rows: Any) -> Floats:
-        """As of an array, by rows: a number, numbers, a mask or a slice."""
-        chosen = np.arange(len(self))[rows]
-        at = np.searchsorted(self.rows, chosen)
-        known = np.append(self.rows, -1)[at] == chosen
-        return np.append(self.values, np.full((1, self.shape[1]), np.nan), axis=0)[np.where(known, at, -1)]
+        """As of an array, by rows: numbers from 0, a mask or a slice."""
+        chosen = numbers(rows, len(self))
+        found = np.full((*chosen.shape, self.shape[1]), np.nan)
+        if len(self.rows):
+            at = np.minimum(np.searchsorted(self.rows, chosen), len(self.rows) - 1)
+            known = self.rows[at] == chosen
+            found[known] = self.values[at[known]]
+        return found
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.asarray(self[:], dtype)

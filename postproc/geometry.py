@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Floats, Ints, numbers
 
 
 @dataclass(frozen=True)
@@ -79,10 +79,7 @@ class PoseRows:
 
     def __getitem__(self, rows: Any) -> Poses:
         """As of ``Poses``: by numbers of rows, a mask, or a slice."""
-        if isinstance(rows, slice):
-            rows = np.arange(*rows.indices(self.count))
-        rows = np.asarray(rows)
-        return self.made(np.flatnonzero(rows) if rows.dtype == np.bool_ else rows)
+        return self.made(numbers(rows, self.count))
 
     def __len__(self) -> int:
         return self.count

@@ -54,8 +54,8 @@ def test_a_force_linear_in_the_path_length_is_found_again(tmp_path):
     ends = np.array([100.0, 300.0, 350.0])
     wanted = np.stack([100 + ends, 0 * ends + 7, -0.5 * ends, 0 * ends, 0.01 * ends, 0 * ends + 2], axis=1)
     assert np.allclose(result.values[1:], wanted, atol=1e-6)
-    assert np.allclose(result.start[2:], wanted[:2], atol=1e-6)
-    assert np.allclose(result.start[1, 0], 100, atol=1e-6)
+    assert np.allclose(result.start[:][2:], wanted[:2], atol=1e-6)
+    assert np.allclose(result.start[:][1, 0], 100, atol=1e-6)
     assert np.allclose(result.along(np.array([2]), np.array([0.5]))[0], [300, 7, -100, 0, 2, 2], atol=1e-6)
     assert np.allclose(result.values[0], 0)
     assert codes(result) == ["FRC029"]
@@ -67,7 +67,7 @@ def test_time_runs_at_the_programmed_feed(tmp_path):
     t = np.linspace(0, 12, 241)
     result = run(path, log(tmp_path, t, 10 * t + 100, "t_s"))
     assert np.allclose(result.values[1:, 0], [150, 170, 220], atol=1e-6)
-    assert np.allclose(result.start[1:, 0], [100, 150, 170], atol=1e-6)
+    assert np.allclose(result.start[:][1:, 0], [100, 150, 170], atol=1e-6)
 
 
 def test_arcs_count_by_their_length(tmp_path):
@@ -84,7 +84,7 @@ def test_the_mean_and_the_peak_of_each_motion(tmp_path):
     force = 200 + 150 * np.sin(2 * np.pi * s / 2.5)
     result = run(STRAIGHT, log(tmp_path, s, force))
     assert np.allclose(result.values[1:, 0], 200, atol=2)
-    assert np.allclose(result.start[1:, 0], 200, atol=2)
+    assert np.allclose(result.start[:][1:, 0], 200, atol=2)
     assert np.allclose(result.peak[1:], 350, atol=1)
     assert np.isnan(result.peak[0])
     what = told(result, "FRC029").message
@@ -107,7 +107,7 @@ def test_the_force_may_step_between_two_motions(tmp_path):
     force = np.where(S < 100, 20.0, 400.0)
     result = run(STRAIGHT, log(tmp_path, S, force))
     assert np.allclose(result.values[1:, 0], [20, 400, 400])
-    assert np.allclose(result.start[1:, 0], [20, 400, 400])
+    assert np.allclose(result.start[:][1:, 0], [20, 400, 400])
     assert result.steps.tolist() == [False, True, True, False]
 
 
@@ -141,7 +141,7 @@ def test_logs_have_a_frame(tmp_path, frame):
     found = run(path, str(tmp_path / "l.csv"))
     wanted = run(path, f"10.5,20,30@{frame}")
     assert np.allclose(found.values, wanted.values)
-    assert np.allclose(found.start, wanted.start)
+    assert np.allclose(found.start[:], wanted.start[:])
     assert found.steps.tolist() == wanted.steps.tolist()
 
 

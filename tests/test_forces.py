@@ -96,7 +96,7 @@ def test_reversal_turns_the_force_and_is_a_step():
     path = path_of([[0, 0, 0], [0.1, 0, 0], [0, 0, 0]], PTP_THEN[:3])
     result = run(path, "10,20,30@feed")
     assert np.allclose(result.values[1:, :3], [[10, 20, 30], [-10, -20, 30]])
-    assert np.allclose(result.start[1:, :3], [[10, 20, 30], [-10, -20, 30]])
+    assert np.allclose(result.start[:][1:, :3], [[10, 20, 30], [-10, -20, 30]])
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_vertices_below_thirty_degrees_share_one_wrench(degrees, shared):
     result = run(path, "100,0,50,0,0,7@feed")
     first, second = np.array([100, 0, 50, 0, 0, 7]), np.array([*(100 * turned + [0, 0, 50]), 0, 0, 7])
     assert np.allclose(result.values[1], 0.5 * (first + second) if shared else first)
-    assert np.allclose(result.start[2], 0.5 * (first + second) if shared else second)
+    assert np.allclose(result.start[:][2], 0.5 * (first + second) if shared else second)
     assert np.allclose(result.values[2], second)  # the exit has its own
 
 
@@ -120,7 +120,7 @@ def test_shared_vertices_take_the_orientation_at_the_vertex():
     result = run(path, "10,0,0@tool")
     assert np.allclose(result.values[1, :3], [10, 0, 0])
     assert np.allclose(result.values[2, :3], [10 * np.cos(a), 10 * np.sin(a), 0])
-    assert np.allclose(result.start[2, :3], [10, 0, 0])
+    assert np.allclose(result.start[:][2, :3], [10, 0, 0])
 
 
 def test_force_steps_are_shared_within_a_cut_and_kept_at_its_ends():
@@ -128,7 +128,7 @@ def test_force_steps_are_shared_within_a_cut_and_kept_at_its_ends():
     notes = [(1, "FORCE 10 0 0", 1), (2, "FORCE 20 0 0", 2), (4, "FORCE OFF", 3), (5, "force 5,0,0", 4)]
     result = run(path_of(points, PTP_THEN, notes=notes), "")
     assert np.allclose(result.values[:, 0], [0, 15, 20, 20, 0, 5])
-    assert np.allclose(result.start[:, 0], [0, 10, 15, 20, 0, 5])
+    assert np.allclose(result.start[:][:, 0], [0, 10, 15, 20, 0, 5])
     assert result.steps.tolist() == [False, True, False, False, False, True]
     assert result.source == "FORCE comments"
 
@@ -150,7 +150,7 @@ def test_a_force_that_jumps_is_a_step(second, jumps):
     notes = [(1, "FORCE 100 0 0", 1), (2, f"FORCE {second} 0 0", 2)]
     result = run(path_of(points, PTP_THEN[:3], notes=notes), "")
     shared = 0.5 * (100 + second)
-    assert np.allclose([result.values[1, 0], result.start[2, 0]], [100, second] if jumps else [shared] * 2)
+    assert np.allclose([result.values[1, 0], result.start[:][2, 0]], [100, second] if jumps else [shared] * 2)
     assert result.steps.tolist() == [False, True, jumps]
 
 
@@ -318,7 +318,7 @@ def test_a_rigid_turn_of_base_and_path_turns_the_wrench_with_it(seed, abc, frame
         refused(path, spec, cell_of(bases={1: move @ base}))
         return
     there = run(path, spec, cell_of(bases={1: move @ base}))
-    for one, two in ((here.values, there.values), (here.start, there.start)):
+    for one, two in ((here.values, there.values), (here.start[:], there.start[:])):
         assert np.allclose(one.reshape(-1, 2, 3) @ move.rotation.T, two.reshape(-1, 2, 3), atol=1e-9)
     world = run(path, "10,20,30@world", cell_of(bases={1: move @ base}))
     assert np.allclose(world.values, run(path, "10,20,30@world", cell_of(bases={1: base})).values)
@@ -355,7 +355,7 @@ def test_unknown_targets_keep_a_force_of_the_right_size(frame):
     path = path_of(points, PTP_THEN[:5], base=[0, 0, -1, 0, 0])
     result = run(path, f"10,20,30,1,2,3@{frame}")
     assert np.all(np.isfinite(result.values))
-    assert np.all(np.isfinite(result.start))
+    assert np.all(np.isfinite(result.start[:]))
     assert np.allclose(np.linalg.norm(result.values[1:, :3], axis=1), np.sqrt(1400))
     assert np.allclose(np.linalg.norm(result.values[1:, 3:], axis=1), np.sqrt(14))
     assert result.carries.tolist() == [False, True, True, True, True]

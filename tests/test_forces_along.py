@@ -41,7 +41,7 @@ def test_on_a_line_the_wrench_is_linear():
     assert np.allclose(found[:, 0], [12, 12.5, 14])
     assert np.allclose(found[:, 1:], [0, 4, 1, 2, 3])
     rows = np.array([0, 1, 3])
-    assert np.allclose(result.along(rows, np.zeros(3)), result.start[rows])
+    assert np.allclose(result.along(rows, np.zeros(3)), result.start[:][rows])
     assert np.allclose(result.along(rows, np.ones(3)), result.values[rows])
 
 
@@ -67,7 +67,7 @@ def test_a_line_that_runs_on_into_an_arc_is_no_step():
     # by its chord the arc would turn by 45 deg; a line along its radius does turn by 90
     result = run(arc_path(90 * DEG, before=[0.3, 0, 0]), "10,0,0@feed")
     assert result.steps.tolist() == [False, True, True]
-    assert np.allclose(result.start[2, :3], [0, 10, 0])
+    assert np.allclose(result.start[:][2, :3], [0, 10, 0])
 
 
 def test_what_a_vertex_shares_fades_along_the_arc_in_its_own_frame():
@@ -76,7 +76,7 @@ def test_what_a_vertex_shares_fades_along_the_arc_in_its_own_frame():
     before = np.array([0.1, 0, 0]) - 0.2 * np.array([-np.sin(a), np.cos(a), 0])
     result = run(arc_path(180 * DEG, before=before), "10,0,0@feed")
     shared = 5 * np.array([-np.sin(a), np.cos(a) + 1, 0])
-    assert np.allclose(result.start[2, :3], shared)
+    assert np.allclose(result.start[:][2, :3], shared)
     half = rotation_from_vector([0, 0, np.pi / 2]) @ (0.5 * shared + 0.5 * np.array([0, 10, 0]))
     assert np.allclose(at(result, 2, 0.5)[0, :3], half)
 
@@ -124,7 +124,7 @@ def test_between_the_ends_nothing_jumps_and_the_size_stays(seed, frame):
     result = run(path, f"10,20,30,1,2,3@{frame}", cell_of(bases={1: base}))
     share = np.linspace(0, 1, 201)
     found = at(result, 1, *share)
-    assert np.allclose(found[[0, -1]], [result.start[1], result.values[1]], atol=1e-9)
+    assert np.allclose(found[[0, -1]], [result.start[:][1], result.values[1]], atol=1e-9)
     assert np.max(np.linalg.norm(np.diff(found, axis=0), axis=1)) < 3.0
     if frame != "base":
         assert np.allclose(np.linalg.norm(found[:, :3], axis=1), np.sqrt(1400))

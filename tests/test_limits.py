@@ -88,7 +88,7 @@ def test_a_posture_that_only_the_correction_makes_singular():
     assert not near_singular(model.robot, track.q).any()
     found = {}
     for sense in (1, -1):
-        force = replace(task.force, values=sense * task.force.values, start=sense * task.force.start)
+        force = replace(task.force, values=sense * task.force.values, start=sense * task.force.start[:])
         near = replace(task, wanted=wanted, toolpath=path, track=track, force=force)
         found[sense] = "KIN003" in codes(near)[0]
     assert sorted(found.values()) == [False, True]

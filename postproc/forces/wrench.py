@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints, frozen
+from postproc.arrays import Bools, FewRows, Floats, Ints, frozen, numbers
 from postproc.blocks import blocks, in_blocks
 from postproc.cell import Cell, Frames
 from postproc.findings import Finding
@@ -31,14 +32,15 @@ class Wrenches:
     """What the workpiece does to the tool, at the TCP, in the axes of the robot root [N, N m].
 
     values (N, 6): at the end point of each motion; start (N, 6): where it leaves the end point before it (the same
-    as there, unless the force steps at that vertex); ``along`` says what is between them.  carries (N,): the motion
-    was given a force (even where both sides of its end point cancel).  steps (N,): it carries force, and the wrench
-    does not go over from the motion before: a cut begins, the path turns by SMOOTH_TURN or more, or the force jumps.
+    as there, unless the force steps at that vertex; only where it is another is it kept); ``along`` says what is
+    between them.  carries (N,): the motion was given a force (even where both sides of its end point cancel).
+    steps (N,): it carries force, and the wrench does not go over from the motion before: a cut begins, the path turns
+    by SMOOTH_TURN or more, or the force jumps.
     ci95, peak (N,): as of ``Stated``.
     """
 
     values: Floats
-    start: Floats
+    start: Floats | Starts
     carries: Bools
     source: str
     findings: tuple[Finding, ...] = ()
@@ -50,7 +52,8 @@ class Wrenches:
     def __post_init__(self) -> None:
         n = len(self.values)
         object.__setattr__(self, "values", frozen(self.values, (n, 6)))
-        object.__setattr__(self, "start", frozen(self.start, (n, 6)))
+        if isinstance(self.start, np.ndarray):
+            object.__setattr__(self, "start", Starts(self.start, self.values))
         object.__setattr__(self, "carries", frozen(self.carries, (n,), np.bool_))
         object.__setattr__(self, "steps", frozen(self.steps, (n,), np.bool_))
 
@@ -94,6 +97,21 @@ class Wrenches:
             at = rows[bent]
             wrench[bent] = self.turning.along(at, fraction[bent], self.start[at], self.values[at])
         return wrench
+
+
+class Starts:
+    """(N, 6) wrenches where motions begin: those of ``values`` (N, 6) where the motion before ends, but in few rows."""
+
+    def __init__(self, start: Floats, values: Floats) -> None:
+        other = np.append(True, (start[1:] != values[:-1]).any(axis=1))[: len(start)]
+        rows = np.flatnonzero(other)
+        self._values, self._own = values, FewRows(rows, frozen(start[rows]), len(start))
+
+    def __getitem__(self, rows: Any) -> Floats:
+        """As of an array, by rows: numbers from 0, a mask or a slice."""
+        chosen = numbers(rows, len(self._values))
+        own = self._own[chosen]
+        return np.where(np.isnan(own), self._values[np.maximum(chosen - 1, 0)], own)
 
 
 @dataclass(frozen=True, eq=False)
