@@ -1,7 +1,7 @@
 """The cells below the header: where they lie in the bytes of the file, found and read for many lines at a time.
 
-A common line has as many cells as the header and neither quotes nor anything that is not ASCII.  All others go to the
-reader of single lines.
+A common line has as many cells as the header, nothing that is not ASCII, and quotes only around whole cells.  All
+others go to the reader of single lines.
 """
 
 from __future__ import annotations
@@ -30,12 +30,13 @@ _LONGEST = 1 << 12
 _LONG = 32
 """Letters of a number that is read in bulk."""
 
-_SEPARATOR, _LINE_END, _OTHER, _SOMETHING = 1, 2, 4, 8
+_SEPARATOR, _LINE_END, _OTHER, _SOMETHING, _QUOTE = 1, 2, 4, 8, 16
+_QUOTED = ord('"')
 _NO_NUMBER = ord("x")
 _POINT = bytes(code if code in b"0123456789+-.eE" else _NO_NUMBER for code in range(256))
 """Letters of numbers, and all others as one that is none."""
 
-_COMMA = _POINT.replace(b",", b".")
+_COMMA = _POINT[: ord(",")] + b"." + _POINT[ord(",") + 1 :]
 
 Other = Callable[[int, int, int], Sequence[str] | None]
 """Reads a line that is not common, of the bytes from .. to and the number: its cells, None where it is no row."""
@@ -61,15 +62,21 @@ class Cells:
         return b"'" in self.raw
 
     def bounds(self, column: int, rows: slice) -> tuple[Ints, Ints]:
-        """Where the cells of a column begin and end, blanks around them left out; an empty one for ``others``."""
+        """Where the cells of a column begin and end, without quotes and blanks; an empty one for ``others``."""
         data = np.frombuffer(self.raw, np.uint8)
-        start = self.begin[rows] if column == 0 else self.ends[rows, column - 1] + 1
-        start, stop = start.astype(np.int64), self.ends[rows, column].astype(np.int64)
-        while (blank := (start < stop) & (data[np.minimum(start, len(data) - 1)] <= 0x20)).any():
-            start += blank
-        while (blank := (start < stop) & (data[stop - 1] <= 0x20)).any():
-            stop -= blank
-        return start, stop
+        begin = self.begin[rows] if column == 0 else self.ends[rows, column - 1] + 1
+        start, stop = _trimmed(data, begin.astype(np.int64), self.ends[rows, column].astype(np.int64))
+        quoted = (start < stop) & (data[np.minimum(start, len(data) - 1)] == _QUOTED)
+        return _trimmed(data, start + quoted, stop - quoted) if quoted.any() else (start, stop)
+
+
+def _trimmed(data: NDArray[np.uint8], start: Ints, stop: Ints) -> tuple[Ints, Ints]:
+    """The same cells (K,) without blanks around them."""
+    while (blank := (start < stop) & (data[np.minimum(start, len(data) - 1)] <= 0x20)).any():
+        start = start + blank
+    while (blank := (start < stop) & (data[stop - 1] <= 0x20)).any():
+        stop = stop - blank
+    return start, stop
 
 
 class Column(Sequence[str]):
@@ -99,20 +106,23 @@ class Column(Sequence[str]):
         raw = self.cells.raw
         start, stop = self.cells.bounds(self.column, rows)
         texts = [raw[a:b].decode("ascii") for a, b in zip(start.tolist(), stop.tolist(), strict=True)]
-        for row in self.cells.others.keys() & set(range(rows.start, rows.stop)):
-            texts[row - rows.start] = self.cells.others[row][self.column].strip()
+        for at, row in enumerate(range(rows.start, rows.stop) if self.cells.others else ()):
+            if row in self.cells.others:
+                texts[at] = self.cells.others[row][self.column].strip()
         return list(map(as_text, texts)) if self.cells.apostrophes else texts
 
-    def numbers(self, one: Callable[[int], float], comma: bool) -> Floats:
+    def numbers(self, one: Callable[[int, str], float], comma: bool) -> Floats:
         """(R,) the cells as ``float`` reads them, with a decimal ``comma`` or without one.
 
-        one: reads the cell of a row that is no plain number.
+        one: reads the cell of a row that is no plain number, of its row and its text.
         """
         values = np.empty(len(self))
         for rows in _blocks(len(self)):
             found, plain = self._plain(rows, comma)
-            for at in np.flatnonzero(~plain).tolist():
-                found[at] = one(rows.start + at)
+            if not plain.all():
+                texts = self._texts(rows)
+                for at in np.flatnonzero(~plain).tolist():
+                    found[at] = one(rows.start + at, texts[at])
             values[rows] = found
         return values
 
@@ -162,6 +172,12 @@ def find_cells(lines: Lines, begin: int, number: int, separator: str, columns: i
         has = np.bitwise_or.reduceat(kind, opening)
         short = closing - opening <= _LONGEST
         common = (np.diff(last, prepend=-1) == columns) & (has & (_OTHER | _SOMETHING) == _SOMETHING) & short
+        quoted = np.flatnonzero(common & (has & _QUOTE != 0))
+        if len(quoted):
+            stops = ends[last[quoted][:, None] + np.arange(1 - columns, 1)]
+            starts = np.column_stack([opening[quoted], stops[:, :-1] + 1])
+            quotes = np.add.reduceat((kind == _QUOTE).astype(np.int32), opening)[quoted]
+            common[quoted] = quotes == 2 * _in_quotes(raw, starts + begin, stops + begin).sum(axis=1)
         rows = common.copy()
         found = []
         for at in np.flatnonzero(~common & ((has & (_OTHER | _SOMETHING) != 0) | ~short)).tolist():
@@ -187,6 +203,14 @@ def find_cells(lines: Lines, begin: int, number: int, separator: str, columns: i
     return Cells(raw, begins, cells_end, numbers, others)
 
 
+def _in_quotes(raw: bytes, start: Ints, stop: Ints) -> Bools:
+    """Which cells (K, C) begin and end with a quote."""
+    data = np.frombuffer(raw, np.uint8)
+    stop = stop - (data[stop - 1] == 0x0D)  # of the line's end
+    first = data[np.minimum(start, len(data) - 1)]
+    return np.asarray((stop - start >= 2) & (first == _QUOTED) & (data[stop - 1] == _QUOTED))
+
+
 def _cut(lines: Lines, begin: int, number: int) -> int:
     """The end of the last line that ends within a block."""
     raw, stop = lines.raw, begin + BLOCK
@@ -206,7 +230,7 @@ def _kinds(separator: str) -> bytes:
     for letter in NOTHING:
         kinds[ord(letter)] = 0
     for letter, kind in (
-        ('"', _OTHER),
+        ('"', _QUOTE),
         ("#", _OTHER),
         (separator, _SEPARATOR),
         ("\n", _LINE_END),

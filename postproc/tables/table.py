@@ -69,10 +69,9 @@ class Table:
         return self._numbers(name, may_miss=True)
 
     def _numbers(self, name: str, may_miss: bool) -> Floats:
-        column, comma = self.columns[name], self.separator != ","
+        comma = self.separator != ","
 
-        def one(row: int) -> float:
-            cell = column[row]
+        def one(row: int, cell: str) -> float:
             if may_miss and is_missing(cell):
                 return math.nan
             if not cell:
@@ -84,7 +83,7 @@ class Table:
                 raise self.error(row, name, f"{cell[:40]!r} is too large")
             return float(written)
 
-        values = column.numbers(one, comma)
+        values = self.columns[name].numbers(one, comma)
         values.setflags(write=False)
         return values
 
