@@ -39,7 +39,8 @@ class Child:
     """``compensate WORDS`` in a process of its own.
 
     ``happens``: called in it whenever it asks the system for something of ``watched`` (opens, renames, removes, lists,
-    locks), with the number of the request from 1.  ``said``: what it said, once it has ended.
+    locks), with the number of the request from 1.  ``said``: what it said, and ``memory`` [bytes] the most that it had,
+    once it has ended.
     """
 
     def __init__(
@@ -48,7 +49,7 @@ class Child:
         watched: Path,
         happens: Callable[[int], None] = lambda number: None,
     ) -> None:
-        self.said = ""
+        self.said, self.memory = "", 0
         self._out, out = os.pipe()
         self.pid = os.fork()
         if self.pid == 0:
@@ -88,7 +89,9 @@ class Child:
         """Its exit code; minus the signal that killed it."""
         with os.fdopen(self._out) as stream:
             self.said = stream.read()
-        return os.waitstatus_to_exitcode(os.waitpid(self.pid, 0)[1])
+        _, status, used = os.wait4(self.pid, 0)
+        self.memory = 1024 * used.ru_maxrss
+        return os.waitstatus_to_exitcode(status)
 
 
 def once(at: int, act: Callable[[], None]) -> Callable[[int], None]:
