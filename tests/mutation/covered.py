@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import time
@@ -50,17 +51,23 @@ class _Contexts:
 
 @dataclass(frozen=True)
 class Cover:
-    """``lines``: file -> line -> tests; ``seconds``: what each test that passes takes."""
+    """``lines``: file -> line -> tests; ``seconds``: what each test that passes takes; ``imports``: file of tests ->
+    the modules that it names."""
 
     lines: dict[str, dict[int, list[str]]]
     seconds: dict[str, float]
+    imports: dict[str, list[str]]
 
     def reaching(self, path: str, first: int, last: int) -> list[str]:
-        """Tests that run a line of first..last; what runs at import is reached by all tests of the file."""
+        """Tests that run a line of first..last.  What runs at import is reached by all that run anything of the file,
+        and by those that import it or its package."""
         lines = self.lines.get(path, {})
         names = {name for line in range(first, last + 1) for name in lines.get(line, [])}
         if EVERYONE in names:
+            module = path.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
+            wanted = {module, module.rpartition(".")[0]}
             names = {name for tests in lines.values() for name in tests}
+            names |= {file for file, modules in self.imports.items() if wanted & set(modules)}
         for file in [name for name in names if name and "::" not in name]:
             names |= {test for test in self.seconds if test.startswith(file + "::")}
         return sorted(names & self.seconds.keys())
@@ -72,7 +79,8 @@ class Cover:
             file: {line: [number[name] for name in tests] for line, tests in of.items()}
             for file, of in self.lines.items()
         }
-        path.write_text(json.dumps({"names": names, "lines": lines, "seconds": self.seconds}))
+        kept = {"names": names, "lines": lines, "seconds": self.seconds, "imports": self.imports}
+        path.write_text(json.dumps(kept))
 
 
 def load(path: Path) -> Cover:
@@ -82,7 +90,18 @@ def load(path: Path) -> Cover:
         file: {int(line): [names[i] for i in tests] for line, tests in of.items()}
         for file, of in read["lines"].items()
     }
-    return Cover(lines, read["seconds"])
+    return Cover(lines, read["seconds"], read["imports"])
+
+
+def imported(path: Path) -> list[str]:
+    """Modules that a file names in its imports, and what it takes from them."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return sorted(found)
 
 
 def cover(tree: Path, packages: list[str], tests: list[str]) -> Cover:
@@ -100,4 +119,4 @@ def cover(tree: Path, packages: list[str], tests: list[str]) -> Cover:
         for file in sorted(data.measured_files())
     }
     seconds = {name: cost for name, cost in contexts.seconds.items() if name not in contexts.failed}
-    return Cover(lines, seconds)
+    return Cover(lines, seconds, {test: imported(tree / test) for test in tests})

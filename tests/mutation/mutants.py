@@ -84,7 +84,9 @@ def silent(node: parso.tree.NodeOrLeaf) -> bool:
     child = node
     while child.parent is not None:
         parent = child.parent
-        if parent.type in ("decorator", "tfpdef", "import_from", "import_name", "parameters"):
+        if parent.type in ("decorator", "tfpdef", "import_from", "import_name"):
+            return True
+        if parent.type == "parameters" and child.type == "operator":
             return True
         if parent.type == "annassign" and child is parent.children[1]:
             return True

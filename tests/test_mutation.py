@@ -1,0 +1,145 @@
+"""The mutation driver: what is mutated, what a sample is, and that a judgement tells a mutant from the original."""
+
+import pytest
+
+pytest.importorskip("cosmic_ray", reason="pip install .[mutation]")
+
+from mutation import judging
+from mutation.command import Judge, changed, row, wilson
+from mutation.covered import Cover, load
+from mutation.mutants import mutants, sample
+
+SOURCE = '''\
+"""A document of 3 words."""
+from dataclasses import dataclass
+
+TABLE = {"a": 1}
+
+
+@dataclass(frozen=True)
+class Thing:
+    size: int | None = 2
+
+
+def grown(thing: Thing | None, by: float = 0.5) -> float:
+    """Adds 7 to nothing."""
+    pairs = zip([thing], [by], strict=True)
+    if thing is None or not by > 0:
+        return -1.0
+    return thing.size + by * len(list(pairs))
+'''
+
+TESTS = """\
+from thing import Thing, grown
+
+def test_quick():
+    assert grown(None) < 0
+
+def test_slow():
+    assert grown(Thing(3), 2.0) == 5.0
+
+def test_far():
+    assert True
+"""
+
+
+@pytest.fixture
+def tree(tmp_path):
+    made = tmp_path / "tree"
+    (made / "tests").mkdir(parents=True)
+    (made / "thing.py").write_text(SOURCE)
+    (made / "tests" / "test_thing.py").write_text(TESTS)
+    return made
+
+
+def texts(tree):
+    found = mutants(tree, "thing.py")
+    return {changed(SOURCE, text) for m in found if (text := m.text(SOURCE)) is not None}
+
+
+def test_only_what_runs_is_mutated(tree):
+    """Neither words, nor annotations, decorators and strict; signs stay signs, comparisons comparisons."""
+    before = {old for old, _ in texts(tree)}
+    assert before == {
+        line.strip() for line in SOURCE.splitlines() if line.strip()[:2] in ("TA", "si", "if", "re", "de")
+    }
+    after = {new.replace(" ", "") for _, new in texts(tree)}
+    assert "returnthing.size-by*len(list(pairs))" in after
+    assert "size:int|None=3" in after
+    assert "ifthingisnotNoneornotby>0:" in after
+    assert "ifthingisNoneandnotby>0:" in after
+    assert not any(
+        word in new for new in after for word in ("<<", "strict=False", "frozen=False", "int&None")
+    )
+
+
+def test_a_sample_draws_sites_once_and_again_the_same(tree):
+    found = mutants(tree, "thing.py")
+    sites = {mutant.site for mutant in found}
+    drawn = [mutant for mutant, _ in sample(found, 1000, 3, {"thing.py": SOURCE})]
+    assert len(drawn) == len({mutant.site for mutant in drawn}) <= len(sites)
+    again = [mutant for mutant, _ in sample(found, 5, 3, {"thing.py": SOURCE})]
+    assert again == drawn[:5]
+    assert again != [mutant for mutant, _ in sample(found, 5, 4, {"thing.py": SOURCE})]
+
+
+def test_the_interval_is_wilsons():
+    assert wilson(0, 0) == (0.0, 1.0)
+    assert wilson(8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+    low, high = wilson(10, 10)
+    assert low == pytest.approx(0.7225, abs=1e-4)
+    assert high == pytest.approx(1.0)
+
+
+def test_lines_that_run_at_import_are_reached_by_all(tmp_path):
+    lines = {"thing.py": {1: [""], 5: ["tests/t.py::one"], 6: ["tests/t.py"], 7: ["tests/u.py::gone"]}}
+    seconds = {
+        "tests/t.py::one": 1.0,
+        "tests/t.py::two": 2.0,
+        "tests/v.py::names": 0.1,
+        "tests/w.py::not": 0.1,
+    }
+    Cover(lines, seconds, {"tests/v.py": ["os", "thing"], "tests/w.py": ["os"]}).save(tmp_path / "kept")
+    kept = load(tmp_path / "kept")
+    assert kept.reaching("thing.py", 5, 5) == ["tests/t.py::one"]
+    assert kept.reaching("thing.py", 5, 6) == ["tests/t.py::one", "tests/t.py::two"]
+    assert kept.reaching("thing.py", 1, 1) == ["tests/t.py::one", "tests/t.py::two", "tests/v.py::names"]
+    assert kept.reaching("thing.py", 7, 9) == []
+
+
+def test_mutants_fall_by_the_tests_that_reach_them(tree, tmp_path):
+    """And the tree is afterwards what it was, with nothing left of them."""
+    quick, slow, far = (f"tests/test_thing.py::test_{word}" for word in ("quick", "slow", "far"))
+    lines = {"thing.py": {14: [quick, slow], 15: [quick, slow], 16: [quick], 17: [slow]}}
+    cover = Cover(lines, {quick: 0.01, slow: 0.02, far: 0.01}, {})
+    stat = (tree / "thing.py").stat()
+    judge = Judge(tmp_path, tree, cover, 10.0)
+    verdicts = {}
+    for mutant in mutants(tree, "thing.py"):
+        text = mutant.text(SOURCE)
+        if text is not None and mutant.line in (15, 16, 17):
+            verdicts[changed(SOURCE, text)[1].replace(" ", "")] = judge.judge(mutant, text)
+    assert verdicts["returnthing.size-by*len(list(pairs))"] == ("killed", slow)
+    assert verdicts["return-2.0"] == ("survived", "")
+    assert verdicts["return+1.0"] == ("killed", quick)
+    assert verdicts["ifthingisnotNoneornotby>0:"][0] == "killed"
+    assert (tree / "thing.py").read_text() == SOURCE
+    assert (tree / "thing.py").stat().st_mtime_ns == stat.st_mtime_ns
+    assert not list((tree / "__pycache__").glob("thing*")) if (tree / "__pycache__").exists() else True
+
+
+def test_what_hangs_is_a_timeout(tree, tmp_path, monkeypatch):
+    monkeypatch.setattr(judging, "LIMIT_S", 0.3)
+    (tree / "tests" / "test_thing.py").write_text("def test_ever():\n    while True:\n        pass\n")
+    name = "tests/test_thing.py::test_ever"
+    assert judging.judge(tree, {name: 0.01}, tmp_path) == ("timeout", name)
+
+
+def test_tests_that_do_not_run_are_no_verdict(tree, tmp_path):
+    with pytest.raises(RuntimeError, match="did not run"):
+        judging.judge(tree, {"tests/test_thing.py::test_none": 0.01}, tmp_path)
+
+
+def test_the_row_counts_what_was_not_reached_as_alive():
+    verdicts = ["killed"] * 6 + ["timeout"] + ["survived"] * 2 + ["not reached"]
+    assert "70.0 % (39.7 to 89.2)" in row("room", 99, [{"verdict": verdict} for verdict in verdicts])
