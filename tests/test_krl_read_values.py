@@ -171,6 +171,16 @@ def test_relative_targets(text: str, ends: list[float]) -> None:
 
 
 @pytest.mark.parametrize(
+    "text", ["LIN_REL {X 10} #WORLD", "CIRC_REL {X 10,Y 10},{X 20} #WORLD", "LIN_REL {X .}"]
+)
+def test_behind_a_relative_motion_that_is_not_understood_nothing_is_taken_over(text: str) -> None:
+    path = body(f"LIN {{X 100,Y 200,Z 300,A 90,B 0,C 0}}\n{text}\nLIN {{Z 0}}\nLIN_REL {{Z 1}}\n").toolpath
+    assert [finding.code for finding in path.refused.values()][1:] == ["KRL004", "KRL008"]
+    assert not np.isfinite(path.position[1:, 0]).any()
+    assert set(path.pinned) >= {0}
+
+
+@pytest.mark.parametrize(
     ("setting", "word", "blend"),
     [
         ("$APO.CDIS=7.5", "C_DIS", 7.5), ("$APO.CDIS=7.5", "C_DIS C_DIS", 7.5), ("$APO.CDIS=7.5", "c_vel", None),

@@ -487,6 +487,15 @@ def test_what_is_taken_over_is_judged_by_the_digits_that_are_written() -> None:
     assert lines[3] == "LIN {Y 10,X 1.000}"
 
 
+def test_what_is_taken_over_from_a_refused_relative_motion_is_where_that_ends() -> None:
+    program = read(START + "CIRC_REL {X .,Y 10},{X 20}\nLIN {Y 500}\nLIN {Y 600}\n")
+    assert set(program.toolpath.refused) == {1}
+    assert set(program.toolpath.pinned) == {0}
+    lines, _ = written(program, plan(program, r2=(1, 0, 0)))
+    assert lines[2] == "LIN {Y 500,X 22.000,Z 3.000,A 4,B 5,C 6}"
+    assert lines[3] == "LIN {Y 600,X 21.000}"
+
+
 def test_an_arc_with_an_angle_ends_where_it_did_when_its_begin_is_rounded() -> None:
     program = read(FLAT + "LIN_REL {X 0.0004}\nCIRC {X 0.5,Y 0.1,Z 0},{X 1,Y 0,Z 0,A 0,B 0,C 0},CA 200\n")
     lines, _ = written(program, plan(program, r0=(0, 0, 1)))

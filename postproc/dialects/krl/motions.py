@@ -98,7 +98,7 @@ def _move(run: Run, statement: Statement, parts: Parts, reason: Reason | None) -
     if first.variable is not None and isinstance(first.target, Unclear) and first.target.code == "KRL016":
         reason = Reason("KRL016", first.target.message, "home")
     row = _enter(run, statement, kind, first, reason, blend, relative=relative)
-    if relative and row not in run.rows.reasons:
+    if relative:
         run.rows.relative[row] = _reference(statement, parts)
 
 
@@ -144,7 +144,8 @@ def _absolute(
     if parts.reference is not None:
         named = statement.code[slice(*parts.reference)].upper().replace(b" ", b"")
         if named not in (b"#BASE", b"#TOOL"):
-            return operand, reason or Reason("KRL008", f"a relative motion in {shown(named)}")
+            why = Reason("KRL008", f"a relative motion in {shown(named)}")
+            return replace(operand, target=Unclear("KRL008", "")), reason or why
     if isinstance(moved, Unclear):
         return operand, reason
     if moved.axes is not None:
@@ -238,7 +239,7 @@ def _arc(
             Span(0, first.start, first.stop), first.variable, -1, t.locked, span if angle is not None else None,
             has_angle,
         )  # fmt: skip
-    if written is not end_point and row not in run.rows.reasons:
+    if written is not end_point:
         run.rows.relative[row] = _reference(statement, parts)
 
 
