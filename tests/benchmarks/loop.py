@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from postproc.compensation.mirror import ANGLE_TOLERANCE, MAX_ITERATIONS, POSITION_TOLERANCE
+from postproc.compensation.mirror import ANGLE_TOLERANCE, MAX_ITERATIONS, POSITION_TOLERANCE, REST
 from postproc.geometry import Poses
-from postproc.model import MAX_STEPS, STEP_TOLERANCE, StiffnessModel
+from postproc.model import MAX_STEPS, StiffnessModel
 from postproc.robot.chain import Chain
 
 INVERSE_TOLERANCE = 1e-11
@@ -91,7 +91,7 @@ class Loop:
             stiffness[self.joint, self.joint] -= slope
             step = np.linalg.solve(stiffness, force - self.stiffness @ theta)
             theta = theta + step
-            if np.abs(step).max() <= STEP_TOLERANCE:
+            if np.abs(step).max() <= REST:
                 pin.framesForwardKinematics(self.model, self.data, q + theta)
                 return self.data.oMf[self.tcp].copy(), theta
         raise ArithmeticError("the equilibrium does not settle")
