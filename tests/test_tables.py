@@ -327,3 +327,25 @@ def test_lines_that_are_too_long(tmp_path, number):
     rows[number - 2] = "1," + " " * 200_000 + "2"
     table = read_table(write(tmp_path, "a,b\n" + "\n".join(rows)), "FRC003")
     assert table.numbers("b").tolist() == [2.0] * 40_000
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        *("1,2.5,-3", "1.,.5,+7e-3", " 1 ,\t2 , -3", '"1","2.5",-3', '1,"",""', '" 1 ",2,3'),
+        *("1;2,5;-3", '"1";"2,5";3', "1\t2,5\t-3.0"),
+    ],
+)
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_common_lines_are_read_many_at_a_time(tmp_path, line, end):
+    """None of them goes to the reader of single lines or, if it is a number, to that of single cells."""
+    separator = next(letter for letter in ";\t," if letter in line)
+    table = read_table(write(tmp_path, separator.join("abc") + end + (line + end) * 5), "FRC003")
+
+    def one(row: int, cell: str) -> float:
+        assert cell == "", f"{cell!r} is common"
+        return 0.0
+
+    for column in table.columns.values():
+        assert column.cells.others == {}
+        assert np.ptp(column.numbers(one, separator != ",")) == 0
