@@ -307,6 +307,14 @@ def test_flags_are_said_where_they_hold():
     for flag, those in said.items():
         assert {name for name, effect in EFFECTS.items() if getattr(effect, flag)} == those
     assert {name for name, effect in EFFECTS.items() if not effect.apart} == {"link_gravity"}
+    slack = {name for name, effect in EFFECTS.items() if effect(kr270().joints).slack}
+    assert slack == {
+        "joint_compliance",
+        "gravity_compensator",
+        "base_compliance",
+        "link_compliance",
+        "joint_stiffening",
+    }
 
 
 @names
