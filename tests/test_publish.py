@@ -110,10 +110,11 @@ def test_a_file_that_is_being_written_is_not_swept(tmp_path):
     sweeper = threading.Thread(target=sweep, args=([path],))
     sweeper.start()
     sweeper.join(0.3)
-    assert sweeper.is_alive()  # it waits for the writer
+    waits = sweeper.is_alive()
     goes_on.set()
     writer.join()
     sweeper.join()
+    assert waits
     assert path.read_bytes() == b"new and whole"
     assert names(tmp_path) == ["a.src"]
 
