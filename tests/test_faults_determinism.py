@@ -4,6 +4,7 @@ one thread or on several, today or in ten years."""
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -166,6 +167,24 @@ def test_another_time_user_and_machine_change_no_byte(tmp_path, words):
     assert made[0]
     assert made[0].keys() == made[1].keys()
     assert [name for name in made[0] if made[0][name] != made[1][name]] == []
+
+
+def test_a_robot_file_says_its_day_and_nothing_else_of_the_time(tmp_path):
+    """Which also shows that another time is another time."""
+    made = []
+    rows = "".join(
+        f"{9 * k},{3 * k - 90},{60 + 9 * k},{8 * k},{45 - 9 * k},{k},{-300 * (k % 3)},{100 * k},0.0{k},0.1,-0.{k}\n"
+        for k in range(1, 10)
+    )
+    (tmp_path / "loads.csv").write_text("# robot: kuka_kr270\nA1,A2,A3,A4,A5,A6,FZ,FX,DX,DY,DZ\n" + rows)
+    for code in ((), (ELSEWHEN,)):
+        words = ["identify", "loads.csv", "--effects", "joint_compliance", "-o", "r.yaml", "-q"]
+        run(words, SURROUNDINGS[0], tmp_path, *code)
+        made.append((tmp_path / "r.yaml").read_text())
+    days = [set(re.findall(r"\b[0-9]{4}-[0-9]{2}-[0-9]{2}\b", text)) for text in made]
+    assert days[1] - days[0] == {"1993-02-18"}
+    (today,) = days[0] - days[1]
+    assert made[0].replace(today, "1993-02-18") == made[1]
 
 
 def test_a_second_run_over_the_first_changes_no_byte(compensate, job):
