@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats
+from postproc.blocks import give_back
 from postproc.compensation.correct import Result, State, correct
 from postproc.compensation.division import Division, Limits, divide, made
 from postproc.compensation.doubt import doubt_of
@@ -84,10 +85,10 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     target = _target(request)
     task, result, division, edits = _corrected(request, ready, target.stem)
     stage("writing, and reading back")
-    program = replace(
-        program, text=None
-    )  # of a million motions a tenth of a gigabyte, and only writing needs it
+    # Only writing needs it, and of a million motions it takes a tenth of a gigabyte.
+    program = replace(program, text=None)
     ready = replace(ready, program=program)
+    give_back()
     written = write(
         program.documents,
         ready.dialect,
@@ -108,6 +109,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff", "report.html")]
     names += [] if request.json is None else [request.json]
     stage("reporting")
+    give_back()
     report = _report(request, ready, result, in_order_of_place(findings), written)
     if report.exit == 1:
         raise Refusal(*report.findings)
@@ -150,7 +152,9 @@ def _corrected(request: Request, ready: Prepared, stem: str) -> tuple[Task, Resu
     writing = written_as(cell, request.own_points)
     while True:
         result = correct(task)
+        give_back()
         division = divide(task, result, allowed)
+        give_back()
         told, beyond = limits(task, result, division)
         division = replace(division, findings=(*division.findings, *told))
         moved = Moved((), {**beyond, **division.held})
