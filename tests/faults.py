@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes  # noqa: F401  numpy opens it; what a run loads is there before it is watched
 import os
 import re
 import sys
@@ -11,7 +12,7 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 
-import postproc.workflows.program  # noqa: F401  what a run loads is there before it is watched
+import postproc.workflows.program  # noqa: F401
 from postproc.cli.main import run
 
 KILLS = int(os.environ.get("POSTPROC_KILLS", "5"))

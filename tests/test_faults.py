@@ -210,6 +210,23 @@ def test_runs_on_one_file_at_once(shop, round):
     assert stray(job.folder) == []
 
 
+def test_runs_on_one_file_into_several_folders_at_once(shop):
+    """Each makes what it makes alone, and none waits for what another one holds."""
+    job, _, old, new, _, _ = shop
+    wanted = {"one": (OLD, old), "two": (NEW, new), "three": (OLD, old), "four": (NEW, new)}
+    children = [
+        Child([job.program, force, "-o", job.folder / name / "part.src", "-q"], job.folder)
+        for name, (force, _) in wanted.items()
+    ]
+    assert {child.end() for child in children} <= {0, 3}
+    for name, (_, made) in wanted.items():
+        found = there(job.folder / name)
+        assert found.keys() == made.keys()
+        for file in ("part.src", "part.dat", "part.corrections.csv", "part.diff"):
+            assert found[file] == made[file], (name, file)
+    assert stray(job.folder) == []
+
+
 def test_one_folder_under_two_names_does_not_wait_for_itself(compensate, job):
     (job.folder / "same").mkdir()
     (job.folder / "link").symlink_to("same")

@@ -3,6 +3,7 @@ one thread or on several, today or in ten years."""
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -167,6 +168,18 @@ def test_another_time_user_and_machine_change_no_byte(tmp_path, words):
     assert made[0]
     assert made[0].keys() == made[1].keys()
     assert [name for name in made[0] if made[0][name] != made[1][name]] == []
+
+
+def test_a_clock_set_back_makes_nothing_anew(tmp_path):
+    """What a batch did in the future is done."""
+    folder = four_programs(tmp_path / "shop")
+    words = ["batch", folder, "--force", "-j", "1", "-q", "--json", folder / "states.json"]
+    states = []
+    for code in ((), (ELSEWHEN,), ()):
+        run(words, SURROUNDINGS[0], folder, *code)
+        programs = json.loads((folder / "states.json").read_bytes())["programs"]
+        states.append({one["state"] for one in programs})
+    assert states == [{"done"}, {"unchanged"}, {"unchanged"}]
 
 
 def test_a_robot_file_says_its_day_and_nothing_else_of_the_time(tmp_path):

@@ -74,6 +74,59 @@ def test_bombs_and_tags_in_a_cell(job, text, words):
     refused([job.program, "--force"], job.folder, "YML001", words)
 
 
+YAML_FILES = {
+    "robot.yaml": ["part.src", "--force=0,0,9", "--robot", "robot.yaml"],
+    "process.yaml": ["part.src", "--force", "process.yaml"],
+    "jobs.yaml": ["batch", "jobs.yaml"],
+    "shown.yaml": ["robots", "shown.yaml"],
+    "mapped.yaml": [
+        "map",
+        "--robot",
+        "mapped.yaml",
+        "--x",
+        "1500",
+        "--y",
+        "0",
+        "--z",
+        "900",
+        "--force=0,0,9",
+    ],
+    "asked.yaml": [
+        "plan",
+        "--robot",
+        "asked.yaml",
+        "--effects",
+        "joint_compliance",
+        "--poses",
+        "9",
+        "-o",
+        "p.csv",
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a: &a [x, x]\nb: &b [*a, *a]\nc: [*b, *b]\n", "aliases"),
+        ("a: !!python/object/apply:os.system ['touch evil']\n", "tags"),
+        ("a: !!python/name:os.system\n", "tags"),
+        ("a: " + "[" * 40 + "]" * 40, "deeper"),
+        ("a: [" + "1," * MAX_NODES + "1]", "values"),
+        ("name: x\nname: y\n", "twice"),
+    ],
+)
+@pytest.mark.parametrize("name", YAML_FILES)
+def test_bombs_and_tags_in_every_yaml_file(compensate, job, monkeypatch, name, text, words):
+    monkeypatch.chdir(job.folder)
+    (job.folder / name).write_text(text)
+    before = tree(job.folder)
+    done = compensate(*YAML_FILES[name])
+    assert done.code == 1
+    assert words in done.err
+    assert tree(job.folder) == before
+
+
 def test_as_many_values_as_are_allowed():
     text = "a: [" + ",".join("1" * (MAX_NODES - 3)) + "]"
     assert parsed(text.encode(), Path("a.yaml")).length("a") == MAX_NODES - 3
