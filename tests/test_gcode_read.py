@@ -348,6 +348,16 @@ def test_nothing_goes_before_a_block_that_a_jump_leads_to() -> None:
     assert list(path.whole) == [len(path) - 2]
 
 
+def test_nothing_goes_before_a_block_that_a_subprogram_returns_to() -> None:
+    lines = ["O1", "G21 G90 G17 G54 T1", "G0 X0. Y0. Z0.", "M98 P200", "G54 G90 G1 X4. Y0. Z0. F100"]
+    lines += ["N60 G1 X6. Y0. Z0.", "N70 X7.", "M30", "O200", "G1 X1.", "M99 P{}", ""]
+    path = read("\n".join(lines).format(60), "fanuc").toolpath
+    whole = {int(path.line[row]): why for row, why in path.whole.items()}
+    assert whole[6] == "a jump leads to its block"
+    path = read("\n".join(lines).format(""), "fanuc").toolpath
+    assert 6 not in path.line[list(path.whole)]
+
+
 def test_a_call_leaves_nothing_known_but_the_unit() -> None:
     program = body(
         "G20\nM98 P5\nX1.\nG0 G90 X1. Y1. Z1.\nG54 G0 X1. Y1. Z1.\nG3 X2. I.5 J0.\nG17 G3 X2. I.5 J0.\n",

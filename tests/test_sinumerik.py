@@ -39,6 +39,17 @@ def test_a_case_reads_as_its_dump(path: Path) -> None:
     assert list(program(path).toolpath.dump()) == path.with_suffix(".dump").read_text().splitlines()
 
 
+@pytest.mark.parametrize(
+    ("code", "unit"), [("G70", 1.0), ("G71", 1.0), ("G700", 25.4), ("G710", 1.0), ("G700 G1 X2 F1\nG70", 1.0)]
+)
+def test_g70_is_the_unit_of_coordinates_alone(code: str, unit: float) -> None:
+    """F stays mm a minute, unless G700 says the unit of both."""
+    text = f"G54 G90 T1 D1\nG0 X0 Y0 Z0\n{code} G1 X1 F60\nM30\n"
+    path = SINUMERIK.read((Document(Path("part.mpf"), text.encode()),), DOWN).toolpath
+    assert path.feed[-1] == pytest.approx(unit * MM)
+    assert path.position[-1, 0] == pytest.approx((25.4 if "G70" in code and "G71" not in code else 1.0) * MM)
+
+
 @pytest.mark.parametrize("path", BAD, ids=lambda path: f"{path.parent.parent.name}-{path.stem}")
 def test_a_bad_case_gives_the_codes_of_its_first_line(path: Path) -> None:
     found = program(path).findings

@@ -36,6 +36,7 @@ class Group(IntEnum):
     DIAMETER = 17  # 0; else X is a diameter
     SPINDLE = 18  # 0 speed, 1 constant surface speed: F per revolution is then unknown
     MACRO = 19  # 0; else every block calls a macro (G66)
+    FEED_UNITS = 24  # 0 mm, 1 inch: of F, where a control tells it apart from that of coordinates
     FOREIGN = 20  # 0; else words are no coordinates of the base in this mode (#MCS ON, TRANSMIT)
     AXIAL = 21  # 0; else targets are axis positions, or reached as the axes go (PTP)
     ONCE = 22  # Once
@@ -167,6 +168,7 @@ class Control:
     a program uses all three, see ``orientation.Angles.sequence``; whole: they then give the orientation of the tool
     itself, not what turns it from where it stands in the cell; vector, euler: keys of the words of a tool vector
     and of angles that say where it points. calls: keys of words that call a subprogram in a block without G and M;
+    feed_units: the group that says the unit of F;
     further: U, V, W are axes beside X, Y, Z, and leave these as they are.
     """
 
@@ -189,4 +191,5 @@ class Control:
     vector: tuple[int, ...] = ()
     euler: tuple[int, ...] = ()
     calls: frozenset[int] = frozenset()
+    feed_units: Group = Group.UNITS
     further: bool = False

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.arrays import Floats, Ints
-from postproc.dialects.gcode.blocks import Blocks
+from postproc.dialects.gcode.blocks import INCH, Blocks
 from postproc.dialects.gcode.control import Feed, Group, Once
+from postproc.dialects.gcode.force import taken
 from postproc.dialects.gcode.source import Column
 from postproc.dialects.gcode.words import key
+from postproc.units import MM
 
 
 class Feeds:
@@ -18,6 +20,7 @@ class Feeds:
         # F and S of a dwell are times (G4 F2).
         self._dwell = given.modal.has(Once.DWELL)
         self._force, self._given = given.modal.force, given
+        self._unit = taken(self._force[given.control.feed_units], np.array([MM, INCH, np.nan]))
         self._rate, self._spindle = (self._outside(given.words(key(letter))) for letter in "FS")
 
     def _outside(self, column: Column) -> Column:
@@ -29,13 +32,13 @@ class Feeds:
     def of(self, blocks: Ints, length: Floats) -> Floats:
         """(N,) [m/s] of the motions in blocks of the program (N,); NaN where it is not known.
 
-        G94: F length units a minute; G95: F length units a turn, S turns a minute; G93: the block takes 1/F minutes for
-        its ``length`` (N,) [m].
+        G94: F units a minute; G95: F units a turn, S turns a minute, in the unit of the coordinates or, on a
+        Sinumerik, of F; G93: the block takes 1/F minutes for its ``length`` (N,) [m].
         """
         mode = self._force[Group.FEED]
         here = mode[blocks]
         at, number = _latest(self._rate, blocks)
-        rate = np.where(number > 0, number * self._given.length[at], np.nan)
+        rate = np.where(number > 0, number * self._unit[at], np.nan)
         # F means another thing in another mode, and has to be stated again there.
         rate[mode[at] != here] = np.nan
         _, turns = _latest(self._spindle, blocks)

@@ -71,7 +71,7 @@ def follow(source: Source, control: Control, once: Ints) -> Flow:
     if control.calls:
         forget[1:] |= source.mask(*control.calls) & ~source.mask(key("G"), key("M"))
     edge = np.zeros(n + 1, np.int32)
-    entered = np.zeros(n, np.bool_)
+    entered = _returned(source, n)
     for begin, end in _stretches(source, n, forget, entered):
         edge[begin] += 1
         edge[end] -= 1
@@ -87,6 +87,16 @@ def follow(source: Source, control: Control, once: Ints) -> Flow:
         # M97 runs what stands behind the end, as a subprogram.
         rest[rest != Doubt.PROGRAM] = Doubt.PROGRAM if (m.value == LOCAL).any() else Doubt.ENDED
     return Flow(doubt, forget[:-1], forget[1:], tape, entered)
+
+
+def _returned(source: Source, n: int) -> Bools:
+    """(B,) blocks to which M99 P leads, by their N."""
+    entered, m, numbers = np.zeros(n, np.bool_), source.column(key("M")), source.column(key("N"))
+    returning = m.block[np.isin(m.value, RETURNS)]
+    if len(returning) and len(numbers):
+        to = source.column(key("P")).last(returning)
+        entered[numbers.block[np.isin(numbers.value, to[np.isfinite(to)])]] = True
+    return entered
 
 
 def _tape(source: Source, n: int) -> Bools:

@@ -53,15 +53,19 @@ def spoiled(given: Blocks) -> Spoiled:
     if not events:
         no = everywhere(False, n)
         return Spoiled(no, no)
-    at, bad = np.zeros(n + 1, np.bool_), np.zeros(n, np.bool_)
+    at = np.zeros(n + 1, np.bool_)
     first: dict[int | None, int] = {}
     for block, number in sorted(events, key=lambda event: event[0]):
         first.setdefault(number, block)
         at[block + 1] |= number is None or number == base[block]
-    rows = np.arange(n)
-    for number, block in first.items():
-        bad |= (rows > block) & ((base == number) if number is not None else True)
-    return Spoiled(at[:n], bad)
+    written = {number: block for number, block in first.items() if number is not None}
+    numbers, blocks = np.array(sorted(written)), np.array([written[number] for number in sorted(written)])
+    # From where on the base in force is not the cell's: the first change of its own number, or of all.
+    since = np.full(n, first.get(None, n))
+    if len(numbers):
+        own = np.minimum(np.searchsorted(numbers, base), len(numbers) - 1)
+        since = np.where(numbers[own] == base, np.minimum(since, blocks[own]), since)
+    return Spoiled(at[:n], np.arange(n) > since)
 
 
 def _is_offset(text: str) -> bool:

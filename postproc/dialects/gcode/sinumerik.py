@@ -177,6 +177,12 @@ CONTROL = Control(
     codes=CODES,
     line=Lines(NAMED, {}),
     comment=COMMENT,
+    # G70 and G71 say the unit of coordinates; F stays in that of the machine's basic system, mm.
+    also={
+        **dict.fromkeys((700, 710, 7100), (Code(Group.FEED_UNITS, 0),)),
+        7000: (Code(Group.FEED_UNITS, 1),),
+    },
+    feed_units=Group.FEED_UNITS,
     start={Group.OFFSET: 0},
     endings=frozenset((2, 17, 30)),
     turns=(TURN, 0),

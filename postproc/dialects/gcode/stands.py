@@ -91,13 +91,14 @@ class Stands:
         kind = self._kind[blocks]
         _machine(where, rows, rapid, used, self._tcp[blocks], kind, result)
         inside = self._tcp[blocks] & (kind != _NOWHERE)
+        given = self._given.part(first, first + len(where.frame))
+        turning = np.array([frame.shift[3:].any() for frame in where.frames])
         pairs = np.stack([kind, np.where(kind == ROTARY, 0, where.frame[rows])], axis=1)
         for one, frame in np.unique(pairs[inside], axis=0).tolist():
             here = np.flatnonzero(inside & (pairs == (one, frame)).all(axis=1))
             number = self._orientation(one, frame, where)
             orientation = self.orientations[number]
             result.orient[here] = number
-            turning = np.array([frame.shift[3:].any() for frame in where.frames])
             shifted = turning[where.frame[rows[here]]]
             ends = where.end[rows[here], 3:]
             values = self._values(trace, one, blocks[here], ends, orientation)
@@ -105,7 +106,6 @@ class Stands:
             ahead = here[(blocks[here] > 0) & ((one == ROTARY) | (self._kind[blocks[here] - 1] == one))]
             begins = where.begin[rows[ahead], 3:]
             result.before[ahead] = self._values(trace, one, blocks[ahead], begins, orientation, 1)
-            given = self._given.part(first, first + len(where.frame))
             present = np.stack(
                 [given.has(address)[rows[here]] for address in orientation.words if address >= 0], axis=1
             )

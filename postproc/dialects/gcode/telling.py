@@ -26,7 +26,10 @@ def told(
     live = modal.flow.tape & (modal.flow.doubt != Doubt.ENDED)
 
     def tell(where: Bools, code: str, message: str) -> None:
-        at = np.flatnonzero(where & live)
+        tell_at(np.flatnonzero(where), code, message)
+
+    def tell_at(at: Ints, code: str, message: str) -> None:
+        at = at[live[at]]
         if len(at):
             many = (
                 f"; {len(at)} blocks, lines {blocks.line[at[0]]} to {blocks.line[at[-1]]}"
@@ -46,9 +49,7 @@ def told(
     strange = modal.strange.block[~motion[modal.strange.block] & live[modal.strange.block]]
     codes = np.nan_to_num(modal.strange.last(strange), nan=-1.0)
     for value in np.unique(codes)[:100].tolist():
-        same = none.copy()
-        same[strange[codes == value]] = True
-        tell(same, "GCO001", f"{code_name(value)} is not known here")
+        tell_at(strange[codes == value], "GCO001", f"{code_name(value)} is not known here")
     calls, m = none.copy(), given.words(key("M"))
     calls[m.block[np.isin(m.value, CALLS)]] = True
     tell(calls | modal.has(Once.CALL) | given.noted("call"), "GCO007", "calls code that was not read")
@@ -59,10 +60,12 @@ def told(
         "GCO024",
         "the program writes a work offset; the cell's base of its number is taken",
     )
-    for name in dict.fromkeys(note.text for note in given.source.notes if note.kind == "tool"):
-        same = none.copy()
-        same[[note.block for note in given.source.notes if note.kind == "tool" and note.text == name]] = True
-        tell(same, "SIN001", name)
+    named_tools: dict[str, list[int]] = {}
+    for note in given.source.notes:
+        if note.kind == "tool":
+            named_tools.setdefault(note.text, []).append(note.block)
+    for name, at in named_tools.items():
+        tell_at(np.unique(at), "SIN001", name)
     if not len(rows):
         return findings
     first = none.copy()
