@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from test_mirror import CARRIES, FORCE, TOOL, Problem, full, program_angles, task
-from ways_at_work import circle, line
+from ways_at_work import circle, corner, line
 
 from postproc.compensation.between import LITTLE, SHARES, SHORT, Pieces, errors_between
 from postproc.compensation.correct import correct, with_residual
@@ -15,6 +15,7 @@ from postproc.compensation.division import Limits, divide, made
 from postproc.compensation.doubt import Unsure, _ForceShare, half_widths, length_quantile
 from postproc.compensation.limits import limits
 from postproc.compensation.mirror import difference, predict
+from postproc.compensation.ways import begins
 from postproc.forces import Wrenches
 from postproc.geometry import Poses, rotation_from_vector
 from postproc.model import NOTHING
@@ -289,3 +290,41 @@ def test_only_the_force_counts_with_the_interval_of_each_motion():
     found = _ForceShare(0.2, scale, False, True).scaled(moves, entries, rows)
     np.testing.assert_array_equal(found[:, :, :3], moves[:, :, :3])
     np.testing.assert_allclose(found[:, :, 3], scale[rows][:, None] * moves[:, :, 3])
+
+
+# Ways
+
+
+@pytest.mark.parametrize("tools", [[1, 1, 1, 1], [1, 1, 2, 2], [2, 2, 1, 1], [1, 2, 1, 2], [2, 1, 1, 2]])
+def test_a_motion_begins_where_the_one_before_ended_with_its_own_tool(tools):
+    """The flange stands where it stood; with another tool, counted up or down, another point is at its tip."""
+    job = line()
+    longer = Poses(rotation_from_vector([0.1, 0.2, 0.3]), np.array([0.05, -0.02, 0.4]))
+    frames = {1: job.tool[0:1], 2: Poses(longer.rotation[None], longer.position[None])}
+    tool = Poses(
+        np.concatenate([frames[t].rotation for t in tools]),
+        np.concatenate([frames[t].position for t in tools]),
+    )
+    path = replace(job.toolpath, tool=np.array(tools))
+    begin = begins(job.wanted, path, tool, job.model.robot, job.track)[np.arange(4)]
+    for row in range(1, 4):
+        flange = job.wanted[row - 1 : row] @ tool[row - 1 : row].inverse()
+        there = flange @ tool[row : row + 1]
+        np.testing.assert_allclose(begin.position[row], there.position[0], atol=1e-12)
+        np.testing.assert_allclose(begin.rotation[row], there.rotation[0], atol=1e-12)
+    assert np.isnan(begin.position[0]).all()
+
+
+@pytest.mark.parametrize("growth", [1.2, 1.4, 1.6, 1.8, 2.0, 2.4])
+def test_a_way_without_its_link_is_not_divided(growth):
+    """It begins beside its place, in however many pieces; links come before points."""
+    job = corner(tolerance=1e-6)
+    result = correct(job)
+    whole, some = divide(job, result, FREE), divide(job, result, Limits(max_growth=growth))
+    wanted = set(whole.source[whole.links].tolist())
+    given = set(some.source[some.links].tolist())
+    assert given <= wanted
+    for row in wanted - given:
+        assert np.count_nonzero(some.source == row) == 1
+    if wanted - given:
+        assert len(some) == len(job.toolpath) + len(given)
