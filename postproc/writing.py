@@ -11,23 +11,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc import __version__
-from postproc.arrays import Bools, Floats, Ints
-from postproc.blocks import blocks, each_block
+from postproc.arrays import Floats, Ints
+from postproc.blocks import each_block
 from postproc.cell import Cell
 from postproc.compensation.between import errors_between
 from postproc.compensation.correct import Result, with_residual
 from postproc.compensation.division import Division, made
 from postproc.compensation.task import Task
 from postproc.dialects.dialect import Dialect, Program, Settings, Writing
+from postproc.dialects.permitted import refuse_other
 from postproc.document import Document, Edit, Edits, apply, undone
 from postproc.findings import Finding, Refusal
-from postproc.geometry import PoseRows, Poses, on_arc, vector_from_rotation
+from postproc.geometry import PoseRows, Poses
+from postproc.holding import hold, hold_residual, meant
 from postproc.robot.description import Robot
-from postproc.toolpath import Kind, Plan, Role, Toolpath
+from postproc.toolpath import Plan, Toolpath
 from postproc.units import DEG, MM
-
-FAR = 2.5
-"""Written steps by which the middle of an arc may be elsewhere than meant: its centre is rounded as well."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +34,8 @@ class Written:
     """``edits`` make the output; ``contents`` are its bytes, a document each; ``result`` has the residual predicted
     from the digits in them, ``division`` the commands as they are in them, and ``between`` (M,) [m] the largest
     distance from the wanted way inside of each corrected motion, NaN for all others.
+
+    off (N,) [m], off_angle (N,) [rad], off_between (M,) [m]: the same residuals, from what the gain leaves.
     """
 
     edits: Edits
@@ -42,6 +43,9 @@ class Written:
     result: Result
     division: Division
     between: Floats
+    off: Floats
+    off_angle: Floats
+    off_between: Floats
 
 
 def planned(task: Task, division: Division) -> Plan:
@@ -53,7 +57,7 @@ def planned(task: Task, division: Division) -> Plan:
     centre, normal, sweep = (np.array(way) if arcs else way for way in (none, none, none[:, 0]))
 
     def put(rows: slice) -> None:
-        part = _planned(task, division, rows)
+        part = meant(task, division, division.moved, rows)
         position[rows], rotation[rows] = part.position, part.rotation
         if arcs:
             centre[rows], normal[rows], sweep[rows] = part.centre, part.normal, part.sweep
@@ -64,32 +68,6 @@ def planned(task: Task, division: Division) -> Plan:
     return Plan(division.source, division.role, position, rotation, centre, normal, sweep)
 
 
-def _planned(task: Task, division: Division, rows: slice) -> Plan:
-    """Some motions of the plan."""
-    path, source, moved = task.toolpath, division.source[rows], division.moved[rows]
-    to_base = task.base.shared(source).inverse()
-    command = to_base @ division.command[rows]
-    turned = moved & path.oriented[source]
-    arc, kept = np.isfinite(division.sweep[rows]), ~moved & ~division.links[rows]
-    centre = (to_base @ Poses(np.eye(3), division.centre[rows])).position
-    normal = (to_base.rotation @ division.normal[rows][..., None])[..., 0]
-
-    def way(new: Floats, old: Floats) -> Floats:
-        more = (1,) * (new.ndim - 1)
-        stays = np.where(kept.reshape(-1, *more), old[source], np.nan)
-        return np.where(arc.reshape(-1, *more), new, stays)
-
-    return Plan(
-        source,
-        division.role[rows],
-        np.where(moved[:, None], command.position, path.position[source]),
-        np.where(turned[:, None, None], command.rotation, path.rotation[source]),
-        way(centre, path.centre),
-        way(normal, path.normal),
-        way(division.sweep[rows], path.sweep),
-    )
-
-
 def written_as(cell: Cell, own_points: str) -> Writing:
     """Decimals whose rounding stays below a twentieth of the tolerances."""
     return Writing(_decimals(cell.tolerance / MM), _decimals(cell.tolerance_angle / DEG), own_points)
@@ -98,9 +76,11 @@ def written_as(cell: Cell, own_points: str) -> Writing:
 def edited(program: Program, dialect: Dialect, moved: Sequence[Edit], robot: Robot, stem: str) -> Edits:
     """The edits that make the output: those of the motions, with its mark and the module name ``stem``.
 
-    Raises Refusal FIL011 (no module name).
+    Raises Refusal FIL008 (an edit touches what is no part of a motion), FIL011 (no module name).
     """
     more: list[Edit] = []
+    moved = Edits.joined(moved)
+    refuse_other(program, moved, dialect.letters)
     if len(moved):
         more.append(dialect.marked(program, _mark(program, robot)))
     main = program.documents[0].path
@@ -112,7 +92,7 @@ def edited(program: Program, dialect: Dialect, moved: Sequence[Edit], robot: Rob
 
 
 def write(
-    documents: tuple[Document, ...],
+    program: Program,
     dialect: Dialect,
     task: Task,
     result: Result,
@@ -122,28 +102,63 @@ def write(
     settings: Settings,
     completed: Callable[[Toolpath], Toolpath],
 ) -> Written:
-    """Turn the edits of ``documents`` into files, and read them back.
+    """Turn the edits of ``program`` into files, and read them back.
 
     ``completed``: fills in what a target that was read back leaves to the axis motion before it.
-    Raises Refusal FIL008 (what was read back is not what was meant).
+    Raises Refusal FIL008 (what was read back is not what was meant), COR002 (it corrects by more than may be).
     """
+    documents = program.documents
     contents = _contents(documents, edits)
-    back = completed(_read_back(documents, contents, dialect, settings))
-    _hold(task, division, back, writing, documents[0].path.name)
+    again = _read_back(documents, contents, dialect, settings)
+    back = completed(again.toolpath)
+    hold(task, result, division, program, again, back, writing)
     there = _as_written(task, division, back)
-    result = with_residual(task, result, there.own_command)
-    return Written(edits, contents, result, there, way_errors(task, result, there))
+    written = with_residual(task, result, there.own_command)
+    hold_residual(task, result, written, there, writing, documents[0].path.name)
+    between = way_errors(task, result, there)
+    if task.gain == 1.0:
+        return Written(edits, contents, written, there, between, written.after, written.after_angle, between)
+    off, angle = _beside_left(task, written)
+    return Written(
+        edits, contents, written, there, between, off, angle, way_errors(task, result, there, 1.0 - task.gain)
+    )
 
 
 def _read_back(
     documents: tuple[Document, ...], contents: tuple[bytes, ...], dialect: Dialect, settings: Settings
-) -> Toolpath:
+) -> Program:
     pairs = zip(documents, contents, strict=True)
-    return dialect.read(tuple(Document(document.path, raw) for document, raw in pairs), settings).toolpath
+    read = tuple(Document(document.path, raw) for document, raw in pairs)
+    return replace(dialect.read(read, replace(settings, places=False)), text=None)
 
 
-def way_errors(task: Task, result: Result, division: Division) -> Floats:
-    """(M,) [m] the largest distance from the wanted way inside of each corrected motion, NaN for all others."""
+def _beside_left(task: Task, result: Result) -> tuple[Floats, Floats]:
+    """(N,) [m] and (N,) [rad] how far the tool is from where the part of the correction that is made leaves it; NaN
+    where nothing is corrected."""
+    rows, left = np.flatnonzero(result.corrected), 1.0 - task.gain
+    off, angle = np.full((2, len(result.state)), np.nan)
+
+    def predicted(part: slice) -> None:
+        at = rows[part]
+        wanted = task.wanted[at]
+        goal = task.goal(at, wanted)
+        after, before = (
+            task.seen(at, task.real(at, command, task.wrench[at]).pose, goal)
+            for command in (result.command[at], wanted)
+        )
+        off[at], angle[at] = (
+            np.linalg.norm(now - left * then, axis=1) for now, then in zip(after, before, strict=True)
+        )
+
+    each_block(predicted, len(rows))
+    return off, angle
+
+
+def way_errors(task: Task, result: Result, division: Division, left: float = 0.0) -> Floats:
+    """(M,) [m] the largest distance from the wanted way inside of each corrected motion, NaN for all others.
+
+    ``left``: the share of the error without a correction that is meant to stay.
+    """
     errors = np.full(len(division), np.nan)
     source, links = division.source, division.links
     chosen = np.flatnonzero(result.corrected[source] & task.ways.known[source] & ~links)
@@ -151,7 +166,7 @@ def way_errors(task: Task, result: Result, division: Division) -> Floats:
     def looked(part: slice) -> None:
         pieces = made(task, division, chosen[part])
         first = (pieces.first == 0.0) & task.steps(pieces.rows, result.corrected)
-        errors[chosen[part]], _ = errors_between(task, pieces, first)
+        errors[chosen[part]], _ = errors_between(task, pieces, first, left)
 
     each_block(looked, len(chosen))
     return errors
@@ -163,8 +178,8 @@ def _as_written(task: Task, division: Division, back: Toolpath) -> Division:
 
     def command(rows: Ints) -> Poses:
         found = task.wanted[source[rows]].copy()
-        moved = np.flatnonzero(division.moved[rows])
-        found.put(moved, base.shared(source[rows[moved]]) @ back.target_in_base[rows[moved]])
+        known = np.flatnonzero(np.isfinite(back.position[rows, 0]))
+        found.put(known, base.shared(source[rows[known]]) @ back.target_in_base[rows[known]])
         return found
 
     there = replace(division, command=PoseRows(len(division), command))
@@ -201,96 +216,3 @@ def _contents(documents: tuple[Document, ...], edits: Edits) -> tuple[bytes, ...
             raise Refusal(Finding("FIL008", "bytes outside of the corrections changed", document.path.name))
         contents.append(raw)
     return tuple(contents)
-
-
-def _hold(task: Task, division: Division, back: Toolpath, writing: Writing, file: str) -> None:
-    """The program read back is the one that was meant, motion by motion.  Raises Refusal FIL008."""
-    path, own = task.toolpath, division.own
-    if len(back) != len(division):
-        raise Refusal(Finding("FIL008", f"{len(division)} motions became {len(back)}", file))
-    place = np.flatnonzero(own)
-    if set(back.refused) != {int(place[row]) for row in path.refused}:
-        raise Refusal(Finding("FIL008", "other motions than before are not understood", file))
-
-    def held(rows: slice) -> None:
-        plan = _planned(task, division, rows)
-        _hold_texts(path, back, plan, rows, file)
-        _hold_targets(path, back, plan, rows, writing, file)
-
-    each_block(held, len(division))
-    _hold_arcs(task, division, back, 10.0**-writing.mm, file)
-
-
-def _hold_texts(path: Toolpath, back: Toolpath, plan: Plan, rows: slice, file: str) -> None:
-    """What a motion says beside its target."""
-    source, own, link = plan.source, plan.own, plan.role == Role.LINK
-    for name, chosen in (
-        ("base", ~link | link),
-        ("tool", ~link | link),
-        ("kind", ~link),
-        ("status", own),
-        ("turn", own),
-        ("axes", own),
-        ("timed", own),
-        ("feed", (path.kind[source] != Kind.PTP) & ~path.timed[source]),
-    ):
-        before, after = getattr(path, name)[source], getattr(back, name)[rows]
-        same = (before == after) | ((before != before) & (after != after))
-        wrong = ~same.reshape(len(source), -1).all(axis=1) & chosen
-        if wrong.any():
-            line = int(path.line[source[np.argmax(wrong)]])
-            raise Refusal(Finding("FIL008", f"the {name} of a motion changed", file, line))
-    if (back.kind[rows][link] != Kind.LIN).any():
-        raise Refusal(Finding("FIL008", "a link is no straight motion", file))
-
-
-def _hold_targets(
-    path: Toolpath, back: Toolpath, plan: Plan, rows: slice, writing: Writing, file: str
-) -> None:
-    if not np.array_equal(np.isfinite(back.position[rows, 0]), np.isfinite(plan.position[:, 0])):
-        raise Refusal(Finding("FIL008", "targets were lost or appeared", file))
-    # Half a written step a coordinate; three angles add up.
-    step_mm, step_deg = 10.0**-writing.mm, 10.0**-writing.deg
-    off = np.abs(back.position[rows] - plan.position).max(axis=1) / MM
-    angle = _angle(plan.rotation, back.rotation[rows], path.free_axis[plan.source]) / DEG
-    _close(off > 0.5001 * step_mm, off, path, plan.source, file, "mm from what was meant")
-    _close(angle > 1.5001 * step_deg, angle, path, plan.source, file, "deg from what was meant")
-
-
-def _hold_arcs(task: Task, division: Division, back: Toolpath, step_mm: float, file: str) -> None:
-    path, source = task.toolpath, division.source
-    kept = ~division.moved & ~division.links
-    arc = np.isfinite(division.sweep) | (kept & np.isfinite(path.sweep[source]))
-    if not np.array_equal(np.isfinite(back.sweep), arc):
-        raise Refusal(Finding("FIL008", "arcs were lost or appeared", file))
-    for rows in blocks(len(division)) if arc.any() else ():
-        begin = max(rows.start - 1, 0)
-        plan = _planned(task, division, slice(begin, rows.stop))
-        at = np.flatnonzero(np.isfinite(plan.sweep))
-        at = at[(at > 0) & (plan.source[at] > 0)]
-        at = at[np.isfinite(plan.position[at - 1, 0])]
-        if not len(at):
-            continue
-        there, half = at + begin, np.full(len(at), 0.5)
-        one, other = (
-            on_arc(p.position[k - 1], p.position[k], p.centre[k], p.normal[k], p.sweep[k], half)
-            for p, k in ((plan, at), (back, there))
-        )
-        off = np.abs(other - one).max(axis=1) / MM
-        _close(off > FAR * step_mm, off, path, plan.source[at], file, "mm from the arc that was meant")
-
-
-def _close(wrong: Bools, off: Floats, path: Toolpath, source: Ints, file: str, words: str) -> None:
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        line = int(path.line[int(source[row])])
-        raise Refusal(Finding("FIL008", f"a target is {off[row]:.6f} {words}", file, line))
-
-
-def _angle(one: Floats, other: Floats, free_axis: Floats) -> Floats:
-    """(M,) [rad] between rotations, where an axis is free between its directions; 0 where one is not known."""
-    turned = np.swapaxes(one, -1, -2) @ other
-    known = np.isfinite(turned[:, 0, 0])
-    vectors = vector_from_rotation(np.where(known[:, None, None], turned, np.eye(3)))
-    axis = np.nan_to_num(free_axis)
-    return np.asarray(np.linalg.norm(vectors - np.sum(vectors * axis, axis=1, keepdims=True) * axis, axis=1))

@@ -19,6 +19,7 @@ ROOMS = {
     "workflows": 8,
     "report": 7,
     "writing": 7,
+    "holding": 7,
     "diagnosis": 6,
     "verification": 6,
     "identification": 5,
@@ -49,6 +50,7 @@ ROOMS = {
 """Room -> its floor.  A new room gets its floor here."""
 
 ONE_FLOOR = {
+    ("writing", "holding"),
     ("schemas", "batch"),
     ("forces", "cell"),
     ("experiments", "identification"),

@@ -91,12 +91,15 @@ class Pieces:
         return found
 
 
-def errors_between(task: Task, pieces: Pieces, from_begin: Bools | None = None) -> tuple[Floats, Floats]:
+def errors_between(
+    task: Task, pieces: Pieces, from_begin: Bools | None = None, left: float = 0.0
+) -> tuple[Floats, Floats]:
     """Largest distance (K,) [m] of the predicted tool from the wanted way, and largest angle (K,) [rad] from the wanted
     orientation, inside of each piece; infinite where the robot can not be there.
 
     Along the way the tool may be early or late: only what it is beside the way counts.  ``from_begin`` (K,): pieces
-    that are looked at where they begin as well (another ended there in its own place).
+    that are looked at where they begin as well (another ended there in its own place).  ``left``: the share of the
+    error without a correction that is meant to stay, and is none.
     """
     length = np.linalg.norm(pieces.end.position - pieces.begin.position, axis=1)
     _, turn = difference(pieces.end, pieces.begin)
@@ -105,24 +108,28 @@ def errors_between(task: Task, pieces: Pieces, from_begin: Bools | None = None) 
     for share in SHARES:
         chosen = np.flatnonzero(long | (share == 0.5))
         if len(chosen):
-            here = _errors(task, pieces if len(chosen) == len(pieces) else pieces[chosen], share)
+            here = _errors(task, pieces if len(chosen) == len(pieces) else pieces[chosen], share, left)
             off[chosen] = np.maximum(off[chosen], here[0])
             angle[chosen] = np.maximum(angle[chosen], here[1])
     if from_begin is not None and from_begin.any():
         chosen = np.flatnonzero(from_begin)
-        here = _errors(task, pieces[chosen], 0.0)
+        here = _errors(task, pieces[chosen], 0.0, left)
         off[chosen], angle[chosen] = np.maximum(off[chosen], here[0]), np.maximum(angle[chosen], here[1])
     return off, angle
 
 
-def _errors(task: Task, pieces: Pieces, share: float) -> tuple[Floats, Floats]:
+def _errors(task: Task, pieces: Pieces, share: float, left: float) -> tuple[Floats, Floats]:
     """As ``errors_between``, at one share of each piece."""
     rows = pieces.rows
     along = pieces.first + share * (pieces.last - pieces.first)
     wanted = task.ways.at(rows, along)
     wrench = task.force.along(rows, along)
     real = task.real(rows, pieces.at(np.full(len(rows), share)), wrench, COARSE)
-    shift, turn = task.off(rows, real.pose, task.goal(rows, wanted, COARSE))
+    goal = task.goal(rows, wanted, COARSE)
+    shift, turn = task.off(rows, real.pose, goal)
+    if left:
+        without = task.off(rows, task.real(rows, wanted, wrench, COARSE).pose, goal)
+        shift, turn = shift - left * without[0], turn - left * without[1]
     tangent = task.ways.tangent(rows, along)
     shift = shift - np.sum(shift * tangent, axis=1, keepdims=True) * tangent
     good = real.reachable & real.settled

@@ -78,6 +78,10 @@ class Dialect(Protocol):
     @property
     def name(self) -> str: ...
 
+    @property
+    def letters(self) -> bytes:
+        """Capital letters of the words that its edits may take out of the line of a motion, or put in."""
+
     def claims(self, path: Path, raw: bytes) -> bool:
         """Whether a file of this name and content is of this dialect."""
 

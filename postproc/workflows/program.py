@@ -90,7 +90,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     ready = replace(ready, program=program)
     give_back()
     written = write(
-        program.documents,
+        program,
         ready.dialect,
         task,
         result,
@@ -193,29 +193,29 @@ def _closing(request: Request, ready: Prepared, written: Written) -> list[Findin
             )
         )
     if request.gain < 1.0:
-        findings.append(
-            Finding("COR007", f"{request.gain:.0%} of the correction was applied, as asked", file)
-        )
-        return findings
-    above = corrected & (result.after > tolerance)
-    if above.any():
-        row = int(np.argmax(np.where(corrected, result.after, -1.0)))
-        findings.append(
-            Finding(
-                "COR005",
-                f"{result.after[row] / MM:.4f} mm remain, tolerance {tolerance / MM:g} mm"
-                f" ({int(above.sum())} motions)",
-                file,
-                int(path.line[row]),
-            )
-        )
-    over = np.nan_to_num(written.between) > tolerance
+        said = f"{request.gain:.0%} of the correction was applied, as asked"
+        findings.append(Finding("COR007", said, file))
+    told = "remain" if request.gain == 1.0 else "are beside what the gain leaves"
+    turns = corrected & path.oriented
+    for off, limit, rows, unit, word in (
+        (written.off, tolerance, corrected, MM, "mm"),
+        (written.off_angle, ready.cell.tolerance_angle, turns, DEG, "deg"),
+    ):
+        above = rows & ~(off <= limit)
+        if above.any():
+            row = int(np.argmax(np.where(above, np.nan_to_num(off, nan=np.inf), -1.0)))
+            message = f"{off[row] / unit:.4f} {word} {told}, tolerance {limit / unit:g} {word}"
+            message += f" ({int(above.sum())} motions)"
+            findings.append(Finding("COR005", message, file, int(path.line[row])))
+    between = np.nan_to_num(written.off_between)
+    over = between > tolerance
     if over.any():
-        worst = int(np.argmax(np.nan_to_num(written.between)))
+        worst = int(np.argmax(between))
+        way = "the wanted way" if request.gain == 1.0 else "the way that the gain leaves"
         findings.append(
             Finding(
                 "COR006",
-                f"between its points the tool is up to {written.between[worst] / MM:.4f} mm from the wanted way (worst"
+                f"between its points the tool is up to {between[worst] / MM:.4f} mm from {way} (worst"
                 f" here), tolerance {tolerance / MM:g} mm ({int(over.sum())} motions)",
                 file,
                 int(path.line[division.source[worst]]),

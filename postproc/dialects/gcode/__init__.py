@@ -31,6 +31,11 @@ class GcodeDialect:
     def name(self) -> str:
         return self.control.name
 
+    @property
+    def letters(self) -> bytes:
+        """Those of coordinates, of G and F that hold for inserted blocks too, and of CIP and EX."""
+        return b"ABCEFGIJKPRXYZ"
+
     def claims(self, path: Path, raw: bytes) -> bool:
         return detection.CLAIMS[self.name](path, raw)
 

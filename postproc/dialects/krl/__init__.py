@@ -21,6 +21,7 @@ class KrlDialect:
     """KRL as a ``Dialect``."""
 
     name = "krl"
+    letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ"  # points have names
 
     def claims(self, path: Path, raw: bytes) -> bool:
         return path.suffix.lower() == ".src" or _CLAIM.search(raw) is not None
