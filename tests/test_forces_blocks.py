@@ -13,6 +13,9 @@ from test_forces import DOWN, cell_of, path_of, run
 from postproc.blocks import ROWS
 from postproc.cell import Tool, frames_of
 from postproc.findings import Refusal
+from postproc.forces.milling import mean_force
+from postproc.forces.operations import process_forces
+from postproc.forces.process import read_process
 from postproc.forces.way import Way
 from postproc.geometry import Poses, rotation_from_abc, rotation_from_vector
 from postproc.toolpath import Annotation, FrameRef, Kind, Toolpath
@@ -165,14 +168,25 @@ def test_a_log_over_a_repeated_path(tmp_path, each):
 
 
 def test_a_process_over_a_repeated_path(tmp_path):
-    path = replace(path_of([[0.02 * k, 0.005 * (k % 2), -0.001 * (k % 3)] for k in range(13)],
-                           [Kind.PTP] + [Kind.LIN] * 12), feed=np.linspace(0.01, 0.02, 13))  # fmt: skip
+    """Two operations by their tools, feeds that differ, and a plunge."""
+    points = [[0.02 * k, 0.005 * (k % 2), -0.001 * (k % 3)] for k in range(13)]
+    points[4] = [*points[3][:2], -0.02]
+    kinds = [Kind.PTP] + [Kind.LIN] * 6 + [Kind.PTP] + [Kind.LIN] * 5
+    path = path_of(points, kinds, frames=FRAMES, tool=[1] * 7 + [2] * 6)
+    path = replace(path, feed=np.linspace(0.01, 0.02, 13)[[0, 1, 2, 2, 4, 5, 6, 7, 3, 9, 1, 11, 12]])
     process = tmp_path / "process.yaml"
     process.write_text(
-        "operations:\n- {lines: [1, 10000000], diameter: 16, teeth: 3, helix: 30, axial_depth: 5, radial_width: 8,\n"
-        "   direction: down, spindle: 12000, material: EN AW-7075-T6}\n"
+        "defaults: {teeth: 3, helix: 30, axial_depth: 5, radial_width: 8, direction: down, spindle: 12000,\n"
+        "           material: EN AW-7075-T6}\n"
+        "operations: [{tool: 1, diameter: 16}, {tool: 2, diameter: 20, teeth: 4}]\n"
     )
     short, long = (run(one, str(process), CELL) for one in (path, repeated(path, TIMES)))
+    assert np.flatnonzero(~short.carries).tolist() == [0, 4, 7]
+    stated, _ = process_forces(process, path, frames_of(CELL, path, "part.src"), "part.src")
+    for row in np.flatnonzero(short.carries):
+        operation = read_process(process)[path.tool[row] - 1]
+        expected = mean_force(operation.cut, operation.feed_per_tooth(path.feed[[row]]))[0]
+        np.testing.assert_allclose(stated.values[stated.row[row]], [*expected, 0, 0, 0])
     same(long, short, TIMES, 2)
     np.testing.assert_allclose(long.ci95, np.tile(short.ci95, TIMES))
     np.testing.assert_allclose(long.peak, np.tile(short.peak, TIMES), rtol=1e-3)

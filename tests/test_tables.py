@@ -301,6 +301,7 @@ def test_a_table_of_many_blocks(tmp_path, end):
     rows[ROWS - 1] = f'"{ROWS - 1}",1,-2'
     rows[ROWS] = f'{ROWS},"3",ä'
     rows[2 * ROWS] = "# note"
+    rows[4 * ROWS] = f"{4 * ROWS},3,ö"
     text = "a,b,c" + end + end.join(rows)
     assert len(text) > 2 * BLOCK
     table = read_table(write(tmp_path, text), "FRC003")
@@ -309,10 +310,11 @@ def test_a_table_of_many_blocks(tmp_path, end):
     assert np.array_equal(table.lines, kept + 2)
     assert np.array_equal(table.numbers("a"), kept)
     b = kept / 7
-    b[ROWS - 1 : ROWS + 1] = 1, 3
+    b[ROWS - 1 : ROWS + 1], b[4 * ROWS - 1] = (1, 3), 3
     assert np.array_equal(table.numbers("b"), b)
     with pytest.raises(Refusal, match=f"file.csv:{ROWS + 2}: FRC003 column c: 'ä' is not a number"):
         table.numbers("c")
+    assert table.columns["c"][4 * ROWS - 1] == "ö"
     assert table.texts("c")[ROWS - 1 : ROWS + 2] == ["-2", "ä", f"-{ROWS + 1}.25"]
 
 
@@ -332,7 +334,14 @@ def test_lines_that_are_too_long(tmp_path, number):
 @pytest.mark.parametrize(
     "line",
     [
-        *("1,2.5,-3", "1.,.5,+7e-3", " 1 ,  2 , -3", '"1","2.5",-3', '1,"",""', '" 1 ",2,3'),
+        *(
+            "123456.7890123456789,2.5,-3.25e-100",
+            "1.,.5,+7e-3",
+            " 1 ,  2 , -3",
+            '"1","2.5",-3',
+            '1,"",""',
+            '" 1 ",2,3',
+        ),
         *("1;2,5;-3", '"1";"2,5";3', "1\t2,5\t-3.0"),
     ],
 )
