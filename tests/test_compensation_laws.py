@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from test_mirror import CARRIES, FORCE, TOOL, Problem, full, program_angles, task
 from ways_at_work import circle, corner, line
+from ways_at_work import task as at_points
 
 from postproc.compensation.between import LITTLE, SHARES, SHORT, Pieces, errors_between
 from postproc.compensation.correct import correct, with_residual
@@ -328,3 +329,35 @@ def test_a_way_without_its_link_is_not_divided(growth):
         assert np.count_nonzero(some.source == row) == 1
     if wanted - given:
         assert len(some) == len(job.toolpath) + len(given)
+
+
+def three_lines(**words):
+    """A cut of three ways, one behind the other: 0.1 m, 0.6 m, 0.3 m; the middle one errs most between its ends."""
+    along = np.array([-0.5, -0.5, -0.4, 0.2, 0.5, 0.5])
+    points = np.stack([np.full(6, 1.6), along, [0.6, 0.5, 0.5, 0.5, 0.5, 0.6]], axis=1)
+    return at_points(points, [False, False, True, True, True, False], **words)
+
+
+@pytest.mark.parametrize("growth", [1.0, 1.17, 1.34, 1.5, 1.67, 1.84, 2.0, 2.5])
+def test_what_may_be_inserted_is_and_where_most_is_left(growth):
+    """All of what is allowed, or all that is wanted; the way that errs most gets its points before the others."""
+    job = three_lines(tolerance=2e-6)
+    n = len(job.toolpath)
+    result = correct(job)
+    wanted, some = (
+        divide(job, result, Limits(max_growth=50.0)),
+        divide(job, result, Limits(max_growth=growth)),
+    )
+    full, got = (np.bincount(d.source[~d.links], minlength=n) - 1 for d in (wanted, some))
+    links = int(wanted.links.sum())
+    spare = int(growth * n) - n
+    assert len(some) == min(n + spare, len(wanted))
+    order = [3, 4, 2]  # the error between two points grows with the square of their distance
+    left = max(spare - links, 0)
+    for row in order:
+        assert got[row] == min(left, full[row])
+        left -= got[row]
+
+
+def test_limits_that_nobody_stated():
+    assert Limits() == Limits(keep=False, min_segment=1e-3, max_growth=2.0)
