@@ -7,7 +7,7 @@ import errno
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from postproc.findings import Finding, Refusal
@@ -16,18 +16,21 @@ Content = bytes | Iterable[bytes]
 """Of a file: as a whole, or in parts that are made while it is written."""
 
 
-def publish(files: Mapping[Path, Content], last: Path | None = None) -> None:
+def publish(
+    files: Mapping[Path, Content], last: Path | None = None, still: Callable[[], None] = lambda: None
+) -> None:
     """Write all of ``files`` or none.
 
     Every file is written whole beside its place and synced before the first one is renamed into it.  ``last``, the
     program itself, is taken away first and comes last: at any moment it is absent or belongs to its companions.
     Folders are made as needed.  A name that is a link is replaced; what it leads to is left alone.  Of runs that write
     into one folder at once each waits for the one before it, so what is there is of one of them; what one that was
-    killed left half-written of these files is taken away.  Raises Refusal FIL004 when the disk or its rights do not
+    killed left half-written of these files is taken away.  ``still``: called when all are written beside their places;
+    where it raises, everything stays as it was.  Raises Refusal FIL004 when the disk or its rights do not
     allow it; the files that were there before are then there again.
     """
     with contextlib.ExitStack() as held:
-        _publish(files, last, held)
+        _publish(files, last, still, held)
 
 
 def sweep(files: Iterable[Path]) -> None:
@@ -41,7 +44,9 @@ def sweep(files: Iterable[Path]) -> None:
             _sweep(there)
 
 
-def _publish(files: Mapping[Path, Content], last: Path | None, held: contextlib.ExitStack) -> None:
+def _publish(
+    files: Mapping[Path, Content], last: Path | None, still: Callable[[], None], held: contextlib.ExitStack
+) -> None:
     ready: dict[Path, Path] = {}
     spare: dict[Path, Path] = {}
     placed: list[Path] = []
@@ -55,6 +60,7 @@ def _publish(files: Mapping[Path, Content], last: Path | None, held: contextlib.
             _sweep(files)
         for at, content in files.items():
             ready[at] = _written_beside(at, content)
+        still()
         order = sorted(files, key=lambda path: path == last)
         # noted before it is done: an interrupt may come between the two
         for at in reversed(order):

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import ast
 import os
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from conftest import CELL
-from faults import there
+from faults import Child, once, stray, there
 
 import postproc
 from postproc.batch.jobs import Job
@@ -124,6 +125,25 @@ def test_every_input_that_changes_is_told_and_nothing_is_written(request_, job, 
     (told,) = refusal.value.findings
     assert (told.code, Path(told.file)) == ("FIL010", job.folder / name)
     assert set(there(job.folder)) == before
+
+
+def test_an_input_that_changes_while_the_results_are_written(job):
+    """At every request to the system: the results are those of what is there, or there are none."""
+    folder, before = job.output.parent, job.program.read_bytes()
+    codes = []
+    for at in range(1, 200, 3):
+        job.program.write_bytes(before)
+        shutil.rmtree(folder, ignore_errors=True)
+        child = Child([job.program, "--force"], folder, once(at, lambda: changing(job.program)("correcting")))
+        codes.append(child.end())
+        if codes[-1] == 1:
+            assert "FIL010" in child.said
+            assert there(folder) == {}
+            assert stray(folder) == []
+        if job.program.read_bytes() == before:
+            break
+    assert codes.count(1) > 3
+    assert codes[-1] == 0
 
 
 @pytest.mark.parametrize("name", ["part.src", "arm.urdf", "milling.yaml"])

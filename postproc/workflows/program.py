@@ -23,6 +23,7 @@ from postproc.compensation.task import Task
 from postproc.dialects.dialect import Moved, Program
 from postproc.document import Edits
 from postproc.findings import Finding, Refusal
+from postproc.inputs import place
 from postproc.publish import Content, publish
 from postproc.report.diff import unified_diff
 from postproc.report.files import corrections_csv
@@ -58,7 +59,7 @@ def predict(request: Request, stage: Stage = silent) -> Report:
         links = beside(shown, {"deflections (CSV)": names[0], "result (JSON)": pages[-1]})
         files[shown] = program_page(page_data(ready.task, result, report, ready.program.documents), links)
     ready.inputs.refuse_changed()
-    publish({**files, **dict.fromkeys(pages, json_bytes(report))})
+    publish({**files, **dict.fromkeys(pages, json_bytes(report))}, still=ready.inputs.refuse_changed)
     return report
 
 
@@ -141,7 +142,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         **dict.fromkeys(names[4:], json_bytes(report)),
     }
     ready.inputs.refuse_changed()
-    publish(files, last=target)
+    publish(files, target, ready.inputs.refuse_changed)  # writing takes its time as well
     return report
 
 
@@ -248,7 +249,7 @@ def _not_over_inputs(ready: Prepared, outputs: Sequence[str]) -> None:
     # a force may be a file, read in this run or not, or be said in numbers, which name none
     named = (cell.path.parent / said for said in (cell.force, cell.process) if said)
     ready.inputs.refuse_outputs(map(Path, outputs), named)
-    if len({Path(output).resolve() for output in outputs}) < len(outputs):
+    if len({place(Path(output)) for output in outputs}) < len(outputs):
         raise Refusal(Finding("FIL007", "two outputs have one name", outputs[0]))
 
 
