@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from test_mirror import CARRIES, FORCE, TOOL, Problem, full, program_angles, task
+from ways_at_work import FORCE as PUSH
 from ways_at_work import circle, corner, line
 from ways_at_work import task as at_points
 
@@ -20,6 +21,7 @@ from postproc.compensation.ways import begins
 from postproc.forces import Wrenches
 from postproc.geometry import Poses, rotation_from_vector
 from postproc.model import NOTHING
+from postproc.robot.track import follow
 from postproc.toolpath import Kind
 
 FREE = Limits(max_growth=100.0)
@@ -361,3 +363,20 @@ def test_what_may_be_inserted_is_and_where_most_is_left(growth):
 
 def test_limits_that_nobody_stated():
     assert Limits() == Limits(keep=False, min_segment=1e-3, max_growth=2.0)
+
+
+def test_a_posture_that_becomes_singular_is_told_at_its_line():
+    """A5 stands just outside of what counts as singular in all motions; one sense of the force leads the cut in."""
+    job = line()
+    q = np.radians([[a1, -60.0, 90.0, 0.0, 0.0, 0.0] for a1 in (-1.0, -1.0, 0.0, 0.0)])
+    q[:, 4] = np.arcsin(0.02) + 1e-5
+    wanted = job.model.chain.flange(q) @ job.tool[0:1]
+    path = replace(job.toolpath, position=wanted.position, rotation=wanted.rotation)
+    track = follow(job.model.robot, path, wanted @ job.tool[0:1].inverse(), q[0])
+    lines = []
+    for sense in (1, -1):
+        near = replace(line(wrench=sense * PUSH), wanted=wanted, toolpath=path, track=track)
+        result = correct(near)
+        found = limits(near, result, divide(near, result, Limits(keep=True)))[0]
+        lines += [finding.line for finding in found if finding.code == "KIN003"]
+    assert lines == [path.line[2]]
