@@ -141,7 +141,8 @@ CODES: dict[str, Code] = {
     "KRL020": Code(
         "warning",
         "jump",
-        "Past a label that a GOTO may reach, base, tool and position are not known until they are set again.",
+        "Past a label that a GOTO may reach, the position is not known until it is set again, nor are base and tool"
+        " where they change between the two.",
     ),
     "KRL021": Code(
         "warning",

@@ -31,14 +31,14 @@ class Calls(Blocks):
         begin = run.routine.begin if run.routine is not None else -1
         if (begin, name) not in self.doubts.labels:
             return
-        effects = {"point", "base", "tool", "feed", "apo", "mode", *run.survey.effects}
+        effects = {"point", *run.survey.on_the_way[begin, name]}
         run.forget(effects, f"after the label {shown(name)} in line {item.line}")
         mark = b"label %d " % begin + name
         run.rows.sources[mark] |= run.state.sources
         run.state.sources = frozenset([mark])
         run.tell(
             "KRL020",
-            f"a GOTO leads to {shown(name)}: base, tool and position are not known from here on",
+            f"a GOTO leads to {shown(name)}: the position is not known from here on, nor is what changes on the way",
             item,
         )
 

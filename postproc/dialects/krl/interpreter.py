@@ -13,6 +13,7 @@ from postproc.dialects.krl.calls import Restart
 from postproc.dialects.krl.data import Declarations, at_the_start, read_data
 from postproc.dialects.krl.finish import finished
 from postproc.dialects.krl.flow import Flow
+from postproc.dialects.krl.jumped import settle_jumps
 from postproc.dialects.krl.lexing import BOM, Statement, lines, module_name
 from postproc.dialects.krl.rows import HELP, Rows
 from postproc.dialects.krl.run import Item, Run
@@ -57,7 +58,9 @@ def read(
     """
     source = documents[0]
     code = list(scan(source, fast))
-    surveyed = survey((i, s if isinstance(s, Statement) else _MOTION) for i, s in enumerate(code))
+    surveyed = survey(_statements(code))
+    if surveyed.jumps:
+        settle_jumps(surveyed, _statements(code))
     declarations = Declarations()
     for file, document in enumerate(documents[1:], 1):
         read_data(declarations, document, file)
@@ -92,6 +95,11 @@ def read(
     )
 
 
+def _statements(code: Sequence[Item]) -> Iterator[tuple[int, Statement]]:
+    """Index and statement; what runs of common lines change, one motion does."""
+    return ((i, item if isinstance(item, Statement) else _MOTION) for i, item in enumerate(code))
+
+
 def _variables(declarations: Declarations, surveyed: Survey) -> Variables:
     fixed, changing = at_the_start(declarations, surveyed.assigned)
     variables = Variables(fixed)
@@ -104,7 +112,7 @@ def _variables(declarations: Declarations, surveyed: Survey) -> Variables:
 def _all_doubts(surveyed: Survey) -> Doubts:
     labels = {
         (routine.begin, name) for routine in surveyed.routine_at.values() for name in routine.labels
-    } & surveyed.jumps
+    } & surveyed.jumps.keys()
     return Doubts(set(), labels, plain=True)
 
 

@@ -81,7 +81,9 @@ class Survey:
     begin; ``assigned``: names that the program assigns as a whole, or with ``.X`` behind them a component of; ``read``:
     names that code reads, other than as the target of a motion; ``later``: names that run or change at a time of their
     own (interrupts, triggers); ``inline``: lines of motions in the fold of an inline form; ``jumps``: begin of the
-    routine and name of every label that a GOTO names; ``effects``: all that the program changes anywhere.
+    routine and name of every label that a GOTO names -> first and last index of these; ``effects``: all that the
+    program changes anywhere; ``blocks``: all of them; ``on_the_way``: the same labels -> what differs between the ways
+    that lead there.
     """
 
     events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
@@ -90,7 +92,9 @@ class Survey:
     assigned: set[bytes] = field(default_factory=set)
     read: set[bytes] = field(default_factory=set)
     later: set[bytes] = field(default_factory=set)
-    jumps: set[tuple[int, bytes]] = field(default_factory=set)
+    jumps: dict[tuple[int, bytes], tuple[int, int]] = field(default_factory=dict)
+    blocks: list[Block] = field(default_factory=list)
+    on_the_way: dict[tuple[int, bytes], Effects] = field(default_factory=dict)
     effects: Effects = field(default_factory=set)
     inline: set[int] = field(default_factory=set)
     unclosed: list[tuple[int, str]] = field(default_factory=list)
@@ -140,7 +144,8 @@ class _Surveyor:
             self._close(index, statement)
         elif kind == "goto":
             if self.routine is not None and isinstance(statement.said, bytes):
-                self.found.jumps.add((self.routine.begin, statement.said))
+                key = (self.routine.begin, statement.said)
+                self.found.jumps[key] = (self.found.jumps.get(key, (index, index))[0], index)
         elif kind == "exit":
             loop = next((block for block in reversed(stack) if block.word in LOOPS), None)
             if loop is not None:
@@ -280,6 +285,7 @@ def survey(statements: Iterable[tuple[int, Statement]]) -> Survey:
     if stack and isinstance(stack[0], Routine):
         found.unclosed.append((stack[0].line, "DEF has no END"))
     surveyor._close_all(index)
+    found.blocks = surveyor.blocks
     _settle(found, surveyor.blocks)
     for name in closure(found, found.later):
         effects = found.routines[name].effects
