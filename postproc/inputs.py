@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
 from collections.abc import Iterable, Iterator
 from contextvars import ContextVar
 from pathlib import Path
@@ -42,14 +43,19 @@ class Inputs:
 
     def refuse_outputs(self, outputs: Iterable[Path], named: Iterable[Path] = ()) -> None:
         """Refusal FIL007 for every output that is one of these files, or of those that are ``named`` and not read."""
-        inputs = {path.resolve() for path in (*self.digests, *named)}
+        inputs = {place(path) for path in (*self.digests, *named)}
         findings = [
             Finding("FIL007", "this output is an input of the same run", str(path))
             for path in outputs
-            if path.resolve() in inputs
+            if place(path) in inputs
         ]
         if findings:
             raise Refusal(*findings)
+
+
+def place(path: Path) -> Path:
+    """Where a path leads, to be compared with others; a link that leads to itself is its own place."""
+    return Path(os.path.realpath(path))
 
 
 @contextlib.contextmanager

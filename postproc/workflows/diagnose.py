@@ -23,6 +23,7 @@ from postproc.identification.outliers import Outlier, outliers
 from postproc.identification.suspicion import check_fit, check_numbers
 from postproc.identification.unknowns import Unknown
 from postproc.identification.validation import held_out
+from postproc.inputs import place
 from postproc.measurements import Readings, measurements_csv
 from postproc.model import STANDARD_GRAVITY, approach
 from postproc.publish import publish
@@ -139,15 +140,15 @@ def _wild(final: Fit) -> tuple[Outlier, ...]:
 
 
 def _spare_inputs(request: DiagnoseRequest) -> None:
-    inputs = {path.resolve() for path in request.data}
+    inputs = {place(path) for path in request.data}
     if request.robot and request.robot.endswith((".yaml", ".yml")):
-        inputs.add(Path(request.robot).resolve())
+        inputs.add(place(Path(request.robot)))
     ways = (request.output, request.next_poses, request.json, request.csv, request.picture, request.page)
     written = [path for path in ways if path is not None]
     for path in written:
-        if path.resolve() in inputs:
+        if place(path) in inputs:
             raise Refusal(Finding("FIL007", "would replace an input", str(path)))
-    if len({path.resolve() for path in written}) < len(written):
+    if len({place(path) for path in written}) < len(written):
         raise Refusal(Finding("FIL007", "two results have the same name", str(written[0])))
 
 
@@ -251,7 +252,7 @@ def _published(request: DiagnoseRequest, measured: Measured, result: Diagnosed, 
     if plan is None and request.output is not None:
         plan = request.output.with_name(request.output.stem + ".next_poses.csv")
     if result.next_poses is not None and plan is not None:
-        if plan.resolve() in {path.resolve() for path in request.data}:  # an earlier plan, filled in
+        if place(plan) in {place(path) for path in request.data}:  # an earlier plan, filled in
             raise Refusal(
                 Finding("FIL007", "would replace an input", str(plan), help="say --next-poses FILE.csv")
             )

@@ -18,6 +18,7 @@ from postproc.identification.outliers import Outlier, outliers
 from postproc.identification.suspicion import check_fit, check_numbers
 from postproc.identification.unknowns import Asked, asked_for
 from postproc.identification.validation import WIDER, Bootstrap, Validation, bootstrap, held_out, validated
+from postproc.inputs import place
 from postproc.measurements import Readings, joined, read_measurements, robot_named
 from postproc.model import StiffnessModel
 from postproc.publish import publish
@@ -197,22 +198,22 @@ def _known(named: str, path: Path) -> str:
 
 
 def _spare_inputs(request: IdentifyRequest) -> None:
-    inputs = {path.resolve() for path in (*request.data, *request.validate)}
+    inputs = {place(path) for path in (*request.data, *request.validate)}
     if request.robot and request.robot.endswith((".yaml", ".yml")):
-        inputs.add(Path(request.robot).resolve())
+        inputs.add(place(Path(request.robot)))
     written = [
         p for p in (request.output, request.json, request.csv, request.picture, request.page) if p is not None
     ]
     for path in written:
-        if path.resolve() in inputs:
+        if place(path) in inputs:
             raise Refusal(Finding("FIL007", "would replace an input", str(path)))
-    if len({path.resolve() for path in written}) < len(written):
+    if len({place(path) for path in written}) < len(written):
         raise Refusal(Finding("FIL007", "two results have the same name", str(written[0])))
 
 
 def _spare(output: Path | None, robot: Path) -> None:
     """Robots that are named and not given as a path are inputs too."""
-    if output is not None and output.resolve() == robot.resolve():
+    if output is not None and place(output) == place(robot):
         raise Refusal(Finding("FIL007", "would replace the robot file that was read", str(output)))
 
 

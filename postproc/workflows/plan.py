@@ -22,6 +22,7 @@ from postproc.experiments.tour import tour
 from postproc.findings import Finding, Refusal, nearest
 from postproc.geometry import Poses
 from postproc.identification.unknowns import Unknown, asked_for
+from postproc.inputs import place
 from postproc.measurements import Readings, measurements_csv
 from postproc.model import StiffnessModel
 from postproc.publish import publish
@@ -221,11 +222,11 @@ def _findings(robot: Robot, found: Designs) -> list[Finding]:
 
 
 def _spare_inputs(request: PlanRequest) -> None:
-    inputs = {path.resolve() for path in request.measured}
-    inputs |= {path.resolve() for path in (request.program, request.cell) if path is not None}
+    inputs = {place(path) for path in request.measured}
+    inputs |= {place(path) for path in (request.program, request.cell) if path is not None}
     written = [path for path in (request.output, request.json) if path is not None]
     for path in written:
-        if path.resolve() in inputs:
+        if place(path) in inputs:
             raise Refusal(Finding("FIL007", "would replace an input", str(path)))
 
 
