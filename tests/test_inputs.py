@@ -275,3 +275,14 @@ def test_whatever_is_read_is_noted():
                 if called in READERS:
                     found.append(f"{name}:{node.lineno} {called}")
     assert found == []
+
+
+@pytest.mark.parametrize("words", [("-o", "loop.src"), ("-o", "out.src", "--json", "loop.src")])
+def test_a_link_that_leads_to_itself_is_replaced(compensate, job, words):
+    """It is no input, and it is nothing else."""
+    loop = job.folder / "loop.src"
+    loop.symlink_to("loop.src")
+    done = compensate(job.program, "--force", *(job.folder / w if w.endswith("src") else w for w in words))
+    assert done.code == 0, done.err
+    assert loop.is_file()
+    assert not loop.is_symlink()
