@@ -12,7 +12,7 @@ import numpy as np
 
 from postproc import __version__
 from postproc.arrays import Floats, Ints
-from postproc.blocks import each_block
+from postproc.blocks import each_block, give_back
 from postproc.cell import Cell
 from postproc.compensation.between import errors_between
 from postproc.compensation.correct import Result, with_residual
@@ -111,10 +111,12 @@ def write(
     contents = _contents(documents, edits)
     again = _read_back(documents, contents, dialect, settings)
     back = completed(again.toolpath)
+    give_back()
     hold(task, result, division, program, again, back, writing)
     there = _as_written(task, division, back)
     written = with_residual(task, result, there.own_command)
     hold_residual(task, result, written, there, writing, documents[0].path.name)
+    give_back()
     between = way_errors(task, result, there)
     if task.gain == 1.0:
         return Written(edits, contents, written, there, between, written.after, written.after_angle, between)

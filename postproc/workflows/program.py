@@ -142,6 +142,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         **dict.fromkeys(names[4:], json_bytes(report)),
     }
     ready.inputs.refuse_changed()
+    give_back()
     publish(files, target, ready.inputs.refuse_changed)  # writing takes its time as well
     return report
 
@@ -157,6 +158,7 @@ def _corrected(request: Request, ready: Prepared, stem: str) -> tuple[Task, Resu
         division = divide(task, result, allowed)
         give_back()
         told, beyond = limits(task, result, division)
+        give_back()
         division = replace(division, findings=(*division.findings, *told))
         moved = Moved((), {**beyond, **division.held})
         if not moved.held:
