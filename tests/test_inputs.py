@@ -277,12 +277,12 @@ def test_whatever_is_read_is_noted():
     assert found == []
 
 
-@pytest.mark.parametrize("words", [("-o", "loop.src"), ("-o", "out.src", "--json", "loop.src")])
-def test_a_link_that_leads_to_itself_is_replaced(compensate, job, words):
+@pytest.mark.parametrize(("option", "name"), [("-o", "loop.src"), ("--json", "loop.json")])
+def test_a_link_that_leads_to_itself_is_replaced(compensate, job, option, name):
     """It is no input, and it is nothing else."""
-    loop = job.folder / "loop.src"
-    loop.symlink_to("loop.src")
-    done = compensate(job.program, "--force", *(job.folder / w if w.endswith("src") else w for w in words))
+    loop = job.folder / name
+    loop.symlink_to(name)
+    done = compensate(job.program, "--force", option, loop)
     assert done.code == 0, done.err
     assert loop.is_file()
     assert not loop.is_symlink()
