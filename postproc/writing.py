@@ -115,6 +115,7 @@ def write(
     hold(task, result, division, program, again, back, writing)
     there = _as_written(task, division, back)
     written = with_residual(task, result, there.own_command)
+    give_back()
     hold_residual(task, result, written, there, writing, documents[0].path.name)
     give_back()
     between = way_errors(task, result, there)
