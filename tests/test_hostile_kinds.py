@@ -101,7 +101,6 @@ def test_what_is_looked_for_and_is_no_file_is_not_there(compensate, shop, name, 
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.xfail(reason="such a link is a defect where paths are compared", strict=False)
 def test_a_link_that_leads_to_itself(compensate, shop, kind):
     name, words = KINDS[kind]
     (shop.folder / name).unlink(missing_ok=True)
@@ -121,7 +120,6 @@ def test_a_link_that_leads_to_itself(compensate, shop, kind):
         ["-o", "loop.src", "--dry-run"],
     ],
 )
-@pytest.mark.xfail(reason="such a link is a defect where paths are compared", strict=False)
 def test_an_output_that_is_a_link_to_itself(compensate, shop, words):
     for name in ("loop.src", "loop", "loop.json"):
         (shop.folder / name).symlink_to(name)
