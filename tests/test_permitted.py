@@ -170,7 +170,7 @@ def test_blocks_keep_what_is_no_coordinate(name, raw):
 def test_one_wrong_edit_among_many_is_found():
     """In whichever block of edits it is, and the first of several is told."""
     lines = b"".join(
-        b"LIN {X %d.0,Y 2.0,Z 3.0,A 0.0,B 0.0,C 0.0,E1 %d}\n" % (k, k % 10) for k in range(30_000)
+        b"LIN {X %d.0,Y 2.0,Z 3.0,A 0.0,B 0.0,C 0.0,E1 %d}\n" % (k, k % 10) for k in range(40_000)
     )
     raw = b"DEF part()\n" + lines + b"END\n"
     made, edits, at = program(raw, "krl"), [], 0
@@ -178,7 +178,7 @@ def test_one_wrong_edit_among_many_is_found():
         edits.append(Edit(Span(0, at, at + 3), b"2.25"))
     letters = DIALECTS["krl"].letters
     refuse_other(made, Edits.joined(edits), letters)
-    for wrong in (1, 29_000):
+    for wrong in (1, 39_000):
         at = raw.index(b"E1", raw.index(b"{X %d.0" % wrong)) + 3
         more = [Edit(Span(0, at, at + 1), b"7"), Edit(Span(0, len(raw) - 4, len(raw) - 1), b"")]
         with pytest.raises(Refusal) as refusal:
