@@ -127,7 +127,7 @@ def test_a_base_that_is_known_is_that_of_every_way(body: list[str]) -> None:
     path, possible = read(body).toolpath, bases(body, blocks(body))
     for at, some in possible.items():
         rows = np.flatnonzero(path.line == at + 1 + len(HEAD))
-        if path.refused.keys().isdisjoint(rows.tolist()):
+        if (path.base[rows] >= 0).all():
             assert some <= {path.frames[path.base[row]].number for row in rows}, "\n".join(body)
 
 
@@ -150,4 +150,4 @@ def test_a_base_that_is_known_is_that_of_every_way(body: list[str]) -> None:
 def test_a_label_forgets_what_changes_on_the_way_to_it(body: list[str], kept: bool) -> None:
     path = read(body).toolpath
     last = len(HEAD) + len(body) - body[::-1].index(FULL)
-    assert (path.line.tolist().index(last) not in path.refused) == kept
+    assert (path.base[path.line.tolist().index(last)] >= 0) == kept

@@ -160,7 +160,7 @@ def test_the_two_ways_agree_on_lines_that_are_nearly_common(changes: list[tuple[
     for at, letter in changes:
         text = text[:at] + letter + text[at:]
     run = 10 * COMMON + text + 9 * COMMENTED
-    same((Document(Path("part.src"), f"DEF part()\n{FRAMES}{FULL}{run}END\n".encode()),))
+    same((Document(Path("part.src"), f"DEF part()\n{FRAMES}$APO.CDIS=7.5\n{FULL}{run}END\n".encode()),))
 
 
 @settings(deadline=None, max_examples=150)

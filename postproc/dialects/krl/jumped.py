@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 
 from postproc.dialects.krl.effects import Effects, effects_of, functions_of, is_harmless
 from postproc.dialects.krl.lexing import Statement, identifiers
 from postproc.dialects.krl.survey import Routine, Survey
 
-MOST_PAIRS = 200_000
-"""Stretches times blocks of a routine that are compared; with more, a label forgets all that the program changes."""
+MOST_PAIRS = 50_000
+"""Stretches times branches of a routine that are compared; with more, a label forgets all that the program changes."""
 
 Stretch = tuple[int, int]
 """First and last index of statements."""
@@ -25,7 +26,10 @@ def settle_jumps(found: Survey, statements: Iterable[tuple[int, Statement]]) -> 
     stretches: dict[tuple[int, bytes], Stretch] = {}
     for routine in found.routine_at.values():
         inner = [
-            (block.begin, block.end) for block in found.blocks if routine.begin < block.begin <= routine.end
+            branch
+            for block in found.blocks
+            if routine.begin < block.begin <= routine.end
+            for branch in pairwise((block.begin, *block.branches, block.end))
         ]
         own = {
             name: (min(at, *found.jumps[key]), max(at, *found.jumps[key]))
@@ -53,12 +57,12 @@ def settle_jumps(found: Survey, statements: Iterable[tuple[int, Statement]]) -> 
                     block.effects |= {"point", *found.on_the_way[key]}
 
 
-def _grown(stretches: list[Stretch], blocks: Sequence[Stretch]) -> list[Stretch]:
-    """Stretches with the blocks that they cut; those that overlap as one."""
+def _grown(stretches: list[Stretch], branches: Sequence[Stretch]) -> list[Stretch]:
+    """Stretches with the branches of blocks that they cut; those that overlap as one."""
     while True:
         grown: list[Stretch] = []
         for low, high in sorted(stretches):
-            for begin, end in blocks:
+            for begin, end in branches:
                 if begin < low <= end <= high or low <= begin <= high < end:
                     low, high = min(low, begin), max(high, end)
             if grown and low <= grown[-1][1]:
