@@ -1,6 +1,7 @@
 """G-code is read and written part by part: where the parts are cut changes nothing, and what a program has nowhere
 takes no room."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from postproc.dialects.gcode.force import Rows, everywhere, in_force
 from postproc.dialects.gcode.source import scan
 from postproc.dialects.gcode.tables import LINUXCNC
 from postproc.document import Document, apply
-from postproc.toolpath import Toolpath
+from postproc.toolpath import Plan, Toolpath
 
 PROGRAMS = Path(__file__).parent / "programs"
 COLUMNS = (
@@ -75,7 +76,17 @@ G91 G1 X1 Y1
 G1 Y-2.5
 G3 X5 Y5 R5
 X1
-G90 X40 Y10
+G90 G1 X40 Y10
+X30
+G3 I-5 J0
+G2 X30 Y10 I5 J2
+G1 Y12
+G1 X31
+G53 G0 Z1
+G0 Z2
+G1 X#1 Z1
+Y8
+X30 Y9
 G92 X0
 G1 X1 Y2
 Y3
@@ -99,6 +110,21 @@ def test_parts_are_written_as_the_whole(seed: int, monkeypatch: pytest.MonkeyPat
     for rows in (1, 2, 5):
         monkeypatch.setattr(writer, "ROWS", rows)
         assert apply(program.documents[0], dialect.moved(program, plan, WRITING).edits) == written
+
+
+def test_a_circle_closes_where_the_part_before_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    dialect = next(one for one in DIALECTS if one.name == "linuxcnc")
+    program = read(
+        dialect, "G21 G90 G17 G54 T1\nG0 X0 Y0 Z5\nG1 X10.00000 Y0 F50\nG3 X10. Y0.0 I-10 J0\nM2\n"
+    )
+    plan = Plan.of(program.toolpath)
+    shift = np.array([1.2345e-4, 4e-7, 0])
+    position, centre = plan.position + shift * [[0], [1], [1]], plan.centre + shift * [0, 1, 0]
+    plan = replace(plan, position=position, centre=centre)
+    for rows in (1, 2, 9):
+        monkeypatch.setattr(writer, "ROWS", rows)
+        written = apply(program.documents[0], dialect.moved(program, plan, WRITING).edits)
+        assert b"G1 X10.12345 Y0 F50\nG3 X10.12345 " in written
 
 
 def test_words_of_a_part_are_those_of_the_whole(whole: dict[Path, Program]) -> None:
