@@ -57,6 +57,12 @@ def test_bounds_are_round_and_even_about_the_null(name, arm):
         assert digits_of(p.upper)[0] in (1, 2, 5), p
 
 
+def test_a_foundation_may_give_way_ten_times_more_in_turns():
+    """1e-5 m/N and 1e-4 rad/(N m): the bounds of what a robot file may say."""
+    for p in made("base_compliance", kr270().joints).parameters:
+        assert p.upper == {"m/N": 1e-5, "rad/(N m)": 1e-4}[p.unit]
+
+
 @arms
 @names
 def test_sizes_are_round_and_within_the_bounds(name, arm):

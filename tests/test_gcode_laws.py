@@ -257,3 +257,17 @@ def test_angles_change_where_others_are_nearer(words: str, share: float) -> None
         # The tool may spin: two of the three angles say where it points.
         apart = np.linalg.norm(np.cross(again[-2:, :, 2], rotation[-2:, :, 2]), axis=1)
         assert apart.max() <= 2 * 0.5001 * step
+
+
+@pytest.mark.parametrize("code", ["G52", "G92"])
+@pytest.mark.parametrize(("unit", "whole"), [("G21", "X1000 Y-2500"), ("G20", "X10000 Y-25000")])
+def test_shifts_count_increments_too(code: str, unit: str, whole: str) -> None:
+    """A control that takes X1000 for a millimetre does so wherever it says a length."""
+    micro = Settings(orientation=DOWN.orientation, integer_words="um")
+    ends = []
+    for said in (whole, "X1. Y-2.5"):
+        text = f"{unit} G90 G17 G54 T1\nG0 X0. Y0. Z0.\n{code} {said}\nG1 X4. Y5. Z6. F100\n"
+        ends.append(read(NAMES["fanuc"], text, micro).toolpath.position)
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-12)
+    text = f"{unit} G90 G17 G54 T1\nG0 X0. Y0. Z0.\nG1 X4. Y5. Z6. F100\n"
+    assert np.abs(ends[0][-1] - read(NAMES["fanuc"], text, micro).toolpath.position[-1]).max() > 0.5 * MM
