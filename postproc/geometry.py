@@ -6,6 +6,7 @@ any leading shape and work without a loop over it.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -83,6 +84,22 @@ class PoseRows:
 
     def __len__(self) -> int:
         return self.count
+
+    def remembered(self) -> PoseRows:
+        """The same, which in each thread remembers the last rows that it was asked for: those of a block are asked for
+        again and again."""
+        last = threading.local()
+
+        def made(rows: Ints) -> Poses:
+            if getattr(last, "rows", None) is not rows:
+                poses = self.made(rows)
+                for array in (poses.rotation, poses.position):
+                    array.setflags(write=False)
+                last.rows, last.poses = rows, poses
+            found: Poses = last.poses
+            return found
+
+        return PoseRows(self.count, made)
 
     @property
     def position(self) -> Floats:

@@ -259,14 +259,12 @@ class _Found:
 def _held(task: Task, scope: Bools, tried: Bools, findings: list[Finding]) -> dict[int, Finding]:
     """Motions that can not be corrected as they are programmed, and why; Refusal where the input must be wrong."""
     path, track, n = task.toolpath, task.track, len(task.toolpath)
-    why: dict[int, Finding] = {}
-    for row in np.flatnonzero(tried):
-        stop = path.refused.get(int(row)) or path.pinned.get(int(row))
-        if stop is not None:
-            why[int(row)] = stop
     cartesian = path.known & ~path.on_axes
-    for row in np.flatnonzero(tried & ~cartesian):
-        why.setdefault(int(row), _at(task, int(row), "COR003", "its target is not known"))
+    lost = np.flatnonzero(tried & ~cartesian)
+    unknown = _at(task, int(lost[0]), "COR003", "its target is not known") if len(lost) else None
+    why = {row: unknown for row in lost.tolist() if unknown}
+    for stops in (path.pinned, path.refused):
+        why.update({row: stop for row, stop in stops.items() if tried[row]})
     free = tried & cartesian & ~_in(why, n)
     _refuse(
         task,

@@ -34,7 +34,7 @@ class Ways:
     def of(path: Toolpath, wanted: Placed, base: Poses, tool: Poses, robot: Robot, track: Track) -> Ways:
         """``wanted`` (N): targets in the robot base; ``base``, ``tool`` (N): frames of each motion."""
         n = len(path)
-        begin = begins(wanted, path, tool, robot, track)
+        begin = begins(wanted, path, tool, robot, track).remembered()
         known = ((path.kind == Kind.LIN) | (path.kind == Kind.CIRC)) & path.known
         length = np.zeros(n)
         ways = Ways(path, begin, wanted, base, known, length)

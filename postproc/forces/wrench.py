@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -65,12 +66,12 @@ class Wrenches:
     def __len__(self) -> int:
         return len(self.values)
 
-    @property
+    @cached_property
     def any(self) -> bool:
         """Whether any motion carries force."""
         return bool(np.any(self.carries))
 
-    @property
+    @cached_property
     def max_force(self) -> float:
         """The largest force [N] at either end of any motion."""
         if not self.any:

@@ -169,7 +169,7 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     _missing_points(program, force)
     _missing_orientation(request, path, force, cell)
     base, tool = frames.base_in_robot, frames.tool_in_flange
-    wanted = PoseRows(len(path), lambda rows: base.shared(rows) @ path.target_in_base[rows])
+    wanted = PoseRows(len(path), lambda rows: base.shared(rows) @ path.target_in_base[rows]).remembered()
     flange = PoseRows(len(path), lambda rows: wanted[rows] @ tool.shared(rows).inverse())
     track = follow(robot, path, flange, _start(cell, robot))
     task = Task(
