@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -86,3 +87,17 @@ class FewRows:
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.asarray(self[:], dtype)
+
+
+class LazyRows:
+    """An array (N, ...) of which parts are made where they are asked for; read-only, and indexed by rows only."""
+
+    def __init__(self, count: int, made: Callable[[Ints], Floats]) -> None:
+        self._count, self._made = count, made
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, rows: Any) -> Floats:
+        """As of an array, by rows: numbers from 0, a mask or a slice."""
+        return self._made(numbers(rows, self._count))

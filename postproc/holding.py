@@ -30,7 +30,7 @@ MARK = "COMPENSATED by compensate "
 BOM = b"\xef\xbb\xbf"
 
 
-def meant(task: Task, division: Division, moved: Bools, rows: slice) -> Plan:
+def meant(task: Task, division: Division, moved: Bools, rows: Ints | slice) -> Plan:
     """Some motions of a division in the programmed bases; those that are not ``moved`` (M,) as the program has them."""
     path, source, moved = task.toolpath, division.source[rows], moved[rows]
     to_base = task.base.shared(source).inverse()
@@ -191,13 +191,13 @@ def _hold_texts(path: Toolpath, back: Toolpath, plan: Plan, rows: slice, file: s
 def _hold_targets(
     path: Toolpath, back: Toolpath, plan: Plan, rows: slice, writing: Writing, file: str
 ) -> None:
-    for found, wanted in ((back.position[rows], plan.position), (back.rotation[rows], plan.rotation)):
+    for found, wanted in ((back.position[rows], plan.position[:]), (back.rotation[rows], plan.rotation[:])):
         if not np.array_equal(np.isfinite(found), np.isfinite(wanted)):
             raise Refusal(Finding("FIL008", "targets were lost or appeared", file))
     # Half a written step a coordinate; three angles add up.
     step_mm, step_deg = 10.0**-writing.mm, 10.0**-writing.deg
-    off = np.abs(back.position[rows] - plan.position).max(axis=1) / MM
-    angle = _angle(plan.rotation, back.rotation[rows], path.free_axis[plan.source]) / DEG
+    off = np.abs(back.position[rows] - plan.position[:]).max(axis=1) / MM
+    angle = _angle(plan.rotation[:], back.rotation[rows], path.free_axis[plan.source]) / DEG
     _close(off > HALF * step_mm, off, path, plan.source, file, "mm from what was meant")
     _close(angle > 3 * HALF * step_deg, angle, path, plan.source, file, "deg from what was meant")
 

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, FewRows, Floats, Ints, frozen, shared
+from postproc.arrays import Bools, FewRows, Floats, Ints, LazyRows, frozen, shared
 from postproc.findings import Finding
 from postproc.geometry import Placed, Poses, abc_from_rotation, rotation_from_abc
 from postproc.units import DEG, MM
@@ -238,14 +238,15 @@ class Plan:
     """The motions that an output has to make, M >= N, all in the programmed base of their source.
 
     source (M,): row of the input, ascending; each has one OWN, last of its group.  role (M,) Role.
-    position (M, 3) [m], rotation (M, 3, 3): targets, NaN where the input's is not known.
+    position (M, 3) [m], rotation (M, 3, 3): targets, NaN where the input's is not known; a dialect asks for those of
+    some rows at a time.
     centre, normal (M, 3), sweep (M,): way of arcs, as in a Toolpath; NaN for all others.
     """
 
     source: Ints
     role: Ints
-    position: Floats
-    rotation: Floats
+    position: Floats | LazyRows
+    rotation: Floats | LazyRows
     centre: Floats
     normal: Floats
     sweep: Floats
@@ -260,7 +261,9 @@ class Plan:
             "sweep": (m,),
         }
         for name, shape in shapes.items():
-            object.__setattr__(self, name, frozen(getattr(self, name), shape))
+            values = getattr(self, name)
+            if not isinstance(values, LazyRows):
+                object.__setattr__(self, name, frozen(values, shape))
         for name, dtype in (("source", np.int32), ("role", np.int8)):
             object.__setattr__(self, name, frozen(getattr(self, name), (m,), dtype))
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc import __version__
-from postproc.arrays import Floats, Ints
+from postproc.arrays import Floats, Ints, LazyRows
 from postproc.blocks import each_block, give_back
 from postproc.cell import Cell
 from postproc.compensation.between import errors_between
@@ -51,21 +51,33 @@ class Written:
 def planned(task: Task, division: Division) -> Plan:
     """A division in the programmed bases: what a dialect is to write."""
     m = len(division)
-    position, rotation = np.empty((m, 3)), np.empty((m, 3, 3))
-    arcs = bool(np.isfinite(division.sweep).any() or np.isfinite(task.toolpath.sweep).any())
-    none = np.broadcast_to(np.nan, (m, 3))
-    centre, normal, sweep = (np.array(way) if arcs else way for way in (none, none, none[:, 0]))
 
-    def put(rows: slice) -> None:
+    def made(rows: Ints) -> Poses:
         part = meant(task, division, division.moved, rows)
-        position[rows], rotation[rows] = part.position, part.rotation
-        if arcs:
+        return Poses(part.rotation[:], part.position[:])
+
+    target = PoseRows(m, made).remembered()
+    none = np.broadcast_to(np.nan, (m, 3))
+    centre, normal, sweep = none, none, none[:, 0]
+    if np.isfinite(division.sweep).any() or np.isfinite(task.toolpath.sweep).any():
+        centre, normal, sweep = np.empty((m, 3)), np.empty((m, 3)), np.empty(m)
+
+        def put(rows: slice) -> None:
+            part = meant(task, division, division.moved, rows)
             centre[rows], normal[rows], sweep[rows] = part.centre, part.normal, part.sweep
 
-    each_block(put, m)
-    for array in (position, rotation, centre, normal, sweep):
-        array.setflags(write=False)
-    return Plan(division.source, division.role, position, rotation, centre, normal, sweep)
+        each_block(put, m)
+        for array in (centre, normal, sweep):
+            array.setflags(write=False)
+    return Plan(
+        division.source,
+        division.role,
+        LazyRows(m, lambda rows: target[rows].position),
+        LazyRows(m, lambda rows: target[rows].rotation),
+        centre,
+        normal,
+        sweep,
+    )
 
 
 def written_as(cell: Cell, own_points: str) -> Writing:

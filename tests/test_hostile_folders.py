@@ -28,7 +28,6 @@ def untouched(outside) -> bool:
     return there(outside) == {"p0.src": b"precious"} and [p.name for p in outside.iterdir()] == ["p0.src"]
 
 
-@pytest.mark.xfail(reason="the folder of results of one program is followed", strict=False)
 def test_results_of_a_program_do_not_follow_a_folder(compensate, shop):
     folder, outside = shop
     (folder / "compensated").symlink_to(outside)

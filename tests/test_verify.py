@@ -31,8 +31,8 @@ def as_run(task, limits=None, gain=1.0):
     kind = np.where(division.links, Kind.LIN, old.kind[plan.source])
     path = Toolpath(
         kind=kind,
-        position=plan.position,
-        rotation=plan.rotation,
+        position=plan.position[:],
+        rotation=plan.rotation[:],
         axes=old.axes[plan.source],
         feed=old.feed[plan.source],
         base=old.base[plan.source],

@@ -232,7 +232,17 @@ def _closing(request: Request, ready: Prepared, written: Written) -> list[Findin
 def _target(request: Request) -> Path:
     """Where the compensated program goes; a name without a suffix is a folder."""
     if request.output is None:
-        return request.program.parent / "compensated" / request.program.name
+        folder = request.program.parent / "compensated"
+        if folder.is_symlink():
+            raise Refusal(
+                Finding(
+                    "FIL004",
+                    "this folder is a link, which is not followed unasked",
+                    str(folder),
+                    help="name the folder with -o if it is meant",
+                )
+            )
+        return folder / request.program.name
     if request.output.is_dir() or (request.program.suffix and not request.output.suffix):
         return request.output / request.program.name
     return request.output
