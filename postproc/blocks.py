@@ -23,6 +23,9 @@ ROWS = 1 << 13
 THREADS = "POSTPROC_THREADS"
 """Environment variable: threads at most; all cores without it."""
 
+LARGE = 1 << 22
+"""Bytes of an array that is no block's."""
+
 MOST = 8
 """Threads at most: what is not numpy's runs in one of them at a time."""
 
@@ -82,7 +85,17 @@ def each_block(work: Callable[[slice], None], count: int, rows: int = ROWS) -> N
 
 def give_back() -> None:
     """Free memory goes back to the system: the C library (glibc) keeps what lies between blocks that are in use."""
-    if sys.platform == "linux":
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-        if trim is not None:
-            trim(0)
+    _allocator("malloc_trim", 0)
+
+
+def large_apart() -> None:
+    """From now on arrays of more than ``LARGE`` bytes lie apart, and go back to the system as soon as they are free."""
+    m_mmap_threshold = -3
+    _allocator("mallopt", m_mmap_threshold, LARGE)
+
+
+def _allocator(name: str, *arguments: int) -> None:
+    """Calls a function of glibc's allocator; nothing where there is none."""
+    function = getattr(ctypes.CDLL(None), name, None) if sys.platform == "linux" else None
+    if function is not None:
+        function(*arguments)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import click
 
 from postproc import __version__
+from postproc.blocks import large_apart
 from postproc.cli.batch import batch
 from postproc.cli.check import check
 from postproc.cli.completion import Commands, completion
@@ -68,6 +69,7 @@ def run(argv: Sequence[str] | None = None) -> None:
     words = list(sys.argv[1:] if argv is None else argv)
     # the matrices here are small: threads for them cost more than they give, and runs beside each other fight
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    large_apart()
     for stream in (sys.stdout, sys.stderr):
         # A name or a comment that the terminal can not show is no reason to stop.
         if isinstance(stream, io.TextIOWrapper):
