@@ -23,7 +23,7 @@ ROWS = 1 << 13
 THREADS = "POSTPROC_THREADS"
 """Environment variable: threads at most; all cores without it."""
 
-LARGE = 1 << 22
+LARGE = 1 << 24
 """Bytes of an array that is no block's."""
 
 MOST = 8
