@@ -489,3 +489,24 @@ def test_what_rapids_are() -> None:
 def test_an_offset_that_no_control_has_is_not_known(number: str) -> None:
     program = read(f"G21 G90 G17 T1 M6\nG54.1 P{number}\nG0 X0. Y0. Z0.\nG1 X1. F100\n", "fanuc")
     assert set(codes(program)) >= {1}
+
+
+HOLDS, LOST, FOREIGN = ("", 1), ("GCO014", -1), ("GCO010", 1)
+BLOCKS_OF_113 = [
+    ("G110", LOST), ("G111", LOST), ("G113", LOST), ("G129", LOST), ("G13.1", HOLDS), ("G113 G54", HOLDS),
+    ("G112", FOREIGN), ("G112\nG113", HOLDS), ("G12.1\nG1 X5.\nG113", HOLDS), ("G112\nG113\nG113", LOST),
+    ("G112\nG49\nG113", HOLDS), ("G112\nG13.1\nG113", LOST), ("G113\nG112", ("GCO010", -1)), ("G113\nG54", HOLDS),
+    ("/G112\nG113", ("GCO010", -1)), ("/G113", LOST), ("G113\nG112\nG113", LOST),
+]  # fmt: skip
+"""A block, and what is told of the motion behind it and of its base."""
+
+
+@pytest.mark.parametrize(("text", "result"), BLOCKS_OF_113)
+def test_g113_is_an_offset_where_no_polar_mode_is_in_force(text: str, result: tuple[str, int]) -> None:
+    """Then the base of the motions behind it is not known, as behind G110."""
+    program = body(f"G54 G1 X1.\n{text}\nG1 X2.\nX3. Y0. Z0.\n", "fanuc")
+    code, base = result
+    path = program.toolpath
+    assert codes(program).get(len(path) - 1, "") == code
+    assert (path.frames[path.base[-1]].number if path.base[-1] >= 0 else -1) == base
+    assert codes(program).get(1) is None

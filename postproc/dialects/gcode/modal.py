@@ -129,6 +129,7 @@ def modal(source: Source, control: Control) -> Modal:
 
     flow = follow(source, control, once)
     groups, values = _offsets(source, number, groups, values, blocks)
+    groups, values = _polar_or_offset(flow, number, groups, values, blocks)
     start = {**_START, **control.start}
     force: dict[Group, Ints] = {}
     for one in Group:
@@ -206,6 +207,19 @@ def _offsets(source: Source, number: Ints, groups: Ints, values: Ints, blocks: I
         if selecting.any():
             groups = np.where(selecting, np.int8(Group.OFFSET), groups)
             values = np.where(groups == Group.OFFSET, np.int32(UNKNOWN), values)
+    return groups, values
+
+
+def _polar_or_offset(flow: Flow, number: Ints, groups: Ints, values: Ints, blocks: Ints) -> tuple[Ints, Ints]:
+    """Groups and values where G113 ends a mode only if one is in force; else it is an offset of a Haas, as G110 is."""
+    polar = groups == Group.FOREIGN
+    ending = (number == 1130) & polar
+    if ending.any():
+        force = _Fill(flow, 0, Group.FOREIGN)(blocks[polar], values[polar])
+        before = np.append(np.zeros(1, force.dtype), force)[blocks]  # in the block ahead
+        ending &= before != 1
+        groups = np.where(ending, np.int8(Group.OFFSET), groups)
+        values = np.where(ending, np.int32(UNKNOWN), values)
     return groups, values
 
 

@@ -131,7 +131,7 @@ FANUC = Control(
             (Group.LENGTHS, 1, (43.1, 43.2, 43.3, 43.7, 44, 45, 46, 47, 48)),
             *((Group.OFFSET, 101 + n, (110 + n,)) for n in range(20)),
             (Group.FOREIGN, 1, (7.1, 107, 112, 12.1)),
-            (Group.FOREIGN, 0, (113, 13.1)),
+            (Group.FOREIGN, 0, (113, 13.1)),  # G113 only where such a mode is in force, see modal
         ),
     },
     frame=offsets.two_shifts,
