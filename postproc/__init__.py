@@ -7,7 +7,7 @@
 {'PTP': 4, 'LIN': 22}
 """
 
-__version__ = "0.1.0"
+__version__ = "0.3.0"
 
 __all__ = ["Checked", "Finding", "Refusal", "Report", "__version__", "check", "compensate", "predict"]
 
