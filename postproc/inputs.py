@@ -1,6 +1,6 @@
 """The files that a run has read: what was in each of them, and whether it still is.
 
-Whatever reads a file does so by ``files.read_file``, and that notes it here: no list of inputs is kept by hand, which
+Whatever reads a file does so by ``postproc.files``, and that notes it here: no list of inputs is kept by hand, which
 would forget the file that a later version reads.
 """
 

@@ -17,6 +17,7 @@ from faults import Child, once, there
 import postproc
 from postproc.files import MAX_BYTES, MAX_LINE, read_file
 from postproc.findings import Refusal
+from postproc.tables import read_table
 from postproc.workflows.preparation import read_document
 from postproc.yamlfile import MAX_NODES, parsed
 
@@ -182,15 +183,44 @@ def test_a_header_without_end(job, header):
 
 @pytest.mark.parametrize("where", [0, 1, MAX_LINE // 2])
 def test_how_long_a_line_may_be(tmp_path, where):
-    """One of MAX_LINE bytes is read wherever it lies; one of twice that is not."""
+    """One of MAX_LINE bytes is read wherever it lies; one of more is not."""
     path = tmp_path / "a.src"
-    path.write_bytes(b"\n" * where + b"x" * (MAX_LINE - 1) + b"\n")
-    assert len(read_document(path).raw) == where + MAX_LINE
-    path.write_bytes(b"\n" * where + b"x" * (2 * MAX_LINE) + b"\n")
+    for end in (b"\n", b"", b"\n" + b"y" * MAX_LINE):
+        path.write_bytes(b"\n" * where + b"x" * MAX_LINE + end)
+        assert read_document(path).raw == path.read_bytes()
+        for more in (1, MAX_LINE):
+            path.write_bytes(b"\n" * where + b"x" * (MAX_LINE + more) + end)
+            with pytest.raises(Refusal) as refusal:
+                read_document(path)
+            finding = refusal.value.findings[0]
+            assert (finding.code, finding.line) == ("FIL003", where + 1)
+
+
+@pytest.mark.parametrize("end", [b"\n", b"\r", b"\r\n"])
+@pytest.mark.parametrize("shift", [0, 1, 2])
+def test_how_long_a_line_of_a_table_may_be(tmp_path, end, shift):
+    """All of a table is there wherever its lines end in what is read at a time, and the long one has its number."""
+    path = tmp_path / "a.csv"
+    head = b"a" * (1 + shift) + end
+    rows = (b" " * (MAX_LINE // 4) + b"1" + end) * 9
+    path.write_bytes(head + rows)
+    assert len(read_table(path, "FRC003")) == 9
+    path.write_bytes(head + rows + b" " * MAX_LINE + b"1")
+    with pytest.raises(Refusal) as refusal:
+        read_table(path, "FRC003")
+    finding = refusal.value.findings[0]
+    assert (finding.code, finding.line) == ("FRC003", 11)
+
+
+def test_what_is_no_text_is_told_where_and_only_in_text(tmp_path):
+    """A NUL far behind is; a file that is not read as text may hold any, and has no lines."""
+    path = tmp_path / "a.bin"
+    path.write_bytes(b"x\n" * MAX_LINE + b"\0" + b"x" * (2 * MAX_LINE))
     with pytest.raises(Refusal) as refusal:
         read_document(path)
-    finding = refusal.value.findings[0]
-    assert (finding.code, finding.line) == ("FIL003", where + 1)
+    assert refusal.value.findings[0].code == "FIL003"
+    assert f"NUL at byte {2 * MAX_LINE}" in refusal.value.findings[0].message
+    assert read_file(path) == path.read_bytes()
 
 
 @pytest.mark.parametrize("closed", [True, False])

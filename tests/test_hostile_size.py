@@ -127,7 +127,6 @@ def endless(path: Path, head: bytes, filler: bytes) -> None:
             stream.write(part)
 
 
-@pytest.mark.xfail(reason="all of it is in memory before it is refused", strict=False)
 @pytest.mark.parametrize("filler", [b"\0", b"1 "], ids=["NUL", "numbers"])
 @pytest.mark.parametrize(
     ("name", "words"),

@@ -263,7 +263,7 @@ ELSEWHERE = ("batch", "publish.py", "files.py", "inputs.py", "report/page.py", "
 
 
 def test_whatever_is_read_is_noted():
-    """``files.read_file`` is the only way to the bytes of a file."""
+    """``files.read_file`` and ``files.read_plain`` are the only ways to the bytes of a file."""
     root, found = Path(postproc.__file__).parent, []
     for path in sorted(root.rglob("*.py")):
         name = path.relative_to(root).as_posix()

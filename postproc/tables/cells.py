@@ -153,14 +153,14 @@ class Column(Sequence[str]):
 def find_cells(lines: Lines, begin: int, number: int, separator: str, columns: int, other: Other) -> Cells:
     """The cells of the lines from byte ``begin`` on, the first of which has this ``number``.
 
-    Raises what ``other`` raises, and Refusal where a line is longer than any table's.
+    Raises what ``other`` raises.
     """
     raw, kinds = lines.raw, _kinds(separator)
     parts: list[tuple[NDArray[np.int32], NDArray[np.int32], Ints]] = []
     others: dict[int, Sequence[str]] = {}
     count = 0
     while begin < len(raw):
-        stop = _cut(lines, begin, number)
+        stop = _cut(raw, begin)
         text = raw[begin:stop].replace(b"\r\n", b" \n")
         if not text.endswith((b"\n", b"\r")):
             text += b"\n"  # the last line
@@ -211,16 +211,14 @@ def _in_quotes(raw: bytes, start: Ints, stop: Ints) -> Bools:
     return np.asarray((stop - start >= 2) & (first == _QUOTED) & (data[stop - 1] == _QUOTED))
 
 
-def _cut(lines: Lines, begin: int, number: int) -> int:
+def _cut(raw: bytes, begin: int) -> int:
     """The end of the last line that ends within a block."""
-    raw, stop = lines.raw, begin + BLOCK
+    stop = begin + BLOCK
     if stop >= len(raw):
         return len(raw)
     end = raw.rfind(b"\n", begin, stop)
     if end < 0:
         end = raw.rfind(b"\r", begin, stop - 1)  # not the first half of \r\n
-    if end < 0:
-        raise lines.too_long(number)
     return end + 1
 
 

@@ -8,12 +8,12 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from postproc.files import MAX_LINE
 from postproc.findings import Finding, Refusal
 
 NOTHING = ' \t;,"'
 """A spreadsheet writes its empty rows as separators alone."""
 
+LINE_ENDS = (b"\n", b"\r")
 _LINE_END = re.compile(rb"\r\n|\n|\r")
 _BLOCK = 1 << 20
 
@@ -40,14 +40,8 @@ class Lines:
         found = _LINE_END.search(self.raw, start)
         return found.span() if found else (len(self.raw), len(self.raw) + 1)
 
-    def text(self, start: int, stop: int, number: int) -> str:
-        """The line of this number.  Refusal where it is longer than any table's."""
-        if stop - start > MAX_LINE:
-            raise self.too_long(number)
+    def text(self, start: int, stop: int) -> str:
         return self.raw[start:stop].decode(self.encoding)
-
-    def too_long(self, number: int) -> Refusal:
-        return self.wrong(f"a line of more than {MAX_LINE} characters", number)
 
     def wrong(self, message: str, number: int, help: str = "") -> Refusal:
         return Refusal(Finding(self.code, message, str(self.path), number, help=help))

@@ -17,10 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from postproc.arrays import Floats, Ints, frozen
-from postproc.files import read_file
+from postproc.files import read_plain
 from postproc.findings import Finding, Refusal, nearest
 from postproc.tables.cells import Column, find_cells
-from postproc.tables.lines import NOTHING, Lines, comment, separator_of
+from postproc.tables.lines import LINE_ENDS, NOTHING, Lines, comment, separator_of
 from postproc.tables.spelling import is_missing, is_number
 
 
@@ -102,7 +102,7 @@ def read_table(path: Path, code: str) -> Table:
 
     Raises Refusal: FIL001 (not readable), FIL002 (empty), FIL003 (binary), ``code`` (header or rows are wrong).
     """
-    raw = _bytes(path)
+    raw = read_plain(path, code, LINE_ENDS)
     lines = Lines.of(path, code, raw)
     comments, header, at, behind = _above(lines)
     if header is None:
@@ -117,7 +117,7 @@ def read_table(path: Path, code: str) -> Table:
         seen.add(name)
 
     def one(start: int, stop: int, number: int) -> list[str] | None:
-        line = lines.text(start, stop, number)
+        line = lines.text(start, stop)
         note = comment(line, above=False)
         if note is not None:
             comments.append((number, note))
@@ -146,9 +146,9 @@ def read_table(path: Path, code: str) -> Table:
 def comments_above(path: Path) -> tuple[tuple[int, str], ...]:
     """(line, text after the #) of the comments above the header; the table itself may be wrong.
 
-    Raises Refusal FIL001 (not readable), FIL003 (binary).
+    Raises Refusal FIL001 (not readable), FIL003 (binary, or an endless line).
     """
-    return tuple(_above(Lines.of(path, "", _bytes(path)))[0])
+    return tuple(_above(Lines.of(path, "FIL003", read_plain(path, ends=LINE_ENDS)))[0])
 
 
 def _above(lines: Lines) -> tuple[list[tuple[int, str]], str | None, int, int]:
@@ -159,7 +159,7 @@ def _above(lines: Lines) -> tuple[list[tuple[int, str]], str | None, int, int]:
     while start <= len(lines.raw):
         number += 1
         stop, behind = lines.end(start)
-        line = lines.text(start, stop, number)
+        line = lines.text(start, stop)
         note = comment(line, above=True)
         if note is not None:
             comments.append((number, note))
@@ -167,13 +167,6 @@ def _above(lines: Lines) -> tuple[list[tuple[int, str]], str | None, int, int]:
             return comments, line, number, behind
         start = behind
     return comments, None, number, start
-
-
-def _bytes(path: Path) -> bytes:
-    raw = read_file(path)
-    if b"\0" in raw:
-        raise Refusal(Finding("FIL003", "holds NUL bytes; save it as plain text (UTF-8)", str(path)))
-    return raw
 
 
 def _wrong_count(lines: Lines, number: int, row: list[str], names: list[str], separator: str) -> Refusal:

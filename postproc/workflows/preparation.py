@@ -15,7 +15,7 @@ from postproc.dialects import DIALECTS, detect
 from postproc.dialects.dialect import Dialect, Program, Settings
 from postproc.document import Document
 from postproc.effects import Conditions
-from postproc.files import MAX_LINE, read_file
+from postproc.files import read_plain
 from postproc.findings import Finding, Refusal, nearest
 from postproc.forces import Wrenches, is_no_force, wrenches
 from postproc.geometry import PoseRows, Poses
@@ -122,16 +122,7 @@ def near_cell(program: Path) -> Cell | None:
 
 def read_document(path: Path) -> Document:
     """A file of a program.  Raises Refusal FIL001 (not readable), FIL003 (no text)."""
-    raw = read_file(path)
-    at = raw.find(b"\0")
-    if at >= 0:
-        raise Refusal(Finding("FIL003", f"NUL at byte {at}: no text of a program", str(path)))
-    for at in range(0, len(raw) - MAX_LINE + 1, MAX_LINE):
-        if raw.find(b"\n", at, at + MAX_LINE) < 0:
-            line = raw.count(b"\n", 0, at) + 1
-            message = f"a line of more than {MAX_LINE} bytes: no text of a program"
-            raise Refusal(Finding("FIL003", message, str(path), line))
-    return Document(path, raw)
+    return Document(path, read_plain(path))
 
 
 def prepare(request: Request) -> Prepared:
