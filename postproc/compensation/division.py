@@ -237,9 +237,8 @@ class _Search:
             return
         spare = max(spare, 0)
         paid = self._first(self.linked.astype(np.int64), self.step, spare) > 0
-        unlinked = self.linked & ~paid
-        more = np.where(unlinked, 0, self.count - self.least)
-        self.count = self.least + self._first(more, self.error, spare - int(paid.sum()))
+        # where a link is not paid, nothing is left for points
+        self.count = self.least + self._first(self.count - self.least, self.error, spare - int(paid.sum()))
         self.linked = paid
         left = np.flatnonzero(self.linked + self.count - self.least < wanted)
         first = int(self.rows[left[np.argmax(np.maximum(self.step, self.error)[left])]])

@@ -9,6 +9,7 @@ the relative change of the deflection over the deflection itself, 2e-3 to 3e-3 o
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -115,37 +116,46 @@ def mirror(
     final = np.full((2, n), np.nan)
     active = np.arange(n)
     for iteration in range(MAX_ITERATIONS + 1):
+        some: Any = active if len(active) < n else slice(None)  # mostly all of them: nothing is copied
         here = predict(
             model,
-            Poses(rotation[active], position[active]),
-            tool if tool.position.ndim == 1 else tool[active],
-            wrench[active],
-            conditions.part(active),
-            status[active],
-            near[active],
+            Poses(rotation[some], position[some]),
+            tool if tool.position.ndim == 1 else tool[some],
+            wrench[some],
+            conditions.part(some),
+            status[some],
+            near[some],
             bent,
         )
-        shift, turn = difference(here.pose, goal[active])
+        shift, turn = difference(here.pose, goal[some])
         if turns is not None:
-            turn = (turns[active] @ turn[..., None])[..., 0]
+            turn = (turns[some] @ turn[..., None])[..., 0]
         error, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
         good = here.reachable & here.settled
-        q[active], reachable[active], settled[active] = here.q, here.reachable, here.settled | ~here.reachable
+        q[some], reachable[some], settled[some] = here.q, here.reachable, here.settled | ~here.reachable
         record = np.full(n, np.nan)
-        record[active] = error
+        record[some] = error
         history.append(record)
-        final[:, active] = error, angle
-        iterations[active] = iteration
+        final[:, some] = error, angle
+        iterations[some] = iteration
         done = good & (error <= POSITION_TOLERANCE) & (angle <= ANGLE_TOLERANCE)
         converged[active[done]] = True
         size = error + angle  # 1 rad weighs as 1 m: both go down together
-        going = good & ~done & (size < 0.5 * last[active])
-        last[active] = size
+        going = good & ~done & (size < 0.5 * last[some])
+        last[some] = size
         if not going.any() or iteration == MAX_ITERATIONS:
             break
-        active, bent = active[going], here.displacement[going]
-        position[active] -= shift[going]
-        rotation[active] = rotation_from_vector(-turn[going]) @ rotation[active]
+        bent = here.displacement
+        if not going.all():
+            active, some, bent, shift, turn = (
+                active[going],
+                active[going],
+                bent[going],
+                shift[going],
+                turn[going],
+            )
+        position[some] -= shift
+        rotation[some] = rotation_from_vector(-turn) @ rotation[some]
     return Correction(
         Poses(rotation, position),
         q,

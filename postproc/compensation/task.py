@@ -104,6 +104,8 @@ class Task:
         begin = nominal_flange(model.robot, motors) @ tool
         away = np.linalg.norm(begin.position - wanted.position, axis=1)
         good = there.reachable & (away <= self.max_correction) & np.isfinite(bent).all(axis=1)
+        if good.all():
+            return begin, bent
         return Poses(
             np.where(good[:, None, None], begin.rotation, wanted.rotation),
             np.where(good[:, None], begin.position, wanted.position),

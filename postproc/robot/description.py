@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from statistics import NormalDist
 
@@ -13,6 +14,7 @@ from postproc.arrays import Floats, Ints, frozen
 from postproc.files import read_file
 from postproc.findings import Finding, Refusal, nearest
 from postproc.geometry import Poses
+from postproc.robot.chain import Chain
 from postproc.robot.geometries import Axis, Geometry, Joint, KukaVariant, SerialArm
 from postproc.robot.provenance import Identification, correlations, read_identification
 from postproc.robot.reading import geometry_kind, read_axes, read_geometry, unit_factor
@@ -120,6 +122,13 @@ class Robot:
         """(n,) [rad/s, m/s] the fastest that each joint moves, NaN where the file does not say it."""
         stated = [np.nan if axis.speed is None else axis.speed for axis in self.axes]
         return np.array(stated or [np.nan] * len(self.joints))
+
+    @cached_property
+    def nominal_chain(self) -> Chain:
+        """The joints and the flange that the controller believes in."""
+        limits = [(joint.lower, joint.upper) for joint in self.joints]
+        joints = self.nominal.joints([joint.name for joint in self.joints], limits)
+        return Chain(joints, self.nominal.flange())
 
     @property
     def programmed(self) -> Ints:

@@ -9,7 +9,6 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.blocks import each_block, in_blocks
 from postproc.geometry import Placed, Poses, wrapped
-from postproc.robot.chain import Chain
 from postproc.robot.description import Robot
 from postproc.robot.geometries import KukaLengths, KukaVariant, SerialArm
 from postproc.robot.inverse import controller_values, inverse, kuka_angles, status_of, turn_of
@@ -209,9 +208,7 @@ def _settle(
 
 def nominal_flange(robot: Robot, q: Floats) -> Poses:
     """Flange poses (N) that the controller computes from joint values (N, n) [rad, m]."""
-    limits = [(joint.lower, joint.upper) for joint in robot.joints]
-    joints = robot.nominal.joints([joint.name for joint in robot.joints], limits)
-    return Chain(joints, robot.nominal.flange()).flange(q)
+    return robot.nominal_chain.flange(q)
 
 
 def sides(robot: Robot, q: Floats) -> tuple[Ints, Ints]:
