@@ -44,6 +44,7 @@ ROOMS = {
     "blocks": 0,
     "findings": 0,
     "units": 0,
+    "printable": 0,
     "arrays": 0,
     "__init__": 0,
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import unicodedata
 from html.parser import HTMLParser
 
 import pytest
@@ -13,11 +14,14 @@ from test_hostile_tables import formulas
 from postproc.robot.description import find_robot
 
 MARK = "OWNED"
+TURNED = "\u202edcba\u2066\u200b\u2028\x9b"
+"""Turns the direction of writing, hides, ends a line, begins an escape."""
+
 EVIL = (
     f"<script>alert('{MARK}')</script>\"'><img src=x onerror=alert('{MARK}')></title></style></textarea>"
-    f"--><svg/onload=alert('{MARK}')>{{{{7*7}}}}{{%{MARK}%}}${{{MARK}}}&lt;script&gt;\\u003cscript\\u003e]]>"
+    f"--><svg/onload=alert('{MARK}')>{{{{7*7}}}}{TURNED}{{%{MARK}%}}${{{MARK}}}&lt;script&gt;\\u003cscript\\u003e]]>"
 )
-FILE = f"<img src=x onerror=alert('{MARK}')>\"'&<svg onload=alert('{MARK}')>"
+FILE = f"<img src=x onerror=alert('{MARK}')>{TURNED}\"'&<svg onload=alert('{MARK}')>"
 """A name that a file may have: no slash."""
 
 
@@ -113,6 +117,17 @@ def test_pages_run_nothing_of_it(made):
         assert looked.ran == [], page.name
         shown += MARK in looked.shown
     assert shown >= 4
+
+
+def test_pages_are_read_as_they_stand(made):
+    """Nothing in them, and in what their scripts are given, turns what is written, or hides."""
+    for page in [*made.rglob("*.html"), *made.rglob("*.svg")]:
+        text = re.sub(r"\\u([0-9a-fA-F]{4})", lambda found: chr(int(found[1], 16)), page.read_text())
+        assert "dcba" in text
+        kinds = {
+            one for one in set(text) - set("\n\t") if unicodedata.category(one) in ("Cc", "Cf", "Zl", "Zp")
+        }
+        assert kinds == set(), page.name
 
 
 def test_tables_hold_no_formula(made):

@@ -180,7 +180,7 @@ def _watched(out: Out) -> Iterator[Watch | None]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from postproc.batch.run import Watch
-    from postproc.report.terminal import printable
+    from postproc.printable import printable
 
     columns = (
         BarColumn(bar_width=24),

@@ -7,8 +7,9 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
+from postproc.printable import printable
 from postproc.report.batched import DONE, FAILED, NOT_RUN, UNCHANGED, Batched, Outcome
-from postproc.report.terminal import printable, show_findings
+from postproc.report.terminal import show_findings
 from postproc.report.words import count
 
 _STYLES = {DONE: "", UNCHANGED: "dim", FAILED: "bold red", NOT_RUN: "yellow"}

@@ -18,6 +18,7 @@ from postproc.arrays import Floats
 from postproc.diagnosis.screens import patterns
 from postproc.diagnosis.search import Key
 from postproc.identification.fit import Fit
+from postproc.printable import printable, printable_lines
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_words import headline
 from postproc.report.identified_picture import shown_rows
@@ -78,7 +79,7 @@ def diagnosed_picture(result: Diagnosed, kind: str) -> bytes:
 
 def _figure(result: Diagnosed) -> Figure:
     figure = Figure(figsize=(13.5, 7.4), layout="constrained")
-    figure.suptitle(_title(result), fontsize=10, parse_math=False)
+    figure.suptitle(printable_lines(_title(result)), fontsize=10, parse_math=False)
     grid = figure.add_gridspec(2, PANELS + 1, width_ratios=[1.0] * PANELS + [1.15])
     _gap(figure.add_subplot(grid[0, :PANELS]), result)
     several = betrayals(result)
@@ -188,8 +189,8 @@ def _betrayed(axes: Axes, betrayal: Betrayal, result: Diagnosed) -> None:
     else:
         _scatter_line(axes, result)
     share = f" ({100 * betrayal.share:.0f} % of what is left)" if np.isfinite(betrayal.share) else ""
-    axes.set_title(f"{variable.name}{share}", fontsize=9, parse_math=False)
-    axes.set_xlabel(f"{variable.name}, {variable.unit}".rstrip(", "), fontsize=9, parse_math=False)
+    axes.set_title(printable(f"{variable.name}{share}"), fontsize=9, parse_math=False)
+    axes.set_xlabel(printable(f"{variable.name}, {variable.unit}").rstrip(", "), fontsize=9, parse_math=False)
     joint = variable.name.partition(" ")[0]
     along = f"residual along a turn of {joint}, mm" if betrayal.turning else "residual, mm"
     axes.set_ylabel(along, fontsize=9, parse_math=False)
@@ -210,7 +211,7 @@ def _evidence(axes: Axes, result: Diagnosed) -> None:
     axes.plot(gains.needed[order], range(len(order)), label="needed to count", **_NEEDED)
     axes.set_xscale("symlog", linthresh=10.0)
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.set_yticks(range(len(order)), [candidates[g].label for g in order])
+    axes.set_yticks(range(len(order)), [printable(candidates[g].label) for g in order])
     for label in axes.get_yticklabels():
         label.set_parse_math(False)
     axes.set_ylim(max(len(order), 1) - 0.5, -0.5)

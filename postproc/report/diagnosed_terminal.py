@@ -9,10 +9,11 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from postproc.printable import printable
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_words import headline, paragraph
 from postproc.report.identified_terminal import add_sizes
-from postproc.report.terminal import printable, show_findings
+from postproc.report.terminal import show_findings
 from postproc.report.words import campaign_in_words, count, fixed, shown_unit, some
 from postproc.robot.description import robot_words
 from postproc.units import MM

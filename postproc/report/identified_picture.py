@@ -15,6 +15,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from postproc.arrays import Floats, Ints
+from postproc.printable import printable, printable_lines
 from postproc.report.identified import Identified
 from postproc.report.picture import rendered
 from postproc.report.residuals import Sizes, Variable
@@ -64,7 +65,7 @@ def _figure(result: Identified) -> Figure:
     count = len(by) + 1
     rows = -(-count // COLUMNS)
     figure = Figure(figsize=(3.7 * COLUMNS, 2.5 * rows + 1.1), layout="constrained")
-    figure.suptitle(_title(result), fontsize=10, parse_math=False)
+    figure.suptitle(printable_lines(_title(result)), fontsize=10, parse_math=False)
     panels = figure.subplots(rows, COLUMNS, squeeze=False, sharey=True).ravel()
     ends = _scale(result)
     for axes, variable in zip(panels, by, strict=False):
@@ -106,7 +107,7 @@ def _scattered(axes: Axes, result: Identified, variable: Variable, least: float)
     axes.plot(variable.values[far], result.lengths["after"][far] / MM, **_OUTLIER)
     if result.after.noise.known:
         axes.axhline(result.after.noise.rms / MM, **_SCATTER)
-    axes.set_xlabel(f"{variable.name}, {variable.unit}".rstrip(", "), fontsize=9, parse_math=False)
+    axes.set_xlabel(printable(f"{variable.name}, {variable.unit}").rstrip(", "), fontsize=9, parse_math=False)
 
 
 def _directions(axes: Axes, result: Identified) -> None:

@@ -12,9 +12,10 @@ from rich.text import Text
 from postproc.arrays import Floats
 from postproc.identification.fit import Estimate
 from postproc.identification.validation import WIDER
+from postproc.printable import printable
 from postproc.report.identified import STRONG, Identified, Sum
 from postproc.report.residuals import Sizes
-from postproc.report.terminal import _once, printable, show_findings
+from postproc.report.terminal import _once, show_findings
 from postproc.report.words import campaign_in_words, count, fixed, shown_unit, some
 from postproc.robot.description import robot_words
 from postproc.units import MM

@@ -15,9 +15,9 @@ from postproc.compensation.correct import Result, State
 from postproc.compensation.division import Division
 from postproc.compensation.task import Task
 from postproc.document import Document, Edit, Edits, Span, apply
+from postproc.printable import printable
 from postproc.report.page_rows import SHOWN, shown_rows, worst_rows
 from postproc.report.report import Report
-from postproc.report.terminal import printable
 from postproc.units import MM
 
 BENDS, EACH = 60_000, (3, 23)

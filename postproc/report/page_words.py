@@ -10,9 +10,10 @@ import numpy as np
 from rich.text import Text
 
 from postproc.compensation.doubt import Doubt
+from postproc.printable import printable_lines
 from postproc.report.page_data import PageData
 from postproc.report.report import Report
-from postproc.report.terminal import _rows, _two_digits, printable
+from postproc.report.terminal import _rows, _two_digits
 from postproc.report.words import count
 from postproc.units import MM
 
@@ -31,8 +32,7 @@ class Tile:
 
 def printed(text: str) -> str:
     """Text of a program or a file name as a page can hold it; its lines stay lines."""
-    lines = text.encode("utf-8", "replace").decode("utf-8").split("\n")
-    return "\n".join(printable(line) for line in lines)
+    return printable_lines(text.encode("utf-8", "replace").decode("utf-8"))
 
 
 def badge(exit: int, changed: int | None) -> tuple[str, str, str]:

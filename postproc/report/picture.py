@@ -20,6 +20,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from postproc.arrays import Floats
+from postproc.printable import printable
 from postproc.report.workspace import Mapped, Quantity, slices_shown
 from postproc.units import MM
 
@@ -52,7 +53,7 @@ def _plane(mapped: Mapped, ranged: list[int]) -> Figure:
     across, up = (_coordinates(mapped, axis) for axis in ranged)
     tall = float(np.clip(np.ptp(up) / np.ptp(across), 0.25, 1.6))
     figure = Figure(figsize=(5.4 * len(panels) + 0.2, 4.2 * tall + 1.35), layout="constrained")
-    figure.suptitle(_title(mapped), fontsize=10)
+    figure.suptitle(_title(mapped), fontsize=10, parse_math=False)
     for axes, quantity in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
         values = _cube(mapped, quantity).reshape(len(across), len(up)).T
         image = _fill(axes, across, up, values, _bounds(values), COLOURS[quantity.key])
@@ -75,7 +76,7 @@ def _slices(mapped: Mapped, ranged: list[int]) -> Figure:
     wide = float(np.clip(np.ptp(across) / np.ptp(up), 0.4, 2.5))
     figure = Figure(figsize=(3.0 * columns + 1.4, 3.0 * rows / wide + 1.3), layout="constrained")
     told = "" if len(shown) == len(levels) else f", {len(shown)} of {len(levels)} slices"
-    figure.suptitle(f"{_title(mapped)}\n{_heading(quantity, cube)}{told}", fontsize=10)
+    figure.suptitle(f"{_title(mapped)}\n{_heading(quantity, cube)}{told}", fontsize=10, parse_math=False)
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for place, axes in enumerate(panels.ravel()):
         if place >= len(shown):
@@ -98,7 +99,7 @@ def _curve(mapped: Mapped, ranged: list[int]) -> Figure:
     axis = ranged[0]
     along = _coordinates(mapped, axis)
     figure = Figure(figsize=(8.0, 2.6 * len(panels) + 1.2), layout="constrained")
-    figure.suptitle(_title(mapped), fontsize=10)
+    figure.suptitle(_title(mapped), fontsize=10, parse_math=False)
     rows = figure.subplots(len(panels), 1, squeeze=False, sharex=True)[:, 0]
     for axes, quantity in zip(rows, panels, strict=True):
         values = _cube(mapped, quantity).ravel()
@@ -228,7 +229,7 @@ def _title(mapped: Mapped) -> str:
     how = ["linear, eq. (5)" if mapped.load.linear else "deflected equilibrium"]
     if mapped.sign:
         how.append(f"compensator sign {mapped.sign}")
-    return f"{mapped.robot}, force {mapped.force}\n{', '.join([*held, *how])}"
+    return f"{printable(mapped.robot)}, force {mapped.force}\n{', '.join([*held, *how])}"
 
 
 def _heading(quantity: Quantity, values: Floats) -> str:

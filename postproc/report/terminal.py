@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Sequence
 
 from rich.console import Console
@@ -13,14 +12,13 @@ from rich.text import Text
 
 from postproc.compensation.doubt import FORCE, Doubt
 from postproc.findings import CODES, Finding
+from postproc.printable import printable
 from postproc.report.report import Report, Spread
 from postproc.units import MM
 
 _STYLES = {"info": "cyan", "warning": "yellow", "error": "bold red"}
 NAMED = 3
 """Parameters that the line on the doubt names."""
-
-_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
 
 def show(console: Console, report: Report, verbose: bool = False) -> None:
@@ -107,11 +105,6 @@ def show_findings(console: Console, findings: Sequence[Finding], verbose: bool =
             advice = finding.help or CODES[finding.code].explanation
             for part in advice.splitlines():
                 console.print(Text("    " + printable(part), style="dim"), soft_wrap=True)
-
-
-def printable(text: str) -> str:
-    """Text of a program without the control characters that could drive a terminal."""
-    return _CONTROL.sub("?", text)
 
 
 def _interval(doubt: Doubt, half_width: float) -> str:
