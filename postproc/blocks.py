@@ -43,12 +43,13 @@ def threads() -> int:
     return min(MOST, int(word) if word.isdecimal() and int(word) else cores())
 
 
-def blocks(count: int, rows: int = ROWS) -> list[slice]:
-    """The blocks of ``count`` rows."""
+def blocks(count: int, rows: int = 0) -> list[slice]:
+    """The blocks of ``count`` rows, of ``ROWS`` each where ``rows`` says nothing else."""
+    rows = rows or ROWS
     return [slice(begin, min(begin + rows, count)) for begin in range(0, count, rows)]
 
 
-def in_blocks(work: Callable[[slice], T], count: int, rows: int = ROWS) -> Iterator[T]:
+def in_blocks(work: Callable[[slice], T], count: int, rows: int = 0) -> Iterator[T]:
     """``work`` of every block of ``count`` rows, in their order.
 
     Few blocks are ahead of the one that is asked for.  Inside of another block all is done where it is asked for.
@@ -77,7 +78,7 @@ def in_blocks(work: Callable[[slice], T], count: int, rows: int = ROWS) -> Itera
                 future.cancel()
 
 
-def each_block(work: Callable[[slice], None], count: int, rows: int = ROWS) -> None:
+def each_block(work: Callable[[slice], None], count: int, rows: int = 0) -> None:
     """``work`` of every block of ``count`` rows, which puts what it finds in its place."""
     for _ in in_blocks(work, count, rows):
         pass

@@ -1,0 +1,86 @@
+"""Whatever the blocks in which rows are worked on: the same correction, to the last byte that is told."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from ways_at_work import circle, corner, line
+
+import postproc.blocks
+import postproc.compensation.division
+from postproc.compensation.correct import correct
+from postproc.compensation.division import Limits, divide
+from postproc.compensation.limits import limits
+from postproc.writing import way_errors
+
+SIZES = [1, 2, 3, 7]
+
+
+def in_blocks_of(monkeypatch, rows):
+    monkeypatch.setattr(postproc.blocks, "ROWS", rows)
+    monkeypatch.setattr(postproc.compensation.division, "ROWS", rows)
+
+
+def found(task, allowed):
+    """All that a correction finds, as plain arrays and words."""
+    result = correct(task)
+    division = divide(task, result, allowed)
+    told, held = limits(task, result, division)
+    command, every = result.command[:], division.command[:]
+    return {
+        "state": result.state,
+        "command": command.position,
+        "turned": command.rotation,
+        "deflection": result.deflection,
+        "before": result.before,
+        "after": result.after,
+        "iterations": result.iterations,
+        "history": result.history,
+        "source": division.source,
+        "role": division.role,
+        "ends": every.position,
+        "centre": division.centre,
+        "sweep": division.sweep,
+        "between": way_errors(task, result, division),
+        "words": [str(one) for one in (*result.findings, *division.findings, *told, *held.values())],
+    }
+
+
+@pytest.mark.parametrize("rows", SIZES)
+@pytest.mark.parametrize(
+    ("task", "allowed"),
+    [
+        (lambda: line(), Limits(max_growth=100.0)),
+        (lambda: line(), Limits(max_growth=1.5)),
+        (lambda: corner(), Limits(max_growth=100.0)),
+        (lambda: circle(), Limits(max_growth=100.0)),
+        (lambda: circle(sweep=1.0), Limits(keep=True)),
+        (lambda: line(gain=0.5), Limits(max_growth=100.0)),
+    ],
+    ids=["line", "rationed", "corner", "circle", "kept", "half"],
+)
+def test_a_correction_does_not_depend_on_the_blocks(monkeypatch, rows, task, allowed):
+    whole = found(task(), allowed)
+    in_blocks_of(monkeypatch, rows)
+    parts = found(task(), allowed)
+    for name, values in whole.items():
+        if name == "words":
+            assert parts[name] == values
+        else:
+            np.testing.assert_allclose(parts[name], values, rtol=0, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.parametrize("rows", SIZES)
+def test_an_output_does_not_depend_on_the_blocks(compensate, job, monkeypatch, rows):
+    """Program, difference, corrections and report, byte for byte."""
+    names = ["part.src", "part.diff", "part.corrections.csv", "part.report.html"]
+    told = []
+    for size in (postproc.blocks.ROWS, rows):
+        in_blocks_of(monkeypatch, size)
+        assert compensate(job.program, "--force").code == 0
+        folder = job.program.parent / "compensated"
+        report = json.loads((folder / "part.report.json").read_text())
+        told.append((report, *((folder / name).read_bytes() for name in names)))
+    assert told[0] == told[1]
