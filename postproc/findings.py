@@ -164,6 +164,11 @@ CODES: dict[str, Code] = {
         "flow is too long to follow",
         "Loops and calls run more statements than are followed; motions in them are kept as they are.",
     ),
+    "KRL025": Code(
+        "warning",
+        "letters that KRL does not have",
+        "Names have the letters A to Z; what such a statement does is not known, nor is what it sets.",
+    ),
     # G-code
     "GCO001": Code(
         "warning",

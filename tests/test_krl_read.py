@@ -614,3 +614,93 @@ def test_a_folder_that_can_not_be_listed_is_told(tmp_path, monkeypatch):
     monkeypatch.setattr(Path, "iterdir", fails)
     with pytest.raises(Refusal, match="FIL001"):
         KRL.companions(tmp_path / "part.src")
+
+
+# letters that KRL does not have
+
+NEXT = "LIN {Z 9}\nLIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+"""What takes its other components from the point before, and what does not."""
+
+LOOK_ALIKE = [
+    "L\u0406N {X 9}", "\uff2c\uff29\uff2e {X 9}", "L\u200bIN {X 9}", "\u202eLIN {X 9}", "LIN\u00a0{X 9}",
+    "\u0420TP XP1", "PTP XP1\u0430", "LIN {X 9\u00a0}", "LIN {X 9} \u0421_DIS", "LIN {X \uff19}", "\u0416",
+]  # fmt: skip
+MORE = [
+    "$B\u0410SE={X 1,Y 0,Z 0,A 0,B 0,C 0}",
+    "B\u0410S(#BASE,2)",
+    "XP1\u0430={X 9}",
+    "GOTO \u0430",
+    "GOTO \u00f6l",
+]
+
+
+@pytest.mark.parametrize("coding", ["utf-8", "utf-16-be"])
+@pytest.mark.parametrize("line", LOOK_ALIKE)
+def test_what_may_hide_a_motion_is_one_that_is_not_understood(line, coding):
+    """And the position behind it is as unknown as behind any such motion."""
+    hidden = line.encode()
+    if coding != "utf-8":  # single bytes of any code page
+        hidden = re.sub(rb"[\x80-\xff]+", b"\xb2", hidden)
+    found = read(f"DEF part()\n{FRAMES}{FULL}".encode() + hidden + f"\n{NEXT}END\n".encode())
+    told = {row: finding.code for row, finding in found.toolpath.refused.items()}
+    assert len(found.toolpath) == 4
+    assert told == {1: "KRL002" if line.startswith("LIN {") and line[-1] == "}" else "KRL001", 2: "KRL004"}
+
+
+@pytest.mark.parametrize(
+    "line", [line.encode() for line in MORE] + [b"$B\xc0SE=XP1", b"XP1\xb2=XP2", b"XP1\xe0=XP2"]
+)
+def test_what_may_set_anything_leaves_nothing_known(line):
+    zero = "{X 0,Y 0,Z 0,A 0,B 0,C 0}"
+    then = f"\n{FULL}$BASE={zero}\n$TOOL={zero}\n{FULL}END\n"
+    found = read(f"DEF part()\n{FRAMES}{FULL}".encode() + line + then.encode())
+    told = {row: finding.code for row, finding in found.toolpath.refused.items()}
+    assert told == {1: "KRL001", 2: "KRL005"}
+    assert "KRL025" in [finding.code for finding in found.findings]
+
+
+@pytest.mark.parametrize("coding", ["utf-8", "latin-1"])
+@pytest.mark.parametrize(
+    ("line", "lost"),
+    [
+        ("Zähler=Zähler+1", False), ("Größe.X=5", False), ("Öl[3]=TRUE", False), ("DECL INT Überlauf", False),
+        ("WAIT FOR größe", False), ("R=größe", False), ("REAL größe", False), ("$OUT[1]=schließen", False),
+        ("Öffnen()", True), ("Z=Öffnen()", True), ("Zähler=Fahren(1)", True), ("schließen(XP1)", True),
+    ],
+)  # fmt: skip
+def test_umlauts_in_names(line, lost, coding):
+    """Told once; an assignment leaves the position, a call of what was not read does not, as with any name."""
+    text = f"DEF part()\n{FRAMES}{FULL}{line}\n{line}\n{NEXT}END\n"
+    found = read(text.encode(coding))
+    told = [finding.code for finding in found.findings]
+    assert told.count("KRL025") == 1
+    assert len(found.toolpath) == 3
+    assert {row: finding.code for row, finding in found.toolpath.refused.items()} == (
+        {1: "KRL004"} if lost else {}
+    )
+
+
+@pytest.mark.parametrize("line", ["R=größe", "R=1\u0430", "R=\uff11", "R=XP1.X+ä", "$BASE.X=1\u00a0"])
+def test_what_such_a_statement_sets_is_not_known(line):
+    data = "DECL REAL R=7\n"
+    found = read(f"DEF part()\n{FRAMES}{line}\nLIN {{X R,Y 2,Z 3,A 4,B 5,C 6}}\nEND\n".encode(), data)
+    assert {finding.code for finding in found.toolpath.refused.values()} <= {"KRL002", "KRL005"}
+    assert len(found.toolpath.refused) == 1
+
+
+@pytest.mark.parametrize("line", ['Text[]="größe"', "; größe", "&COMMENT größe", '$MSG[]="Zähler" ; Öl'])
+def test_strings_and_comments_may_hold_any_letter(line):
+    found = read(f"DEF part()\n{FRAMES}{FULL}{line}\n{NEXT}END\n".encode("latin-1"))
+    assert not found.toolpath.refused
+    assert "KRL025" not in [finding.code for finding in found.findings]
+
+
+def test_a_block_knows_what_may_hide_in_it():
+    part = "LIN {Z 9}\n"
+    for line, then, code in (
+        ("L\u0406N XP1", part, "KRL004"), ("L\u0406N XP1", FULL, ""), ("$B\u0410SE=X", FULL, "KRL005"),
+        ("Zähler=1", part, ""), ("Öffnen()", part, "KRL004"),
+    ):  # fmt: skip
+        found = read(f"DEF part()\n{FRAMES}{FULL}IF $IN[1] THEN\n{line}\nENDIF\n{then}END\n".encode())
+        last = found.toolpath.refused.get(len(found.toolpath) - 1)
+        assert (last.code if last else "") == code

@@ -47,11 +47,16 @@ PATH_FROM_FILE = (b"CR_PROCESS",)
 HIDDEN = re.compile(rb"(?<![#$\w])(?:PTP|LIN|CIRC)\b", re.I)
 """A motion word inside of a statement of a technology package."""
 
+_MORE = re.compile(rb"[=(:]|\AGOTO\b", re.I)
+"""An assignment, a call, a label or a GOTO: what no motion holds without a brace."""
+
+EVERYTHING: Effects = {"point", "base", "tool", "feed", "apo", "mode", "record", "all"}
+
 _FUNCTION = re.compile(rb"(?<![A-Za-z0-9_$#.'])(" + NAME + rb")[ \t]*\(")
 _WORDS = frozenset(
     b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN WHILE UNTIL FOR TO STEP SWITCH CASE WAIT SEC RETURN".split()
 )
-_CALLING = frozenset(["assignment", "call", "open", "close", "return"])
+_CALLING = frozenset(["assignment", "call", "foreign", "open", "close", "return"])
 """Kinds of statement whose expressions may call functions, besides WAIT."""
 
 _COUNTER = re.compile(rb"FOR[ \t]+(" + NAME + rb")[ \t]*=", re.I)
@@ -151,4 +156,6 @@ def effects_of(statement: Statement) -> tuple[Effects, bytes]:
     if statement.kind == "open" and statement.word == b"FOR":
         counter = _COUNTER.match(statement.code)
         return ({counter[1].upper()} if counter else set()), b""
+    if statement.kind == "strange":
+        return (set(EVERYTHING) if _MORE.search(statement.code) else {"point"}), b""
     return ({"point"} if statement.kind == "other" and HIDDEN.search(statement.code) else set()), b""

@@ -9,8 +9,8 @@ from postproc.dialects.krl.assignments import assign, declare
 from postproc.dialects.krl.blocks import BUDGET
 from postproc.dialects.krl.bulk import Bulk
 from postproc.dialects.krl.calls import Calls, Restart
-from postproc.dialects.krl.effects import HIDDEN, functions_of
-from postproc.dialects.krl.lexing import Assignment, Call, Declared, Statement
+from postproc.dialects.krl.effects import HIDDEN, effects_of, functions_of
+from postproc.dialects.krl.lexing import Assignment, Call, Declared, Statement, has_strange_letters
 from postproc.dialects.krl.state import Form, State
 from postproc.dialects.krl.survey import INLINE, Routine
 from postproc.toolpath import Annotation
@@ -77,6 +77,8 @@ class Flow(Calls):
                     motions.move_bulk(run, item)
             elif item.kind == "motion" and item.line not in lines:
                 motions.move(run, item)
+            elif item.kind == "strange" and item.line not in lines and run.survey.has_routine:
+                motions.unknown_motion(run, item)
         run.idle = False
 
     def _step(self, pc: int) -> int | None:
@@ -97,6 +99,8 @@ class Flow(Calls):
         kind, said = item.kind, item.said
         if kind == "comment":
             return pc + 1
+        if not item.code.isascii() and kind != "motion" and has_strange_letters(item.code):
+            self._tell_letters(item)
         for name in functions_of(item):
             self._called(item, name, item.code)
         events = run.survey.events.get(pc, ())
@@ -110,6 +114,14 @@ class Flow(Calls):
                 return again
         if kind == "motion":
             motions.move(run, item)
+        elif kind == "strange":
+            if run.survey.has_routine:
+                motions.unknown_motion(run, item)
+            run.forget(effects_of(item)[0], f"after line {item.line}, which is not understood")
+        elif kind == "foreign" and isinstance(said, Call):
+            self._called(item, said.name, said.arguments)
+        elif kind == "foreign":
+            run.forget(effects_of(item)[0], f"after line {item.line}, whose name is none of KRL")
         elif isinstance(said, Assignment):
             assign(run, item, said)
         elif isinstance(said, Declared):
@@ -142,6 +154,10 @@ class Flow(Calls):
             run.rows.annotations.append(note)
         elif item.kind == "comment":
             self.comments.setdefault(item.line, note)
+
+    def _tell_letters(self, item: Statement) -> None:
+        """Once; the motions that it leaves uncertain are told one by one."""
+        self.run.tell("KRL025", "letters that KRL does not have: what they name is not known", item)
 
     def _give_up(self, pc: int) -> int:
         """The budget is spent."""

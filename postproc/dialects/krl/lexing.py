@@ -45,6 +45,9 @@ KEPT = frozenset(
     b"IMPORT SIGNAL ENUM STRUC ANOUT ANIN DIGIN INI".split()
 )
 
+_GERMAN = re.compile(rb"[\xc4\xd6\xdc\xe4\xf6\xfc\xdf]|\xc3[\x84\x96\x9c\xa4\xb6\xbc\x9f]")
+"""Umlauts and sharp s of Latin-1 or UTF-8: no letter of a motion word looks like one."""
+
 _FIRST = re.compile(rb"[ \t]*(" + NAME + rb")")
 _LABEL = re.compile(rb"(" + NAME + rb")[ \t]*:[ \t]*\Z")
 _DEF = re.compile(
@@ -105,7 +108,11 @@ class Declared(NamedTuple):
 
 
 class Statement(NamedTuple):
-    """One line: its kind, its first word (upper case), its code without comment, and what it says."""
+    """One line: its kind, its first word (upper case), its code without comment, and what it says.
+
+    Kind "strange": letters that KRL does not have hide what it does; "foreign": an assignment, a call or a declaration
+    whose name has umlauts, each byte of them ``_`` in what it says.
+    """
 
     kind: str
     word: bytes
@@ -189,7 +196,26 @@ def statement(raw: bytes, line: int, start: int, stop: int) -> Statement | None:
     first = _FIRST.match(code)
     word = first[1].upper() if first else b""
     kind, said = _kind(word, code, at)
+    if not code.isascii() and kind in ("other", "goto") and has_strange_letters(code):
+        kind, said = _strange(word, code, at)
     return Statement(kind, word, code, line, at, said, comment)
+
+
+def has_strange_letters(code: bytes) -> bool:
+    """Whether code holds letters that KRL does not have, other than in strings."""
+    return not without_strings(code).isascii()
+
+
+def _strange(
+    word: bytes, code: bytes, at: int
+) -> tuple[str, Assignment | Call | Declared | Head | bytes | None]:
+    plain = _GERMAN.sub(lambda found: b"_" * len(found[0]), code)
+    if word != b"GOTO" and len(code) <= LONGEST and not has_strange_letters(plain):
+        first = _FIRST.match(plain)
+        kind, said = _kind(first[1].upper() if first else b"", plain, at)
+        if kind in ("assignment", "call", "declaration"):
+            return "foreign", said
+    return "strange", None
 
 
 def _parameters(text: bytes) -> tuple[tuple[bytes, bool], ...]:

@@ -51,6 +51,7 @@ HELP = {
     "KRL022": "Correct only cuts in which no external axis carries the robot or the workpiece.",
     "KRL019": "Write the declaration as an aggregate of numbers.",
     "KRL023": "Nothing needs to be done if these motions are not meant to run.",
+    "KRL025": "Write the names with the letters A to Z; retype a word that only looks like one of KRL.",
     "KRL024": "Let the post-processor write the loop as a straight run of motions.",
 }
 
