@@ -9,7 +9,7 @@ import unicodedata
 
 import pytest
 from conftest import CELL, LINES
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from rich.table import Table
 from rich.text import Text
@@ -27,6 +27,7 @@ def driving(text: str) -> list[str]:
 
 
 @given(st.text())
+@example(EVIL + "\u2029\x00\n\t")
 def test_what_is_shown_is_to_be_read(text):
     stream = io.StringIO()
     console = SafeConsole(stream)
