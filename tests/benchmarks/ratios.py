@@ -3,8 +3,7 @@
 Both sides of a row are measured in the same run, one after the other several times; their medians count.  A pose is
 processor time of one thread; where two results are not equal the comparison is void.  BLAS has one thread everywhere.
 
-- mirror loop: ``compensation.mirror`` in blocks, as a run works, against the plain loop over Pinocchio calls of
-  ``tests/benchmarks/loop.py``.
+- mirror loop: ``compensation.mirror`` against the plain loop over Pinocchio calls of ``tests/benchmarks/loop.py``.
 - linear deflection: forward kinematics, Jacobian and J K^-1 J^T F, against roboticstoolbox-python, which is installed
   into a virtual environment of its own (``--toolbox`` names the Python of one that is there already).
 - whole run: the command, in a process with start-up, reading back and all reports, against
@@ -33,7 +32,6 @@ from statistics import median
 import numpy as np
 import pinocchio as pin
 
-from postproc.blocks import blocks
 from postproc.compensation.mirror import mirror
 from postproc.geometry import Poses, rotation_from_vector
 from postproc.model import NOTHING, StiffnessModel
@@ -97,23 +95,20 @@ def mirror_loop(states: States) -> None:
 
     def batch() -> None:
         nonlocal done
-        done = [
-            mirror(model, wanted[rows], wanted[rows], TOOL, wrench[rows], NOTHING, status[rows], q[rows])
-            for rows in blocks(POSES)
-        ]
+        done = mirror(model, wanted, wanted, TOOL, wrench, NOTHING, status, q)
 
     def plain() -> None:
         nonlocal found
         found = [loop.corrected(place, *state) for place, *state in zip(places, q, wrench, strict=False)]
 
-    done, found = [], []
+    done, found = None, []
     batch()
     times = [(timed(batch, POSES), timed(plain, PLAIN)) for _ in range(TIMES)]
     there = np.array([one.command.translation for one in found])
     turned = np.array([one.command.rotation for one in found])
-    off_mm = 1e3 * np.abs(there - done[0].command.position[:PLAIN]).max()
-    angle = np.abs(turned - done[0].command.rotation[:PLAIN]).max()
-    if not all(part.converged.all() for part in done) or not off_mm <= SAME_MM or not angle <= SAME:
+    off_mm = 1e3 * np.abs(there - done.command.position[:PLAIN]).max()
+    angle = np.abs(turned - done.command.rotation[:PLAIN]).max()
+    if not done.converged.all() or not off_mm <= SAME_MM or not angle <= SAME:
         raise SystemExit(f"mirror loop: void, the results are {off_mm:.2g} mm and {angle:.2g} apart")
     faster("mirror loop, Pinocchio, a pose", *map(list, zip(*times, strict=True)), WANTED_MIRROR)
 
