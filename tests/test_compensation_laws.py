@@ -380,3 +380,21 @@ def test_a_posture_that_becomes_singular_is_told_at_its_line():
         found = limits(near, result, divide(near, result, Limits(keep=True)))[0]
         lines += [finding.line for finding in found if finding.code == "KIN003"]
     assert lines == [path.line[2]]
+
+
+def test_a_way_that_is_not_known_has_no_length():
+    ways = line().ways
+    assert not ways.known[0]  # nothing says where the first motion begins
+    assert ways.known.any()
+    assert (ways.length[~ways.known] == 0).all()
+    assert (ways.length[ways.known] > 0).all()
+
+
+@pytest.mark.parametrize("tools", [[0, 0], [0, 1], [1, 0]])
+def test_a_correction_begins_anew_behind_another_tool(tools):
+    """Whichever of the two has the larger number; nothing else changes between the two motions in air."""
+    task = line()
+    path = task.toolpath
+    path = replace(path, tool=np.array([tools[0], *[tools[1]] * (len(path) - 1)]), frames=path.frames * 2)
+    every = np.ones(len(path), bool)
+    assert replace(task, toolpath=path).steps(np.array([1]), every)[0] == (tools[0] != tools[1])
