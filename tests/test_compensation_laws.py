@@ -398,3 +398,21 @@ def test_a_correction_begins_anew_behind_another_tool(tools):
     path = replace(path, tool=np.array([tools[0], *[tools[1]] * (len(path) - 1)]), frames=path.frames * 2)
     every = np.ones(len(path), bool)
     assert replace(task, toolpath=path).steps(np.array([1]), every)[0] == (tools[0] != tools[1])
+
+
+def test_half_a_correction_is_half_of_it_on_the_way_of_an_arc_too():
+    """In the middle of each arc the command lies half as far from the wanted way."""
+    whole, half = (circle(gain=gain) for gain in (1.0, 0.5))
+    divisions = [divide(task, correct(task), FREE) for task in (whole, half)]
+    assert np.array_equal(divisions[0].role, divisions[1].role)
+    arcs = np.flatnonzero(np.isfinite(divisions[0].sweep))
+    assert len(arcs) > 1
+    away = []
+    for task, division in zip((whole, half), divisions, strict=True):
+        pieces = made(task, division, arcs)
+        middle = pieces.at(np.full(len(arcs), 0.5)).position
+        wanted = task.ways.at(pieces.rows, 0.5 * (pieces.first + pieces.last)).position
+        away.append(middle - wanted)
+    size = np.linalg.norm(away[0], axis=1)
+    assert size.min() > 1e-4
+    assert (np.linalg.norm(away[1] - 0.5 * away[0], axis=1) < 0.02 * size).all()
