@@ -408,10 +408,10 @@ def test_half_a_correction_is_half_of_it_on_the_way_of_an_arc_too():
     arcs = np.flatnonzero(np.isfinite(divisions[0].sweep))
     assert len(arcs) > 1
     away = []
-    for task, division in zip((whole, half), divisions, strict=True):
-        pieces = made(task, division, arcs)
+    for cut, division in zip((whole, half), divisions, strict=True):
+        pieces = made(cut, division, arcs)
         middle = pieces.at(np.full(len(arcs), 0.5)).position
-        wanted = task.ways.at(pieces.rows, 0.5 * (pieces.first + pieces.last)).position
+        wanted = cut.ways.at(pieces.rows, 0.5 * (pieces.first + pieces.last)).position
         away.append(middle - wanted)
     size = np.linalg.norm(away[0], axis=1)
     assert size.min() > 1e-4
