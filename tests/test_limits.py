@@ -70,6 +70,19 @@ def test_axes_that_are_too_slow_for_the_feed():
     assert codes(quick)[0] == []
 
 
+def test_the_motion_that_is_too_fast_is_the_one_that_is_told():
+    """The axes turn on the way to its end: its own feed counts, and its own line is told."""
+    task = corner()
+    robot, path = task.model.robot, task.toolpath
+    axes = tuple(replace(axis, speed=np.radians(0.5)) for axis in robot.axes)
+    feed = np.where(np.arange(len(path)) == 3, 0.1, 1e-5)
+    slow = replace(task, model=replace(task.model, robot=replace(robot, axes=axes)))
+    slow = replace(slow, toolpath=replace(path, feed=feed))
+    result = correct(slow)
+    found, _ = limits(slow, result, divide(slow, result, Limits(keep=True)))
+    assert [(finding.code, finding.line) for finding in found] == [("KIN009", path.line[3])]
+
+
 @pytest.mark.parametrize(("blend", "told"), [(0.0, False), (1e-4, False), (1e-2, True), (np.nan, True)])
 def test_roundings_that_are_larger_than_the_correction(blend, told):
     task = corner(blend=np.full(5, blend))
