@@ -82,7 +82,7 @@ def _shares(task: Task, division: Division, motions: Ints, place: Floats, q: Flo
     """(K, n) speeds that the axes ``q`` (K, n) need on the way from the command before, at the programmed feed, over
     those that they can have; 0 where that is not known.  ``place`` (K, 3) [m] of the commands."""
     speeds, share = task.model.robot.speeds, np.zeros(q.shape)
-    if len(motions) < 2 or not np.isfinite(speeds).any():
+    if not np.isfinite(speeds).any():
         return share
     feed = task.toolpath.feed[division.source[motions[1:]]]
     length = np.linalg.norm(np.diff(place, axis=0), axis=1)
@@ -99,9 +99,11 @@ class _Found:
     def __init__(self, task: Task, division: Division) -> None:
         self.task, self.division = task, division
         self.held: dict[int, Finding] = {}
-        self.near, self.nearest = 0, (np.inf, 0, 0)  # motions; what is left, motion, axis
-        self.singular, self.first = 0, 0
-        self.over, self.fastest = 0, (FAST, 0, 0)
+        self.near, self.singular, self.over = 0, 0, 0
+        # of each block: what is left to a limit and the share of a speed, with motion and axis
+        self.nearest: list[tuple[float, int, int]] = []
+        self.fastest: list[tuple[float, int, int]] = []
+        self.first: list[int] = []
 
     def put(self, block: _Block) -> None:
         joints, source = self.task.model.robot.joints, self.division.source
@@ -111,28 +113,26 @@ class _Found:
             self.held[row] = _at(self.task, row, "COR008", message)
         k, axis = divmod(int(np.argmin(block.near)), block.near.shape[1])
         self.near += int(np.isfinite(block.near).any(axis=1).sum())
-        self.nearest = min(self.nearest, (float(block.near[k, axis]), int(block.rows[k]), axis))
-        if block.singular.any() and not self.singular:
-            self.first = int(block.rows[np.argmax(block.singular)])
+        self.nearest.append((float(block.near[k, axis]), int(block.rows[k]), axis))
         self.singular += int(block.singular.sum())
+        self.first += block.rows[block.singular][:1].tolist()
         k, axis = divmod(int(np.argmax(block.share)), block.share.shape[1])
         self.over += int((block.share.max(axis=1) > FAST).sum())
-        if block.share[k, axis] > self.fastest[0]:
-            self.fastest = float(block.share[k, axis]), int(block.rows[k]), axis
+        self.fastest.append((float(block.share[k, axis]), int(block.rows[k]), axis))
 
     def findings(self) -> list[Finding]:
         robot, told = self.task.model.robot, []
         if self.near:
-            left, motion, axis = self.nearest
+            left, motion, axis = min(self.nearest)
             joint = robot.joints[axis]
             unit, word = (DEG, "deg") if joint.kind == "revolute" else (MM, "mm")
             message = f"the correction brings {joint.name} to {left / unit:.2f} {word} from its limit"
             told.append(self._told("KIN008", motion, message, self.near))
         if self.singular:
             message = f"the correction leads near to a singular posture ({singular_words(robot)})"
-            told.append(self._told("KIN003", self.first, message, self.singular))
+            told.append(self._told("KIN003", self.first[0], message, self.singular))
         if self.over:
-            share, motion, axis = self.fastest
+            share, motion, axis = max(self.fastest, key=lambda one: one[0])
             joint, speed = robot.joints[axis], robot.speeds[axis]
             unit, word = (DEG, "deg/s") if joint.kind == "revolute" else (MM, "mm/s")
             message = (
