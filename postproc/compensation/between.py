@@ -44,7 +44,7 @@ class Pieces:
     @staticmethod
     def straight(rows: Ints, first: Floats, last: Floats, begin: Poses, end: Poses) -> Pieces:
         none = np.full((len(rows), 3), np.nan)
-        return Pieces(rows, first, last, begin, end, none, none, none[:, 0])
+        return Pieces(rows, first, last, begin, end, none, none, np.full(len(rows), np.nan))
 
     @staticmethod
     def round(
@@ -53,12 +53,8 @@ class Pieces:
         """Arcs through ``via``; about ``normal`` (K, 3), with what is left along it in proportion, or where that is NaN
         in the plane of the three points."""
         points = begin.position, via.position, end.position
-        free = np.isnan(normal[:, :1])
-        centre, axis, sweep = (
-            np.where(free if one.ndim > 1 else free[:, 0], one, other)
-            for one, other in zip(arc_through(*points), arc_in_plane(*points, normal), strict=True)
-        )
-        return Pieces(rows, first, last, begin, end, centre, axis, sweep)
+        axis = np.where(np.isnan(normal), arc_through(*points)[1], normal)
+        return Pieces(rows, first, last, begin, end, *arc_in_plane(*points, axis))
 
     def __len__(self) -> int:
         return len(self.rows)

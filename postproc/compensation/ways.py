@@ -9,7 +9,7 @@ import numpy as np
 from postproc.arrays import Bools, Floats, Ints
 from postproc.blocks import each_block
 from postproc.compensation.mirror import partly
-from postproc.geometry import UNKNOWN, Placed, PoseRows, Poses, on_arc
+from postproc.geometry import UNKNOWN, Placed, PoseRows, Poses, on_arc, turned
 from postproc.robot.description import Robot
 from postproc.robot.track import Track, nominal_flange
 from postproc.toolpath import Kind, Toolpath
@@ -42,9 +42,8 @@ class Ways:
         def measured(block: slice) -> None:
             rows = np.arange(block.start, block.stop)
             start, end = begin[rows], wanted[rows].position
-            known[block] &= np.isfinite(start.position[:, 0]) & np.isfinite(end[:, 0])
-            known[block] &= np.isfinite(start.rotation[:, 0, 0])
             way = np.linalg.norm(end - start.position, axis=1)
+            known[block] &= np.isfinite(way) & np.isfinite(start.rotation[:, 0, 0])
             bent = np.flatnonzero(ways.arc[rows])
             if len(bent):
                 centre, normal, sweep = ways.circles(rows[bent])
@@ -67,9 +66,8 @@ class Ways:
     def circles(self, rows: Ints) -> tuple[Floats, Floats, Floats]:
         """Centre (K, 3) [m], normal (K, 3) and sweep (K,) of the arcs ``rows`` (K,), in the robot base."""
         base = self.base[rows]
-        centre = (base @ Poses(np.eye(3), self.path.centre[rows])).position
-        normal = (base.rotation @ self.path.normal[rows][..., None])[..., 0]
-        return centre, normal, self.path.sweep[rows]
+        centre = base.position + turned(base.rotation, self.path.centre[rows])
+        return centre, turned(base.rotation, self.path.normal[rows]), self.path.sweep[rows]
 
     def at(self, rows: Ints, share: Floats) -> Poses:
         """Poses (K) at the shares (K,) of the ways of ``rows`` (K,): straight or round, turning evenly."""
@@ -93,7 +91,7 @@ class Ways:
             rise = np.sum(step[bent] * normal, axis=1)[:, None]
             step[bent] = sweep[:, None] * np.cross(normal, here - centre) + rise * normal
         length = np.linalg.norm(step, axis=1, keepdims=True)
-        return np.where(length > _NO_MOVE, step / np.where(length > 0, length, 1.0), 0.0)
+        return np.where(length > _NO_MOVE, step / np.maximum(length, _NO_MOVE), 0.0)
 
 
 def begins(end: Placed, path: Toolpath, tool: Poses, robot: Robot, track: Track) -> PoseRows:
@@ -103,16 +101,15 @@ def begins(end: Placed, path: Toolpath, tool: Poses, robot: Robot, track: Track)
     def made(rows: Ints) -> Poses:
         before = np.maximum(rows - 1, 0)
         found = end[before].copy()
-        found.put(rows == 0, UNKNOWN)
-        follows = rows > 0
-        other = np.flatnonzero(follows & (path.tool[rows] != path.tool[before]) & path.known[before])
+        other = np.flatnonzero((path.tool[rows] != path.tool[before]) & path.known[before])
         if len(other):
             found.put(other, found[other] @ tool[before[other]].inverse() @ tool[rows[other]])
-        behind_axes = np.flatnonzero(follows & ~path.known[before])
+        behind_axes = np.flatnonzero(~path.known[before])
         behind_axes = behind_axes[np.isfinite(track.q[before[behind_axes]]).all(axis=1)]
         if len(behind_axes):
             flange = nominal_flange(robot, track.q[before[behind_axes]])
             found.put(behind_axes, flange @ tool[rows[behind_axes]])
+        found.put(rows == 0, UNKNOWN)
         return found
 
     return PoseRows(len(path), made)
