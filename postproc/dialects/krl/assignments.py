@@ -267,7 +267,7 @@ def _set_variable(run: Run, said: Assignment) -> None:
         path = b"[" + indices + b"]"
     if not said.path:
         value = _value(run, said.value.rstrip(), said.at)
-        _keep(run, name, path, value)
+        keep(run, name, path, value)
         return
     inner, _, key = said.path.rpartition(b".")
     if b"[" in said.path:
@@ -277,7 +277,7 @@ def _set_variable(run: Run, said: Assignment) -> None:
     is_component = key in COMPONENTS or key in AXES or key in EXTERNAL or key in (b"S", b"T")
     before = run.variables.get(name, path)
     if not is_component or not (isinstance(before, Target) or _may_be_point(run, name, path)):
-        _keep(run, name, path + b"." + key, _value(run, said.value.rstrip(), said.at))
+        keep(run, name, path + b"." + key, _value(run, said.value.rstrip(), said.at))
         return
     text = said.value.rstrip()
     value = run.value(text)
@@ -301,7 +301,7 @@ def _may_be_point(run: Run, name: bytes, path: bytes) -> bool:
     return b"." in path or run.type_of(name) not in SCALARS
 
 
-def _keep(run: Run, name: bytes, path: bytes, value: Value) -> None:
+def keep(run: Run, name: bytes, path: bytes, value: Value) -> None:
     """Stores a value; a number only where no other program can change it."""
     if not isinstance(value, (Target, Unclear)):
         if not run.trusted(name):

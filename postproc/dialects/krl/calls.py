@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from postproc.dialects.krl.assignments import command
+from postproc.dialects.krl.assignments import command, keep
 from postproc.dialects.krl.blocks import Blocks
 from postproc.dialects.krl.effects import PATH_FROM_FILE, is_harmless
 from postproc.dialects.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, value_end
@@ -99,7 +99,7 @@ class Calls(Blocks):
         run.routine = call.routine
         for value, name, path in back:
             if value is not None:
-                run.variables.set(name, path, value)
+                keep(run, name, path, value)
         return call.back
 
     def _call(self, pc: int, item: Statement, said: Call) -> int:
@@ -144,8 +144,11 @@ class Calls(Blocks):
         own = run.routine.types if run.routine is not None else {}
         names = dict.fromkeys([*own, *routine.types])
         self.spent += len(names)
-        opened.saved = tuple((name, variables.replace(name, given.get(name))) for name in names)
         run.routine = routine
+        for name, entry in given.items():
+            for key, value in entry.items():
+                entry[key] = run.converted(name, value)
+        opened.saved = tuple((name, variables.replace(name, given.get(name))) for name in names)
         run.followed[routine.name] = None
         return routine.begin + 1
 

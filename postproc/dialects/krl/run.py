@@ -8,7 +8,7 @@ from postproc.dialects.krl.bulk import Bulk
 from postproc.dialects.krl.data import Declarations
 from postproc.dialects.krl.effects import Effects
 from postproc.dialects.krl.expressions import Value, evaluate
-from postproc.dialects.krl.lexing import LOOPS, SCALARS, Statement
+from postproc.dialects.krl.lexing import LOOPS, Statement
 from postproc.dialects.krl.rows import HELP, Rows
 from postproc.dialects.krl.state import ZERO, Frames, Source, State
 from postproc.dialects.krl.survey import Block, Routine, Survey
@@ -135,14 +135,15 @@ class Run:
         return name in self.declarations.types and name not in self.declarations.shared
 
     def converted(self, name: bytes, value: Value) -> Value:
-        """The value as a variable of its type holds it."""
+        """The value as a variable of its type holds it; a number is no BOOL, and a BOOL no number."""
         kind = self.type_of(name)
-        if kind in SCALARS and isinstance(value, (int, float)) and not isinstance(value, bool):
-            if kind == b"INT":
-                return int(value + 0.5) if value >= 0 else -int(0.5 - value)
-            if kind == b"REAL":
-                return float(value)
-        return value
+        if not isinstance(value, (int, float)) or kind not in (b"INT", b"REAL", b"BOOL"):
+            return value
+        if isinstance(value, bool) != (kind == b"BOOL"):
+            return Unclear("KRL002", f"{shown(name)} is of type {shown(kind)} and is given what is none")
+        if kind == b"INT":
+            return int(value + 0.5) if value >= 0 else -int(0.5 - value)
+        return float(value) if kind == b"REAL" else value
 
     def why_walked(self, routine: Routine) -> str:
         """Why the motions of a subprogram are not known to run, or run otherwise than they are read here."""
