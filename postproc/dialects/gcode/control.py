@@ -94,11 +94,11 @@ UNKNOWN = -1
 
 
 class Line(NamedTuple):
-    """A line that is not plain words: its words (address offset, key, number's start and stop or -1, value, How) and
-    what else it says."""
+    """A line that is not plain words: its words (address offset, key, number's start and stop or -1, value, How), the
+    kinds and texts of what else it says, whether it begins with a slash."""
 
     words: list[tuple[int, int, int, int, float, int]]
-    notes: list[Note]
+    notes: list[tuple[str, str]]
     deleted: bool
 
 
@@ -175,7 +175,7 @@ class Control:
     name: str
     codes: Mapping[int, Code]
     also: Mapping[int, tuple[Code, ...]] = field(default_factory=dict, kw_only=True)
-    line: Callable[[bytes, int], Line]
+    line: Callable[[bytes], Line]
     comment: bytes
     named: Mapping[bytes, Code] = field(default_factory=dict)
     names: Mapping[bytes, int] = field(default_factory=dict)

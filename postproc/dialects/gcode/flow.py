@@ -15,6 +15,7 @@ from postproc.dialects.gcode.source import Source
 from postproc.dialects.gcode.words import key
 
 _GOTO = re.compile(r"(?:GOTO[BFC]?|REPEATB?)\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
+_ZEROS = re.compile(r"^N?0*(?=\d)")
 CALLS = (72, 97, 98, 198)
 """M72 of LinuxCNC brings back modes that M70 has saved."""
 LOCAL = 97
@@ -141,7 +142,7 @@ def _stretches(source: Source, n: int, forget: Bools, entered: Bools) -> list[tu
             if goto is None:
                 continue
             labels = _labels(source) if labels is None else labels
-            ends = [labels.get(name.upper().lstrip("N0") or "0") for name in goto.groups() if name]
+            ends = [labels.get(_label(name)) for name in goto.groups() if name]
             if not ends or None in ends:
                 found.append((0, n))
             else:
@@ -159,6 +160,9 @@ def _labels(source: Source) -> dict[str, int]:
     known = np.isfinite(numbers.value)
     names = [f"{value:.0f}" for value in numbers.value[known].tolist()]
     labels = dict(zip(names, numbers.block[known].tolist(), strict=True))
-    return labels | {
-        note.text.upper().lstrip("N0"): note.block for note in source.notes if note.kind == "label"
-    }
+    return labels | {_label(note.text): note.block for note in source.notes if note.kind == "label"}
+
+
+def _label(name: str) -> str:
+    """A label in upper case, of a block number the digits: N0030 and 30 are 30."""
+    return _ZEROS.sub("", name.upper())

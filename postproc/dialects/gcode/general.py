@@ -6,7 +6,7 @@ import math
 import re
 
 from postproc.dialects.gcode.control import Line
-from postproc.dialects.gcode.words import How, Note
+from postproc.dialects.gcode.words import How
 
 _NUMBER = rb"[-+]?[ \t]*(?:\d[\d \t]*(?:\.[\d \t]*)?|\.[ \t]*\d[\d \t]*)"
 _TOKEN = re.compile(
@@ -43,88 +43,87 @@ HARMLESS = (b"EXCLUDE_OBJECT", b"SET_", b"TIMELAPSE", b"POPEN", b"PCLOS", b"DPRN
 """Names of commands that move nothing."""
 
 
-def line(text: bytes, offset: int) -> Line:
-    """Takes one line apart, comments blanked; ``offset`` is added to all places."""
+def line(text: bytes) -> Line:
+    """Takes one line apart, comments blanked."""
     words: list[tuple[int, int, int, int, float, int]] = []
-    notes: list[Note] = []
+    notes: list[tuple[str, str]] = []
 
-    def note(kind: str, said: bytes, at: int) -> None:
-        notes.append(Note(0, kind, said[:60].decode("latin-1"), offset + at))
+    def note(kind: str, said: bytes) -> None:
+        notes.append((kind, said.decode("latin-1")))
 
     place, deleted = 0, False
     head = _HEAD.match(text)
     if head is not None:
         place = head.end()
         if head["tape"]:
-            note("tape", b"%", head.start("tape"))
+            note("tape", b"%")
             return Line(words, notes, False)
         # With more behind it, it is the number of a block.
         if head["program"] and not text[place:].strip():
-            note("program", head["program"], head.start("program"))
+            note("program", head["program"])
     said = _TEXT.match(text, place)
     if said is not None:
-        words.append((offset + said.start(1), ord("M"), -1, offset + said.end(1), 117.0, How.INTEGER))
+        words.append((said.start(1), ord("M"), -1, said.end(1), 117.0, How.INTEGER))
         return Line(words, notes, deleted)
     flow = _FLOW.match(text, place)
     if flow is not None:
-        note(_FLOW_WORDS.get(flow[2].upper(), "unknown"), flow[1], flow.start(1))
+        note(_FLOW_WORDS.get(flow[2].upper(), "unknown"), flow[1])
         return Line(words, notes, deleted)
     while place < len(text):
         found = _TOKEN.match(text, place)
         if found is None and _speaks(words):
             break
         if found is None:
-            note("unknown", text[place:].strip(), place)
+            note("unknown", text[place:].strip())
             break
         place = found.end()
         kind = found.lastgroup or ""
         if kind == "number":
             literal = found["number"]
-            start = offset + found.start("number")
+            start = found.start("number")
             stop = start + len(literal.rstrip())
             value = float(literal.translate(None, b" \t"))
             how = How.NUMBER if b"." in literal else How.INTEGER
             if not math.isfinite(value):
                 value, how = math.nan, How.UNREAD
-            words.append(
-                (offset + found.start("letter"), ord(found["letter"].upper()), start, stop, value, how)
-            )
+            words.append((found.start("letter"), ord(found["letter"].upper()), start, stop, value, how))
         elif kind == "open":
             start = found.start("sign")
             place = _expression(text, found.start("open"))
-            at = offset + found.start("letter")
+            at = found.start("letter")
             letter = ord(found["letter"].upper())
-            words.append((at, letter, offset + start, offset + place, math.nan, How.UNREAD))
+            words.append((at, letter, start, place, math.nan, How.UNREAD))
         elif kind == "slash":
             deleted = True
         elif kind == "bare":
             # G28 X Y of printers; behind an M code (M84 X Y) it is no axis.
-            at, codes = offset + found.start("bare"), [word[1] for word in words]
+            at, codes = found.start("bare"), [word[1] for word in words]
             if ord("G") in codes:
                 words.append((at, ord(found["bare"].upper()), -1, at + 1, math.nan, How.UNREAD))
             elif ord("M") not in codes:
-                note("unknown", text[found.start() :].strip(), found.start())
+                note("unknown", text[found.start() :].strip())
                 break
         elif kind == "assign":
             target = _TARGET.match(text, found.start())
-            note("assign", (target and target[1]) or b"", found.start())
+            note("assign", (target and target[1]) or b"")
             break
         elif kind == "corner":
-            note("corner", text[found.start() :].strip(), found.start())
+            note("corner", text[found.start() :].strip())
         elif kind == "name":
             word = found["name"].upper()
             if word.startswith(HARMLESS) or _speaks(words):
                 break
             if word in _JUMPS:
-                note("jump", text[found.start() :].strip(), found.start())
+                note("jump", text[found.start() :].strip())
             elif word in (b"WHILE", b"DO", b"END"):
-                note("close" if word == b"END" else "open", b"", found.start())
+                note("close" if word == b"END" else "open", b"")
             else:
-                note("unknown", text[found.start() :].strip(), found.start())
+                note("unknown", text[found.start() :].strip())
             break
-    if words and (text.count(b"[") > text.count(b"]") or text.rstrip().endswith(b"#")):
+    opened = any(text.count(one) > text.count(other) for one, other in ((b"[", b"]"), (b"#<", b">")))
+    if words and (opened or text.rstrip().endswith(b"#")):
         # What is put behind such a line would belong to its expression.
-        note("unknown", text.strip(), 0)
+        note("unknown", text.strip())
     return Line(words, notes, deleted)
 
 

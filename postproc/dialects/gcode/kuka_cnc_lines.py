@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from postproc.dialects.gcode.control import Line
 from postproc.dialects.gcode.sinumerik_expression import bracket_end, constant, expression_end, is_open
-from postproc.dialects.gcode.words import How, Note, key
+from postproc.dialects.gcode.words import How, key
 
 _HEAD = re.compile(rb"[ \t\x0b\x0c]*(?P<slash>/[ \t]*\d?[ \t]*)?(?:[Nn:][ \t]*\d+)?[ \t]*")
 _COMMAND = re.compile(rb"#[ \t]*([A-Za-z]+)[ \t]*([A-Za-z]*)[ \t]*")
@@ -38,17 +38,15 @@ class Lines:
     def __init__(self, names: Mapping[bytes, tuple[float, ...]]) -> None:
         self._names = names
 
-    def __call__(self, text: bytes, offset: int) -> Line:
+    def __call__(self, text: bytes) -> Line:
         words: list[tuple[int, int, int, int, float, int]] = []
-        notes: list[Note] = []
+        notes: list[tuple[str, str]] = []
 
-        def note(kind: str, said: bytes, at: int) -> None:
-            notes.append(Note(0, kind, said[:60].decode("latin-1"), offset + at))
+        def note(kind: str, said: bytes) -> None:
+            notes.append((kind, said.decode("latin-1")))
 
         def word(at: int, address: int, start: int, stop: int, value: float, how: int) -> None:
-            words.append(
-                (offset + at, address, offset + start if start >= 0 else -1, offset + stop, value, how)
-            )
+            words.append((at, address, start, stop, value, how))
 
         head = _HEAD.match(text)
         place = head.end() if head else 0
@@ -66,13 +64,13 @@ class Lines:
                 kind = "close" if name.startswith(b"END") else "open"
                 if name in (b"ELSE", b"ELSEIF", b"CASE", b"BREAK", b"CONTINUE"):
                     kind = "between"
-                note("jump" if b"GOTO" in text.upper() else kind, text[place:].strip().upper(), place)
+                note("jump" if b"GOTO" in text.upper() else kind, text[place:].strip().upper())
                 break
             address, plain = _ADDRESS.match(text, place), _WORD.match(text, place)
             if address is not None:
                 letter, index = address[1].decode().upper(), address[2]
                 if letter == "P" and index:
-                    note("assign", b"<" + address[0], place)
+                    note("assign", b"<" + address[0])
                     break
                 close = expression_end(text, address.end())
                 literal = text[address.end() : close].rstrip()
@@ -89,7 +87,7 @@ class Lines:
             else:
                 place = self._rest(text, place, words, note)
         if words and is_open(text):
-            note("unknown", text.strip(), 0)
+            note("unknown", text.strip())
         return Line(words, notes, deleted)
 
     def _command(self, text: bytes, place: int, command, word, note) -> None:  # type: ignore[no-untyped-def]
@@ -99,9 +97,9 @@ class Lines:
             word(place, key("G"), -1, len(text.rstrip()), number, How.INTEGER)
         if said in self._names or name in self._names or name in QUIET:
             if name == b"CS":
-                note("frame", text[place:].strip().upper(), place)
+                note("frame", text[place:].strip().upper())
             return
-        note("call", text[place:].strip(), place)
+        note("call", text[place:].strip())
 
     @staticmethod
     def _rest(text: bytes, place: int, words: list[tuple[int, int, int, int, float, int]], note) -> int:  # type: ignore[no-untyped-def]
@@ -116,7 +114,7 @@ class Lines:
                 at = bracket_end(text, at)
             assigned = text[at:].lstrip(b" \t").startswith(b"=")
             quiet = assigned or name[0].upper() == b"WAIT"
-            note("assign" if quiet else "call", b"<" + rest if quiet else rest, place)
+            note("assign" if quiet else "call", b"<" + rest if quiet else rest)
         else:
-            note("unknown", rest, place)
+            note("unknown", rest)
         return len(text)

@@ -64,7 +64,6 @@ def lex(raw: bytes, control: Control, begin: int = 0, end: int | None = None, li
             places += begin
         words.start[words.start >= 0] += begin
         comments[:, :2] += begin
-        notes = tuple(Note(note.block, note.kind, note.text, note.at + begin) for note in notes)
     blocks.line[:] += line
     comments[:, 2] += line + np.searchsorted(feeds, comments[:, 0] - begin)
     return Text(words, blocks, notes, comments)
@@ -197,11 +196,11 @@ def _values(letters: Bytes, start: Ints, stop: Ints) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Other:
-    """Words of the other lines; notes: of which line, what it says, where that line begins; said: lines with notes or
-    a slash; deleted: those with a slash."""
+    """Words of the other lines; notes: of which line, their kinds and texts; said: lines with notes or a slash;
+    deleted: those with a slash."""
 
     words: _Plain
-    notes: list[tuple[int, Note, int]]
+    notes: list[tuple[int, str, str]]
     said: Ints
     deleted: Ints
 
@@ -210,7 +209,7 @@ def _taken(texts: list[bytes], rows: Ints, starts: Ints, control: Control) -> _O
     """The lines that are not plain, each text taken apart once; ``rows``: their numbers."""
     number: dict[bytes, int] = {}
     which = np.array([number.setdefault(text, len(number)) for text in texts], dtype=np.int64)
-    lines = [control.line(text, 0) for text in number]
+    lines = [control.line(text) for text in number]
     counts = np.array([len(line.words) for line in lines], dtype=np.int64)
     flat = [word for line in lines for word in line.words]
     columns = zip(*flat, strict=True) if flat else [()] * 6
@@ -235,10 +234,8 @@ def _taken(texts: list[bytes], rows: Ints, starts: Ints, control: Control) -> _O
     slashed = np.array([line.deleted for line in lines], dtype=np.bool_)
     noted = np.flatnonzero(speaks[which]) if len(lines) else which
     notes = [
-        (row, note, begin)
-        for row, begin, text in zip(
-            rows[noted].tolist(), starts[rows[noted]].tolist(), which[noted].tolist(), strict=True
-        )
+        (row, *note)
+        for row, text in zip(rows[noted].tolist(), which[noted].tolist(), strict=True)
         for note in lines[text].notes
     ]
     deleted = rows[slashed[which]] if len(lines) else rows
@@ -285,8 +282,5 @@ def _joined(
         deleted=deleted[used],
     )
     where = np.searchsorted(used, np.array([row for row, _, _ in other.notes], dtype=np.int64)).tolist()
-    notes = tuple(
-        Note(block, note.kind, note.text, note.at + begin)
-        for block, (_, note, begin) in zip(where, other.notes, strict=True)
-    )
+    notes = tuple(Note(block, kind, said) for block, (_, kind, said) in zip(where, other.notes, strict=True))
     return words, blocks, notes

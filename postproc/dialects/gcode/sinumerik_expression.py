@@ -52,7 +52,7 @@ def expression_end(text: bytes, at: int) -> int:
 
 def is_open(text: bytes) -> bool:
     """Whether a string, a bracket or a sum does not close: what is put behind such a line would belong to it."""
-    rest = _CLOSED.sub(b"", text).rstrip()
+    rest = _CLOSED.sub(b"0", text).rstrip()
     return (
         b'"' in rest
         or rest.endswith((b"=", b"+", b"-", b"*", b"/"))

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from postproc.dialects.gcode.control import Line
 from postproc.dialects.gcode.sinumerik_expression import bracket_end, constant, expression_end, is_open
-from postproc.dialects.gcode.words import NAMES, How, Note, key
+from postproc.dialects.gcode.words import NAMES, How, key
 
 TURN, RPL = NAMES, NAMES + 1
 NAMED_WORDS: Mapping[bytes, int] = {b"CR": key("R"), b"TURN": TURN, b"RPL": RPL}
@@ -69,30 +69,30 @@ class Lines:
     def __init__(self, names: Mapping[bytes, tuple[float, ...]], tools: Mapping[bytes, int]) -> None:
         self._names, self._tools = names, tools
 
-    def __call__(self, text: bytes, offset: int) -> Line:
-        return _Taken(text, offset, self._names, self._tools).line()
+    def __call__(self, text: bytes) -> Line:
+        return _Taken(text, self._names, self._tools).line()
 
 
 class _Taken:
     def __init__(
-        self, text: bytes, offset: int, names: Mapping[bytes, tuple[float, ...]], tools: Mapping[bytes, int]
+        self, text: bytes, names: Mapping[bytes, tuple[float, ...]], tools: Mapping[bytes, int]
     ) -> None:
-        self.text, self.offset, self.names, self.tools = text, offset, names, tools
+        self.text, self.names, self.tools = text, names, tools
         self.words: list[tuple[int, int, int, int, float, int]] = []
-        self.notes: list[Note] = []
+        self.notes: list[tuple[str, str]] = []
         self.deleted = False
 
     def line(self) -> Line:
         program = _PROGRAM.match(self.text)
         if program is not None:
-            self.note("program" if program[1] else "tape", program[1], program.start())
+            self.note("program" if program[1] else "tape", program[1])
             return Line([], self.notes, False)
         head = _HEAD.match(self.text)
         place = head.end() if head else 0
         self.deleted = head is not None and bool(head["slash"] or head["slash2"])
         label = _LABEL.match(self.text, place)
         if label is not None:
-            self.note("label", label[1].upper(), place)
+            self.note("label", label[1].upper())
             place = label.end()
         while place < len(self.text):
             if self.text[place] in b" \t\x0b\x0c":
@@ -100,15 +100,14 @@ class _Taken:
                 continue
             place = self.token(place)
         if self.words and is_open(self.text):
-            self.note("unknown", self.text[head.end() if head else 0 :].strip(), 0)
+            self.note("unknown", self.text[head.end() if head else 0 :].strip())
         return Line(self.words, self.notes, self.deleted)
 
-    def note(self, kind: str, said: bytes, at: int) -> None:
-        self.notes.append(Note(0, kind, said[:60].decode("latin-1"), self.offset + at))
+    def note(self, kind: str, said: bytes) -> None:
+        self.notes.append((kind, said.decode("latin-1")))
 
     def word(self, at: int, address: int, start: int, stop: int, value: float, how: int) -> None:
-        begin = self.offset + start if start >= 0 else -1
-        self.words.append((self.offset + at, address, begin, self.offset + stop, value, how))
+        self.words.append((at, address, start, stop, value, how))
 
     def codes(self, at: int, stop: int, name: bytes) -> None:
         for number in self.names[name]:
@@ -121,10 +120,10 @@ class _Taken:
         if address is not None:
             letter, index = address[1].upper(), address[2]
             if letter == b"R" and index:
-                self.note("assign", b"<" + address[0], place)
+                self.note("assign", b"<" + address[0])
                 return len(text)
             if letter == b"G":
-                self.note("axis", address[0], place)
+                self.note("axis", address[0])
                 return expression_end(text, address.end())
             number = key(letter.decode(), int(index) if index else None)
             return self.value(place, number, address.end())
@@ -138,7 +137,7 @@ class _Taken:
             how = How.NUMBER if b"." in literal else How.INTEGER
             self.word(place, key(plain[1].decode().upper()), start, plain.end(), value, how)
             return plain.end()
-        self.note("unknown", text[place:].strip(), place)
+        self.note("unknown", text[place:].strip())
         return len(text)
 
     def value(self, place: int, address: int, at: int) -> int:
@@ -148,7 +147,7 @@ class _Taken:
             string = _STRING.match(text, at)
             if string is not None and string[0] in self.tools:
                 tool = self.tools[string[0]]
-                self.note("tool", b"T=%s is tool %d of the cell" % (string[0], tool), place)
+                self.note("tool", b"T=%s is tool %d of the cell" % (string[0], tool))
                 self.word(place, address, -1, string.end(), float(tool), How.INTEGER)
                 return string.end()
         how = _HOW.match(text, at)
@@ -177,7 +176,7 @@ class _Taken:
         if assigned is not None and not name.startswith(b"$"):
             return self.assigned(name, place, assigned.end())
         if name.startswith(b"$"):
-            self.note("base" if name.startswith(b"$P_UIFR") else "assign", b"<" + text[place:].strip(), place)
+            self.note("base" if name.startswith(b"$P_UIFR") else "assign", b"<" + text[place:].strip())
             return len(text)
         if name in self.names:
             self.codes(place, end, name)
@@ -194,16 +193,16 @@ class _Taken:
         close = expression_end(self.text, behind)
         if name in ACTIONS:
             # It acts before the motion, as S and M do.
-            self.word(place, key("S"), -1, close, math.nan, How.UNREAD)
+            self.word(place, key("S"), -1, len(self.text[:close].rstrip()), math.nan, How.UNREAD)
         elif name in CORNERS or name in POLAR:
-            self.note("corner" if name in CORNERS else "polar", name, place)
+            self.note("corner" if name in CORNERS else "polar", name)
         elif name in SETTINGS:
             pass
         elif name in POSITIONS or self.words or _AXIS.fullmatch(name):
             # In a block with other words it can only be an axis of the machine.
-            self.note("axis", name, place)
+            self.note("axis", name)
         else:
-            self.note("assign", b"<" + self.text[place:].strip(), place)
+            self.note("assign", b"<" + self.text[place:].strip())
         return max(close, behind + 1)
 
     def arguments(self, end: int) -> int:
@@ -223,19 +222,17 @@ class _Taken:
         if name in OPENS or name in CLOSES or name in JUMPS or name in DECLARES or name in QUIET_NAMES:
             said = text[place:].strip().upper()
             if b"GOTO" in said or name in JUMPS:
-                self.note(
-                    "jump" if b"GOTO" in said or name in (b"REPEAT", b"REPEATB") else "call", said, place
-                )
+                self.note("jump" if b"GOTO" in said or name in (b"REPEAT", b"REPEATB") else "call", said)
             elif name in OPENS or name in CLOSES:
-                self.note("open" if name in OPENS else "close", said, place)
+                self.note("open" if name in OPENS else "close", said)
             else:
-                self.note("assign", b"<" + said, place)
+                self.note("assign", b"<" + said)
             return len(text)
         closed = self.arguments(end)
         if name in QUIET_CALLS:
             return closed
         if self.words or (closed == end and text[end:].strip()):
-            self.note("unknown", text[place:].strip(), place)
+            self.note("unknown", text[place:].strip())
             return len(text)
-        self.note("call", name, place)
+        self.note("call", name)
         return closed

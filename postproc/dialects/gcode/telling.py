@@ -45,7 +45,7 @@ def told(
     text = given.noted("unknown") & ~motion
     if text.any():
         said = next(note.text for note in given.source.notes if note.kind == "unknown" and text[note.block])
-        tell(text, "GCO001", f"not understood: {said!r}")
+        tell(text, "GCO001", f"not understood: {said[:60]!r}")
     strange = modal.strange.block[~motion[modal.strange.block] & live[modal.strange.block]]
     codes = np.nan_to_num(modal.strange.last(strange), nan=-1.0)
     for value in np.unique(codes)[:100].tolist():

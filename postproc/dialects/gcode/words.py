@@ -53,12 +53,11 @@ class Words:
 
 
 class Note(NamedTuple):
-    """What a block says besides its words: ``kind`` of the said, its text, where it stands."""
+    """What a block says besides its words: ``kind`` of the said, and its text."""
 
     block: int
     kind: str
     text: str
-    at: int
 
 
 @dataclass(frozen=True, eq=False)
