@@ -1,0 +1,102 @@
+"""Small programs of G-code beside all that is read of them: every motion with its modes, every finding in full.
+
+A file holds the control (and how the cell reads it), the program, a line of dashes, and the reading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from postproc.arrays import Floats
+from postproc.dialects.dialect import Program, Settings
+from postproc.dialects.gcode import DIALECTS
+from postproc.dialects.gcode.control import Feed
+from postproc.document import Document
+from postproc.geometry import abc_from_rotation
+from postproc.toolpath import Kind
+from postproc.units import DEG, MM
+
+CASES = sorted((Path(__file__).parent / "programs" / "readings").glob("*.txt"))
+NAMES = {dialect.name: dialect for dialect in DIALECTS}
+DOWN = np.array([0.0, 0.0, np.pi])
+RULE = "--------\n"
+
+
+def read(head: str, text: str) -> Program:
+    name, *words = head.split()
+    orientation = None if "unoriented" in words else DOWN
+    settings = Settings(orientation=orientation, integer_words="um" if "um" in words else "mm")
+    return NAMES[name].read((Document(Path("part.nc"), text.encode("latin-1")),), settings)
+
+
+def number(value: float) -> str:
+    return "?" if np.isnan(value) else f"{round(value, 4) + 0.0:g}"
+
+
+def letters(names: str, values: Floats) -> str:
+    return " ".join(f"{name}{number(value)}" for name, value in zip(names, values, strict=True))
+
+
+def reading(program: Program) -> Iterator[str]:
+    path, text = program.toolpath, program.text
+    for row in range(len(path)):
+        said = [f"{path.line[row]} {Kind(path.kind[row]).name}", letters("XYZ", path.position[row] / MM)]
+        if np.isnan(path.rotation[row, 0, 0]):
+            said.append("ABC?")
+        elif text.orient[row] >= 0:
+            said.append(letters("ABC", abc_from_rotation(path.rotation[row]) / DEG))
+        if np.isfinite(path.sweep[row]):
+            centre, normal = path.centre[row] / MM, path.normal[row]
+            said.append(
+                f"arc {letters('XYZ', centre)} {letters('UVW', normal)} {number(path.sweep[row] / DEG)}deg"
+            )
+        if text.orient[row] >= 0:
+            ways = "written" if path.oriented[row] else "kept"
+            said.append(f"{letters('abc', text.turned_values[row])} {ways}")
+            said.append(f"from {letters('abc', text.turned_before[row])}")
+            if np.isfinite(path.free_axis[row, 0]):
+                said.append(f"about {letters('xyz', path.free_axis[row])}")
+        said.append(f"F{number(path.feed[row] / MM * 60)}")
+        for letter, index in (("G", path.base[row]), ("T", path.tool[row])):
+            frame = path.frames[index] if index >= 0 else None
+            said.append(f"{letter}{frame.number if frame else '?'}{'w' if frame and frame.pose else ''}")
+        said.append(f"from {letters('XYZ', text.begin[row] / MM)}")
+        said.append(f"blend {number(path.blend[row] / MM)}" if path.blend[row] > 0 else "")
+        said.append("exact" if path.blend[row] == 0 else "")
+        said.append({0: "", 1: "G18", 2: "G19"}.get(int(text.plane[row]), "plane?"))
+        said.append("G91" if text.incremental[row] else "")
+        said.append("centres absolute" if text.arc_absolute[row] else "")
+        said.append("any plane" if path.any_plane[row] and path.kind[row] == Kind.CIRC else "")
+        if text.scale[row] != MM or text.increment[row] != MM:
+            said.append(f"unit {number(text.scale[row] / MM)} {number(text.increment[row] / MM)}")
+        if text.frame[row]:
+            said.append(f"frame {letters('XYZ', text.frames.position[text.frame[row]] / MM)}")
+        if text.feed_mode[row] != Feed.PER_MINUTE:
+            said.append(f"feed {text.feed_mode[row]}")
+        said.append("timed" if path.timed[row] else "")
+        yield " ".join(word for word in said if word)
+        for name in ("refused", "pinned"):
+            finding = getattr(path, name).get(row)
+            if finding:
+                yield f"  {name} {finding.code} {finding.line}:{finding.column} {finding.message}"
+        if row in path.whole:
+            yield f"  whole: {path.whole[row]}"
+    for note in path.annotations:
+        yield f"speaks before {note.row} line {note.line}: {note.text}"
+    for note in path.comments:
+        yield f"comment before {note.row} line {note.line}: {note.text}"
+    yield f"mark {program.marker_at.start}" + (f" in place of {program.marker}" if program.marker else "")
+    for finding in program.findings:
+        yield f"{finding.code} {finding.line}:{finding.column} {finding.message}"
+        yield f"  {finding.help}"
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_a_program_reads_as_said(path: Path) -> None:
+    program, expected = path.read_text(encoding="latin-1").split(RULE)
+    head, text = program.split("\n", 1)
+    assert list(reading(read(head, text))) == expected.splitlines()
