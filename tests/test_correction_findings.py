@@ -1,0 +1,397 @@
+"""What a correction says, word for word: every reason for which motions are left or a program is refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+import pytest
+from test_mirror import ALL, CARRIES, FIRST_LEFT, A, C, full, program_angles, switch, task
+
+import postproc.blocks
+from postproc.compensation.correct import State, correct
+from postproc.compensation.task import Task
+from postproc.findings import Finding, Refusal
+from postproc.geometry import Poses
+from postproc.toolpath import Kind
+
+LEFT, OFF = State.LEFT, State.OFF
+SECOND_LEFT = [A, C, C, C, A, LEFT, LEFT, LEFT, A]
+BOTH_LEFT = [A, LEFT, LEFT, LEFT, A, LEFT, LEFT, LEFT, A]
+
+
+def words(result):
+    assert all(one.file == "part.src" for one in result.findings)
+    return [(one.code, one.line, one.message, one.help) for one in result.findings]
+
+
+def cut_left(first, last, reason, help=""):
+    return (
+        "COR003",
+        first,
+        f"the cut of lines {first} to {last} (3 motions) is left as it was; {reason}",
+        help,
+    )
+
+
+FIRST = (11, 13)
+SECOND = (15, 17)
+
+
+def lost(*rows):
+    """A task whose targets of ``rows`` are not known."""
+    job = task()
+    position = job.wanted.position.copy()
+    position[list(rows)] = np.nan
+    return task(wanted=Poses(job.wanted.rotation, position))
+
+
+def far(*rows, **more):
+    """A task whose targets of ``rows`` are far out of reach."""
+    wanted = task().wanted
+    position = wanted.position.copy()
+    position[list(rows)] += [3.0, 0.0, 0.0]
+    return task(wanted=Poses(wanted.rotation, position), **more)
+
+
+def standing(**degrees):
+    """A task in which axis 1 of some rows stands beyond its limits: _2=185.5."""
+    job = task(max_correction=10.0)
+    q, within = job.track.q.copy(), np.ones(9, bool)
+    for name, value in degrees.items():
+        q[int(name[1:]), 0], within[int(name[1:])] = np.radians(value), False
+    return replace(job, track=replace(job.track, q=q, within=within))
+
+
+# before anything is computed
+
+
+def test_targets_that_are_not_known():
+    result = correct(lost(2))
+    assert result.state.tolist() == FIRST_LEFT
+    assert words(result) == [cut_left(*FIRST, "line 12: COR003 its target is not known")]
+    # the place is that of the first of them, in every cut that has one
+    result = correct(lost(3, 5, 6))
+    assert result.state.tolist() == BOTH_LEFT
+    assert words(result) == [
+        cut_left(*FIRST, "line 13: COR003 its target is not known"),
+        cut_left(*SECOND, "line 15: COR003 its target is not known"),
+    ]
+    assert words(correct(lost(0, 4))) == []
+
+
+ONE, OTHER = Finding("KRL007", "one", help="do this"), Finding("KRL008", "other", help="do that")
+
+
+@pytest.mark.parametrize(
+    ("pinned", "refused", "told"),
+    [
+        ({1: ONE}, {}, ["line 11: KRL007 one", "do this"]),
+        ({}, {3: OTHER}, ["line 13: KRL008 other", "do that"]),
+        ({2: ONE}, {2: OTHER}, ["line 12: KRL008 other", "do that"]),
+        ({2: ONE}, {3: OTHER}, ["line 12: KRL007 one", "do this"]),
+        ({0: ONE}, {4: OTHER}, None),
+    ],
+)
+def test_motions_that_their_text_holds(pinned, refused, told):
+    result = correct(task(pinned=pinned, refused=refused))
+    assert words(result) == ([cut_left(*FIRST, *told)] if told else [])
+
+
+def test_axes_beyond_their_limits():
+    limits = "limits -185 .. 185 deg"
+    result = correct(standing(_2=185.54))
+    assert result.state.tolist() == FIRST_LEFT
+    words_ = f"A1 at 185.5 deg, {limits}"
+    assert words(result) == [("KIN002", 12, words_, ""), cut_left(*FIRST, f"line 12: KIN002 {words_}")]
+    result = correct(standing(_3=-186.0, _6=188.0))
+    assert result.state.tolist() == BOTH_LEFT
+    words_ = f"A1 at -186.0 deg, {limits}"
+    assert words(result) == [
+        ("KIN002", 13, words_ + " (2 motions, to line 16)", ""),
+        cut_left(*FIRST, f"line 13: KIN002 {words_}"),
+        cut_left(*SECOND, f"line 16: KIN002 {words_}"),
+    ]
+    # in air they are told and hinder nothing
+    result = correct(standing(_4=187.0))
+    assert result.state.tolist() == ALL
+    assert words(result) == [("KIN005", 14, f"A1 at 187.0 deg, {limits}", "")]
+    result = correct(standing(_0=187.0, _8=186.0))
+    assert words(result) == [("KIN005", 10, f"A1 at 187.0 deg, {limits} (2 motions, to line 18)", "")]
+
+
+def test_the_axis_that_is_farthest_beyond_is_told():
+    q = program_angles()
+    q[1] = np.radians([186.0, 2.5, 110.0, 10.0, 127.0, 352.25])
+    for axis, said in (
+        (1, "A2 at 2.5 deg, limits -146 .. 0 deg"),
+        (5, "A6 at 352.2 deg, limits -350 .. 350 deg"),
+        (4, "A5 at 127.0 deg, limits -125 .. 125 deg"),
+        (0, "A1 at 186.0 deg, limits -185 .. 185 deg"),
+    ):
+        job = task(program_angles(), max_correction=1.0)
+        job = replace(job, track=replace(job.track, q=q, within=np.arange(9) != 1))
+        assert words(correct(job))[0] == ("KIN002", 11, said, "")
+        q[1, axis] = program_angles()[1, axis]  # the next time another one is
+
+
+def test_poses_out_of_reach():
+    said = "the programmed pose is out of reach"
+    assert words(correct(far(4))) == [("KIN005", 14, said, "")]
+    assert words(correct(far(0, 4, 8))) == [("KIN005", 10, said + " (3 motions, to line 18)", "")]
+    # of an absolute correction air is a cut of its own, and left
+    result = correct(far(0, 4, process=False))
+    assert result.state.tolist() == [LEFT, C, C, C, LEFT, C, C, C, C]
+    assert result.cut.tolist() == [0, 1, 1, 1, 2, 3, 3, 3, 4]
+    single = "the cut of lines {0} to {0} (1 motions) is left as it was; line {0}: KIN005 " + said
+    assert words(result) == [
+        ("KIN005", 10, said + " (2 motions, to line 14)", ""),
+        ("COR003", 10, single.format(10), ""),
+        ("COR003", 14, single.format(14), ""),
+    ]
+    for row in (1, 2, 5, 7):
+        assert refusal(far(row)) == (
+            "KIN001",
+            10 + row,
+            said,
+            "check the base, the tool and the robot of the cell against the program",
+        )
+    assert refusal(far(3, 4, 6))[1:3] == (13, said + " (2 motions, to line 16)")
+    # what is switched off, or held for another reason, is not asked for
+    job = far(2, annotations=switch((0, "COMPENSATE OFF"), (4, "COMPENSATE ON")))
+    assert words(correct(job)) == []
+    assert [one[0] for one in words(correct(far(2, refused={2: ONE})))] == ["COR003"]
+
+
+def refusal(job):
+    with pytest.raises(Refusal) as caught:
+        correct(job)
+    (one,) = caught.value.findings
+    assert one.file == "part.src"
+    return one.code, one.line, one.message, one.help
+
+
+def test_a_configuration_that_is_not_known():
+    said = "the robot's configuration is not known here"
+    help_ = "give `start:` (axes before the first motion) in the cell, or S and T with the PTP before it"
+    assert refusal(task(start=False)) == ("KIN004", 11, said + " (6 motions, to line 17)", help_)
+    job = task(start=False, axes={4: program_angles()[4]})
+    assert refusal(job) == ("KIN004", 11, said + " (3 motions, to line 13)", help_)
+    job = task(start=False, refused={1: ONE, 2: ONE, 5: ONE, 6: ONE, 7: ONE})
+    assert refusal(job) == ("KIN004", 13, said, help_)
+
+
+def test_a_correction_that_is_too_large():
+    job = task()
+    size = np.linalg.norm(correct(job).correction, axis=1)
+    rows = np.flatnonzero(size > 0)
+    for row in rows:
+        limit = (1 - 1e-5) * size[row]
+        above = np.flatnonzero(size > limit)
+        more = "" if len(above) == 1 else f" ({len(above)} motions, to line {10 + above[-1]})"
+        assert refusal(replace(job, max_correction=limit)) == (
+            "COR002",
+            10 + above[0],
+            f"the correction is {1e3 * size.max():.2f} mm, more than max_correction ({1e3 * limit:g} mm){more}",
+            "check force, base and tool; if it is meant, raise max_correction in the cell",
+        )
+    assert not correct(replace(job, max_correction=(1 + 1e-5) * size.max())).findings
+    half = replace(job, gain=0.5, max_correction=0.50001 * size.max())
+    assert not correct(half).findings
+
+
+@pytest.mark.parametrize(
+    ("rows", "left", "line"),
+    [
+        ((2, 3), "111000", 11),
+        ((1, 3), "111000", 13),
+        ((3, 9), "111111", 11),
+        ((6, 7), "000111", 15),
+        ((0, 6), "000111", 16),
+    ],
+)
+def test_switching_inside_of_a_cut(rows, left, line):
+    job = task(annotations=switch((rows[0], "COMPENSATE OFF"), (rows[1], "COMPENSATE ON")))
+    result = correct(job)
+    said = [one for one in words(result) if one[0] == "COR003"]
+    place = FIRST if left[0] == "1" else SECOND
+    assert said == [cut_left(*place, f"line {line}: COR004 COMPENSATE is switched inside this cut")]
+    assert words(result) == said
+    off = [row for row in range(9) if rows[0] <= row < rows[1]]
+    for k, row in enumerate(np.flatnonzero(CARRIES)):
+        expected = OFF if row in off else LEFT if left[k] == "1" else C
+        assert result.state[row] == expected
+
+
+def test_a_comment_that_is_no_switch_is_told():
+    result = correct(task(annotations=switch((2, "COMPENSATE MAYBE"))))
+    assert result.state.tolist() == ALL
+    assert words(result) == [
+        ("COR011", 12, "'COMPENSATE MAYBE' is neither COMPENSATE OFF nor COMPENSATE ON; it was not used", "")
+    ]
+
+
+# what a correction is found to do
+
+
+@dataclass(frozen=True)
+class Made(Task):
+    """A task of which some corrections end as they are told to: row -> what is false, or the angle of axis 1 [deg]."""
+
+    ends: dict = field(default_factory=dict)
+
+    def command(self, rows, *given, **more):
+        done = super().command(rows, *given, **more)
+        flags = {name: getattr(done, name).copy() for name in ("reachable", "settled", "converged", "q")}
+        for k, row in enumerate(rows.tolist()):
+            for end in self.ends.get(row, ()):
+                if isinstance(end, str):
+                    flags[end][k] = False
+                else:
+                    flags["q"][k, 0] = np.radians(end)
+        return replace(done, **flags)
+
+
+def made(ends, **more):
+    job = task(**more)
+    return Made(**{one.name: getattr(job, one.name) for one in fields(Task)}, ends=ends)
+
+
+REACH, REST, SETTLE = (
+    ("COR009", "the correction leads out of reach"),
+    ("MOD002", "the robot has no stable rest under this force"),
+    ("COR001", "the correction does not settle"),
+)
+
+
+def beyond(angle):
+    return ("COR008", f"the correction brings A1 at {angle} deg, limits -185 .. 185 deg")
+
+
+U, S, N = ("reachable", "converged"), ("settled", "converged"), ("converged",)
+
+
+@pytest.mark.parametrize(
+    ("ends", "told", "reasons"),
+    [
+        ({1: U}, [(REACH, 11, "")], {FIRST: (11, REACH)}),
+        ({2: S}, [(REST, 12, "")], {FIRST: (12, REST)}),
+        ({3: N}, [(SETTLE, 13, "")], {FIRST: (13, SETTLE)}),
+        ({5: (185.25,)}, [(beyond("185.2"), 15, "")], {SECOND: (15, beyond("185.2"))}),
+        ({5: (-185.26,)}, [(beyond("-185.3"), 15, "")], {SECOND: (15, beyond("-185.3"))}),
+        ({5: (184.99,), 6: (-184.99,)}, [], {}),
+        # what comes first counts, of one motion and of a cut
+        (
+            {1: (*U, *S, 190.0), 2: (*S, 191.0), 3: (*N, 192.0)},
+            [(REACH, 11, ""), (REST, 12, ""), (SETTLE, 13, "")],
+            {FIRST: (11, REACH)},
+        ),
+        ({3: U, 2: N, 1: S}, [(REACH, 13, ""), (REST, 11, ""), (SETTLE, 12, "")], {FIRST: (11, REST)}),
+        (
+            {1: U, 3: U, 6: U, 7: N},
+            [(REACH, 11, " (3 motions, to line 16)"), (SETTLE, 17, "")],
+            {FIRST: (11, REACH), SECOND: (16, REACH)},
+        ),
+        (
+            {2: (186.0,), 5: (187.0,), 6: (188.0,)},
+            [(beyond("186.0"), 12, " (3 motions, to line 16)")],
+            {FIRST: (12, beyond("186.0")), SECOND: (15, beyond("186.0"))},
+        ),
+    ],
+)
+@pytest.mark.parametrize("size", [1, 2, 4, 100])
+def test_corrections_that_do_not_end_well(monkeypatch, size, ends, told, reasons):
+    monkeypatch.setattr(postproc.blocks, "ROWS", size)
+    result = correct(made(ends))
+    expected = [(code, line, message + more, "") for (code, message), line, more in told]
+    for cut, (line, (code, message)) in reasons.items():
+        expected.append(cut_left(*cut, f"line {line}: {code} {message}"))
+    assert words(result) == expected
+    left = [rows for rows, cut in ((range(1, 4), FIRST), (range(5, 8), SECOND)) if cut in reasons]
+    state = np.array(ALL)
+    for rows in left:
+        state[list(rows)] = LEFT
+    assert result.state.tolist() == state.tolist()
+    for rows in left:
+        np.testing.assert_array_equal(result.after[list(rows)], result.before[list(rows)])
+        np.testing.assert_array_equal(result.after_angle[list(rows)], result.before_angle[list(rows)])
+        assert not result.correction[list(rows)].any()
+    assert (np.linalg.norm(result.correction[result.state == C], axis=1) > 1e-4).all()
+
+
+def test_sides_that_are_crossed():
+    """S 2 and T 2 are what the program says; turned by a whole turn A1 stands on the other side of zero."""
+    said = "the corrected pose crosses the side that S or T states"
+    kinds = [Kind.LIN, Kind.PTP, Kind.PTP, Kind.LIN, Kind.LIN, Kind.PTP, Kind.LIN, Kind.PTP, Kind.LIN]
+    stated = {"kind": kinds, "status": 2, "turn": 2, "max_correction": 10.0}
+    cases = (
+        ({}, []),
+        ({1: (-5.0,)}, [("KIN006", 11, said, "")]),
+        ({3: (-5.0,), 6: (-5.0,)}, []),  # no PTP
+        ({7: (-5.0,), 2: (-5.0,), 5: (-5.0,)}, [("KIN006", 12, said + " (3 motions, to line 17)", "")]),
+        ({5: (-5.0,), 2: (5.0,)}, [("KIN006", 15, said, "")]),
+    )
+    for ends, told in cases:
+        assert words(correct(made(ends, **stated))) == told
+    # of a cut that is left nothing is crossed
+    result = correct(made({1: (-5.0,), 3: N, 7: (-5.0,)}, **stated))
+    assert [one[:2] for one in words(result)] == [("COR001", 13), ("COR003", 11), ("KIN006", 17)]
+    assert words(result)[-1] == ("KIN006", 17, said, "")
+    # a motion that says neither is on no side
+    silent = {**stated, "status": -1, "turn": -1}
+    assert words(correct(made({2: (-5.0,), 5: (-5.0,)}, **silent))) == []
+
+
+def test_a_turn_of_no_axis_is_said_too():
+    """T 0: every axis is at zero or above."""
+    model = full()
+    robot = model.robot
+    joints = tuple(replace(one, upper=max(one.upper, 0.5)) for one in robot.joints)
+    model = replace(model, robot=replace(robot, joints=joints))
+    q = program_angles()
+    q[:, 1] = np.radians(10.0)
+    words_ = {"q": q, "model": model, "kind": Kind.PTP, "status": -1, "start": True, "max_correction": 10.0}
+    for turn, codes in ((0, ["KIN006"]), (-1, [])):
+        result = correct(made({2: (-5.0,)}, turn=turn, **words_))
+        assert [one.code for one in result.findings] == codes
+
+
+def test_postures_near_to_a_singular_one():
+    said = "A5 near 0, the wrist over axis 1, or the arm stretched"
+    for rows, more in (([6], ""), ([2, 6, 7], " (3 motions, to line 17)")):
+        q = program_angles()
+        q[rows, 4] = np.radians(0.9)
+        assert words(correct(task(q))) == [("KIN003", 10 + rows[0], said + more, "")]
+    q = program_angles()
+    q[[0, 4], 4] = np.radians(0.9)
+    assert words(correct(task(q))) == []  # in air
+    # told whether it is corrected or not
+    q[3, 4] = np.radians(0.9)
+    assert [one[:2] for one in words(correct(task(q, refused={1: ONE})))] == [("COR003", 11), ("KIN003", 13)]
+
+
+# cuts and states
+
+
+def test_cuts_of_an_absolute_correction():
+    """A run of forced motions is one, every other motion is one by itself; an unknown target is in none."""
+    result = correct(replace(lost(4), process=False))
+    assert result.cut.tolist() == [0, 1, 1, 1, -1, 2, 2, 2, 3]
+    assert result.state.tolist() == [C, C, C, C, A, C, C, C, C]
+    assert words(result) == []
+    forced = np.array([0, 0, 1, 1, 0, 0, 1, 0, 1], bool)
+    result = correct(task(carries=forced, process=False, refused={0: ONE, 3: OTHER, 7: ONE}))
+    assert result.cut.tolist() == [0, 1, 2, 2, 3, 4, 5, 6, 7]
+    assert result.state.tolist() == [LEFT, C, LEFT, LEFT, C, C, C, LEFT, C]
+    assert [(one.code, one.line) for one in result.findings] == [
+        ("COR003", 10),
+        ("COR003", 12),
+        ("COR003", 17),
+    ]
+
+
+def test_motions_that_do_not_follow_are_another_cut():
+    runs = np.arange(9) < 3
+    result = correct(task(runs=runs, refused={2: ONE}))
+    assert result.cut.tolist() == [-1, 0, 0, 1, -1, 2, 2, 2, -1]
+    assert result.state.tolist() == [A, LEFT, LEFT, C, A, C, C, C, A]
