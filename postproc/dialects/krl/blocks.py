@@ -22,7 +22,7 @@ _REPEATED = LOOPS | {b"DEF"}
 _FOR = re.compile(
     rb"FOR[ \t]+("
     + NAME
-    + rb")[ \t]*=(.*?)[ \t)]TO(?![A-Za-z0-9_$])(.*?)(?:[ \t)]STEP(?![A-Za-z0-9_$])(.*))?\Z",
+    + rb")[ \t]*=(.*?)(?<=[ \t)])TO(?![A-Za-z0-9_$])(.*?)(?:(?<=[ \t)])STEP(?![A-Za-z0-9_$])(.*))?\Z",
     re.I | re.S,
 )
 _THEN = re.compile(rb"(?<![A-Za-z0-9_$])THEN[ \t]*\Z", re.I)

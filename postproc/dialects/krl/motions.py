@@ -340,10 +340,10 @@ def _enter(
             rows.locked[row] = stated.locked
     if kind == Kind.SPL or (run.stack and any(item.block.word in SPLINES for item in run.stack)):
         rows.whole[row] = "it is part of a spline"
-    elif statement.line in run.survey.inline and not _in_form(run, row):
-        rows.whole[row] = "it is an inline form that sets another base or tool"
     elif run.triggered:
         rows.whole[row] = "a TRIGGER before it counts from it"
+    elif statement.line in run.survey.inline and not _in_form(run, row):
+        rows.whole[row] = "it is an inline form that sets another base or tool"
     run.triggered = False
     if partial or relative or operand.builds:
         rows.builds_on[row] = state.sources
@@ -362,7 +362,7 @@ def _in_form(run: Run, row: int) -> bool:
     if form is None:
         return False
     run.rows.inline[row] = InlineForm(form.at, form.feed)
-    return form.frames == (state.base, state.tool) and not run.triggered
+    return form.frames == (state.base, state.tool)
 
 
 def _inherits(stated: Target | None, relative: bool) -> int:
