@@ -201,6 +201,16 @@ def test_only_motions_that_are_moved_and_known_are_looked_at():
     assert found == [("KIN008", 12, near("A1", "0.50"))]
 
 
+def test_a_motion_in_no_branch_is_not_looked_at():
+    """Though its joints be known, and those of the branch with the highest number."""
+    robot = kr270()
+    before = [-129.0, -117.0, -1.0, 9.0, -76.0, 348.0]
+    assert status_of(robot.nominal, np.radians([before])).tolist() == [7]
+    after = [[*before[:5], 349.5]]
+    assert told(robot, [before], after)[0] == [("KIN008", 10, near("A6", "0.50"))]
+    assert told(robot, [before], after, status=[-1]) == ([], {})
+
+
 def test_a_posture_that_was_singular_before_is_no_news():
     robot = kr270()
     before = [posed(A5=angle) for angle in (5.0, 0.5, 5.0, 0.5, 5.0)]
@@ -252,6 +262,19 @@ def chord(robot, one, other):
 def fast(name, needed, can, count=1, unit="deg/s"):
     more = f" ({count} motions)" if count > 1 else ""
     return f"{name} has to move at {needed} {unit} at the programmed feed, it can {can} {unit}{more}"
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 100])
+def test_the_axis_that_is_too_fast_is_found_in_whatever_block_it_moves(monkeypatch, rows):
+    monkeypatch.setattr(postproc.blocks, "ROWS", rows)
+    robot = with_speeds(kr270(), [10.0] * 6)
+    for first, second in (("A1", "A6"), ("A6", "A1")):
+        path = [posed()]
+        for name, step in ((first, 2.0), (second, 3.0), (first, 2.5), (second, 2.0)):
+            path.append([angle + step * (axis == int(name[1]) - 1) for axis, angle in enumerate(path[-1])])
+        feed = [np.nan, *(chord(robot, path[i], path[i + 1]) / 0.1 for i in range(4))]
+        found, _ = told(robot, path, path, feed=feed)
+        assert found == [("KIN009", 12, fast(second, "30.0", "10", 4))]
 
 
 @pytest.mark.parametrize(("share", "said"), [(0.89, False), (0.91, True), (3.0, True), (0.0, False)])

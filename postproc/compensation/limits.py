@@ -151,8 +151,7 @@ def _rounded(task: Task, result: Result) -> list[Finding]:
     """Corrected points that the controller rounds off by more than they were moved."""
     path = task.toolpath
     size = np.linalg.norm(result.correction, axis=1)
-    rounds = result.corrected & ~(path.blend <= 0)
-    more = rounds & ~(path.blend <= size)
+    more = result.corrected & ~(path.blend <= size)
     if not more.any():
         return []
     known = path.blend[more & np.isfinite(path.blend)]
