@@ -27,12 +27,7 @@ def cuts_of(in_scope: Bools, runs: Bools | None = None) -> Ints:
 
 def spread(blocked: Bools, cut: Ints) -> Bools:
     """(N,) motions whose cut holds a blocked motion."""
-    if not blocked.any():
-        return np.zeros_like(blocked)
-    struck = np.zeros(cut.max(initial=-1) + 2, bool)
-    struck[cut[blocked]] = True
-    struck[-1] = False  # the entry that -1 points to
-    return struck[cut]
+    return np.isin(cut, cut[blocked & (cut >= 0)])
 
 
 def switched_on(toolpath: Toolpath) -> Bools:
@@ -61,21 +56,19 @@ def switch_findings(file: str, toolpath: Toolpath) -> list[Finding]:
 def left_findings(file: str, toolpath: Toolpath, cut: Ints, why: Mapping[int, Finding]) -> list[Finding]:
     """One finding for every cut that is left as it was, with the first reason in it."""
     findings = []
-    inside = np.flatnonzero(cut >= 0)
-    bounds = np.searchsorted(cut[inside], np.arange(cut.max(initial=-1) + 2))
-    told = -1
-    for row in sorted(why):
-        if cut[row] <= told:  # of another cut it would be a larger number
-            continue
-        told = int(cut[row])
-        first, last = inside[bounds[told]], inside[bounds[told + 1] - 1]
+    inside, held = np.flatnonzero(cut >= 0), np.array(sorted(why), int)
+    held = held[cut[held] >= 0]
+    held = held[np.unique(cut[held], return_index=True)[1]]  # the first of each cut
+    begin, stop = (np.searchsorted(cut[inside], cut[held], side) for side in ("left", "right"))
+    for row, first, last, count in zip(
+        held.tolist(), inside[begin], inside[stop - 1], stop - begin, strict=True
+    ):
         reason = why[row]
         place = f"line {toolpath.line[row]}: " if toolpath.line[row] else ""
         findings.append(
             Finding(
                 "COR003",
-                f"the cut of lines {toolpath.line[first]} to {toolpath.line[last]}"
-                f" ({bounds[told + 1] - bounds[told]} motions)"
+                f"the cut of lines {toolpath.line[first]} to {toolpath.line[last]} ({count} motions)"
                 f" is left as it was; {place}{reason.code} {reason.message}",
                 file,
                 int(toolpath.line[first]),
