@@ -3,11 +3,13 @@
 A case in ``programs/krl/readings``: ``### name``, the program (with base and tool 1 set where it begins with no DEF,
 ``@`` a full point), ``=== dat`` and ``=== config`` with the other files, and ``=== told``: a line a motion, as in a
 dump, with base and tool where they are not 1, then findings (!), annotations (;) and comments (,).
+Or ``=== places``: where the numbers of each motion stand, ``@1`` in the .dat.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ import pytest
 
 from postproc.dialects.dialect import Program
 from postproc.dialects.krl import interpreter
+from postproc.dialects.krl.places import Auxiliary, Variable
 from postproc.dialects.krl.rows import HELP
 from postproc.document import Document
 from postproc.findings import Finding
@@ -87,7 +90,7 @@ def story(program: Program) -> list[str]:
     return out
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [name for name in CASES if "told" in CASES[name]])
 def test_a_program_reads_as_it_is_told(name: str) -> None:
     assert story(read(CASES[name])) == CASES[name]["told"].strip().splitlines()
 
@@ -98,3 +101,86 @@ def test_runs_of_lines_read_as_each_line_alone(name: str) -> None:
     assert story(alone) == story(together)
     for part in "start", "stop", "file", "insert", "home", "motion", "inherits", "text":
         np.testing.assert_array_equal(getattr(alone.text, part), getattr(together.text, part))
+
+
+def span(program: Program, file: int, start: int, stop: int) -> str:
+    return program.documents[file].raw[start:stop].decode()
+
+
+def literals(program: Program, keys: str, starts: list[int], stops: list[int], files: list[int]) -> str:
+    out = []
+    for key, start, stop, file in zip(keys, starts, stops, files, strict=True):
+        if start < 0:
+            assert stop == file == -1
+        else:
+            out.append(f"{key}={span(program, file, start, stop)}" + f"@{file}" * (file > 0))
+    return " ".join(out) or "-"
+
+
+def insertion(program: Program, home: int, at: int) -> str:
+    """Three letters before the place of insertion, and one behind it."""
+    if home < 0:
+        assert at == -1
+        return "adds at nowhere"
+    return f"adds at {home}:{span(program, home, at - 3, at)}|{span(program, home, at, at + 1)}"
+
+
+def point(variable: Variable, program: Program) -> str:
+    span_of = variable.declared
+    declared = "None" if span_of is None else span(program, span_of.file, span_of.start, span_of.stop)
+    return (
+        f"{variable.name.decode()} {variable.type.decode()} ({variable.words.decode()}) declared {declared}"
+    )
+
+
+def auxiliary(program: Program, arc: Auxiliary) -> list[str]:
+    operand = span(program, 0, arc.operand.start, arc.operand.stop)
+    via = literals(program, "XYZ", list(arc.start), list(arc.stop), list(arc.file))
+    out = [f"via [{operand}] {via} {insertion(program, arc.home, arc.insert)} text {arc.text}"]
+    if arc.variable is not None:
+        out.append("via point " + point(arc.variable, program).partition(" declared")[0])
+    if arc.locked:
+        out.append(f"via locked: {arc.locked}")
+    if arc.has_angle:
+        angle = "computed" if arc.angle is None else span(program, 0, arc.angle.start, arc.angle.stop)
+        out.append(f"CA {angle}")
+    return out
+
+
+def places(program: Program) -> Iterator[str]:
+    text = program.text
+    for row, line in enumerate(program.toolpath.line):
+        word, start, stop, end = text.motion[row].tolist()
+        before, operand, behind = (
+            span(program, 0, *of) for of in ((word, start), (start, stop), (stop, end))
+        )
+        out = [f"{line}: {before}[{operand}]{behind}"]
+        out.append(
+            literals(program, "XYZABC", *(part[row].tolist() for part in (text.start, text.stop, text.file)))
+        )
+        if bits := int(text.inherits[row]):
+            assert bits < 64
+            out.append("from before " + "".join(key for i, key in enumerate("XYZABC") if bits >> i & 1))
+        out += [insertion(program, int(text.home[row]), int(text.insert[row])), f"text {text.text[row]}"]
+        if row in text.variables:
+            out.append("point " + point(text.variables[row], program))
+        if row in text.locked:
+            out.append(f"locked: {text.locked[row]}")
+        if row in text.arcs:
+            out += auxiliary(program, text.arcs[row])
+        if row in text.relative:
+            found = text.relative[row]
+            reference = found.reference
+            said = "-" if reference is None else span(program, 0, reference.start, reference.stop)
+            said += " in tool" * found.in_tool
+            out.append(f"relative {span(program, 0, found.word.start, found.word.stop)} {said}")
+        if row in text.inline:
+            line_of, column = program.documents[0].place(text.inline[row].at)
+            assert column == 1
+            out.append(f"form of line {line_of} {text.inline[row].feed:g}")
+        yield "; ".join(out)
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if "places" in CASES[name]])
+def test_the_numbers_of_a_program_stand_where_it_is_told(name: str) -> None:
+    assert list(places(read(CASES[name]))) == CASES[name]["places"].strip().splitlines()

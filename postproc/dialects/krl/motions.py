@@ -212,8 +212,8 @@ def _arc(
         return
     end_point = operand_at(run, code, statement.at, points[0])
     begin_known = state.point if state.point_frames == (state.base, state.tool) else None
-    written = end_point
-    if statement.word.endswith(b"_REL"):
+    relative = statement.word.endswith(b"_REL")
+    if relative:
         end_point, reason = _absolute(run, statement, parts, end_point, reason)
         if isinstance(first.target, Target) and begin_known is not None:
             by = shift(begin_known, first.target, _reference(statement, parts).in_tool)
@@ -227,9 +227,7 @@ def _arc(
         found = None
         code_of = reason.code if reason is not None else "KRL009"
         end_point = replace(end_point, target=Unclear(code_of, "its way is not known"), builds=True)
-    row = _enter(
-        run, statement, Kind.CIRC, end_point, reason, blend, found, relative=written is not end_point
-    )
+    row = _enter(run, statement, Kind.CIRC, end_point, reason, blend, found, relative)
     if row in run.rows.reasons:
         run.rows.builds_on[row] = run.rows.builds_on.get(row, frozenset()) | _before(run, row)
     if isinstance(first.target, Target):
@@ -239,7 +237,7 @@ def _arc(
             Span(0, first.start, first.stop), first.variable, -1, t.locked, span if angle is not None else None,
             has_angle,
         )  # fmt: skip
-    if written is not end_point:
+    if relative:
         run.rows.relative[row] = _reference(statement, parts)
 
 
