@@ -92,6 +92,8 @@ def judged(
     for one in NUMBERS:
         column = given.words(one)
         unread[column.block[column.how == How.UNREAD]] = True
+    turns = given.words(given.control.turns[0])
+    unread[turns.block[(turns.how == How.UNREAD) & _bent(given.move[turns.block])]] = True
     refuse(
         unread[rows],
         "GCO005",
@@ -119,12 +121,22 @@ def judged(
     for wrong, message in ARCS.items():
         refuse(moves.arcs.wrong == wrong, "GCO012", message)
     refuse(moves.arcs.wrong == 1, "GCO012", "where the arc begins is not known")
+    centred = _bent(moves.move) & given.has(*(key(letter) for letter in "IJK"))[rows]
+    refuse(
+        centred & (force[Group.ARCS] < 0),
+        "GCO012",
+        "whether I J K are coordinates or differences is not known",
+    )
     refuse(
         moves.stand.wrong == 1,
         "GCO013",
         "a rotary axis away from 0, or not known, without a TCP mode: the machine's own geometry",
     )
     refuse(moves.stand.wrong == 2, "GCO013", "a rotary axis that the program names was not set yet")
+
+
+def _bent(move: Ints) -> Bools:
+    return np.isin(move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH))
 
 
 def _codes(given: Blocks, rows: Ints, doubts: Doubts) -> None:

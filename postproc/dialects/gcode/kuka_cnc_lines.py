@@ -7,7 +7,13 @@ import re
 from collections.abc import Mapping
 
 from postproc.dialects.gcode.control import Line
-from postproc.dialects.gcode.sinumerik_expression import bracket_end, constant, expression_end, is_open
+from postproc.dialects.gcode.sinumerik_expression import (
+    assigned_end,
+    bracket_end,
+    constant,
+    expression_end,
+    is_open,
+)
 from postproc.dialects.gcode.words import How, key
 
 _HEAD = re.compile(rb"[ \t\x0b\x0c]*(?P<slash>/[ \t]*\d?[ \t]*)?(?:[Nn:][ \t]*\d+)?[ \t]*")
@@ -71,7 +77,8 @@ class Lines:
                 letter, index = address[1].decode().upper(), address[2]
                 if letter == "P" and index:
                     note("assign", b"<" + address[0])
-                    break
+                    place = assigned_end(text, address.end())
+                    continue
                 close = expression_end(text, address.end())
                 literal = text[address.end() : close].rstrip()
                 value = constant(literal)

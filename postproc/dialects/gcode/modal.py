@@ -43,8 +43,9 @@ _ARGUMENTS = np.array(
     ]
 )
 """M codes of printers whose X, Y, Z are settings."""
-_FORGOTTEN = (Group.MOTION, Group.PLANE, Group.DISTANCE, Group.ARCS, Group.FEED, Group.OFFSET)
-"""What other code leaves in another state; that it leaves units or a tool radius in another one is not assumed."""
+_FORGOTTEN = (Group.MOTION, Group.PLANE, Group.DISTANCE, Group.FEED, Group.OFFSET)
+"""What other code leaves in another state; that it leaves units, a tool radius or what I J K are in another one is not
+assumed."""
 _FARTHEST_OFFSET = 1e6
 """No control numbers its offsets so far."""
 

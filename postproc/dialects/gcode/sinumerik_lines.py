@@ -7,7 +7,13 @@ import re
 from collections.abc import Mapping
 
 from postproc.dialects.gcode.control import Line
-from postproc.dialects.gcode.sinumerik_expression import bracket_end, constant, expression_end, is_open
+from postproc.dialects.gcode.sinumerik_expression import (
+    assigned_end,
+    bracket_end,
+    constant,
+    expression_end,
+    is_open,
+)
 from postproc.dialects.gcode.words import NAMES, How, key
 
 TURN, RPL = NAMES, NAMES + 1
@@ -121,7 +127,7 @@ class _Taken:
             letter, index = address[1].upper(), address[2]
             if letter == b"R" and index:
                 self.note("assign", b"<" + address[0])
-                return len(text)
+                return assigned_end(text, address.end())
             if letter == b"G":
                 self.note("axis", address[0])
                 return expression_end(text, address.end())
@@ -191,13 +197,16 @@ class _Taken:
         if name in NAMED_WORDS:
             return self.value(place, NAMED_WORDS[name], behind)
         close = expression_end(self.text, behind)
+        end = len(self.text[:close].rstrip())
         if name in ACTIONS:
             # It acts before the motion, as S and M do.
-            self.word(place, key("S"), -1, len(self.text[:close].rstrip()), math.nan, How.UNREAD)
+            self.word(place, key("S"), -1, end, math.nan, How.UNREAD)
         elif name in CORNERS or name in POLAR:
             self.note("corner" if name in CORNERS else "polar", name)
         elif name in SETTINGS:
             pass
+        elif name in self.names:  # MEAS=1
+            self.codes(place, end, name)
         elif name in POSITIONS or self.words or _AXIS.fullmatch(name):
             # In a block with other words it can only be an axis of the machine.
             self.note("axis", name)

@@ -112,6 +112,8 @@ class Stands:
             result.stated[here] = present.any(axis=1) if orientation.joint else present.all(axis=1)
             columns = np.array(orientation.words) >= 0
             known = np.isfinite(values[:, columns]).all(axis=1)
+            if one == VECTOR:
+                known &= values.any(axis=1)
             result.wrong[here[~known]] = 2
             good = here[known]
             result.rotation[here] = np.nan
