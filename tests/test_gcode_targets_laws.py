@@ -237,7 +237,7 @@ def test_words_that_are_one_whole(
     np.testing.assert_allclose(into.end[0], np.array(end), atol=1e-12)
     assert np.isnan(into.end[1]).all()
     expected = np.where(written, np.array(end), np.array(own))
-    np.testing.assert_allclose(into.number[0], expected, atol=1e-12)
+    np.testing.assert_allclose(into.number[0], np.asarray(expected, np.float64), atol=1e-12)
     begin = wanted.origin[0] if said.get("resumes") else before
     np.testing.assert_array_equal(into.begin[0], begin)
 
