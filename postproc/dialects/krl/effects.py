@@ -12,7 +12,6 @@ from collections.abc import Set
 from postproc.dialects.krl.lexing import (
     NAME,
     SPLINES,
-    TYPES,
     Assignment,
     Call,
     Declared,
@@ -125,9 +124,7 @@ def read_by(statement: Statement) -> Set[bytes]:
         read = identifiers(said.value)
         return names | (read - _KEYS if said.value.startswith(b"{") else read)
     if isinstance(said, Declared):
-        if said.type in TYPES:
-            return {name for _, value, _ in said.items if value for name in identifiers(value)} - _KEYS
-        return set()
+        return {name for _, value, _ in said.items for name in identifiers(value)} - _KEYS
     if isinstance(said, Call):
         return set() if said.name == b"BAS" and bas(said.arguments) else identifiers(said.arguments)
     return identifiers(statement.code)

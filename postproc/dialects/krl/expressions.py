@@ -154,13 +154,8 @@ class _Parser:
             operator = self.token
             self._next()
             right = self._logic(depth, level + 1)
-            bits = operator.startswith(b"B_")
-            wanted = int if bits else bool
-            if (
-                not isinstance(left, wanted)
-                or not isinstance(right, wanted)
-                or (bits and isinstance(left, bool))
-            ):
+            wanted = int if operator.startswith(b"B_") else bool
+            if type(left) is not wanted or type(right) is not wanted:
                 raise self._unknown(f"{shown(operator)} of what has no such value")
             left = _LOGIC[level][operator](left, right)
         return left
