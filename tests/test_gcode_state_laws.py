@@ -1,0 +1,469 @@
+"""What holds from block to block of G-code, against a walk through the blocks one by one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from postproc.arrays import Floats, Ints
+from postproc.dialects.gcode import positions
+from postproc.dialects.gcode.comments import head
+from postproc.dialects.gcode.control import Frame
+from postproc.dialects.gcode.detection import CLAIMS
+from postproc.dialects.gcode.flow import Doubt, Flow
+from postproc.dialects.gcode.force import Rows, everywhere, in_force, switched, taken
+from postproc.dialects.gcode.numbered import references
+from postproc.dialects.gcode.orientation import Angles, Vector, swing
+from postproc.dialects.gcode.positions import Course, Trace
+from postproc.dialects.gcode.refusals import HELP, Doubts
+from postproc.dialects.gcode.source import NONE, Column, scan
+from postproc.dialects.gcode.tables import LINUXCNC
+from postproc.document import Document
+from postproc.findings import CODES
+from postproc.geometry import rotation_from_vector
+from postproc.units import DEG
+
+NAN = np.nan
+
+
+# Columns
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+@pytest.mark.parametrize(
+    "value", [5, NAN, True, [1.0, 1.0], [1.0, 2.0], [NAN] * 3, np.eye(2), np.empty((0,))]
+)
+def test_one_value_everywhere(value: Any, count: int) -> None:
+    """Takes no room where its parts are alike too."""
+    column = everywhere(value, count)
+    np.testing.assert_array_equal(column, np.stack([np.asarray(value)] * count) if count else column[:0])
+    assert column.shape == (count, *np.asarray(value).shape)
+    assert column.dtype == np.asarray(value).dtype
+    assert not column.flags.writeable
+    one = np.asarray(value)
+    alike = one.size > 0 and (np.isnan(one).all() or bool((one == one.flat[0]).all()))
+    assert (not any(column.strides)) == (alike or not one.size)
+    assert everywhere(1, 2, np.int8).dtype == np.int8
+
+
+def test_what_never_changes_takes_no_room() -> None:
+    none = np.empty(0, np.int64)
+    for at, value, first, held in (
+        (none, none, 7, [7, 7, 7, 7]),
+        (np.array([0]), np.array([3]), 7, [3, 3, 3, 3]),
+        (np.array([0, 2]), np.array([3, 3]), 7, [3, 3, 3, 3]),
+        (np.array([1]), np.array([7]), 7, [7, 7, 7, 7]),
+        (np.array([0, 0]), np.array([1, 3]), 7, [3, 3, 3, 3]),
+        (np.array([1]), np.array([3]), 7, [7, 3, 3, 3]),
+        (np.array([0, 3]), np.array([3, 4]), 7, [3, 3, 3, 4]),
+    ):
+        state = in_force(4, at, value, first, np.int8)
+        assert state.tolist() == held
+        assert state.dtype == np.int8
+        assert (state.strides == (0,)) == (len(set(held)) == 1)
+
+
+def test_where_a_state_is_another_one() -> None:
+    for state, before, expected in (
+        (everywhere(2, 3, np.int8), 2, [False] * 3),
+        (everywhere(2, 3, np.int8), 1, [True, False, False]),
+        (everywhere(2, 0, np.int8), 1, []),
+        (np.array([1, 1, 0, 2, 2]), 1, [False, False, True, True, False]),
+        (np.array([1, 1, 0, -1, 2]), 0, [True, False, True, True, True]),
+        (np.array([-128, 127, 127], np.int8), 127, [True, True, False]),
+    ):
+        assert switched(state, before).tolist() == expected
+
+
+def test_what_a_state_means() -> None:
+    table = np.array([1.0, 2.0, NAN])
+    np.testing.assert_array_equal(taken(np.array([0, 1, -1, 0]), table), [1, 2, NAN, 1])
+    one = taken(everywhere(1, 4, np.int8), table)
+    assert (one.tolist(), one.strides) == ([2.0] * 4, (0,))
+    assert taken(everywhere(1, 0, np.int8), table).tolist() == []
+
+
+def test_rows_are_filled_part_by_part() -> None:
+    parts = [
+        {"a": np.array([1, 1]), "b": np.array([NAN, NAN]), "c": np.array([[0.0, NAN]] * 2), "d": np.array([1.0, 2.0])},
+        {"a": np.empty(0, int), "b": np.empty(0), "c": np.empty((0, 2)), "d": np.empty(0)},
+        {"a": np.array([1]), "b": np.array([NAN]), "c": np.array([[0.0, NAN]]), "d": np.array([NAN])},
+        {"a": everywhere(1, 2), "b": np.array([NAN, 3.0]), "c": np.array([[0.0, 0.0]] * 2), "d": everywhere(2.0, 2)},
+    ]  # fmt: skip
+    rows = Rows(5)
+    for part in parts:
+        rows.put(len(part["a"]), **part)
+    for name, uniform in (("a", True), ("b", False), ("c", False), ("d", False)):
+        column = rows.taken(name)
+        np.testing.assert_array_equal(column, np.concatenate([part[name] for part in parts]))
+        assert (column.strides[0] == 0) == uniform
+        assert not column.flags.writeable
+
+
+def test_rows_whose_first_one_differs_are_kept() -> None:
+    for first, second in (([1, 2], [2, 2]), ([2, 2], [1, 2]), ([2, 2], [2, 1]), ([2, 1], [2, 2])):
+        rows = Rows(4)
+        rows.put(2, a=np.array(first))
+        rows.put(2, a=np.array(second))
+        assert rows.taken("a").tolist() == first + second
+
+
+def test_words_of_blocks() -> None:
+    column = Column(np.array([1, 1, 4]), np.array([5.0, 6.0, 7.0]), np.array([0, 1, 2]))
+    np.testing.assert_array_equal(column.last(np.arange(6)), [NAN, 6, NAN, NAN, 7, NAN])
+    np.testing.assert_array_equal(column.last(np.arange(6), absent=-1), [-1, 6, -1, -1, 7, -1])
+    np.testing.assert_array_equal(NONE.last(np.arange(2)), [NAN, NAN])
+    for begin, stop, block, value in (
+        (0, 2, [1, 1], [5, 6]),
+        (1, 4, [0, 0], [5, 6]),
+        (2, 5, [2], [7]),
+        (2, 4, [], []),
+    ):
+        part = column.part(begin, stop)
+        assert (part.block.tolist(), part.value.tolist(), len(part)) == (block, value, len(block))
+    assert column.part(4, 5).how.tolist() == [2]
+
+
+def test_blocks_of_a_program() -> None:
+    found = scan(b"N1\nN2 X1 (a)\n/Y2\n\n;b\nM2 what\n#1=2\nG1 X3 Y4\n", LINUXCNC)
+    blocks = found.blocks
+    assert blocks.line.tolist() == [1, 2, 3, 6, 7, 8]
+    assert blocks.wordy.tolist() == [False, True, True, True, False, True]
+    assert blocks.deleted.tolist() == [False, False, True, False, False, False]
+    assert blocks.first.tolist() == [0, 3, 14, 21, 29, 34]
+    assert found.mask(ord("X")).tolist() == [False, True, False, False, False, True]
+    assert found.mask(ord("X"), ord("Y")).tolist() == [False, True, True, False, False, True]
+    assert found.mask().tolist() == [False] * 6
+    assert {kind: rows.tolist() for kind, rows in found.noted.items()} == {"unknown": [3], "assign": [4]}
+    assert found.comments.tolist() == [[9, 12, 2], [18, 20, 5]]
+    assert len(found.column(ord("Q"))) == 0
+    assert len(scan(b"", LINUXCNC).blocks) == 0
+
+
+# Flow
+
+
+def test_the_last_block_of_those_in_doubt() -> None:
+    random = np.random.default_rng(1)
+    for n in (0, 1, 2, 9, 30):
+        doubt = random.integers(0, 3, n) * (random.random(n) < 0.7)
+        no = np.zeros(n, np.bool_)
+        expected = []
+        for row in range(n):
+            last = row
+            while doubt[row] and last + 1 < n and doubt[last + 1]:
+                last += 1
+            expected.append(last)
+        assert Flow(doubt, no, no, no, no).last.tolist() == expected
+    assert Doubt.NONE == 0
+
+
+# Coordinates
+
+
+def course(random: np.random.Generator, n: int) -> Course:
+    kind = random.choice(4, (n, 6), p=[0.4, 0.3, 0.2, 0.1])
+    value = np.round(random.normal(0, 1, (n, 6)), 3)
+    value[random.random((n, 6)) < 0.05] = NAN
+    lost, left = random.random((n, 6)) < 0.06, random.random((n, 6)) < 0.06
+    return Course(np.where(kind > 0, value, 0.0), kind == 1, kind == 2, lost, left)
+
+
+def change(block: int, frame: Frame, position: Floats) -> Frame:
+    """Turns and shifts of all kinds; every fifth says where the tool is."""
+    random = np.random.default_rng(block)
+    turn = np.eye(3) if block % 2 else rotation_from_vector(random.normal(0, 1, (1, 3)))[0]
+    shift = random.normal(0, 1, 6)
+    return Frame(frame.turn @ turn, position - shift if block % 5 == 0 else shift)
+
+
+def walked(way: Course, events: list[int]) -> tuple[Floats, Floats, Ints, Ints]:
+    """Before and behind every block, which block told it last, and the frame, one block after the other."""
+    n = len(way.value)
+    here, origin, frame, number = np.full(6, NAN), np.full(6, -1), Frame(np.eye(3), np.zeros(6)), 0
+    begins, ends, sources, frames = [], [], [], []
+    for k in range(n):
+        if k in events:
+            there = frame.to_base(here)
+            frame = change(k, frame, there)
+            here, number = frame.from_base(there), number + 1
+            origin = np.where(np.isnan(here), k, origin)
+        begins.append(np.where(way.left[k], NAN, here))
+        after = here.copy()
+        for axis in range(6):
+            value = way.value[k, axis]
+            if way.sets[k, axis]:
+                after[axis] = NAN if way.lost[k, axis] else value
+            elif way.lost[k, axis] or way.left[k, axis]:
+                after[axis] = NAN
+            elif way.adds[k, axis]:
+                after[axis] += value
+            told = way.sets[k, axis] or way.lost[k, axis] or way.left[k, axis]
+            if told or (way.adds[k, axis] and np.isnan(value)):
+                origin[axis] = k
+        here = after
+        ends.append(here)
+        sources.append(origin.copy())
+        frames.append(number)
+    return np.array(begins), np.array(ends), np.array(sources), np.array(frames)
+
+
+@pytest.mark.parametrize("parts", [[40], [1, 39], [7, 13, 20], [10] * 4])
+@pytest.mark.parametrize("seed", range(5))
+def test_coordinates_are_followed_from_block_to_block(seed: int, parts: list[int]) -> None:
+    random = np.random.default_rng(seed)
+    way = course(random, 40)
+    events = sorted(set(random.integers(0, 40, seed * 2).tolist()) | ({7, 20} if seed else set()))
+    trace = Trace(Frame(np.eye(3), np.zeros(6)), np.array(events, np.int64), change)
+    found, begin = [], 0
+    for size in parts:
+        rows = slice(begin, begin + size)
+        found.append(trace.follow(Course(*(column[rows] for column in vars(way).values())), begin))
+        begin += size
+    begins, ends, sources, frames = walked(way, events)
+    np.testing.assert_allclose(np.concatenate([part.begin for part in found]), begins, atol=1e-12)
+    np.testing.assert_allclose(np.concatenate([part.end for part in found]), ends, atol=1e-12)
+    np.testing.assert_array_equal(np.concatenate([part.source for part in found]), sources)
+    np.testing.assert_array_equal(np.concatenate([part.frame for part in found]), frames)
+    np.testing.assert_array_equal(trace.frame_of(np.arange(40)), frames)
+    base = np.array([trace.frames[f].to_base(end) for f, end in zip(frames, ends, strict=True)])
+    np.testing.assert_allclose(np.concatenate([part.in_base() for part in found]), base, atol=1e-12)
+
+
+def test_behind_too_many_changes_nothing_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(positions, "MOST", 3)
+    n = 6
+    none, all_ = np.zeros((n, 6), np.bool_), np.ones((n, 6), np.bool_)
+    trace = Trace(Frame(np.eye(3), np.zeros(6)), np.arange(1, n), lambda *_: Frame(np.eye(3), np.zeros(6)))
+    found = trace.follow(Course(np.ones((n, 6)), all_, none, none, none), 0)
+    assert found.frame.tolist() == [0, 1, 2, 3, 3, 3]
+    assert np.isfinite(found.in_base()).all(axis=1).tolist() == [True, True, True, False, False, False]
+
+
+def test_a_frame_there_and_back() -> None:
+    random = np.random.default_rng(2)
+    turn = rotation_from_vector(random.normal(0, 1, (1, 3)))[0]
+    frame, point = Frame(turn, random.normal(0, 1, 6)), random.normal(0, 1, (5, 6))
+    there = frame.to_base(point)
+    np.testing.assert_allclose(there[:, :3], point[:, :3] @ turn.T + frame.shift[:3])
+    np.testing.assert_allclose(there[:, 3:], point[:, 3:] + frame.shift[3:])
+    np.testing.assert_allclose(frame.from_base(there), point, atol=1e-12)
+    # Without a rotation an axis that is not known says nothing of the others.
+    straight = Frame(np.eye(3), np.arange(6.0))
+    half = np.array([NAN, 1, 2, 3, NAN, 5])
+    np.testing.assert_array_equal(straight.to_base(half), half + np.arange(6))
+    np.testing.assert_array_equal(straight.from_base(half), half - np.arange(6))
+    assert np.isnan(frame.to_base(half)[:3]).all()
+
+
+# Numbers of bases and tools
+
+
+def test_frames_of_bases_and_tools() -> None:
+    base, tool = np.array([2, 2, -1, 0, 2, 7]), np.array([3, 3, 3, 3, 3, 3])
+    line = np.array([10, 11, 12, 13, 14, 15])
+    bases, tools, frames = references(base, tool, line)
+    said = [(frame.number, frame.pose is None, frame.line) for frame in frames]
+    assert said == [(0, False, 13), (2, True, 10), (7, True, 15), (3, True, 10)]
+    assert bases.tolist() == [1, 1, -1, 0, 1, 2]
+    assert tools.tolist() == [3] * 6
+    np.testing.assert_array_equal(frames[0].pose.position, np.zeros(3))  # type: ignore[union-attr]
+    # A tool with the number 0 is no frame of the control's own.
+    bases, tools, frames = references(np.array([-1, -1]), np.array([0, -1]), np.array([4, 5]))
+    assert [(frame.number, frame.pose, frame.line) for frame in frames] == [(0, None, 4)]
+    assert (bases.tolist(), tools.tolist()) == ([-1, -1], [0, -1])
+    empty = references(np.empty(0, int), np.empty(0, int), np.empty(0, int))
+    assert ([len(column) for column in empty]) == [0, 0, 0]
+
+
+# Refusals
+
+
+def test_the_first_reason_stays() -> None:
+    doubts = Doubts(5)
+    doubts.refuse(np.array([False, True, False, True, False]), "GCO001", "one")
+    doubts.refuse(np.array([True, True, False, False, False]), "GCO002", "two", "cause")
+    doubts.refuse(np.zeros(5, np.bool_), "GCO003", "never")
+    part = doubts.part(slice(2, 5))
+    part.refuse_each(
+        np.array([0, 1, 2]), [("GCO002", "three", "cause"), ("GCO001", "one", "one")], np.array([0, 0, 1])
+    )
+    found = doubts.done(
+        Document(Path("a.nc"), b""),
+        np.arange(10, 15),
+        np.array([0, 20, 40, 60, 80]),
+        np.array([2, 20, 41, 60, 85]),
+    )
+    assert list(found) == [0, 1, 2, 3, 4]
+    assert len(found) == 5
+    said = [(found[row].code, found[row].message, found[row].line, found[row].column) for row in found]
+    assert said == [
+        ("GCO002", "two", 10, 3), ("GCO001", "one", 11, 1), ("GCO002", "three", 12, 2), ("GCO001", "one", 13, 1),
+        ("GCO001", "one", 14, 6),
+    ]  # fmt: skip
+    assert [finding.help for finding in found.values()] == [HELP[code] for code, *_ in said]
+    assert [str(finding) for finding in found.told()] == [
+        "a.nc:10:3: GCO002 two; 2 motions, lines 10 to 12",
+        "a.nc:11:1: GCO001 one; 3 motions, lines 11 to 14",
+    ]
+
+
+def test_rows_that_are_not_refused() -> None:
+    doubts = Doubts(9)
+    doubts.refuse(np.isin(np.arange(9), (2, 5)), "GCO001", "one")
+    found = doubts.done(Document(Path("a.nc"), b""), np.arange(9), np.zeros(9, int), np.zeros(9, int))
+    assert [row in found for row in range(-1, 10)] == [row in (2, 5) for row in range(-1, 10)]
+    assert np.int64(5) in found
+    assert "5" not in found
+    for row in (0, 3, 6, 8, 100):
+        with pytest.raises(KeyError):
+            found[row]
+    none = Doubts(3).done(Document(Path("a.nc"), b""), np.arange(3), np.arange(3), np.arange(3))
+    assert (len(none), none.told(), 0 in none) == (0, [], False)
+    assert set(HELP) <= set(CODES)
+
+
+# Orientations
+
+
+def test_a_vector_points_from_the_tip_to_the_spindle() -> None:
+    tool = rotation_from_vector(np.array([[np.pi, 0.0, 0.0]]))[0]
+    vector = Vector((1, 2, 3), np.eye(3), tool)
+    values = np.array([[0, 0, 1], [1, 0, 0], [0, 3, 0], [0, 0, -2], [NAN, 0, 5], [0, 0, 0]], float)
+    found = vector.rotation(values)
+    np.testing.assert_allclose(
+        (found @ vector.free_axis)[:5], [[0, 0, 1], [1, 0, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], atol=1e-12
+    )
+    assert np.isnan(found[5]).all()
+    near = np.array([[0, 0, 2], [0, 0, 1], [NAN, NAN, NAN], [0, 0, 0.5], [0, 0, 0]], float)
+    again = vector.values(found[:5], near)
+    np.testing.assert_allclose(np.linalg.norm(again, axis=1), [2, 1, 1, 0.5, 1])
+    np.testing.assert_allclose(again[:2], [[0, 0, 2], [1, 0, 0]], atol=1e-12)
+    assert vector.writable(values).tolist() == [True] * 6
+    unknown = Vector((1, 2, 3), np.eye(3), None)
+    assert np.isnan(unknown.rotation(values)).all()
+    assert np.isnan(unknown.values(found, values)).all()
+    assert np.isnan(unknown.free_axis).all()
+    assert unknown.writable(values).tolist() == [False] * 6
+
+
+def test_swing_of_what_points_down_is_about_x() -> None:
+    for tilt in (0.0, 1e-13):
+        np.testing.assert_allclose(swing(np.array([[0, tilt, -1.0]]))[0], np.diag([1, -1, -1]), atol=1e-12)
+    np.testing.assert_allclose(swing(np.array([[0, 0, 1.0]]))[0], np.eye(3), atol=1e-12)
+
+
+ROTARY = Angles((65, 66, 67), ((2, 2), (1, 1), (0, 0)), np.eye(3), np.eye(3))
+HEAD = Angles((-1, 66, 67), ((2, 2), (1, 1)), np.eye(3), np.eye(3), free_spin=True)
+ONE = Angles((-1, -1, 67), ((2, 2),), np.eye(3), np.eye(3), free_spin=True)
+
+
+def test_where_angles_say_small_changes() -> None:
+    """All but near their poles: twenty times the change there is too much."""
+    for b, fine in ((0, True), (80, True), (90, False), (89.99, False), (-90, False)):
+        assert ROTARY.writable(np.array([[10.0, b, 20.0]])).tolist() == [fine]
+    pole = np.degrees(np.arcsin(0.05))
+    for b, fine in ((0, False), (0.99 * pole, False), (1.01 * pole, True), (-1.01 * pole, True), (90, True)):
+        assert HEAD.writable(np.array([[NAN, b, 20.0]])).tolist() == [fine], b
+    assert ONE.writable(np.zeros((2, 3))).tolist() == [False, False]
+    nothing = Angles((65, 66, 67), ((2, 2), (1, 1), (0, 0)), np.eye(3), None)
+    assert nothing.writable(np.full((2, 3), 10.0)).tolist() == [False, False]
+    assert np.isnan(nothing.rotation(np.zeros((2, 3)))).all()
+    assert np.isnan(nothing.values(np.stack([np.eye(3)] * 2), np.zeros((2, 3)))).all()
+    assert np.isnan(nothing.free_axis).all()
+    assert np.isnan(ROTARY.free_axis).all()
+    assert HEAD.free_axis.tolist() == [0, 0, 1]
+
+
+def test_angles_are_those_nearest() -> None:
+    """On their turn, exactly; NaN where none lead there; a word that is not used has none."""
+    near = np.array([[10.0, 20, 30], [370, 20, 30], [0, 0, 0], [10, 20, 30]])
+    there = ROTARY.rotation(np.array([[11.0, 21, 29], [11, 21, 29], [50, -60, 70], [10, 20, 30]]))
+    there[3] = NAN
+    found = ROTARY.values(there, near)
+    np.testing.assert_allclose(found[:3], [[11, 21, 29], [371, 21, 29], [50, -60, 70]], atol=1e-7)
+    assert np.isnan(found[3]).all()
+    found = HEAD.values(
+        HEAD.rotation(np.array([[NAN, 30, 40], [NAN, 30, 40]])), np.array([[5.0, 29, 41], [5, 30, 40]])
+    )
+    np.testing.assert_allclose(found[:, 1:], [[30, 40], [30, 40]], atol=1e-7)
+    assert np.isnan(found[:, 0]).all()
+    # One axis reaches no other direction.
+    assert np.isnan(ONE.values(HEAD.rotation(np.array([[NAN, 30.0, 40]])), np.zeros((1, 3)))).all()
+    # Opposite to where the tool points: half a turn.
+    tipped = HEAD.values(HEAD.rotation(np.array([[NAN, 170.0, 0]])), np.array([[NAN, 1.0, 0.5]]))
+    np.testing.assert_allclose(
+        HEAD.rotation(tipped)[0, :, 2], HEAD.rotation(np.array([[NAN, 170.0, 0]]))[0, :, 2], atol=1e-8
+    )
+
+
+def test_frame_and_tool_of_angles() -> None:
+    random = np.random.default_rng(3)
+    frame, tool = (rotation_from_vector(random.normal(0, 1, (1, 3)))[0] for _ in range(2))
+    angles = Angles((65, 66, 67), ((2, 2), (1, 1), (0, 0)), frame, tool)
+    values = np.array([[10.0, 20, 30]])
+    about = [
+        rotation_from_vector(angle * DEG * np.eye(3)[[axis]])[0]
+        for axis, angle in ((2, 30), (1, 20), (0, 10))
+    ]
+    np.testing.assert_allclose(
+        angles.rotation(values)[0], frame @ about[0] @ about[1] @ about[2] @ tool, atol=1e-12
+    )
+    np.testing.assert_allclose(angles.values(angles.rotation(values), values + 2), values, atol=1e-7)
+
+
+# Files
+
+HEADS: list[tuple[bytes, int]] = [
+    (b"", 0), (b"G0", 0), (b"%", 1), (b"%\n", 2), (b"\n\n%\nG0", 4), (b"\n\nG0", 0), (b"%\n\nO1 (A)\n\nG0", 10),
+    (b"%\r\n\r\nO1\r\nG0", 9), (b"\xef\xbb\xbf%\nG0", 5), (b"\xef\xbb\xbfG0", 3), (b"%_N_A_MPF\n;$PATH=/_N_X\nG0", 23),
+    (b":12 ; a\nG0", 8), (b"O<abc>\nG0", 7), (b"O1 G0\n", 0), (b" % a\n O 12 \nG0", 12), (b"%\n\n", 2), (b"O1", 2),
+    (b"%\n;A\nO1\n", 2), (b"%\nO1", 4),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("raw", "end"), HEADS)
+def test_where_the_head_of_a_program_ends(raw: bytes, end: int) -> None:
+    assert head(raw) == end
+
+
+KINDS: list[tuple[str, bytes, str]] = [
+    # name, text, those that claim it
+    ("a.nc", b"", "fanuc- linuxcnc"),
+    ("a.NC", b"hello", "linuxcnc"),
+    ("a.txt", b"hello", ""),
+    ("a.txt", b"G1 X1\n", "linuxcnc"),
+    ("a.txt", b"G21\n", ""),
+    ("a.txt", b"G5\nM8\n", ""),
+    ("a.txt", b"X1\n", "linuxcnc"),
+    ("a.txt", b"M3 S1000\nG0 Z5\n", "linuxcnc"),
+    ("a.txt", b"O100\nG1 X1\n", "fanuc linuxcnc"),
+    ("a.txt", b"O100\nhello\n", ""),
+    ("a.nc", b"O100\n", "fanuc linuxcnc"),
+    ("a.nc", b"o100 sub\n", "linuxcnc"),
+    ("a.nc", b"G1 X1\nG05.1 Q1\n", "fanuc linuxcnc"),
+    ("a.nc", b"G65 P1\n", "fanuc linuxcnc"),
+    ("a.nc", b"IF [1] GOTO 5\n", "fanuc linuxcnc"),
+    ("a.nc", b"(M98 P1)\n", "linuxcnc"),
+    ("a.mpf", b"G1 X1\n", "linuxcnc sinumerik"),
+    ("a.SPF", b"G1 X1\n", "linuxcnc sinumerik"),
+    ("a.nc", b"TRAORI\nG1 X1\n", "linuxcnc sinumerik"),
+    ("a.nc", b"G1 X=AC(5)\n", "linuxcnc sinumerik"),
+    ("a.nc", b"#TRAFO ON\nG1 X1\n", "kuka_cnc linuxcnc"),
+    ("a.nc", b"N10 # CS ON[1]\n", "kuka_cnc linuxcnc"),
+    ("a.nc", b"#1=5\n", "linuxcnc"),
+    ("a.nc", b"DEF A()\nG1 X1\n", ""),
+    ("a.nc", b"&ACCESS RVP\nG1 X1\n", ""),
+    ("a.mpf", b"LIN {X 1}\nTRAORI\n", ""),
+    ("a.txt", b" " * 65536 + b"\nG1 X1\n", ""),
+    ("a.nc", b" " * 65536 + b"\nO100\nTRAORI\n#TRAFO ON\nDEF A()\n", "linuxcnc"),
+]
+
+
+@pytest.mark.parametrize(("name", "raw", "controls"), KINDS)
+def test_whose_program_it_is(name: str, raw: bytes, controls: str) -> None:
+    found = sorted(control for control, claims in CLAIMS.items() if claims(Path(name), raw))
+    assert found == [control for control in controls.split() if not control.endswith("-")]
