@@ -107,6 +107,13 @@ def test_a_way_is_known_from_a_known_place_to_a_known_place(monkeypatch, rows):
     assert not ways.arc.any()
 
 
+@pytest.mark.parametrize("kind", list(Kind))
+def test_only_of_lines_and_arcs_the_way_is_known(kind):
+    arcs = {1: ARCS["a quarter"]} if kind == Kind.CIRC else {}
+    ways = every([K.LIN, kind, K.LIN], arcs=arcs)[0]
+    assert ways.known.tolist() == [False, kind in (Kind.LIN, Kind.CIRC), True]
+
+
 def test_where_the_motion_before_is_not_known_a_motion_begins_nowhere():
     _, wanted, tool, track = every(**PROGRAM)
     path = every(**PROGRAM)[0].path

@@ -35,7 +35,7 @@ class Ways:
         """``wanted`` (N): targets in the robot base; ``base``, ``tool`` (N): frames of each motion."""
         n = len(path)
         begin = begins(wanted, path, tool, robot, track).remembered()
-        known = ((path.kind == Kind.LIN) | (path.kind == Kind.CIRC)) & path.known
+        known = np.isin(path.kind, (Kind.LIN, Kind.CIRC)) & path.known
         length = np.zeros(n)
         ways = Ways(path, begin, wanted, base, known, length)
 
