@@ -1,0 +1,313 @@
+"""What a program may change where, and the bounds up to which it is followed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from test_krl_readings import CASES, FULL, HEAD
+
+from postproc.dialects.dialect import Program
+from postproc.dialects.krl import KrlDialect, blocks, flow, motions
+from postproc.dialects.krl.calls import MOST_CALLS
+from postproc.dialects.krl.effects import Effects
+from postproc.dialects.krl.jumped import MOST_PAIRS, settle_jumps
+from postproc.dialects.krl.lexing import LONGEST, Statement
+from postproc.dialects.krl.rows import FEW, NAN6, NO_ARC, Reason, Row, Rows
+from postproc.dialects.krl.scan import scan
+from postproc.dialects.krl.state import Source
+from postproc.dialects.krl.survey import DEEPEST, MOST_EFFECTS, Block, Routine, Survey, survey
+from postproc.document import Document
+from postproc.units import MM
+
+POINT = FULL.decode()
+LINE = f"LIN {POINT}\n"
+
+
+def surveyed(text: str) -> tuple[Survey, list[Statement]]:
+    items = [
+        item for item in scan(Document(Path("a.src"), text.encode()), False) if isinstance(item, Statement)
+    ]
+    found = survey(enumerate(items))
+    if found.jumps:
+        settle_jumps(found, enumerate(items))
+    return found, items
+
+
+def names(effects: Effects | set[bytes]) -> str:
+    return " ".join(sorted(e.decode() if isinstance(e, bytes) else e for e in effects)) or "-"
+
+
+def told(text: str) -> Iterator[str]:
+    found, items = surveyed(text)
+
+    def line(index: int) -> int:
+        return items[index].line
+
+    for block in found.blocks:
+        out = f"{block.word.decode()} {block.line}-{line(block.end)}"
+        out += (
+            "".join(f"|{line(at)}" for at in block.branches)
+            + " broken" * block.broken
+            + " leaves" * block.leaves
+        )
+        yield f"{out}: {names(block.effects)} calls {names(block.calls)}"
+        if isinstance(block, Routine):
+            out = f"  {block.name.decode()}" + " main" * block.is_main + " function" * block.is_function
+            out += " (" + ",".join(name.decode() + "*" * back for name, back in block.parameters) + ") "
+            out += (
+                ",".join(f"{name.decode()}:{kind.decode()}" for name, kind in block.types.items())
+                + " labels "
+            )
+            labels = (
+                f"{name.decode()}@{line(at)}" + "".join(f"/{outer.line}" for outer in around)
+                for name, (at, around) in block.labels.items()
+            )
+            yield (out + ",".join(labels)).rstrip()
+    events = (
+        f"{line(at)}:" + ",".join(f"{what} {block.line}" for what, block in found.events[at])
+        for at in sorted(found.events)
+    )
+    yield ("events " + " ".join(events)).rstrip()
+    yield (
+        f"assigned {names(found.assigned)}; read {names(found.read)}; later {names(found.later)}; "
+        f"changed {names(found.effects)}"
+    )
+    jumps = " ".join(f"{name.decode()}:{line(a)}-{line(b)}" for (_, name), (a, b) in found.jumps.items())
+    ways = "; ".join(f"{name.decode()}: {names(way)}" for (_, name), way in found.on_the_way.items())
+    yield f"jumps {jumps} on the way {ways}".rstrip()
+    yield f"inline {sorted(found.inline)} unclosed {found.unclosed}"
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if "surveyed" in CASES[name]])
+def test_a_program_is_surveyed_as_it_is_told(name: str) -> None:
+    assert list(told(CASES[name][""])) == CASES[name]["surveyed"].strip("\n").splitlines()
+
+
+@pytest.mark.parametrize("deep", [1, DEEPEST, DEEPEST + 1, DEEPEST + 5])
+def test_blocks_are_told_apart_up_to_a_depth(deep: int) -> None:
+    """What lies deeper belongs to the last that is told apart, and all of them end."""
+    text = "DEF a()\n" + "".join(f"IF v{i} THEN\n" for i in range(deep)) + "ELSE\nn=1\n" + "ENDIF\n" * deep
+    found, _ = surveyed(text + "m=1\nEND\n")
+    assert found.unclosed == []
+    assert len(found.blocks) == 1 + min(deep, DEEPEST)
+    assert len(found.blocks[-1].branches) == (deep <= DEEPEST)
+    assert {block.begin + block.end for block in found.blocks[1:]} == {2 * deep + 3}
+    assert names(found.blocks[-1].effects) == "N"
+    assert names(found.blocks[0].effects) == "M N"
+
+
+@pytest.mark.parametrize("count", [MOST_EFFECTS, MOST_EFFECTS + 1])
+def test_what_a_block_changes_is_told_apart_up_to_a_number(count: int) -> None:
+    """Tool and position count besides the variables."""
+    many = count > MOST_EFFECTS
+    body = "".join(f"v{i}=1\n" for i in range(count - 2)) + "LIN P\nBAS(#TOOL,1)\n"
+    found, _ = surveyed(f"DEF a()\nIF x THEN\n{body}ENDIF\nEND\n")
+    changed = found.blocks[1].effects
+    assert changed == ({"tool", "point", "all"} if many else {"tool", "point"} | found.assigned)
+    head = "INTERRUPT DECL 3 WHEN $IN[1] DO b()\n"
+    found, _ = surveyed(f"{head}DEF a()\nother.X=1\nEND\nDEF b()\n{body}END\n")
+    assert b"V0" in found.later
+    assert (b"OTHER" in found.later) == many
+
+
+@pytest.mark.parametrize("count", [MOST_EFFECTS, MOST_EFFECTS + 1])
+def test_calls_are_told_apart_up_to_a_number_of_routines(count: int) -> None:
+    subs = "".join(f"DEF s{i}()\nv{i}=1\nEND\n" for i in range(count - 1))
+    found, _ = surveyed(f"DEF a()\nIF x THEN\ns0()\nENDIF\nIF x THEN\ny=1\nENDIF\nEND\n{subs}")
+    called, other = found.blocks[1:3]
+    assert names(other.effects) == "Y"
+    if count > MOST_EFFECTS:
+        assert called.effects >= {"all", "point", "base", "tool", "feed", "apo", "mode"}
+    else:
+        assert names(called.effects) == "V0"
+
+
+def test_labels_are_told_apart_up_to_a_number() -> None:
+    """Labels squared, without blocks."""
+    most = int(MOST_PAIRS**0.5)
+    for count in most, most + 1:
+        text = "".join(f"l{i}:\nv{i}=1\nGOTO l{i}\n" for i in range(count))
+        found, _ = surveyed(f"DEF a()\n{text}END\n")
+        sizes = {len(way) for way in found.on_the_way.values()}
+        assert len(found.on_the_way) == count
+        assert sizes == ({1} if count == most else {5 + len(found.effects)})
+
+
+def program(text: str, rest: str = "") -> Program:
+    raw = f"{HEAD}DECL INT i,j\n{text}END\n{rest}"
+    return KrlDialect().read((Document(Path("part.src"), raw.encode()),))
+
+
+def xs(found: Program) -> list[float]:
+    path = found.toolpath
+    return [round(x, 6) for row, x in enumerate(path.position[:, 0] / MM) if row not in path.refused]
+
+
+def codes(found: Program) -> list[str]:
+    return [f"{one.line} {one.code}" for one in found.findings]
+
+
+@pytest.fixture
+def budget(monkeypatch: pytest.MonkeyPatch) -> int:
+    for module in blocks, flow:
+        monkeypatch.setattr(module, "BUDGET", 12)
+    return 12
+
+
+@pytest.mark.usefixtures("budget")
+@pytest.mark.parametrize(
+    ("text", "rest", "followed"),
+    [
+        # once more, a FOR of two lines runs two statements
+        ("FOR i=1 TO 7\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n", "", True),
+        ("FOR i=1 TO 8\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n", "", False),
+        ("FOR i=7 TO 1 STEP -1\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n", "", True),
+        ("FOR i=8 TO 1 STEP -1\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n", "", False),
+        ("FOR i=1 TO 15 STEP 2\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n", "", False),
+        ("FOR i=1 TO 14 STEP 2\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n", "", True),
+        # the second has what the first leaves
+        ("FOR i=1 TO 4\nENDFOR\nFOR i=1 TO 5\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n", "", True),
+        ("FOR i=1 TO 5\nENDFOR\nFOR i=1 TO 5\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n", "", True),
+        ("FOR i=1 TO 6\nENDFOR\nFOR i=1 TO 5\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n", "", False),
+        # three statements a turn
+        ("i=0\nWHILE i<5\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\ni=i+1\nENDWHILE\n", "", True),
+        ("i=0\nWHILE i<6\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\ni=i+1\nENDWHILE\n", "", False),
+        ("i=0\nREPEAT\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\ni=i+1\nUNTIL i>=5\n", "", True),
+        ("i=0\nREPEAT\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\ni=i+1\nUNTIL i>=6\n", "", False),
+        # a run of lines counts as its lines, a branch as one
+        (f"i=0\nREPEAT\n{LINE * 10}i=i+1\nUNTIL i>=2\n", "", True),
+        (f"i=0\nREPEAT\n{LINE * 11}i=i+1\nUNTIL i>=2\n", "", False),
+        # a call: its variables, those of the caller, and from the second on three statements
+        ("sub()\nsub()\n", f"DEF sub()\n{LINE}$OUT[1]=TRUE\nEND\n", True),
+        ("sub()\nsub()\nsub()\n", f"DEF sub()\n{LINE}$OUT[1]=TRUE\nEND\n", True),
+        ("sub()\nsub()\nsub()\n", f"DEF sub()\nINT k\n{LINE}$OUT[1]=TRUE\nEND\n", False),
+        # five statements a jump, from the second on
+        ("i=0\nup:\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\ni=i+1\nIF i<4 THEN\nGOTO up\nENDIF\n", "", True),
+        ("i=0\nup:\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\ni=i+1\nIF i<5 THEN\nGOTO up\nENDIF\n", "", False),
+    ],
+)  # fmt: skip
+def test_statements_are_followed_again_up_to_a_number(text: str, rest: str, followed: bool) -> None:
+    found = program(text, rest)
+    assert (not found.toolpath.refused) == followed
+    assert any(one.code == "KRL024" for one in found.findings) == (not followed and "GOTO" not in text)
+
+
+@pytest.mark.usefixtures("budget")
+def test_where_too_much_runs_is_told_and_passed_over() -> None:
+    """The outermost loop or call; what it changed is taken back, and the rest is followed."""
+    inner = f"j=0\nREPEAT\n{LINE}j=j+1\nUNTIL j>2\n"
+    found = program(
+        f"IF TRUE THEN\ni=0\nWHILE i<3\n{inner}i=i+1\nENDWHILE\nLIN {{X 5}}\nENDIF\n{LINE}LIN {{X 6}}\n"
+    )
+    assert codes(found) == ["7 KRL024", "10 KRL006", "15 KRL004"]
+    assert (
+        found.findings[0].message
+        == "it runs more than the 12 statements that are followed again; it is passed over"
+    )
+    assert xs(found) == [1, 6]
+    found = program("FOR i=1 TO 9\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n" + LINE)
+    assert codes(found) == ["5 KRL024", "6 KRL006"]
+    assert xs(found) == [1]
+    found = program("FOR i=1 TO 9\n$OUT[i]=TRUE\nENDFOR\n" + LINE)
+    assert codes(found) == []
+    found = program("sub()\n" * 4 + LINE, f"DEF sub()\nINT k\n{LINE}$OUT[1]=TRUE\nEND\n")
+    assert [code.split()[1] for code in codes(found)] == ["KRL024", "KRL015"]
+
+
+@pytest.mark.parametrize("deep", [1, MOST_CALLS, MOST_CALLS + 1])
+def test_calls_inside_of_one_another_are_followed_up_to_a_number(deep: int) -> None:
+    sub = "DEF again(n:IN)\nINT n\nLIN {X n,Y 0,Z 0,A 0,B 0,C 0}\n"
+    found = program("again(1)\n", sub + f"IF n<{deep} THEN\nagain(n+1)\nENDIF\nEND\n")
+    if deep > MOST_CALLS:
+        assert [code.split()[1] for code in codes(found)] == ["KRL015"]
+    else:
+        assert xs(found) == list(range(1, deep + 1))
+
+
+@pytest.mark.parametrize("length", [LONGEST, LONGEST + 1])
+def test_motions_are_taken_apart_up_to_a_length(length: int) -> None:
+    line = LINE.strip()[:-1]
+    found = program(line + " " * (length - len(line) - 1) + "}\nLIN {X 2}\n").toolpath
+    messages = {row: one.message for row, one in found.refused.items()}
+    if length > LONGEST:
+        assert messages == {
+            0: "'LIN {X 1,Y 2,Z 3,A 4,B 5,C 6         ...' is not understood",
+            1: "Y, Z, A, B, C left out, and the position is not known: after the motion in line 5",
+        }
+    else:
+        assert messages == {}
+
+
+# rows
+
+
+def row(line: int) -> Row:
+    return Row(1, line, (0, 1, 2, 3), NAN6, NAN6, 0.0, 0, 0, 0.0, None, 0, NO_ARC)
+
+
+def test_few_places_are_kept_apart_and_many_are_one() -> None:
+    rows = Rows(Document(Path("a"), b""))
+    few: frozenset[Source] = frozenset(range(FEW))
+    assert rows.joined(few) == few
+    many: frozenset[Source] = frozenset(range(FEW + 1))
+    marks = [next(iter(rows.joined(frozenset([*many, last])))) for last in (50, 51)]
+    assert marks[0] != marks[1]
+    assert [rows.sources[mark] for mark in marks] == [many | {50}, many | {51}]  # type: ignore[index]
+
+
+def test_rows_are_taken_out_from_any_on() -> None:
+    """As if only those before had been added, alone or in runs."""
+    raw = (LINE * 9 + "HALT\n").encode()
+    bulk = next(iter(scan(Document(Path("a.src"), raw), True)))
+    assert not isinstance(bulk, Statement)
+
+    def filled(stop: int) -> Rows:
+        rows = Rows(Document(Path("a.src"), raw))
+        for at in range(6):
+            if rows.count < stop:
+                rows.add(row(at), None)
+            for sparse in (
+                rows.anchors, rows.reasons, rows.variables, rows.locked, rows.arcs, rows.relative, rows.whole,
+                rows.inline, rows.slurred, rows.builds_on,
+            ):  # fmt: skip
+                if at < stop and at % 2:
+                    sparse[at] = at  # type: ignore[index, assignment]
+        return rows
+
+    for stop in range(7):
+        rows = filled(6)
+        rows.truncate(stop)
+        wanted = filled(stop)
+        assert rows == wanted or (stop == 0 and rows.chunks == [])
+        assert len(rows) == stop
+
+    rows = Rows(Document(Path("a.src"), raw))
+    state = motions.State()
+    rows.add(row(0), None)
+    assert rows.add_bulk(bulk, state, Reason("KRL006", "why")) == 9
+    rows.add(row(10), None)
+    rows.add(row(11), None)
+    assert rows.add_bulk(bulk, state, None) == 20
+    assert rows.ranges == [(1, 10, Reason("KRL006", "why"))]
+    for stop, chunks in (12, 3), (11, 3), (10, 2):
+        rows.truncate(stop)
+        assert (len(rows), len(rows.chunks), len(rows.ranges)) == (stop, chunks, 1)
+    rows.truncate(1)
+    assert (len(rows), len(rows.chunks), rows.ranges) == (1, 1, [])
+
+
+def test_external_axes_move_where_they_are_first_elsewhere() -> None:
+    rows = Rows(Document(Path("a"), b""))
+    for at, (key, value) in enumerate(
+        [(b"E1", 1.0), (b"E2", 0.0), (b"E1", 1.0), (b"E2", 0.5), (b"E2", 0.0), (b"E3", None), (b"E1", 2.0)]
+    ):
+        rows.follow_external(at, ((key, value, b""),))
+    assert rows.moving == {b"E2": 3, b"E3": 5, b"E1": 6}
+
+
+def test_a_block_of_a_program_without_routines_is_closed() -> None:
+    found, _ = surveyed("IF x THEN\nn=1\nENDIF\n")
+    assert [(block.word, block.begin, block.end) for block in found.blocks] == [(b"", 0, 2), (b"IF", 0, 2)]
+    assert isinstance(found.blocks[0], Block)
