@@ -150,7 +150,11 @@ def test_a_correction_begins_anew_where_the_force_jumps_in_any_component(scale, 
         assert forced.steps(rows, corrected).tolist() == [False, anew, False]
     corrected[[1, 6]] = False
     assert forced.steps(rows, corrected).tolist() == [True, True, True]
-    assert forced.steps(np.array([0]), np.ones(9, bool)).tolist() == [True]
+    for every in (np.ones(9, bool), np.zeros(9, bool)):
+        assert forced.steps(np.array([0]), every).tolist() == [True]
+    # with another tool as well
+    path = replace(job.toolpath, tool=np.arange(9) % 2)
+    assert replace(forced, toolpath=path).steps(rows, np.ones(9, bool)).all()
 
 
 def test_a_correction_goes_on_along_the_joints_of_the_track():

@@ -1,0 +1,460 @@
+"""Divisions as a whole: which motions there are, where each ends, what is inserted and why some can not be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+
+import numpy as np
+import pytest
+from test_mirror import CARRIES
+from test_mirror import task as joints_task
+from ways_at_work import FORCE, circle, corner, line
+from ways_at_work import task as at_points
+
+from postproc.compensation.between import errors_between
+from postproc.compensation.correct import correct
+from postproc.compensation.division import Limits, _Search, divide, made
+from postproc.compensation.mirror import difference
+from postproc.compensation.task import Task
+from postproc.geometry import Poses, arc_through, rotation_from_vector
+from postproc.toolpath import Kind, Role
+
+FREE = Limits(max_growth=100.0)
+OWN, PIECE, LINK = Role.OWN, Role.PIECE, Role.LINK
+
+
+def divided(job, limits=FREE):
+    result = correct(job)
+    return result, divide(job, result, limits)
+
+
+def commands(job, rows, share):
+    """Where the controller has to be sent so that the tool is at the shares of the wanted ways."""
+    wanted = job.ways.at(rows, share)
+    return job.command(rows, wanted, job.force.along(rows, share), job.goal(rows, wanted)).command
+
+
+def planar(job):
+    return replace(job, toolpath=replace(job.toolpath, any_plane=np.zeros(len(job.toolpath), bool)))
+
+
+def mixed(**words):
+    """A line, an arc that rises, a line in air, an arc in air, and a cut again."""
+    n = 8
+    points = np.array(
+        [
+            [1.5, -0.3, 0.6], [1.5, -0.3, 0.5], [1.5, 0.1, 0.5], [1.7, 0.3, 0.55], [1.7, 0.3, 0.6], [1.6, 0.2, 0.6],
+            [1.6, 0.1, 0.5], [1.6, 0.0, 0.6],
+        ]
+    )  # fmt: skip
+    kinds = [Kind.LIN, Kind.LIN, Kind.LIN, Kind.CIRC, Kind.LIN, Kind.CIRC, Kind.LIN, Kind.LIN]
+    centre, normal, sweep = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan)
+    centre[3], normal[3], sweep[3] = [1.7, 0.1, 0.5], [0, 0, -1.0], 0.5 * np.pi
+    centre[5], normal[5], sweep[5] = [1.65, 0.25, 0.6], [0, 0, 1.0], np.pi
+    carries = np.isin(np.arange(n), [2, 3, 6])
+    return at_points(points, carries, kinds, centre=centre, normal=normal, sweep=sweep, **words)
+
+
+JOBS = {
+    "line": lambda **words: line(**words),
+    "line without points": lambda **words: line(tolerance=1.0, **words),
+    "corner": lambda **words: corner(**words),
+    "circle": lambda **words: circle(**words),
+    "circle in its plane": lambda **words: planar(circle(sweep=4.0, rise=0.05, **words)),
+    "mixed": lambda **words: mixed(tolerance=5e-6, **words),
+    "mixed in planes": lambda **words: planar(mixed(tolerance=5e-6, **words)),
+    "air as well": lambda **words: replace(mixed(**words), process=False),
+}
+
+
+@pytest.mark.parametrize("job", JOBS)
+@pytest.mark.parametrize(
+    "limits", [FREE, Limits(max_growth=1.5), Limits(keep=True)], ids=["free", "few", "none"]
+)
+def test_a_division_has_links_pieces_and_own_motions_where_they_belong(job, limits):
+    task = JOBS[job]()
+    result, division = divided(task, limits)
+    n, links_only = len(task.toolpath), Role.LINK
+    assert (np.diff(division.source) >= 0).all()
+    assert set(division.source.tolist()) == set(range(n))
+    assert division.inserted == len(division) - n
+    whole = result.command[:]
+    for row in range(n):
+        group = np.flatnonzero(division.source == row)
+        roles = division.role[group].tolist()
+        linked = roles[0] == links_only
+        count = len(group) - linked
+        assert roles == [LINK] * linked + [PIECE] * (count - 1) + [OWN]
+        np.testing.assert_allclose(
+            division.share[group], [0.0] * linked + [(k + 1) / count for k in range(count)], rtol=1e-15
+        )
+        corrected = bool(result.corrected[row])
+        moved = [True] * linked + [corrected] * count
+        assert division.moved[group].tolist() == moved
+        end = division.command[group[-1:]]
+        np.testing.assert_array_equal(end.position[0], whole.position[row])
+        np.testing.assert_array_equal(end.rotation[0], whole.rotation[row])
+        if linked:
+            begin = division.command[group[:1]]
+            there = commands(task, np.array([row]), np.zeros(1)) if corrected else task.ways.begin[[row]]
+            for one, other in zip(difference(begin, there), (1e-8, 1e-8), strict=True):
+                assert np.linalg.norm(one) < other
+        if count > 1:
+            assert corrected
+            inner = group[linked:-1]
+            there = commands(task, np.full(count - 1, row), division.share[inner])
+            for one in difference(division.command[inner], there):
+                assert np.linalg.norm(one, axis=1).max() < 1e-8
+        # arcs stay arcs, through the place where the tool has to be in the middle of each
+        arc = corrected and task.toolpath.kind[row] == Kind.CIRC
+        curved = group[linked:]
+        assert np.isfinite(division.sweep[curved]).tolist() == [arc] * count
+        assert np.isnan(division.sweep[group[:linked]]).all()
+        for name in ("centre", "normal"):
+            assert (np.isfinite(getattr(division, name)).all(axis=1) == np.isfinite(division.sweep)).all()
+        if arc:
+            pieces = made(task, division, curved)
+            middle = 0.5 * (pieces.first + pieces.last)
+            via = commands(task, np.full(count, row), middle).position
+            points = pieces.begin.position, via, pieces.end.position
+            if task.toolpath.any_plane[row]:
+                for name, values in zip(("centre", "normal", "sweep"), arc_through(*points), strict=True):
+                    np.testing.assert_allclose(getattr(division, name)[curved], values, atol=1e-7)
+            else:
+                normal = np.broadcast_to(task.ways.circles(np.array([row]))[1], (count, 3))
+                np.testing.assert_array_equal(division.normal[curved], normal)
+                out = [point - division.centre[curved] for point in points]
+                out = [one - np.sum(one * normal, axis=1)[:, None] * normal for one in out]
+                radius = [np.linalg.norm(one, axis=1) for one in out]
+                np.testing.assert_allclose(radius[1], radius[0], atol=1e-9)
+                np.testing.assert_allclose(radius[2], radius[0], atol=1e-9)
+    assert not division.held
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_as_many_pieces_as_the_tolerance_asks_for_and_no_more(job):
+    task = JOBS[job]()
+    result, division = divided(task)
+    search = _Search(task, result, FREE)
+    search.link()
+    for place, row in enumerate(search.rows.tolist()):
+        if not task.carries[row]:
+            continue  # it may begin with a step, which points do not mend
+        count = int(np.sum((division.source == row) & (division.role != LINK)))
+        least = 2 if task.toolpath.kind[row] == Kind.CIRC and task.ways.sweep[row] > np.radians(300) else 1
+        for pieces, fits in ((count, True), (count - 1, False)):
+            if pieces < least:
+                continue
+            made_ = search._pieces(np.array([place]), np.array([pieces]))[0]
+            off, angle = errors_between(task, made_)
+            parts = max(off.max() / task.tolerance, angle.max() / task.tolerance_angle)
+            assert (parts <= 0.9) == fits
+
+
+# links
+
+
+def steps(task):
+    """(N,) by how much the correction of each motion steps where it begins, in parts of the tolerance; and the error of
+    its way in one piece from where the motion before it ends."""
+    n = len(task.toolpath)
+    result, division = divided(task, Limits(keep=True))
+    size, left = np.zeros(n), np.zeros(n)
+    for row in range(2, n):
+        here = np.array([row])
+        shift, turn = task.off(here, commands(task, here, np.zeros(1)), result.command[here - 1])
+        size[row] = max(np.linalg.norm(shift) / task.tolerance, np.linalg.norm(turn) / task.tolerance_angle)
+        off, angle = errors_between(task, made(task, division, here))
+        left[row] = max(off[0] / task.tolerance, angle[0] / task.tolerance_angle)
+    return size, left
+
+
+@pytest.mark.parametrize("part", [0.05, 0.09, 0.11, 0.5, 0.89, 0.91, 3.0])
+@pytest.mark.parametrize("by", ["place", "angle"])
+@pytest.mark.parametrize("length", [0.02, 0.8])
+def test_a_link_where_the_correction_steps_by_more_than_its_part_of_the_tolerance(part, by, length):
+    """Nine tenths; from a tenth on where the way would otherwise not fit into one piece."""
+    task = line(length=length, tolerance=1.0)
+    task = replace(task, tolerance_angle=1e9 if by == "place" else 1.0)
+    if by == "angle":
+        task = replace(task, tolerance=1e9)
+    size = steps(task)[0][2]
+    name = "tolerance" if by == "place" else "tolerance_angle"
+    task = replace(task, **{name: size / part})
+    size, left = steps(task)
+    assert size[2] == pytest.approx(part, rel=1e-6)
+    expected = bool(part > 0.9 or (part > 0.1 and left[2] > 0.9))
+    division = divided(task)[1]
+    assert division.source[division.links].tolist() == [2] * expected
+    assert not size[3] or not task.carries[3]
+
+
+def test_a_small_step_gets_a_link_where_the_way_behind_it_does_not_fit():
+    """Of these two ways of one step the long one needs points, so that its link is worth it; where a tenth of the
+    tolerance is not stepped over, points alone have to do."""
+    found = {}
+    for part in (0.09, 0.3):
+        task = replace(line(tolerance=1.0), tolerance_angle=1e9)
+        task = replace(task, tolerance=steps(task)[0][2] / part)
+        wanted = steps(task)[1][2] > 0.9
+        found[part] = (wanted, divided(task)[1].links.sum())
+    assert found[0.09][1] == 0
+    assert found[0.3] == (found[0.3][0], int(found[0.3][0]))
+
+
+def test_links_lead_only_to_motions_that_carry_force_and_are_corrected():
+    """An absolute correction steps where the force begins and ends; behind it, in air, no link is made."""
+    task = replace(line(), process=False)
+    result, division = divided(task)
+    assert result.corrected[1:].all()
+    assert division.source[division.links].tolist() == [2]
+    assert steps(task)[0][3] > 1.0
+
+
+def test_an_arc_that_stays_begins_where_it_was_programmed():
+    """With a link to there; where none may be inserted the motion before it is held."""
+    task = circle(sweep=1.0)
+    carries = np.array([False, True, False, False])
+    wrench = np.where(carries[:, None], FORCE, 0.0)
+    task = replace(task, force=replace(task.force, carries=carries, values=wrench, start=wrench))
+    division = divided(task)[1]
+    assert division.source[division.links].tolist() == [1, 2]
+    assert not division.held
+    said = "an arc that stays as it is begins where this motion ends"
+    for job, limits in ((task, Limits(keep=True)), (again(task, whole={2: "a TRIGGER"}), FREE)):
+        division = divided(job, limits)[1]
+        assert [(row, one.code, one.message, one.file, one.line) for row, one in division.held.items()] == [
+            (1, "COR013", said, "part.src", 11)
+        ]
+        assert 2 not in division.source[division.links]
+    # behind a motion that is not corrected, or by less than a nanometre, it begins where it is
+    still = replace(task, force=replace(task.force, values=1e-9 * wrench, start=1e-9 * wrench))
+    assert divided(still)[1].inserted == 0
+    none = replace(task, force=replace(task.force, carries=~carries & carries))
+    assert divided(none)[1].inserted == 0
+
+
+def again(task, **words):
+    return replace(task, toolpath=replace(task.toolpath, **words))
+
+
+# what may be inserted
+
+
+@pytest.mark.parametrize(
+    ("least", "count"),
+    [(0.81, 1), (0.8001, 1), (0.7999, 1), (0.41, 1), (0.3999, 2), (0.201, 3), (0.1999, 4), (5.0, 1)],
+)
+def test_no_piece_is_shorter_than_the_shortest_that_may_be(least, count):
+    task = line(tolerance=1e-8)
+    division = divided(task, Limits(min_segment=least, max_growth=50.0))[1]
+    assert int(np.sum((division.source == 2) & ~division.links)) == count
+    assert not division.findings
+
+
+@pytest.mark.parametrize(
+    ("growth", "most"), [(1.0, 0), (1.25, 1), (1.49, 1), (1.5, 2), (2.0, 4), (5.0, 16), (0.5, 0)]
+)
+def test_what_would_have_to_be_inserted_is_told(growth, most):
+    """Of a tolerance that no number of pieces keeps: all that the limits leave."""
+    task = line(tolerance=1e-9)
+    division = divided(task, Limits(max_growth=growth))[1]
+    wanted = 1 + max(1, int(4 * growth))
+    (told,) = division.findings
+    assert (told.code, told.file, told.line) == ("COR014", "part.src", 12)
+    assert told.message == (
+        f"{wanted} motions would have to be inserted, max_growth ({growth:g}) allows {most}: 1 motions have fewer than"
+        " they need (the largest error here)"
+    )
+    assert told.help == "raise max_growth or tolerance in the cell"
+    assert division.inserted == most
+    if most:
+        assert division.role[division.source == 2].tolist() == [LINK, *[PIECE] * (most - 1), OWN]
+
+
+def test_the_motion_that_errs_most_is_the_one_that_is_told():
+    """Of two cuts the longer one, whichever comes first; a step without its link counts as well."""
+    for longer in (0, 1):
+        lengths = (0.8, 0.3) if longer == 0 else (0.3, 0.8)
+        points = []
+        for k, length in enumerate(lengths):
+            x = 1.5 + 0.1 * k
+            points += [
+                [x, -length / 2, 0.6],
+                [x, -length / 2, 0.5],
+                [x, length / 2, 0.5],
+                [x, length / 2, 0.6],
+            ]
+        task = at_points(points, [False, False, True, False] * 2, tolerance=3e-6)
+        result = correct(task)
+        whole = divide(task, result, FREE)
+        wanted = whole.inserted
+        spare = wanted - 2
+        some = divide(task, result, Limits(max_growth=(8 + spare + 0.5) / 8))
+        assert some.inserted == spare
+        (told,) = some.findings
+        assert told.message.startswith(f"{wanted} motions would have to be inserted,")
+        assert f" allows {spare}: 1 motions have" in told.message
+        # links first, then those of the longer one: the other one is short of points
+        assert told.line == (16 if longer == 0 else 12)
+        none = divide(task, result, Limits(max_growth=1.0))
+        assert ": 2 motions have" in none.findings[0].message
+        assert none.findings[0].line in (12, 16)
+        assert none.inserted == 0
+
+
+@pytest.mark.parametrize("spare", range(9))
+def test_the_largest_need_is_served_first(spare):
+    wanted, need = np.array([2, 0, 3, 1, 2]), np.array([0.5, 9.0, 2.0, 2.0, 0.1])
+    given = _Search._first(wanted, need, spare)
+    left, expected = spare, [0] * 5
+    for place in (1, 2, 3, 0, 4):
+        expected[place] = min(left, int(wanted[place]))
+        left -= expected[place]
+    assert given.tolist() == expected
+
+
+def test_an_arc_of_nearly_a_full_turn_has_two_pieces_at_least():
+    """From 300 degrees on; where it can not be divided it is held, where nothing may be inserted it stays."""
+    said = "an arc of nearly a full turn can not be divided here"
+    for degrees, pieces in ((299.0, 1), (301.0, 2), (360.0, 2), (370.0, 3), (720.0, 4)):
+        rise = 0.1 if degrees > 360 else 0.0
+        loose = replace(
+            planar(circle(sweep=np.radians(degrees), rise=rise, tolerance=1.0)), tolerance_angle=1.0
+        )
+        division = divided(loose)[1]
+        assert int(np.sum((division.source == 2) & ~division.links)) == pieces
+        held = divided(again(loose, whole={2: "a loop"}))[1].held
+        expected = [(2, "COR013", said, "part.src", 12)] if pieces > 1 else []
+        assert [(row, one.code, one.message, one.file, one.line) for row, one in held.items()] == expected
+        assert not divided(loose, Limits(keep=True))[1].held
+    # what the limits leave is on top of the pieces that there have to be
+    task = circle(tolerance=1e-9)
+    (told,) = divided(task, Limits(max_growth=1.5))[1].findings
+    assert told.message.startswith("7 motions would have to be inserted, max_growth (1.5) allows 1:")
+
+
+# what can not be
+
+
+@dataclass(frozen=True)
+class Walled(Task):
+    """A task whose tool comes nowhere beyond ``wall`` [m] along y, and has no rest, or does not settle, as ``flag``
+    says."""
+
+    wall: float = np.inf
+    flag: str = "reachable"
+    sense: float = 1.0
+    note: list = field(default_factory=list)
+
+    def command(self, rows, wanted, *given, **more):
+        done = super().command(rows, wanted, *given, **more)
+        bad = self.sense * wanted.position[:, 1] > self.wall
+        return replace(done, **{self.flag: getattr(done, self.flag) & ~bad})
+
+
+@pytest.mark.parametrize("flag", ["reachable", "settled", "converged"])
+@pytest.mark.parametrize(("sense", "where"), [(1.0, "on its way"), (-1.0, "where this motion begins")])
+def test_a_way_that_leads_out_of_reach_is_held(flag, sense, where):
+    """The ends are in reach: what is inserted is not."""
+    task = line(tolerance=2e-6)
+    result = correct(task)
+    wall = 0.3999 if sense < 0 else 0.05
+    walled = Walled(
+        **{one.name: getattr(task, one.name) for one in fields(Task)}, wall=wall, flag=flag, sense=sense
+    )
+    held = divide(walled, result, FREE).held
+    assert [(row, one.code, one.message, one.file, one.line) for row, one in held.items()] == [
+        (2, "COR009", f"{where} the correction leads out of reach", "part.src", 12)
+    ]
+
+
+# a share of the correction
+
+
+@pytest.mark.parametrize("gain", [0.25, 0.5])
+@pytest.mark.parametrize("job", JOBS)
+def test_a_share_of_a_correction_is_that_share_of_every_motion(job, gain):
+    task = JOBS[job]()
+    whole = divided(task)[1]
+    part = divided(replace(task, gain=gain))[1]
+    for name in ("source", "role", "share", "moved"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(whole, name))
+    known = task.ways.known[whole.source]
+    end = task.wanted[whole.source]
+    way = task.ways.at(whole.source[known], whole.share[known])
+    end.put(np.flatnonzero(known), way)
+    shift, turn = difference(whole.command[:], end)
+    half, bent = difference(part.command[:], end)
+    moved = whole.moved
+    np.testing.assert_allclose(half[moved], gain * shift[moved], atol=1e-9)
+    np.testing.assert_allclose(bent[moved], gain * turn[moved], atol=1e-9)
+    np.testing.assert_array_equal(part.command[:].position[~moved], whole.command[:].position[~moved])
+    arcs = np.flatnonzero(np.isfinite(whole.sweep))
+    assert np.isfinite(part.sweep).nonzero()[0].tolist() == arcs.tolist()
+    if not len(arcs):
+        return
+    # in the middle of each arc the command lies so far from the wanted way as well
+    away = []
+    for division in (whole, part):
+        pieces = made(task, division, arcs)
+        wanted = task.ways.at(pieces.rows, 0.5 * (pieces.first + pieces.last)).position
+        away.append(pieces.at(np.full(len(arcs), 0.5)).position - wanted)
+    radial = np.linalg.norm(away[1] - gain * away[0], axis=1)
+    assert radial.max() < 0.05 * np.linalg.norm(away[0], axis=1).max()
+
+
+def test_motions_whose_way_is_not_known_are_scaled_where_they_end():
+    """The first of a program, PTP motions, and what comes behind an unknown place."""
+    kinds = [Kind.LIN, Kind.LIN, Kind.PTP, Kind.LIN, Kind.LIN, Kind.LIN, Kind.PTP, Kind.LIN, Kind.LIN]
+    whole, part = (joints_task(process=False, kind=kinds, gain=gain) for gain in (1.0, 0.5))
+    full = correct(whole)
+    division = divided(part, Limits(keep=True))[1]
+    assert division.moved.all()
+    shift, turn = difference(full.command[:], whole.wanted)
+    half, bent = difference(division.command[:], whole.wanted)
+    np.testing.assert_allclose(half, 0.5 * shift, atol=1e-9)
+    np.testing.assert_allclose(bent, 0.5 * turn, atol=1e-9)
+    assert np.linalg.norm(shift, axis=1)[CARRIES].min() > 1e-4
+
+
+# as the controller makes them
+
+
+def test_motions_begin_where_those_before_them_end():
+    task = mixed(tolerance=5e-6)
+    division = divided(task)[1]
+    motions = np.flatnonzero(division.source > 0)
+    pieces = made(task, division, motions)
+    end = division.command[:]
+    np.testing.assert_allclose(pieces.begin.position, end.position[motions - 1], atol=1e-14)
+    np.testing.assert_allclose(pieces.begin.rotation, end.rotation[motions - 1], atol=1e-14)
+    np.testing.assert_array_equal(pieces.end.position, end.position[motions])
+    np.testing.assert_array_equal(pieces.rows, division.source[motions])
+    same = division.source[motions] == division.source[motions - 1]
+    np.testing.assert_array_equal(pieces.first, np.where(same, division.share[motions - 1], 0.0))
+    np.testing.assert_array_equal(pieces.last, division.share[motions])
+    for name in ("centre", "normal", "sweep"):
+        np.testing.assert_array_equal(getattr(pieces, name), getattr(division, name)[motions])
+    # in any order, and the first of all, which begins nowhere
+    order = np.array([5, 0, 3])
+    some = made(task, division, order)
+    np.testing.assert_array_equal(some.end.position, end.position[order])
+    assert np.isnan(some.begin.position[1]).all()
+    assert some.first[1] == 0.0
+    np.testing.assert_allclose(some.begin.position[[0, 2]], end.position[[4, 2]], atol=1e-14)
+
+
+def test_behind_another_tool_a_motion_begins_with_its_own():
+    task = line()
+    longer = Poses(rotation_from_vector([0.1, 0.2, 0.3]), np.array([0.05, -0.02, 0.4]))
+    tool = task.tool.copy()
+    tool.put(slice(2, 4), longer)
+    path = replace(task.toolpath, tool=np.array([0, 0, 1, 1]))
+    task = replace(task, tool=tool, toolpath=path)
+    result = correct(line())
+    division = divide(line(), result, Limits(keep=True))
+    begin = made(task, division, np.array([2])).begin
+    there = division.command[[1]] @ tool[1].inverse() @ longer
+    np.testing.assert_allclose(begin.position, there.position, atol=1e-12)
+    np.testing.assert_allclose(begin.rotation, there.rotation, atol=1e-12)
