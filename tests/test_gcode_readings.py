@@ -1,4 +1,5 @@
-"""Small programs of G-code beside all that is read of them: every motion with its modes, every finding in full.
+"""Small programs of G-code beside all that is read of them: every motion with its modes, every finding in full; and
+beside what their blocks state, as numbers that may be written anew.
 
 A file holds the control (and how the cell reads it), the program, a line of dashes, and the reading.
 """
@@ -12,15 +13,17 @@ import numpy as np
 import pytest
 
 from postproc.arrays import Floats
-from postproc.dialects.dialect import Program, Settings
+from postproc.dialects.dialect import Program, Settings, Writing
 from postproc.dialects.gcode import DIALECTS
 from postproc.dialects.gcode.control import Feed
+from postproc.dialects.gcode.writer_text import stated
 from postproc.document import Document
 from postproc.geometry import abc_from_rotation
 from postproc.toolpath import Kind
 from postproc.units import DEG, MM
 
-CASES = sorted((Path(__file__).parent / "programs" / "readings").glob("*.txt"))
+PROGRAMS = Path(__file__).parent / "programs"
+CASES, STATED = (sorted((PROGRAMS / name).glob("*.txt")) for name in ("readings", "stated"))
 NAMES = {dialect.name: dialect for dialect in DIALECTS}
 DOWN = np.array([0.0, 0.0, np.pi])
 RULE = "--------\n"
@@ -100,3 +103,33 @@ def test_a_program_reads_as_said(path: Path) -> None:
     program, expected = path.read_text(encoding="latin-1").split(RULE)
     head, text = program.split("\n", 1)
     assert list(reading(read(head, text))) == expected.splitlines()
+
+
+def blocks(program: Program) -> Iterator[str]:
+    """Of every column its address and number (r: an increment), the digits with which it is written (r: an increment
+    where it is not there yet), and what stands there; the word of the motion, and what is behind the last word."""
+    part = program.text.part(0, len(program.toolpath))
+    text, words, raw = stated(part, Writing(mm=3, deg=2)), part.text.words, part.raw
+    for row in range(len(part)):
+        said = []
+        for column, key in enumerate(text.keys[row].tolist()):
+            value, relative = text.value[row, column], text.relative[row, column]
+            mode = f".{text.decimals[row, column]}{'r' * bool(text.modal[row, column])}"
+            name = "-" if key < 0 else chr(key & 0xFF) + (f"{key // 256 - 1}=" if key > 255 else "")
+            number = "" if np.isnan(value) else f"{value:.12g}{'r' * bool(relative)}"
+            k = int(text.word[row, column])
+            literal = raw[words.start[k] : words.stop[k]].decode() if k >= 0 else ""
+            said.append(f"{name}{number}{mode}" + (f"<{literal}>" if k >= 0 else ""))
+        verb = part.verb[row]
+        said.append(raw[words.at[verb] : words.stop[verb]].decode() if verb >= 0 else "inherited")
+        said += [f"turns {text.turns[row]}"] * bool(text.turns[row]) + ["through"] * bool(text.through[row])
+        stop = part.text.blocks.stop[part.block[row]]
+        said.append(f"before {raw[part.insert[row] : stop].decode()!r}")
+        yield f"{program.toolpath.line[row]} " + " ".join(said)
+
+
+@pytest.mark.parametrize("path", STATED, ids=lambda path: path.stem)
+def test_blocks_state_what_is_said(path: Path) -> None:
+    program, expected = path.read_text(encoding="latin-1").split(RULE)
+    head, text = program.split("\n", 1)
+    assert list(blocks(read(head, text))) == expected.splitlines()

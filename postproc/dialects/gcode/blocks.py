@@ -20,6 +20,8 @@ from postproc.dialects.gcode.words import COLUMNS, How, key
 from postproc.units import DEG, MM
 
 INCH = 25.4 * MM
+SMALL_ANGLE = 1e-3
+"""[deg] what an angle without a decimal point counts where such words count increments."""
 AXES = tuple(key(letter) for letter in "XYZABC")
 THROUGH = tuple(key(letter, 1) for letter in "IJK")
 """The point between of an arc through three points."""
@@ -151,7 +153,7 @@ class Blocks:
 
     def angles(self, wanted: int) -> Floats:
         """(B,) [rad], NaN where absent."""
-        return self._scaled(wanted, DEG, DEG * (1e-3 if self.increments else 1.0))
+        return self._scaled(wanted, DEG, DEG * (SMALL_ANGLE if self.increments else 1.0))
 
     @cached_property
     def length(self) -> Floats:

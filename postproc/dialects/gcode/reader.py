@@ -13,7 +13,7 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.dialects.dialect import PLAIN, Program, Settings
 from postproc.dialects.gcode import offsets
 from postproc.dialects.gcode.arcs import Arcs, arcs, through
-from postproc.dialects.gcode.blocks import AXES, THROUGH, Blocks, Reasons, blocks, course, tilted
+from postproc.dialects.gcode.blocks import AXES, SMALL_ANGLE, THROUGH, Blocks, Reasons, blocks, course, tilted
 from postproc.dialects.gcode.comments import remarks
 from postproc.dialects.gcode.control import Control, Event, Feed, Frame, Group, Move, Once
 from postproc.dialects.gcode.feeds import Feeds
@@ -202,7 +202,7 @@ def _change(given: Blocks, events: Ints) -> Callable[[int, Frame, Floats], Frame
     def changed(block: int, frame: Frame, position: Floats) -> Frame:
         here = given.part(block, block + 1)
         lengths = float(here.length_of_integer[0] / here.length[0])
-        angles = 1e-3 if given.increments else 1.0
+        angles = SMALL_ANGLE if given.increments else 1.0
         small = {one: angles if one in AXES[3:] else lengths for one in keys}
         words = {
             one: float(column.value[-1] * (small[one] if column.how[-1] == How.INTEGER else 1.0))

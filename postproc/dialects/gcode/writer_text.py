@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.dialects.dialect import Writing
+from postproc.dialects.gcode.blocks import SMALL_ANGLE
 from postproc.dialects.gcode.control import Move
 from postproc.dialects.gcode.places import Part
 from postproc.dialects.gcode.words import NAMES, How, key
@@ -79,7 +80,8 @@ def stated(places: Part, writing: Writing) -> Stated:
     counted = np.ones(word.shape)
     lengths = np.r_[0:3, 6:10]
     # Where mm or inch is not known, neither is the increment.
-    counted[:, lengths] = np.nan_to_num(places.increment / places.scale, nan=1.0)[:, None]
+    ratio = np.nan_to_num(places.increment / places.scale, nan=1.0)[:, None]
+    counted[:, lengths], counted[:, TURNED] = ratio, np.where(ratio == 1.0, 1.0, SMALL_ANGLE)
     integer = how == How.INTEGER
     value[integer] *= counted[integer]
     modal = _modal(places, orient, through)
