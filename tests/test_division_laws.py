@@ -334,6 +334,56 @@ def test_an_arc_of_nearly_a_full_turn_has_two_pieces_at_least():
     assert told.message.startswith("7 motions would have to be inserted, max_growth (1.5) allows 1:")
 
 
+@pytest.mark.parametrize("job", ["line", "corner", "circle"])
+def test_what_just_fits_is_not_told(job):
+    task = JOBS[job]()
+    result, whole = divided(task)
+    n = len(task.toolpath)
+    just = divide(task, result, Limits(max_growth=len(whole) / n))
+    assert not just.findings
+    np.testing.assert_array_equal(just.source, whole.source)
+    less = divide(task, result, Limits(max_growth=(len(whole) - 1) / n))
+    assert [one.code for one in less.findings] == ["COR014"]
+    assert len(less) == len(whole) - 1
+
+
+@pytest.mark.parametrize(("first", "line_"), [(3, 12), (2, 13)])
+def test_of_links_that_of_the_largest_step_comes_first(first, line_):
+    """The other motion is the one that is told."""
+    task = corner()
+    if first == 2:  # hardly another force behind the corner
+        values = task.force.values.copy()
+        values[3] = 1.3 * values[2]
+        task = replace(task, force=replace(task.force, values=values, start=values))
+    size = steps(task)[0]
+    assert min(size[2:4]) > 1.0
+    assert (size[2] > size[3]) == (first == 2)
+    one = divided(task, Limits(max_growth=1.2))[1]
+    assert one.source[one.links].tolist() == [first]
+    assert one.findings[0].line == line_
+
+
+def test_a_link_back_to_an_arc_that_stays_is_made_before_all_others():
+    task = circle(sweep=1.0, tolerance=1.0)
+    carries = np.array([False, True, False, False])
+    wrench = np.where(carries[:, None], FORCE, 0.0)
+    task = replace(
+        task, force=replace(task.force, carries=carries, values=wrench, start=wrench), tolerance=1e-5
+    )
+    free = divided(task)[1]
+    assert free.source[free.links].tolist() == [1, 2]
+    points = free.inserted - 2
+    division = divided(task, Limits(max_growth=1.25))[1]
+    assert division.source[division.links].tolist() == [2]
+    assert division.inserted == 1
+    assert division.findings[0].message.startswith(
+        f"{1 + points} motions would have to be inserted, max_growth (1.25) allows 0: 1 motions"
+    )
+    more = divided(task, Limits(max_growth=1.5))[1]
+    assert more.source[more.links].tolist() == [1, 2]
+    assert more.inserted == 2
+
+
 # what can not be
 
 
@@ -366,6 +416,47 @@ def test_a_way_that_leads_out_of_reach_is_held(flag, sense, where):
     held = divide(walled, result, FREE).held
     assert [(row, one.code, one.message, one.file, one.line) for row, one in held.items()] == [
         (2, "COR009", f"{where} the correction leads out of reach", "part.src", 12)
+    ]
+
+
+@dataclass(frozen=True)
+class Flat(Task):
+    """A task whose commands lie on one line, along y."""
+
+    def command(self, rows, wanted, *given, **more):
+        done = super().command(rows, wanted, *given, **more)
+        position = done.command.position.copy()
+        position[:, [0, 2]] = 1.6, 0.5
+        return replace(done, command=Poses(done.command.rotation, position))
+
+
+@pytest.mark.parametrize("in_plane", [False, True])
+def test_an_arc_of_points_that_lie_on_no_circle_is_held(in_plane):
+    job = replace(circle(sweep=1.0), max_correction=1.0)
+    job = planar(job) if in_plane else job
+    flat = Flat(**{one.name: getattr(job, one.name) for one in fields(Task)})
+    division = divide(flat, correct(flat), Limits(min_segment=1.0))
+    assert division.role.tolist() == [OWN, OWN, LINK, OWN, OWN]
+    said = "the corrected points of this arc lie on no circle"
+    assert [(row, one.code, one.message, one.file, one.line) for row, one in division.held.items()] == [
+        (2, "COR013", said, "part.src", 12)
+    ]
+
+
+def test_what_is_held_is_told_in_the_order_of_the_program_and_once():
+    """A nearly full turn that leads out of reach as well, behind another way that does."""
+    task = line(tolerance=2e-6)
+    result = correct(task)
+    search = _Search(task, result, FREE)
+    search._hold(np.array([3, 1]), "COR009", "first")
+    search._hold(np.array([1, 2]), "COR013", "second")
+    search.link()
+    search.refine()
+    held = search.division().held
+    assert [(row, one.code, one.message, one.line) for row, one in held.items()] == [
+        (1, "COR009", "first", 11),
+        (2, "COR013", "second", 12),
+        (3, "COR009", "first", 13),
     ]
 
 
@@ -402,6 +493,18 @@ def test_a_share_of_a_correction_is_that_share_of_every_motion(job, gain):
         away.append(pieces.at(np.full(len(arcs), 0.5)).position - wanted)
     radial = np.linalg.norm(away[1] - gain * away[0], axis=1)
     assert radial.max() < 0.05 * np.linalg.norm(away[0], axis=1).max()
+
+
+def test_a_share_may_be_small_enough_where_the_whole_is_not():
+    """The points of a first cut are those of the last one, which the cell does not allow yet."""
+    task = line()
+    size = np.linalg.norm(correct(task).correction, axis=1).max()
+    whole = divided(task)[1]
+    part = divided(replace(task, gain=0.5, max_correction=0.6 * size))[1]
+    np.testing.assert_array_equal(part.source, whole.source)
+    own = np.flatnonzero(part.own)
+    away = part.command.position[own] - task.wanted.position
+    np.testing.assert_allclose(away, 0.5 * (whole.command.position[own] - task.wanted.position), atol=1e-9)
 
 
 def test_motions_whose_way_is_not_known_are_scaled_where_they_end():
