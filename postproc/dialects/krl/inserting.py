@@ -23,7 +23,7 @@ _DEEPEST = 80
 """Blanks of an indentation."""
 
 _BLANKS = np.isin(np.arange(256), np.frombuffer(b" \t", np.uint8))
-_CONDITIONS = re.compile(rb"\bWITH\b.*\Z", re.I | re.S)
+_CONDITIONS = re.compile(rb"\bWITH\b.*?(?=(?:[ \t,]C_(?:DIS|VEL|ORI|PTP|SPL))?[ \t]*\Z)", re.I | re.S)
 _WORD = re.compile(rb"[A-Za-z_]+")
 
 

@@ -119,8 +119,8 @@ def _targets(task: Task, rows: Ints, completed: Bools, lines: Lines) -> Iterator
             yield end
         if arc is None or not via:
             continue
-        if arc.has_angle:
-            _change_angle(task, row, arc, bool(kept_angle[k]), lines)
+        if arc.angle is not None:
+            _change_angle(task, row, arc.angle, bool(kept_angle[k]), lines)
         finer_by = FINER if kept_angle[k] else 0
         auxiliary = _auxiliary(task, row, arc, said_vias[row], via, finer_by, texts[3:])
         if auxiliary.missing or auxiliary.anew():
@@ -173,20 +173,16 @@ def _said_vias(task: Task, rows: list[int]) -> dict[int, Via]:
     return dict(zip(rows, zip(values.tolist(), decimals.tolist(), strict=True), strict=True))
 
 
-def _change_angle(task: Task, row: int, arc: Auxiliary, stays: bool, lines: Lines) -> None:
+def _change_angle(task: Task, row: int, angle: Span, stays: bool, lines: Lines) -> None:
     """Drops the CA of a row, or sets it to the planned sweep."""
-    sweep = float(task.plan.sweep[task.own[row]]) / DEG
-    if arc.angle is None:
-        lines.hold(row, "the angle CA of a corrected arc is an expression")
-    elif stays:
-        radius = (
-            float(np.linalg.norm(task.plan.position[task.own[row]] - task.plan.centre[task.own[row]])) / MM
-        )
-        decimals = max(int(task.least[0] + FINER + math.log10(max(radius, 1.0))), 0)
-        lines.ask(row, lines.replaced(arc.angle, fixed_one(sweep, decimals)))
+    if stays:
+        plan, own = task.plan, task.own[row]
+        radius = float(np.linalg.norm(plan.position[own] - plan.centre[own])) / MM
+        decimals = int(task.least[0] + FINER + math.log10(max(radius, 1.0)))
+        lines.ask(row, lines.replaced(angle, fixed_one(float(plan.sweep[own]) / DEG, decimals)))
     else:
         # ", CA 90": from the end point to the number.
-        lines.ask(row, Edit(Span(0, int(task.places.motion[row, 2]), arc.angle.stop), b""))
+        lines.ask(row, Edit(Span(0, int(task.places.motion[row, 2]), angle.stop), b""))
 
 
 def _users(task: Task, needed: dict[int, list[Target]]) -> dict[int, dict[Spot, float]]:

@@ -1,0 +1,130 @@
+"""Small programs, plans for them, and what is written: each line that changes or is added, or why none is.
+
+A case in ``programs/krl/writings.txt``: ``### name``, the program (see ``test_krl_readings``), ``=== dat``, and
+``=== plan`` with lines ``LINE what numbers``, where LINE.2 is the second run of a line: ``move`` [mm] and ``turn``
+(rotation vector, deg) of the end; ``slide`` [mm] of the ends from a line to another, with the arcs between; ``on``
+[deg] for the end of an arc; ``piece`` and ``link`` inserted there [mm], pieces of arcs with their sweep [deg], which
+the last piece gets by ``sweep``; ``digits`` and ``own`` of the writing.
+``=== written``: number and text of each line as it is afterwards, ``@1`` in the .dat; or ``held``.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_krl_readings import read
+
+from postproc.dialects.dialect import Plan, Program, Role, Writing
+from postproc.dialects.krl import KrlDialect
+from postproc.document import apply
+from postproc.geometry import rotation_from_vector
+from postproc.units import DEG, MM
+
+KRL = KrlDialect()
+
+
+def cases() -> dict[str, dict[str, str]]:
+    path = Path(__file__).parent / "programs" / "krl" / "writings.txt"
+    found = {}
+    for case in re.split(r"^### ", path.read_text(), flags=re.M)[1:]:
+        parts = re.split(r"^=== (\w+)\n", case, flags=re.M)
+        name, _, program = parts[0].partition("\n")
+        found[name] = {"": program, **dict(zip(parts[1::2], parts[2::2], strict=True))}
+    return found
+
+
+CASES = cases()
+
+
+def planned(program: Program, text: str) -> tuple[Plan, Writing]:
+    path = program.toolpath
+    plan = Plan.of(path)
+    position, rotation = np.array(plan.position), np.array(plan.rotation)
+    centre, sweep = plan.centre.copy(), plan.sweep.copy()
+    inserted: list[tuple[int, Role, list[float]]] = []
+    writing = Writing(3, 3)
+    for line in text.split("\n"):
+        first, what, *rest = [*line.split(), "", ""]
+        numbers = [float(word) for word in rest if re.fullmatch(r"-?[\d.]+", word)]
+        if first == "digits":
+            writing = replace(writing, mm=int(what), deg=int(rest[0]))
+        elif first == "own":
+            writing = replace(writing, own_points=what)
+        elif first:
+            number, _, run = first.partition(".")
+            row = int(np.flatnonzero(path.line == int(number))[int(run or 1) - 1])
+            match what:
+                case "move":
+                    position[row] += np.array(numbers) * MM
+                case "turn":
+                    rotation[row] = rotation_from_vector(np.array(numbers) * DEG) @ rotation[row]
+                case "slide":
+                    until = int(numbers.pop(0))
+                    for other in np.flatnonzero((path.line >= int(number)) & (path.line <= until)):
+                        position[other] += np.array(numbers) * MM
+                        centre[other] += np.array(numbers) * MM * (other > row)
+                case "on":
+                    sweep[row] += numbers[0] * DEG
+                    turn = rotation_from_vector(numbers[0] * DEG * path.normal[row])
+                    position[row] = centre[row] + turn @ (position[row] - centre[row])
+                case "sweep":
+                    sweep[row] = numbers[0] * DEG
+                case _:
+                    inserted.append((row, Role[what.upper()], numbers))
+    at = [row for row, _, _ in inserted]
+    source = np.insert(plan.source, at, at)
+    role = np.insert(plan.role, at, [kind for _, kind, _ in inserted])
+    position, rotation, centre = (
+        np.insert(array, at, array[at], axis=0) for array in (position, rotation, centre)
+    )
+    normal = np.insert(plan.normal, at, plan.normal[at], axis=0)
+    sweep = np.insert(sweep, at, sweep[at])
+    for there, (_, kind, numbers) in zip(np.flatnonzero(role != Role.OWN), inserted, strict=True):
+        position[there] = np.array(numbers[:3]) * MM
+        if kind == Role.LINK:
+            centre[there] = normal[there] = sweep[there] = np.nan
+        elif len(numbers) > 3:
+            sweep[there] = numbers[3] * DEG
+    return Plan(source, role, position, rotation, centre, normal, sweep), writing
+
+
+def written(case: dict[str, str]) -> Iterator[str]:
+    program = read(case)
+    plan, writing = planned(program, case["plan"])
+    found = KRL.moved(program, plan, writing)
+    for _, held in sorted(found.held.items()):
+        assert held.file == "part.src"
+        yield f"held {held.line}:{held.column} {held.code}: {held.message}"
+    if found.held:
+        assert not len(found.edits)
+        return
+    after = []
+    for file, document in enumerate(program.documents):
+        raw = apply(document, [edit for edit in found.edits if edit.span.file == file])
+        after.append(replace(document, raw=raw))
+        before, now = (text.decode().split("\n") for text in (document.raw, raw))
+        for kind, _, _, low, high in difflib.SequenceMatcher(None, before, now, False).get_opcodes():
+            if kind in ("replace", "insert"):
+                for number in range(low, high):
+                    yield f"{number + 1} {now[number]}" + f"@{file}" * (file > 0)
+    back = KRL.read(tuple(after)).toolpath
+    step = 0.5000001 * 10.0**-writing.mm * MM
+    known = np.isfinite(plan.position)
+    np.testing.assert_array_equal(np.isfinite(back.position), known)
+    assert np.abs(back.position - plan.position)[known].max() <= step
+    np.testing.assert_allclose(
+        back.rotation[known[:, 0]], plan.rotation[known[:, 0]], atol=2 * 10.0**-writing.deg * DEG
+    )
+    arcs = np.isfinite(plan.sweep)
+    np.testing.assert_allclose(back.centre[arcs], plan.centre[arcs], atol=10 * step)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_plan_is_written_as_it_is_told(name: str) -> None:
+    assert list(written(CASES[name])) == CASES[name]["written"].strip("\n").splitlines()
