@@ -193,12 +193,10 @@ def test_each_figure_has_its_column_and_the_force_is_scaled():
     assert all(given is start for _, _, given in model.asked)
     scaled = [one for _, one, _ in model.asked if not np.array_equal(one, wrench)]
     np.testing.assert_allclose(scaled, [0.96 * wrench, 1.04 * wrench], rtol=1e-15)
-    # no force, no scale of it; the parameters are asked for all the same
-    model = Formula()
-    found = sensitivities(model, [force, unsure(A, 0.1)], q, np.zeros((2, 6)), TOOL)
+    # no force, no scale of it
+    found = sensitivities(Formula(), [force, unsure(A, 0.1)], q, np.zeros((2, 6)), TOOL)
     assert not found[:, :, 0].any()
     np.testing.assert_allclose(found[:, 0, 1], 6.0)
-    assert len(model.asked) == 2
 
 
 def test_where_a_stepped_model_has_no_rest_nothing_is_known():

@@ -141,7 +141,7 @@ def sensitivities(
     for column, entry in enumerate(entries):
         low = max(entry.value - entry.step, entry.lower)
         high = min(entry.value + entry.step, entry.upper)
-        if not low < high or (entry.term < 0 and not wrench.any()):
+        if not low < high:
             continue
         ends = []
         for value in (low, high):
@@ -166,10 +166,12 @@ def half_widths(error: Floats, spread: Floats) -> Floats:
     Of an error that stands clear of its doubt: along its own direction.  Elsewhere, as after a correction, the
     length that the deviation keeps below with 95 %.
     """
-    size, length = np.linalg.norm(error, axis=1), length_quantile(spread)
-    unit = error / np.where(size > 0, size, 1.0)[:, None]
-    along = np.einsum("ni,nij,nj->n", unit, spread, unit)
-    return np.where(size > length, COVERAGE * np.sqrt(np.maximum(along, 0.0)), length)
+    size, found = np.linalg.norm(error, axis=1), length_quantile(spread)
+    clear = size > found
+    unit = error[clear] / size[clear, None]
+    along = np.einsum("ni,nij,nj->n", unit, spread[clear], unit)
+    found[clear] = COVERAGE * np.sqrt(np.maximum(along, 0.0))
+    return found
 
 
 def length_quantile(spread: Floats) -> Floats:
@@ -180,12 +182,10 @@ def length_quantile(spread: Floats) -> Floats:
     direction this is 1.96 sqrt(lambda), for three alike 2.80 sqrt(lambda): both exact, between them to about 1 %.
     """
     total, squares = np.trace(spread, axis1=1, axis2=2), (spread**2).sum(axis=(1, 2))
-    some = squares > 0
-    freedom, quantile = np.array(_CHI_SQUARE).T
-    chi = np.interp(total**2 / np.where(some, squares, 1.0), freedom, quantile)
-    return np.where(
-        np.isnan(total), np.nan, np.sqrt(np.where(some, squares, 0.0) / np.where(some, total, 1.0) * chi)
-    )
+    found, some = 0.0 * total, squares > 0  # NaN where nothing is known
+    total, squares = total[some], squares[some]
+    found[some] = np.sqrt(squares / total * np.interp(total**2 / squares, *np.transpose(_CHI_SQUARE)))
+    return found
 
 
 def shares(sensitivity: Floats, covariance: Floats) -> Floats:
