@@ -34,7 +34,7 @@ def plan_of(program: Program, steps: str) -> Plan:
     and ``3 piece X1 Y2 Z3`` put a motion to that point before it, all that inherit are left where they were."""
     path = program.toolpath
     own = Plan.of(path)
-    position, rotation, centre = own.position.copy(), np.array(own.rotation), own.centre.copy()
+    position, rotation, centre = own.position.copy(), np.array(own.rotation), np.array(own.centre)
     before: dict[int, list[tuple[Role, Floats]]] = {}
     for step in filter(None, steps.split(";")):
         number, *words = step.split()
@@ -162,6 +162,12 @@ TEXTS: list[tuple[str, str, str, str]] = [
      "G1 X10.100 F60 Z5.500\nCIP X0.100 Y10 I1=7.171 J1=7.071 K1=IC(0) ;a\n"),
     ("sinumerik", "G1 X10 F60\nG91 CIP X-10 Y10 I1=-2.929 J1=7.071\n", "-1 X.1;-2 X.1",
      "G1 X10.100 F60\nG91 CIP X-10 Y10 I1=-2.929 J1=7.071\n"),
+    ("linuxcnc", "G1 X10 F60\nG3 X0.004 Y10 I-10.003 J0.002\nG1 X5\n", "-1 Y.1",
+     "G1 X10 F60\nG3 X0.004 Y10 I-10.003 J0.002\nG1 X5 Y10.100\n"),
+    ("linuxcnc", "G1 X10 F60\nG3 X0.004 Y10 R10.003\nG1 X5\n", "-1 Y.1",
+     "G1 X10 F60\nG3 X0.004 Y10 R10.003\nG1 X5 Y10.100\n"),
+    ("linuxcnc", "G1 X10 F60\nG41 D1 G3 X0 Y10 Z5 I-10 J0\nG40 G1 X5 Y5 Z5\nX6\n", "-1 Y.1",
+     "G1 X10 F60\nG41 D1 G3 X0 Y10 Z5 I-10 J0\nG40 G1 X5 Y5 Z5\nX6 Y5.100\n"),
     # Names and brackets
     ("sinumerik", "G1 X=IC(1) F60\n", "-1 Y.1", "G1 X=IC(1) F60 Y0.100\n"),
     ("sinumerik", "G1 F60 X=IC(1)\n", "-1 Y.1", "G1 F60 X=IC(1) Y0.100\n"),
@@ -248,6 +254,22 @@ def test_increments_of_angles_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     assert written("fanuc", text, "-2 c1", UM) == "G1 X1000 B30000 C11.000\nX2000 C10.000\n"
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "steps", "settings", "expected"),
+    [
+        ("fanuc", "G1 X1000 Y5000 F60\nX2000\n", "-1 Y.3", UM, "G1 X1000 Y5000 F60\nX2000 Y5.3\n"),
+        ("fanuc", "G1 X1000 Y5000 F60\nX2000\n", "-1 X.3", UM, "G1 X1000 Y5000 F60\nX2.300\n"),
+        ("fanuc", "G1 X1. Y5. F60\nX2.\n", "-1 X.3 Y.04", DOWN, "G1 X1. Y5. F60\nX2.3\n"),
+        ("linuxcnc", "G20 G1 X1 F60\nX2\n", "-1 Y2.54", DOWN, "G20 G1 X1 F60\nX2 Y0.100\n"),
+    ],
+)
+def test_numbers_of_few_digits(name: str, text: str, steps: str, settings: Settings, expected: str) -> None:
+    """A tenth of a millimetre or less; where a number counts increments, as many as it stood there with."""
+    program = read(NAMES[name], HEADS[name] + text, settings)
+    moved = NAMES[name].moved(program, plan_of(program, steps), Writing(mm=1, deg=1))
+    assert apply(program.documents[0], list(moved.edits)).decode() == HEADS[name] + expected
+
+
 STYLES: list[tuple[str, bytes, bool, bool]] = [
     # text, newline, spaced, two digits
     ("G1 X1\n", b"\n", True, False), ("G1X1\n", b"\n", False, False), ("G01X1\r\n", b"\r\n", False, True),
@@ -316,7 +338,9 @@ def test_a_defect_of_the_caller_is_told_by_its_row(rows: int, monkeypatch: pytes
     assert told(BODY, short) == "a plan has one own motion for every row"
 
 
-def test_what_no_words_state_is_held_and_told() -> None:
+@pytest.mark.parametrize("rows", [1, 2, 9])
+def test_what_no_words_state_is_held_and_told(rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(writer, "ROWS", rows)
     dialect = NAMES["linuxcnc"]
     program = read(dialect, HEADS["linuxcnc"] + BODY)
     plan = plan_of(program, "-2 i1")

@@ -48,13 +48,13 @@ def arcs(
 ) -> Arcs:
     """The arcs of N blocks.
 
-    begin, end (N, 3) [m]; plane (N,) 0, 1, 2, else not known; counter (N,): G3; ijk (N, 3) [m], NaN where absent;
+    begin, end (N, 3) [m]; plane (N,) 0, 1, 2, -1 not known; counter (N,): G3; ijk (N, 3) [m], NaN where absent;
     absolute (N,) or (N, 3): of ijk; radius (N,) [m], NaN where absent; turns (N,) whole turns beyond the first.
     """
     n = len(begin)
     wrong = np.zeros(n, np.int64)
     rows = np.arange(n)
-    axes = PLANES[np.clip(plane, 0, 2)]
+    axes = PLANES[np.maximum(plane, 0)]
     u, v, w = axes.T
     b = np.stack([begin[rows, u], begin[rows, v]], 1)
     e = np.stack([end[rows, u], end[rows, v]], 1)
@@ -95,7 +95,7 @@ def arcs(
     wrong[~np.isfinite(sweep) | (turns < 0)] = np.where(wrong == 0, 2, wrong)[
         ~np.isfinite(sweep) | (turns < 0)
     ]
-    wrong[(plane < 0) | (plane > 2)] = 5
+    wrong[plane < 0] = 5
     unknown = ~(np.isfinite(begin).all(axis=1) & np.isfinite(end).all(axis=1))
     wrong[unknown & np.isin(wrong, (0, 2, 3, 4)) & (by_centre | by_radius)] = 1
 

@@ -102,4 +102,4 @@ def _further(given: Blocks) -> Bools:
     return moving
 
 
-_LETTERS = frozenset(key(one) for one in "XYZABCUVW")
+_LETTERS = frozenset(key(one) for one in "XYZABCUVWEQ")

@@ -167,9 +167,7 @@ def _missed(arcs: Arcs, number: Floats, through: Bools, by_radius: Bools) -> tup
     closes = (np.abs(_in_plane(arcs, start - stop)) <= 1e-9).all(axis=1)
     sweep = np.where(closes, 2 * np.pi, sweep) + 2 * np.pi * arcs.turns
     if through.any():
-        via = np.where(np.isnan(number[:, :3]), 0.0, number[:, :3])
-        via = via + np.where(arcs.relative, arcs.begin, 0.0)
-        way = arc_through(arcs.begin[through], via[through], arcs.end[through])
+        way = arc_through(arcs.begin[through], stated[through], arcs.end[through])
         centre[through], normal[through], sweep[through] = way
     step = np.maximum(10.0 ** -arcs.decimals[:, :3].min(axis=1), 2.0 * arcs.off)
     worst = np.zeros(count)
