@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.dialects.krl import effects, lexing
+from postproc.dialects.krl import KrlDialect, effects, lexing
 from postproc.dialects.krl.effects import bas, effects_of, functions_of, read_by
 from postproc.dialects.krl.expressions import DEEPEST, component, evaluate, index_text
 from postproc.dialects.krl.lexing import (
@@ -735,3 +735,63 @@ def test_components_of_variables() -> None:
 
 def test_short_code_is_remembered() -> None:
     assert lexing.identifiers(b"a") is lexing.identifiers(b"a")
+
+
+# files
+
+KRL = KrlDialect()
+
+
+@pytest.mark.parametrize(
+    ("name", "raw", "claimed"),
+    [
+        ("a.SRC", b"", True), ("a.txt", b"x\n\tDEF a\r\nEND", True), ("a.txt", b"global def a;c", True),
+        ("a.txt", b"DEF a b", False),
+        ("a.txt", b"\xef\xbb\xbfDEF a()", True), ("a.txt", b"x\n SLIN{X 1}", True), ("a.txt", b"ptp {A1 5}", True),
+        ("a.txt", b"DEFX a()", False),
+        ("a.txt", b"; PTP {A1 5}", False), ("a.txt", b"PTP P1", False), ("a.dat", b"DEFDAT a", False),
+    ],
+)  # fmt: skip
+def test_programs_that_are_krl(name: str, raw: bytes, claimed: bool) -> None:
+    assert KRL.claims(Path(name), raw) == claimed
+
+
+@pytest.mark.parametrize(
+    ("raw", "marker", "at"),
+    [
+        (b"DEF a()\n;COMPENSATED by compensate 1\nEND\n", b";COMPENSATED by compensate 1", 8),
+        (b"DEF a()\r\n \t;COMPENSATED by compensate 1 \r\nEND", b" \t;COMPENSATED by compensate 1 ", 9),
+        (b"\xef\xbb\xbf;COMPENSATED by compensate 1", b";COMPENSATED by compensate 1", 3),
+        (b"x=1 ;COMPENSATED by compensate 1\n\n;COMPENSATED by compensate\nDEF b()", None, 68),
+        (b"x=1 ;COMPENSATED by compensate 1\n\n;COMPENSATED by compensate 2\nDEF b", b";COMPENSATED by compensate 2", 69),
+        (b"x=1 ;COMPENSATED by compensate 1\nx=2 ;COMPENSATED by compensate 3", None, 0),
+        (b"&A\n\n&B\nDEF a()\n", None, 15), (b"&A\n  &B\nx=1\n&C\n", None, 8), (b"\xef\xbb\xbf&A\nx=1", None, 6),
+        (b"x=1\nDEF a", None, 9),
+        (b"&A", None, 2), (b"x\nDEF a()\nEND\nDEF b()\nEND\n", None, 10),
+    ],
+)  # fmt: skip
+def test_where_the_marker_stands_or_belongs(raw: bytes, marker: bytes | None, at: int) -> None:
+    program = KRL.read((Document(Path("a.src"), raw),))
+    found = program.marker
+    assert (None if found is None else raw[found.start : found.stop]) == marker
+    assert (program.marker_at.start, program.marker_at.stop) == (at, at)
+
+
+def test_a_program_without_a_routine_is_told_at_its_first_line() -> None:
+    for raw, line in (b"\n \nx=1\n", 3), (b"", 1), (b"x=1", 1), (b"\n\n", 1):
+        (found,) = KRL.read((Document(Path("a.src"), raw),)).findings
+        assert (found.code, found.line, found.column) == ("KRL018", line, 1)
+
+
+def test_names_of_the_module_in_both_files() -> None:
+    texts = b"x\nDEF a()\nEND\n", b"DEFDAT b\nENDDAT\n"
+    program = KRL.read(tuple(Document(Path(f"a{i}"), text) for i, text in enumerate(texts)))
+    assert [texts[span.file][span.start : span.stop] for span in program.names] == [b"a", b"b"]
+    program = KRL.read(tuple(Document(Path(f"a{i}"), text) for i, text in enumerate((b"", texts[1]))))
+    assert [(span.file, span.start) for span in program.names] == [(1, 7)]
+
+
+def test_findings_stand_in_the_order_of_their_places() -> None:
+    raw = b"DEF a()\n LIN {X 1}\nENDIF\nunread()\n LIN P\nENDFOR\n"
+    places = [(found.line, found.column) for found in KRL.read((Document(Path("a.src"), raw),)).findings]
+    assert places == [(1, 1), (2, 2), (3, 1), (4, 1), (5, 2), (6, 1)]

@@ -11,6 +11,7 @@ the last piece gets by ``sweep``; ``digits`` and ``own`` of the writing.
 from __future__ import annotations
 
 import difflib
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -22,7 +23,8 @@ from test_krl_readings import read
 
 from postproc.dialects.dialect import Plan, Program, Role, Writing
 from postproc.dialects.krl import KrlDialect
-from postproc.document import apply
+from postproc.dialects.krl.components import Components, differs, other_literal, written_decimals
+from postproc.document import Document, apply
 from postproc.geometry import rotation_from_vector
 from postproc.units import DEG, MM
 
@@ -128,3 +130,65 @@ def written(case: dict[str, str]) -> Iterator[str]:
 @pytest.mark.parametrize("name", CASES)
 def test_a_plan_is_written_as_it_is_told(name: str) -> None:
     assert list(written(CASES[name])) == CASES[name]["written"].strip("\n").splitlines()
+
+
+POINT = "DECL FRAME P={X 1,Y 2,Z 3,A 4,B 5,C 6}"
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+@pytest.mark.parametrize(
+    ("data", "after"),
+    [
+        (f"DEFDAT a\n{POINT}", f"DEFDAT a\n{POINT}\nDECL FRAME P_1=NEW"),
+        (f"DEFDAT a\n{POINT}\n", f"DEFDAT a\n{POINT}\nDECL FRAME P_1=NEW\n"),
+        (f"DEFDAT a\n{POINT} ;note\nENDDAT", f"DEFDAT a\n{POINT} ;note\nDECL FRAME P_1=NEW\nENDDAT"),
+    ],
+)
+def test_a_new_point_stands_behind_the_old_one(data: str, after: str, newline: str) -> None:
+    texts = ["DEF a()\nBAS(#INITMOV,0)\nLIN P\nLIN P\nEND\n", data]
+    program = KRL.read(
+        tuple(
+            Document(Path(name), text.replace("\n", newline).encode())
+            for name, text in zip(("a.src", "a.dat"), texts, strict=True)
+        )
+    )
+    plan, writing = planned(program, "own dat\n4 move 0 0 1")
+    found = [edit for edit in KRL.moved(program, plan, writing).edits if edit.span.file == 1]
+    wanted = after.replace("NEW", "{X 1,Y 2,Z 4.000,A 4,B 5,C 6}").replace("\n", newline)
+    assert apply(program.documents[1], found).decode() == wanted
+
+
+@pytest.mark.parametrize(
+    ("literal", "decimals"),
+    [
+        (b"- 2.50", 2), (b"1.250E1", 2), (b"1E-3", 3), (b"1.5e+2", 0), (b"1.50E1", 1), (b"'HF'", 0), (b"1.5E-20", 12),
+        (b"+5", 0), (b"1.E1", 0), (b"1.", 0), (b"0.123 ", 3),
+    ],
+)  # fmt: skip
+def test_decimals_that_a_literal_is_written_with(literal: bytes, decimals: int) -> None:
+    assert written_decimals(literal) == decimals
+    assert other_literal(literal)[1] == decimals
+
+
+def test_values_of_literals_in_any_form() -> None:
+    assert [other_literal(text)[0] for text in (b"- 2.5", b"'HF'", b"none")] == [-2.5, 15.0, 0.0]
+
+
+def test_what_stays_as_it_is_written() -> None:
+    """Within half a step of each literal; angles go round."""
+    own = np.array([[1.0, 2.0, 3.0, 180.0, -360.0, 90.0]])
+    none = np.full((1, 6), -1)
+    said = Components(own, np.array([[0, 1, 2, 1, 1, 1]]), none, none, none)
+    np.testing.assert_allclose(said.half_step, [[0.5, 0.05, 0.005, 0.05, 0.05, 0.05]])
+    change = np.array([[0.5, -0.0499, 0.0051, -359.96, 360.04, 0.051]])
+    assert said.kept(own + change).tolist() == [[True, True, False, True, True, False]]
+    two = Components(
+        np.vstack([own, own + 1]), *(np.vstack([part, part]) for part in (said.decimals, *[none] * 3))
+    )
+    assert two.of(np.array([False, True])).own.tolist() == (own + 1).tolist()
+
+
+def test_numbers_that_differ() -> None:
+    nan = math.nan
+    old, new = np.array([0.0, 0.0, 1.0, nan, nan, 1.0]), np.array([1e-12, 2e-12, -1.0, nan, 1.0, nan])
+    assert differs(new, old).tolist() == [False, True, True, False, True, True]

@@ -27,13 +27,12 @@ class Calls(Blocks):
     """Follows jumps and calls."""
 
     def _label(self, item: Statement, name: bytes) -> None:
-        run = self.run
-        begin = run.routine.begin if run.routine is not None else -1
-        if (begin, name) not in self.doubts.labels:
+        run, routine = self.run, self.run.routine
+        if routine is None or (routine.begin, name) not in self.doubts.labels:
             return
-        effects = {"point", *run.survey.on_the_way[begin, name]}
+        effects = {"point", *run.survey.on_the_way[routine.begin, name]}
         run.forget(effects, f"after the label {shown(name)} in line {item.line}")
-        mark = b"label %d " % begin + name
+        mark = b"label %d " % routine.begin + name
         run.rows.sources[mark] |= run.state.sources
         run.state.sources = frozenset([mark])
         run.tell(
@@ -44,9 +43,10 @@ class Calls(Blocks):
 
     def _goto(self, pc: int, name: bytes) -> int:
         run, routine = self.run, self.run.routine
-        target = routine.labels.get(name) if routine is not None else None
-        if target is not None and routine is not None:
-            at, blocks = target
+        if routine is None:
+            return pc + 1
+        if name in routine.labels:
+            at, blocks = routine.labels[name]
             open_blocks = self._open_in_routine()
             inside = [opened for opened in open_blocks if opened.block in blocks]
             certain = not run.unsure and not self.doubts.plain and [o.block for o in inside] == list(blocks)
@@ -59,8 +59,7 @@ class Calls(Blocks):
                 self.doubts.labels.add((routine.begin, name))
                 self.doubts.passed.update(o.block.begin for o in open_blocks if o.block.word in LOOPS)
                 raise Restart
-        begin = routine.begin if routine is not None else -1
-        run.rows.sources[b"label %d " % begin + name] |= run.state.sources
+        run.rows.sources[b"label %d " % routine.begin + name] |= run.state.sources
         return pc + 1
 
     def _open_in_routine(self) -> list[Open]:

@@ -43,21 +43,17 @@ class Chain:
         for low in range(0, len(first), BLOCK):
             rows = first[low : low + BLOCK]
             self.deviation[rows] = _deviation(*self.task.targets(rows))
-        last, at = [0.0] * 6, -2
         for low in range(0, len(dependent), BLOCK):
             rows = dependent[low : low + BLOCK]
             before = np.where((rows > 0)[:, None], self.deviation[rows - 1], 0.0)
             active = self.touched[rows] | (self.task.inserted[rows] > 0)
             # Rows far behind a change need not be looked at.
-            if not (active.any() or before.any() or (at == rows[0] - 1 and any(last))):
-                at, last = int(rows[-1]), [0.0] * 6
-                continue
-            last, at = self._follow(rows, before.tolist(), last, at)
+            if active.any() or before.any():
+                self._follow(rows, before.tolist())
 
-    def _follow(
-        self, rows: Ints, before: list[list[float]], last: list[float], at: int
-    ) -> tuple[list[float], int]:
+    def _follow(self, rows: Ints, before: list[list[float]]) -> None:
         task = self.task
+        last, at = [0.0] * 6, -2
         said, wanted, kept = task.targets(rows)
         fresh: list[list[float]] = _deviation(said, wanted, kept).tolist()
         wish: list[list[float]] = _wrapped(wanted - said.own).tolist()
@@ -98,7 +94,6 @@ class Chain:
                         for i, (t, f) in enumerate(zip(taken, fresh[k], strict=True))]  # fmt: skip
             self._inexact[row] = any(abs(value) > EXACT for value in last)
             self.deviation[row] = last
-        return last, at
 
     def again(self, way: Bools) -> Bools:
         """(N,) rows to be written for the sake of the row before; ``way`` (N,): arcs that are planned otherwise."""

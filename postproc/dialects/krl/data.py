@@ -141,7 +141,7 @@ def read_point(value: bytes, at: int, file: int, line: int) -> Target | Unclear:
     where = f"its declaration in line {line} of the .dat"
     if not (value.startswith(b"{") and value.endswith(b"}") and value.count(b"{") == 1):
         return Unclear("KRL019", f"{where} is no aggregate of numbers")
-    target = parse(value, at, max(file, -1))
+    target = parse(value, at, file)
     if isinstance(target, Unclear):
         return Unclear("KRL019", f"{where}: {target.message}")
     if file < 0:

@@ -79,7 +79,6 @@ class Flow(Calls):
                 motions.move(run, item)
             elif item.kind == "strange" and item.line not in lines and run.survey.has_routine:
                 motions.unknown_motion(run, item)
-        run.idle = False
 
     def _step(self, pc: int) -> int | None:
         """Takes up a statement; gives the index of the next one, None behind the end."""

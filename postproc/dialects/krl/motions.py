@@ -398,7 +398,7 @@ def _frames_missing(run: Run) -> Reason | None:
 
 def _apart(run: Run) -> bool:
     """Whether the motion does not follow the one before it: it never runs, or nobody knows when."""
-    return run.idle or (run.walked and run.routine is not None and not run.routine.is_main)
+    return run.idle or run.walked
 
 
 def _structure(run: Run) -> Reason | None:
@@ -409,7 +409,7 @@ def _structure(run: Run) -> Reason | None:
     if routine is None:
         if run.survey.has_routine:
             return Reason("KRL014", "a motion outside of every DEF", "outside")
-    elif run.walked and not routine.is_main:
+    elif run.walked:
         return Reason("KRL015", run.why_walked(routine), f"def {routine.line}")
     for item in run.stack:
         word = item.block.word

@@ -107,7 +107,7 @@ def _plain(task: Task, private: Bools) -> Bools:
 def _partial(task: Task, private: Bools) -> Bools:
     """(N,) rows whose target is an aggregate in a line that runs once; it leaves out components of the row before."""
     places = task.places
-    left_out = (places.inherits[:, None] >> np.arange(6, dtype=np.uint8)) & 1 == 1
+    left_out = np.unpackbits(places.inherits[:, None], axis=1, count=6, bitorder="little")
     partial = private & task.is_inline & (places.inherits > 0) & (places.home == 0)
     partial &= ((places.start >= 0) | left_out).all(axis=1)
     words = places.motion[:, 0]
