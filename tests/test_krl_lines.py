@@ -763,7 +763,7 @@ def test_programs_that_are_krl(name: str, raw: bytes, claimed: bool) -> None:
         (b"DEF a()\r\n \t;COMPENSATED by compensate 1 \r\nEND", b" \t;COMPENSATED by compensate 1 ", 9),
         (b"\xef\xbb\xbf;COMPENSATED by compensate 1", b";COMPENSATED by compensate 1", 3),
         (b"x=1 ;COMPENSATED by compensate 1\n\n;COMPENSATED by compensate\nDEF b()", None, 68),
-        (b"x=1 ;COMPENSATED by compensate 1\n\n;COMPENSATED by compensate 2\nDEF b", b";COMPENSATED by compensate 2", 69),
+        (b"x ;COMPENSATED by compensate 1\n\n;COMPENSATED by compensate 2\nDEF b", b";COMPENSATED by compensate 2", 66),
         (b"x=1 ;COMPENSATED by compensate 1\nx=2 ;COMPENSATED by compensate 3", None, 0),
         (b"&A\n\n&B\nDEF a()\n", None, 15), (b"&A\n  &B\nx=1\n&C\n", None, 8), (b"\xef\xbb\xbf&A\nx=1", None, 6),
         (b"x=1\nDEF a", None, 9),
