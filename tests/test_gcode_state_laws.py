@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gcode_writing import read
 
 from postproc.arrays import Floats, Ints
-from postproc.dialects.gcode import positions
+from postproc.dialects.gcode import DIALECTS, positions
 from postproc.dialects.gcode.comments import head
 from postproc.dialects.gcode.control import Frame
 from postproc.dialects.gcode.detection import CLAIMS
@@ -21,12 +22,13 @@ from postproc.dialects.gcode.positions import Course, Trace
 from postproc.dialects.gcode.refusals import HELP, Doubts
 from postproc.dialects.gcode.source import NONE, Column, scan
 from postproc.dialects.gcode.tables import LINUXCNC
-from postproc.document import Document
+from postproc.document import Document, apply
 from postproc.findings import CODES
 from postproc.geometry import rotation_from_vector
 from postproc.units import DEG
 
 NAN = np.nan
+NAMES = {dialect.name: dialect for dialect in DIALECTS}
 
 
 # Columns
@@ -159,6 +161,19 @@ def test_the_last_block_of_those_in_doubt() -> None:
             expected.append(last)
         assert Flow(doubt, no, no, no, no).last.tolist() == expected
     assert Doubt.NONE == 0
+
+
+SETTINGS = (92, 201, 203, 204, 205, 206, 208, 218, 350, 425, 557, 558, 566, 569, 574, 665, 666, 669, 851, 906, 907, 908,
+            913, 914)  # fmt: skip
+"""M codes of printers (Marlin, RepRapFirmware) whose X, Y, Z are steps, speeds, currents or places of a probe."""
+
+
+def test_settings_of_printers_are_no_motions() -> None:
+    codes = [code for code in range(1000) if code not in (2, 30, 72, 97, 98, 99, 117, 118, 198)]
+    text = "G21 G90\nG1 F60\n" + "".join(f"M{code} X5 Y{code}\n" for code in codes)
+    path = read(NAMES["linuxcnc"], text).toolpath
+    moving = {codes[line - 3] for line in path.line.tolist()}
+    assert sorted(set(codes) - moving) == list(SETTINGS)
 
 
 # Coordinates
@@ -467,3 +482,26 @@ KINDS: list[tuple[str, bytes, str]] = [
 def test_whose_program_it_is(name: str, raw: bytes, controls: str) -> None:
     found = sorted(control for control, claims in CLAIMS.items() if claims(Path(name), raw))
     assert found == [control for control in controls.split() if not control.endswith("-")]
+
+
+@pytest.mark.parametrize("newline", [b"\n", b"\r\n"])
+@pytest.mark.parametrize(
+    ("name", "raw", "marked"),
+    [
+        ("linuxcnc", b"G0 X1\n", b"(COMPENSATED by compensate [a])\nG0 X1\n"),
+        ("linuxcnc", b"%\nO1\nG0\n", b"%\nO1\n(COMPENSATED by compensate [a])\nG0\n"),
+        ("linuxcnc", b"%\nO1", b"%\nO1\n(COMPENSATED by compensate [a])"),
+        ("linuxcnc", b"", b"(COMPENSATED by compensate [a])\n"),
+        ("fanuc", b"\xef\xbb\xbfG0\n", b"\xef\xbb\xbf(COMPENSATED by compensate [a])\nG0\n"),
+        ("sinumerik", b"%_N_A_MPF\nG0\n", b"%_N_A_MPF\n;COMPENSATED by compensate [a]\nG0\n"),
+        ("kuka_cnc", b"G0\n;COMPENSATED by compensate x\nX1\n", b"G0\n;COMPENSATED by compensate [a]\nX1\n"),
+    ],
+)
+def test_where_a_program_is_marked(name: str, raw: bytes, marked: bytes, newline: bytes) -> None:
+    if b"\n" not in raw and newline == b"\r\n":
+        return  # which newline it has is not said
+    raw, marked = raw.replace(b"\n", newline), marked.replace(b"\n", newline)
+    program = read(NAMES[name], raw)
+    assert apply(program.documents[0], [NAMES[name].marked(program, "(a)")]) == marked
+    assert NAMES[name].companions(Path("a.nc")) == []
+    assert NAMES[name].renamed(program, "b") == []

@@ -22,7 +22,7 @@ def constant(text: bytes) -> float:
 
 
 def expression_end(text: bytes, at: int) -> int:
-    """Where an expression that begins at ``at`` ends: before a blank or a letter that begins the next word.
+    """Where an expression that begins at ``at`` ends, blanks behind it included: before the letter of the next word.
 
     Brackets hold whatever they hold; a name, a number and what operators join belong to it.
     """
@@ -35,9 +35,6 @@ def expression_end(text: bytes, at: int) -> int:
             place, joined = place + 1, True
         elif letter in b" \t":
             place += 1
-            ahead = text[place : place + 1]
-            if ahead and ahead not in b" \t" and not joined and ahead not in b"+-*/(<>=":
-                return place - 1
         elif letter == b'"':
             stop = text.find(b'"', place + 1)
             place, joined = (size if stop < 0 else stop + 1), False
