@@ -1,8 +1,8 @@
 """Small programs and all that is read from them: every motion, every finding in full, every note.
 
 A case in ``programs/krl/readings``: ``### name``, the program (with base and tool 1 set where it begins with no DEF,
-``@`` a full point), ``=== dat`` and ``=== config`` with the other files, and ``=== told``: a line a motion, as in a
-dump, with base and tool where they are not 1, then findings (!), annotations (;) and comments (,).
+``@`` a full point), ``=== dat``, ``=== config`` and ``=== other`` with other files, and ``=== told``: a line a motion,
+as in a dump, with base and tool where they are not 1, then findings (!), annotations (;) and comments (,).
 Or ``=== places``: where the numbers of each motion stand, ``@1`` in the .dat.
 """
 
@@ -41,6 +41,7 @@ def cases() -> dict[str, dict[str, str]]:
 
 
 CASES = cases()
+OTHERS = {"$config.dat": "config", "other.dat": "other"}
 
 
 def read(case: dict[str, str], fast: bool = True) -> Program:
@@ -50,9 +51,10 @@ def read(case: dict[str, str], fast: bool = True) -> Program:
     files = {"part.src": text}
     if "dat" in case:
         files["part.dat"] = f"DEFDAT part\n{case['dat']}ENDDAT\n"
+    others = {name: case[part] for name, part in OTHERS.items() if part in case}
     documents, references = (
         tuple(Document(Path(name), text.encode("latin-1").replace(b"@", FULL)) for name, text in of.items())
-        for of in (files, {"$config.dat": case["config"]} if "config" in case else {})
+        for of in (files, others)
     )
     return interpreter.read(documents, references, fast)
 

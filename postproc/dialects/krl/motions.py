@@ -295,12 +295,10 @@ def _enter(
             axes = filled(target.axes, state.axes)
         else:
             reason = reason or Reason("KRL001", "a straight line can not go to axis angles")
-        if target.lost is not None:
-            axes, reason = None, reason or refusal(target.lost, "")
         stated = replace(target.detached(), locked="")
     else:
         values = filled(target.values, state.point)
-        if values is None and state.point_frames == (state.base, state.tool):
+        if values is None and state.anchor is not None and state.point_frames == (state.base, state.tool):
             values, anchor = anchored(target.values, state.anchor)
         stated = target
     partial = stated is not None and bool(stated.missing) and not relative

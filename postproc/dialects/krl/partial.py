@@ -22,13 +22,11 @@ def filled(own: Six, before: Numbers | None) -> Numbers | None:
     return (u, v, w, d, e, f)
 
 
-def anchored(own: Six, anchor: Anchor | None) -> tuple[Numbers | None, Anchor | None]:
+def anchored(own: Six, anchor: Anchor) -> tuple[Numbers | None, Anchor | None]:
     """The components with those of ``anchor``: all six, or what is then still left to its axis motion.
 
     Of A, B, C all three or none must be left: how the controller writes an orientation is its own choice.
     """
-    if anchor is None:
-        return None, None
     given = six([old if new is None else new for new, old in zip(own, anchor.given, strict=True)])
     full = filled(given, None)
     if full is not None:

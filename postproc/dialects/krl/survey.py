@@ -20,7 +20,6 @@ from postproc.dialects.krl.lexing import (
     CLOSES,
     LOOPS,
     NAME,
-    SPLINES,
     Assignment,
     Declared,
     Head,
@@ -345,10 +344,6 @@ def _settle(found: Survey, blocks: Sequence[Block]) -> None:
 def _stays(code: bytes) -> bool:
     words = code.split(None, 2)
     return len(words) > 1 and words[1].upper() in HERE
-
-
-def in_spline(stack: Iterable[Block]) -> bool:
-    return any(block.word in SPLINES for block in stack)
 
 
 def _shown(word: bytes) -> str:
