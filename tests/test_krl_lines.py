@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import random
 from pathlib import Path
@@ -795,3 +796,14 @@ def test_findings_stand_in_the_order_of_their_places() -> None:
     raw = b"DEF a()\n LIN {X 1}\nENDIF\nunread()\n LIN P\nENDFOR\n"
     places = [(found.line, found.column) for found in KRL.read((Document(Path("a.src"), raw),)).findings]
     assert places == [(1, 1), (2, 2), (3, 1), (4, 1), (5, 2), (6, 1)]
+
+
+@pytest.mark.parametrize("running", [True, False])
+def test_the_collector_runs_behind_a_reading_as_before(running: bool) -> None:
+    before = gc.isenabled()
+    try:
+        (gc.enable if running else gc.disable)()
+        KRL.read((Document(Path("a.src"), b"DEF a()\nEND\n"),))
+        assert gc.isenabled() == running
+    finally:
+        (gc.enable if before else gc.disable)()
