@@ -134,6 +134,8 @@ WRONG: list[tuple[dict[str, Any], int]] = [
     ({"ijk": [0.005, NAN, 0.001], "end": [0.01, NAN, 0]}, 1),
     ({"radius": 0.004, "begin": [NAN, 0, 0]}, 1),
     ({"radius": 0.005, "end": [NAN, 0, 0]}, 1),
+    ({"ijk": [0.006, 0.0, NAN], "end": [0.01, 0, NAN]}, 1),
+    ({"radius": 0.004, "end": [0.01, 0, NAN]}, 1),
     ({"begin": [NAN, 0, 0]}, 2),
     ({"ijk": [0.005, NAN, NAN], "plane": -1, "end": [NAN, 0, 0]}, 5),
 ]
@@ -360,3 +362,19 @@ def test_radii_that_differ_by_more_than_two_steps_are_given_up(apart: float, bad
     written = writing.write_arcs(task(one, CENTRE, True, np.full((1, 4), NAN), 3))
     assert written.bad.tolist() == [bad]
     assert written.decimals[0, :3].tolist() == [4 if apart > 0.5 else 3] * 3
+
+
+@pytest.mark.parametrize(
+    ("degrees", "balanced"), [(90, True), (170, True), (190, True), (290, True), (305, False), (350, False)]
+)
+def test_a_centre_lies_between_ends_that_are_rounded(degrees: float, balanced: bool) -> None:
+    """At the same distance from both, but where the circle nearly closes: there that would move its far side."""
+    angle = np.radians(degrees)
+    end = 10.0003 * np.array([[np.cos(angle), np.sin(angle), 0]])
+    one = {"begin": np.array([[10.0, 0, 0]]), "end": end, "centre": np.zeros((1, 3)), "sweep": np.array([angle]),
+           "normal": np.array([[0, 0, 1.0]]), "plane": np.array([0]), "counter": np.array([True])}  # fmt: skip
+    written = writing.write_arcs(task(one, CENTRE, False, np.full((1, 4), NAN), 6))
+    centre = np.array([[*written.number[0, :2], 0]])
+    apart = np.linalg.norm(centre - one["begin"]) - np.linalg.norm(centre - end)
+    assert (abs(apart) < 2e-6) == balanced
+    assert (np.abs(centre).max() < 1e-9) == (not balanced)

@@ -10,13 +10,14 @@ import pytest
 from gcode_writing import read
 
 from postproc.arrays import Floats, Ints
-from postproc.dialects.gcode import DIALECTS, positions
+from postproc.dialects.gcode import DIALECTS, kuka_cnc, positions
 from postproc.dialects.gcode.comments import head
 from postproc.dialects.gcode.control import Frame
 from postproc.dialects.gcode.detection import CLAIMS
 from postproc.dialects.gcode.flow import Doubt, Flow
 from postproc.dialects.gcode.force import Rows, everywhere, in_force, switched, taken
-from postproc.dialects.gcode.numbered import references
+from postproc.dialects.gcode.lexing import lex
+from postproc.dialects.gcode.numbered import _is_offset, references
 from postproc.dialects.gcode.orientation import Angles, Vector, swing
 from postproc.dialects.gcode.positions import Course, Trace
 from postproc.dialects.gcode.refusals import HELP, Doubts
@@ -36,7 +37,7 @@ NAMES = {dialect.name: dialect for dialect in DIALECTS}
 
 @pytest.mark.parametrize("count", [0, 1, 3])
 @pytest.mark.parametrize(
-    "value", [5, NAN, True, [1.0, 1.0], [1.0, 2.0], [NAN] * 3, np.eye(2), np.empty((0,))]
+    "value", [5, NAN, True, [5.0], [1.0, 1.0], [1.0, 2.0], [NAN] * 3, np.eye(2), np.empty((0,))]
 )
 def test_one_value_everywhere(value: Any, count: int) -> None:
     """Takes no room where its parts are alike too."""
@@ -292,6 +293,29 @@ def test_frames_of_bases_and_tools() -> None:
     assert (bases.tolist(), tools.tolist()) == ([-1, -1], [0, -1])
     empty = references(np.empty(0, int), np.empty(0, int), np.empty(0, int))
     assert ([len(column) for column in empty]) == [0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("text", "offset"),
+    [
+        ("5200", False), ("5201", True), ("5400", True), ("5401", False), ("7000", False), ("7001", True),
+        ("7999", True), ("8000", False), ("14000", False), ("14001", True), ("20000", True), ("20001", False),
+        ("000005221", True), ("1", False), ("5221000000", False), ("", True), ("<a", False), ("x", True),
+    ],
+)  # fmt: skip
+def test_variables_that_are_offsets(text: str, offset: bool) -> None:
+    """A variable that is computed may be one; those with a name are none."""
+    assert _is_offset(text) == offset
+
+
+WEIGHTS = (100, 101, 102, *range(129, 138), 231, 233, 234)
+"""Codes of acceleration, whose percentage follows without a letter."""
+
+
+def test_percentages_follow_some_codes_of_kuka_cnc() -> None:
+    for code in range(400):
+        notes = lex(b"G%d 50" % code, kuka_cnc.CONTROL).notes
+        assert (not notes) == (code in WEIGHTS), code
 
 
 # Refusals

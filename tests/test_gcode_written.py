@@ -168,6 +168,12 @@ TEXTS: list[tuple[str, str, str, str]] = [
      "G1 X10 F60\nG3 X0.004 Y10 R10.003\nG1 X5 Y10.100\n"),
     ("linuxcnc", "G1 X10 F60\nG41 D1 G3 X0 Y10 Z5 I-10 J0\nG40 G1 X5 Y5 Z5\nX6\n", "-1 Y.1",
      "G1 X10 F60\nG41 D1 G3 X0 Y10 Z5 I-10 J0\nG40 G1 X5 Y5 Z5\nX6 Y5.100\n"),
+    ("linuxcnc", "G1 X10.00000 F60\nG3 X10. Y0.0 I-10 J0\nG1 X5\n", "-2 X.12345;-3 X.12345",
+     "G1 X10.12345 F60\nG3 X10.12345 Y0.0 I-10 J0\nG1 X5\n"),
+    ("linuxcnc", "G1 X10.00000 F60\nG3 X10. Y0.0 I-10 J0 P2\nG1 X5\n", "-2 X.12345;-3 X.12345",
+     "G1 X10.12345 F60\nG3 X10.12345 Y0.0 I-10 J0 P2\nG1 X5\n"),
+    ("linuxcnc", "G19 G1 Y10.00000 F60\nG3 Y10. Z5.0 J-10 K0\nG1 X5\n", "-2 Y.12345;-3 Y.12345",
+     "G19 G1 Y10.12345 F60\nG3 Y10.12345 Z5.0 J-10 K0\nG1 X5 Y10.000\n"),
     # Names and brackets
     ("sinumerik", "G1 X=IC(1) F60\n", "-1 Y.1", "G1 X=IC(1) F60 Y0.100\n"),
     ("sinumerik", "G1 F60 X=IC(1)\n", "-1 Y.1", "G1 F60 X=IC(1) Y0.100\n"),
@@ -199,10 +205,36 @@ def test_what_is_written(
         assert written(name, text, steps) == expected
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "steps", "expected"),
+    [
+        ("linuxcnc", "G00 X0 Y0 Z5\nG01 X1 F60\nX2\n", "-1 piece X1.5 Y0 Z5",
+         "G00 X0 Y0 Z5\nG01 X1 F60\nG01 X1.500\nX2\n"),
+        ("linuxcnc", "G00X0Y0Z5\nG01X1F60\nG02X3I1\nx5i1\n", "-1 link X3 Y0 Z6",
+         "G00X0Y0Z5\nG01X1F60\nG02X3I1\ng01z6.000\ng02x5i1z5.000\n"),
+        ("linuxcnc", "\xef\xbb\xbfG1 X1 Y2 Z3 F60\nX2\n", "0 piece X0 Y2 Z3",
+         "\xef\xbb\xbfG1 X0.000 Y2.000 Z3.000 F60\nG1 X1 Y2 Z3 F60\nX2\n"),
+        ("sinumerik", "TRAORI\nG0 X0 Y0 Z5 A3=0 B3=0 C3=1\nCIP X4 Y0 I1=2 J1=2 F60\nX8 I1=6 J1=2\n",
+         "-1 link X4 Y0 Z5",
+         "TRAORI\nG0 X0 Y0 Z5 A3=0 B3=0 C3=1\nCIP X4 Y0 I1=2 J1=2 F60\nG1 X4.000\n"
+         "CIP X8 I1=6 J1=2\n"),
+        ("linuxcnc", "G0 X0 Y0 Z5\n/G1 X1 F60\nG1 X2 Y0 Z5\n", "-1 X.1", "G0 X0 Y0 Z5\n/G1 X1 F60\nG1 X2.100 Y0 Z5\n"),
+    ],
+)  # fmt: skip
+def test_what_is_written_from_the_first_line_on(
+    name: str, text: str, steps: str, expected: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    head = {"linuxcnc": "", "sinumerik": "G54 G71 G90 G17 T1 D1\n"}[name]
+    monkeypatch.setitem(HEADS, name, head)
+    assert written(name, text, steps) == expected
+
+
 TURNED: list[tuple[str, str, str]] = [
     # Sinumerik behind TRAORI: text, steps, written
     ("G1 X1 A3=0 B3=0 C3=1\nX2\n", "-2 a1", "G1 X1 A3=0 B3=-0.01745 C3=0.99985\nX2 A3=0.00000 B3=0.00000 C3=1.00000\n"),
     ("G1 X1 A3=0 B3=0 C3=1\nX2\n", "-1 a1", "G1 X1 A3=0 B3=0 C3=1\nX2 A3=0.00000 B3=-0.01745 C3=0.99985\n"),
+    ("G1 X1 A3=0 B3=0 C3=1\nX2\n", "-1 a1;-1 piece X1.5 Y0 Z5",
+     "G1 X1 A3=0 B3=0 C3=1\nG1 X1.500 A3=0.00000 B3=-0.01745 C3=0.99985\nX2\n"),
     ("G1 X1 C3=1\nX2\n", "-1 b1;-2 b1", "G1 X1 C3=0.99985 A3=0.01745\nX2\n"),
     ("G1 X1 A3=0 B3=0 C3=2\n", "-1 b1", "G1 X1 A3=0.03490 B3=0 C3=1.99970\n"),
     ("G1 X1 A3=0 B3=1 C3=1\nX2\n", "-1 Y.1", "G1 X1 A3=0 B3=1 C3=1\nX2 Y0.100\n"),
@@ -319,6 +351,13 @@ def test_a_defect_of_the_caller_is_told_by_its_row(rows: int, monkeypatch: pytes
         told(lost, lambda program: plan_of(program, "-2 piece X2 Y2 Z5"))
         == "motions that can not be divided were: rows [2]"
     )
+
+    def found(program: Program) -> Plan:
+        plan = Plan.of(program.toolpath)
+        return replace(plan, position=np.nan_to_num(plan.position))
+
+    unknown = "G1 X1 F60 Y0 Z0\nG1 X#1 Y0 Z0\nX1 Y0 Z0\n"
+    assert told(unknown, found) == "motions that can not be corrected were moved: rows [2]"
     pinned = "G1 X1 F60\nX2\nG41 D1 X3\n"
     assert (
         told(pinned, lambda program: plan_of(program, "-2 X1"))

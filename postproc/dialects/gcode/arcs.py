@@ -97,7 +97,7 @@ def arcs(
     ]
     wrong[plane < 0] = 5
     unknown = ~(np.isfinite(begin).all(axis=1) & np.isfinite(end).all(axis=1))
-    wrong[unknown & np.isin(wrong, (0, 2, 3, 4)) & (by_centre | by_radius)] = 1
+    wrong[unknown & (wrong != 5) & (by_centre | by_radius)] = 1
 
     place = np.array(begin)
     place[rows, u], place[rows, v] = centre.T

@@ -31,7 +31,7 @@ ARCS = {
     5: "the plane of the arc is not known",
     6: "the three points of the arc lie on a line",
 }
-_POSITION = re.compile(rb"#[ \t]*+(?:50[0-6]\d|542\d|<_(?:abs_)?[xyzabcuvw]>|#|\[)(?!\d)", re.I)
+_POSITION = re.compile(rb"#[ \t]*+(?:(?:50[0-6]\d|542\d)(?!\d)|<_(?:abs_)?[xyzabcuvw]>|#|\[)", re.I)
 
 
 @dataclass(frozen=True, eq=False)

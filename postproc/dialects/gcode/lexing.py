@@ -132,13 +132,12 @@ def _plain(letters: Bytes, kinds: Bytes) -> tuple[_Plain, list[int], Ints]:
     equal = np.flatnonzero(kind == _EQUALS)
     if len(equal):
         before, two = np.maximum(equal - 1, 0), np.maximum(equal - 2, 0)
-        after = np.minimum(equal + 1, len(kind) - 1)
         named = (kind[before] == _LETTER) & (equal > 0)
         one = place[two] + 1 == place[before]
         alone = np.append(run_stop, -1)[run[before]] == place[before] + 1
         digit = kinds[np.minimum(place[before], size - 1)] == _DIGIT
         indexed = (kind[before] == _DIGIT) & (kind[two] == _LETTER) & (equal > 1) & one & alone & digit
-        fine = (named | indexed) & (kind[after] == _DIGIT)
+        fine = (named | indexed) & (kind[equal + 1] == _DIGIT)
         bad[equal[~fine]] = True
         dropped[equal] = True
         numbered = equal[indexed & fine]

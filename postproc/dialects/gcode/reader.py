@@ -259,6 +259,7 @@ def _arcs(given: Blocks, rows: Ints, begin: Floats, end: Floats, plane: Ints, be
     turns = np.zeros(n)
     if word in given.columns:
         turns = np.nan_to_num(given.number(word)[rows] - usual)
+        turns[turns % 1 != 0] = np.nan
     for some, keys in ((bent & ~between, tuple(key(letter) for letter in "IJK")), (bent & between, THROUGH)):
         if not some.any():
             continue
