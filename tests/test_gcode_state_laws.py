@@ -26,6 +26,7 @@ from postproc.dialects.gcode.tables import LINUXCNC
 from postproc.document import Document, apply
 from postproc.findings import CODES
 from postproc.geometry import rotation_from_vector
+from postproc.toolpath import Toolpath
 from postproc.units import DEG
 
 NAN = np.nan
@@ -175,6 +176,50 @@ def test_settings_of_printers_are_no_motions() -> None:
     path = read(NAMES["linuxcnc"], text).toolpath
     moving = {codes[line - 3] for line in path.line.tolist()}
     assert sorted(set(codes) - moving) == list(SETTINGS)
+
+
+BESIDE = sorted(set("ABCDEFHIJKLMPQRSTUVW"))
+"""Letters of words beside X in a block; N and O number blocks and programs."""
+
+
+def beside(name: str, words: str) -> Toolpath:
+    return read(NAMES[name], f"G21 G90 G17 G54 T1\nG0 X0 Y0 Z0 A0 B0 C0\nG1 X1 F60\n{words}\n").toolpath
+
+
+def is_whole(name: str, words: str) -> bool:
+    path = beside(name, words)
+    return len(path) - 1 in path.whole
+
+
+@pytest.mark.parametrize(("name", "whole"), [("linuxcnc", "ABCDEHLMQSTUVW"), ("kuka_cnc", "DEHLMQSTUVW")])
+def test_blocks_with_which_words_are_whole(name: str, whole: str) -> None:
+    """Such that act, or move something beside the tool; rotary axes where they do not turn it about its tip."""
+    for letter in BESIDE:
+        assert is_whole(name, f"X2 {letter}1") == (letter in whole), letter
+    for name, code in (("linuxcnc", "G43.4"), ("fanuc", "G43.4")):
+        assert not is_whole(name, f"{code}\nX2 B1")
+    assert [is_whole("linuxcnc", f"G2 X2 I.5 P{turns}") for turns in (0, 1, 2)] == [
+        False,
+        False,
+        True,
+    ]
+    assert [is_whole("fanuc", f"G2 X2 I.5 P{turns}") for turns in (0, 1, 2)] == [False] * 3
+    assert [is_whole("sinumerik", f"G2 X2 I.5 TURN={turns}") for turns in (0, 1, 2)] == [True] * 3
+
+
+@pytest.mark.parametrize("name", ["linuxcnc", "fanuc"])
+def test_expressions_in_which_words_are_refused(name: str) -> None:
+    """Those that say where the motion goes; what is said of feeds and tools is no matter of its place."""
+    for letter in BESIDE:
+        found = beside(name, f"X2 {letter}#1")
+        assert (found.refused.get(2) and found.refused[2].code) == {
+            **dict.fromkeys("ABCIJKR", "GCO005"), **dict.fromkeys("UVW", "GCO016"), "T": "GCO015"
+        }.get(letter), letter  # fmt: skip
+        lost = beside(name, f"X2 {letter}#1\nA0").refused.get(3)
+        assert (lost and lost.code) == {
+            **dict.fromkeys("BC", "GCO013"), **dict.fromkeys("UVW", "GCO002"), "T": "GCO015"
+        }.get(letter), letter  # fmt: skip
+    assert beside(name, "G2 X2 I.5 P#1").refused[2].code == "GCO005" if name == "linuxcnc" else True
 
 
 # Coordinates
