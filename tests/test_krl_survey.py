@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from test_krl_readings import CASES, FULL, HEAD
 
@@ -15,7 +16,7 @@ from postproc.dialects.krl.effects import Effects
 from postproc.dialects.krl.jumped import MOST_PAIRS, settle_jumps
 from postproc.dialects.krl.lexing import LONGEST, Statement
 from postproc.dialects.krl.rows import FEW, NAN6, NO_ARC, Reason, Row, Rows
-from postproc.dialects.krl.scan import scan
+from postproc.dialects.krl.scan import FEWEST, MOST, scan
 from postproc.dialects.krl.state import Source
 from postproc.dialects.krl.survey import DEEPEST, MOST_EFFECTS, Block, Routine, Survey, survey
 from postproc.document import Document
@@ -125,14 +126,14 @@ def test_calls_are_told_apart_up_to_a_number_of_routines(count: int) -> None:
 
 
 def test_labels_are_told_apart_up_to_a_number() -> None:
-    """Labels squared, without blocks."""
-    most = int(MOST_PAIRS**0.5)
-    for count in most, most + 1:
-        text = "".join(f"l{i}:\nv{i}=1\nGOTO l{i}\n" for i in range(count))
+    """Labels times branches and labels."""
+    for count, branches, apart in (200, MOST_PAIRS // 200 - 200, True), (21, 2360, False):
+        assert (count * (branches + count) <= MOST_PAIRS) == apart
+        text = "".join(f"l{i}:\nv{i}=1\nGOTO l{i}\n" for i in range(count)) + "IF x THEN\nENDIF\n" * branches
         found, _ = surveyed(f"DEF a()\n{text}END\n")
         sizes = {len(way) for way in found.on_the_way.values()}
         assert len(found.on_the_way) == count
-        assert sizes == ({1} if count == most else {5 + len(found.effects)})
+        assert sizes == ({1} if apart else {5 + len(found.effects)})
 
 
 def program(text: str, rest: str = "") -> Program:
@@ -238,6 +239,31 @@ def test_motions_are_taken_apart_up_to_a_length(length: int) -> None:
         }
     else:
         assert messages == {}
+
+
+@pytest.mark.usefixtures("budget")
+def test_what_is_passed_over_does_not_count() -> None:
+    """Though it was followed before."""
+    body = f"{LINE}$OUT[1]=TRUE\n$OUT[2]=TRUE\ni=i+1\nIF i==2 THEN\ni=$IN[1]\nENDIF\n"
+    found = program(
+        f"i=0\nWHILE i<9\n{body}ENDWHILE\nFOR j=1 TO 2\nLIN {{X j,Y 0,Z 0,A 0,B 0,C 0}}\nENDFOR\n"
+    )
+    assert codes(found) == ["7 KRL006"]
+    assert xs(found) == [1, 2]
+
+
+@pytest.mark.parametrize(
+    ("count", "sizes"),
+    [
+        (FEWEST - 1, [1] * (FEWEST - 1)), (FEWEST, [FEWEST]), (MOST, [MOST]), (MOST + 2, [MOST, 1, 1]),
+        (MOST + FEWEST, [MOST, FEWEST]),
+    ],
+)  # fmt: skip
+def test_common_lines_are_read_together(count: int, sizes: list[int]) -> None:
+    """The first of them has the number of its line."""
+    items = list(scan(Document(Path("a.src"), f"x=1\n{LINE * count}".encode()), True))[1:]
+    assert [1 if isinstance(item, Statement) else len(item) for item in items] == sizes
+    assert [item.line for item in items] == np.cumsum([2, *sizes])[:-1].tolist()
 
 
 # rows

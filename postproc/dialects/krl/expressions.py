@@ -102,7 +102,8 @@ def _no_constant(name: bytes) -> Unclear:
 
 
 class _Parser:
-    """Recursive descent; evaluates as it goes.  ``place``: behind what was read."""
+    """Recursive descent; evaluates as it goes.  ``place``: behind what was read; ``token``: what stands there, of the
+    ``kind`` that its first letter tells."""
 
     def __init__(self, text: bytes, lookup: Lookup) -> None:
         self.text, self.lookup = text, lookup
@@ -128,7 +129,7 @@ class _Parser:
 
     def comparison(self, depth: int) -> Value:
         left = self._logic(depth, 0)
-        while self.kind == "op" and self.token in _COMPARISONS:
+        while self.token in _COMPARISONS:
             operator = self.token
             self._next()
             right = self._logic(depth, 0)
@@ -150,7 +151,7 @@ class _Parser:
         if level == len(_LOGIC):
             return self._sum(depth)
         left = self._logic(depth, level + 1)
-        while self.kind == "name" and self.token in _LOGIC[level]:
+        while self.token in _LOGIC[level]:
             operator = self.token
             self._next()
             right = self._logic(depth, level + 1)
@@ -162,7 +163,7 @@ class _Parser:
 
     def _sum(self, depth: int) -> Value:
         left = self._product(depth)
-        while self.kind == "op" and self.token in (b"+", b"-"):
+        while self.token in (b"+", b"-"):
             operator = self.token
             self._next()
             right = self._product(depth)
@@ -172,7 +173,7 @@ class _Parser:
 
     def _product(self, depth: int) -> Value:
         left = self._unary(depth)
-        while self.kind == "op" and self.token in (b"*", b"/"):
+        while self.token in (b"*", b"/"):
             operator = self.token
             self._next()
             a, b = self._number(left), self._number(self._unary(depth))
@@ -188,17 +189,17 @@ class _Parser:
 
     def _unary(self, depth: int) -> Value:
         signs = negative = 0
-        while self.kind == "op" and self.token in (b"+", b"-"):
+        while self.token in (b"+", b"-"):
             signs += 1
             negative += self.token == b"-"
             self._next()
-        if self.kind == "name" and self.token in (b"NOT", b"B_NOT"):
-            negations = 0
-            bits = self.token == b"B_NOT"
-            while self.kind == "name" and self.token == (b"B_NOT" if bits else b"NOT"):
+        if self.token in (b"NOT", b"B_NOT"):
+            word, negations = self.token, 0
+            while self.token == word:
                 negations += 1
                 self._next()
             value = self._geometric(depth)
+            bits = word == b"B_NOT"
             if isinstance(value, bool) == bits or not isinstance(value, int):
                 raise self._unknown("NOT of what has no such value")
             return value if negations % 2 == 0 else (~value if bits else not value)
@@ -210,7 +211,7 @@ class _Parser:
 
     def _geometric(self, depth: int) -> Value:
         left = self._operand(depth)
-        while self.kind == "op" and self.token == b":":
+        while self.token == b":":
             self._next()
             right = self._operand(depth)
             if not isinstance(left, Target) or not isinstance(right, Target):
@@ -246,12 +247,12 @@ class _Parser:
         if kind == "enum":
             self._next()
             return b"#" + token[1:].lstrip()
-        if kind == "op" and token == b"(":
+        if token == b"(":
             self._next()
             inner = self.comparison(depth + 1)
             self._expect(b")")
             return inner
-        if kind == "op" and token == b"{":
+        if token == b"{":
             return self._aggregate()
         if kind == "name":
             return self._name(depth)
@@ -275,10 +276,10 @@ class _Parser:
             self._next()
             return _SYSTEM[name]
         self._next()
-        if self.kind == "op" and self.token == b"(":
+        if self.token == b"(":
             return self._call(name, depth)
         path = b""
-        while self.kind == "op" and self.token in (b"[", b"."):
+        while self.token in (b"[", b"."):
             if self.token == b".":
                 self._next()
                 if self.kind != "name":
@@ -293,7 +294,7 @@ class _Parser:
                 if not isinstance(index, int) or isinstance(index, bool):
                     raise self._unknown(f"an index of {shown(name)} is not a constant")
                 indices.append(b"%d" % index)
-                if not (self.kind == "op" and self.token == b","):
+                if self.token != b",":
                     break
                 self._next()
             self._expect(b"]")
@@ -311,14 +312,14 @@ class _Parser:
             raise self._unknown(f"it calls {shown(name)}")
         self._next()
         given = [self._number(self.comparison(depth + 1))]
-        while self.kind == "op" and self.token == b",":
+        while self.token == b",":
             self._next()
             given.append(self._number(self.comparison(depth + 1)))
         self._expect(b")")
         return function(*given)
 
     def _expect(self, token: bytes) -> None:
-        if self.kind != "op" or self.token != token:
+        if self.token != token:
             raise self._unknown(f"'{shown(self.text)}' is not understood")
         self._next()
 
