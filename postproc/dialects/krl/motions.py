@@ -81,7 +81,7 @@ def _move(run: Run, statement: Statement, parts: Parts, reason: Reason | None) -
         )
         _enter(run, statement, kind, empty, reason, NAN)
         return
-    blend = _blend(run.state, parts, kind)
+    blend = _blend(run.state, parts)
     first = operand_at(run, code, statement.at, parts.points[0])
     if not relative and first.variable is not None and first.variable.name in HERE and len(parts.points) == 1:
         return
@@ -95,7 +95,7 @@ def _move(run: Run, statement: Statement, parts: Parts, reason: Reason | None) -
         reason = reason or Reason("KRL001", f"'{shown(odd)}' is not understood")
     if relative:
         first, reason = _absolute(run, statement, parts, first, reason)
-    if first.variable is not None and isinstance(first.target, Unclear) and first.target.code == "KRL016":
+    if isinstance(first.target, Unclear) and first.target.code == "KRL016":
         reason = Reason("KRL016", first.target.message, "home")
     row = _enter(run, statement, kind, first, reason, blend, relative=relative)
     if relative:
@@ -110,7 +110,7 @@ def _kind(run: Run, word: bytes) -> Kind:
     return Kind.SPL if word in _SPLINES else Kind.LIN
 
 
-def _blend(state: State, parts: Parts, kind: Kind) -> float:
+def _blend(state: State, parts: Parts) -> float:
     """[mm] that the controller may leave the way before the end point."""
     if not parts.slurs:
         return 0.0
@@ -122,8 +122,7 @@ def _extent(statement: Statement, operand: Operand | None) -> tuple[int, int, in
     at = statement.at
     stop = at + len(statement.code)
     if operand is None:
-        behind = min(at + len(statement.word), stop)
-        return at, behind, stop, stop
+        return at, at + len(statement.word), stop, stop
     return at, operand.start, operand.stop, stop
 
 
@@ -304,7 +303,7 @@ def _enter(
     partial = stated is not None and bool(stated.missing) and not relative
     if partial and stated is not None and reason is None and anchor is None:
         reason = incomplete(state, stated, axes if kind is Kind.AXIS else values)
-    if partial and values is not None and state.point_frames not in (None, (state.base, state.tool)):
+    if partial and values is not None and state.point_frames != (state.base, state.tool):
         values = None
     if values is not None and way is not None:
         values = (*way.end, *values[3:])

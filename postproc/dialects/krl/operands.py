@@ -124,7 +124,7 @@ def operand_at(run: Run, code: bytes, at: int, place: tuple[int, int]) -> Operan
             return _computed(run, text, begin, end)
         return Operand(Unclear("KRL001", "it has no target that can be read"), begin, end)
     rest = text[found.end() :]
-    if rest[:1] in (b":", b"+", b"-", b"*", b"/", b"(", b"[", b".") and rest:
+    if rest[:1] in (b":", b"+", b"-", b"*", b"/", b"(", b"[", b"."):
         return _computed(run, text, begin, end)
     if rest:
         why = f"'{shown(rest)}' is not understood; an inline form without the lines that it unfolds to"
@@ -158,13 +158,7 @@ def _variable(run: Run, found: re.Match[bytes], begin: int, end: int) -> Operand
             )
         return Operand(value, begin, end, replace(variable, words=value.words))
     if isinstance(value, Unclear) and has is not None:
-        return Operand(
-            Unclear(value.code, f"point {words}: {value.message}"),
-            begin,
-            end,
-            variable,
-            value.code != "KRL003",
-        )
+        return Operand(Unclear(value.code, f"point {words}: {value.message}"), begin, end, variable, True)
     if name in HERE or name.startswith(b"$"):
         reads = READS_POSITION.match(name) is not None
         why = Unclear("KRL002", f"its target {words} is a variable of the controller")
@@ -190,7 +184,7 @@ def _computed(run: Run, text: bytes, begin: int, end: int) -> Operand:
             return Operand(value, begin, end, Variable(b"", b"", None, value.words))
         value = value.lost
     why = value.message if isinstance(value, Unclear) else f"'{shown(text)}' is no point"
-    code = value.code if isinstance(value, Unclear) and value.code != "KRL003" else "KRL002"
+    code = value.code if isinstance(value, Unclear) else "KRL002"
     return Operand(
         Unclear(code, f"its target is computed: {why}"), begin, end, None, reads or text.startswith(b"{")
     )

@@ -59,12 +59,12 @@ class Variables:
                 return self._lost
         if path in entry:
             return entry[path]
-        at = path.rfind(b".")
-        if at >= 0:
-            whole = entry.get(path[:at])
+        head, dot, _ = path.rpartition(b".")
+        if dot:
+            whole = entry.get(head)
             if isinstance(whole, Unclear):
                 return whole
-            found = None if whole is None else component(whole, path[at:])
+            found = None if whole is None else component(whole, path[len(head) :])
             if found is not None:
                 return found
         whole = entry.get(b"")
