@@ -171,7 +171,7 @@ SETTINGS = (92, 201, 203, 204, 205, 206, 208, 218, 350, 425, 557, 558, 566, 569,
 
 
 def test_settings_of_printers_are_no_motions() -> None:
-    codes = [code for code in range(1000) if code not in (2, 30, 72, 97, 98, 99, 117, 118, 198)]
+    codes = sorted({code + by for code in SETTINGS for by in (-1, 0, 1)})
     text = "G21 G90\nG1 F60\n" + "".join(f"M{code} X5 Y{code}\n" for code in codes)
     path = read(NAMES["linuxcnc"], text).toolpath
     moving = {codes[line - 3] for line in path.line.tolist()}
@@ -194,8 +194,8 @@ def is_whole(name: str, words: str) -> bool:
 @pytest.mark.parametrize(("name", "whole"), [("linuxcnc", "ABCDEHLMQSTUVW"), ("kuka_cnc", "DEHLMQSTUVW")])
 def test_blocks_with_which_words_are_whole(name: str, whole: str) -> None:
     """Such that act, or move something beside the tool; rotary axes where they do not turn it about its tip."""
-    for letter in BESIDE:
-        assert is_whole(name, f"X2 {letter}1") == (letter in whole), letter
+    path = beside(name, "\n".join(f"X2 {letter}1" for letter in BESIDE))
+    assert "".join(letter for row, letter in enumerate(BESIDE, 2) if row in path.whole) == whole
     for name, code in (("linuxcnc", "G43.4"), ("fanuc", "G43.4")):
         assert not is_whole(name, f"{code}\nX2 B1")
     assert [is_whole("linuxcnc", f"G2 X2 I.5 P{turns}") for turns in (0, 1, 2)] == [
@@ -210,15 +210,15 @@ def test_blocks_with_which_words_are_whole(name: str, whole: str) -> None:
 @pytest.mark.parametrize("name", ["linuxcnc", "fanuc"])
 def test_expressions_in_which_words_are_refused(name: str) -> None:
     """Those that say where the motion goes; what is said of feeds and tools is no matter of its place."""
-    for letter in BESIDE:
-        found = beside(name, f"X2 {letter}#1")
-        assert (found.refused.get(2) and found.refused[2].code) == {
-            **dict.fromkeys("ABCIJKR", "GCO005"), **dict.fromkeys("UVW", "GCO016"), "T": "GCO015"
-        }.get(letter), letter  # fmt: skip
-        lost = beside(name, f"X2 {letter}#1\nA0").refused.get(3)
-        assert (lost and lost.code) == {
-            **dict.fromkeys("BC", "GCO013"), **dict.fromkeys("UVW", "GCO002"), "T": "GCO015"
-        }.get(letter), letter  # fmt: skip
+    home = "G0 X0 Y0 Z0 A0 B0 C0 T1\nG1 X1 F60"
+    path = beside(name, "\n".join(f"{home}\nX2 {letter}#1\nA0" for letter in BESIDE))
+    codes = [path.refused[row].code if row in path.refused else "" for row in range(2, len(path))]
+    first = {**dict.fromkeys("ABCIJKR", "GCO005"), **dict.fromkeys("UVW", "GCO016"), "T": "GCO015"}
+    behind = {**dict.fromkeys("BC", "GCO013"), **dict.fromkeys("UVW", "GCO002"), "T": "GCO015"}
+    assert dict(zip(BESIDE, codes[2::4], strict=True)) == {letter: first.get(letter, "") for letter in BESIDE}
+    assert dict(zip(BESIDE, codes[3::4], strict=True)) == {
+        letter: behind.get(letter, "") for letter in BESIDE
+    }
     assert beside(name, "G2 X2 I.5 P#1").refused[2].code == "GCO005" if name == "linuxcnc" else True
 
 

@@ -309,4 +309,4 @@ def course(given: Blocks, spoiled: Bools, away: Bools, reasons: Reasons) -> Cour
             leave(whole, modal.switched(group), What.FRAME)
     # With the rotary axes at 0 the words mean the same with and without a TCP mode.
     leave(linear, modal.switched(Group.TCP) & away, What.TIP)
-    return Course(np.where(target, value, 0.0), target & ~relative, target & relative, lost, left)
+    return Course(np.where(target, value, 0.0), target & ~relative, relative, lost, left)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.dialects.decimals import literals
 from postproc.dialects.gcode.control import Control
 from postproc.dialects.gcode.words import Blocks, How, Note, Text, Words
 
@@ -161,7 +162,7 @@ def _plain(letters: Bytes, kinds: Bytes) -> tuple[_Plain, list[int], Ints]:
     runs = run[kept[position + 1]]
     start, stop = run_start[runs], run_stop[runs]
     upper = letters[place[first]].astype(np.int64) & 0xDF
-    value = _values(letters, start, stop)
+    value, _ = literals(letters, start, stop, _long)
     how = np.where(integer[runs], How.INTEGER, How.NUMBER)
     how[~np.isfinite(value)] = How.UNREAD
     value[~np.isfinite(value)] = np.nan
@@ -183,14 +184,9 @@ def _numerals(kinds: Bytes, start: Ints, stop: Ints) -> tuple[Bools, Bools]:
     return bad, many_dots == 0
 
 
-def _values(letters: Bytes, start: Ints, stop: Ints) -> Floats:
-    """The numbers that stand in these ranges, all of them well formed."""
-    edge = np.zeros(len(letters) + 1, np.int8)
-    edge[start] += 1
-    edge[stop] -= 1
-    inside = np.cumsum(edge[:-1], dtype=np.int8) > 0
-    text = np.where(inside, letters, np.uint8(32)).tobytes()
-    return np.fromstring(text, dtype=np.float64, sep=" ") if len(start) else np.empty(0)
+def _long(text: bytes) -> tuple[float, int]:
+    """A number of more digits than are read in bulk."""
+    return float(text), 0
 
 
 @dataclass(frozen=True, eq=False)

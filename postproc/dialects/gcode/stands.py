@@ -144,7 +144,7 @@ class Stands:
             return np.where(self._used, axes / DEG, np.nan)
         given = self._given
         keys = given.control.vector if kind == VECTOR else given.control.euler
-        at = np.maximum(self._stating[blocks - earlier], 0)
+        at = self._stating[blocks - earlier]
         values = np.stack([given.words(one).last(at, absent=0.0) for one in keys], axis=1)
         # Stated in other coordinates: where it points stays.
         stated, now = trace.frame_of(at), trace.frame_of(blocks)
@@ -180,8 +180,8 @@ def _kinds(given: Blocks, tcp: Bools, rotary: bool) -> tuple[Ints, Ints]:
     # A vector does not outlast its mode; positions of rotary axes do.
     stated[lost] = _NOWHERE
     fresh = marks | lost | changed
-    at = np.maximum.accumulate(np.where(fresh, np.arange(n, dtype=np.int32), np.int32(-1)))
-    kind = np.where(at >= 0, stated[np.maximum(at, 0)], np.int8(_NOWHERE))
+    at = np.maximum.accumulate(np.where(fresh, np.arange(n, dtype=np.int32), np.int32(0)))
+    kind = stated[at]
     return np.where((kind == _NOWHERE) & rotary, np.int8(ROTARY), kind), at
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
@@ -22,7 +22,6 @@ _HEAD = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*(?:/[ \t]*\d?[ \t]*)?)")
 HEAD = 1 << 16
 """Bytes from the begin of a file that say how it is written."""
 
-_NAME = re.compile(rb"[A-Za-z_][A-Za-z0-9_]*")
 _NUMBER = key("N")
 _LETTERS = list(b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_")
 _BEHIND = [ord(letter) for letter in ") \t"]
@@ -149,7 +148,6 @@ def _closed(raw: bytes, at: int) -> int:
     return found.end() if found else at
 
 
-@cache
 def _address(number: int, lower: bool) -> bytes:
     letter = bytes([number & 0xFF])
     text = letter if number < 256 else b"%s%d=" % (letter, (number >> 8) - 1)
@@ -175,11 +173,7 @@ class _Block:
 
     def _word(self, k: int) -> bytes:
         words = self.blocks.places.text.words
-        at, stop = int(words.at[k]), int(words.stop[k])
-        if stop < 0:
-            name = _NAME.match(self.raw, at)
-            return name[0] if name else b""
-        return self.raw[at:stop]
+        return self.raw[int(words.at[k]) : int(words.stop[k])]
 
     def _cased(self, text: bytes) -> bytes:
         return text.lower() if self.lower else text
