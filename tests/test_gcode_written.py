@@ -132,6 +132,12 @@ TEXTS: list[tuple[str, str, str, str]] = [
     ("linuxcnc", "G1 X1 F60\n  N7 G1X2(a b)\n", "-1 Y.1", "G1 X1 F60\n  N7 G1X2Y0.100(a b)\n"),
     ("linuxcnc", "G1 X1 F60\n/G1 X2 Y2 Z2\nG1 X1 Y1 Z1\nX2\n", "-1 Y.1",
      "G1 X1 F60\n/G1 X2 Y2 Z2\nG1 X1 Y1 Z1\nX2 Y1.100\n"),
+    ("linuxcnc", "G20 G1 X1 Y1 Z1 F60\nG28 X0\nX1 Y2\nZ3\n", "-1 Y.254",
+     "G20 G1 X1 Y1 Z1 F60\nG28 X0\nX1 Y2\nZ3 Y2.01000\n"),
+    ("linuxcnc", "G1 X1 Y1 Z1 F60\nG28 X0\nG52 Y1\nX1 Y2\nZ3\n", "-1 Y.1",
+     "G1 X1 Y1 Z1 F60\nG28 X0\nG52 Y1\nX1 Y2\nZ3 Y2.100\n"),
+    ("linuxcnc", "G1 X1 Y1 Z1 F60\nG28 X0\nX2 Y2\nG28 Z0\nX1 Z1\nY5\n", "-1 X.1",
+     "G1 X1 Y1 Z1 F60\nG28 X0\nX2 Y2\nG28 Z0\nX1 Z1\nY5 X1.100\n"),
     # Links and pieces
     ("linuxcnc", "G1 X1 F60\nX2\n", "-1 link X1 Y.5 Z5", "G1 X1 F60\nG1 Y0.500\nX2 Y0.000\n"),
     ("linuxcnc", "G1 X1 F60\nX2\n", "-1 piece X1.5 Y0 Z5", "G1 X1 F60\nG1 X1.500\nX2\n"),
