@@ -180,6 +180,9 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> int:
         # a run of lines counts as its lines, a branch as one
         (f"i=0\nREPEAT\n{LINE * 10}i=i+1\nUNTIL i>=2\n", "", True),
         (f"i=0\nREPEAT\n{LINE * 11}i=i+1\nUNTIL i>=2\n", "", False),
+        # a case that does not hold counts, four statements a turn
+        ("i=0\nREPEAT\nSWITCH 9\n" + "CASE 1\n" * 4 + "ENDSWITCH\ni=i+1\nUNTIL i>=2\n", "", True),
+        ("i=0\nREPEAT\nSWITCH 9\n" + "CASE 1\n" * 5 + f"ENDSWITCH\n{LINE}i=i+1\nUNTIL i>=2\n", "", False),
         # a call: its variables, those of the caller, and from the second on three statements
         ("sub()\nsub()\n", f"DEF sub()\n{LINE}$OUT[1]=TRUE\nEND\n", True),
         ("sub()\nsub()\nsub()\n", f"DEF sub()\n{LINE}$OUT[1]=TRUE\nEND\n", True),

@@ -91,7 +91,7 @@ def _private(task: Task) -> Bools:
     """(N,) rows whose literals nothing else uses."""
     places = task.places
     vias = np.array([arc.text for arc in places.arcs.values()], np.int64)
-    used = np.bincount(np.concatenate([places.text, vias]), minlength=1)
+    used = np.bincount(np.concatenate([places.text, vias]))
     private = used[places.text] == 1
     private[list(places.locked)] = False
     return np.asarray(private)
