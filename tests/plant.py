@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import NamedTuple
 
 import mujoco
@@ -421,6 +422,7 @@ def _words(numbers: tuple[float, ...]) -> str:
 # The robot of the tests, and states for it.
 
 
+@cache
 def kr270() -> Robot:
     return load_robot(find_robot("kuka_kr270"))
 

@@ -236,7 +236,8 @@ def test_a_comment_that_is_no_switch_is_told():
 
 @dataclass(frozen=True)
 class Made(Task):
-    """A task of which some corrections end as they are told to: row -> what is false, or the angle of axis 1 [deg]."""
+    """A task of which some corrections end as they are told to: row -> what is false, the angle of axis 1 [deg] or of
+    another, or which limit axis 1 is at."""
 
     ends: dict = field(default_factory=dict)
 
@@ -245,10 +246,13 @@ class Made(Task):
         flags = {name: getattr(done, name).copy() for name in ("reachable", "settled", "converged", "q")}
         for k, row in enumerate(rows.tolist()):
             for end in self.ends.get(row, ()):
-                if isinstance(end, str):
+                if end in flags:
                     flags[end][k] = False
+                elif end in ("low", "high"):
+                    flags["q"][k, 0] = self.model.robot.limits[0, int(end == "high")]
                 else:
-                    flags["q"][k, 0] = np.radians(end)
+                    axis, angle = end if isinstance(end, tuple) else (0, end)
+                    flags["q"][k, axis] = np.radians(angle)
         return replace(done, **flags)
 
 
@@ -280,6 +284,7 @@ U, S, N = ("reachable", "converged"), ("settled", "converged"), ("converged",)
         ({5: (185.25,)}, [(beyond("185.2"), 15, "")], {SECOND: (15, beyond("185.2"))}),
         ({5: (-185.26,)}, [(beyond("-185.3"), 15, "")], {SECOND: (15, beyond("-185.3"))}),
         ({5: (184.99,), 6: (-184.99,)}, [], {}),
+        ({5: ("high",), 6: ("low",)}, [], {}),
         # what comes first counts, of one motion and of a cut
         (
             {1: (*U, *S, 190.0), 2: (*S, 191.0), 3: (*N, 192.0)},
@@ -319,41 +324,57 @@ def test_corrections_that_do_not_end_well(monkeypatch, size, ends, told, reasons
     assert (np.linalg.norm(result.correction[result.state == C], axis=1) > 1e-4).all()
 
 
-def test_sides_that_are_crossed():
-    """S 2 and T 2 are what the program says; turned by a whole turn A1 stands on the other side of zero."""
-    said = "the corrected pose crosses the side that S or T states"
-    kinds = [Kind.LIN, Kind.PTP, Kind.PTP, Kind.LIN, Kind.LIN, Kind.PTP, Kind.LIN, Kind.PTP, Kind.LIN]
-    stated = {"kind": kinds, "status": 2, "turn": 2, "max_correction": 10.0}
-    cases = (
+SIDES = "the corrected pose crosses the side that S or T states"
+KINDS = [Kind.LIN, Kind.PTP, Kind.PTP, Kind.LIN, Kind.LIN, Kind.PTP, Kind.LIN, Kind.PTP, Kind.LIN]
+STATED = {"kind": KINDS, "status": 2, "turn": 2, "max_correction": 10.0}
+
+
+@pytest.mark.parametrize(
+    ("ends", "told"),
+    [
         ({}, []),
-        ({1: (-5.0,)}, [("KIN006", 11, said, "")]),
+        ({1: (-5.0,)}, [("KIN006", 11, SIDES, "")]),
         ({3: (-5.0,), 6: (-5.0,)}, []),  # no PTP
-        ({7: (-5.0,), 2: (-5.0,), 5: (-5.0,)}, [("KIN006", 12, said + " (3 motions, to line 17)", "")]),
-        ({5: (-5.0,), 2: (5.0,)}, [("KIN006", 15, said, "")]),
-    )
-    for ends, told in cases:
-        assert words(correct(made(ends, **stated))) == told
-    # of a cut that is left nothing is crossed
-    result = correct(made({1: (-5.0,), 3: N, 7: (-5.0,)}, **stated))
+        ({7: (-5.0,), 2: (-5.0,), 5: (-5.0,)}, [("KIN006", 12, SIDES + " (3 motions, to line 17)", "")]),
+        ({5: (-5.0,), 2: (5.0,)}, [("KIN006", 15, SIDES, "")]),
+        ({5: ((4, -50.0),)}, [("KIN006", 15, SIDES, "")]),  # S and T
+    ],
+)
+def test_sides_that_are_crossed(ends, told):
+    """S 2 and T 2 are what the program says; turned back A1 stands on the other side of zero."""
+    assert words(correct(made(ends, **STATED))) == told
+
+
+def test_sides_are_crossed_only_by_what_is_corrected():
+    result = correct(made({1: (-5.0,), 3: N, 7: (-5.0,)}, **STATED))
     assert [one[:2] for one in words(result)] == [("COR001", 13), ("COR003", 11), ("KIN006", 17)]
-    assert words(result)[-1] == ("KIN006", 17, said, "")
-    # a motion that says neither is on no side
-    silent = {**stated, "status": -1, "turn": -1}
-    assert words(correct(made({2: (-5.0,), 5: (-5.0,)}, **silent))) == []
+    assert words(result)[-1] == ("KIN006", 17, SIDES, "")
 
 
-def test_a_turn_of_no_axis_is_said_too():
-    """T 0: every axis is at zero or above."""
+@pytest.mark.parametrize(("status", "turn"), [(2, -1), (-1, 2), (-1, -1)])
+def test_a_motion_that_says_neither_is_on_no_side(status, turn):
+    result = correct(made({2: (-5.0,)}, **{**STATED, "status": status, "turn": turn}))
+    assert [one.line for one in result.findings] == ([12] if max(status, turn) > 0 else [])
+
+
+ABOVE = [5.0, 10.0, 110.0, 10.0, 50.0, 20.0]
+"""[deg] every axis is at zero or above: T 0; and S 0 where the arm is bent the other way."""
+
+
+@pytest.mark.parametrize(
+    ("status", "turn", "elbow", "told"),
+    [(-1, 0, 110.0, True), (-1, -1, 110.0, False), (0, -1, -10.0, True), (0, 2, -10.0, True)],
+)
+def test_a_number_of_zero_is_said_too(status, turn, elbow, told):
     model = full()
     robot = model.robot
     joints = tuple(replace(one, upper=max(one.upper, 0.5)) for one in robot.joints)
     model = replace(model, robot=replace(robot, joints=joints))
-    q = program_angles()
-    q[:, 1] = np.radians(10.0)
-    words_ = {"q": q, "model": model, "kind": Kind.PTP, "status": -1, "start": True, "max_correction": 10.0}
-    for turn, codes in ((0, ["KIN006"]), (-1, [])):
-        result = correct(made({2: (-5.0,)}, turn=turn, **words_))
-        assert [one.code for one in result.findings] == codes
+    q = np.tile(np.radians([*ABOVE[:2], elbow, *ABOVE[3:]]), (9, 1))
+    q[:, 1] = np.radians(10.0 if elbow > 0 else -60.0)
+    given = {"q": q, "model": model, "kind": Kind.PTP, "status": status, "turn": turn, "max_correction": 10.0}
+    result = correct(made({2: (-5.0,)}, **given))
+    assert [one.code for one in result.findings] == ["KIN006"] * told
 
 
 def test_postures_near_to_a_singular_one():
