@@ -250,6 +250,16 @@ def again(task, **words):
 # what may be inserted
 
 
+def test_a_long_way_that_goes_on_without_a_step_is_divided_only_where_it_may_be():
+    points = [[1.6, -0.5, 0.6], [1.6, -0.5, 0.5], [1.6, -0.4, 0.5], [1.6, 0.4, 0.5], [1.6, 0.4, 0.6]]
+    task = at_points(points, [False, False, True, True, False])
+    result, division = divided(task)
+    assert np.sum(division.source == 3) > 1
+    assert 3 not in division.source[division.links]
+    assert divide(task, result, Limits(keep=True)).inserted == 0
+    assert np.sum(divide(again(task, whole={3: "a loop"}), result, FREE).source == 3) == 1
+
+
 @pytest.mark.parametrize(
     ("least", "count"),
     [(0.81, 1), (0.8001, 1), (0.7999, 1), (0.41, 1), (0.3999, 2), (0.201, 3), (0.1999, 4), (5.0, 1)],
