@@ -223,7 +223,7 @@ def _change(given: Blocks, events: Ints) -> Callable[[int, Frame, Floats], Frame
         after = change(event)
         after = replace(after, shift=np.where(np.abs(after.shift) > FARTHEST * MM, np.nan, after.shift))
         if here.modal.flow.doubt[0]:
-            same = (after.shift == frame.shift) | (np.isnan(after.shift) & np.isnan(frame.shift))
+            same = after.shift == frame.shift
             return Frame(after.turn, np.where(same, frame.shift, np.nan), after.memory)
         return after
 
