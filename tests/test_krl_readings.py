@@ -186,3 +186,22 @@ def places(program: Program) -> Iterator[str]:
 @pytest.mark.parametrize("name", [name for name in CASES if "places" in CASES[name]])
 def test_the_numbers_of_a_program_stand_where_it_is_told(name: str) -> None:
     assert list(places(read(CASES[name]))) == CASES[name]["places"].strip().splitlines()
+
+
+@pytest.mark.parametrize(
+    ("setting", "number", "pose"),
+    [
+        ("BAS(#BASE,0)", 0, (0, 0, 0)), ("$BASE=$WORLD", 0, (0, 0, 0)), ("$BASE=$NULLFRAME", 0, (0, 0, 0)),
+        ("BAS(#INITMOV,0)", 0, (0, 0, 0)), ("$BASE=BASE_DATA[0]", 0, (0, 0, 0)), ("BAS(#BASE,1)", 1, None),
+        ("$BASE={X 5,Y 0,Z 0,A 0,B 0,C 0}", None, (5, 0, 0)), ("$BASE=BASE_DATA[3]", 3, None),
+        ("BASE_DATA[3]={X 5,Y 0,Z 0,A 0,B 0,C 0}\n$BASE=BASE_DATA[3]", 3, (5, 0, 0)),
+        ("$BASE={X 5,Y 0,Z 0,A 0,B 0,C 0}\n$BASE.Y=4", None, (5, 4, 0)), ("$BASE=SBASE(0)", 0, (0, 0, 0)),
+    ],
+)  # fmt: skip
+def test_the_number_and_pose_of_a_base(setting: str, number: int | None, pose: tuple | None) -> None:
+    """And the line in which it is set first."""
+    path = read({"": f"{setting}\n;\n{setting}\nLIN @\n"}).toolpath
+    found = path.frames[path.base[0]]
+    assert found.number == number
+    assert (None if found.pose is None else tuple(np.round(found.pose.position / MM, 9))) == pose
+    assert found.line == (2 if number == 1 else 3 + len(setting.splitlines()))

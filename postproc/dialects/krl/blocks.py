@@ -128,7 +128,8 @@ class Blocks:
         if not isinstance(value, (int, bytes)):
             return None
         for at in block.branches:
-            self.spent += 1 if self.repeating or self.jumped else 0
+            if self.repeating or self.jumped:
+                self.spent += 1
             case = run.code[at]
             assert isinstance(case, Statement)
             wanted = self._values(case.code[4:]) if case.word == b"CASE" else [value]

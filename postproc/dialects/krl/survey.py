@@ -136,7 +136,7 @@ class _Surveyor:
             self._open(index, statement)
         elif kind == "branch":
             self.note(statement)
-            if not self.buried and len(stack) > 1 and stack[-1].word == BRANCHES[statement.word]:
+            if not self.buried and stack and stack[-1].word == BRANCHES[statement.word]:
                 stack[-1].branches.append(index)
                 self.found.events[index] = [("branch", stack[-1])]
         elif kind == "close":
