@@ -394,6 +394,13 @@ def test_postures_near_to_a_singular_one():
 # cuts and states
 
 
+def test_of_a_program_without_force_there_is_no_history():
+    result = correct(task(carries=np.zeros(9, bool)))
+    assert result.history.shape == (1, 9)
+    assert np.isnan(result.history).all()
+    assert not result.iterations.any()
+
+
 def test_cuts_of_an_absolute_correction():
     """A run of forced motions is one, every other motion is one by itself; an unknown target is in none."""
     result = correct(replace(lost(4), process=False))

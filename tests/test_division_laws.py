@@ -198,17 +198,16 @@ def test_a_link_where_the_correction_steps_by_more_than_its_part_of_the_toleranc
     assert division.source[division.links].tolist() == [2] * expected
 
 
-def test_a_small_step_gets_a_link_where_the_way_behind_it_does_not_fit():
-    """Of these two ways of one step the long one needs points, so that its link is worth it; where a tenth of the
-    tolerance is not stepped over, points alone have to do."""
-    found = {}
-    for part in (0.09, 0.3):
-        task = replace(line(tolerance=1.0), tolerance_angle=1e9)
-        task = replace(task, tolerance=steps(task)[0][2] / part)
-        wanted = steps(task)[1][2] > 0.9
-        found[part] = (wanted, divided(task)[1].links.sum())
-    assert found[0.09][1] == 0
-    assert found[0.3] == (found[0.3][0], int(found[0.3][0]))
+@pytest.mark.parametrize("part", [0.05, 0.11, 0.3, 0.6, 0.89])
+def test_a_small_step_gets_a_link_where_the_way_behind_it_does_not_fit(part):
+    """Here the force grows on the way: it errs by far more than it steps.  Where less than a tenth of the tolerance is
+    stepped over, points alone have to do."""
+    task = replace(line(start=0.02 * FORCE, tolerance=1.0), tolerance_angle=1e9)
+    size, left = (values[2] for values in steps(task))
+    assert left > 3 * size
+    division = divided(replace(task, tolerance=size / part))[1]
+    expected = part > 0.1 and left * part / size > 0.9
+    assert division.source[division.links].tolist() == [2] * bool(expected)
 
 
 def test_links_lead_only_to_motions_that_carry_force_and_are_corrected():

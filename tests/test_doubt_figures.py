@@ -273,6 +273,7 @@ def test_covariances_and_shares():
     np.testing.assert_allclose(part, np.diag(matrix @ moves[0].T @ moves[0]) / np.trace(found[0]))
     assert part.sum() == pytest.approx(1.0)
     assert shares(np.zeros((3, 2)), np.eye(2)).tolist() == [0.0, 0.0]
+    assert shares(np.full((3, 2), np.nan), np.eye(2)).tolist() == [0.0, 0.0]
     assert shares(1e-30 * np.eye(3), np.eye(3)) == pytest.approx([1 / 3] * 3)
 
 
