@@ -107,19 +107,20 @@ class Calls(Blocks):
             command(run, item, said.arguments)
             return pc + 1
         routine = run.survey.routines.get(said.name)
-        known = routine is not None and not (run.unsure or self.doubts.plain or routine.is_main)
-        if (
-            routine is None
-            or not known
-            or routine.is_function
-            or routine.begin in self.doubts.passed
-            or said.name in run.survey.later
-            or sum(opened.back >= 0 for opened in run.stack) >= MOST_CALLS
-        ):
-            run.mentioned |= identifiers(said.arguments)
-            self._called(item, said.name, said.arguments)
-            return pc + 1
-        return self._enter_call(pc, said, routine)
+        if routine is not None and self._follows(said.name, routine):
+            return self._enter_call(pc, said, routine)
+        run.mentioned |= identifiers(said.arguments)
+        self._called(item, said.name, said.arguments)
+        return pc + 1
+
+    def _follows(self, name: bytes, routine: Routine) -> bool:
+        """Whether a call is followed, as it surely runs now and is no call of a call of a call ..."""
+        run, doubts = self.run, self.doubts
+        if run.unsure or doubts.plain or routine.is_main or routine.is_function:
+            return False
+        if routine.begin in doubts.passed or name in run.survey.later:
+            return False
+        return sum(opened.back >= 0 for opened in run.stack) < MOST_CALLS
 
     def _enter_call(self, pc: int, said: Call, routine: Routine) -> int:
         run, variables = self.run, self.run.variables

@@ -45,7 +45,7 @@ class Chain:
             self.deviation[rows] = _deviation(*self.task.targets(rows))
         for low in range(0, len(dependent), BLOCK):
             rows = dependent[low : low + BLOCK]
-            before = np.where((rows > 0)[:, None], self.deviation[rows - 1], 0.0)
+            before = self.deviation[rows - 1]  # the first row of all depends on none
             active = self.touched[rows] | (self.task.inserted[rows] > 0)
             # Rows far behind a change need not be looked at.
             if active.any() or before.any():
