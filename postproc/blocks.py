@@ -17,7 +17,7 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-ROWS = 1 << 13
+ROWS = 3 << 12
 """Rows of a block."""
 
 THREADS = "POSTPROC_THREADS"
@@ -90,9 +90,14 @@ def give_back() -> None:
 
 
 def large_apart() -> None:
-    """From now on arrays of more than ``LARGE`` bytes lie apart, and go back to the system as soon as they are free."""
-    m_mmap_threshold = -3
+    """From now on arrays of more than ``LARGE`` bytes lie apart, and go back to the system as soon as they are free;
+    those of blocks lie together, and what is free of them stays at hand: to fetch a page again takes as long as to
+    compute what it holds."""
+    m_trim_threshold, m_top_pad, m_mmap_threshold, m_arena_max = -1, -2, -3, -8
     _allocator("mallopt", m_mmap_threshold, LARGE)
+    _allocator("mallopt", m_trim_threshold, 4 * LARGE)
+    _allocator("mallopt", m_top_pad, LARGE // 2)
+    _allocator("mallopt", m_arena_max, 1)
 
 
 def _allocator(name: str, *arguments: int) -> None:

@@ -45,6 +45,11 @@ class Poses:
         return Poses(back, -turned(back, self.position))
 
     def __getitem__(self, rows: Any) -> Poses:
+        whole = self.rotation.flags.c_contiguous and self.position.flags.c_contiguous
+        if (
+            whole and isinstance(rows, np.ndarray) and rows.dtype.kind == "i"
+        ):  # several times as fast as an index
+            return Poses(self.rotation.take(rows, axis=0), self.position.take(rows, axis=0))
         return Poses(self.rotation[rows], self.position[rows])
 
     def __len__(self) -> int:
@@ -63,6 +68,9 @@ class Poses:
         """Sets ``rows`` to ``poses``."""
         self.rotation[rows], self.position[rows] = poses.rotation, poses.position
 
+
+SMALL = 0.01
+"""[rad] Angles up to which the first four terms of a series hold to rounding."""
 
 UNKNOWN = Poses(np.full((3, 3), np.nan), np.full(3, np.nan))
 """No pose."""
@@ -117,12 +125,34 @@ Placed = Poses | PoseRows
 
 
 def product(one: Floats, other: Floats) -> Floats:
-    """one @ other of rotations (..., 3, 3): a single product of matrices where one of them is the same for all."""
+    """one @ other of rotations (..., 3, 3): of many, component by component; a single product of matrices where one of
+    them is the same for all."""
+    if one.ndim == 3 == other.ndim and len(one) == len(other):
+        a, b = _components(one), _components(other)
+        found = a[:, 0, None] * b[None, 0]
+        found += a[:, 1, None] * b[None, 1]
+        found += a[:, 2, None] * b[None, 2]
+        return _rows(found)
     if other.ndim == 2 < one.ndim:
         return (one.reshape(-1, 3) @ other).reshape(one.shape)
-    if one.ndim == 2 < other.ndim:
-        return np.swapaxes(product(np.swapaxes(other, -1, -2), one.T), -1, -2)
+    if one.ndim == 2 and other.ndim == 3:
+        return _rows((one @ _components(other).reshape(3, -1)).reshape(3, 3, -1))
     return np.asarray(one @ other)
+
+
+def _components(rotation: Floats) -> Floats:
+    """(3, 3, N) of rotations (N, 3, 3): each component in a row of its own."""
+    return np.ascontiguousarray(rotation.transpose(1, 2, 0))
+
+
+def _rows(components: Floats) -> Floats:
+    """(N, 3, 3) of components (3, 3, N)."""
+    return np.ascontiguousarray(components.transpose(2, 0, 1))
+
+
+def lengths(vectors: Floats) -> Floats:
+    """(N,) lengths of vectors (N, 3)."""
+    return np.sqrt(np.einsum("ni,ni->n", vectors, vectors))
 
 
 def turned(rotation: Floats, vector: Floats) -> Floats:
@@ -177,20 +207,41 @@ def wrapped(angle: ArrayLike) -> Floats:
 def rotation_from_vector(vector: ArrayLike) -> Floats:
     """exp of rotation vectors (..., 3) [rad] (Rodrigues' formula)."""
     v = np.asarray(vector, dtype=float)
-    x, y, z = np.moveaxis(v, -1, 0)
+    x, y, z = own = np.ascontiguousarray(v.reshape(-1, 3).T)
     angle2 = x * x + y * y + z * z
-    angle = np.sqrt(angle2)
-    small = angle < 1e-4
-    safe = np.where(small, 1.0, angle)
-    first = np.where(small, 1 - angle2 / 6, np.sin(safe) / safe)
-    second = np.where(small, 0.5 - angle2 / 24, (1 - np.cos(safe)) / (safe * safe))
+    if angle2.max(initial=0.0) < SMALL**2:
+        first = 1.0 - angle2 / 6 * (1.0 - angle2 / 20 * (1.0 - angle2 / 42))
+        second = 0.5 - angle2 / 24 * (1.0 - angle2 / 30 * (1.0 - angle2 / 56))
+    else:
+        angle = np.sqrt(angle2)
+        small = angle < 1e-4
+        safe = np.where(small, 1.0, angle)
+        first = np.where(small, 1 - angle2 / 6, np.sin(safe) / safe)
+        second = np.where(small, 0.5 - angle2 / 24, (1 - np.cos(safe)) / (safe * safe))
     # 1 + first [v]x + second [v]x [v]x, and [v]x [v]x = v v^T - |v|^2
-    found, rest = np.empty((*v.shape, 3)), 1 - second * angle2
+    found, rest = np.empty((3, 3, len(x))), 1 - second * angle2
+    even, odd = second * own, first * own
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        found[..., i, i] = rest + second * v[..., i] * v[..., i]
-        even, odd = second * v[..., i] * v[..., j], first * v[..., k]
-        found[..., i, j], found[..., j, i] = even - odd, even + odd
-    return found
+        np.add(rest, even[i] * own[i], out=found[i, i])
+        both = even[i] * own[j]
+        np.subtract(both, odd[k], out=found[i, j])
+        np.add(both, odd[k], out=found[j, i])
+    return _rows(found).reshape(*v.shape, 3)
+
+
+def turn_between(begin: Floats, end: Floats) -> Floats:
+    """log(end begin^T): rotation vectors (N, 3) [rad] that turn ``begin`` (N, 3, 3) to ``end`` (N, 3, 3)."""
+    a, b = _components(end), _components(begin)
+    odd, trace = np.empty((3, a.shape[2])), (a * b).sum(axis=(0, 1))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.subtract((a[k] * b[j]).sum(axis=0), (a[j] * b[k]).sum(axis=0), out=odd[i])
+    odd *= 0.5
+    sine2 = odd[0] ** 2 + odd[1] ** 2 + odd[2] ** 2
+    if not (sine2.max(initial=0.0) < SMALL**2 and trace.min(initial=3.0) > 2.0):
+        return vector_from_rotation(product(end, np.swapaxes(begin, -1, -2)))
+    # angle / sine
+    odd *= 1.0 + sine2 / 6 * (1.0 + sine2 * 9 / 20 * (1.0 + sine2 * 25 / 42))
+    return np.ascontiguousarray(odd.T)
 
 
 def vector_from_rotation(rotation: ArrayLike) -> Floats:

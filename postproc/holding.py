@@ -14,7 +14,7 @@ from postproc.compensation.division import Division
 from postproc.compensation.task import Task
 from postproc.dialects.dialect import Plan, Program, Role, Writing
 from postproc.findings import Finding, Refusal
-from postproc.geometry import Poses, on_arc, vector_from_rotation
+from postproc.geometry import Poses, lengths, on_arc, turn_between
 from postproc.toolpath import Annotation, FrameRef, Kind, Toolpath
 from postproc.units import DEG, MM
 
@@ -294,8 +294,10 @@ def _close(wrong: Bools, off: Floats, path: Toolpath, source: Ints, file: str, w
 
 def _angle(one: Floats, other: Floats, free_axis: Floats) -> Floats:
     """(M,) [rad] between rotations, where an axis is free between its directions; 0 where one is not known."""
-    turned = np.swapaxes(one, -1, -2) @ other
-    known = np.isfinite(turned[:, 0, 0])
-    vectors = vector_from_rotation(np.where(known[:, None, None], turned, np.eye(3)))
+    known = np.isfinite(one[:, 0, 0]) & np.isfinite(other[:, 0, 0])
+    if not known.all():
+        one, other = (np.where(known[:, None, None], rotation, np.eye(3)) for rotation in (one, other))
+    # in the turned axes: one^T other
+    vectors = turn_between(np.swapaxes(other, -1, -2), np.swapaxes(one, -1, -2))
     axis = np.nan_to_num(free_axis)
-    return np.asarray(np.linalg.norm(vectors - np.sum(vectors * axis, axis=1, keepdims=True) * axis, axis=1))
+    return lengths(vectors - np.sum(vectors * axis, axis=1, keepdims=True) * axis)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -12,21 +13,27 @@ from postproc.arrays import Bools, Floats, Ints, frozen
 from postproc.effects import EFFECTS, ComplianceLaw, Conditions, Effect, Load, Offset, State, Values
 from postproc.findings import Finding, nearest
 from postproc.geometry import Poses
-from postproc.robot.chain import Chain, generalized_force, jacobian
+from postproc.robot.chain import Chain, Sweep, generalized_force, jacobian
 from postproc.robot.description import Robot, Value, parameter_value
 from postproc.units import DEG
 
-CHUNK = 8192
+CHUNK = 3 << 12
 """States evaluated at once: small enough for the arrays of a sweep to stay in the cache."""
 
-STEP_TOLERANCE = 1e-13
-"""Largest last step of the equilibrium [rad]; the next error is smaller by the rate of convergence."""
+TOLERANCE = 1e-14
+"""[rad] What may be left of the way to the equilibrium behind its last step, by the rate of the steps before."""
+
+ENOUGH = 1e-11
+"""[rad] Last step of a state that is at rest after all, where it can not come to the one that was asked for."""
 
 MAX_STEPS = 60
 
 NUDGE = 1e-9
 """[rad, m] Where an equilibrium begins: beside the unloaded pose, so that a column pressed exactly along its line falls
 over instead of standing on its tip."""
+
+ROUNDS = 3
+"""Times that ``motors_at`` looks at what depends on the motors."""
 
 STILL = 1e-9
 """[rad, m] A motor that moves less stands still: it is the rounding of an inverse kinematics, not a motion."""
@@ -64,6 +71,43 @@ class Equilibrium:
     converged: Bools
     steps: int
 
+    def part(self, rows: Ints) -> Equilibrium:
+        return Equilibrium(
+            # component first, as they are made
+            self.coordinates.T.take(rows, axis=1).T,
+            self.displacement.T.take(rows, axis=1).T,
+            self.pose[rows],
+            self.mount.T.take(rows, axis=1).T,
+            self.converged[rows],
+            self.steps,
+        )
+
+
+def _at_rest(swept: Sweep, coordinates: Floats, theta: Floats, good: Bools, steps: int) -> Equilibrium:
+    """Of coordinates and displacements (m, N); none where the TCP is nowhere."""
+    good = good & np.isfinite(swept.position).all(axis=0)
+    return Equilibrium(coordinates.T, theta.T, swept.pose, swept.mount.T, good, steps)
+
+
+def _joined(count: int, parts: Sequence[tuple[Ints, Equilibrium]]) -> Equilibrium:
+    """``count`` states of which each part has its own."""
+    rows, order = np.concatenate([rows for rows, _ in parts]), np.empty(count, np.int64)
+    order[rows] = np.arange(count)
+    in_order = bool((rows[1:] > rows[:-1]).all())
+
+    def whole(take: Callable[[Equilibrium], Any]) -> Any:
+        joined = np.concatenate([take(rest) for _, rest in parts])
+        return joined if in_order else joined.take(order, axis=0)
+
+    return Equilibrium(
+        whole(lambda rest: rest.coordinates),
+        whole(lambda rest: rest.displacement),
+        Poses(whole(lambda rest: rest.pose.rotation), whole(lambda rest: rest.pose.position)),
+        whole(lambda rest: rest.mount),
+        whole(lambda rest: rest.converged),
+        max(rest.steps for _, rest in parts),
+    )
+
 
 @dataclass(frozen=True)
 class _Problems:
@@ -75,11 +119,11 @@ class _Problems:
     tool: Poses
     conditions: Conditions
 
-    def part(self, rows: Bools) -> _Problems:
+    def part(self, rows: Ints) -> _Problems:
         return _Problems(
-            self.motors[:, rows],
-            self.rest[:, rows],
-            self.wrench[:, rows],
+            self.motors.take(rows, axis=1),
+            self.rest.take(rows, axis=1),
+            self.wrench.take(rows, axis=1),
             self.tool if self.tool.position.ndim == 1 else self.tool[rows],
             self.conditions.part(rows),
         )
@@ -192,82 +236,73 @@ class StiffnessModel:
         tool: Poses,
         conditions: Conditions = NOTHING,
         start: Floats | None = None,
-        tolerance: float = STEP_TOLERANCE,
+        tolerance: float = TOLERANCE,
     ) -> Equilibrium:
         """Where the robot comes to rest with its motors at ``q`` (N, n) [rad, m] under ``wrench`` (N, 6) [N, N m] at
         the TCP, robot base axes; ``tool``: TCP on the flange, one pose or N.
 
         ``start`` (N, m): displacement to begin with, that of a state nearby; the result does not depend on it.
-        ``tolerance`` [rad, m]: largest last step.
+        ``tolerance`` [rad, m]: what may be left behind the last step, by the rate at which the steps became smaller.
 
         Solves theta = C(J^T w + loads) at coordinates rest + theta, the balance on the deflected pose, by a Newton
         iteration with the diagonal of the loads' and laws' derivatives.  What the diagonal leaves out (the lever of
         the wrench moving with the pose, weights) makes it linear with a rate of about 5e-3.
         """
         conditions = self._completed(q, conditions)
-        count, m = len(q), self.chain.size
-        coordinates, theta = np.empty((count, m)), np.empty((count, m))
-        converged, steps = np.empty(count, bool), 0
-        rotation, position, mount = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty((count, 3))
-        for begin in range(0, count, CHUNK):
+        parts: list[tuple[Ints, Equilibrium]] = []
+        for begin in range(0, max(len(q), 1), CHUNK):
             rows = slice(begin, begin + CHUNK)
-            part = self._equilibrium(
-                np.ascontiguousarray(q[rows].T),
+            motors, given = np.ascontiguousarray(q[rows].T), conditions.part(rows)
+            there = _Problems(
+                motors,
+                self._rest(motors, given),
                 np.ascontiguousarray(wrench[rows].T),
                 tool if tool.position.ndim == 1 else tool[rows],
-                conditions.part(rows),
-                np.repeat(NUDGE * np.cos(np.arange(m))[:, None], len(q[rows]), axis=1)
-                if start is None
-                else np.array(start[rows].T, order="C"),
-                tolerance,
+                given,
             )
-            coordinates[rows], theta[rows], converged[rows] = (
-                part.coordinates,
-                part.displacement,
-                part.converged,
-            )
-            rotation[rows], position[rows], mount[rows] = part.pose.rotation, part.pose.position, part.mount
-            steps = max(steps, part.steps)
-        return Equilibrium(coordinates, theta, Poses(rotation, position), mount, converged, steps)
+            if start is None:
+                aside = NUDGE * np.cos(np.arange(self.chain.size))
+                theta = np.repeat(aside[:, None], motors.shape[1], axis=1)
+            else:
+                theta = np.array(start[rows].T, order="C")
+            parts += ((begin + ended, rest) for ended, rest in self._ended(there, theta, tolerance))
+        return parts[0][1] if len(parts) == 1 else _joined(len(q), parts)
 
-    def _equilibrium(
-        self,
-        motors: Floats,
-        wrench: Floats,
-        tool: Poses,
-        conditions: Conditions,
-        theta: Floats,
-        tolerance: float,
-    ) -> Equilibrium:
-        rest = self._rest(motors, conditions)
+    def _ended(self, given: _Problems, theta: Floats, tolerance: float) -> Iterator[tuple[Ints, Equilibrium]]:
+        """The states in the order in which they come to rest: their numbers (K,) and where they do."""
+        rows, steps = np.arange(theta.shape[1]), 0
         if not self._laws:
-            theta = np.zeros_like(rest)
-        count, steps = theta.shape[1], 0
-        last, stable = np.zeros(count), np.ones(count, bool)
-        # the states still on their way, and how far they are bent
-        rows, bent = np.arange(count), theta
-        problems = _Problems(motors, rest, wrench, tool, conditions)
-        while self._laws and steps < MAX_STEPS:
-            step, holds = self._step(problems, bent)
-            bent += step
+            swept = self.chain.sweep(given.rest, given.tool, given.conditions.spindle)
+            yield rows, _at_rest(swept, given.rest, np.zeros_like(given.rest), np.ones(len(rows), bool), 0)
+            return
+        stable, last = np.ones(len(rows), bool), np.zeros(len(rows))
+        while True:
+            swept, step, holds = self._step(given, theta)
+            theta += step
             steps += 1
+            stable &= holds
             size = np.abs(step).max(axis=0)
-            last[rows] = size
-            stable[rows] &= holds
-            moving = size > tolerance
-            if not moving.any():
-                break
-            if 4 * moving.sum() < 3 * len(rows):
-                theta[:, rows] = bent
-                rows, bent = rows[moving], bent[:, moving]
-                problems = problems.part(moving)
-        theta[:, rows] = bent
-        swept = self.chain.sweep(rest + theta, tool, conditions.spindle)
-        rested = stable & (last < max(1e-11, tolerance)) & np.isfinite(swept.position).all(axis=0)
-        return Equilibrium((rest + theta).T, theta.T, swept.pose, swept.mount.T, rested, steps)
+            # of a geometric series; the first step says nothing of its rate
+            left = np.where(size < last, size * size / np.where(size < last, last - size, 1.0), size)
+            last, resting = size, left <= tolerance
+            ends = ~(left > tolerance) if steps < MAX_STEPS else np.ones(len(rows), bool)
+            if len(rows) and not ends.any():
+                continue
+            # The last step is so small that nothing has to be evaluated anew.  Each state stops at its own, whatever
+            # the others do: what is found of it does not depend on them.
+            good = stable & (resting | (size <= ENOUGH))
+            there = _at_rest(swept.nudged(step), given.rest + theta, theta, good, steps)
+            if ends.all():
+                yield rows, there
+                return
+            ended, on = np.flatnonzero(ends), np.flatnonzero(~ends)
+            yield rows[ended], there.part(ended)
+            rows, stable, last = rows[on], stable[on], last[on]
+            theta, given = theta.take(on, axis=1), given.part(on)
 
-    def _step(self, given: _Problems, theta: Floats) -> tuple[Floats, Bools]:
-        """The step (m, N) of the iteration from displacement ``theta`` (m, N), and whether the diagonal holds (N,)."""
+    def _step(self, given: _Problems, theta: Floats) -> tuple[Sweep, Floats, Bools]:
+        """The chain at displacement ``theta`` (m, N), the step (m, N) of the iteration from there, and whether the
+        diagonal holds (N,)."""
         coordinates = given.rest + theta
         swept = self.chain.sweep(coordinates, given.tool, given.conditions.spindle)
         state = State(
@@ -285,7 +320,8 @@ class StiffnessModel:
         # A load that pushes away faster than the joint holds (C dM/dq >= 1) has no stable rest.
         stiffening = 1.0 - compliance * slope
         holds = stiffening > 0
-        return (target - theta) / np.where(holds, stiffening, np.inf), np.asarray(holds.all(axis=0))
+        step = (target - theta) / np.where(holds, stiffening, np.inf)
+        return swept, step, np.asarray(holds.all(axis=0))
 
     def _displacement(self, state: State, force: Floats) -> tuple[Floats, Floats]:
         """Displacement (m, N) by all laws under ``force`` (m, N), and its derivative, coordinate by coordinate."""
@@ -312,8 +348,11 @@ class StiffnessModel:
 
     def _forces(self, state: State) -> tuple[Floats, Floats]:
         """Generalized forces (m, N) of wrench and loads, and the loads' derivatives, coordinate by coordinate."""
-        force = generalized_force(state.swept, state.swept.position, state.wrench)
-        slope = np.zeros_like(force)
+        return self._loaded(state, generalized_force(state.swept, state.swept.position, state.wrench))
+
+    def _loaded(self, state: State, pushed: Floats) -> tuple[Floats, Floats]:
+        """As ``_forces``, of the wrench's own (m, N)."""
+        force, slope = pushed.copy(), np.zeros_like(pushed)
         for load, values in self._loads:
             load.add_force(values, state, force, slope)
         return force, slope
@@ -361,15 +400,28 @@ class StiffnessModel:
     ) -> tuple[Floats, Floats]:
         """Motors (N, n) that leave the loaded joints at ``coordinates`` (N, n), and the displacement (N, m) there.
 
-        q = z - theta(z) - offsets(z), without an iteration: exact where only the joints give way and have offsets that
-        do not depend on the motors; elsewhere a value to begin with.
+        q = z - theta(z, q) - offsets(q): the chain is evaluated once, at z, and only what depends on the motors (a
+        balanced load, an offset) is repeated.  Exact where only the joints give way; elsewhere a value to begin with.
         """
+        conditions = self._completed(coordinates, conditions)
         state = self.state(coordinates, wrench, tool, conditions)
-        force, _ = self._forces(state)
-        theta, _ = self._displacement(state, force)
-        rows = self.chain.motor_rows
-        away = theta[rows] + state.rest[rows] - state.motors
-        return np.asarray((state.motors - away).T), np.asarray(theta.T)
+        rows, joints = self.chain.motor_rows, state.motors
+        pushed = generalized_force(state.swept, state.swept.position, state.wrench)
+        was, moved = joints, np.zeros_like(joints)
+        for _ in range(ROUNDS):
+            force, _ = self._loaded(state, pushed)
+            theta, _ = self._displacement(state, force)
+            motors = joints - theta[rows] - (state.rest[rows] - state.motors)
+            before, moved = moved, motors - was
+            if not moved.any():
+                break
+            state = replace(state, motors=motors, rest=self._rest(motors, conditions))
+            was = motors
+        # what is still to come, as the rest of a geometric series
+        share = np.clip(moved / np.where(before == 0.0, np.inf, before), -0.5, 0.5)
+        more = moved * share / (1.0 - share)
+        theta[rows] -= more
+        return np.asarray((motors + more).T), np.asarray(theta.T)
 
     def compliance(self, state: State) -> Floats:
         """(N, m) [rad/(N m), m/N] compliance of each coordinate at ``state``, its own part of the loads' stiffness in

@@ -7,6 +7,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -32,20 +33,30 @@ from postproc.units import DEG, MM
 @dataclass(frozen=True)
 class Written:
     """``edits`` make the output; ``contents`` are its bytes, a document each; ``result`` has the residual predicted
-    from the digits in them, ``division`` the commands as they are in them, and ``between`` (M,) [m] the largest
-    distance from the wanted way inside of each corrected motion, NaN for all others.
+    from the digits in them, ``division`` the commands as they are in them.
 
-    off (N,) [m], off_angle (N,) [rad], off_between (M,) [m]: the same residuals, from what the gain leaves.
+    off (N,) [m], off_angle (N,) [rad]: the same residuals, from what the gain leaves.
     """
 
+    task: Task
     edits: Edits
     contents: tuple[bytes, ...]
     result: Result
     division: Division
-    between: Floats
     off: Floats
     off_angle: Floats
-    off_between: Floats
+
+    @cached_property
+    def between(self) -> Floats:
+        """(M,) [m] the largest distance from the wanted way inside of each corrected motion, NaN for all others."""
+        return way_errors(self.task, self.result, self.division)
+
+    @cached_property
+    def off_between(self) -> Floats:
+        """(M,) [m] the same, from the way that the gain leaves."""
+        if self.task.gain == 1.0:
+            return self.between
+        return way_errors(self.task, self.result, self.division, 1.0 - self.task.gain)
 
 
 def planned(task: Task, division: Division) -> Plan:
@@ -125,18 +136,17 @@ def write(
     back = completed(again.toolpath)
     give_back()
     hold(task, result, division, program, again, back, writing)
+    give_back()
     there = _as_written(task, division, back)
     written = with_residual(task, result, there.own_command)
+    written = replace(
+        written, turn=np.broadcast_to(np.nan, written.turn.shape)
+    )  # it was meant for what is written
     give_back()
     hold_residual(task, result, written, there, writing, documents[0].path.name)
     give_back()
-    between = way_errors(task, result, there)
-    if task.gain == 1.0:
-        return Written(edits, contents, written, there, between, written.after, written.after_angle, between)
-    off, angle = _beside_left(task, written)
-    return Written(
-        edits, contents, written, there, between, off, angle, way_errors(task, result, there, 1.0 - task.gain)
-    )
+    left = (written.after, written.after_angle) if task.gain == 1.0 else _beside_left(task, written)
+    return Written(task, edits, contents, written, there, *left)
 
 
 def _read_back(

@@ -291,6 +291,12 @@ U, S, N = ("reachable", "converged"), ("settled", "converged"), ("converged",)
             [(REACH, 11, ""), (REST, 12, ""), (SETTLE, 13, "")],
             {FIRST: (11, REACH)},
         ),
+        # an axis is told of a correction that settles
+        (
+            {5: (*N, 190.0), 6: (186.0,)},
+            [(SETTLE, 15, ""), (beyond("186.0"), 16, "")],
+            {SECOND: (15, SETTLE)},
+        ),
         ({3: U, 2: N, 1: S}, [(REACH, 13, ""), (REST, 11, ""), (SETTLE, 12, "")], {FIRST: (11, REST)}),
         (
             {1: U, 3: U, 6: U, 7: N},

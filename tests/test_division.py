@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from ways_at_work import circle, corner, line
+from ways_at_work import task as task_to
 
+import postproc.compensation.division as division_module
 from postproc.compensation.between import Pieces, errors_between
 from postproc.compensation.correct import correct
-from postproc.compensation.division import ROOM, Limits, _Search, divide, made
+from postproc.compensation.division import ROOM, STEP, Limits, _Search, divide, made
 from postproc.toolpath import Role
 from postproc.units import MM
 
@@ -199,3 +201,76 @@ def test_pieces_of_a_straight_way_are_where_they_are_asked_for():
     rows, zero = np.array([2]), np.zeros(1)
     half = Pieces.straight(rows, zero, zero + 1, task.ways.begin[rows], task.ways.end[rows]).at(zero + 0.5)
     np.testing.assert_allclose(half.position[0], [1.6, 0.0, 0.5], atol=1e-12)
+
+
+# ways that need no look
+
+
+def looked_at(task, monkeypatch):
+    """How many pieces the search looks at, for the motions of the input."""
+    seen = []
+    errors = division_module.errors_between
+    monkeypatch.setattr(
+        division_module,
+        "errors_between",
+        lambda task, pieces, *more: seen.append(len(pieces)) or errors(task, pieces, *more),
+    )
+    _, division = divided(task)
+    return sum(seen), division
+
+
+def in_steps(points, length=0.8, **words):
+    """A straight cut across the workspace by ``points`` that follow one another."""
+    along = np.linspace(-0.5, 0.5, points) * length
+    places = np.stack([np.full(points, 1.6), along, np.full(points, 0.5)], axis=1)
+    return task_to(places, np.arange(points) > 0, **words)
+
+
+def test_ways_on_which_the_correction_hardly_changes_are_not_looked_at(monkeypatch):
+    seen, division = looked_at(in_steps(1601, 0.4), monkeypatch)
+    # the first one begins where nothing is corrected
+    assert seen <= 2
+    assert division.inserted <= 1
+
+
+@pytest.mark.parametrize("points", [801, 3201])
+def test_what_is_not_looked_at_is_within_the_tolerance(points):
+    task = in_steps(points)
+    result, division = divided(task)
+    changed = np.linalg.norm(np.diff(result.correction, axis=0), axis=1)[1:]
+    worst = dense(task, division, 5)
+    skipped = np.flatnonzero(changed <= STEP * task.tolerance) + 2
+    assert len(skipped) > 0.2 * points
+    own = np.isin(division.source, skipped)
+    assert worst[own].max() < STEP * task.tolerance
+
+
+def test_a_long_way_is_looked_at_even_if_the_correction_is_the_same_at_both_ends():
+    task = in_steps(3)
+    full = correct(task)
+    alike = replace(full, correction=np.full((3, 3), 1e-3), turn=np.full((3, 3), 1e-3))
+    search = _Search(task, replace(alike, state=full.state), FREE)
+    search.start_at[:] = -1
+    assert not search._even().any()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda task: replace(task, tolerance=1e-7),
+        lambda task: replace(task, tolerance_angle=1e-9),
+        lambda task: replace(task, toolpath=replace(task.toolpath, tool=np.arange(401) % 2)),
+        lambda task: replace(task, track=replace(task.track, q=task.track.q * 1000.0)),
+    ],
+    ids=["position", "angle", "tool", "axes"],
+)
+def test_each_condition_of_an_even_way_counts(change):
+    task = in_steps(401, 0.1)
+    result = correct(task)
+    search = _Search(task, result, FREE)
+    search.start_at[:] = -1
+    assert search._even()[1:].all()
+    assert not search._even()[0]
+    other = _Search(change(task), result, FREE)
+    other.start_at[:] = -1
+    assert not other._even()[200:].any()

@@ -10,7 +10,7 @@ from postproc.arrays import Bools, Floats, Ints
 from postproc.compensation.mirror import difference
 from postproc.compensation.task import Task
 from postproc.compensation.ways import between
-from postproc.geometry import Poses, arc_in_plane, arc_through, on_arc
+from postproc.geometry import Poses, arc_in_plane, arc_through, lengths, on_arc
 from postproc.units import DEG, MM
 
 SHARES = (0.25, 0.5, 0.75)
@@ -18,10 +18,6 @@ SHARES = (0.25, 0.5, 0.75)
 
 SHORT, LITTLE = 30 * MM, 3 * DEG
 """Of a piece that is shorter and turns by less the middle tells enough."""
-
-COARSE = 1e-8
-"""[rad, m] Last step of an equilibrium here.  What is left after it is less than a hundredth of that, a tenth of a
-nanometre at the tool."""
 
 
 @dataclass(frozen=True)
@@ -97,9 +93,9 @@ def errors_between(
     that are looked at where they begin as well (another ended there in its own place).  ``left``: the share of the
     error without a correction that is meant to stay, and is none.
     """
-    length = np.linalg.norm(pieces.end.position - pieces.begin.position, axis=1)
+    length = lengths(pieces.end.position - pieces.begin.position)
     _, turn = difference(pieces.end, pieces.begin)
-    long = (length > SHORT) | (np.linalg.norm(turn, axis=1) > LITTLE) | np.isfinite(pieces.sweep)
+    long = (length > SHORT) | (lengths(turn) > LITTLE) | np.isfinite(pieces.sweep)
     off, angle = np.zeros(len(pieces)), np.zeros(len(pieces))
     for share in SHARES:
         chosen = np.flatnonzero(long | (share == 0.5))
@@ -120,14 +116,14 @@ def _errors(task: Task, pieces: Pieces, share: float, left: float) -> tuple[Floa
     along = pieces.first + share * (pieces.last - pieces.first)
     wanted = task.ways.at(rows, along)
     wrench = task.force.along(rows, along)
-    real = task.real(rows, pieces.at(np.full(len(rows), share)), wrench, COARSE)
-    goal = task.goal(rows, wanted, COARSE)
+    real = task.real(rows, pieces.at(np.full(len(rows), share)), wrench)
+    goal = task.goal(rows, wanted)
     shift, turn = task.off(rows, real.pose, goal)
     if left:
-        without = task.off(rows, task.real(rows, wanted, wrench, COARSE).pose, goal)
+        without = task.off(rows, task.real(rows, wanted, wrench).pose, goal)
         shift, turn = shift - left * without[0], turn - left * without[1]
     tangent = task.ways.tangent(rows, along)
     shift = shift - np.sum(shift * tangent, axis=1, keepdims=True) * tangent
     good = real.reachable & real.settled
-    off, angle = (np.where(good, np.linalg.norm(part, axis=1), np.inf) for part in (shift, turn))
+    off, angle = (np.where(good, lengths(part), np.inf) for part in (shift, turn))
     return off, angle

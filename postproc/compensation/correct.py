@@ -14,7 +14,7 @@ from postproc.compensation.cuts import cuts_of, left_findings, spread, switch_fi
 from postproc.compensation.mirror import Correction, difference
 from postproc.compensation.task import Task
 from postproc.findings import Finding, Refusal
-from postproc.geometry import Placed, PoseRows, Poses, rotation_from_vector
+from postproc.geometry import Placed, PoseRows, Poses, lengths, product, rotation_from_vector
 from postproc.robot.track import near_singular, sides, singular_words
 from postproc.toolpath import Kind
 from postproc.units import DEG, MM
@@ -30,7 +30,8 @@ class State(IntEnum):
 @dataclass(frozen=True)
 class Result:
     """state (N,) State; cut (N,), -1 in air; command (N): TCP commands in the robot base; correction (N, 3) [m]: their
-    place minus the wanted one, 0 where nothing is corrected; before, after (N,) [m] predicted position error, NaN where
+    place minus the wanted one, 0 where nothing is corrected; turn (N, 3) [rad]: by how much they are
+    meant to be turned, NaN behind the writing; before, after (N,) [m] predicted position error, NaN where
     nothing is predicted, and before_angle, after_angle (N,) [rad]; deflection (N, 3) [m] before; iterations (N,);
     history (K + 1, N) [m]; findings."""
 
@@ -38,6 +39,7 @@ class Result:
     cut: Ints
     command: Placed
     correction: Floats
+    turn: Floats
     deflection: Floats
     before: Floats
     before_angle: Floats
@@ -86,7 +88,7 @@ def correct(task: Task) -> Result:
 
     shift, turn = task.gain * found.shift, task.gain * found.turn
     shift[~keeps], turn[~keeps] = 0.0, 0.0
-    size = np.linalg.norm(shift, axis=1)
+    size = lengths(shift)
     _refuse(
         task,
         size > task.max_correction,
@@ -111,6 +113,7 @@ def correct(task: Task) -> Result:
         cut,
         PoseRows(n, lambda rows: _moved(task.wanted[rows], shift[rows], turn[rows])),
         shift,
+        turn,
         found.deflection,
         found.before,
         found.before_angle,
@@ -127,7 +130,7 @@ def correct(task: Task) -> Result:
 
 def _moved(wanted: Poses, shift: Floats, turn: Floats) -> Poses:
     """``wanted`` (K), shifted by (K, 3) [m] and turned by (K, 3) [rad] in place."""
-    return Poses(rotation_from_vector(turn) @ wanted.rotation, wanted.position + shift)
+    return Poses(product(rotation_from_vector(turn), wanted.rotation), wanted.position + shift)
 
 
 def with_residual(task: Task, result: Result, command: Placed) -> Result:
@@ -141,8 +144,8 @@ def with_residual(task: Task, result: Result, command: Placed) -> Result:
         there, wanted = command[at], task.wanted[at]
         here = task.real(at, there, task.wrench[at])
         shift, turn = task.seen(at, here.pose, task.goal(at, wanted))
-        after[at] = np.where(here.reachable & here.settled, np.linalg.norm(shift, axis=1), np.inf)
-        after_angle[at] = np.linalg.norm(turn, axis=1)
+        after[at] = np.where(here.reachable & here.settled, lengths(shift), np.inf)
+        after_angle[at] = lengths(turn)
         correction[at] = there.position - wanted.position
 
     each_block(predicted, len(rows))
@@ -170,11 +173,13 @@ def _tried(task: Task, rows: Ints, may: Bools) -> _Block:
     """Predict the motions ``rows`` (K,), and correct those that ``may`` (K,) be."""
     wanted, wrench = task.wanted[rows], task.wrench[rows]
     goal = task.goal(rows, wanted)
-    here = task.real(rows, wanted, wrench)
+    q = task.track.q[rows]
+    begin, bent = task.begin(rows, wanted, wrench, goal, q if goal is wanted else None)
+    here = task.real(rows, wanted, wrench, bent, q)
     shift, turn = task.seen(rows, here.pose, goal)
     shift[~here.settled], turn[~here.settled] = np.nan, np.nan
     tried, wanted = rows[may], wanted[may]
-    done = task.command(tried, wanted, wrench[may], goal[may])
+    done = task.command(tried, wanted, wrench[may], goal[may], (begin[may], bent[may]))
     path, robot = task.toolpath, task.model.robot
     low, high = robot.limits.T
     crossed = ((path.status[tried] >= 0) | (path.turn[tried] >= 0)) & (path.kind[tried] == Kind.PTP)
@@ -184,8 +189,8 @@ def _tried(task: Task, rows: Ints, may: Bools) -> _Block:
     return _Block(
         rows,
         shift,
-        np.linalg.norm(shift, axis=1),
-        np.linalg.norm(turn, axis=1),
+        lengths(shift),
+        lengths(turn),
         tried,
         *difference(done.command, wanted),
         done,
@@ -226,15 +231,16 @@ class _Found:
         self.history[0, tried] = self.before[tried]
         self.history[1 : len(done.history) + 1, tried] = done.history
         self.crossed += tried[block.crossed].tolist()
+        beyond = block.beyond & done.converged  # what is not is told as that
         for code, failed in (
             ("COR009", ~done.reachable),
             ("MOD002", ~done.settled),
             ("COR001", ~done.converged),
-            ("COR008", block.beyond),
+            ("COR008", beyond),
         ):
             self.failed.setdefault(code, []).append(tried[failed])
-        if block.beyond.any() and not len(self.axes):
-            self.axes = done.q[block.beyond][:1]
+        if beyond.any() and not len(self.axes):
+            self.axes = done.q[beyond][:1]
 
     def judged(self, task: Task, why: dict[int, Finding], findings: list[Finding]) -> None:
         """Notes why motions that were tried can not be corrected after all."""

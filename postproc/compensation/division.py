@@ -17,7 +17,7 @@ from postproc.compensation.mirror import partly
 from postproc.compensation.task import Task
 from postproc.compensation.ways import begins
 from postproc.findings import Finding
-from postproc.geometry import Placed, PoseRows, Poses
+from postproc.geometry import Placed, PoseRows, Poses, lengths
 from postproc.toolpath import Kind, Role
 from postproc.units import DEG, MM
 
@@ -25,7 +25,10 @@ ROOM = 0.9
 """Share of the tolerance that the way between points may take: written digits take a part of the rest."""
 
 STEP = 0.1
-"""Share of the tolerance by which the correction may step without a look at what that does to the way behind it."""
+"""Share of the tolerance by which the correction may step, or change on a way, without a look at what that does."""
+
+LITTLE = 3 * DEG
+"""Axes that turn by less leave a robot's compliance as it is: what changes with its square is a thousandth."""
 
 WIDEST = 300 * DEG
 """An arc that turns further is divided: the moved end of a nearly full circle could lie on the wrong side."""
@@ -210,7 +213,7 @@ class _Search:
         most = np.where(can, np.maximum(least, most), least).astype(np.int32)
         fails, holds = least - 1, np.zeros(len(rows), np.int32)
         ratio = np.zeros(len(rows))
-        self.count, active = least.copy(), np.arange(len(rows))
+        self.count, active = least.copy(), np.flatnonzero(~self._even())
         while len(active):
             found = self._errors(active, self.count[active])
             self.error[active] = np.where(self.count[active] == least[active], found, self.error[active])
@@ -227,6 +230,22 @@ class _Search:
             guess = np.ceil(np.maximum(fails[active], 1) * np.minimum(ratio[active], 1e6) ** power)
             top = np.where(holds[active] > 0, holds[active] - 1, most[active])
             self.count[active] = np.clip(guess, fails[active] + 1, top).astype(np.int32)
+
+    def _even(self) -> Bools:
+        """(R,) straight ways on which the correction hardly changes and the axes hardly turn: it lies on a line from
+        begin to end, and between them nothing is off by more than a part of that change."""
+        task, full, path = self.task, self.full, self.task.toolpath
+
+        def even(part: slice) -> Bools:
+            rows = self.rows[part]
+            before = np.maximum(rows - 1, 0)
+            alike = full.corrected[before] & (rows > 0) & (self.start_at[part] < 0)
+            alike &= ~task.ways.arc[rows] & (path.tool[rows] == path.tool[before])
+            for change, most in ((full.correction, task.tolerance), (full.turn, task.tolerance_angle)):
+                alike &= lengths(change[rows] - change[before]) <= STEP * most
+            return alike & (np.abs(task.track.q[rows] - task.track.q[before]) <= LITTLE).all(axis=1)
+
+        return np.concatenate([np.empty(0, bool), *in_blocks(even, len(self.rows))])
 
     def ration(self) -> None:
         """Where all together are more than may be inserted: links first, then points, the largest errors before."""

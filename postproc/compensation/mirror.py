@@ -15,9 +15,9 @@ import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
 from postproc.effects import Conditions
-from postproc.geometry import Poses, rotation_from_vector, vector_from_rotation
+from postproc.geometry import Poses, lengths, product, rotation_from_vector, turn_between
 from postproc.model import StiffnessModel
-from postproc.robot.inverse import inverse
+from postproc.robot.inverse import Inverse, inverse
 
 POSITION_TOLERANCE = 1e-8
 """[m] predicted error at which a motion is done: far below what any program's digits can say."""
@@ -25,8 +25,8 @@ POSITION_TOLERANCE = 1e-8
 ANGLE_TOLERANCE = 1e-8
 """[rad]"""
 
-REST = 1e-10
-"""[rad, m] Last step of an equilibrium: what is left after it is a picometre or two at the tool."""
+REST = 2e-10
+"""[rad, m] What may be left of the way to an equilibrium: less than a nanometre at the tool."""
 
 MAX_ITERATIONS = 20
 
@@ -52,16 +52,19 @@ def predict(
     status: Ints,
     near: Floats,
     start: Floats | None = None,
-    tolerance: float = REST,
+    q: Floats | None = None,
 ) -> Prediction:
     """The tool's pose when the controller is sent to ``command`` (N TCP poses in the robot base) under ``wrench``
     (N, 6), in the branch ``status`` (N,), with turns nearest to ``near`` (N, 6) [rad].
 
-    ``start`` (N, m): the displacement of a state nearby, to begin the equilibrium with; ``tolerance`` [rad, m]: its
-    last step.
+    ``start`` (N, m): the displacement of a state nearby, to begin the equilibrium with; ``q`` (N, 6): motor angles at
+    ``command``, where they are known.
     """
-    found = inverse(model.robot.nominal, command @ tool.inverse(), status, near)
-    rest = model.equilibrium(found.q, wrench, tool, conditions, start, tolerance)
+    if q is not None:
+        found = Inverse(q, np.asarray(np.isfinite(q).all(axis=1)))
+    else:
+        found = inverse(model.robot.nominal, command @ tool.inverse(), status, near)
+    rest = model.equilibrium(found.q, wrench, tool, conditions, start, REST)
     return Prediction(rest.pose, found.q, rest.displacement, found.reachable, rest.converged)
 
 
@@ -130,7 +133,7 @@ def mirror(
         shift, turn = difference(here.pose, goal[some])
         if turns is not None:
             turn = (turns[some] @ turn[..., None])[..., 0]
-        error, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
+        error, angle = lengths(shift), lengths(turn)
         good = here.reachable & here.settled
         q[some], reachable[some], settled[some] = here.q, here.reachable, here.settled | ~here.reachable
         record = np.full(n, np.nan)
@@ -155,7 +158,7 @@ def mirror(
                 turn[going],
             )
         position[some] -= shift
-        rotation[some] = rotation_from_vector(-turn) @ rotation[some]
+        rotation[some] = product(rotation_from_vector(-turn), rotation[some])
     return Correction(
         Poses(rotation, position),
         q,
@@ -169,10 +172,39 @@ def mirror(
     )
 
 
+def beginning(
+    model: StiffnessModel,
+    wanted: Poses,
+    goal: Poses,
+    tool: Poses,
+    wrench: Floats,
+    conditions: Conditions,
+    status: Ints,
+    near: Floats,
+    farthest: float,
+    q: Floats | None = None,
+) -> tuple[Poses, Floats]:
+    """What ``mirror`` can begin with: commands whose loaded joints stand where the goal is, and how far they are bent
+    there; the wanted pose where that is out of reach, or more than ``farthest`` [m] away.  ``q`` (N, 6): motor angles
+    at the goal, where they are known."""
+    if q is None:
+        q = inverse(model.robot.nominal, goal @ tool.inverse(), status, near).q
+    known = np.asarray(np.isfinite(q).all(axis=1))
+    joints = q if known.all() else np.where(known[:, None], q, near)
+    motors, bent = model.motors_at(joints, wrench, tool, conditions)
+    begin = model.robot.nominal_chain.flange(motors) @ tool
+    good = known & (lengths(begin.position - wanted.position) <= farthest) & np.isfinite(bent).all(axis=1)
+    if good.all():
+        return begin, bent
+    return Poses(
+        np.where(good[:, None, None], begin.rotation, wanted.rotation),
+        np.where(good[:, None], begin.position, wanted.position),
+    ), np.where(good[:, None], bent, 0.0)
+
+
 def difference(real: Poses, goal: Poses) -> tuple[Floats, Floats]:
     """real (-) goal: position difference (N, 3) [m] and rotation vector (N, 3) [rad], both in base axes."""
-    turn = vector_from_rotation(real.rotation @ np.swapaxes(goal.rotation, -1, -2))
-    return real.position - goal.position, turn
+    return real.position - goal.position, turn_between(goal.rotation, real.rotation)
 
 
 def partly(wanted: Poses, command: Poses, gain: float | Floats) -> Poses:
@@ -180,4 +212,5 @@ def partly(wanted: Poses, command: Poses, gain: float | Floats) -> Poses:
     if isinstance(gain, float) and gain == 1.0:
         return command
     shift, turn = difference(command, wanted)
-    return Poses(rotation_from_vector(gain * turn) @ wanted.rotation, wanted.position + gain * shift)
+    turned = product(rotation_from_vector(gain * turn), wanted.rotation)
+    return Poses(turned, wanted.position + gain * shift)

@@ -8,14 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.mirror import REST, Correction, Prediction, difference, mirror, predict
+from postproc.compensation.mirror import Correction, Prediction, beginning, difference, mirror, predict
 from postproc.compensation.ways import Ways
 from postproc.effects import Conditions
 from postproc.forces import Wrenches
 from postproc.geometry import Placed, Poses
 from postproc.model import StiffnessModel
-from postproc.robot.inverse import inverse
-from postproc.robot.track import Track, nominal_flange
+from postproc.robot.track import Track
 from postproc.toolpath import Toolpath
 
 
@@ -58,9 +57,17 @@ class Task:
     def ways(self) -> Ways:
         return Ways.of(self.toolpath, self.wanted, self.base, self.tool, self.model.robot, self.track)
 
-    def real(self, rows: Ints, command: Poses, wrench: Floats, tolerance: float = REST) -> Prediction:
+    def real(
+        self,
+        rows: Ints,
+        command: Poses,
+        wrench: Floats,
+        start: Floats | None = None,
+        q: Floats | None = None,
+    ) -> Prediction:
         """Where the tool comes when the controller is sent to ``command`` (K) in motions ``rows`` (K,) under
-        ``wrench`` (K, 6).  ``tolerance`` [rad, m]: last step of the equilibrium."""
+        ``wrench`` (K, 6).  ``start`` (K, m): displacement of a state nearby; ``q`` (K, n): motors at ``command``, where
+        they are known."""
         return predict(
             self.model,
             command,
@@ -69,18 +76,29 @@ class Task:
             self.conditions.part(rows),
             self.track.status[rows],
             self.track.q[rows],
-            tolerance=tolerance,
+            start,
+            q,
         )
 
-    def goal(self, rows: Ints, wanted: Poses, tolerance: float = REST) -> Poses:
+    def goal(self, rows: Ints, wanted: Poses) -> Poses:
         """Where the tool is to be: the wanted poses (K), or where the robot without force takes it."""
         if not self.process or self.model.slack:
             return wanted
-        return self.real(rows, wanted, np.zeros((len(rows), 6)), tolerance).pose
+        return self.real(rows, wanted, np.zeros((len(rows), 6))).pose
 
-    def command(self, rows: Ints, wanted: Poses, wrench: Floats, goal: Poses) -> Correction:
-        """The commands (K) that bring the tool to ``goal`` (K) in motions ``rows`` (K,)."""
+    def command(
+        self,
+        rows: Ints,
+        wanted: Poses,
+        wrench: Floats,
+        goal: Poses,
+        begin: tuple[Poses, Floats] | None = None,
+    ) -> Correction:
+        """The commands (K) that bring the tool to ``goal`` (K) in motions ``rows`` (K,).  ``begin``: as ``begin`` gives
+        it, where it is known."""
         turns = self.turns(rows, goal.rotation)
+        if turns is None and begin is None:
+            begin = self.begin(rows, wanted, wrench, goal)
         return mirror(
             self.model,
             wanted,
@@ -91,25 +109,25 @@ class Task:
             self.track.status[rows],
             self.track.q[rows],
             turns,
-            self._begin(rows, wanted, wrench, goal) if turns is None else None,
+            begin if turns is None else None,
         )
 
-    def _begin(self, rows: Ints, wanted: Poses, wrench: Floats, goal: Poses) -> tuple[Poses, Floats]:
-        """Commands whose loaded joints stand where the goal is, and how far they are bent there; the wanted pose where
-        that is out of reach, or far away."""
-        model, tool = self.model, self.tool.shared(rows)
-        near, status, given = self.track.q[rows], self.track.status[rows], self.conditions.part(rows)
-        there = inverse(model.robot.nominal, goal @ tool.inverse(), status, near)
-        motors, bent = model.motors_at(np.where(there.reachable[:, None], there.q, near), wrench, tool, given)
-        begin = nominal_flange(model.robot, motors) @ tool
-        away = np.linalg.norm(begin.position - wanted.position, axis=1)
-        good = there.reachable & (away <= self.max_correction) & np.isfinite(bent).all(axis=1)
-        if good.all():
-            return begin, bent
-        return Poses(
-            np.where(good[:, None, None], begin.rotation, wanted.rotation),
-            np.where(good[:, None], begin.position, wanted.position),
-        ), np.where(good[:, None], bent, 0.0)
+    def begin(
+        self, rows: Ints, wanted: Poses, wrench: Floats, goal: Poses, q: Floats | None = None
+    ) -> tuple[Poses, Floats]:
+        """Commands and displacements with which a correction begins (see ``beginning``)."""
+        return beginning(
+            self.model,
+            wanted,
+            goal,
+            self.tool.shared(rows),
+            wrench,
+            self.conditions.part(rows),
+            self.track.status[rows],
+            self.track.q[rows],
+            self.max_correction,
+            q,
+        )
 
     def turn_freely(self, rows: Ints) -> bool:
         """Whether the texts of all motions ``rows`` (K,) can express any orientation."""

@@ -15,7 +15,7 @@ from postproc.findings import Finding
 from postproc.forces.feed import FeedFrames
 from postproc.forces.stated import BASE, FEED, TOOL, WORLD, Stated
 from postproc.forces.way import SMOOTH_TURN, Runs, Way
-from postproc.geometry import rotation_from_vector, vector_from_rotation
+from postproc.geometry import lengths, rotation_from_vector, vector_from_rotation
 from postproc.toolpath import Kind, Toolpath
 
 JUMP = float(2 * np.sin(SMOOTH_TURN / 2))
@@ -236,8 +236,8 @@ def _largest(wrenches: Floats) -> float:
 def _jumps(one: Floats, two: Floats, largest: float, scatter: Floats) -> Bools:
     """(M,) whether the force between ``one`` and ``two`` (M, 6) changes by more than JUMP, and clear of its
     ``scatter`` (M,) [N]; ``largest`` [N]: of the program."""
-    size = np.maximum(np.linalg.norm(one[:, :3], axis=1), np.linalg.norm(two[:, :3], axis=1))
-    change = np.linalg.norm(two[:, :3] - one[:, :3], axis=1)
+    size = np.maximum(lengths(one[:, :3]), lengths(two[:, :3]))
+    change = lengths(two[:, :3] - one[:, :3])
     return np.asarray(
         (change > np.maximum(JUMP * size, JUMP_OF_LARGEST * largest)) & (change > CLEAR * scatter)
     )
@@ -300,6 +300,8 @@ class _Turn:
         return wrench.reshape(-1, 6)
 
     def _base(self, pairs: Floats, rows: Ints, side: int) -> Floats:
+        if not self.base_in_robot.strides[0]:  # one for all
+            return pairs @ self.base_in_robot[0].T
         return np.einsum("nij,nkj->nki", self.base_in_robot[rows], pairs)
 
     def _world(self, pairs: Floats, rows: Ints, side: int) -> Floats:

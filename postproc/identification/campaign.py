@@ -27,8 +27,8 @@ ONE_POSE = 1e-6
 """[rad, m] Motors that differ by less stand in one pose."""
 
 
-REST = 1e-12
-"""[rad, m] Last step of an equilibrium, whose error is smaller by a hundred: differences of two loads are taken."""
+REST = 1e-14
+"""[rad, m] What may be left of the way to an equilibrium: differences of two loads are taken."""
 
 
 @dataclass(frozen=True)

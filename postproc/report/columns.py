@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from postproc.arrays import Floats
 from postproc.blocks import ROWS, in_blocks
-from postproc.dialects.decimals import Fours, fours, number_letters, text_of
+from postproc.decimals import Fours, fours, number_letters, text_of
 
 
 @dataclass(frozen=True, eq=False)

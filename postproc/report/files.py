@@ -11,7 +11,7 @@ from postproc.arrays import Floats
 from postproc.compensation.correct import Result, State
 from postproc.compensation.division import Division
 from postproc.compensation.task import Task
-from postproc.geometry import abc_from_rotation, turned, vector_from_rotation
+from postproc.geometry import abc_from_rotation, turn_between, turned
 from postproc.report.columns import Numbers, Words, csv_parts
 from postproc.toolpath import Kind, Role
 from postproc.units import DEG, MM
@@ -39,7 +39,7 @@ def _motion(rows: slice, task: Task, result: Result) -> list[Numbers | Words]:
     to_base = task.base.shared(rows).inverse()
     moved = to_base @ result.command[rows]
     shift = (moved.position - position) / MM
-    turn = vector_from_rotation(np.swapaxes(rotation, -1, -2) @ moved.rotation) / DEG
+    turn = turn_between(np.swapaxes(moved.rotation, -1, -2), np.swapaxes(rotation, -1, -2)) / DEG
     bent = turned(to_base.rotation, result.deflection[rows]) / MM
     wrench = task.wrench[rows]
     force, moment = (turned(to_base.rotation, part) for part in (wrench[:, :3], wrench[:, 3:]))

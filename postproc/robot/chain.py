@@ -16,7 +16,8 @@ the batch evaluation, which works component-wise on arrays with the states in th
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -37,25 +38,64 @@ _Z_ALONG = [np.roll(np.eye(3), shift, axis=1) for shift in (2, 1, 0)]
 class Sweep:
     """The chain at N states, component first.
 
-    axes, origins (m, 3, N): of the coordinates, in the robot base; turns (m,): a turn, or else a shift; tcp: the three
-    columns (3, N) of its rotation; position (3, N) [m] of the TCP; mount (3, N) [m]: the same without what the
-    spindle's coordinates shift it, where the tool's body is; flange: columns and position of the flange; links: the
-    columns of the frame behind each motor.
+    axes, origins (m, 3, N): of the coordinates, in the robot base; turns (m,): a turn, or else a shift; apart (m,): it
+    has another origin than the one before it; spindles: how many of them, the last ones, are the spindle's; position
+    (3, N) [m] of the TCP; mount (3, N) [m]: the same without what the spindle's coordinates shift it, where the tool's
+    body is; flange: columns and position of the flange; links: the columns of the frame behind each motor.
     """
 
     axes: Floats
     origins: Floats
     turns: Bools
-    tcp: tuple[Floats, ...]
+    apart: Bools
+    spindles: int
     position: Floats
     mount: Floats
     flange: tuple[tuple[Floats, ...], Floats]
     links: tuple[tuple[Floats, ...], ...]
+    _columns: tuple[Floats, ...]
+    _tool: Floats | None
+
+    @cached_property
+    def tcp(self) -> tuple[Floats, ...]:
+        """The three columns (3, N) of the TCP's rotation; few that evaluate a chain ask for them."""
+        if self._tool is None:
+            return self._columns
+        return tuple(_combined(self._columns, self._tool[..., k]) for k in range(3))
 
     @property
     def pose(self) -> Poses:
         """The TCP (N) in the robot base."""
         return _poses(self.tcp, self.position)
+
+    def nudged(self, step: Floats) -> Sweep:
+        """The TCP and the mount after a small ``step`` (m, N) [rad, m] of the coordinates; all else stays as it is.
+
+        w = sum of s_i z_i over the turns; dp = sum of s_i z_i x (p - p_i) over the turns, and of s_i z_i over the
+        shifts.  What is left out has the size of the step's square.
+        """
+        turn, shift, behind = (np.zeros((3, step.shape[1])) for _ in range(3))
+        mounted, at = len(self.axes) - self.spindles, 0
+        while at < len(self.axes):
+            about = np.zeros_like(turn)  # one origin
+            origin = self.origins[at]
+            while True:
+                move = step[at] * self.axes[at]
+                if self.turns[at]:
+                    about += move
+                elif at < mounted:
+                    shift += move
+                else:
+                    behind += move
+                at += 1
+                if at == len(self.axes) or self.apart[at]:
+                    break
+            turn += about
+            shift -= cross(about, origin)
+        mount = self.mount + shift + cross(turn, self.mount)
+        position = self.position + shift + cross(turn, self.position) + behind if self.spindles else mount
+        tcp = tuple(column + cross(turn, column) for column in self.tcp)
+        return replace(self, position=position, mount=mount, _columns=tcp, _tool=None)
 
 
 class Chain:
@@ -97,6 +137,9 @@ class Chain:
         self.motor_rows = np.array(motors)
         turns = [*(turns for *_, turns in self._arm), *(name[5] == "r" for name in self._tool)]
         self.turns = np.array([*turns, *(False for _ in self._spindle)])
+        near = [self.turns[i - 1] and not self._arm[i][1].any() for i in range(1, len(self._arm))]
+        self.apart = np.ones(self.size, bool)
+        self.apart[1 : len(self._arm)] = ~np.array(near, bool)
 
     @property
     def size(self) -> int:
@@ -129,8 +172,9 @@ class Chain:
         """
         count = coordinates.shape[1]
         axes, origins = np.empty((self.size, 3, count)), np.empty((self.size, 3, count))
-        columns: list[Floats] = [np.repeat(unit[:, None], count, axis=1) for unit in np.eye(3)]
-        position = np.zeros((3, count))
+        # what all states share has one column until a coordinate tells them apart
+        columns: list[Floats] = list(np.eye(3)[:, :, None])
+        position = np.zeros((3, 1))
         links = []
         motors = set(self.motor_rows.tolist())
         for i, (rotation, translation, turns) in enumerate(self._arm):
@@ -142,12 +186,14 @@ class Chain:
             else:
                 position = position + coordinates[i] * columns[2]
             if i in motors:
-                links.append(tuple(columns))
+                links.append(_of_all(columns, count))
         position = _along(columns, self._tip.position, position)
         columns = [_along(columns, column) for column in self._tip.rotation.T]
-        flange = (tuple(columns), position)
+        flange = _of_all(columns, count), _of_all([position], count)[0]
         position = position + _combined(columns, tool.position)
-        columns = [_combined(columns, tool.rotation[..., k]) for k in range(3)]
+        beyond: Floats | None = tool.rotation
+        if self._tool or self._spindle:
+            columns, beyond = [_combined(columns, tool.rotation[..., k]) for k in range(3)], None
         i = len(self._arm)
         for name in self._tool:
             k = "xyz".index(name[-1])
@@ -158,13 +204,25 @@ class Chain:
             else:
                 position = position + coordinates[i] * columns[k]
             i += 1
-        mount = position
+        (mount,) = _of_all([position], count)
         if self._spindle:
             for name, direction in zip(self._spindle, self._spindle_axes(columns, spindle), strict=True):
                 axes[i], origins[i] = direction, position
                 position = position + coordinates[self.index[name]] * direction
                 i += 1
-        return Sweep(axes, origins, self.turns, tuple(columns), position, mount, flange, tuple(links))
+        return Sweep(
+            axes,
+            origins,
+            self.turns,
+            self.apart,
+            len(self._spindle),
+            position if self._spindle else mount,
+            mount,
+            flange,
+            tuple(links),
+            _of_all(columns, count),
+            beyond,
+        )
 
     def _spindle_axes(self, columns: list[Floats], spindle: Floats | None) -> list[Floats]:
         """Directions (3, N) of the spindle coordinates: two across the spindle, one along it."""
@@ -221,14 +279,17 @@ def generalized_force(swept: Sweep, point: Floats, wrench: Floats) -> Floats:
     force = np.empty((len(swept.axes), wrench.shape[1]))
     fx, fy, fz = wrench[:3]
     mx, my, mz = wrench[3:] + cross(point, wrench[:3])
+    about: tuple[Floats, ...] = ()
     # coordinate by coordinate: what is in the making stays in the cache
-    for own, (zx, zy, zz), (px, py, pz), turns in zip(
-        force, swept.axes, swept.origins, swept.turns.tolist(), strict=True
+    for own, (zx, zy, zz), (px, py, pz), turns, apart in zip(
+        force, swept.axes, swept.origins, swept.turns.tolist(), swept.apart.tolist(), strict=True
     ):
+        if apart:  # the moment about its origin
+            about = mx - (py * fz - pz * fy), my - (pz * fx - px * fz), mz - (px * fy - py * fx)
         if turns:
-            np.multiply(zx, mx - (py * fz - pz * fy), out=own)
-            own += zy * (my - (pz * fx - px * fz))
-            own += zz * (mz - (px * fy - py * fx))
+            np.multiply(zx, about[0], out=own)
+            own += zy * about[1]
+            own += zz * about[2]
         else:
             np.multiply(zx, fx, out=own)
             own += zy * fy
@@ -238,7 +299,11 @@ def generalized_force(swept: Sweep, point: Floats, wrench: Floats) -> Floats:
 
 def cross(a: Floats, b: Floats) -> Floats:
     """a x b of (3, N) arrays."""
-    return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    found = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.multiply(a[j], b[k], out=found[i])
+        found[i] -= a[k] * b[j]
+    return found
 
 
 def weight_about(axis: Floats, moment: Floats, gravity: Floats) -> tuple[Floats, Floats]:
@@ -267,6 +332,13 @@ def _turned(first: Floats, second: Floats, angle: Floats) -> tuple[Floats, Float
     one += sine * second
     other -= sine * first
     return one, other
+
+
+def _of_all(columns: Sequence[Floats], count: int) -> tuple[Floats, ...]:
+    """Columns (3, N) of all states."""
+    return tuple(
+        column if column.shape[1] == count else np.broadcast_to(column, (3, count)) for column in columns
+    )
 
 
 def _along(columns: Sequence[Floats], weights: Floats, start: Floats | None = None) -> Floats:

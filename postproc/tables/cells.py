@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
+from postproc.decimals import plain_decimals
 from postproc.tables.lines import NOTHING, Lines
 from postproc.tables.spelling import as_text
 
@@ -129,25 +130,34 @@ class Column(Sequence[str]):
     def _plain(self, rows: slice, comma: bool) -> tuple[Floats, Bools]:
         """Values of some rows, and which of them are numbers in the letters that numbers have."""
         start, stop = self.cells.bounds(self.column, rows)
-        length = stop - start
-        plain = (length > 0) & (length <= _LONG)
-        length[~plain] = 0
-        place = np.arange(int(length.max(initial=1)) + 1)  # one blank at least behind each
-        inside = place < length[:, None]
         data = np.frombuffer(self.cells.raw, np.uint8)
-        letters = data[np.minimum(start[:, None] + place, len(data) - 1)]
-        known = _COMMA if comma else _POINT
-        letters = np.frombuffer(letters.tobytes().translate(known), np.uint8).reshape(letters.shape)
-        plain &= ~((letters == _NO_NUMBER) & inside).any(axis=1)
-        inside &= plain[:, None]
-        letters = np.where(inside, letters, np.uint8(0x20))
-        letters[~plain, 0] = ord("0")
-        try:
-            # nothing but these letters: float() takes what is a number and nothing else
-            found = np.array(list(map(float, letters.tobytes().split())))
-        except ValueError:
-            return np.empty(len(plain)), np.zeros_like(plain)
-        return found, plain & np.isfinite(found)
+        found, _, plain = plain_decimals(data, start, stop, b"," if comma else b".")
+        rest = np.flatnonzero(~plain)
+        if len(rest):
+            found[rest], plain[rest] = _spelled(data, start[rest], stop[rest], comma)
+        return found, plain
+
+
+def _spelled(data: NDArray[np.uint8], start: Ints, stop: Ints, comma: bool) -> tuple[Floats, Bools]:
+    """The values of cells (K,) with exponents or many digits, and which of them are numbers."""
+    length = stop - start
+    plain = (length > 0) & (length <= _LONG)
+    length[~plain] = 0
+    place = np.arange(int(length.max(initial=1)) + 1)  # one blank at least behind each
+    inside = place < length[:, None]
+    letters = data[np.minimum(start[:, None] + place, len(data) - 1)]
+    known = _COMMA if comma else _POINT
+    letters = np.frombuffer(letters.tobytes().translate(known), np.uint8).reshape(letters.shape)
+    plain &= ~((letters == _NO_NUMBER) & inside).any(axis=1)
+    inside &= plain[:, None]
+    letters = np.where(inside, letters, np.uint8(0x20))
+    letters[~plain, 0] = ord("0")
+    try:
+        # nothing but these letters: float() takes what is a number and nothing else
+        found = np.array(list(map(float, letters.tobytes().split())))
+    except ValueError:
+        return np.empty(len(plain)), np.zeros_like(plain)
+    return found, plain & np.isfinite(found)
 
 
 def find_cells(lines: Lines, begin: int, number: int, separator: str, columns: int, other: Other) -> Cells:

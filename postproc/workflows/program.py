@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.arrays import Bools, Floats, Ints
 from postproc.blocks import give_back
 from postproc.compensation.correct import Result, State, correct
 from postproc.compensation.division import Division, Limits, divide, made
@@ -23,6 +23,7 @@ from postproc.compensation.task import Task
 from postproc.dialects.dialect import Moved, Program
 from postproc.document import Edits
 from postproc.findings import Finding, Refusal
+from postproc.geometry import lengths
 from postproc.inputs import place
 from postproc.publish import Content, publish
 from postproc.report.diff import unified_diff
@@ -101,7 +102,8 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         ready.settings,
         lambda path: completed(path, ready.cell, ready.robot, request.program),
     )
-    result, division = written.result, written.division
+    result, division = written.result, written.division  # what was meant goes, before its place is needed
+    give_back()
     findings = [*ready.findings, *result.findings, *division.findings, *_closing(request, ready, written)]
     paths = _output_paths(program, target)
     outputs = dict(zip(paths, written.contents, strict=True))
@@ -274,19 +276,16 @@ def _report(
 ) -> Report:
     task, corrected = ready.task, written is not None
     scope = result.state != State.AIR
-    size = np.linalg.norm(result.correction, axis=1)
-    force = np.linalg.norm(task.wrench[:, :3], axis=1)
-    order = np.argsort(-np.nan_to_num(np.where(scope, result.before, -1.0), nan=-1.0), kind="stable")
+    size = lengths(result.correction)
     worst = tuple(
         Worst(
             int(task.toolpath.line[row]),
             float(result.before[row] / MM),
             float(size[row] / MM) if corrected else math.nan,
             float(result.after[row] / MM) if corrected else math.nan,
-            float(force[row]),
+            float(np.linalg.norm(task.wrench[row, :3])),
         )
-        for row in order[:WORST_PLACES]
-        if scope[row] and np.isfinite(result.before[row])
+        for row in _largest_rows(result.before, scope, WORST_PLACES)
     )
     return Report(
         program=str(request.program),
@@ -321,6 +320,16 @@ def _report(
         findings=findings,
         exit=exit_code(findings, request.strict),
     )
+
+
+def _largest_rows(values: Floats, mask: Bools, count: int) -> Ints:
+    """The rows of the ``count`` largest of ``values`` (N,), the largest first, of those in ``mask`` that are known."""
+    rows = np.flatnonzero(mask & np.isfinite(values))
+    known = values[rows]
+    if len(rows) > count:
+        high = known >= np.partition(known, -count)[-count]
+        rows, known = rows[high], known[high]
+    return rows[np.argsort(-known, kind="stable")[:count]]
 
 
 def _links(task: Task, division: Division) -> tuple[Link, ...]:

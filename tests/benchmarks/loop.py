@@ -79,6 +79,7 @@ class Loop:
     def rest(self, q: np.ndarray, wrench: np.ndarray, theta: np.ndarray) -> tuple[pin.SE3, np.ndarray]:
         """The tool's pose and the displacement (6,) of the joints, from ``theta`` (6,) on."""
         balanced, _ = self.torque(q[self.joint])
+        last = 0.0
         for _ in range(MAX_STEPS):
             there = q + theta
             jacobian = pin.computeFrameJacobian(
@@ -91,7 +92,9 @@ class Loop:
             stiffness[self.joint, self.joint] -= slope
             step = np.linalg.solve(stiffness, force - self.stiffness @ theta)
             theta = theta + step
-            if np.abs(step).max() <= REST:
+            size = np.abs(step).max()
+            left, last = size * size / (last - size) if size < last else size, size
+            if left <= REST:
                 pin.framesForwardKinematics(self.model, self.data, q + theta)
                 return self.data.oMf[self.tcp].copy(), theta
         raise ArithmeticError("the equilibrium does not settle")

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.dialects.decimals import literals
+from postproc.decimals import literals
 from postproc.dialects.gcode.control import Control
 from postproc.dialects.gcode.words import Blocks, How, Note, Text, Words
 

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.dialects.decimals import fixed
+from postproc.decimals import fixed
 from postproc.dialects.dialect import Moved, Plan, Program, Role, Writing
 from postproc.dialects.gcode.control import Move
 from postproc.dialects.gcode.places import Part

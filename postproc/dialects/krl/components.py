@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.dialects.decimals import MOST_DECIMALS, fixed_one, literals
+from postproc.decimals import MOST_DECIMALS, fixed_one, literals
 from postproc.dialects.dialect import Plan, Program, Writing
 from postproc.dialects.krl.lexing import number
 from postproc.dialects.krl.places import Places

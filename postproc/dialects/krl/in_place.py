@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.dialects.decimals import fixed
+from postproc.decimals import fixed
 from postproc.dialects.krl.components import KEYS, LETTER, Components, Task
 from postproc.document import Edit, Edits, Span
 

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.dialects.decimals import fixed, fixed_one
+from postproc.decimals import fixed, fixed_one
 from postproc.dialects.dialect import Role
 from postproc.dialects.krl.arcs import half_way
 from postproc.dialects.krl.components import LETTER, Components, Task

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import lru_cache
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.blocks import in_blocks
+from postproc.decimals import literals
 from postproc.dialects.krl.bulk import Bulk
 from postproc.dialects.krl.lexing import BOM, statement
 from postproc.dialects.krl.run import Item
 from postproc.dialects.krl.target import COMPONENTS, External, Target, parse
-from postproc.document import Document, Store, offset_type
+from postproc.document import BLOCK, Document, Store, offset_type
 
 FEWEST, MOST = 8, 1 << 14
 """Lines of a run that are read together: with fewer it does not pay, with more it takes memory."""
@@ -43,15 +47,41 @@ def scan(document: Document, fast: bool) -> Iterator[Item]:
     raw = document.raw
     store = Store()
     line, place = 1, len(BOM) if document.raw.startswith(BOM) else 0
-    for found in _RUN.finditer(raw, place) if fast else ():
-        start, stop = found.span()
+    runs = [found.span() for found in _RUN.finditer(raw, place)] if fast else []
+    groups = _groups(runs)
+    read = in_blocks(
+        lambda part: [_bulk(raw, *run) for group in groups[part] for run in group], len(groups), 1
+    )
+    for (start, stop), found in zip(runs, chain.from_iterable(read), strict=True):
         yield from _lines(raw, line, place, start)
         line += raw.count(b"\n", place, start)
-        bulk = _bulk(raw, line, start, stop, store)
+        bulk = _kept(found, line, store)
         yield bulk
         line += len(bulk)
         place = stop
     yield from _lines(raw, line, place, len(raw))
+
+
+def _groups(runs: Sequence[tuple[int, int]]) -> list[Sequence[tuple[int, int]]]:
+    """The runs, in groups of as many bytes as are read at a time."""
+    ends = np.cumsum([stop - start for start, stop in runs])
+    cuts = np.searchsorted(ends, np.arange(BLOCK, ends[-1] if runs else 0, BLOCK)) + 1
+    bounds = [0, *np.unique(cuts).tolist(), len(runs)]
+    return [runs[a:b] for a, b in pairwise(bounds) if a < b]
+
+
+def _kept(bulk: Bulk, line: int, store: Store) -> Bulk:
+    """The same where it takes no more memory than it needs, with the number of its first line."""
+    return replace(
+        bulk,
+        line=line,
+        is_line=store.keep(bulk.is_line),
+        values=store.keep(bulk.values),
+        start=store.keep(bulk.start),
+        stop=store.keep(bulk.stop),
+        motion=store.keep(bulk.motion),
+        slur=store.keep(bulk.slur),
+    )
 
 
 def _lines(raw: bytes, line: int, start: int, stop: int) -> Iterator[Item]:
@@ -64,8 +94,8 @@ def _lines(raw: bytes, line: int, start: int, stop: int) -> Iterator[Item]:
         start, line = end, line + 1
 
 
-def _bulk(raw: bytes, line: int, start: int, stop: int, store: Store) -> Bulk:
-    """The common lines from byte ``start`` to ``stop``, whose number is ``line`` on."""
+def _bulk(raw: bytes, start: int, stop: int) -> Bulk:
+    """The common lines from byte ``start`` to ``stop``, as if they were the first ones."""
     text = np.frombuffer(raw, np.uint8, stop - start, start)
     ends = np.flatnonzero(text == 0x0A)
     begins = np.concatenate([[0], ends[:-1] + 1])
@@ -83,26 +113,22 @@ def _bulk(raw: bytes, line: int, start: int, stop: int, store: Store) -> Bulk:
     offset = offset_type(len(raw))
     motion = np.stack([word, opening, closing + 1, code], axis=1)
     return Bulk(
-        line=line,
-        is_line=store.keep((text[word] | 0x20) == ord("l")),
-        values=store.keep(_numbers(text, starts, stops)),
-        start=store.keep(starts + start, offset),
-        stop=store.keep(stops + start, offset),
-        motion=store.keep(motion + start, offset),
+        line=1,
+        is_line=(text[word] | 0x20) == ord("l"),
+        values=literals(text, starts.ravel(), stops.ravel(), _long)[0].reshape(-1, 6),
+        start=(starts + start).astype(offset),
+        stop=(stops + start).astype(offset),
+        motion=(motion + start).astype(offset),
         status=status,
         turn=turn,
-        slur=store.keep(slur),
+        slur=slur,
         external=external,
     )
 
 
-def _numbers(text: NDArray[Any], starts: NDArray[Any], stops: NDArray[Any]) -> NDArray[np.float64]:
-    """The values of the literals, as ``float`` reads them."""
-    change = np.zeros(len(text) + 1, np.int8)
-    change[starts.ravel()] += 1
-    change[stops.ravel()] -= 1
-    plain = np.where(np.cumsum(change[:-1], dtype=np.int8) > 0, text, 0x20).astype(np.uint8)
-    return np.fromstring(plain.tobytes().decode("ascii"), sep=" ").reshape(starts.shape)
+def _long(text: bytes) -> tuple[float, int]:
+    """A number of more digits than are read in bulk."""
+    return float(text), 0
 
 
 def _approximations(text: NDArray[Any], closing: NDArray[Any]) -> tuple[NDArray[np.int8], NDArray[Any]]:

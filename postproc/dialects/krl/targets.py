@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.arrays import Bools, Floats, Ints
-from postproc.dialects.decimals import fixed_one, literals
+from postproc.decimals import fixed_one, literals
 from postproc.dialects.krl.arcs import half_way, on_arcs
 from postproc.dialects.krl.components import Task, other_literal
 from postproc.dialects.krl.in_place import completion

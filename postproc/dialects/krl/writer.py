@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from postproc.arrays import Bools, Ints
+from postproc.blocks import each_block, in_blocks
 from postproc.dialects.dialect import Moved, Plan, Program, Role, Writing
 from postproc.dialects.krl.chain import Chain
 from postproc.dialects.krl.components import Task, differs
@@ -47,12 +48,16 @@ def _parts(task: Task, touched: Bools, way: Bools, held: dict[int, Finding]) -> 
     held.update(not_moved)
     if held:
         return
-    for rows in _blocks(np.arange(len(touched))):
-        yield Edits.joined(
+
+    def written(block: slice) -> Edits:
+        rows = np.arange(block.start, block.stop)
+        return Edits.joined(
             literal_edits(task, rows[plain[rows] & ~chain.depends[rows]]),
             partial_edits(task, rows[partial[rows]], chain.completed),
             *insertions(task, rows),
         )
+
+    yield from in_blocks(written, len(touched))
     yield single
 
 
@@ -60,10 +65,13 @@ def _touched(task: Task) -> tuple[Bools, Bools]:
     """(N,) rows whose end is another one, and arcs whose way is."""
     path, plan, n = task.path, task.plan, len(task.path)
     touched, way = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
-    for rows in _blocks(np.arange(n)):
+
+    def ends(rows: slice) -> None:
         there = task.own[rows]
         touched[rows] = differs(plan.position[there], path.position[rows]).any(axis=1)
         touched[rows] |= differs(plan.rotation[there], path.rotation[rows]).any(axis=(1, 2))
+
+    each_block(ends, n)
     for rows in _blocks(np.flatnonzero(path.kind == Kind.CIRC)):
         there = task.own[rows]
         for new, old in ((plan.centre, path.centre), (plan.normal, path.normal), (plan.sweep, path.sweep)):

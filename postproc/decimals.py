@@ -16,8 +16,11 @@ LARGEST = 2.0**53
 """Whole numbers below it are exact."""
 
 MOST_DECIMALS = 12
-_LONGEST = 16
-"""Digits of a number below LARGEST."""
+_LONGEST = 15
+"""Letters of a number that is below LARGEST with a digit in the place of its point."""
+
+_ZEROS, _HIGHEST, _ABOVE_NINE = (np.uint64(byte * 0x0101010101010101) for byte in (0x30, 0x80, 0x76))
+"""One byte in all eight places; 0x76 and more than 9 have the highest bit."""
 
 Fours = NDArray[np.uint32]
 """Letters by fours, in the order in which they stand in memory; a zero is no letter."""
@@ -36,32 +39,63 @@ def literals(
 
     Digits with a sign and a point are read here, exactly as ``float`` does; ``other`` reads any other form.
     """
-    length = np.asarray(stop - start, dtype=np.int64)
-    count, width = len(length), int(length.max(initial=0))
-    value, decimals = np.zeros(count), np.zeros(count, dtype=np.int64)
-    plain = length <= _LONGEST
-    begin = np.asarray(start, dtype=np.int64)
-    pointed = np.zeros(count, dtype=bool)
-    first = np.zeros(count, dtype=np.uint8)
-    for i in range(min(width, _LONGEST)):
-        inside = i < length
-        letter = raw[np.minimum(begin + i, len(raw) - 1)]
-        letter = np.where(inside, letter, 0)
-        if i == 0:
-            first = letter
-        digit = letter - np.uint8(48)  # wraps: what is no digit gives more than 9
-        is_digit = digit <= 9
-        value = np.where(is_digit, value * 10.0 + digit, value)
-        decimals += is_digit & pointed
-        point = letter == 46
-        sign = ((letter == 45) | (letter == 43)) if i == 0 else np.zeros(1, dtype=bool)
-        plain &= is_digit | (point & ~pointed) | sign | ~inside
-        pointed |= point
-    value = np.where(first == 45, -value, value) / 10.0**decimals
-    plain &= (length > 1) | (first - np.uint8(48) <= 9)
-    for k in np.flatnonzero(~plain).tolist():
-        value[k], decimals[k] = other(raw[int(start[k]) : int(stop[k])].tobytes())
+    value, decimals = np.empty(len(start)), np.empty(len(start), np.int64)
+    for low in range(0, len(start), BLOCK):
+        part = slice(low, low + BLOCK)
+        value[part], decimals[part], plain = plain_decimals(raw, start[part], stop[part])
+        for k in (low + np.flatnonzero(~plain)).tolist():
+            value[k], decimals[k] = other(raw[int(start[k]) : int(stop[k])].tobytes())
     return value, decimals
+
+
+def plain_decimals(
+    raw: NDArray[np.uint8], start: NDArray[Any], stop: NDArray[Any], point: bytes = b"."
+) -> tuple[Floats, Ints, Bools]:
+    """Values and decimals (K,) of literals near each other, and which of them are digits with a sign and a ``point``.
+
+    Their letters are held in words of eight, the last one in the highest byte, and read all at once.
+    """
+    if not len(start):
+        return np.empty(0), np.empty(0, np.int64), np.empty(0, bool)
+    low, high = int(start.min()), int(stop.max())
+    letters = np.full(-(-(high - low) // 8) * 8 + 3 * 8, ord("0"), np.uint8)
+    letters[16 : 16 + high - low] = raw[low:high]
+    words = letters.view("<u8")
+    first = raw.take(start, mode="clip")
+    minus = first == ord("-")
+    length = np.asarray(stop - start, np.int64) - (minus | (first == ord("+")))
+    plain = (length > 0) & (length <= _LONGEST)
+    value, decimals = np.zeros(len(start)), np.zeros(len(start), np.int64)
+    dotted, size = np.zeros(len(start), np.uint8), 1.0
+    eight = np.uint64(point[0] * 0x0101010101010101)
+    for behind in range(0, int(length[plain].max(initial=0)), 8):  # letters behind those of the word
+        at = np.asarray(stop - (low + behind) + 8, np.int64)
+        shift = (at.astype(np.uint64) & 7) << 3
+        word = (words.take(at >> 3) >> shift) | (words.take((at >> 3) + 1) << (64 - shift))
+        missing = np.clip(8 - (length - behind), 0, 8).astype(np.uint64) << 3
+        word = ((word ^ _ZEROS) >> missing << missing) ^ _ZEROS
+        points = _bytes_that_are_zero(word ^ eight)
+        word ^= (points >> 7) * np.uint64(point[0] ^ ord("0"))
+        word ^= _ZEROS
+        plain &= ((word + _ABOVE_NINE) | word) & _HIGHEST == 0
+        dotted += np.bitwise_count(points)
+        decimals += np.where(points > 0, behind + 7 - (np.bitwise_count(points - 1) >> 3), 0)
+        word = (word * 10 + (word >> 8)) & 0x00FF00FF00FF00FF
+        word = (word * 100 + (word >> 16)) & 0x0000FFFF0000FFFF
+        word = (word * 10000 + (word >> 32)) & 0xFFFFFFFF
+        value += word * size
+        size *= 1e8
+    plain &= (dotted <= 1) & (length > dotted)
+    # the point stands there as a digit 0
+    power = 10.0**decimals
+    value -= np.where(dotted > 0, 9.0 * power * np.floor(value / (10.0 * power)), 0.0)
+    value /= power
+    return np.where(minus, -value, value), decimals, plain
+
+
+def _bytes_that_are_zero(words: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """The highest bit of every byte that is zero, and no other."""
+    return ~(((words & ~_HIGHEST) + ~_HIGHEST) | words) & _HIGHEST
 
 
 def fixed(values: Floats, decimals: Ints, apart: Bools | None = None) -> tuple[bytes, Ints]:
