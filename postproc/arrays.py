@@ -55,6 +55,13 @@ def numbers(rows: Any, count: int) -> Ints:
     return np.flatnonzero(chosen) if chosen.dtype == np.bool_ else chosen
 
 
+def sums(lengths: NDArray[Any], kind: type[np.signedinteger] = np.int64) -> Ints:
+    """(K + 1,) where parts of these lengths (K,) begin, and the last one ends."""
+    ends = np.zeros(len(lengths) + 1, dtype=kind)
+    np.cumsum(lengths, out=ends[1:])
+    return ends
+
+
 class FewRows:
     """(N, k) numbers of which only few rows are known, kept alone; NaN in all others.  Read-only.
 

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.document import sums
+from postproc.arrays import Bools, Floats, Ints, sums
 
 LARGEST = 2.0**53
 """Whole numbers below it are exact."""

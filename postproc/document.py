@@ -20,7 +20,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.arrays import Ints
+from postproc.arrays import Ints, sums
 
 Offsets = NDArray[np.signedinteger]
 """Byte offsets; 32 bits where they fit."""
@@ -246,13 +246,6 @@ def _as_arrays(edits: Iterable[Edit]) -> Edits:
 def offset_type(size: int) -> type[np.signedinteger]:
     """The type of offsets in so many bytes."""
     return np.int32 if size < 2**31 else np.int64
-
-
-def sums(lengths: NDArray[Any], kind: type[np.signedinteger] = np.int64) -> Offsets:
-    """(K + 1,) where parts of these lengths (K,) begin, and the last one ends."""
-    ends = np.zeros(len(lengths) + 1, dtype=kind)
-    np.cumsum(lengths, out=ends[1:])
-    return ends
 
 
 def _narrow(offsets: NDArray[Any]) -> Offsets:

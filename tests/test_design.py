@@ -41,6 +41,7 @@ ROOMS = {
     "publish": 1,
     "files": 1,
     "inputs": 1,
+    "decimals": 1,
     "blocks": 0,
     "findings": 0,
     "units": 0,
@@ -59,6 +60,7 @@ ONE_FLOOR = {
     ("measurements", "tables"),
     ("measurements", "geometry"),
     ("tables", "files"),
+    ("tables", "decimals"),
     ("yamlfile", "files"),
     ("files", "inputs"),
 }

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints
+from postproc.arrays import Bools, Ints, sums
 from postproc.blocks import in_blocks
-from postproc.document import Document, Edit, Edits, gathered, sums
+from postproc.document import Document, Edit, Edits, gathered
 
 CONTEXT = 3
 """Lines shown around a change, as diff -u does."""

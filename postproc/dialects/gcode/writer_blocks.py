@@ -9,14 +9,14 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints
+from postproc.arrays import Bools, Ints, sums
 from postproc.dialects.dialect import Program, Role
 from postproc.dialects.gcode.control import Move
 from postproc.dialects.gcode.lexing import lex
 from postproc.dialects.gcode.places import Part
 from postproc.dialects.gcode.words import How, key
 from postproc.dialects.gcode.writer_text import RADIUS, Stated
-from postproc.document import Edit, Edits, Span, sums
+from postproc.document import Edit, Edits, Span
 
 _HEAD = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*(?:/[ \t]*\d?[ \t]*)?)")
 HEAD = 1 << 16

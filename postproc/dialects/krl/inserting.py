@@ -7,14 +7,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.arrays import Bools, Floats, Ints, sums
 from postproc.decimals import fixed, fixed_one
 from postproc.dialects.dialect import Role
 from postproc.dialects.krl.arcs import half_way
 from postproc.dialects.krl.components import LETTER, Components, Task
 from postproc.dialects.krl.lexing import BOM
 from postproc.dialects.krl.own_points import aggregate, carried
-from postproc.document import Edit, Edits, Span, gathered, sums
+from postproc.document import Edit, Edits, Span, gathered
 
 BLOCK = 1 << 15
 """Motions that are written at a time."""
