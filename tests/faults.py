@@ -78,7 +78,8 @@ class Child:
                     happens(asked)
 
             sys.addaudithook(heard)
-            run(words)
+            sys.argv[1:] = words
+            run()
         except SystemExit as end:
             code = end.code or 0
         except BaseException:

@@ -130,6 +130,20 @@ def test_signals_are_as_before_behind_a_run():
     assert [signal.getsignal(number) for number in SIGNALS] == before
 
 
+def test_the_signal_that_ends_a_process_is_the_last_one_it_hears():
+    before = {number: signal.getsignal(number) for number in SIGNALS}
+    try:
+        with pytest.raises(Stopped), ended_in_words(and_exits=True):
+            signal.raise_signal(signal.SIGINT)
+        for number in SIGNALS:
+            signal.raise_signal(number)
+        with ended_in_words(and_exits=True):
+            pass
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 @pytest.mark.parametrize(
     ("error", "words"), [(ZeroDivisionError("x"), "a defect of compensate"), (MemoryError(), "memory")]
 )

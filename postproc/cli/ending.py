@@ -20,9 +20,10 @@ class Stopped(SystemExit):
 
 
 @contextlib.contextmanager
-def ended_in_words() -> Iterator[None]:
+def ended_in_words(and_exits: bool = False) -> Iterator[None]:
     """Signals become ``Stopped``, so that a run takes its half-written files away; further ones do not disturb it on
-    its way out.  A defect is told as one, with exit code 1."""
+    its way out.  A defect is told as one, with exit code 1.  ``and_exits``: the process ends with the run, so that a
+    signal that stopped it is the last one that it hears."""
     stopped = False
 
     def stop(number: int, _frame: FrameType | None) -> None:
@@ -47,7 +48,7 @@ def ended_in_words() -> Iterator[None]:
         _say("this is a defect of compensate: please report the lines above, with the input that leads there")
         raise SystemExit(1) from None
     finally:
-        for number, handler in before.items():
+        for number, handler in before.items() if not (stopped and and_exits) else ():
             signal.signal(number, handler)
 
 

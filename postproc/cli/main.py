@@ -78,7 +78,7 @@ def run(argv: Sequence[str] | None = None) -> None:
         hint = nearest(words[0], COMMANDS)
         click.echo(f"Error: no command and no file {words[0]!r}{hint}", err=True)
         raise SystemExit(2)
-    with ended_in_words():
+    with ended_in_words(and_exits=argv is None):
         main.main(args=normalized(words), prog_name="compensate")
 
 
