@@ -274,3 +274,11 @@ def test_each_condition_of_an_even_way_counts(change):
     other = _Search(change(task), result, FREE)
     other.start_at[:] = -1
     assert not other._even()[200:].any()
+
+
+def test_a_way_that_begins_with_a_step_is_not_even():
+    task = in_steps(401, 0.1)
+    search = _Search(task, correct(task), FREE)
+    search.start_at[:] = -1
+    search.start_at[[7, 9]] = 0, 3
+    assert np.flatnonzero(~search._even()).tolist() == [0, 7, 9]

@@ -368,7 +368,7 @@ def test_effects_add_and_touch_nothing_else(name, arm):
     values = sampled(effect, rng)
     swept = state.swept
     inputs = [state.gravity.copy(), state.motors, state.rest, state.coordinates, state.wrench]
-    inputs += [swept.axes, swept.origins, swept.position, *swept.tcp, swept.flange[1], *swept.flange[0]]
+    inputs += [*swept.axes, *swept.origins, swept.position, *swept.tcp, swept.flange[1], *swept.flange[0]]
     inputs += [column for link in swept.links for column in link]
     inputs += [v for v in vars(state.conditions).values() if v is not None]
     state = replace(state, gravity=inputs[0])

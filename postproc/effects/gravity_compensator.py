@@ -31,12 +31,32 @@ _SOURCE = "Klimchik et al., Fig. 1 and eqs (1)-(4)"
 
 
 class SpringState(NamedTuple):
-    """Length s [m], energy U [J], torque M_c = -dU/dq [N m] and dM_c/dq [N m/rad] of the spring, each (N,)."""
+    """The spring at joint angles (N,), with its stiffness and rest length.  ``length`` s [m]; ``ratio`` s0 / s;
+    ``product`` a L [m2]; ``sine``, ``cosine`` of the angle between a and L."""
 
+    stiffness: float
+    rest: float
+    product: float
     length: Floats
-    energy: Floats
-    torque: Floats
-    slope: Floats
+    ratio: Floats
+    sine: Floats
+    cosine: Floats
+
+    @property
+    def energy(self) -> Floats:
+        """(N,) U [J]."""
+        return np.asarray(0.5 * self.stiffness * (self.length - self.rest) ** 2)
+
+    @property
+    def torque(self) -> Floats:
+        """(N,) M_c = -dU/dq [N m]."""
+        return np.asarray(self.stiffness * self.product * (1 - self.ratio) * self.sine)
+
+    @property
+    def slope(self) -> Floats:
+        """(N,) dM_c/dq [N m/rad]."""
+        share = self.product / (self.length * self.length) * self.sine * self.sine
+        return np.asarray(self.stiffness * self.product * (self.cosine - self.ratio * (share + self.cosine)))
 
 
 class GravityCompensator(EnergyLoad):
@@ -114,9 +134,7 @@ class GravityCompensator(EnergyLoad):
         product = a * length
         sine, cosine = sine_and_cosine(phi)
         s = np.sqrt(np.maximum(a * a + length * length + 2 * product * cosine + values["h"] ** 2, 1e-18))
-        ratio = s0 / s
-        eta = cosine - ratio * (product / (s * s) * sine * sine + cosine)
-        return SpringState(s, 0.5 * k * (s - s0) ** 2, k * (1 - ratio) * product * sine, k * product * eta)
+        return SpringState(k, s0, product, s, s0 / s, sine, cosine)
 
     def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
         row = state.chain.motor_rows[self.joint]

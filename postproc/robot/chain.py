@@ -38,14 +38,14 @@ _Z_ALONG = [np.roll(np.eye(3), shift, axis=1) for shift in (2, 1, 0)]
 class Sweep:
     """The chain at N states, component first.
 
-    axes, origins (m, 3, N): of the coordinates, in the robot base; turns (m,): a turn, or else a shift; apart (m,): it
-    has another origin than the one before it; spindles: how many of them, the last ones, are the spindle's; position
-    (3, N) [m] of the TCP; mount (3, N) [m]: the same without what the spindle's coordinates shift it, where the tool's
-    body is; flange: columns and position of the flange; links: the columns of the frame behind each motor.
+    axes, origins: (3, N) of each of the m coordinates, in the robot base; turns (m,): a turn, or else a shift; apart
+    (m,): it has another origin than the one before it; spindles: how many of them, the last ones, are the spindle's;
+    position (3, N) [m] of the TCP; mount (3, N) [m]: the same without what the spindle's coordinates shift it, where
+    the tool's body is; flange: columns and position of the flange; links: the columns of the frame behind each motor.
     """
 
-    axes: Floats
-    origins: Floats
+    axes: tuple[Floats, ...]
+    origins: tuple[Floats, ...]
     turns: Bools
     apart: Bools
     spindles: int
@@ -171,7 +171,8 @@ class Chain:
         axes (tool z without it).
         """
         count = coordinates.shape[1]
-        axes, origins = np.empty((self.size, 3, count)), np.empty((self.size, 3, count))
+        axes: list[Floats] = []
+        origins: list[Floats] = []
         # what all states share has one column until a coordinate tells them apart
         columns: list[Floats] = list(np.eye(3)[:, :, None])
         position = np.zeros((3, 1))
@@ -180,7 +181,8 @@ class Chain:
         for i, (rotation, translation, turns) in enumerate(self._arm):
             position = _along(columns, translation, position)
             columns = [_along(columns, column) for column in rotation.T]
-            axes[i], origins[i] = columns[2], position
+            axes.append(columns[2])
+            origins.append(position)
             if turns:
                 columns[:2] = _turned(columns[0], columns[1], coordinates[i])
             else:
@@ -197,7 +199,8 @@ class Chain:
         i = len(self._arm)
         for name in self._tool:
             k = "xyz".index(name[-1])
-            axes[i], origins[i] = columns[k], position
+            axes.append(columns[k])
+            origins.append(position)
             if self.turns[i]:
                 a, b = (k + 1) % 3, (k + 2) % 3
                 columns[a], columns[b] = _turned(columns[a], columns[b], coordinates[i])
@@ -207,12 +210,12 @@ class Chain:
         (mount,) = _of_all([position], count)
         if self._spindle:
             for name, direction in zip(self._spindle, self._spindle_axes(columns, spindle), strict=True):
-                axes[i], origins[i] = direction, position
+                axes.append(direction)
+                origins.append(position)
                 position = position + coordinates[self.index[name]] * direction
-                i += 1
         return Sweep(
-            axes,
-            origins,
+            _of_all(axes, count),
+            _of_all(origins, count),
             self.turns,
             self.apart,
             len(self._spindle),
@@ -265,9 +268,9 @@ class Chain:
 
 def jacobian(swept: Sweep) -> Floats:
     """Geometric Jacobians (N, 6, m) of the TCP: column [z x (p - p_i); z] of a turn, [z; 0] of a shift."""
-    turns = swept.turns[:, None, None]
-    lever = np.cross(swept.axes, swept.position[None] - swept.origins, axis=1)
-    linear, angular = np.where(turns, lever, swept.axes), np.where(turns, swept.axes, 0.0)
+    turns, axes = swept.turns[:, None, None], np.array(swept.axes)
+    lever = np.cross(axes, swept.position[None] - np.array(swept.origins), axis=1)
+    linear, angular = np.where(turns, lever, axes), np.where(turns, axes, 0.0)
     return np.moveaxis(np.concatenate([linear, angular], axis=1), (0, 1, 2), (2, 1, 0))
 
 
@@ -320,9 +323,12 @@ def weight_about(axis: Floats, moment: Floats, gravity: Floats) -> tuple[Floats,
 def sine_and_cosine(angle: Floats) -> tuple[Floats, Floats]:
     """sin and cos of ``angle``, to 1e-15, by t = tan(angle / 2): numpy's tan is several times as fast as the two."""
     t = np.tan(0.5 * angle)
-    square = t * t
-    share = 1.0 / (1.0 + square)
-    return 2.0 * t * share, (1.0 - square) * share
+    share = t * t
+    share += 1.0
+    np.divide(2.0, share, out=share)
+    t *= share
+    share -= 1.0
+    return t, share
 
 
 def _turned(first: Floats, second: Floats, angle: Floats) -> tuple[Floats, Floats]:
