@@ -807,3 +807,13 @@ def test_the_collector_runs_behind_a_reading_as_before(running: bool) -> None:
         assert gc.isenabled() == running
     finally:
         (gc.enable if before else gc.disable)()
+
+
+def test_a_program_may_begin_with_an_empty_line():
+    text = b"DEF part()\n$BASE={X 0,Y 0,Z 0,A 0,B 0,C 0}\n$TOOL=$BASE\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0}\nEND\n"
+    plain, later = (
+        KrlDialect().read((Document(Path("part.src"), lead + text),)).toolpath for lead in (b"", b"\n")
+    )
+    assert plain.line.tolist() == [4]
+    assert later.line.tolist() == [5]
+    np.testing.assert_array_equal(later.position, plain.position)
