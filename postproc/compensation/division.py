@@ -75,7 +75,7 @@ class Division:
     def __len__(self) -> int:
         return len(self.source)
 
-    @property
+    @cached_property
     def own(self) -> Bools:
         return np.asarray(self.role == Role.OWN)
 
@@ -85,7 +85,7 @@ class Division:
         own = np.flatnonzero(self.own)
         return PoseRows(len(own), lambda rows: self.command[own[rows]])
 
-    @property
+    @cached_property
     def links(self) -> Bools:
         return np.asarray(self.role == Role.LINK)
 

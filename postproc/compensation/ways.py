@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -59,7 +60,7 @@ class Ways:
     def sweep(self) -> Floats:
         return self.path.sweep
 
-    @property
+    @cached_property
     def arc(self) -> Bools:
         return np.asarray(np.isfinite(self.path.sweep))
 

@@ -87,6 +87,8 @@ class Task:
     def _given(self) -> NDArray[Any] | None:
         """(N, 6) the row whose text gives a component: the row itself, or that which it takes it from; None: always
         the row itself."""
+        if not self.places.inherits.any():
+            return None
         # A relative motion, and an arc with CA, do not end where the X, Y, Z say that they take over.
         ends_elsewhere = self.is_relative | self.has_angle
         bits = self.places.inherits & np.where(ends_elsewhere, 0b111000, 0b111111).astype(np.uint8)
