@@ -11,6 +11,7 @@ from postproc import model as model_module
 from postproc.effects import EFFECTS
 from postproc.geometry import Poses, vector_from_rotation
 from postproc.model import NOTHING, StiffnessModel
+from postproc.robot.chain import Chain
 
 
 def full(**change):
@@ -352,3 +353,17 @@ def test_pushed_beyond_all_measure_nothing_is_called_a_rest():
         stiffness = np.diag(1 / compliance) - model._curvature(state, tool[good], np.arange(model.chain.size))
         assert (np.linalg.eigvalsh(0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))) > 0).all()
     assert not rest.converged.all()
+
+
+@pytest.mark.parametrize("extras", [(), ("base.x", "A3.ry", "tool.rx", "tool.z", "spindle.x", "spindle.z")])
+def test_a_nudge_is_a_sweep_to_first_order(extras):
+    robot = kr270()
+    chain = Chain(robot.joints, robot.flange, extras)
+    rng = np.random.default_rng(8)
+    at = rng.uniform(-1.0, 1.0, (chain.size, 20))
+    step = rng.uniform(-1.0, 1.0, (chain.size, 20)) * 1e-5
+    there, exact = chain.sweep(at, TOOL_AHEAD).nudged(step), chain.sweep(at + step, TOOL_AHEAD)
+    for near, far in ((there.position, exact.position), (there.mount, exact.mount)):
+        assert np.abs(near - far).max() < 1e-8
+        assert np.abs(far - chain.sweep(at, TOOL_AHEAD).position).max() > 1e-6
+    assert np.abs(np.array(there.tcp) - np.array(exact.tcp)).max() < 1e-8

@@ -12,9 +12,12 @@ from scipy.spatial.transform import Rotation
 from postproc.geometry import (
     Poses,
     abc_from_rotation,
+    lengths,
+    product,
     rotation_from_abc,
     rotation_from_vector,
     skew,
+    turn_between,
     vector_from_rotation,
     wrapped,
 )
@@ -239,10 +242,44 @@ def test_poses_broadcast_and_index():
     many = Poses.from_abc(rng.normal(size=(6, 3)), rng.normal(size=(6, 3)))
     one = Poses.from_abc([1.0, 2.0, 3.0], [0.1, 0.2, 0.3])
     assert len(many) == 6
-    for product, left, right in ((many @ one, many, None), (one @ many, None, many)):
-        assert product.position.shape == (6, 3)
+    for joined, left, right in ((many @ one, many, None), (one @ many, None, many)):
+        assert joined.position.shape == (6, 3)
         for row in range(6):
             single = (left[row] if left else one) @ (right[row] if right else one)
-            assert same(product[row].position, single.position, 1e-15)
-            assert same(product[row].rotation, single.rotation, 1e-15)
+            assert same(joined[row].position, single.position, 1e-15)
+            assert same(joined[row].rotation, single.rotation, 1e-15)
     assert len(many[2:4]) == 2
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-5, 0.0099, 0.0101, 0.3, 1.5, 3.1])
+def test_small_and_large_turns_are_those_of_scipy(angle):
+    rng = np.random.default_rng(3)
+    axis = rng.normal(size=(200, 3))
+    vector = angle * axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    turn = rotation_from_vector(vector)
+    np.testing.assert_allclose(turn, Rotation.from_rotvec(vector).as_matrix(), atol=1e-15, rtol=0)
+    begin = Rotation.random(200, random_state=4).as_matrix()
+    np.testing.assert_allclose(product(turn, begin), turn @ begin, atol=1e-15, rtol=0)
+    np.testing.assert_allclose(product(turn[0], begin), turn[0] @ begin, atol=1e-15, rtol=0)
+    np.testing.assert_allclose(turn_between(begin, turn @ begin), vector, atol=3e-14, rtol=0)
+
+
+def test_one_large_turn_among_small_ones_changes_none_of_them():
+    vector = np.array([[1e-3, -2e-3, 5e-4], [1.0, 2.0, 0.5], [0.0, 0.0, 0.0]])
+    turn = rotation_from_vector(vector)
+    np.testing.assert_allclose(turn[:1], rotation_from_vector(vector[:1]), atol=1e-16)
+    begin = np.broadcast_to(np.eye(3), (3, 3, 3))
+    np.testing.assert_allclose(turn_between(begin, turn), vector, atol=1e-15)
+
+
+def test_lengths_are_those_of_vectors():
+    vectors = np.random.default_rng(5).normal(size=(50, 3))
+    np.testing.assert_allclose(lengths(vectors), np.linalg.norm(vectors, axis=1), rtol=1e-15)
+    assert np.isnan(lengths(np.array([[np.nan, 0.0, 0.0]]))).all()
+
+
+def test_poses_of_one_for_all_are_taken_as_such():
+    poses = Poses(np.broadcast_to(np.eye(3), (9, 3, 3)), np.broadcast_to([1.0, 2.0, 3.0], (9, 3)))
+    some = poses[np.array([2, 7])]
+    assert some.position.tolist() == [[1.0, 2.0, 3.0]] * 2
+    assert some.rotation.shape == (2, 3, 3)
