@@ -1,4 +1,4 @@
-"""Offline post-processor that makes an industrial robot cut as if it did not bend.
+"""Offline post-processor that makes an industrial robot cut as if it were rigid.
 
 ``import postproc`` is light: what computes is loaded when it is first named.
 

@@ -11,10 +11,11 @@ import os
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from postproc.findings import Finding, Refusal
+from postproc.base.findings import Finding, Refusal
 from postproc.report.checked import Checked
 from postproc.report.report import Report
 from postproc.workflows import listing, program
+from postproc.workflows.option_names import SHARED_POINTS, accept_former_names
 from postproc.workflows.preparation import Request
 
 PathLike: TypeAlias = str | os.PathLike[str]
@@ -22,6 +23,7 @@ PathLike: TypeAlias = str | os.PathLike[str]
 __all__ = ["Checked", "Finding", "Refusal", "Report", "check", "compensate", "predict"]
 
 
+@accept_former_names
 def compensate(
     path: PathLike,
     *,
@@ -32,38 +34,38 @@ def compensate(
     output: PathLike | None = None,
     report: PathLike | None = None,
     config_dat: PathLike | None = None,
-    force_offset: bool = False,
-    keep_points: bool = False,
-    own_points: Literal["inline", "dat", "refuse"] = "inline",
+    tare: bool = False,
+    no_insert: bool = False,
+    shared_points: Literal["copy-inline", "copy-dat", "keep"] = "copy-inline",
     strict: bool = False,
     dry_run: bool = False,
-    again: bool = False,
+    allow_compensated: bool = False,
 ) -> Report:
     """Compensate a program for the deflection of the robot, as ``compensate PROGRAM`` does.
 
     force: True for the forces that belong to the program, or ``"0,360,560@base"`` (N, N m), or a CSV; cell: instead of
     the nearest ``cell.yaml``; robot: name or file, instead of the cell's; gain: share of the correction, 0 .. 1;
     output: file or folder of the result [``compensated/<same name>``]; report: folder of the reports [beside it];
-    config_dat: the controller's ``$config.dat``; force_offset: take the mean of a force CSV in air off its readings;
-    keep_points: insert no motion; own_points: what a named point that serves several motions becomes; strict: warnings
-    are errors; dry_run: write nothing; again: although it is compensated already.
+    config_dat: the controller's ``$config.dat``; tare: subtract the mean of a force CSV in air from its readings;
+    no_insert: insert no motions; shared_points: what happens to a named point that several motions use; strict: treat
+    warnings as errors; dry_run: write nothing; allow_compensated: accept a program that is compensated already.
 
     >>> import postproc
     >>> report = postproc.compensate("samples/kr270_taught/taught.src", force=True, output="out/taught.src")
-    >>> report.exit, report.left
-    (0, 0)
+    >>> report.exit, report.uncorrected  # 3: its corners are approximated by more than the tolerance
+    (3, 0)
     >>> report.after.max < 0.02e-3 < report.before.max
     True
     >>> any(path.endswith("taught.src") for path in report.outputs)
     True
 
-    What can not be done says why:
+    What cannot be done states why:
 
     >>> try:
     ...     postproc.compensate("samples/kr270_taught/taught.src", force="0,360")
     ... except postproc.Refusal as refusal:
     ...     print(refusal.findings[0].code, refusal.findings[0].message)
-    FRC002 --force 0,360: 2 numbers where 3 or 6 are needed
+    FRC002 --force 0,360: 2 numbers are given where 3 or 6 are needed
     """
     return program.compensate(
         Request(
@@ -75,16 +77,17 @@ def compensate(
             output=_path(output),
             report=_path(report),
             config_dat=_path(config_dat),
-            force_offset=force_offset,
-            keep_points=keep_points,
-            own_points=own_points,
+            tare=tare,
+            no_insert=no_insert,
+            shared_points=_shared_points(shared_points),
             strict=strict,
             dry_run=dry_run,
-            again=again,
+            allow_compensated=allow_compensated,
         )
     )
 
 
+@accept_former_names
 def predict(
     path: PathLike,
     *,
@@ -93,7 +96,7 @@ def predict(
     robot: str | None = None,
     report: PathLike | None = None,
     config_dat: PathLike | None = None,
-    force_offset: bool = False,
+    tare: bool = False,
     strict: bool = False,
 ) -> Report:
     """The deflection at every pose of a program, as ``compensate predict`` does; files only in the folder ``report``.
@@ -111,7 +114,7 @@ def predict(
             robot=robot,
             report=_path(report),
             config_dat=_path(config_dat),
-            force_offset=force_offset,
+            tare=tare,
             strict=strict,
         )
     )
@@ -132,7 +135,7 @@ def _force(force: bool | str) -> str | None:
     """As ``Request`` has it."""
     if isinstance(force, str):
         if not force.strip():
-            raise ValueError("force is empty; True takes the forces that belong to the program")
+            raise ValueError("force is empty; use True for the forces that belong to the program")
         return force
     return "" if force else None
 
@@ -143,5 +146,11 @@ def _path(path: PathLike | None) -> Path | None:
 
 def _share(gain: float) -> float:
     if not 0.0 <= gain <= 1.0:
-        raise ValueError(f"gain is a share of the correction, 0 .. 1, not {gain!r}")
+        raise ValueError(f"gain must be a share of the correction, 0 .. 1, and is {gain!r}")
     return gain
+
+
+def _shared_points(choice: str) -> str:
+    if choice not in SHARED_POINTS:
+        raise ValueError(f"shared_points is one of {', '.join(SHARED_POINTS)}, not {choice!r}")
+    return choice

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import signal
@@ -9,15 +10,27 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from tiers import choose_profile, mark_samples
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is there
 
+import postproc.codes  # noqa: F401  findings of all rooms can be made
 from postproc.cli.main import run
 
 # In the background of a shell, or under nohup, these are ignored, by all that is started here too.
 for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
     if signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, handler)
+
+
+def pytest_configure(config):
+    choose_profile(config)
+
+
+@pytest.hookimpl(tryfirst=True)  # before the marks are asked for
+def pytest_collection_modifyitems(items):
+    mark_samples(items)
+
 
 CELL = """\
 robot: kuka_kr270
@@ -54,6 +67,12 @@ LINES = [
     "END",
 ]
 
+JUMPED_LINES = [
+    line.replace("LIN {Z 0.000}", "PTP {X 0.000,Y 0.000,Z 0.000,A 0.000,B 0.000,C 180.000}") for line in LINES
+]
+"""The same; a jump before its first cut, which a transition move has to enter."""
+JUMPED_LINES[16] = LINES[16]
+
 
 @dataclass
 class Done:
@@ -84,14 +103,21 @@ def compensate(capsys):
 
 
 def without_inserted(lines: list, report: dict) -> list:
-    """The lines of a KRL output as they would be without its marker and the links inserted into it."""
-    assert report["inserted"] == len(report["links"])
+    """The lines of a KRL output as they would be without its marker and the motions inserted into it."""
+    (table,) = (path for path in report["outputs"] if path.endswith(".corrections.csv"))
+    with open(table, newline="") as stream:
+        rows = [
+            (int(row["line"]), int(row["transition_moves"]) + int(row["intermediate_points"]))
+            for row in csv.DictReader(stream)
+        ]
+    assert report["inserted"] == sum(count for _, count in rows)
     mark = ";COMPENSATED by compensate "
     kept = [line for line in lines if (mark.encode() if isinstance(line, bytes) else mark) not in line]
     assert len(kept) == len(lines) - 1
-    for link in report["links"]:  # before that line of the input; those before are gone already
-        gone = kept.pop(link["line"] - 1)
-        assert b"LIN {" in gone if isinstance(gone, bytes) else "LIN {" in gone, gone
+    for line, count in rows:  # before that line of the input; those before are gone already
+        for _ in range(count):
+            gone = kept.pop(line - 1)
+            assert b"LIN {" in gone if isinstance(gone, bytes) else "LIN {" in gone, gone
     return kept
 
 

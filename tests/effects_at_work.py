@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.effects import EFFECTS, ComplianceLaw, Conditions
-from postproc.geometry import Poses, rotation_from_vector
-from postproc.model import StiffnessModel, Term
+from postproc.model import EffectInstance, StiffnessModel
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
@@ -46,7 +46,9 @@ def conditions(count, rng, payload=False, joints=6):
 
 def with_terms(model, *pairs):
     """The model with more effects: (effect, values)."""
-    return replace(model, terms=(*model.terms, *(Term(effect, values, {}) for effect, values in pairs)))
+    return replace(
+        model, terms=(*model.terms, *(EffectInstance(effect, values, {}) for effect, values in pairs))
+    )
 
 
 def elastic(robot, rng):

@@ -7,21 +7,21 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.dialects.dialect import PLAIN, Plan, Program, Role, Settings, Writing
-from postproc.dialects.gcode import GcodeDialect
-from postproc.dialects.gcode.control import Feed
-from postproc.dialects.gcode.writer_text import stated
-from postproc.document import Document, apply, undone
-from postproc.geometry import arc_in_plane, on_arc, rotation_from_vector, vector_from_rotation
+from postproc.base.arrays import Floats
+from postproc.base.document import Document, apply, undone
+from postproc.base.geometry import arc_in_plane, on_arc, rotation_from_vector, vector_from_rotation
+from postproc.base.units import DEG, MM
+from postproc.languages.dialect import PLAIN, Plan, Program, ReadingSettings, Role, WritingSettings
+from postproc.languages.gcode import GcodeDialect
+from postproc.languages.gcode.control import Feed
+from postproc.languages.gcode.writer_text import stated
 from postproc.toolpath import Kind, Toolpath
-from postproc.units import DEG, MM
 
-WRITING = Writing(mm=3, deg=3)
-DOWN = Settings(orientation=np.array([0.3, 0.0, np.pi]))
+WRITING = WritingSettings(mm=3, deg=3)
+DOWN = ReadingSettings(orientation=np.array([0.3, 0.0, np.pi]))
 
 
-def read(dialect: GcodeDialect, raw: bytes | str, settings: Settings = DOWN) -> Program:
+def read(dialect: GcodeDialect, raw: bytes | str, settings: ReadingSettings = DOWN) -> Program:
     text = raw if isinstance(raw, bytes) else raw.encode("latin-1")
     return dialect.read((Document(Path("part.nc"), text),), settings)
 
@@ -37,7 +37,7 @@ def begins(path: Toolpath) -> Floats:
 def free(path: Toolpath) -> np.ndarray:
     """(N,) rows that may be moved."""
     rows = path.known.copy()
-    rows[[*path.refused, *path.pinned]] = False
+    rows[[*path.refused, *path.locked]] = False
     return rows
 
 
@@ -57,9 +57,13 @@ def random_plan(
     movable = free(path)
     moves = movable & (random.random(n) < share)
     end = path.position + np.where(moves[:, None], random.normal(0, size, (n, 3)), 0.0)
-    turns = rotation_from_vector(random.normal(0, turn, (n, 3)) * (moves & path.oriented)[:, None])
+    turns = rotation_from_vector(
+        random.normal(0, turn, (n, 3)) * (moves & path.orientation_programmed)[:, None]
+    )
     rotation = np.where(
-        moves[:, None, None] & path.oriented[:, None, None], turns @ path.rotation, path.rotation
+        moves[:, None, None] & path.orientation_programmed[:, None, None],
+        turns @ path.rotation,
+        path.rotation,
     )
     start = begins(path)
     groups: list[tuple[int, Role, Floats, Floats, Floats]] = []
@@ -67,15 +71,20 @@ def random_plan(
     for row in range(n):
         begin = last if row and path.base[row] == path.base[row - 1] else np.full(3, np.nan)
         arc = path.kind[row] == Kind.CIRC and np.isfinite(path.sweep[row])
-        whole = row in path.whole or row in path.refused or not moves[row] or not np.isfinite(begin).all()
+        whole = (
+            row in path.no_insert_before
+            or row in path.refused
+            or not moves[row]
+            or not np.isfinite(begin).all()
+        )
         if not arc:
             if not whole and random.random() < divided and path.kind[row] == Kind.LIN:
                 if random.random() < 0.5:
                     begin = begin + random.normal(0, size, 3)
-                    groups.append((row, Role.LINK, begin, rotation[row], np.full(7, np.nan)))
+                    groups.append((row, Role.TRANSITION, begin, rotation[row], np.full(7, np.nan)))
                 middle = 0.5 * (begin + end[row]) + random.normal(0, size, 3)
-                groups.append((row, Role.PIECE, middle, rotation[row], np.full(7, np.nan)))
-            groups.append((row, Role.OWN, end[row], rotation[row], np.full(7, np.nan)))
+                groups.append((row, Role.INTERMEDIATE, middle, rotation[row], np.full(7, np.nan)))
+            groups.append((row, Role.ORIGINAL, end[row], rotation[row], np.full(7, np.nan)))
         else:
             if through[row] and movable[row]:
                 # Three points: no advance along the normal.
@@ -110,7 +119,7 @@ def _arc(path, row, start, begin, end, rotation, whole, moves, random, divided, 
     """An arc, or two, from ``begin``; as it is where nothing moves."""
     own = np.concatenate([path.centre[row], path.normal[row], [path.sweep[row]]])
     if row in path.refused or (not moves and np.array_equal(begin, start)):
-        return [(row, Role.OWN, path.position[row], rotation, own)]
+        return [(row, Role.ORIGINAL, path.position[row], rotation, own)]
     source = [
         on_arc(start[None], path.position[[row]], own[None, :3], own[None, 3:6], own[6:], np.array([t]))[0]
         for t in (0.25, 0.5, 0.75)
@@ -127,7 +136,7 @@ def _arc(path, row, start, begin, end, rotation, whole, moves, random, divided, 
         and random.random() < divided
     ):
         begin = begin + random.normal(0, 1e-4, 3)
-        link = [(row, Role.LINK, begin, rotation, np.full(7, np.nan))]
+        link = [(row, Role.TRANSITION, begin, rotation, np.full(7, np.nan))]
     long = np.linalg.norm(path.position[row] - start) > 0.002
     two = not whole and (own[6] > np.radians(300) or (long and random.random() < divided))
     if two:
@@ -138,22 +147,22 @@ def _arc(path, row, start, begin, end, rotation, whole, moves, random, divided, 
     if two:
         return [
             *link,
-            (row, Role.PIECE, through[1], rotation, first),
-            (row, Role.OWN, end, rotation, second),
+            (row, Role.INTERMEDIATE, through[1], rotation, first),
+            (row, Role.ORIGINAL, end, rotation, second),
         ]
     extra = np.floor(own[6] / (2 * np.pi) - 1e-9) * 2 * np.pi
     if own[6] > 6 or extra:
         # A circle that must stay whole moves as it is.
         way = own.copy()
         way[:3] += begin - start
-        return [(row, Role.OWN, path.position[row] + begin - start, rotation, way)]
+        return [(row, Role.ORIGINAL, path.position[row] + begin - start, rotation, way)]
     way = _through(begin, through[1], end, own)
     if not np.isfinite(way).all() or abs(way[6] - own[6]) > 1.0:
         # Shorter than what it is moved by: as it is.
         way = own.copy()
         way[:3] += begin - start
         end = path.position[row] + begin - start
-    return [*link, (row, Role.OWN, end, rotation, way)]
+    return [*link, (row, Role.ORIGINAL, end, rotation, way)]
 
 
 def _through(begin, via, end, own):
@@ -161,10 +170,10 @@ def _through(begin, via, end, own):
     return np.concatenate([centre[0], normal[0], sweep])
 
 
-def written(dialect: GcodeDialect, program: Program, plan: Plan, writing: Writing = WRITING) -> bytes:
+def written(dialect: GcodeDialect, program: Program, plan: Plan, writing: WritingSettings = WRITING) -> bytes:
     """The output; every byte outside of the edits is checked."""
-    moved = dialect.moved(program, plan, writing)
-    assert not moved.held, moved.held
+    moved = dialect.edit_targets(program, plan, writing)
+    assert not moved.unwritten, moved.unwritten
     document = program.documents[0]
     raw = apply(document, moved.edits)
     assert undone(raw, document.raw, moved.edits)
@@ -176,8 +185,8 @@ def assert_reads_as(
     program: Program,
     plan: Plan,
     raw: bytes,
-    settings: Settings = DOWN,
-    writing: Writing = WRITING,
+    settings: ReadingSettings = DOWN,
+    writing: WritingSettings = WRITING,
 ) -> Program:
     """Read again, every motion ends where the plan says, on the way that it says, with all else as it was."""
     before = program.toolpath
@@ -185,8 +194,8 @@ def assert_reads_as(
     path = again.toolpath
     assert len(path) == len(plan), raw.decode("latin-1")
     source = plan.source
-    own = plan.role == Role.OWN
-    link = plan.role == Role.LINK
+    own = plan.role == Role.ORIGINAL
+    link = plan.role == Role.TRANSITION
     step = np.full(len(source), 10.0**-writing.mm * MM)
     half = 0.5 * step * (1 + 1e-3) + 1e-9
 
@@ -201,7 +210,7 @@ def assert_reads_as(
     timed = program.text.feed_mode[source] == Feed.INVERSE_TIME
     same = np.isclose(path.feed, before.feed[source], rtol=np.where(timed, 0.2, 1e-9), equal_nan=True)
     assert same[~air].all()
-    np.testing.assert_array_equal(path.oriented, before.oriented[source])
+    np.testing.assert_array_equal(path.orientation_programmed, before.orientation_programmed[source])
     own_rows = np.flatnonzero(own)
     codes = {int(source[m]): path.refused[m].code for m in own_rows if m in path.refused}
     assert codes == {row: finding.code for row, finding in before.refused.items()}
@@ -238,11 +247,11 @@ def _assert_arcs(path: Toolpath, plan: Plan, arc, step, raw) -> None:
         )
 
 
-def _assert_turned(path: Toolpath, plan: Plan, before: Toolpath, writing: Writing) -> None:
-    oriented = (before.oriented & before.known)[plan.source]
+def _assert_turned(path: Toolpath, plan: Plan, before: Toolpath, writing: WritingSettings) -> None:
+    oriented = (before.orientation_programmed & before.known)[plan.source]
     if not oriented.any():
         return
-    free_axis = before.free_axis[plan.source]
+    free_axis = before.redundant_axis[plan.source]
     spins = oriented & np.isfinite(free_axis[:, 0])
     # Half a step in each of three angles, or a little less of a vector's components.
     most = 3 * 0.5 * 10.0**-writing.deg * DEG * 1.01 + 1e-8
@@ -262,8 +271,8 @@ def round_trip(
     dialect: GcodeDialect,
     raw: bytes,
     seed: int,
-    settings: Settings = DOWN,
-    writing: Writing = WRITING,
+    settings: ReadingSettings = DOWN,
+    writing: WritingSettings = WRITING,
     **change: float,
 ) -> bytes:
     """Reads, moves at random, writes, reads again; the output."""

@@ -5,8 +5,8 @@ from functools import cache
 
 import numpy as np
 
-from postproc.geometry import Poses
-from postproc.identification.campaign import Campaign, Nuisances, Seen
+from postproc.base.geometry import Poses
+from postproc.identification.campaign import Campaign, Nuisances, PredictedReadings
 from postproc.measurements import Readings, planned
 from postproc.robot.description import find_robot, load_robot
 
@@ -74,7 +74,7 @@ def somewhere(campaign, rng, reach=0.3):
 
 def taken(campaign, model, given=None):
     """The readings of a campaign with what ``model`` shows of it, without any scatter."""
-    seen = campaign.seen(model)
+    seen = campaign.predicted(model)
     assert seen.converged.all()
     value, rotation = campaign.expected(seen, given or campaign.start())
     return replace(campaign.readings, value=value, rotation=rotation)
@@ -96,23 +96,23 @@ class Straight(Campaign):
 
     def __init__(self, readings: Readings, model, unknowns):
         super().__init__(readings)
-        self.about, self.base, self.slopes = model, super().seen(model), {}
+        self.about, self.base, self.slopes = model, super().predicted(model), {}
         for unknown in unknowns:
             at = model.terms[unknown.term].values[unknown.parameter.name] + unknown.parameter.scale
-            moved = super().seen(model.changed({unknown.key: at}))
+            moved = super().predicted(model.with_values({unknown.key: at}))
             slope = [
                 (a - b) / unknown.parameter.scale
                 for a, b in zip(_moving(moved), _moving(self.base), strict=True)
             ]
             self.slopes[unknown.key] = slope
 
-    def seen(self, model, start=None, tolerance=0.0):
+    def predicted(self, model, start=None, tolerance=0.0):
         parts = [part.copy() for part in _moving(self.base)]
         for (term, name), slope in self.slopes.items():
             step = model.terms[term].values[name] - self.about.terms[term].values[name]
             for part, by in zip(parts, slope, strict=True):
                 part += step * by
-        return Seen(*parts, self.base.converged)
+        return PredictedReadings(*parts, self.base.converged)
 
 
 def _moving(seen):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from postproc.effects import Conditions, State
-from postproc.geometry import Poses
+from postproc.base.geometry import Poses
+from postproc.effects import ChainState, Conditions
 from postproc.robot.chain import Chain
 from postproc.toolpath import FrameRef, Kind, Toolpath
 
@@ -45,13 +45,13 @@ def motions(target: Poses, kind=Kind.LIN, axes=None, status=-1, turn=-1, **more)
 def load_of(effect, values, robot, coordinates, motors):
     """Force and slope (n, N) of a load at displaced ``coordinates`` (n, N) of a robot with ``motors`` at (n, N)."""
     chain = Chain(robot.joints, robot.flange)
-    state = State(
+    state = ChainState(
         chain=chain,
         gravity=np.array([0.0, 0.0, -9.81]),
         motors=motors,
         rest=motors,
         coordinates=coordinates,
-        swept=chain.sweep(coordinates, Poses.identity()),
+        swept=chain.evaluate(coordinates, Poses.identity()),
         wrench=np.zeros((6, motors.shape[1])),
         conditions=Conditions(),
     )

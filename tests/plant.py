@@ -20,10 +20,10 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from postproc.base.geometry import Poses
 from postproc.effects import Conditions
 from postproc.effects.gravity_compensator import GravityCompensator
-from postproc.geometry import Poses
-from postproc.model import StiffnessModel, Term
+from postproc.model import EffectInstance, StiffnessModel
 from postproc.robot.description import Robot, find_robot, load_robot
 from postproc.robot.geometries import KukaLengths
 
@@ -133,13 +133,13 @@ class Plant:
         self.model = mujoco.MjModel.from_xml_string(_xml(arm, gives, spring, self.hardware))
         self.data = mujoco.MjData(self.model)
         self.size = self.model.nv
-        self._row = {name: int(self.model.joint(name).dofadr[0]) for name in (*BASE, *MOTORS, *TILTS, *TIP)}
-        self._motors = np.array([self._row[name] for name in MOTORS])
-        self._gives = np.array([gives[self.model.joint(i).name] for i in range(self.size)])
-        self._free = np.flatnonzero(self._gives)
+        self.row_of = {name: int(self.model.joint(name).dofadr[0]) for name in (*BASE, *MOTORS, *TILTS, *TIP)}
+        self.motor_rows = np.array([self.row_of[name] for name in MOTORS])
+        self.compliances = np.array([gives[self.model.joint(i).name] for i in range(self.size)])
+        self._free = np.flatnonzero(self.compliances)
         self._bearings = [self.model.body(f"bearing{i}").id for i in range(1, 7)]
         self._places = self.model.body_pos[self._bearings].copy()
-        self._last, self._tip = self.model.body("link6").id, self.model.body("tip").id
+        self.last_body, self.tip_body = self.model.body("link6").id, self.model.body("tip").id
         self.d6 = arm.d6
 
     def _compliances(self, joints: np.ndarray) -> dict[str, float]:
@@ -163,7 +163,7 @@ class Plant:
             elif name == "link_gravity":
                 have = replace(have, links=links)
             else:
-                have = replace(have, **_PARTS[name](values, term.effect))
+                have = replace(have, **PARTS[name](values, term.effect))
         return cls(model.robot.arm, compliance, spring, have)
 
     def first_moments(self, amount: float = 0.0) -> dict[str, float]:
@@ -180,8 +180,8 @@ class Plant:
 
     def passive(self, coordinates: np.ndarray, motors: np.ndarray) -> np.ndarray:
         """(6,) [N m] torque of springs and weights on the joints (6,), motors at ``motors``."""
-        self._place(self._whole(coordinates), self._whole(motors))
-        return (self.data.qfrc_passive - self.data.qfrc_bias)[self._motors]
+        self.place(self.coordinates_of(coordinates), self.coordinates_of(motors))
+        return (self.data.qfrc_passive - self.data.qfrc_bias)[self.motor_rows]
 
     def rest(
         self,
@@ -196,43 +196,43 @@ class Plant:
         along = np.array([0.0, 0, 1]) if given.spindle is None else given.spindle[row]
         amount = given.time if have.by_time else given.temperature
         self.model.body_pos[self._bearings] = self._placed(0.0 if amount is None else amount[row])
-        self._set_tip(tool, along)
+        self.set_tip(tool, along)
         if wrench.any():
             wrench = (1 + have.gauge[0]) * (wrench - have.gauge[1:])
         came = None if given.direction is None else given.direction[row]
-        self._came = np.zeros(len(self._motors)) if came is None else came
+        self.directions = np.zeros(len(self.motor_rows)) if came is None else came
         free = self._unloaded(motors, came)
         held = np.zeros(self.size)
         if self.balanced:
             # without load the joints' springs are slack: what is left is the tendon
-            self._place(free, free)
+            self.place(free, free)
             held = -self.data.qfrc_passive.copy()
         moving, coordinates = self._free, free.copy()
         for _ in range(40):
             step = np.linalg.solve(
                 self._slope(coordinates, free, held, wrench),
-                -self._residual(coordinates, free, held, wrench)[moving],
+                -self.residual(coordinates, free, held, wrench)[moving],
             )
             coordinates[moving] += step
             if np.abs(step).max() < STEP_TOLERANCE:
-                self._place(coordinates, free)
-                return Rest(coordinates[self._motors], *self._tcp())
+                self.place(coordinates, free)
+                return Rest(coordinates[self.motor_rows], *self.tcp())
         raise ArithmeticError("Newton's method found no equilibrium")
 
     def energy(self, coordinates: np.ndarray, motors: np.ndarray) -> float:
         """[J] in all springs."""
-        self._place(self._whole(coordinates), self._whole(motors))
+        self.place(self.coordinates_of(coordinates), self.coordinates_of(motors))
         mujoco.mj_energyPos(self.model, self.data)
         return float(self.data.energy[0])
 
     def spring_length(self, coordinates: np.ndarray) -> float:
         """[m] from P0 to P1."""
-        self._place(self._whole(coordinates), self._whole(coordinates))
+        self.place(self.coordinates_of(coordinates), self.coordinates_of(coordinates))
         return float(self.data.ten_length[0])
 
-    def _whole(self, joints: np.ndarray) -> np.ndarray:
+    def coordinates_of(self, joints: np.ndarray) -> np.ndarray:
         whole = np.zeros(self.size)
-        whole[self._motors] = joints
+        whole[self.motor_rows] = joints
         return whole
 
     def _unloaded(self, motors: np.ndarray, direction: np.ndarray | None) -> np.ndarray:
@@ -245,9 +245,9 @@ class Plant:
             stand[joint] += share * motors[other]
         if direction is not None:
             stand = stand - 0.5 * have.width * direction
-        whole = self._whole(stand)
-        whole[[self._row[name] for name in BASE]] = have.base_offset
-        whole[[self._row[name] for name in TILTS]] = have.turn
+        whole = self.coordinates_of(stand)
+        whole[[self.row_of[name] for name in BASE]] = have.base_offset
+        whole[[self.row_of[name] for name in TILTS]] = have.turn
         return whole
 
     def _placed(self, amount: float) -> np.ndarray:
@@ -261,7 +261,7 @@ class Plant:
             )
         return places
 
-    def _set_tip(self, tool: Poses, along: np.ndarray) -> None:
+    def set_tip(self, tool: Poses, along: np.ndarray) -> None:
         """Put the tip's body at the TCP, with its z axis along the spindle."""
         x, y, z, *turns = self.hardware.tool_offset
         turned = tool.rotation
@@ -272,37 +272,39 @@ class Plant:
             turned = turned @ matrix.reshape(3, 3)
         flange = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # z out along the forearm
         centre = tool.position + tool.rotation @ [x, y, z]
-        self.model.body_pos[self._tip] = [self.d6, 0, 0] + flange @ centre
+        self.model.body_pos[self.tip_body] = [self.d6, 0, 0] + flange @ centre
         # any frame with this z axis: across the spindle all directions are alike
         frame = np.zeros(4)
         mujoco.mju_quatZ2Vec(frame, flange @ turned @ along)
-        self.model.body_quat[self._tip] = frame
+        self.model.body_quat[self.tip_body] = frame
         self._tool_in_link = flange @ turned
 
-    def _place(self, coordinates: np.ndarray, motors: np.ndarray) -> None:
+    def place(self, coordinates: np.ndarray, motors: np.ndarray) -> None:
         self.model.qpos_spring[:] = motors
         self.data.qpos[:] = coordinates
         mujoco.mj_fwdPosition(self.model, self.data)
         mujoco.mj_fwdVelocity(self.model, self.data)
 
-    def _tcp(self) -> tuple[np.ndarray, np.ndarray]:
-        turned = self.data.xmat[self._last].reshape(3, 3)
-        return self.data.xpos[self._tip].copy(), turned @ self._tool_in_link
+    def tcp(self) -> tuple[np.ndarray, np.ndarray]:
+        turned = self.data.xmat[self.last_body].reshape(3, 3)
+        return self.data.xpos[self.tip_body].copy(), turned @ self._tool_in_link
 
-    def _residual(
+    def residual(
         self, coordinates: np.ndarray, free: np.ndarray, held: np.ndarray, wrench: np.ndarray
     ) -> np.ndarray:
-        self._place(coordinates, free)
+        self.place(coordinates, free)
         linear, angular = np.zeros((3, self.size)), np.zeros((3, self.size))
-        mujoco.mj_jac(self.model, self.data, linear, angular, self.data.xpos[self._tip], self._tip)
+        mujoco.mj_jac(self.model, self.data, linear, angular, self.data.xpos[self.tip_body], self.tip_body)
         force = self.data.qfrc_passive - self.data.qfrc_bias + held
         force += linear.T @ wrench[:3] + angular.T @ wrench[3:]
         if self.hardware.gap.any():
             # the torque on a joint's own spring shifts it to one side of its gap; friction of 20 N m holds it back
-            rows = self._motors
-            stiffness = 1 / self._gives[rows]
+            rows = self.motor_rows
+            stiffness = 1 / self.compliances[rows]
             torque = force[rows] + stiffness * (coordinates - free)[rows]
-            force[rows] += stiffness * 0.5 * self.hardware.gap * np.tanh((torque - 20.0 * self._came) / 10.0)
+            sides = [np.tanh((torque - 20.0 * came) / 10.0) for came in (1.0, -1.0)]
+            side = 0.5 * ((1 + self.directions) * sides[0] + (1 - self.directions) * sides[1])
+            force[rows] += stiffness * 0.5 * self.hardware.gap * side
         return force
 
     def _slope(self, coordinates: np.ndarray, *rest: np.ndarray) -> np.ndarray:
@@ -310,7 +312,7 @@ class Plant:
         for row in self._free:
             move = np.zeros(self.size)
             move[row] = step
-            ends = [self._residual(coordinates + sign * move, *rest)[self._free] for sign in (1, -1)]
+            ends = [self.residual(coordinates + sign * move, *rest)[self._free] for sign in (1, -1)]
             columns.append((ends[0] - ends[1]) / (2 * step))
         return np.stack(columns, axis=1)
 
@@ -326,7 +328,7 @@ def _joints(values: Mapping[str, float], letter: str) -> np.ndarray:
     return _list(values, *(f"{letter}{i}" for i in range(1, 7)))
 
 
-_PARTS = {
+PARTS = {
     "base_compliance": lambda v, e: {"base": _list(v, "c_x", "c_y", "c_z", "c_rx", "c_ry", "c_rz")},
     "link_compliance": lambda v, e: {"tilts": _list(v, *(f"c{i}{a}" for i in range(1, 7) for a in "xy"))},
     "tool_compliance": lambda v, e: {"radial": v["radial"], "axial": v["axial"]},
@@ -441,7 +443,7 @@ def with_compensator(model: StiffnessModel, **change: object) -> StiffnessModel:
                 float(change.get("zero", old.zero)),  # type: ignore[arg-type]
             )
             values = {name: change.get(name, value) for name, value in term.values.items()}
-            term = Term(effect, values, {})  # type: ignore[arg-type]
+            term = EffectInstance(effect, values, {})  # type: ignore[arg-type]
         terms.append(term)
     return replace(model, terms=tuple(terms))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from plant import SOFTER, Plant, kr270, random_angles, random_tools, random_wrenches, with_compensator
 
-from postproc.geometry import vector_from_rotation
+from postproc.base.geometry import vector_from_rotation
 from postproc.model import StiffnessModel
 from postproc.robot.geometries import KukaLengths
 
@@ -47,7 +47,7 @@ def other_arm():
 
 
 MODELS = {
-    "joint compliance": lambda: full().without(["gravity_compensator"]),
+    "joint compliance": lambda: full().without_effects(["gravity_compensator"]),
     "compensator of Table 1, balanced": full,
     "softer compensator, acting": lambda: with_compensator(full(), **SOFTER),
     "another arm, spring askew": other_arm,

@@ -53,6 +53,7 @@ def test_what_is_public_is_there_and_nothing_else():
         postproc.compensat  # noqa: B018
 
 
+@pytest.mark.slow
 def test_types_are_seen(tmp_path):
     """A caller's mistake is told by a type checker, from the installed package."""
     wrong = tmp_path / "caller.py"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from postproc.geometry import arc_in_plane, arc_through, on_arc, rotation_from_vector
+from postproc.base.geometry import arc_in_plane, arc_through, on_arc, rotation_from_vector
 
 COUNT = 500
 

@@ -12,9 +12,9 @@ import pytest
 from batches import WRONG, contents, four_programs, program
 from conftest import CELL, LINES
 
-from postproc.batch.jobs import jobs_of
-from postproc.batch.reading import code_digest
-from postproc.batch.work import Task, work
+from postproc.batch.files_read import code_digest
+from postproc.batch.item import BatchItem, run_item
+from postproc.batch.job_file import jobs_of
 from postproc.report.batched import Outcome
 
 ROBOT = Path(__file__).resolve().parent.parent / "robots" / "kuka_kr270.yaml"
@@ -44,12 +44,13 @@ def test_every_program_is_what_the_main_job_makes_of_it(compensate, parts, tmp_p
         assert alone.code == 0
         assert single.read_bytes() == (parts / "compensated" / f"p{number}.src").read_bytes()
         entry = summary["programs"][number]
-        for key in ("motions", "corrected", "left", "error_before_mm", "error_after_mm", "findings"):
+        for key in ("motions", "corrected", "uncorrected", "error_before_mm", "error_after_mm", "findings"):
             assert entry[key] == alone.json[key]
     assert not list((parts / "compensated").rglob("*.lock"))
     assert not list(parts.rglob("*.tmp*"))
 
 
+@pytest.mark.slow
 def test_the_same_bytes_on_one_and_on_many_processes(compensate, parts):
     compensate("batch", parts, "--force", "-j", "1")
     one = contents(parts / "compensated")
@@ -59,6 +60,7 @@ def test_the_same_bytes_on_one_and_on_many_processes(compensate, parts):
     assert "p3.report.json" in one
 
 
+@pytest.mark.slow
 def test_the_page_links_every_report_and_shows_hostile_names_as_text(compensate, parts):
     odd = "a<script>alert(1)<script>%20&b.src"
     program(parts / odd)
@@ -77,6 +79,7 @@ def test_the_page_links_every_report_and_shows_hostile_names_as_text(compensate,
     assert "KIN001" in page
 
 
+@pytest.mark.slow
 def test_one_that_fails_stops_no_other(compensate, parts):
     program(parts / "bad.src", 0, WRONG)
     program(parts / "p9.src").write_bytes(b"")
@@ -93,6 +96,7 @@ def test_one_that_fails_stops_no_other(compensate, parts):
     assert "2 failed" in shown
 
 
+@pytest.mark.slow
 def test_the_exit_code_is_that_of_the_worst(compensate, parts):
     assert compensate("batch", parts, "--force").code == 0
     lines = [*LINES[:10], "LIN {X $POS_ACT.X,Y 0,Z 0}", *LINES[10:]]
@@ -101,6 +105,7 @@ def test_the_exit_code_is_that_of_the_worst(compensate, parts):
     assert compensate("batch", parts, "--force", "--strict").code == 1
 
 
+@pytest.mark.slow
 def test_fail_fast_stops(compensate, parts):
     program(parts / "bad.src", 0, ["; the largest begins first" + " " * 5000, *WRONG])
     done = compensate("batch", parts, "--force", "--fail-fast", "-j", "1", "--json", "-")
@@ -111,6 +116,7 @@ def test_fail_fast_stops(compensate, parts):
     assert not (parts / "compensated" / "p0.src").exists()
 
 
+@pytest.mark.slow
 def test_a_dry_run_writes_nothing(compensate, parts):
     before = sorted(parts.rglob("*"))
     done = compensate("batch", parts, "--force", "--dry-run", "--json", "-")
@@ -124,7 +130,7 @@ def test_a_dry_run_writes_nothing(compensate, parts):
 def run(*words: object, rerun: bool = False, **said: object) -> dict[str, Outcome]:
     """The outcomes of a batch that is done in this process, by name."""
     jobs = jobs_of([str(word) for word in words], {"force": "", **said})
-    return {job.name: work(Task(job, code_digest(), rerun)) for job in jobs.jobs}
+    return {job.name: run_item(BatchItem(job, code_digest(), rerun)) for job in jobs.jobs}
 
 
 def done(outcomes: dict[str, Outcome]) -> list[str]:
@@ -133,6 +139,7 @@ def done(outcomes: dict[str, Outcome]) -> list[str]:
     return [name for name, outcome in outcomes.items() if outcome.state == "done"]
 
 
+@pytest.mark.slow
 def test_what_is_unchanged_is_not_done_again(parts):
     first = run(parts)
     assert len(done(first)) == 4
@@ -152,6 +159,7 @@ def edit(path: Path, old: str, new: str) -> None:
     path.write_bytes(text.replace(old.encode(), new.encode()))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("change", "same"),
     [
@@ -184,6 +192,7 @@ def test_what_changed_is_done_again_and_nothing_else(parts, change, same):
     assert done(run(parts)) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "change",
     [
@@ -203,6 +212,7 @@ def test_what_all_share_is_watched(parts, change):
     assert len(done(run(parts, force=str(parts / "f.csv")))) == 4
 
 
+@pytest.mark.slow
 def test_options_and_a_nearer_cell_are_watched(parts):
     run(parts)
     assert len(done(run(parts, gain=0.5))) == 4
@@ -231,10 +241,9 @@ def test_an_output_of_an_earlier_run_is_told(parts):
     assert [finding.code for finding in outcome.findings][-1] == "BAT007"
 
 
+@pytest.mark.slow
 def test_the_command_says_what_is_unchanged(compensate, parts):
     compensate("batch", parts, "--force")
     again = compensate("batch", parts, "--force", "--json", "-")
     assert set(states(again).values()) == {"unchanged"}
-    assert set(states(compensate("batch", parts, "--force", "--force-rerun", "--json", "-")).values()) == {
-        "done"
-    }
+    assert set(states(compensate("batch", parts, "--force", "--rerun", "--json", "-")).values()) == {"done"}

@@ -13,11 +13,11 @@ import pytest
 from conftest import CELL
 from test_batch_killed import a_long_program
 
+from postproc.base.findings import Refusal
 from postproc.batch.cluster import run_on_cluster
-from postproc.batch.jobs import jobs_of
-from postproc.batch.reading import code_digest
-from postproc.batch.work import Task
-from postproc.findings import Refusal
+from postproc.batch.files_read import code_digest
+from postproc.batch.item import BatchItem
+from postproc.batch.job_file import jobs_of
 
 PROGRAMS = 8
 
@@ -43,12 +43,13 @@ def results(folder) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in (folder / "compensated").iterdir() if path.is_file()}
 
 
+@pytest.mark.slow
 def test_the_same_bytes_as_on_this_machine(compensate, parts, cluster):
     here = compensate("batch", parts, "--force", "--json", "-")
     assert here.code == 0, here.err
     wanted = results(parts)
     there = compensate(
-        "batch", parts, "--force", "--force-rerun", "--dask", cluster.scheduler_address, "--json", "-"
+        "batch", parts, "--force", "--rerun", "--dask", cluster.scheduler_address, "--json", "-"
     )
     assert there.code == 0, there.err
     assert there.json == here.json
@@ -57,11 +58,12 @@ def test_the_same_bytes_as_on_this_machine(compensate, parts, cluster):
     assert {one["state"] for one in again.json["programs"]} == {"unchanged"}
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_is_survived(compensate, parts, cluster):
     compensate("batch", parts, "--force", "-q")
     wanted = {name: text for name, text in results(parts).items() if name.startswith("part")}
     jobs = jobs_of([str(parts)], {"force": ""})
-    tasks = [Task(job, code_digest(), rerun=True) for job in jobs.jobs]
+    tasks = [BatchItem(job, code_digest(), rerun=True) for job in jobs.jobs]
     with distributed.Client(cluster.scheduler_address, set_as_default=False) as client:
         workers = client.run(os.getpid)
     assert len(set(workers.values())) == 2
@@ -79,10 +81,11 @@ def test_a_worker_that_is_killed_is_survived(compensate, parts, cluster):
         client.wait_for_workers(2, timeout=60)
 
 
+@pytest.mark.slow
 def test_a_cluster_that_is_lost_midway_is_told(parts):
     """What was done stays, and the rest is not waited for."""
     jobs = jobs_of([str(parts)], {"force": ""})
-    tasks = [Task(job, code_digest()) for job in jobs.jobs]
+    tasks = [BatchItem(job, code_digest()) for job in jobs.jobs]
     outcomes = {}
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address="127.0.0.1:0"
@@ -124,9 +127,10 @@ def test_no_cluster_is_told_before_anything_begins(compensate, parts, monkeypatc
 def test_what_is_no_address_is_told_at_once(address):
     with pytest.raises(Refusal) as refusal:
         list(run_on_cluster([], address, lambda number, stage: None))
-    assert "is no address" in refusal.value.findings[0].message
+    assert "is not the address" in refusal.value.findings[0].message
 
 
+@pytest.mark.slow
 def test_a_cluster_without_workers_is_told(parts, monkeypatch):
     from postproc.batch import cluster as module
 

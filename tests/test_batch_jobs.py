@@ -10,9 +10,9 @@ import pytest
 from conftest import CELL, LINES
 
 from postproc.api import compensate
-from postproc.batch.jobs import PROGRAM_KEYS, jobs_of
+from postproc.base.findings import Refusal
+from postproc.batch.job_file import PROGRAM_KEYS, jobs_of
 from postproc.cli.batch import batch
-from postproc.findings import Refusal
 from postproc.workflows.preparation import Request
 
 PROGRAM = "\r\n".join(LINES)
@@ -170,8 +170,8 @@ def test_an_output_of_its_own(shop, output, target):
         ("programs: a.src\ngain: half\n", "YML004", 2, 1, ("not a number",)),
         ("programs: a.src\nforce: 1,2\n", "FRC002", 2, 1, ("2 numbers",)),
         ("programs: a.src\nforce: [1, 2, 3]\n", "FRC002", 2, 1, ("force",)),
-        ("programs: a.src\nforce: none.csv\n", "YML004", 2, 1, ("there is no file",)),
-        ("programs: a.src\ncell: none.yaml\n", "YML004", 2, 1, ("there is no file",)),
+        ("programs: a.src\nforce: none.csv\n", "YML004", 2, 1, ("does not exist",)),
+        ("programs: a.src\ncell: none.yaml\n", "YML004", 2, 1, ("does not exist",)),
         ("programs: a.src\nrobot: kuka_kr27\n", "CEL003", 2, 1, ("did you mean 'kuka_kr270'",)),
         ("programs: a.src\nstrict: perhaps\n", "YML004", 2, 1, ("true or false",)),
         ("programs: *.src\n", "YML001", 1, 12, ("expected alphabetic",)),
@@ -249,7 +249,7 @@ def test_words_of_the_command_line(shop, monkeypatch):
         assert refusal.value.findings[0].code == "BAT001"
     with pytest.raises(Refusal) as refusal:
         jobs_of([str(shop.file("programs: a.src")), "shop"], {})
-    assert "stands alone" in refusal.value.findings[0].message
+    assert "only argument" in refusal.value.findings[0].message
 
 
 def test_nothing_starts_where_the_job_file_is_wrong(compensate, shop):
@@ -261,4 +261,4 @@ def test_nothing_starts_where_the_job_file_is_wrong(compensate, shop):
     assert sorted(shop.folder.rglob("*")) == sorted({*before, shop.folder / "night.yaml"})
     assert compensate("batch").code == 2
     lost = compensate("batch", "--force", shop.folder / "night.yaml")
-    assert (lost.code, "value of --force" in lost.err) == (2, True)
+    assert (lost.code, "as its value" in lost.err) == (2, True)

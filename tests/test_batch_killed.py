@@ -19,6 +19,8 @@ import numpy as np
 import pytest
 from conftest import CELL
 
+pytestmark = pytest.mark.slow
+
 KILLS = int(os.environ.get("POSTPROC_KILLS", "3"))
 PROGRAMS, WORKERS = 8, 2
 

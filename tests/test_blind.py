@@ -26,24 +26,26 @@ def truly(run):
     for hidden, _ in run.hidden:
         model = joined(model, hidden.made)
     for name in sorted(there - {term.effect.name for term in model.terms}):
-        model = model.added(EFFECTS[name](model.robot.joints))
+        model = model.with_effect(EFFECTS[name](model.robot.joints))
     return gap.at_truth(run, model)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("effect", EVERY)
 def test_truth_is_the_plants(effect):
     """The model with the true values says what the plant does: else the benchmark would be one of model errors."""
-    run = cases._made(case("single", effect, 2.0, 15), np.random.default_rng(5))
+    run = cases.drawn_from(case("single", effect, 2.0, 15), np.random.default_rng(5))
     design = replace(run.design, jitter=0.0)
     campaign = Campaign(measured.readings(design, measured.observed(run.scene, design), run.sigma))
     model = truly(run)
-    left = campaign.residual(campaign.seen(model), run.oracle.given)
+    left = campaign.residual(campaign.predicted(model), run.oracle.given)
     assert np.abs(left).max() < 1e-10
     # and what is hidden shows as large as it is said to, or is as large as is plausible
     (hidden, size), shown = run.hidden[0], run.snr[0]
     assert shown == pytest.approx(2.0, rel=0.06) or (size == hidden.cap and shown < 2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", OUTSIDE)
 def test_outside_is_none_of_the_library(effect):
     """No effect of the library alone does the same."""
@@ -55,6 +57,7 @@ def test_outside_is_none_of_the_library(effect):
     assert run.oracle.beyond(signal) > 0.2 * run.snr[0]
 
 
+@pytest.mark.slow
 def test_a_case_is_always_the_same():
     one, again = (made(case("single", "backlash", 2.0, 15)) for _ in range(2))
     other = made(replace(case("single", "backlash", 2.0, 15), seed=2))
@@ -82,7 +85,7 @@ def test_noise_is_as_stated():
 
 def test_the_worker_opens_nothing_else(tmp_path, monkeypatch):
     own, other = (tmp_path / f"{worker.ROOMS}{name}" for name in ("data-1", "truth-1"))
-    monkeypatch.setattr(worker, "_allowed", str(own))
+    monkeypatch.setattr(worker, "allowed_folder", str(own))
     worker.guard("open", (str(own / "data.csv"), "r", 0))
     worker.guard("open", ("/usr/lib/anything", "r", 0))
     for event in ("open", "os.listdir", "os.scandir"):
@@ -114,13 +117,13 @@ UNSEEN = [[Rival("nothing", "", 1.0)]]
     ],
 )
 def test_outcomes(word, names, sets, rivals, outcome):
-    assert verdicts._outcome(word, TRUTH, names, sets, False, rivals) == outcome
+    assert verdicts.outcome_of_words(word, TRUTH, names, sets, False, rivals) == outcome
 
 
 def test_nulls_and_outsiders():
-    assert verdicts._outcome("nothing_missing", set(), set(), [], False, []) == "exact"
-    assert verdicts._outcome("named", set(), TRUTH, [], False, []) == "wrong"
-    assert verdicts._outcome("named", {("windup", "A2")}, TRUTH, [], True, [[]]) == "wrong"
+    assert verdicts.outcome_of_words("nothing_missing", set(), set(), [], False, []) == "exact"
+    assert verdicts.outcome_of_words("named", set(), TRUTH, [], False, []) == "wrong"
+    assert verdicts.outcome_of_words("named", {("windup", "A2")}, TRUTH, [], True, [[]]) == "wrong"
     assert verdicts.right("outside", "unknown")
     assert not verdicts.right("single", "unknown")
 
@@ -159,6 +162,7 @@ def name(one):
     return f"{one.row} {' '.join(one.effects)} {one.poses} {one.number}"
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("one", NULLS, ids=name)
 def test_nothing_is_named_where_nothing_is(said, one):
     record = said(one)
@@ -166,16 +170,19 @@ def test_nothing_is_named_where_nothing_is(said, one):
     assert not table.is_named(record)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("one", CLEAR, ids=name)
 def test_what_is_hidden_is_named(said, one):
     assert said(one)["outcome"] == "exact"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("one", ALIKE, ids=name)
 def test_what_an_oracle_can_not_tell_apart_is_ambiguous(said, one):
     assert said(one)["outcome"] == "ambiguous"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("one", STRANGE, ids=name)
 def test_what_no_library_has_is_unknown(said, one):
     record = said(one)
@@ -183,11 +190,13 @@ def test_what_no_library_has_is_unknown(said, one):
     assert not table.is_named(record)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("one", HOPELESS, ids=name)
 def test_what_can_not_be_told_apart_is_not_claimed(said, one):
     assert said(one)["right"]
 
 
+@pytest.mark.slow
 def test_poses_that_settle_it(tmp_path_factory):
     """Where A2 hardly moves, a balancer is some stiffness of it; the poses that are proposed take it through its range,
     and with them it is the balancer."""
@@ -251,4 +260,4 @@ def test_tables_count_every_run(tmp_path):
 def test_what_was_run_is_not_run_again(tmp_path):
     path = tmp_path / "runs.jsonl"
     path.write_text('{"key": "single/0/1", "x": 1}\n{"key": "other/0/1"}\n{"key": "single/1')
-    assert command._kept(path, {"single/0/1", "single/1/1"}) == [{"key": "single/0/1", "x": 1}]
+    assert command.kept_records(path, {"single/0/1", "single/1/1"}) == [{"key": "single/0/1", "x": 1}]

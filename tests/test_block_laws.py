@@ -8,26 +8,26 @@ import numpy as np
 import pytest
 from ways_at_work import circle, corner, line
 
-import postproc.blocks
-import postproc.compensation.division
+import postproc.base.batches
+import postproc.compensation.subdivision
+from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.correct import correct
-from postproc.compensation.division import Limits, divide
-from postproc.compensation.limits import limits
-from postproc.writing import way_errors
+from postproc.compensation.subdivision import Limits, subdivide
+from postproc.output.write import path_errors_as_written
 
 SIZES = [1, 2, 3, 7]
 
 
 def in_blocks_of(monkeypatch, rows):
-    monkeypatch.setattr(postproc.blocks, "ROWS", rows)
-    monkeypatch.setattr(postproc.compensation.division, "ROWS", rows)
+    monkeypatch.setattr(postproc.base.batches, "ROWS", rows)
+    monkeypatch.setattr(postproc.compensation.subdivision, "ROWS", rows)
 
 
 def found(task, allowed):
     """All that a correction finds, as plain arrays and words."""
     result = correct(task)
-    division = divide(task, result, allowed)
-    told, held = limits(task, result, division)
+    division = subdivide(task, result, allowed)
+    told, held = check_limits(task, division)
     command, every = result.command[:], division.command[:]
     return {
         "state": result.state,
@@ -43,11 +43,12 @@ def found(task, allowed):
         "ends": every.position,
         "centre": division.centre,
         "sweep": division.sweep,
-        "between": way_errors(task, result, division),
+        "between": path_errors_as_written(task, result, division)[0],
         "words": [str(one) for one in (*result.findings, *division.findings, *told, *held.values())],
     }
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("rows", SIZES)
 @pytest.mark.parametrize(
     ("task", "allowed"),
@@ -56,7 +57,7 @@ def found(task, allowed):
         (lambda: line(), Limits(max_growth=1.5)),
         (lambda: corner(), Limits(max_growth=100.0)),
         (lambda: circle(), Limits(max_growth=100.0)),
-        (lambda: circle(sweep=1.0), Limits(keep=True)),
+        (lambda: circle(sweep=1.0), Limits(no_insert=True)),
         (lambda: line(gain=0.5), Limits(max_growth=100.0)),
     ],
     ids=["line", "rationed", "corner", "circle", "kept", "half"],
@@ -72,12 +73,13 @@ def test_a_correction_does_not_depend_on_the_blocks(monkeypatch, rows, task, all
             np.testing.assert_allclose(parts[name], values, rtol=0, atol=1e-9, err_msg=name)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("rows", SIZES)
 def test_an_output_does_not_depend_on_the_blocks(compensate, job, monkeypatch, rows):
     """Program, difference, corrections and report, byte for byte."""
     names = ["part.src", "part.diff", "part.corrections.csv", "part.report.html"]
     told = []
-    for size in (postproc.blocks.ROWS, rows):
+    for size in (postproc.base.batches.ROWS, rows):
         in_blocks_of(monkeypatch, size)
         assert compensate(job.program, "--force").code == 0
         folder = job.program.parent / "compensated"

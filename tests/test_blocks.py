@@ -5,7 +5,7 @@ import threading
 import numpy as np
 import pytest
 
-from postproc.blocks import THREADS, blocks, in_blocks, threads
+from postproc.base.batches import THREADS, blocks, in_blocks, threads
 
 
 @pytest.mark.parametrize("count", [0, 1, 9, 10, 11, 95])

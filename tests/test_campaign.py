@@ -33,11 +33,12 @@ def ratios(done):
     return np.array([wide.get(name, np.inf) for name in rig.TABLE_1]) / (TRUE * TABLE / 100)
 
 
+@pytest.mark.slow
 def test_plant_and_model_agree():
     """Else the campaign would be one of model errors."""
     readings = trial().readings[0]
     campaign = Campaign(readings)
-    expected, _ = campaign.expected(campaign.seen(rig.truth()), campaign.start())
+    expected, _ = campaign.expected(campaign.predicted(rig.truth()), campaign.start())
     assert np.abs(expected - readings.value).max() < 1e-12
     assert np.median(np.linalg.norm(readings.value, axis=1)) > 3e-3
 
@@ -70,6 +71,7 @@ def test_intervals_beat_table_1():
     assert (np.median(many().ci95, axis=0) / TRUE <= 0.8 * TABLE / 100).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("poses", "loads"), [(30, rig.WEIGHT), (15, rig.TWO_WEIGHTS)])
 def test_twice_the_readings(poses, loads):
     worst = ratios(fitted(trial(poses, loads), SEED, 0)).max()
@@ -78,6 +80,7 @@ def test_twice_the_readings(poses, loads):
     assert worst > 0.8 * ratios(fitted(trial(), SEED, 0)).max() / np.sqrt(2)
 
 
+@pytest.mark.slow
 def test_random_designs_do_not():
     rng = np.random.default_rng(15)
     designs = [Trial("", (rig.read_off(rig.at_random(15, rng)),)) for _ in range(7)]
@@ -86,6 +89,7 @@ def test_random_designs_do_not():
     assert np.median(worst) > 2.0
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("past_first_axis", [True, False])
 def test_compensation_with_the_identified_file(tmp_path, past_first_axis):
     """On the way of the command, by files; forces past A1 because its compliance was not looked for."""

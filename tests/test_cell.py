@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from postproc.base.findings import Finding, Refusal
+from postproc.base.geometry import Poses
 from postproc.cell import Cell, Tool, find_cell, frames_of, load_cell
-from postproc.findings import Finding, Refusal
-from postproc.geometry import Poses
 from postproc.toolpath import FrameRef, Kind, Toolpath
 
 FULL = """\
@@ -30,6 +30,9 @@ max_growth: 3
 controller: {absolute_accuracy: true, gravity_compensated: false}
 dialect: {integer_words: um}
 """
+
+
+TOUCHED = "correct: touched_off\ncontroller: {absolute_accuracy: false}\n"
 
 
 def write(folder: Path, text: str) -> Path:
@@ -105,6 +108,42 @@ def test_defaults(tmp_path):
     assert (cell.min_segment, cell.max_growth) == (pytest.approx(1e-3), 2.0)
     assert not cell.controller.absolute_accuracy
     assert cell.integer_words == "mm"
+    assert (cell.cycle_ms, cell.force_ramp, cell.temperature) == (12.0, None, None)
+    assert (cell.force_ci95, cell.force_vector, cell.touch_points) == (None, None, {})
+    assert cell.tools[1].diameter is None
+
+
+def test_what_is_corrected_and_what_the_controller_does(tmp_path):
+    text = FULL.replace("correct: absolute", "correct: touched_off").replace(
+        "com: [0, 0, 120]", "com: [0, 0, 120], diameter: 12"
+    )
+    text = text.replace("gravity_compensated: false", "gravity_compensated: false, cycle_ms: 4")
+    text += "force_ramp: 6\ntemperature: 24.5\n"
+    cell = load_cell(write(tmp_path, text + "touch_points: [[0, 0, 0], [900, 0, 0], [0, 600, 10]]\n"))
+    assert cell.correct == "touched_off"
+    assert list(cell.touch_points) == [None]
+    assert cell.touch_points[None].tolist() == [[0, 0, 0], [0.9, 0, 0], [0, 0.6, 0.01]]
+    assert cell.touch_line == 21
+    assert not cell.touch_points[None].flags.writeable
+    assert (cell.cycle_ms, cell.controller.cycle_ms) == (4.0, 4.0)
+    assert cell.force_ramp == pytest.approx(6e-3)
+    assert (cell.temperature, cell.temperature_line) == (24.5, 20)
+    assert cell.tools[1].diameter == pytest.approx(0.012)
+    cell = load_cell(write(tmp_path, text + "touch_points:\n  1: [[5, 0, 0]]\n  3: [[0, 0, 0], [0, 0, 7]]\n"))
+    assert {number: len(points) for number, points in cell.touch_points.items()} == {1: 1, 3: 2}
+
+
+def test_what_is_known_of_the_force(tmp_path):
+    def read(value):
+        cell = load_cell(write(tmp_path, f"robot: r\nforce_ci95: {value}\n"))
+        return cell.force_ci95, cell.force_vector
+
+    assert read(0.2) == (0.2, None)
+    scale, vector = read("{scale: 0.2, direction_deg: 10}")
+    assert (scale, vector.direction, vector.components) == (0.2, pytest.approx(np.radians(10)), None)
+    scale, vector = read("{fx: 20, fy: 0, fz: 5}")
+    assert (scale, vector.direction, vector.components.tolist()) == (None, 0.0, [20, 0, 5])
+    assert read("{direction_deg: 5}")[0] is None
 
 
 def test_arrays_are_read_only(tmp_path):
@@ -142,9 +181,9 @@ def test_spindle_axes(tmp_path, word, axis):
         ("tools: {}\n", "YML003", 1, "'robot' is missing"),
         ("robot:\n", "YML003", 1, "robot: has no value"),
         ("robot: ''\n", "YML004", 1, "robot: is empty"),
-        ("robot: r\ntool: {}\n", "YML002", 2, "tool: unknown key; did you mean 'tools'"),
+        ("robot: r\ntool: {}\n", "YML002", 2, "tool: the key is unknown; did you mean 'tools'"),
         ("robot: r\nrobot_base: {x: 0, y: 0}\n", "YML003", 2, "robot_base: the key 'z' is missing"),
-        ("robot: r\nrobot_base: {x: 0, y: 0, z: 0, d: 1}\n", "YML002", 2, "robot_base.d: unknown key"),
+        ("robot: r\nrobot_base: {x: 0, y: 0, z: 0, d: 1}\n", "YML002", 2, "robot_base.d: the key is unknown"),
         ("robot: r\nbases:\n  0: {x: 0, y: 0, z: 0}\n", "YML004", 3, "bases.0: is not a number from 1"),
         ("robot: r\nbases:\n  01: {x: 0, y: 0, z: 0}\n", "YML004", 3, "is not a number from 1"),
         ("robot: r\nbases:\n  G54: {x: 0, y: 0, z: 0}\n", "YML004", 3, "is not a number from 1"),
@@ -152,11 +191,16 @@ def test_spindle_axes(tmp_path, word, axis):
             "robot: r\nbases:\n  1: {x: 0, y: 0, z: 0}\n  1: {x: 0, y: 0, z: 1}\n",
             "YML004",
             4,
-            "bases.1 stands twice",
+            "bases.1 is defined twice",
         ),
         ("robot: r\nbases:\n  1: {x: 0, y: 0, z: 5 mm}\n", "YML004", 3, "'5 mm' is not a number"),
         ("robot: r\nbases:\n  1: {x: 0, y: 0, z: nan}\n", "YML004", 3, "'nan' is not a number"),
-        ("robot: r\nbases:\n  1: {x: 0, y: 0, z: 0, axis: +z}\n", "YML002", 3, "bases.1.axis: unknown key"),
+        (
+            "robot: r\nbases:\n  1: {x: 0, y: 0, z: 0, axis: +z}\n",
+            "YML002",
+            3,
+            "bases.1.axis: the key is unknown",
+        ),
         ("robot: r\ntools: [1]\n", "YML004", 2, "keys and values"),
         ("robot: r\ntools: {1: {x: 0, y: 0, z: 0, axis: z}}\n", "YML004", 2, "'z' is not one of +x, -x"),
         ("robot: r\ntools: {1: {x: 0, y: 0, z: 0, axis: [0, 0, 0]}}\n", "YML004", 2, "no direction"),
@@ -165,17 +209,17 @@ def test_spindle_axes(tmp_path, word, axis):
             "robot: r\ntools: {1: {x: 0, y: 0, z: 0, mass: 3}}\n",
             "YML003",
             2,
-            "tools.1.mass: stands without 'com'",
+            "tools.1.mass: is incomplete: 'com' is missing",
         ),
-        ("robot: r\ntools: {1: {x: 0, y: 0, z: 0, com: [0, 0, 1]}}\n", "YML003", 2, "stands without 'mass'"),
+        ("robot: r\ntools: {1: {x: 0, y: 0, z: 0, com: [0, 0, 1]}}\n", "YML003", 2, "'mass' is missing"),
         (
             "robot: r\ntools: {1: {x: 0, y: 0, z: 0, mass: -1, com: [0, 0, 1]}}\n",
             "YML004",
             2,
             "-1 is not within",
         ),
-        ("robot: r\nforce: 1,2,3\nprocess: p.yaml\n", "YML004", 3, "stands beside 'force'"),
-        ("robot: r\nforce: [1, 2, 3]\n", "YML004", 2, "a text, not a list"),
+        ("robot: r\nforce: 1,2,3\nprocess: p.yaml\n", "YML004", 3, "excludes 'force'"),
+        ("robot: r\nforce: [1, 2, 3]\n", "YML004", 2, "a text and not a list"),
         ("robot: r\nforce: ''\n", "YML004", 2, "force: is empty"),
         ("robot: r\ncorrect: prozess\n", "YML004", 2, "did you mean 'process'"),
         ("robot: r\nstart: [0, 0, 0]\n", "YML004", 2, "list of 6 numbers"),
@@ -187,6 +231,59 @@ def test_spindle_axes(tmp_path, word, axis):
         ("robot: r\nmax_growth: 0.9\n", "YML004", 2, "0.9 is not within 1"),
         ("robot: r\ncontroller: {absolute_accuracy: maybe}\n", "YML004", 2, "true or false"),
         ("robot: r\ncontroller: {absolut: true}\n", "YML002", 2, "did you mean 'absolute_accuracy'"),
+        ("robot: r\ncontroller: {cycle_ms: 0}\n", "YML004", 2, "cycle_ms: 0 is not within 0.1 .. 100"),
+        ("robot: r\ncontroller: {cycle_ms: -12}\n", "YML004", 2, "-12 is not within 0.1 .. 100"),
+        ("robot: r\ncontroller: {cycle_ms: 12 ms}\n", "YML004", 2, "'12 ms' is not a number"),
+        ("robot: r\nforce_ramp: -3\n", "YML004", 2, "force_ramp: -3 is not within 0"),
+        ("robot: r\ntools: {1: {x: 0, y: 0, z: 0, diameter: -8}}\n", "YML004", 2, "-8 is not within 0.01"),
+        ("robot: r\ntemperature: 297\n", "YML004", 2, "temperature: 297 is not within -10 .. 60"),
+        ("robot: r\ntemperature: warm\n", "YML004", 2, "'warm' is not a number"),
+        ("robot: r\nforce_ci95: {}\n", "YML003", 2, "force_ci95: states nothing"),
+        ("robot: r\nforce_ci95: {direction: 10}\n", "YML002", 2, "did you mean 'direction_deg'"),
+        ("robot: r\nforce_ci95: {direction_deg: -1}\n", "YML004", 2, "-1 is not within 0 .. 90"),
+        ("robot: r\nforce_ci95: {scale: 20}\n", "YML004", 2, "20 is not within 0 .. 1"),
+        ("robot: r\nforce_ci95: {fx: 20, fz: 5}\n", "YML003", 2, "fx: is incomplete: 'fy' is missing"),
+        ("robot: r\nforce_ci95: {fx: 20, fy: -1, fz: 5}\n", "YML004", 2, "fy: -1 is not within 0"),
+        ("robot: r\ncorrect: absolute\n", "CEL010", 2, "correct: absolute needs to know"),
+        (
+            "robot: r\ncorrect: absolute\ncontroller: {gravity_compensated: true}\n",
+            "CEL010",
+            2,
+            "needs to know",
+        ),
+        (
+            "robot: r\ntouch_points: [[0, 0, 0]]\ncorrect: touched_off\n",
+            "CEL010",
+            3,
+            "touched_off needs to know",
+        ),
+        ("robot: r\ntouch_points: [[0, 0, 0]]\n", "YML004", 2, "needs 'correct: touched_off'"),
+        (f"robot: r\n{TOUCHED}", "YML003", 2, "touched_off needs 'touch_points'"),
+        (f"robot: r\n{TOUCHED}touch_points: 5\n", "YML004", 4, "touch_points: must contain keys and values"),
+        (f"robot: r\n{TOUCHED}touch_points: []\n", "YML004", 4, "must be a list of lists of 3 numbers"),
+        (f"robot: r\n{TOUCHED}touch_points: {{}}\n", "YML003", 4, "contains no touch point"),
+        (f"robot: r\n{TOUCHED}touch_points: [0, 0, 0]\n", "YML004", 4, "entry 1 must be a list of 3 numbers"),
+        (f"robot: r\n{TOUCHED}touch_points: [[0, 0]]\n", "YML004", 4, "entry 1 must be a list of 3 numbers"),
+        (f"robot: r\n{TOUCHED}touch_points: [[0, 0, x]]\n", "YML004", 4, "'x' is not a number"),
+        (f"robot: r\n{TOUCHED}touch_points: {{a: [[0, 0, 0]]}}\n", "YML004", 4, "a: is not a number from 1"),
+        (
+            f"robot: r\n{TOUCHED}touch_points: [[0, 0, 0], [9, 0, 0], [0, 0.5, 0]]\n",
+            "YML004",
+            4,
+            "points 1 and 3 are the same place",
+        ),
+        (
+            f"robot: r\n{TOUCHED}touch_points: [[0, 0, 0], [450, 2, 0], [900, 0, 0]]\n",
+            "YML004",
+            4,
+            "the 3 points are on one line",
+        ),
+        (
+            f"robot: r\n{TOUCHED}touch_points:\n  1: [[0, 0, 0]]\n  2: [[0, 0, 0], [1, 1, 1], [2, 2, 2], [5, 5, 5]]\n",
+            "YML004",
+            6,
+            "touch_points.2: the 4 points are on one line",
+        ),
         ("robot: r\ndialect: {integer_words: inch}\n", "YML004", 2, "not one of mm, um"),
     ],
 )

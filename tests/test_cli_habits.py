@@ -90,7 +90,17 @@ def test_help_is_light():
     loaded = set(
         json.loads(subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout)
     )
-    assert not loaded & {"numpy", "scipy", "pinocchio", "yaml", "rich", "matplotlib", "jinja2", "distributed"}
+    assert not loaded & {
+        "numpy",
+        "scipy",
+        "pinocchio",
+        "yaml",
+        "ruamel",
+        "rich",
+        "matplotlib",
+        "jinja2",
+        "distributed",
+    }
 
 
 def test_as_a_module():
@@ -114,6 +124,7 @@ def completed(folder: Path, *words: str) -> list[tuple[str, str]]:
     return [tuple(line.split(",", 1)) for line in done.stdout.splitlines()]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize(
     ("words", "there", "not_there"),
     [
@@ -150,6 +161,7 @@ def test_the_scripts_are_scripts(compensate, tmp_path, shell):
 # ---------------------------------------------------------------------------------------- colours and progress
 
 
+@pytest.mark.slow
 def test_colours_on_a_terminal_unless_unwanted(tmp_path):
     words = [*COMPENSATE, "check", "none.src"]
     assert COLOUR.search(on_a_terminal(words, tmp_path))
@@ -158,6 +170,7 @@ def test_colours_on_a_terminal_unless_unwanted(tmp_path):
     assert not COLOUR.search(said)
 
 
+@pytest.mark.slow
 def test_quiet_in_a_pipe(job):
     for words in (["part.src", "--force"], ["batch", "part.src", "--force"], ["robots"]):
         done = subprocess.run([*COMPENSATE, *words], capture_output=True, cwd=job.folder)
@@ -170,6 +183,7 @@ def test_quiet_in_a_pipe(job):
     assert (done.stdout, done.stderr) == (b"", b"")
 
 
+@pytest.mark.slow
 def test_a_batch_shows_its_progress_on_a_terminal(job):
     for number in range(6):
         job.write(LINES, name=f"p{number}.src")

@@ -8,7 +8,7 @@ import io
 import numpy as np
 import pytest
 
-from postproc.report.columns import Numbers, Words, csv_parts
+from postproc.report.csv_columns import NumberColumn, TextColumn, csv_parts
 
 
 @pytest.mark.parametrize("rows", [0, 1, 7, 1000])
@@ -24,13 +24,13 @@ def test_it_is_what_the_csv_module_writes(rows):
 
     def columns(part):
         return [
-            Numbers("line", np.arange(rows)[part] + 1.0),
-            Numbers("x_mm", small[part], 6),
-            Words("kind", codes[part], words),
-            Numbers("large", large[part], 9),
-            Numbers("one", np.full(rows, -2.5)[part], 3),
-            Numbers("none", none[part], 3),
-            Numbers("bound", np.where(small > 0, np.inf, -np.inf)[part], 3),
+            NumberColumn("line", np.arange(rows)[part] + 1.0),
+            NumberColumn("x_mm", small[part], 6),
+            TextColumn("kind", codes[part], words),
+            NumberColumn("large", large[part], 9),
+            NumberColumn("one", np.full(rows, -2.5)[part], 3),
+            NumberColumn("none", none[part], 3),
+            NumberColumn("bound", np.where(small > 0, np.inf, -np.inf)[part], 3),
         ]
 
     made = b"".join(csv_parts(columns, rows, 300))  # several parts

@@ -11,17 +11,22 @@ from ways_at_work import FORCE as PUSH
 from ways_at_work import circle, corner, line
 from ways_at_work import task as at_points
 
-from postproc.compensation.between import LITTLE, SHARES, SHORT, Pieces, errors_between
+from postproc.base.geometry import Poses, rotation_from_vector
+from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.correct import correct, with_residual
-from postproc.compensation.division import Limits, divide, made
-from postproc.compensation.doubt import Unsure, _ForceShare, half_widths, length_quantile
-from postproc.compensation.limits import limits
-from postproc.compensation.mirror import difference, predict
-from postproc.compensation.ways import begins
-from postproc.forces import Wrenches
-from postproc.geometry import Poses, rotation_from_vector
+from postproc.compensation.desired_path import start_poses
+from postproc.compensation.mirror import pose_error, predict
+from postproc.compensation.path_error import LITTLE, SHARES, SHORT, PathSegments, path_errors
+from postproc.compensation.subdivision import Limits, subdivide, subdivided_motions
+from postproc.compensation.uncertainty import (
+    ForceUncertainty,
+    UncertainInput,
+    expanded_uncertainty,
+    length_quantile,
+)
 from postproc.model import NOTHING
-from postproc.robot.track import follow
+from postproc.process import Wrenches
+from postproc.robot.axis_track import follow_axes
 from postproc.toolpath import Kind
 
 FREE = Limits(max_growth=100.0)
@@ -53,10 +58,10 @@ def test_iterations_are_the_steps_of_the_history(process):
 Z, NONE = np.array([0.0, 0.0, 1.0]), np.full(3, np.nan)
 SAID = {
     "any orientation": {},
-    "no orientation": {"oriented": np.zeros(9, bool)},
-    "free about z": {"free_axis": np.tile(Z, (9, 1))},
-    "one free about z": {"free_axis": np.where(np.arange(9)[:, None] == 2, Z, NONE)},
-    "one not oriented": {"oriented": np.arange(9) != 6},
+    "no orientation": {"orientation_programmed": np.zeros(9, bool)},
+    "free about z": {"redundant_axis": np.tile(Z, (9, 1))},
+    "one free about z": {"redundant_axis": np.where(np.arange(9)[:, None] == 2, Z, NONE)},
+    "one not oriented": {"orientation_programmed": np.arange(9) != 6},
 }
 
 
@@ -78,8 +83,8 @@ def test_what_is_left_is_what_the_robot_does_with_the_commands(said, gain):
         job.track.q[rows],
     ).pose
     wanted = job.wanted[rows]
-    shift, turn = difference(there, wanted)
-    free = np.nan_to_num(job.toolpath.free_axis[rows])
+    shift, turn = pose_error(there, wanted)
+    free = np.nan_to_num(job.toolpath.redundant_axis[rows])
     axis = (wanted.rotation @ free[..., None])[..., 0]
     shows = turn - np.sum(turn * axis, axis=1)[:, None] * axis
     np.testing.assert_allclose(result.after[rows], np.linalg.norm(shift, axis=1), atol=1e-9)
@@ -95,8 +100,11 @@ def test_commands_turn_only_as_the_text_can_say(said):
     job = task(**SAID[said])
     result = correct(job)
     rows = np.flatnonzero(result.corrected)
-    _, turn = difference(result.command[rows], job.wanted[rows])
-    oriented, free = job.toolpath.oriented[rows], np.nan_to_num(job.toolpath.free_axis[rows])
+    _, turn = pose_error(result.command[rows], job.wanted[rows])
+    oriented, free = (
+        job.toolpath.orientation_programmed[rows],
+        np.nan_to_num(job.toolpath.redundant_axis[rows]),
+    )
     assert np.linalg.norm(turn[~oriented], axis=1).max(initial=0.0) == 0.0
     whole = oriented & ~free.any(axis=1)
     assert (np.linalg.norm(turn[whole], axis=1) > 1e-6).all()
@@ -148,18 +156,7 @@ def test_a_limit_is_told_as_it_is(axis, degrees):
     (told,) = [f for f in correct(job).findings if f.code == "KIN002"]
     low, high = np.degrees(job.model.robot.limits[axis])
     name = job.model.robot.joints[axis].name
-    assert told.message == f"{name} at {degrees:.1f} deg, limits {low:g} .. {high:g} deg"
-    assert told.line == job.toolpath.line[2]
-
-
-def test_the_largest_rounding_of_those_that_count_is_told():
-    """Points that are not corrected, or rounded by less than they move, are none of them."""
-    blend = np.array([9e-3, 1e-5, 3e-3, np.nan, 8e-3, 4e-3, 1e-5, 0.0, 7e-3])
-    job = task(blend=blend)
-    result = correct(job)
-    found = limits(job, result, divide(job, result, Limits(keep=True)))[0]
-    (told,) = [f for f in found if f.code == "COR015"]
-    assert told.message.startswith("3 corrected points are approximated by up to 4 mm,")
+    assert told.message == f"{name} is at {degrees:.1f} deg, beyond its limits {low:g} .. {high:g} deg"
     assert told.line == job.toolpath.line[2]
 
 
@@ -173,11 +170,11 @@ def lines(lengths, tilts=None):
     n = len(lengths)
     rows, first = np.full(n, 2), np.linspace(0.1, 0.6, n)
     last = first + np.asarray(lengths) / 0.8
-    begin, end = job.ways.at(rows, first), job.ways.at(rows, last)
+    begin, end = job.desired_path.at(rows, first), job.desired_path.at(rows, last)
     if tilts is not None:
         turn = rotation_from_vector(np.outer(tilts, [1.0, 0.0, 0.0]))
         end = Poses(turn @ end.rotation, end.position)
-    return job, Pieces.straight(rows, first, last, begin, end)
+    return job, PathSegments.straight(rows, first, last, begin, end)
 
 
 def looked_at(job, pieces, shares):
@@ -186,9 +183,9 @@ def looked_at(job, pieces, shares):
     for share in shares:
         along = pieces.first + share * (pieces.last - pieces.first)
         here = pieces.at(np.full(len(pieces), share))
-        real = job.real(pieces.rows, here, job.force.along(pieces.rows, along)).pose
-        shift = real.position - job.goal(pieces.rows, job.ways.at(pieces.rows, along)).position
-        way = job.ways.tangent(pieces.rows, along)
+        real = job.simulated(pieces.rows, here, job.force.along(pieces.rows, along)).pose
+        shift = real.position - job.goal(pieces.rows, job.desired_path.at(pieces.rows, along)).position
+        way = job.desired_path.tangent(pieces.rows, along)
         shift -= np.sum(shift * way, axis=1, keepdims=True) * way
         worst = np.maximum(worst, np.linalg.norm(shift, axis=1))
     return worst
@@ -196,12 +193,12 @@ def looked_at(job, pieces, shares):
 
 def test_long_pieces_are_looked_at_in_three_places_and_short_ones_in_the_middle():
     job, pieces = lines([0.9 * SHORT, 1.1 * SHORT, 0.2, 0.9 * SHORT], [0.0, 0.0, 0.0, 1.1 * LITTLE])
-    off, _ = errors_between(job, pieces)
+    off, _ = path_errors(job, pieces)
     long = np.array([False, True, True, True])
     middle, three = looked_at(job, pieces, [0.5]), looked_at(job, pieces, SHARES)
     assert (three > middle + 1e-9).all()
     np.testing.assert_allclose(off, np.where(long, three, middle), atol=2e-9)
-    begins, _ = errors_between(job, pieces, np.array([True, False, False, True]))
+    begins, _ = path_errors(job, pieces, np.array([True, False, False, True]))
     first = np.maximum(off, looked_at(job, pieces, [0.0]))
     np.testing.assert_allclose(begins, np.where([True, False, False, True], first, off), atol=2e-9)
 
@@ -210,8 +207,8 @@ def test_the_angle_between_is_that_from_the_wanted_orientation():
     """Pieces that turn away, evenly: a quarter, a half, three quarters of it show."""
     tilts = np.array([0.0, 0.5 * LITTLE, 2 * LITTLE])
     job, pieces = lines([0.01, 0.01, 0.01], tilts)
-    _, angle = errors_between(job, pieces)
-    _, still = errors_between(job, lines([0.01, 0.01, 0.01])[1])
+    _, angle = path_errors(job, pieces)
+    _, still = path_errors(job, lines([0.01, 0.01, 0.01])[1])
     shares = np.array([0.5, 0.5, 0.75])
     assert np.abs(angle - shares * tilts).max() <= still.max() + 1e-6
 
@@ -221,15 +218,15 @@ def test_pieces_of_an_arc_go_on_from_each_other_the_way_it_turns(sweep):
     """Their sweeps sum up to that of the arc, and none turns back."""
     job = circle(sweep=sweep)
     result = correct(job)
-    division = divide(job, result, FREE)
-    own = np.flatnonzero((division.source == 2) & ~division.links)
+    division = subdivide(job, result, FREE)
+    own = np.flatnonzero((division.source == 2) & ~division.transitions)
     assert len(own) > 1
     assert (division.sweep[own] > 0).all()
     assert division.sweep[own].sum() == pytest.approx(sweep, abs=5e-3)
-    pieces = made(job, division, own)
-    np.testing.assert_allclose(pieces.begin.position[1:], pieces.end.position[:-1], atol=1e-12)
+    pieces = subdivided_motions(job, division, own)
+    np.testing.assert_allclose(pieces.start.position[1:], pieces.end.position[:-1], atol=1e-12)
     np.testing.assert_allclose(np.diff(pieces.last), pieces.last[0], atol=1e-12)
-    assert errors_between(job, pieces)[0].max() <= job.tolerance
+    assert path_errors(job, pieces)[0].max() <= job.tolerance
 
 
 @pytest.mark.parametrize("growth", [1.0, 1.5, 2.0, 3.0, 5.0])
@@ -237,7 +234,7 @@ def test_never_more_motions_than_may_be(growth):
     """What is inserted stays within the limit, and it is told exactly where that leaves some with fewer."""
     job = line(tolerance=2e-6)
     result = correct(job)
-    whole, some = divide(job, result, FREE), divide(job, result, Limits(max_growth=growth))
+    whole, some = subdivide(job, result, FREE), subdivide(job, result, Limits(max_growth=growth))
     assert len(some) <= growth * len(job.toolpath)
     fewer = len(some) < len(whole)
     told = [finding for finding in some.findings if finding.code == "COR014"]
@@ -275,22 +272,22 @@ def test_an_error_of_zero_has_the_doubt_of_its_deviation():
     spread = root @ np.swapaxes(root, 1, 2)
     error = np.zeros((5, 3))
     error[3:] = rng.normal(size=(2, 3))
-    found = half_widths(error, spread)
+    found = expanded_uncertainty(error, spread)
     np.testing.assert_array_equal(found[:3], length_quantile(spread)[:3])
     unit = error[3:] / np.linalg.norm(error[3:], axis=1)[:, None]
     along = np.sqrt(np.einsum("ni,nij,nj->n", unit, spread[3:], unit))
     np.testing.assert_allclose(found[3:], 1.959964 * along, rtol=1e-4)
-    np.testing.assert_allclose(half_widths(2 * error[3:], spread[3:]), found[3:], rtol=1e-12)
+    np.testing.assert_allclose(expanded_uncertainty(2 * error[3:], spread[3:]), found[3:], rtol=1e-12)
 
 
 def test_only_the_force_counts_with_the_interval_of_each_motion():
     """Parameters are as uncertain in one motion as in another, the first effect's as the last one's."""
     moves = np.random.default_rng(41).normal(size=(4, 3, 4))
-    entries = [Unsure(str(i), i, "c", 1.0, 0.0, 2.0, 0.1) for i in (0, 1, 2)]
-    entries.append(Unsure("force", -1, "force", 1.0, -np.inf, np.inf, 0.1))
+    entries = [UncertainInput(str(i), i, "c", 1.0, 0.0, 2.0, 0.1) for i in (0, 1, 2)]
+    entries.append(UncertainInput("force", -1, "force", 1.0, -np.inf, np.inf, 0.1))
     scale = np.array([0.0, 0.25, 0.5, 0.75, 1.0, 1.0])
     rows = np.array([1, 3, 4, 0])
-    found = _ForceShare(0.2, scale, False, True).scaled(moves, entries, rows)
+    found = ForceUncertainty(0.2, scale, False, True).scaled(moves, entries, rows)
     np.testing.assert_array_equal(found[:, :, :3], moves[:, :, :3])
     np.testing.assert_allclose(found[:, :, 3], scale[rows][:, None] * moves[:, :, 3])
 
@@ -309,7 +306,7 @@ def test_a_motion_begins_where_the_one_before_ended_with_its_own_tool(tools):
         np.concatenate([frames[t].position for t in tools]),
     )
     path = replace(job.toolpath, tool=np.array(tools))
-    begin = begins(job.wanted, path, tool, job.model.robot, job.track)[np.arange(4)]
+    begin = start_poses(job.wanted, path, tool, job.model.robot, job.track)[np.arange(4)]
     for row in range(1, 4):
         flange = job.wanted[row - 1 : row] @ tool[row - 1 : row].inverse()
         there = flange @ tool[row : row + 1]
@@ -323,9 +320,9 @@ def test_a_way_without_its_link_is_not_divided(growth):
     """It begins beside its place, in however many pieces; links come before points."""
     job = corner(tolerance=1e-6)
     result = correct(job)
-    whole, some = divide(job, result, FREE), divide(job, result, Limits(max_growth=growth))
-    wanted = set(whole.source[whole.links].tolist())
-    given = set(some.source[some.links].tolist())
+    whole, some = subdivide(job, result, FREE), subdivide(job, result, Limits(max_growth=growth))
+    wanted = set(whole.source[whole.transitions].tolist())
+    given = set(some.source[some.transitions].tolist())
     assert given <= wanted
     for row in wanted - given:
         assert np.count_nonzero(some.source == row) == 1
@@ -340,6 +337,7 @@ def three_lines(**words):
     return at_points(points, [False, False, True, True, True, False], **words)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("growth", [1.0, 1.17, 1.34, 1.5, 1.67, 1.84, 2.0, 2.5])
 def test_what_may_be_inserted_is_and_where_most_is_left(growth):
     """All of what is allowed, or all that is wanted; the way that errs most gets its points before the others."""
@@ -347,11 +345,11 @@ def test_what_may_be_inserted_is_and_where_most_is_left(growth):
     n = len(job.toolpath)
     result = correct(job)
     wanted, some = (
-        divide(job, result, Limits(max_growth=50.0)),
-        divide(job, result, Limits(max_growth=growth)),
+        subdivide(job, result, Limits(max_growth=50.0)),
+        subdivide(job, result, Limits(max_growth=growth)),
     )
-    full, got = (np.bincount(d.source[~d.links], minlength=n) - 1 for d in (wanted, some))
-    links = int(wanted.links.sum())
+    full, got = (np.bincount(d.source[~d.transitions], minlength=n) - 1 for d in (wanted, some))
+    links = int(wanted.transitions.sum())
     spare = int(growth * n) - n
     assert len(some) == min(n + spare, len(wanted))
     order = [3, 4, 2]  # the error between two points grows with the square of their distance
@@ -362,7 +360,7 @@ def test_what_may_be_inserted_is_and_where_most_is_left(growth):
 
 
 def test_limits_that_nobody_stated():
-    assert Limits() == Limits(keep=False, min_segment=1e-3, max_growth=2.0)
+    assert Limits() == Limits(no_insert=False, min_segment=1e-3, max_growth=2.0)
 
 
 def test_a_posture_that_becomes_singular_is_told_at_its_line():
@@ -372,22 +370,22 @@ def test_a_posture_that_becomes_singular_is_told_at_its_line():
     q[:, 4] = np.arcsin(0.02) + 1e-5
     wanted = job.model.chain.flange(q) @ job.tool[0:1]
     path = replace(job.toolpath, position=wanted.position, rotation=wanted.rotation)
-    track = follow(job.model.robot, path, wanted @ job.tool[0:1].inverse(), q[0])
+    track = follow_axes(job.model.robot, path, wanted @ job.tool[0:1].inverse(), q[0])
     lines = []
     for sense in (1, -1):
         near = replace(line(wrench=sense * PUSH), wanted=wanted, toolpath=path, track=track)
         result = correct(near)
-        found = limits(near, result, divide(near, result, Limits(keep=True)))[0]
+        found = check_limits(near, subdivide(near, result, Limits(no_insert=True)))[0]
         lines += [finding.line for finding in found if finding.code == "KIN003"]
     assert lines == [path.line[2]]
 
 
 def test_a_way_that_is_not_known_has_no_length():
-    ways = line().ways
-    assert not ways.known[0]  # nothing says where the first motion begins
-    assert ways.known.any()
-    assert (ways.length[~ways.known] == 0).all()
-    assert (ways.length[ways.known] > 0).all()
+    ways = line().desired_path
+    assert not ways.traceable[0]  # nothing says where the first motion begins
+    assert ways.traceable.any()
+    assert (ways.length[~ways.traceable] == 0).all()
+    assert (ways.length[ways.traceable] > 0).all()
 
 
 @pytest.mark.parametrize("tools", [[0, 0], [0, 1], [1, 0]])
@@ -403,15 +401,15 @@ def test_a_correction_begins_anew_behind_another_tool(tools):
 def test_half_a_correction_is_half_of_it_on_the_way_of_an_arc_too():
     """In the middle of each arc the command lies half as far from the wanted way."""
     whole, half = (circle(gain=gain) for gain in (1.0, 0.5))
-    divisions = [divide(task, correct(task), FREE) for task in (whole, half)]
+    divisions = [subdivide(task, correct(task), FREE) for task in (whole, half)]
     assert np.array_equal(divisions[0].role, divisions[1].role)
     arcs = np.flatnonzero(np.isfinite(divisions[0].sweep))
     assert len(arcs) > 1
     away = []
     for cut, division in zip((whole, half), divisions, strict=True):
-        pieces = made(cut, division, arcs)
+        pieces = subdivided_motions(cut, division, arcs)
         middle = pieces.at(np.full(len(arcs), 0.5)).position
-        wanted = cut.ways.at(pieces.rows, 0.5 * (pieces.first + pieces.last)).position
+        wanted = cut.desired_path.at(pieces.rows, 0.5 * (pieces.first + pieces.last)).position
         away.append(middle - wanted)
     size = np.linalg.norm(away[0], axis=1)
     assert size.min() > 1e-4

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from test_mirror import ALL, CARRIES, FIRST_LEFT, A, C, full, program_angles, switch, task
 
-import postproc.blocks
-from postproc.compensation.correct import State, correct
-from postproc.compensation.task import Task
-from postproc.findings import Finding, Refusal
-from postproc.geometry import Poses
+import postproc.base.batches
+from postproc.base.findings import CODES, Finding, Refusal
+from postproc.base.geometry import Poses
+from postproc.compensation.correct import MotionOutcome, correct
+from postproc.compensation.problem import CompensationProblem
 from postproc.toolpath import Kind
 
-LEFT, OFF = State.LEFT, State.OFF
+LEFT, OFF = MotionOutcome.UNCORRECTED, MotionOutcome.OFF
 SECOND_LEFT = [A, C, C, C, A, LEFT, LEFT, LEFT, A]
 BOTH_LEFT = [A, LEFT, LEFT, LEFT, A, LEFT, LEFT, LEFT, A]
 
@@ -26,11 +26,13 @@ def words(result):
 
 
 def cut_left(first, last, reason, help=""):
+    """What is told of a cut; the help is that of the reason, or of the reason's code."""
+    code = reason.split(": ")[1][:6]
     return (
         "COR003",
         first,
-        f"the cut of lines {first} to {last} (3 motions) is left as it was; {reason}",
-        help,
+        f"the cut of lines {first} to {last} (3 motions) is not corrected; {reason}",
+        help or CODES[code].action,
     )
 
 
@@ -94,19 +96,19 @@ ONE, OTHER = Finding("KRL007", "one", help="do this"), Finding("KRL008", "other"
     ],
 )
 def test_motions_that_their_text_holds(pinned, refused, told):
-    result = correct(task(pinned=pinned, refused=refused))
+    result = correct(task(locked=pinned, refused=refused))
     assert words(result) == ([cut_left(*FIRST, *told)] if told else [])
 
 
 def test_axes_beyond_their_limits():
-    limits = "limits -185 .. 185 deg"
+    limits = "beyond its limits -185 .. 185 deg"
     result = correct(standing(_2=185.54))
     assert result.state.tolist() == FIRST_LEFT
-    words_ = f"A1 at 185.5 deg, {limits}"
+    words_ = f"A1 is at 185.5 deg, {limits}"
     assert words(result) == [("KIN002", 12, words_, ""), cut_left(*FIRST, f"line 12: KIN002 {words_}")]
     result = correct(standing(_3=-186.0, _6=188.0))
     assert result.state.tolist() == BOTH_LEFT
-    words_ = f"A1 at -186.0 deg, {limits}"
+    words_ = f"A1 is at -186.0 deg, {limits}"
     assert words(result) == [
         ("KIN002", 13, words_ + " (2 motions, to line 16)", ""),
         cut_left(*FIRST, f"line 13: KIN002 {words_}"),
@@ -115,19 +117,19 @@ def test_axes_beyond_their_limits():
     # in air they are told and hinder nothing
     result = correct(standing(_4=187.0))
     assert result.state.tolist() == ALL
-    assert words(result) == [("KIN005", 14, f"A1 at 187.0 deg, {limits}", "")]
+    assert words(result) == [("KIN005", 14, f"A1 is at 187.0 deg, {limits}", "")]
     result = correct(standing(_0=187.0, _8=186.0))
-    assert words(result) == [("KIN005", 10, f"A1 at 187.0 deg, {limits} (2 motions, to line 18)", "")]
+    assert words(result) == [("KIN005", 10, f"A1 is at 187.0 deg, {limits} (2 motions, to line 18)", "")]
 
 
 def test_the_axis_that_is_farthest_beyond_is_told():
     q = program_angles()
     q[1] = np.radians([186.0, 2.5, 110.0, 10.0, 127.0, 352.25])
     for axis, said in (
-        (1, "A2 at 2.5 deg, limits -146 .. 0 deg"),
-        (5, "A6 at 352.2 deg, limits -350 .. 350 deg"),
-        (4, "A5 at 127.0 deg, limits -125 .. 125 deg"),
-        (0, "A1 at 186.0 deg, limits -185 .. 185 deg"),
+        (1, "A2 is at 2.5 deg, beyond its limits -146 .. 0 deg"),
+        (5, "A6 is at 352.2 deg, beyond its limits -350 .. 350 deg"),
+        (4, "A5 is at 127.0 deg, beyond its limits -125 .. 125 deg"),
+        (0, "A1 is at 186.0 deg, beyond its limits -185 .. 185 deg"),
     ):
         job = task(program_angles(), max_correction=1.0)
         job = replace(job, track=replace(job.track, q=q, within=np.arange(9) != 1))
@@ -143,11 +145,11 @@ def test_poses_out_of_reach():
     result = correct(far(0, 4, process=False))
     assert result.state.tolist() == [LEFT, C, C, C, LEFT, C, C, C, C]
     assert result.cut.tolist() == [0, 1, 1, 1, 2, 3, 3, 3, 4]
-    single = "the cut of lines {0} to {0} (1 motions) is left as it was; line {0}: KIN005 " + said
+    single = "the cut of lines {0} to {0} (1 motions) is not corrected; line {0}: KIN005 " + said
     assert words(result) == [
         ("KIN005", 10, said + " (2 motions, to line 14)", ""),
-        ("COR003", 10, single.format(10), ""),
-        ("COR003", 14, single.format(14), ""),
+        ("COR003", 10, single.format(10), CODES["KIN005"].action),
+        ("COR003", 14, single.format(14), CODES["KIN005"].action),
     ]
     for row in (1, 2, 5, 7):
         assert refusal(far(row)) == (
@@ -173,7 +175,7 @@ def refusal(job):
 
 def test_a_configuration_that_is_not_known():
     said = "the robot's configuration is not known here"
-    help_ = "give `start:` (axes before the first motion) in the cell, or S and T with the PTP before it"
+    help_ = "add `start:` (axes before the first motion) to the cell, or state S and T in the PTP before it"
     assert refusal(task(start=False)) == ("KIN004", 11, said + " (6 motions, to line 17)", help_)
     job = task(start=False, axes={4: program_angles()[4]})
     assert refusal(job) == ("KIN004", 11, said + " (3 motions, to line 13)", help_)
@@ -192,8 +194,8 @@ def test_a_correction_that_is_too_large():
         assert refusal(replace(job, max_correction=limit)) == (
             "COR002",
             10 + above[0],
-            f"the correction is {1e3 * size.max():.2f} mm, more than max_correction ({1e3 * limit:g} mm){more}",
-            "check force, base and tool; if it is meant, raise max_correction in the cell",
+            f"the correction is {1e3 * size.max():.2f} mm, which exceeds max_correction ({1e3 * limit:g} mm){more}",
+            "check force, base and tool; raise max_correction in the cell if the correction is intended",
         )
     assert not correct(replace(job, max_correction=(1 + 1e-5) * size.max())).findings
     half = replace(job, gain=0.5, max_correction=0.50001 * size.max())
@@ -227,7 +229,7 @@ def test_a_comment_that_is_no_switch_is_told():
     result = correct(task(annotations=switch((2, "COMPENSATE MAYBE"))))
     assert result.state.tolist() == ALL
     assert words(result) == [
-        ("COR011", 12, "'COMPENSATE MAYBE' is neither COMPENSATE OFF nor COMPENSATE ON; it was not used", "")
+        ("COR011", 12, "'COMPENSATE MAYBE' is neither COMPENSATE OFF nor COMPENSATE ON; it is ignored", "")
     ]
 
 
@@ -235,7 +237,7 @@ def test_a_comment_that_is_no_switch_is_told():
 
 
 @dataclass(frozen=True)
-class Made(Task):
+class Made(CompensationProblem):
     """A task of which some corrections end as they are told to: row -> what is false, the angle of axis 1 [deg] or of
     another, or which limit axis 1 is at."""
 
@@ -258,23 +260,27 @@ class Made(Task):
 
 def made(ends, **more):
     job = task(**more)
-    return Made(**{one.name: getattr(job, one.name) for one in fields(Task)}, ends=ends)
+    return Made(**{one.name: getattr(job, one.name) for one in fields(CompensationProblem)}, ends=ends)
 
 
 REACH, REST, SETTLE = (
-    ("COR009", "the correction leads out of reach"),
-    ("MOD002", "the robot has no stable rest under this force"),
-    ("COR001", "the correction does not settle"),
+    ("COR009", "the corrected pose is out of reach"),
+    ("MOD002", "the robot has no equilibrium under this force"),
+    ("COR001", "the correction does not converge"),
 )
 
 
 def beyond(angle):
-    return ("COR008", f"the correction brings A1 at {angle} deg, limits -185 .. 185 deg")
+    return (
+        "COR008",
+        f"the corrected pose exceeds the limits: A1 is at {angle} deg, beyond its limits -185 .. 185 deg",
+    )
 
 
 U, S, N = ("reachable", "converged"), ("settled", "converged"), ("converged",)
 
 
+@pytest.mark.sample(16)
 @pytest.mark.parametrize(
     ("ends", "told", "reasons"),
     [
@@ -312,7 +318,7 @@ U, S, N = ("reachable", "converged"), ("settled", "converged"), ("converged",)
 )
 @pytest.mark.parametrize("size", [1, 2, 4, 100])
 def test_corrections_that_do_not_end_well(monkeypatch, size, ends, told, reasons):
-    monkeypatch.setattr(postproc.blocks, "ROWS", size)
+    monkeypatch.setattr(postproc.base.batches, "ROWS", size)
     result = correct(made(ends))
     expected = [(code, line, message + more, "") for (code, message), line, more in told]
     for cut, (line, (code, message)) in reasons.items():
@@ -330,7 +336,7 @@ def test_corrections_that_do_not_end_well(monkeypatch, size, ends, told, reasons
     assert (np.linalg.norm(result.correction[result.state == C], axis=1) > 1e-4).all()
 
 
-SIDES = "the corrected pose crosses the side that S or T states"
+SIDES = "the target has a Status/Turn mismatch: the corrected pose is on the other side of an axis angle"
 KINDS = [Kind.LIN, Kind.PTP, Kind.PTP, Kind.LIN, Kind.LIN, Kind.PTP, Kind.LIN, Kind.PTP, Kind.LIN]
 STATED = {"kind": KINDS, "status": 2, "turn": 2, "max_correction": 10.0}
 
@@ -426,6 +432,6 @@ def test_cuts_of_an_absolute_correction():
 
 def test_motions_that_do_not_follow_are_another_cut():
     runs = np.arange(9) < 3
-    result = correct(task(runs=runs, refused={2: ONE}))
+    result = correct(task(executes=runs, refused={2: ONE}))
     assert result.cut.tolist() == [-1, 0, 0, 1, -1, 2, 2, 2, -1]
     assert result.state.tolist() == [A, LEFT, LEFT, C, A, C, C, C, A]

@@ -9,14 +9,14 @@ from functools import partial
 
 import numpy as np
 import pytest
-from conftest import CELL, LINES
+from conftest import CELL, JUMPED_LINES
 
-from postproc.compensation.correct import State, correct
-from postproc.compensation.division import Limits, divide
-from postproc.geometry import abc_from_rotation, rotation_from_vector
-from postproc.report import files
-from postproc.report.columns import csv_parts
-from postproc.report.files import corrections_csv
+from postproc.base.geometry import abc_from_rotation, rotation_from_vector
+from postproc.compensation.correct import MotionOutcome, correct
+from postproc.compensation.subdivision import Limits, subdivide
+from postproc.report import corrections_csv as files
+from postproc.report.corrections_csv import corrections_csv
+from postproc.report.csv_columns import csv_parts
 from postproc.toolpath import Kind, Role
 from postproc.workflows.preparation import Request, prepare
 
@@ -29,10 +29,10 @@ def done(tmp_path_factory):
     assert base in CELL
     cell = CELL.replace(base, base.replace("a: 0", "a: 25").replace("c: 0", "c: 3"))
     (folder / "cell.yaml").write_text(cell.replace("tolerance: 0.02", "tolerance: 0.0005"))
-    (folder / "part.src").write_text("\n".join(LINES) + "\n")
+    (folder / "part.src").write_text("\n".join(JUMPED_LINES) + "\n")
     task = prepare(Request(folder / "part.src", force="")).task
     result = correct(task)
-    division = divide(task, result, Limits(min_segment=1e-3, max_growth=50.0))
+    division = subdivide(task, result, Limits(min_segment=1e-3, max_growth=50.0))
     way = np.random.default_rng(5).random(len(division)) * 1e-5
     way[::3] = np.nan
     return task, result, division, way
@@ -53,14 +53,17 @@ def test_a_row_tells_where_the_motion_is_what_bends_it_and_what_corrects_it(done
     task, result, _, _ = done
     table, path = rows_of(corrections_csv(task, result)), task.toolpath
     assert len(table) == len(path)
-    assert (result.state == State.CORRECTED).sum() == 5
+    assert (result.state == MotionOutcome.CORRECTED).sum() == 5
 
     def values(row, names):
         return np.array([float(row[name] or "nan") for name in names.split()])
 
     for k, row in enumerate(table):
         assert row["line"] == str(path.line[k])
-        assert (row["kind"], row["state"]) == (Kind(path.kind[k]).name, State(result.state[k]).name.lower())
+        assert (row["kind"], row["state"]) == (
+            Kind(path.kind[k]).name,
+            MotionOutcome(result.state[k]).name.lower(),
+        )
         assert row["cut"] == ("" if result.cut[k] < 0 else str(result.cut[k] + 1))
         back = task.base[k].rotation.T
         near = partial(np.testing.assert_allclose, rtol=0, atol=5.1e-7, equal_nan=True)
@@ -90,15 +93,15 @@ def test_a_row_tells_where_the_motion_is_what_bends_it_and_what_corrects_it(done
 def test_a_row_counts_what_was_inserted_and_tells_the_largest_error_on_the_way(done):
     task, result, division, way = done
     table = rows_of(corrections_csv(task, result, division, way))
-    assert {Role.OWN, Role.LINK, Role.PIECE} == set(division.role)
+    assert {Role.ORIGINAL, Role.TRANSITION, Role.INTERMEDIATE} == set(division.role)
     assert division.inserted > 5
     for k, row in enumerate(table):
         own = division.source == k
-        assert int(row["links"]) == (own & (division.role == Role.LINK)).sum()
-        assert int(row["points"]) == (own & (division.role == Role.PIECE)).sum()
+        assert int(row["transition_moves"]) == (own & (division.role == Role.TRANSITION)).sum()
+        assert int(row["intermediate_points"]) == (own & (division.role == Role.INTERMEDIATE)).sum()
         known = own & np.isfinite(way)
         largest = f"{way[known].max() * 1e3:.6f}" if known.any() else ""
-        assert row["error_way_mm"] == largest
+        assert row["path_error_mm"] == largest
 
 
 def test_what_is_not_finite_is_empty(done):

@@ -9,9 +9,15 @@ import numpy as np
 import pytest
 from motions import motions
 
-from postproc.compensation.cuts import cuts_of, left_findings, spread, switch_findings, switched_on
-from postproc.findings import Finding
-from postproc.geometry import Poses
+from postproc.base.findings import CODES, Finding
+from postproc.base.geometry import Poses
+from postproc.compensation.cuts import (
+    feed_motions,
+    number_cuts,
+    spread_over_cuts,
+    switch_findings,
+    uncorrected_findings,
+)
 from postproc.toolpath import Annotation
 
 
@@ -34,9 +40,9 @@ def numbered(scope, runs):
 @pytest.mark.parametrize("count", [0, 1, 2, 3, 4])
 def test_a_cut_begins_behind_air_and_where_motions_do_not_follow(count):
     for scope in product([False, True], repeat=count):
-        assert cuts_of(np.array(scope, bool)).tolist() == numbered(scope, [True] * count)
+        assert number_cuts(np.array(scope, bool)).tolist() == numbered(scope, [True] * count)
         for runs in product([False, True], repeat=count):
-            assert cuts_of(np.array(scope, bool), np.array(runs, bool)).tolist() == numbered(scope, runs)
+            assert number_cuts(np.array(scope, bool), np.array(runs, bool)).tolist() == numbered(scope, runs)
 
 
 CUTS = [0, 0, -1, 1, -1, -1, 2, 3, 3, -1]
@@ -49,13 +55,13 @@ def test_what_is_blocked_blocks_its_cut(blocked):
     mask = np.zeros(10, bool)
     mask[list(blocked)] = True
     struck = {CUTS[row] for row in blocked} - {-1}
-    found = spread(mask, np.array(CUTS))
+    found = spread_over_cuts(mask, np.array(CUTS))
     assert found.dtype == bool
     assert found.tolist() == [cut in struck for cut in CUTS]
 
 
 def test_of_air_alone_nothing_is_blocked():
-    assert spread(np.array([True, True]), np.array([-1, -1])).tolist() == [False, False]
+    assert spread_over_cuts(np.array([True, True]), np.array([-1, -1])).tolist() == [False, False]
 
 
 SWITCHES = [
@@ -75,7 +81,7 @@ SWITCHES = [
 @pytest.mark.parametrize(("notes", "on"), SWITCHES)
 def test_a_switch_holds_from_its_motion_on(notes, on):
     path = path_of(5, tuple(Annotation(row, text, 10 + row) for row, text in notes))
-    assert "".join("01"[value] for value in switched_on(path).tolist()) == on
+    assert "".join("01"[value] for value in feed_motions(path).tolist()) == on
 
 
 def test_what_begins_like_a_switch_and_is_none_is_told():
@@ -90,7 +96,7 @@ def test_what_begins_like_a_switch_and_is_none_is_told():
         long,
     ]
     path = path_of(3, tuple(Annotation(1, text, 30 + k) for k, text in enumerate(texts)))
-    words = "is neither COMPENSATE OFF nor COMPENSATE ON; it was not used"
+    words = "is neither COMPENSATE OFF nor COMPENSATE ON; it is ignored"
     assert switch_findings("part.src", path) == [
         Finding("COR011", f"'compensate maybe' {words}", "part.src", 31),
         Finding("COR011", f"'COMPENSATE ONE' {words}", "part.src", 34),
@@ -102,7 +108,7 @@ LINES = [10, 11, 12, 20, 21, 22, 30, 31, 33, 40]
 
 
 def left(why, cut=CUTS, lines=LINES):
-    found = left_findings("part.src", path_of(len(cut), lines=lines), np.array(cut), why)
+    found = uncorrected_findings("part.src", path_of(len(cut), lines=lines), np.array(cut), why)
     assert all(one.file == "part.src" for one in found)
     return [(one.code, one.message, one.line, one.help) for one in found]
 
@@ -111,8 +117,8 @@ ONE, TWO = (
     Finding("KRL007", "serves several places", help="copy the point"),
     Finding("KIN002", "A1 is beyond"),
 )
-FIRST = "the cut of lines 10 to 11 (2 motions) is left as it was; "
-FOURTH = "the cut of lines 31 to 33 (2 motions) is left as it was; "
+FIRST = "the cut of lines 10 to 11 (2 motions) is not corrected; "
+FOURTH = "the cut of lines 31 to 33 (2 motions) is not corrected; "
 
 
 @pytest.mark.parametrize(
@@ -122,12 +128,12 @@ FOURTH = "the cut of lines 31 to 33 (2 motions) is left as it was; "
         ({2: ONE}, []),  # in air
         ({0: ONE}, [(FIRST + "line 10: KRL007 serves several places", 10, "copy the point")]),
         ({1: TWO, 0: ONE}, [(FIRST + "line 10: KRL007 serves several places", 10, "copy the point")]),
-        ({1: TWO, 2: ONE}, [(FIRST + "line 11: KIN002 A1 is beyond", 10, "")]),
+        ({1: TWO, 2: ONE}, [(FIRST + "line 11: KIN002 A1 is beyond", 10, CODES["KIN002"].action)]),
         (
             {3: ONE},
             [
                 (
-                    "the cut of lines 20 to 20 (1 motions) is left as it was; line 20: KRL007 serves several places",
+                    "the cut of lines 20 to 20 (1 motions) is not corrected; line 20: KRL007 serves several places",
                     20,
                     "copy the point",
                 )
@@ -148,7 +154,7 @@ def test_a_cut_that_is_left_is_told_once_with_its_first_reason(why, told):
 
 def test_a_motion_without_a_line_has_no_place_in_words():
     (told,) = left({1: TWO}, lines=[10, 0, *LINES[2:]])
-    assert told[1] == "the cut of lines 10 to 0 (2 motions) is left as it was; KIN002 A1 is beyond"
+    assert told[1] == "the cut of lines 10 to 0 (2 motions) is not corrected; KIN002 A1 is beyond"
 
 
 def test_cuts_that_lie_apart_in_air_of_an_absolute_correction():

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.decimals import MOST_DECIMALS, fixed, literals
+from postproc.base.decimals import MOST_DECIMALS, fixed, literals
 
 VALUES = st.lists(
     st.tuples(st.floats(-1e7, 1e7) | st.floats(-2, 2), st.integers(0, MOST_DECIMALS), st.booleans()),

@@ -9,33 +9,32 @@ import numpy as np
 import pytest
 from measured import MARKERS, on_markers, plan, robot
 
-from postproc.diagnosis.candidates import candidates, shows
-from postproc.diagnosis.diagnose import diagnose
-from postproc.diagnosis.foils import Foil, foils
-from postproc.diagnosis.growth import grown, whole
-from postproc.diagnosis.screens import where
-from postproc.diagnosis.search import SHARED, _not_imitated, _sharing, own_unknowns, search
-from postproc.diagnosis.selection import price
+from postproc.base.geometry import Poses
+from postproc.diagnosis.candidates import candidates, is_visible
+from postproc.diagnosis.decoys import AlternativeForm, decoys
+from postproc.diagnosis.diagnosis import diagnose
+from postproc.diagnosis.nonlinear_effects import evaluate_at_size, whole
+from postproc.diagnosis.residual_patterns import residual_patterns
+from postproc.diagnosis.search import SHARED, drop_confounded, limit_shared_scatter, model_unknowns, search
+from postproc.diagnosis.selection import complexity_penalty
 from postproc.diagnosis.verdict import (
     BUILT,
     MARGIN,
     OTHER_COURSE,
-    _alternatives,
-    _beyond_telling,
-    _left_out,
-    _of_another_course,
-    judged,
+    ambiguity_set,
+    held_out_gain,
+    is_implausible,
+    judge,
 )
 from postproc.effects import Conditions
 from postproc.effects.thermal_growth import ThermalGrowth
 from postproc.effects.transmission_error import TransmissionError
-from postproc.geometry import Poses
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Estimate, fit
 from postproc.identification.unknowns import asked_for
 from postproc.model import StiffnessModel
 from postproc.robot.description import load_robot
-from postproc.workflows.diagnose import _wild
+from postproc.workflows.diagnose import gross_errors
 
 SIGMA = 2e-5
 SAMPLES = Path(__file__).parent.parent / "samples"
@@ -45,7 +44,7 @@ TOOL = Poses(np.eye(3), np.array([0.0, 0.5, 0.2]))
 @cache
 def stated():
     """The joints' compliance of an arm, c1 not stated: hung weights do not show it."""
-    model = StiffnessModel.from_robot(robot("kuka_kr270")).without(["gravity_compensator"])
+    model = StiffnessModel.from_robot(robot("kuka_kr270")).without_effects(["gravity_compensator"])
     (term,) = model.terms
     return replace(model, terms=(replace(term, stated={k: v for k, v in term.stated.items() if k != "c1"}),))
 
@@ -60,7 +59,7 @@ def campaign_of(model, poses=20, seed=0, shared=0.0, wild=0.0, loads=(2600.0,), 
     rows, wrench, words = on_markers(q, wrench)
     readings = plan(model.robot, rows, wrench, tool=TOOL, sigma=SIGMA, **words, **where)
     campaign = Campaign(readings)
-    value = campaign.expected(campaign.seen(model), campaign.start())[0]
+    value = campaign.expected(campaign.predicted(model), campaign.start())[0]
     size = np.where(rng.random(len(rows)) < wild, 3.0, 1.0)[:, None]
     value = value + SIGMA * size * rng.normal(size=value.shape)
     value += shared * np.repeat(rng.normal(size=(poses, 3)), len(loads) * len(MARKERS), axis=0)
@@ -69,7 +68,7 @@ def campaign_of(model, poses=20, seed=0, shared=0.0, wild=0.0, loads=(2600.0,), 
 
 def fitted(campaign, model=None):
     model = model or stated()
-    return fit(campaign, model, own_unknowns(model))
+    return fit(campaign, model, model_unknowns(model))
 
 
 # What parameters cost
@@ -84,20 +83,20 @@ def test_a_parameter_costs_what_it_would_have_shown():
     for gain in (30.0, 500.0):
         left = np.sqrt(gain) * column[:, 0]
         for scale in (1e-3, 1.0, 1e4):
-            assert price(scale * column, left, 1.0) == pytest.approx(1 + np.log(gain), rel=0.02)
+            assert complexity_penalty(scale * column, left, 1.0) == pytest.approx(1 + np.log(gain), rel=0.02)
 
 
 def test_what_can_not_be_seen_costs_nothing():
     rng = np.random.default_rng(2)
     basis = np.linalg.qr(rng.normal(size=(60, 3)))[0]
     left = 20.0 * basis[:, 0]
-    alone = price(basis[:, :1], left, 1.0)
+    alone = complexity_penalty(basis[:, :1], left, 1.0)
     # beside it two that would have shown as well, and are not there
-    clear = price(basis, left, 1.0)
+    clear = complexity_penalty(basis, left, 1.0)
     assert clear > alone + 2 * 0.9 * np.log(20.0**2) - 3
-    unseen = price(basis * [1.0, 1e-4, 1e-4], left, 1.0)
+    unseen = complexity_penalty(basis * [1.0, 1e-4, 1e-4], left, 1.0)
     assert unseen == pytest.approx(alone, abs=0.01)
-    assert price(0 * basis, left, 1.0) == 0.0
+    assert complexity_penalty(0 * basis, left, 1.0) == 0.0
 
 
 # What does not grow in proportion
@@ -118,9 +117,11 @@ def test_an_effect_is_looked_at_as_large_as_it_is(times):
     asked = asked_for(stated(), ["joint_stiffening.k3"])
     (unknown,) = asked.unknowns
     value = times * unknown.parameter.scale
-    campaign = campaign_of(asked.model.changed({unknown.key: value}), 30, loads=(1200.0, 2600.0))
+    campaign = campaign_of(asked.model.with_values({unknown.key: value}), 30, loads=(1200.0, 2600.0))
     point = fit(campaign, stated(), ()).point
-    large = grown(campaign, point, asked.model, asked.unknowns, lambda c: c.reshape(-1, c.shape[2]) / SIGMA)
+    large = evaluate_at_size(
+        campaign, point, asked.model, asked.unknowns, lambda c: c.reshape(-1, c.shape[2]) / SIGMA
+    )
     assert large.values[0] == pytest.approx(value, rel=0.1)
     assert np.mean(large.left**2) == pytest.approx(1.0, abs=0.2)
     assert np.mean(large.target**2) > np.mean(large.left**2) + 0.1
@@ -139,7 +140,7 @@ def test_a_gain_of_the_force_is_a_softer_arm():
     campaign = campaign_of(stated(), 20, loads=(1200.0, 2600.0))
     base = fitted(campaign)
     every = candidates(campaign, base.model, base.point.given)
-    left = _not_imitated(base, replace(base.weights, shared=0.0), every)
+    left = drop_confounded(base, replace(base.weights, shared=0.0), every)
     names = [
         {u.parameter.name for u in c.unknowns}
         for several in (every, left)
@@ -155,7 +156,7 @@ def test_differences_show_no_places():
     campaign = campaign_of(stated())
     base = fitted(campaign)
     every = candidates(campaign, base.model, base.point.given)
-    shown = {c.name for c in every if shows(c, base.weights)}
+    shown = {c.name for c in every if is_visible(c, base.weights)}
     assert {"gravity_compensator", "backlash", "link_compliance", "base_compliance"} <= shown
     assert not {"joint_offset", "transmission_error", "hysteresis", "thermal_growth"} & shown
 
@@ -164,7 +165,7 @@ def test_weights_are_looked_for_up_to_each_joint():
     model = stated()
     campaign = campaign_of(model)
     steps = [c for c in candidates(campaign, model, campaign.start()) if c.name == "link_gravity"]
-    assert [c.upto for c in steps] == ["A2", "A3", "A4", "A5", ""]
+    assert [c.up_to_joint for c in steps] == ["A2", "A3", "A4", "A5", ""]
     assert all(later.contains(earlier) for earlier, later in pairwise(steps))
     assert not steps[0].contains(steps[1])
     assert len({c.label for c in steps}) == len(steps)
@@ -176,13 +177,14 @@ def test_a_compensator_is_told_from_a_stiffness_that_varies():
     campaign = campaign_of(spring, 30, loads=(1200.0, 2600.0))
     base = fitted(campaign)
     found = [c for c in candidates(campaign, base.model, base.point.given) if c.name == "gravity_compensator"]
-    (foil,) = foils(base.model, campaign.readings.q, found[0])
+    (foil,) = decoys(base.model, campaign.readings.q, found[0])
     assert (foil.name, foil.joint) == ("joint_compliance", "A2")
     assert "varying with its angle" in foil.label
     other = next(c for c in candidates(campaign, model, campaign.start()) if c.name == "backlash")
-    assert not foils(base.model, campaign.readings.q, other)
+    assert not decoys(base.model, campaign.readings.q, other)
 
 
+@pytest.mark.slow
 def test_hardware_of_the_file_is_doubted_only_where_something_else_explains_more():
     spring = StiffnessModel.from_robot(robot("kuka_kr270"))
     campaign = campaign_of(spring, 30, loads=(1200.0, 2600.0))
@@ -193,14 +195,14 @@ def test_hardware_of_the_file_is_doubted_only_where_something_else_explains_more
 
     def sets(worse, seen):
         other = replace(found, rivals=(replace(foil, worse=worse, more=0.0),))
-        return len(_alternatives(other, group, seen))
+        return len(ambiguity_set(other, group, seen))
 
     assert sets(BUILT, True) == sets(0.0, True) == sets(-0.9 * BUILT, True) == 1
     assert sets(-1.1 * BUILT, True) == 2
 
     def refused(worse, **change):
         other = replace(found, rivals=(replace(foil, worse=worse, more=0.0, fitted=True, **change),))
-        return _of_another_course(other, found.linear.candidates[group])
+        return OTHER_COURSE in [why for _, why in judge(other).rejected]
 
     assert refused(-1.1 * MARGIN)
     assert not refused(-0.9 * MARGIN)
@@ -215,10 +217,11 @@ def test_hardware_of_the_file_is_doubted_only_where_something_else_explains_more
 def wave(model, order):
     """The arm with an error of A3 over its angle that comes back ``order`` times a turn."""
     size = dict.fromkeys((f"s3_{order:g}", f"c3_{order:g}"), 2e-4)
-    wider = model.added(TransmissionError(model.robot.joints, (order,)))
-    return wider.changed({(len(model.terms), name): value for name, value in size.items()})
+    wider = model.with_effect(TransmissionError(model.robot.joints, (order,)))
+    return wider.with_values({(len(model.terms), name): value for name, value in size.items()})
 
 
+@pytest.mark.slow
 def test_a_wave_of_another_order_is_no_harmonic():
     for order, word in ((1.0, "named"), (2.0, "named"), (0.5, "unknown"), (1.5, "unknown")):
         campaign = campaign_of(wave(stated(), order), 40, deflection=False, in_robot_frame=True)
@@ -228,13 +231,16 @@ def test_a_wave_of_another_order_is_no_harmonic():
         if word == "named":
             assert [(n.effect, n.joints) for n in told.named] == [("transmission_error", ("A3",))]
             (named,) = told.named
-            assert named.evidence.alias is None or not isinstance(named.evidence.alias.effect, Foil)
+            assert named.evidence.alias is None or not isinstance(
+                named.evidence.alias.effect, AlternativeForm
+            )
 
 
+@pytest.mark.slow
 def test_a_stand_that_creeps_is_no_link_that_grows():
     model, hours = stated(), np.repeat(np.linspace(0.0, 3600.0, 40), len(MARKERS))
     growth = ThermalGrowth(model.robot.joints, "time")
-    grown_arm = model.added(growth).changed({(len(model.terms), "g3"): 4e-8})
+    grown_arm = model.with_effect(growth).with_values({(len(model.terms), "g3"): 4e-8})
 
     def told(arm, creep):
         campaign = campaign_of(arm, 40, deflection=False, conditions=Conditions(None, time=hours))
@@ -255,31 +261,34 @@ def test_what_is_large_and_hardly_told_is_not_believed():
     def estimates(*of):
         return [Estimate(unknown, size * scale, share * size * scale, False) for size, share in of]
 
-    assert _beyond_telling(estimates((30.0, 0.9)))
-    assert not _beyond_telling(estimates((30.0, 0.1)))
-    assert not _beyond_telling(estimates((1.0, 0.9)))
-    assert not _beyond_telling(estimates((30.0, 0.9), (30.0, 0.1)))
-    assert not _beyond_telling([])
+    assert is_implausible(estimates((30.0, 0.9)))
+    assert not is_implausible(estimates((30.0, 0.1)))
+    assert not is_implausible(estimates((1.0, 0.9)))
+    assert not is_implausible(estimates((30.0, 0.9), (30.0, 0.1)))
+    assert not is_implausible([])
 
 
 # What is chance
 
 
+@pytest.mark.slow
 def test_no_pattern_is_seen_in_what_poses_share():
     """Errors that the readings of a pose share, and wild ones, are no structure."""
     told = 0
     for seed in range(30):
         campaign = campaign_of(stated(), 20, seed, shared=3 * SIGMA, wild=0.1)
-        told += bool(where(fitted(campaign), chance=0.01))
+        told += bool(residual_patterns(fitted(campaign), chance=0.01))
     assert told <= 2
 
 
 def test_a_pattern_is_seen():
     spring = StiffnessModel.from_robot(robot("kuka_kr270"))
-    assert any("A2 over" in one.variable for one in where(fitted(campaign_of(spring, 60)), chance=0.001))
+    assert any(
+        "A2 over" in one.variable for one in residual_patterns(fitted(campaign_of(spring, 60)), chance=0.001)
+    )
     # in fewer poses against the scatter that is known
     campaign = campaign_of(spring, 20)
-    first, *_ = where(fitted(campaign), fit(campaign, spring, ()))
+    first, *_ = residual_patterns(fitted(campaign), fit(campaign, spring, ()))
     assert "A2 over" in first.variable
 
 
@@ -290,7 +299,7 @@ def test_accidents_strike_one_reading_or_one_pose():
     def struck(*rows):
         value = good.readings.value.copy()
         value[list(rows)] += [0.0, 2e-3, 0.0]
-        return sorted(one.row for one in _wild(fitted(Campaign(replace(good.readings, value=value)))))
+        return sorted(one.row for one in gross_errors(fitted(Campaign(replace(good.readings, value=value)))))
 
     assert struck() == []
     assert struck(7, 70) == [7, 70]
@@ -302,14 +311,15 @@ def test_accidents_strike_one_reading_or_one_pose():
 def test_what_poses_share_is_no_more_than_scatter_can_be():
     base = fitted(campaign_of(stated(), 20, shared=20 * SIGMA))
     assert base.weights.shared > 10 * SIGMA
-    assert _sharing(base, base).shared == pytest.approx(SHARED * SIGMA)
+    assert limit_shared_scatter(base, base).shared == pytest.approx(SHARED * SIGMA)
     # what is stated is all the scatter of a coordinate, shared or not
-    assert _sharing(base, base).shared < 1.001 * SIGMA
+    assert limit_shared_scatter(base, base).shared < 1.001 * SIGMA
     little = fitted(campaign_of(stated(), 20, shared=0.9 * SIGMA))
     assert 0 < little.weights.shared < SHARED * SIGMA
-    assert _sharing(base, little).shared == little.weights.shared
+    assert limit_shared_scatter(base, little).shared == little.weights.shared
 
 
+@pytest.mark.slow
 def test_a_few_poses_do_not_foretell_a_campaign():
     """Of two sessions of which one is most of all, only the other is left out."""
     spring = StiffnessModel.from_robot(robot("kuka_kr270"))
@@ -317,10 +327,10 @@ def test_a_few_poses_do_not_foretell_a_campaign():
     found = search(campaign, fitted(campaign))
     (group,) = found.explained.groups
     rows = np.arange(len(campaign))
-    small = _left_out(found, found.explained, group, (rows >= len(rows) - 18).astype(np.int64))
-    swapped = _left_out(found, found.explained, group, (rows < len(rows) - 18).astype(np.int64))
+    small = held_out_gain(found, found.explained, group, (rows >= len(rows) - 18).astype(np.int64))
+    swapped = held_out_gain(found, found.explained, group, (rows < len(rows) - 18).astype(np.int64))
     assert small == pytest.approx(swapped)
-    both = _left_out(found, found.explained, group, (rows >= len(rows) // 2).astype(np.int64))
+    both = held_out_gain(found, found.explained, group, (rows >= len(rows) // 2).astype(np.int64))
     assert both > small > 0
-    assert np.isnan(_left_out(found, found.explained, group, 0 * rows))
-    assert judged(found).word in ("named", "ambiguous")
+    assert np.isnan(held_out_gain(found, found.explained, group, 0 * rows))
+    assert judge(found).word in ("named", "ambiguous")

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import examples
 
-from postproc.document import Document, Edit, Span, apply
+from postproc.base.document import Document, Edit, Span, apply
 from postproc.report import diff as diff_module
 from postproc.report.diff import CONTEXT, unified_diff
 
@@ -72,7 +73,7 @@ def edited(draw: st.DrawFn) -> tuple[bytes, list[Edit]]:
     return raw, [Edit(Span(0, a, draw(st.sampled_from((a, b)))), draw(text)) for a, b in pairs]
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=examples(400), deadline=None)
 @given(edited(), st.sampled_from([(1, 1), (2, 3), (diff_module.EDITS, diff_module.BLOCKS)]))
 def test_a_diff_applied_is_the_output_and_taken_back_the_source(
     case: tuple[bytes, list[Edit]], sizes: tuple[int, int]

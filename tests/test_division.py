@@ -6,37 +6,37 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ways_at_work import circle, corner, line
+from ways_at_work import FORCE, circle, corner, in_even_pieces, line
 from ways_at_work import task as task_to
 
-import postproc.compensation.division as division_module
-from postproc.compensation.between import Pieces, errors_between
+import postproc.compensation.subdivision as division_module
+from postproc.base.units import MM
 from postproc.compensation.correct import correct
-from postproc.compensation.division import ROOM, STEP, Limits, _Search, divide, made
+from postproc.compensation.path_error import PathSegments, path_errors
+from postproc.compensation.subdivision import ROOM, STEP, Limits, subdivide, subdivided_motions
 from postproc.toolpath import Role
-from postproc.units import MM
 
 FREE = Limits(max_growth=100.0)
 
 
 def divided(task, limits=FREE):
     result = correct(task)
-    return result, divide(task, result, limits)
+    return result, subdivide(task, result, limits)
 
 
 def dense(task, division, samples=41):
     """(M,) [m] the largest distance from the wanted way inside of each motion, at ``samples`` shares of each."""
-    pieces = made(task, division, np.arange(len(division)))
-    chosen = np.flatnonzero(~division.links & np.isin(division.source, np.flatnonzero(task.carries)))
+    pieces = subdivided_motions(task, division, np.arange(len(division)))
+    chosen = np.flatnonzero(~division.transitions & np.isin(division.source, np.flatnonzero(task.carries)))
     worst = np.zeros(len(division))
     for share in np.linspace(0, 1, samples):
         part = pieces[chosen]
         along = part.first + share * (part.last - part.first)
-        wanted = task.ways.at(part.rows, along)
+        wanted = task.desired_path.at(part.rows, along)
         here = part.at(np.full(len(chosen), share))
-        real = task.real(part.rows, here, task.force.along(part.rows, along)).pose
+        real = task.simulated(part.rows, here, task.force.along(part.rows, along)).pose
         shift = real.position - task.goal(part.rows, wanted).position
-        along = task.ways.tangent(part.rows, along)
+        along = task.desired_path.tangent(part.rows, along)
         shift -= np.sum(shift * along, axis=1, keepdims=True) * along
         worst[chosen] = np.maximum(worst[chosen], np.linalg.norm(shift, axis=1))
     return worst
@@ -45,37 +45,34 @@ def dense(task, division, samples=41):
 def planar_only(task):
     """The same task where arcs lie in a plane that the program selects."""
     n = len(task.toolpath)
-    return replace(task, toolpath=replace(task.toolpath, any_plane=np.zeros(n, bool)))
+    return replace(task, toolpath=replace(task.toolpath, arc_plane_free=np.zeros(n, bool)))
 
 
-def in_even_pieces(task, count):
-    """The error of a way in ``count`` even pieces, whatever it is."""
-    result = correct(task)
-    search = _Search(task, result, FREE)
-    search.link()
-    pieces, _ = search._pieces(np.arange(1), np.array([count]))
-    return errors_between(task, pieces)[0].max()
+def error_in_even_pieces(task, division, count):
+    """The error of the one cut in ``count`` even pieces, whatever it is."""
+    return path_errors(task, in_even_pieces(task, division, 2, count))[0].max()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize("build", [line, circle], ids=["800 mm line", "600 mm circle"])
 def test_points_are_inserted_where_the_ends_are_not_enough(build, planar, capsys):
     task = planar_only(build()) if planar else build()
     least = 1 if build is line else 2
-    ends_only = in_even_pieces(task, least)
-    assert ends_only > 0.05 * MM
     _, division = divided(task)
-    ours = int(np.sum((division.source == 2) & ~division.links))
+    ends_only = error_in_even_pieces(task, division, least)
+    assert ends_only > 0.05 * MM
+    ours = int(np.sum((division.source == 2) & ~division.transitions))
     assert dense(task, division).max() <= task.tolerance
 
     # two others: halving, and a fixed distance that suffices wherever the same force may act
     halved = least
-    while in_even_pieces(task, halved) > ROOM * task.tolerance:
+    while error_in_even_pieces(task, division, halved) > ROOM * task.tolerance:
         halved *= 2
-    length = task.ways.length[2]
+    length = task.desired_path.length[2]
     fixed = next(
         step for step in (100, 50, 40, 30, 25, 20, 15, 10, 5, 2, 1)
-        if in_even_pieces(task, int(np.ceil(length / (step * MM)))) <= ROOM * task.tolerance
+        if error_in_even_pieces(task, division, int(np.ceil(length / (step * MM)))) <= ROOM * task.tolerance
     )  # fmt: skip
     stepped = int(np.ceil(length / (fixed * MM)))
     with capsys.disabled():
@@ -86,12 +83,13 @@ def test_points_are_inserted_where_the_ends_are_not_enough(build, planar, capsys
         )
     assert ours <= halved
     assert ours <= stepped
-    assert ours == least or in_even_pieces(task, ours - 1) > ROOM * task.tolerance
+    assert ours == least or error_in_even_pieces(task, division, ours - 1) > ROOM * task.tolerance
 
 
 def test_error_falls_with_the_square_of_the_length_on_lines():
     task = line()
-    errors = [in_even_pieces(task, count) for count in (4, 8, 16)]
+    _, division = divided(task)
+    errors = [error_in_even_pieces(task, division, count) for count in (4, 8, 16)]
     rate = np.log2(errors[0] / errors[1]), np.log2(errors[1] / errors[2])
     assert rate == pytest.approx((2.0, 2.0), abs=0.1)
 
@@ -106,41 +104,41 @@ def test_a_loose_tolerance_inserts_nothing():
 def test_a_cut_begins_and_ends_with_its_own_correction():
     task = line()
     result, division = divided(task)
-    (link,) = np.flatnonzero(division.links)
+    (link,) = np.flatnonzero(division.transitions)
     assert division.source[link] == 2
-    assert division.role[link + 1] != Role.LINK
+    assert division.role[link + 1] != Role.TRANSITION
     # the tool is at the begin of the way when the force is on, and where it was programmed when it is off
     row = np.array([2])
-    real = task.real(row, division.command[[link]], task.force.along(row, np.zeros(1))).pose.position
-    goal = task.goal(row, task.ways.begin[row]).position
+    real = task.simulated(row, division.command[[link]], task.force.along(row, np.zeros(1))).pose.position
+    goal = task.goal(row, task.desired_path.start[row]).position
     assert np.linalg.norm(real - goal) < 1e-7
     assert np.array_equal(division.command.position[link - 1], task.wanted.position[1])
     assert np.array_equal(division.command.position[-1], task.wanted.position[3])
-    own = np.flatnonzero(division.own)[2]
+    own = np.flatnonzero(division.original)[2]
     np.testing.assert_array_equal(division.command.position[own], result.command.position[2])
 
 
 def test_a_corner_gets_a_point_for_each_side():
     task = corner()
     _, division = divided(task)
-    assert division.source[division.links].tolist() == [2, 3]
+    assert division.source[division.transitions].tolist() == [2, 3]
     assert dense(task, division).max() <= task.tolerance
-    _, without = divided(task, replace(FREE, keep=True))
+    _, without = divided(task, replace(FREE, no_insert=True))
     assert without.inserted == 0
     assert dense(task, without).max() > 0.1 * MM
 
 
 def test_where_nothing_may_be_inserted_nothing_is():
-    task = corner(whole={3: "a TRIGGER"})
+    task = corner(no_insert_before={3: "a TRIGGER"})
     _, division = divided(task)
-    assert division.source[division.links].tolist() == [2]
+    assert division.source[division.transitions].tolist() == [2]
     assert np.sum(division.source == 3) == 1
 
 
 def test_no_piece_is_shorter_than_the_shortest():
     task = line()
     _, division = divided(task, replace(FREE, min_segment=0.3))
-    assert np.sum((division.source == 2) & ~division.links) == 2
+    assert np.sum((division.source == 2) & ~division.transitions) == 2
     assert dense(task, division).max() > task.tolerance
 
 
@@ -156,7 +154,7 @@ def test_half_a_correction_has_the_points_of_the_whole():
     whole, part = divided(full)[1], divided(half)[1]
     np.testing.assert_array_equal(whole.source, part.source)
     np.testing.assert_array_equal(whole.role, part.role)
-    ways = full.ways.at(whole.source[1:], whole.share[1:]).position
+    ways = full.desired_path.at(whole.source[1:], whole.share[1:]).position
     away = whole.command.position[1:] - ways
     np.testing.assert_allclose(part.command.position[1:] - ways, 0.5 * away, atol=1e-12)
     arcs = np.isfinite(whole.sweep)
@@ -172,8 +170,8 @@ def test_arcs_in_their_plane_keep_their_normal_and_advance():
     np.testing.assert_array_equal(division.normal[arcs], np.tile([0.0, 0.0, 1.0], (arcs.sum(), 1)))
     assert dense(task, division).max() <= task.tolerance
     # begin, end and centre are those of one circle, seen along the normal
-    pieces = made(task, division, np.flatnonzero(arcs))
-    out = [np.linalg.norm((p.position - pieces.centre)[:, :2], axis=1) for p in (pieces.begin, pieces.end)]
+    pieces = subdivided_motions(task, division, np.flatnonzero(arcs))
+    out = [np.linalg.norm((p.position - pieces.centre)[:, :2], axis=1) for p in (pieces.start, pieces.end)]
     np.testing.assert_allclose(out[0], out[1], atol=1e-12)
 
 
@@ -184,39 +182,42 @@ def test_an_arc_in_air_begins_where_it_was_programmed():
     force = replace(task.force, carries=carries, values=wrench, start=wrench)
     task = replace(task, force=force)
     _, division = divided(task)
-    back = np.flatnonzero(division.links & (division.source == 2))
+    back = np.flatnonzero(division.transitions & (division.source == 2))
     assert len(back) == 1
     np.testing.assert_array_equal(division.command.position[back[0]], task.wanted.position[1])
     assert np.isnan(division.sweep).all()
 
 
 def test_a_nearly_full_circle_that_can_not_be_divided_is_held():
-    task = circle(whole={2: "runs many times"})
+    task = circle(no_insert_before={2: "runs many times"})
     _, division = divided(task)
-    assert [finding.code for finding in division.held.values()] == ["COR013"]
+    assert [finding.code for finding in division.not_refined.values()] == ["COR013"]
 
 
 def test_pieces_of_a_straight_way_are_where_they_are_asked_for():
     task = line()
     rows, zero = np.array([2]), np.zeros(1)
-    half = Pieces.straight(rows, zero, zero + 1, task.ways.begin[rows], task.ways.end[rows]).at(zero + 0.5)
+    half = PathSegments.straight(
+        rows, zero, zero + 1, task.desired_path.start[rows], task.desired_path.end[rows]
+    ).at(zero + 0.5)
     np.testing.assert_allclose(half.position[0], [1.6, 0.0, 0.5], atol=1e-12)
 
 
 # ways that need no look
 
 
-def looked_at(task, monkeypatch):
-    """How many pieces the search looks at, for the motions of the input."""
+def looked_at(task, result, monkeypatch):
+    """The rows of all pieces at whose errors a division looks, and the division."""
     seen = []
-    errors = division_module.errors_between
-    monkeypatch.setattr(
-        division_module,
-        "errors_between",
-        lambda task, pieces, *more: seen.append(len(pieces)) or errors(task, pieces, *more),
-    )
-    _, division = divided(task)
-    return sum(seen), division
+    errors = division_module.path_errors
+    with monkeypatch.context() as watched:
+        watched.setattr(
+            division_module,
+            "path_errors",
+            lambda task, pieces, *more: seen.extend(pieces.rows.tolist()) or errors(task, pieces, *more),
+        )
+        division = subdivide(task, result, FREE)
+    return seen, division
 
 
 def in_steps(points, length=0.8, **words):
@@ -227,9 +228,10 @@ def in_steps(points, length=0.8, **words):
 
 
 def test_ways_on_which_the_correction_hardly_changes_are_not_looked_at(monkeypatch):
-    seen, division = looked_at(in_steps(1601, 0.4), monkeypatch)
+    task = in_steps(1601, 0.4)
+    seen, division = looked_at(task, correct(task), monkeypatch)
     # the first one begins where nothing is corrected
-    assert seen <= 2
+    assert len(seen) <= 2
     assert division.inserted <= 1
 
 
@@ -245,13 +247,10 @@ def test_what_is_not_looked_at_is_within_the_tolerance(points):
     assert worst[own].max() < STEP * task.tolerance
 
 
-def test_a_long_way_is_looked_at_even_if_the_correction_is_the_same_at_both_ends():
+def test_a_long_way_is_looked_at_even_if_the_correction_is_the_same_at_both_ends(monkeypatch):
     task = in_steps(3)
-    full = correct(task)
-    alike = replace(full, correction=np.full((3, 3), 1e-3), turn=np.full((3, 3), 1e-3))
-    search = _Search(task, replace(alike, state=full.state), FREE)
-    search.start_at[:] = -1
-    assert not search._even().any()
+    alike = replace(correct(task), correction=np.full((3, 3), 1e-3), turn=np.full((3, 3), 1e-3))
+    assert set(looked_at(task, alike, monkeypatch)[0]) == {1, 2}
 
 
 @pytest.mark.parametrize(
@@ -264,21 +263,15 @@ def test_a_long_way_is_looked_at_even_if_the_correction_is_the_same_at_both_ends
     ],
     ids=["position", "angle", "tool", "axes"],
 )
-def test_each_condition_of_an_even_way_counts(change):
+def test_each_condition_of_an_even_way_counts(change, monkeypatch):
     task = in_steps(401, 0.1)
     result = correct(task)
-    search = _Search(task, result, FREE)
-    search.start_at[:] = -1
-    assert search._even()[1:].all()
-    assert not search._even()[0]
-    other = _Search(change(task), result, FREE)
-    other.start_at[:] = -1
-    assert not other._even()[200:].any()
+    assert set(looked_at(task, result, monkeypatch)[0]) == {1}
+    assert set(looked_at(change(task), result, monkeypatch)[0]) >= set(range(201, 401))
 
 
-def test_a_way_that_begins_with_a_step_is_not_even():
-    task = in_steps(401, 0.1)
-    search = _Search(task, correct(task), FREE)
-    search.start_at[:] = -1
-    search.start_at[[7, 9]] = 0, 3
-    assert np.flatnonzero(~search._even()).tolist() == [0, 7, 9]
+def test_a_way_that_begins_with_a_step_is_looked_at(monkeypatch):
+    start = np.tile(FORCE, (401, 1))
+    start[[8, 10]] *= 0.5
+    task = in_steps(401, 0.1, start=start)
+    assert set(looked_at(task, correct(task), monkeypatch)[0]) == {1, 8, 10}

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.document import BLOCK, Document, Edit, Edits, Span, apply, undone
+from postproc.base.document import BLOCK, Document, Edit, Edits, Span, apply, undone
 
 
 def in_order(edits: list[Edit]) -> list[Edit]:
@@ -109,6 +109,7 @@ def test_edits_of_several_documents_are_not_spliced_into_one() -> None:
         apply(document(b"abc"), [Edit(Span(0, 0, 1), b""), Edit(Span(1, 2, 3), b"")])
 
 
+@pytest.mark.slow
 def test_a_million_edits_in_many_blocks() -> None:
     """Against joining slices one by one; with long stretches that no edit touches, and long texts."""
     random = np.random.default_rng(5)

@@ -9,10 +9,10 @@ import pytest
 from effects_at_work import conditions, elastic, made, nulls, random_arm, with_terms
 from plant import kr270, random_angles, random_tools, random_wrenches
 
-from postproc.effects import EFFECTS, Conditions, Offset, State
-from postproc.findings import Refusal
-from postproc.geometry import Poses
-from postproc.yamlfile import parsed
+from postproc.base.findings import Refusal
+from postproc.base.geometry import Poses
+from postproc.base.yaml_section import parsed
+from postproc.effects import EFFECTS, ChainState, Conditions, Offset
 
 ARMS = {
     "kr270": lambda: kr270().joints,
@@ -282,7 +282,7 @@ def test_a_weight_without_its_centre_is_not_guessed(missing):
 def test_offsets_are_linear_in_their_parameters(name):
     """Values of two parameters act as each alone, added; each does something."""
     rng = np.random.default_rng(32)
-    base = elastic(kr270(), rng).without(families=["elastic"])
+    base = elastic(kr270(), rng).without_effects(families=["elastic"])
     effect = made(name, base.robot.joints)
     q = random_angles(kr270(), 6, rng)
     given = conditions(6, rng)
@@ -313,7 +313,7 @@ def test_flags_are_said_where_they_hold():
     for flag, those in said.items():
         assert {name for name, effect in EFFECTS.items() if getattr(effect, flag)} == those
     assert {name for name, effect in EFFECTS.items() if not effect.apart} == {"link_gravity"}
-    slack = {name for name, effect in EFFECTS.items() if effect(kr270().joints).slack}
+    slack = {name for name, effect in EFFECTS.items() if effect(kr270().joints).zero_without_load}
     assert slack == {
         "joint_compliance",
         "gravity_compensator",
@@ -351,7 +351,7 @@ def test_the_force_of_a_spring_is_the_gradient_of_its_energy_in_both_preloads(pr
         there = rest.copy()
         there[row] += moved
         none = np.zeros((6, 9))
-        return State(chain, np.zeros(3), rest[chain.motors], rest, there, None, none, Conditions())
+        return ChainState(chain, np.zeros(3), rest[chain.motors], rest, there, None, none, Conditions())
 
     def force(moved):
         out = np.zeros_like(rest), np.zeros_like(rest)
@@ -362,4 +362,4 @@ def test_the_force_of_a_spring_is_the_gradient_of_its_energy_in_both_preloads(pr
     slope = (spring.energy(values, at(bent + step)) - spring.energy(values, at(bent - step))) / (2 * step)
     np.testing.assert_allclose(force(bent), -slope, rtol=1e-6)
     assert np.any(force(0 * bent)) == (preload == "acting")
-    assert spring.slack == (preload == "balanced")
+    assert spring.zero_without_load == (preload == "balanced")

@@ -7,10 +7,9 @@ import pytest
 from effects_at_work import TOOL, conditions, elastic, made, sampled, with_terms
 from plant import SOFTER, kr270, random_angles, random_tools, random_wrenches, with_compensator
 
-from postproc import model as model_module
+from postproc.base.geometry import Poses, vector_from_rotation
 from postproc.effects import EFFECTS
-from postproc.geometry import Poses, vector_from_rotation
-from postproc.model import NOTHING, StiffnessModel
+from postproc.model import NOTHING, StiffnessModel, approach, compute_curvature, solve
 from postproc.robot.chain import Chain
 
 
@@ -20,7 +19,7 @@ def full(**change):
 
 def joints_only(factor=1.0, **values):
     """Without the compensator; all joints ``factor`` times as soft, then some of them as given."""
-    model = full().without(["gravity_compensator"])
+    model = full().without_effects(["gravity_compensator"])
     (term,) = model.terms
     softer = {name: factor * value for name, value in term.values.items()}
     return replace(model, terms=(replace(term, values=softer | values),))
@@ -72,6 +71,7 @@ def measured_compliance(model, q, wrench, tool, given, small=1.0):
     return np.stack(columns, axis=2)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", MODELS)
 def test_loaded_compliance_is_the_derivative_of_the_equilibrium(name):
     build, share = MODELS[name]
@@ -116,7 +116,7 @@ def test_compliance_sees_the_order_of_states_as_the_equilibrium_does():
     model = with_terms(joints_only(), (hysteresis, {p.name: 0.02 for p in hysteresis.parameters}))
     q, wrench, tool, _ = problem(12, 35)
     found = model.cartesian_compliance(q, wrench, tool)
-    given = replace(NOTHING, direction=model_module.approach(q))
+    given = replace(NOTHING, direction=approach(q))
     expected = measured_compliance(model, q, wrench, tool, given)
     assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()
 
@@ -129,7 +129,7 @@ def steps_of(model, q, wrench, tool, given, monkeypatch, count=10):
     after = []
     for limit in range(1, count + 1):
         with monkeypatch.context() as short:
-            short.setattr(model_module, "MAX_STEPS", limit)
+            short.setattr(solve, "MAX_STEPS", limit)
             after.append(model.equilibrium(q, wrench, tool, given, tolerance=0.0).displacement)
     return np.array(after)
 
@@ -138,12 +138,12 @@ def rate_in_theory(model, q, wrench, tool, given):
     """(N,) spectral radius of (1 - C S)^-1 C (H - S): what the diagonal S of the loads leaves of H."""
     rest = model.equilibrium(q, wrench, tool, given)
     state = model.state(q, wrench, tool, given, rest.displacement)
-    force, slope = model._forces(state)
+    force, slope = model.forces(state)
     target, gives = np.zeros_like(force), np.zeros_like(force)
-    for law, values in model._laws:
+    for law, values in model.laws:
         law.add_displacement(values, state, force, target, gives)
     diagonal = slope.T[:, :, None] * np.eye(model.chain.size)
-    left = model._curvature(state, tool, np.arange(model.chain.size)) - diagonal
+    left = compute_curvature(model, state, tool, np.arange(model.chain.size)) - diagonal
     factor = (gives / (1 - gives * slope)).T
     return np.abs(np.linalg.eigvals(factor[:, :, None] * left)).max(axis=1)
 
@@ -294,10 +294,10 @@ def test_a_soft_elbow_pushed_into_a_fold_is_told(factor):
     assert np.isfinite(rest.pose.position[good]).all()
     # what is called a rest is one, and one that resists
     state = model.state(q, wrench, TOOL, displacement=rest.displacement)
-    force = model._forces(state)[0]
+    force = model.forces(state)[0]
     compliance = np.array([model.terms[0].values[f"c{i}"] for i in range(1, 7)])
     assert np.abs(rest.displacement - compliance * force.T)[good].max() < 1e-10
-    stiffness = np.diag(1 / compliance) - model._curvature(state, TOOL, np.arange(model.chain.size))
+    stiffness = np.diag(1 / compliance) - compute_curvature(model, state, TOOL, np.arange(model.chain.size))
     symmetric = 0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))
     assert (np.linalg.eigvalsh(symmetric)[good] > 0).all()
 
@@ -346,11 +346,13 @@ def test_pushed_beyond_all_measure_nothing_is_called_a_rest():
         state = model.state(
             q[good], share * wrench[good], tool[good], given.part(good), rest.displacement[good]
         )
-        force = model._forces(state)[0]
+        force = model.forces(state)[0]
         compliance = np.array([model.terms[0].values[f"c{i}"] for i in range(1, 7)])
         miss = np.abs(rest.displacement[good] - compliance * force.T)
         assert miss.max() < 1e-10 + 1e-12 * np.abs(force).max()
-        stiffness = np.diag(1 / compliance) - model._curvature(state, tool[good], np.arange(model.chain.size))
+        stiffness = np.diag(1 / compliance) - compute_curvature(
+            model, state, tool[good], np.arange(model.chain.size)
+        )
         assert (np.linalg.eigvalsh(0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))) > 0).all()
     assert not rest.converged.all()
 
@@ -362,8 +364,11 @@ def test_a_nudge_is_a_sweep_to_first_order(extras):
     rng = np.random.default_rng(8)
     at = rng.uniform(-1.0, 1.0, (chain.size, 20))
     step = rng.uniform(-1.0, 1.0, (chain.size, 20)) * 1e-5
-    there, exact = chain.sweep(at, TOOL_AHEAD).nudged(step), chain.sweep(at + step, TOOL_AHEAD)
+    there, exact = (
+        chain.evaluate(at, TOOL_AHEAD).first_order_update(step),
+        chain.evaluate(at + step, TOOL_AHEAD),
+    )
     for near, far in ((there.position, exact.position), (there.mount, exact.mount)):
         assert np.abs(near - far).max() < 1e-8
-        assert np.abs(far - chain.sweep(at, TOOL_AHEAD).position).max() > 1e-6
+        assert np.abs(far - chain.evaluate(at, TOOL_AHEAD).position).max() > 1e-6
     assert np.abs(np.array(there.tcp) - np.array(exact.tcp)).max() < 1e-8

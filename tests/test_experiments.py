@@ -9,24 +9,25 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import examples
 
+from postproc.base.findings import Refusal
+from postproc.base.geometry import Poses
+from postproc.base.units import DEG
 from postproc.experiments import pool, precision
+from postproc.experiments.candidate_setups import CandidateSetups, drawn, readings_of, spacings, usable_limits
 from postproc.experiments.criteria import AtTestPoses, Determinant, Disagreement, Minimax
-from postproc.experiments.discriminating import Rival, apart, discriminating, rivalry
-from postproc.experiments.exchange import Choices, exchanged, grown, random_choice
-from postproc.experiments.offer import Offer, drawn, readings_of, spacings, usable_limits
-from postproc.experiments.precision import Task, choices_of, designs, predicted
-from postproc.experiments.seen import awake, judged, measured, shown
-from postproc.experiments.tour import tour
-from postproc.findings import Refusal
-from postproc.geometry import Poses
+from postproc.experiments.discrimination import CompetingModel, apart, discriminating, rivalry
+from postproc.experiments.exchange import CandidateSet, exchanged, grown, random_choice
+from postproc.experiments.measuring_order import measuring_order
+from postproc.experiments.observability import influential, judged, measured, observability
+from postproc.experiments.precision import DesignProblem, choices_of, designs, predicted
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit
 from postproc.identification.unknowns import asked_for
 from postproc.measurements import measurements_csv, read_measurements
 from postproc.model import StiffnessModel
 from postproc.robot.description import find_robot, load_robot
-from postproc.units import DEG
 
 TARGETS = np.array([[0.3, 0.0, 0.1], [-0.15, 0.26, 0.1], [-0.15, -0.26, 0.1]])
 TABLE_1 = ("joint_compliance", "gravity_compensator")
@@ -51,9 +52,9 @@ def ur5() -> StiffnessModel:
     return StiffnessModel.from_robot(load_robot(find_robot("ur5")))
 
 
-def offer(model, tool=(0.0, 0.5, 0.3), limits=(), **change) -> Offer:
+def offer(model, tool=(0.0, 0.5, 0.3), limits=(), **change) -> CandidateSetups:
     """265 kg on a sideways lever, three reflectors."""
-    whole = Offer(
+    whole = CandidateSetups(
         tool=Poses(np.eye(3), np.array(tool)),
         targets=("M1", "M2", "M3"),
         places=TARGETS,
@@ -71,17 +72,17 @@ def offer(model, tool=(0.0, 0.5, 0.3), limits=(), **change) -> Offer:
     return replace(whole, **change)
 
 
-def task(model, what: Offer, words=TABLE_1, **change) -> Task:
+def task(model, what: CandidateSetups, words=TABLE_1, **change) -> DesignProblem:
     asked = asked_for(model, words)
     wanted = [
         u.stated.interval if u.stated and u.stated.interval else 0.05 * (abs(u.value) or u.parameter.scale)
         for u in asked.unknowns
     ]
     counts = np.array([unknown.prior is None for unknown in asked.unknowns])
-    return Task(asked.model, asked.unknowns, what, np.array(wanted), counts, **change)
+    return DesignProblem(asked.model, asked.unknowns, what, np.array(wanted), counts, **change)
 
 
-def filled_in(model, what: Offer, setups):
+def filled_in(model, what: CandidateSetups, setups):
     """The readings of setups as the model predicts them."""
     plan = readings_of(model, what, setups)
     campaign = Campaign(plan)
@@ -89,7 +90,7 @@ def filled_in(model, what: Offer, setups):
     if what.targets:
         into = what.tool.inverse()
         given = replace(given, places=what.places @ into.rotation.T + into.position)
-    return replace(plan, value=campaign.expected(campaign.seen(model), given)[0])
+    return replace(plan, value=campaign.expected(campaign.predicted(model), given)[0])
 
 
 def names(lost) -> set[str]:
@@ -143,11 +144,11 @@ def test_readings_that_exist_count(kr270):
     what = offer(kr270, deflection=False, rough=True)
     asked = task(kr270, what)
     setups = drawn(kr270, what, 20, np.random.default_rng(1))
-    known = shown(kr270, asked.unknowns, what, setups[:10])
+    known = observability(kr270, asked.unknowns, what, setups[:10])
     before = measured(kr270, asked.unknowns, Campaign(filled_in(kr270, what, setups[:10])), what.sigma)
     np.testing.assert_allclose(before.columns[0], known.columns.reshape(-1, len(asked.unknowns)), atol=1e-4)
-    alone = judged(kr270, asked.unknowns, shown(kr270, asked.unknowns, what, setups[10:]))[0]
-    both = judged(kr270, asked.unknowns, shown(kr270, asked.unknowns, what, setups[10:]), before)[0]
+    alone = judged(kr270, asked.unknowns, observability(kr270, asked.unknowns, what, setups[10:]))[0]
+    both = judged(kr270, asked.unknowns, observability(kr270, asked.unknowns, what, setups[10:]), before)[0]
     kept = np.isfinite(alone)
     assert (both[kept] <= alone[kept]).all()
     assert (both[kept] < 0.9 * alone[kept]).any()
@@ -168,9 +169,9 @@ def test_a_further_pose_never_widens_an_interval(kr270):
 # Criteria and exchange, on plain arrays
 
 
-def some_choices(seed: int, count=60, rows=3, p=5, spacing=0.3) -> Choices:
+def some_choices(seed: int, count=60, rows=3, p=5, spacing=0.3) -> CandidateSet:
     rng = np.random.default_rng(seed)
-    return Choices(
+    return CandidateSet(
         rng.normal(size=(count, rows, p)) * rng.uniform(0.2, 3.0, p),
         rng.uniform(-1.0, 1.0, (count, 2)),
         np.array([spacing, spacing]),
@@ -188,7 +189,7 @@ def criteria(p=5):
     return [Minimax(counts), Determinant(counts), AtTestPoses(root), disagreement(p)]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 @given(st.integers(0, 10_000), st.integers(2, 8))
 def test_exchange_beats_greedy_and_greedy_beats_chance(seed, count):
     choices = some_choices(seed)
@@ -204,7 +205,7 @@ def test_exchange_beats_greedy_and_greedy_beats_chance(seed, count):
         assert score <= by_chance
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 @given(st.integers(0, 10_000))
 def test_chosen_setups_are_distinct_enough(seed):
     choices = some_choices(seed)
@@ -278,8 +279,11 @@ def test_table_1_is_beaten(kr270, monkeypatch):
     assert found.chosen[15].worst <= 0.8
     assert found.chosen[30].worst <= 0.55
     assert found.at_random[15][1] > 1.5
-    assert names(found.unseen) == {"joint_compliance.c1"}
-    assert "A1 stands upright, a hung load puts 0 N m on it: pull sideways" in found.unseen[0].why
+    assert names(found.unobservable) == {"joint_compliance.c1"}
+    assert (
+        "A1 is vertical, so an attached weight applies 0 N m to it: pull sideways"
+        in found.unobservable[0].why
+    )
     a2 = found.chosen[15].setups.q[:, 1] / DEG
     for wide in (-145, -110, -10):
         assert np.abs(a2 - wide).min() < 12
@@ -316,25 +320,25 @@ def test_each_criterion_wins_by_its_own_measure(kr270):
 def test_load_on_the_last_axis_does_not_show_it(kr270):
     what = offer(kr270, tool=(0.0, 0.0, 0.3))
     found = designs(task(kr270, what, ("joint_compliance.c5", "joint_compliance.c6")), 4, candidates=100)
-    assert names(found.unseen) == {"joint_compliance.c6"}
-    assert "on the axis of A6, 0 N m on it: put the TCP beside" in found.unseen[0].why
+    assert names(found.unobservable) == {"joint_compliance.c6"}
+    assert "on the axis of A6 and applies 0 N m to it: move the TCP off" in found.unobservable[0].why
     aside = designs(task(kr270, offer(kr270), ("joint_compliance.c6",)), 4, candidates=100)
-    assert aside.unseen == ()
+    assert aside.unobservable == ()
 
 
 def test_a_narrow_range_of_the_joint_hides_the_preload(kr270):
     """s0 shows by how it changes over A2."""
     what = offer(kr270, limits={"A2": (-60 * DEG, -45 * DEG)}.items())
     found = designs(task(kr270, what), 10, candidates=200)
-    lost = {one.name: one.why for one in (*found.unseen, *found.left_out, *found.weak)}
+    lost = {one.name: one.why for one in (*found.unobservable, *found.left_out, *found.weak)}
     assert "A2 moves within -60 .. -45 deg" in lost["gravity_compensator.s0"]
     wide = designs(task(kr270, offer(kr270)), 10, candidates=200)
-    assert "gravity_compensator.s0" not in names((*wide.unseen, *wide.left_out))
+    assert "gravity_compensator.s0" not in names((*wide.unobservable, *wide.left_out))
 
 
 def test_deflections_do_not_show_what_moves_both_alike(kr270):
     found = designs(task(kr270, offer(kr270), ("joint_compliance.c2", "joint_offset.o1")), 5, candidates=100)
-    lost = {one.name: one.why for one in (*found.unseen, *found.left_out, *found.weak)}
+    lost = {one.name: one.why for one in (*found.unobservable, *found.left_out, *found.weak)}
     assert "measure places (--kind absolute)" in lost["joint_offset.o1"]
     # what can be seen is not spoiled for what can not
     alone = designs(task(kr270, offer(kr270), ("joint_compliance.c2",)), 5, candidates=100)
@@ -343,36 +347,36 @@ def test_deflections_do_not_show_what_moves_both_alike(kr270):
 
 def test_what_no_load_acts_on(kr270):
     unloaded = offer(kr270, deflection=False, loads=np.zeros(1))
-    with pytest.raises(Refusal, match=r"only a load shows it \(--loads\)"):
+    with pytest.raises(Refusal, match=r"observable only under a load \(--loads\)"):
         designs(task(kr270, unloaded, ("joint_compliance.c2",)), 5, candidates=50)
     found = designs(task(kr270, offer(kr270), ("base_compliance",)), 6, candidates=100)
-    lost = {one.name.partition(".")[2]: one.why for one in found.unseen}
+    lost = {one.name.partition(".")[2]: one.why for one in found.unobservable}
     assert set(lost) == {"c_x", "c_y", "c_rz"}
-    assert all("hung loads do not act on it" in why for why in lost.values())
+    assert all("attached weights do not act on it" in why for why in lost.values())
 
 
 def test_warming_up_is_no_matter_of_poses(ur5):
     what = offer(ur5, deflection=False, loads=np.zeros(1))
-    with pytest.raises(Refusal, match=r"PLN002.*measure one pose again and again, with TEMP"):
+    with pytest.raises(Refusal, match=r"PLN002.*measure one pose repeatedly, with TEMP"):
         designs(task(ur5, what, ("thermal_growth",)), 5, candidates=50)
 
 
 def test_first_joint_is_part_of_the_registration(ur5):
     what = offer(ur5, deflection=False, loads=np.zeros(1))
     found = designs(task(ur5, what, ("joint_offset",)), 8, candidates=100)
-    assert {one.name: one.imitated for one in found.unseen} == {"joint_offset.o1": True}
+    assert {one.name: one.imitated for one in found.unobservable} == {"joint_offset.o1": True}
 
 
 def test_sleeping_effects_are_woken(kr270):
     """A compensator without stiffness and preload moves nothing; it is planned for at the usual sizes of both."""
-    bare = kr270.changed({(1, "K_c"): 0.0, (1, "s0"): 0.0})
+    bare = kr270.with_values({(1, "K_c"): 0.0, (1, "s0"): 0.0})
     asked = task(bare, offer(bare), ("gravity_compensator.s0", "gravity_compensator.K_c"))
-    setups = drawn(bare, asked.offer, 30, np.random.default_rng(0))
-    woken = awake(bare, asked.unknowns[:1], asked.offer, setups)
+    setups = drawn(bare, asked.setups, 30, np.random.default_rng(0))
+    woken = influential(bare, asked.unknowns[:1], asked.setups, setups)
     assert woken is bare  # s0 alone moves nothing at any size
-    woken = awake(bare.changed({(1, "K_c"): 0.0}), asked.unknowns, asked.offer, setups)
+    woken = influential(bare.with_values({(1, "K_c"): 0.0}), asked.unknowns, asked.setups, setups)
     assert woken.terms[1].values["K_c"] in (0.0, asked.unknowns[1].parameter.scale)
-    assert awake(kr270, asked.unknowns, asked.offer, setups) is kr270
+    assert influential(kr270, asked.unknowns, asked.setups, setups) is kr270
 
 
 def test_sense_of_approach_is_planned_where_it_matters(kr270):
@@ -383,7 +387,7 @@ def test_sense_of_approach_is_planned_where_it_matters(kr270):
     assert set(np.unique(setups.direction)) == {-1.0, 1.0}
     readings = readings_of(found.model, what, setups)
     np.testing.assert_array_equal(readings.direction[::3], setups.direction)
-    assert {one.name for one in found.unseen if not one.imitated} == set()
+    assert {one.name for one in found.unobservable if not one.imitated} == set()
 
 
 # What is offered
@@ -421,7 +425,7 @@ def test_what_is_out_of_sight_tells_nothing(kr270):
     what = offer(kr270, tracker=np.array([3.5, -0.5, 0.8]), cone=40 * DEG)
     asked = task(kr270, what)
     setups = drawn(kr270, what, 40, np.random.default_rng(0))
-    columns = shown(kr270, asked.unknowns, what, setups).columns.reshape(40, 3, 3, -1)
+    columns = observability(kr270, asked.unknowns, what, setups).columns.reshape(40, 3, 3, -1)
     assert (columns[~setups.visible] == 0).all()
     assert (np.abs(columns[setups.visible]).max(axis=(1, 2)) > 0).all()
 
@@ -436,7 +440,7 @@ def test_spacing_is_kept(kr270):
 
 
 def test_nothing_in_the_box(kr270, monkeypatch):
-    monkeypatch.setattr("postproc.experiments.offer.TRIES", 3)
+    monkeypatch.setattr("postproc.experiments.candidate_setups.TRIES", 3)
     with pytest.raises(Refusal, match=r"PLN001.*never all inside the box"):
         drawn(kr270, offer(kr270, box=np.array([[9.0, 10.0]] * 3)), 10, np.random.default_rng(0))
     hidden = offer(kr270, tracker=np.array([0.0, 0.0, 90.0]), cone=1e-6)
@@ -445,7 +449,7 @@ def test_nothing_in_the_box(kr270, monkeypatch):
 
 
 def test_limits_that_leave_nothing(kr270):
-    with pytest.raises(Refusal, match=r"PLN001.*A2 can not move within 10 \.\. 20 deg.*-145 \.\. -1 deg"):
+    with pytest.raises(Refusal, match=r"PLN001.*A2 cannot move within 10 \.\. 20 deg.*-145 \.\. -1 deg"):
         usable_limits(kr270.robot, {"A2": (10 * DEG, 20 * DEG)})
 
 
@@ -494,17 +498,17 @@ def test_both_loads_are_used_where_one_does_not_tell(kr270):
 def test_a_tour_is_an_order_and_short():
     rng = np.random.default_rng(0)
     q = rng.uniform(-2, 2, (20, 6))
-    order = tour(q, np.ones(6))
+    order = measuring_order(q, np.ones(6))
     assert sorted(order) == list(range(20))
 
     def length(some):
         return np.abs(np.diff(q[some], axis=0)).max(axis=1).sum()
 
     assert length(order) < 0.8 * length(np.arange(20))
-    np.testing.assert_array_equal(tour(q[:1], np.ones(6)), [0])
+    np.testing.assert_array_equal(measuring_order(q[:1], np.ones(6)), [0])
     # from the middle of a line one goes back and forth
     line = np.outer([1.0, 0.0, 2.0, 3.5], np.ones(6))
-    assert list(tour(line, np.ones(6))) in ([1, 0, 2, 3], [3, 2, 0, 1])
+    assert list(measuring_order(line, np.ones(6))) in ([1, 0, 2, 3], [3, 2, 0, 1])
 
 
 # Telling two effects apart
@@ -512,7 +516,9 @@ def test_a_tour_is_an_order_and_short():
 
 def two_rivals(seed, count=10, k=1):
     rng = np.random.default_rng(seed)
-    first, second = (Rival(rng.normal(size=(count, 2, k)), rng.normal(size=(count, 2, 2))) for _ in range(2))
+    first, second = (
+        CompetingModel(rng.normal(size=(count, 2, k)), rng.normal(size=(count, 2, 2))) for _ in range(2)
+    )
     return first, second, rng.normal(size=(count, 2, 1)), rng.uniform(-1, 1, (count, 2))
 
 
@@ -538,7 +544,7 @@ def test_separation_is_what_least_squares_leave(seed):
 
 def test_what_the_other_imitates_is_not_told_apart():
     first, second, common, q = two_rivals(1)
-    same = Rival(first.pattern, np.concatenate([first.pattern, second.columns], axis=2))
+    same = CompetingModel(first.pattern, np.concatenate([first.pattern, second.columns], axis=2))
     chosen = discriminating(first, same, common, q, np.full(2, 1e-6), 6)
     assert chosen.separation[0] < 1e-2
 
@@ -570,7 +576,7 @@ def test_a_tiny_effect_is_told_from_nothing(kr270):
     other = [u for u in asked.unknowns if u.name.startswith("joint")]
     found = [
         apart(model, own, other, (), offer(kr270), (5,), candidates=80).separation[5][0]
-        for model in (asked.model, asked.model.changed({(1, "K_c"): 1e-3}))
+        for model in (asked.model, asked.model.with_values({(1, "K_c"): 1e-3}))
     ]
     assert found[0] > 1.0
     assert found[1] < 1e-6
@@ -585,7 +591,7 @@ def test_the_search_sees_what_a_fit_states(kr270, change):
     asked = task(kr270, what)
     setups = drawn(kr270, what, 40, np.random.default_rng(6))
     before = measured(kr270, asked.unknowns, Campaign(filled_in(kr270, what, setups[:12])), what.sigma)
-    some = pool.Pool(setups[12:], shown(kr270, asked.unknowns, what, setups[12:]))
+    some = pool.Pool(setups[12:], observability(kr270, asked.unknowns, what, setups[12:]))
     for known in (None, before):
         given = replace(asked, before=known)
         kept = [i for i in range(len(asked.unknowns)) if i != 0]
@@ -608,7 +614,7 @@ def test_units_of_the_search_do_not_matter(kr270):
     what = offer(kr270)
     asked = task(kr270, what)
     setups = drawn(kr270, what, 60, np.random.default_rng(4))
-    some = pool.Pool(setups, shown(kr270, asked.unknowns, what, setups))
+    some = pool.Pool(setups, observability(kr270, asked.unknowns, what, setups))
     kept = [i for i in range(len(asked.unknowns)) if i != 0]
     counts = asked.counts[kept]
     scores = []

@@ -18,7 +18,7 @@ import pytest
 from conftest import LINES
 from faults import KILLS, Child, once, seconds, stray, there
 
-from postproc.findings import Refusal
+from postproc.base.findings import Refusal
 from postproc.workflows.preparation import Request
 from postproc.workflows.program import compensate as compensated
 
@@ -69,6 +69,7 @@ def there_without_results(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
 
 
+@pytest.mark.slow
 def test_killed_at_random_moments(shop):
     job, folder, _, new, begin, check = shop
     lasts = seconds(lambda: Child([job.program, NEW], job.folder).end())
@@ -103,6 +104,7 @@ def full() -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
+@pytest.mark.slow
 def test_killed_at_requests_to_the_system(shop):
     job, folder, _, new, begin, check = shop
     begin()
@@ -119,6 +121,7 @@ def test_killed_at_requests_to_the_system(shop):
     assert stray(job.folder) == []
 
 
+@pytest.mark.slow
 def test_interrupted_at_requests_to_the_system(shop):
     """Ctrl-C: exit code 130, all old files or all new ones."""
     job, folder, old, new, begin, check = shop
@@ -137,6 +140,7 @@ def test_interrupted_at_requests_to_the_system(shop):
     assert stray(job.folder) == []
 
 
+@pytest.mark.slow
 def test_requests_to_the_system_that_fail(shop):
     job, folder, old, new, begin, _ = shop
     refused = 0
@@ -149,13 +153,14 @@ def test_requests_to_the_system_that_fail(shop):
         refused += code == 1
         assert there(folder) == (old if code == 1 else new), child.said
         if code == 1:
-            assert "nothing was written" in child.said
+            assert "nothing is written" in child.said
             assert "FIL004" in child.said
         if not reached:
             break
     assert refused > 1
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_full_at_any_file(shop):
     """No file may be longer than the system says; every output in turn is the first that is too long."""
     job, folder, old, new, begin, _ = shop
@@ -173,6 +178,7 @@ def test_a_disk_that_is_full_at_any_file(shop):
     assert resource.getrlimit(resource.RLIMIT_FSIZE) == (soft, hard)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["part.src", "part.dat"])
 @pytest.mark.parametrize("stage", ["correcting", "reporting"])
 def test_an_input_that_changes_while_it_is_read(shop, name, stage):
@@ -199,6 +205,7 @@ def test_an_input_that_goes_while_it_is_read(job):
     assert job.nothing_written()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("round", range(3))
 def test_runs_on_one_file_at_once(shop, round):
     """All files are of one of them."""
@@ -210,6 +217,7 @@ def test_runs_on_one_file_at_once(shop, round):
     assert stray(job.folder) == []
 
 
+@pytest.mark.slow
 def test_runs_on_one_file_into_several_folders_at_once(shop):
     """Each makes what it makes alone, and none waits for what another one holds."""
     job, _, old, new, _, _ = shop
@@ -237,6 +245,7 @@ def test_one_folder_under_two_names_does_not_wait_for_itself(compensate, job):
     assert len(there(job.folder / "same")) == 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("when", [-1e9, 0.0, 4e9])
 def test_the_clock_is_of_no_matter(compensate, job, when):
     """Files from before the first disk or from the far future: the same bytes; what a batch has done stays done."""

@@ -99,6 +99,7 @@ def run(words: list[object], own: dict[str, str], folder: Path, *code: str) -> N
     assert done.returncode in (0, 3), done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["src", "ngc"])
 def test_surroundings_change_no_byte(job, languages, ending):
     """All files of a run: program, data list, report, corrections, difference, page."""
@@ -148,6 +149,7 @@ OTHERS = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", OTHERS, ids=[words[0] for words in OTHERS])
 def test_another_time_user_and_machine_change_no_byte(tmp_path, words):
     """In another folder too, but for a batch, whose reports name its programs with their whole paths."""
@@ -170,6 +172,7 @@ def test_another_time_user_and_machine_change_no_byte(tmp_path, words):
     assert [name for name in made[0] if made[0][name] != made[1][name]] == []
 
 
+@pytest.mark.slow
 def test_a_clock_set_back_makes_nothing_anew(tmp_path):
     """What a batch did in the future is done."""
     folder = four_programs(tmp_path / "shop")
@@ -182,6 +185,7 @@ def test_a_clock_set_back_makes_nothing_anew(tmp_path):
     assert states == [{"done"}, {"unchanged"}, {"unchanged"}]
 
 
+@pytest.mark.slow
 def test_a_robot_file_says_its_day_and_nothing_else_of_the_time(tmp_path):
     """Which also shows that another time is another time."""
     made = []
@@ -220,6 +224,7 @@ def test_rights_change_no_byte(compensate, job, umask):
     assert job.output.stat().st_mode & 0o777 == 0o666 & ~umask
 
 
+@pytest.mark.slow
 def test_one_process_or_many_or_each_alone(compensate, tmp_path):
     """A batch by one process, by two, and every program for itself make the same files."""
     folder = four_programs(tmp_path / "shop")

@@ -38,10 +38,11 @@ def shop(job):
 def refused(child: Child) -> None:
     assert child.end() == 1, child.said
     assert "FIL004" in child.said
-    assert "nothing was written" in child.said
+    assert "nothing is written" in child.said
     assert "Traceback" not in child.said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "code", "most"),
     [
@@ -73,7 +74,7 @@ def test_every_request_to_the_disk_fails_once(shop, kind, code, most):
         assert ended == 1, child.said
         assert "FIL004" in child.said
         assert os.strerror(code) in child.said
-        assert "nothing was written" in child.said
+        assert "nothing is written" in child.said
         assert there(folder) == old
         assert stray(job.folder) == []
         failed += 1
@@ -84,6 +85,7 @@ def test_every_request_to_the_disk_fails_once(shop, kind, code, most):
         assert stray(job.folder) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("before", [False, True])
 def test_a_disk_that_is_full(shop, before):
     """A real file system with room for more and more pages: whole files of one run, or those of the run before."""
@@ -116,6 +118,7 @@ def test_a_disk_that_is_full(shop, before):
     assert outcomes & {0, 3}
 
 
+@pytest.mark.slow
 def test_a_disk_without_room_for_another_name(shop):
     job, _, _, new, _ = shop
     outcomes = set()
@@ -129,6 +132,7 @@ def test_a_disk_without_room_for_another_name(shop):
     assert outcomes & {0, 3}
 
 
+@pytest.mark.slow
 def test_a_disk_that_is_read_only(compensate, shop):
     """Results go elsewhere or nowhere; the program on it is as it was."""
     job, _, _, new, _ = shop
@@ -150,6 +154,7 @@ def test_a_disk_that_is_read_only(compensate, shop):
         assert there(job.folder / "other").keys() == new.keys()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("which", ["beside", "results"])
 def test_a_folder_that_nobody_may_write(compensate, job, which):
     """The program's folder, in which there is no folder of results yet, or the folder of results itself."""

@@ -15,7 +15,7 @@ import pytest
 from faults import KILLS, Child, once, seconds, stray, there
 from test_batch_killed import a_long_program
 
-from postproc.cli.ending import SIGNALS, Stopped, ended_in_words
+from postproc.cli.signals import SIGNALS, Stopped, ended_in_words
 
 OLD, NEW = "--force=0,50,0", "--force=0,150,0"
 
@@ -47,6 +47,7 @@ def tidy(job) -> None:
         assert stray(job.folder) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
 @pytest.mark.parametrize("twice", [False, True], ids=["once", "twice"])
 def test_ended_at_random_moments(shop, name, twice):
@@ -77,6 +78,7 @@ def test_ended_at_random_moments(shop, name, twice):
     assert 128 + number in ends
 
 
+@pytest.mark.slow
 def test_a_second_signal_does_not_disturb_the_way_out(shop):
     """Told to end at each request to the system, and told again at each one that it makes on its way out."""
     job, folder, old, new = shop
@@ -95,6 +97,7 @@ def test_a_second_signal_does_not_disturb_the_way_out(shop):
         tidy(job)
 
 
+@pytest.mark.slow
 def test_a_batch_is_ended_by_the_end_of_the_session(job):
     for number in range(30):
         a_long_program(job.folder / f"p{number}.src", 0, 100)
@@ -107,7 +110,7 @@ def test_a_batch_is_ended_by_the_end_of_the_session(job):
     process.terminate()
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (143, b"")
-    assert b"goes on from there" in err
+    assert b"continues from there" in err
     assert b"Traceback" not in err
     assert stray(job.folder) == []
 
@@ -145,7 +148,13 @@ def test_the_signal_that_ends_a_process_is_the_last_one_it_hears():
 
 
 @pytest.mark.parametrize(
-    ("error", "words"), [(ZeroDivisionError("x"), "a defect of compensate"), (MemoryError(), "memory")]
+    ("error", "words"),
+    [
+        (ZeroDivisionError("x"), "a defect of compensate"),
+        (RuntimeError("x"), "a defect of compensate"),
+        (MemoryError(), "the memory of this machine"),
+        (RuntimeError("can't start new thread"), "the memory of this machine"),
+    ],
 )
 def test_a_defect_is_told_as_one(capsys, error, words):
     with pytest.raises(SystemExit) as end, ended_in_words():
@@ -156,6 +165,7 @@ def test_a_defect_is_told_as_one(capsys, error, words):
     assert ("ZeroDivisionError" in said) == isinstance(error, ZeroDivisionError)
 
 
+@pytest.mark.slow
 def test_not_enough_memory(shop):
     """The system gives no more: a sentence, and all files as they were."""
     import resource

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_forces import DOWN, PTP_THEN, cell_of, path_of, run
+from tiers import examples
 
-from postproc.geometry import Poses, rotation_from_abc, rotation_from_vector
+from postproc.base.geometry import Poses, rotation_from_abc, rotation_from_vector
+from postproc.base.units import DEG
 from postproc.toolpath import Kind
-from postproc.units import DEG
 
 
 def arc_path(
@@ -112,7 +113,7 @@ def test_an_upright_arc_keeps_x_where_its_tangent_is_along_the_spindle():
     assert np.allclose(at(result, 1, 0, 0.3, 0.7, 1)[:, 0], [-10, -10, 10, 10])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["feed", "tool", "base", "world"]))
 def test_between_the_ends_nothing_jumps_and_the_size_stays(seed, frame):
     rng = np.random.default_rng(seed)

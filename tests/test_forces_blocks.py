@@ -9,17 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_forces import DOWN, cell_of, path_of, run
+from tiers import examples
 
-from postproc.blocks import ROWS
+from postproc.base.batches import ROWS
+from postproc.base.findings import Refusal
+from postproc.base.geometry import Poses, rotation_from_abc, rotation_from_vector
+from postproc.base.units import DEG, MM
 from postproc.cell import Tool, frames_of
-from postproc.findings import Refusal
-from postproc.forces.milling import mean_force
-from postproc.forces.operations import process_forces
-from postproc.forces.process import read_process
-from postproc.forces.way import Way
-from postproc.geometry import Poses, rotation_from_abc, rotation_from_vector
+from postproc.process.milling_forces import mean_force
+from postproc.process.operations import process_forces
+from postproc.process.path_length import PathLength
+from postproc.process.process_file import read_process
 from postproc.toolpath import Annotation, FrameRef, Kind, Toolpath
-from postproc.units import DEG, MM
 
 TIMES = 2 * ROWS // 10
 """Repetitions: a path of 11 to 14 motions then ends in all places of a block."""
@@ -77,10 +78,20 @@ def repeated(path: Toolpath, times: int) -> Toolpath:
     notes = [
         Annotation(note.row + n * k, note.text, note.line) for k in range(times) for note in path.annotations
     ]
-    rest = {name: np.empty((0, *getattr(path, name).shape[1:])) for name in ("given", "free_axis", "blend")}
+    left_out = (
+        "partial_target",
+        "redundant_axis",
+        "approximation",
+        "orientation_path",
+        "rotary_from",
+        "rotary_to",
+        "external",
+    )
+    rest = {name: np.empty((0, *getattr(path, name).shape[1:])) for name in left_out}
     return replace(path, **tiled, **rest, line=np.arange(n * times) + 10, annotations=tuple(notes),
-                   anchor=np.empty(0, int), **{name: np.empty(0, bool) for name in
-                                               ("oriented", "runs", "any_plane", "timed")})  # fmt: skip
+                   inherits_from_row=np.empty(0, int), **{name: np.empty(0, bool) for name in
+                   ("orientation_programmed", "executes", "arc_plane_free", "inverse_time_feed", "stops")},
+                   **{name: np.empty(0, np.int8) for name in ("orientation", "arc_frame")})  # fmt: skip
 
 
 def same(long, short, times: int, seed: int) -> None:
@@ -95,7 +106,7 @@ def same(long, short, times: int, seed: int) -> None:
     np.testing.assert_allclose(long.along(rows, share), short.along(rows % n, share), atol=1e-9)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(
     st.integers(0, 2**32 - 1),
     st.integers(11, 14),
@@ -143,12 +154,13 @@ def test_a_table_of_a_repeated_path(tmp_path):
     same(run(long, table(long, "long.csv"), CELL), run(path, table(path, "short.csv"), CELL), TIMES, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("each", [0.8, 9.0])
 def test_a_log_over_a_repeated_path(tmp_path, each):
     """Readings that repeat with the path: every repetition but the first and the last ones gets the same of them."""
     path = path_of([[0.004 * k, 0.001 * (k % 2), 0] for k in range(13)], [Kind.PTP] + [Kind.LIN] * 12)
     long = repeated(path, TIMES)
-    way = Way(long, frames_of(CELL, long, "part.src"))
+    way = PathLength(long, frames_of(CELL, long, "part.src"))
     period = way.length[13:26].sum()
     count = int(period / (each * MM)) + 1
     place = period * (np.arange(count * TIMES) + 0.37) / count / MM

@@ -15,9 +15,9 @@ from fuzz.examine import Broken, examined
 from fuzz.hostile import hostile
 from fuzz.mutations import MUTATIONS, mutated
 
-from postproc.dialects import DIALECTS
-from postproc.dialects.dialect import Dialect
-from postproc.document import Document, Edit, Span
+from postproc.base.document import Document, Edit, Span
+from postproc.languages import DIALECTS
+from postproc.languages.dialect import Dialect
 
 TESTS = Path(__file__).parent
 HELD = DIALECTS
@@ -35,6 +35,7 @@ def programs() -> tuple[Source, ...]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hundred", range(6))
 def test_mutants_are_read_moved_and_lose_no_byte(hundred: int) -> None:
     assert {source.dialect.name for source in programs()} == set(HELD)
@@ -43,6 +44,7 @@ def test_mutants_are_read_moved_and_lose_no_byte(hundred: int) -> None:
         assert not done.failure, f"run {number}, {done.name}, {done.mutation}: {done.failure} ({done.place})"
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("source", programs(), ids=lambda source: source.documents[0].path.name)
 def test_programs_as_they_are_move_at_random(source: Source) -> None:
     for seed in range(3):
@@ -51,6 +53,7 @@ def test_programs_as_they_are_move_at_random(source: Source) -> None:
         assert [d.raw for d in done.documents] == [d.raw for d in source.documents]
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", hostile(1))
 @pytest.mark.parametrize("dialect", HELD.values(), ids=list(HELD))
 def test_hostile_input_is_read(dialect: Dialect, name: str) -> None:
@@ -79,15 +82,15 @@ class _Forgetful:
     def read(self, documents, settings):
         return self.dialect.read(documents, settings)
 
-    def moved(self, program, plan, writing):
-        found = self.dialect.moved(program, plan, writing)
+    def edit_targets(self, program, plan, writing):
+        found = self.dialect.edit_targets(program, plan, writing)
         edits = list(found.edits)
         if self.wrong == "left out" and edits:
             edits.pop(len(edits) // 2)
         if self.wrong == "too much" and not edits:
             at = program.documents[0].raw.rfind(b"X") + 2
             edits.append(Edit(Span(0, at, at + 1), b"7"))
-        return type(found)(tuple(edits), found.held)
+        return type(found)(tuple(edits), found.unwritten)
 
 
 @pytest.mark.parametrize("wrong", ["left out", "too much"])

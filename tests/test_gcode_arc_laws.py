@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from postproc.arrays import Floats
-from postproc.dialects.gcode import arcs as reading
-from postproc.dialects.gcode import writer_arcs as writing
-from postproc.dialects.gcode.writer_arcs import Form
-from postproc.geometry import on_arc, rotation_from_vector
+from postproc.base.arrays import Floats
+from postproc.base.geometry import on_arc, rotation_from_vector
+from postproc.languages.gcode import arcs as reading
+from postproc.languages.gcode import writer_arcs as writing
+from postproc.languages.gcode.writer_arcs import ArcForm
 
 NAN = np.nan
 AXES = ((0, 1, 2), (2, 0, 1), (1, 2, 0))
@@ -45,7 +45,7 @@ def in_plane(one: dict[str, Any], values: Floats) -> Floats:
     return np.where(np.arange(3) == third[:, None], NAN, values)
 
 
-def read(begin: Floats, end: Floats, **said: Any) -> reading.Arcs:
+def read(begin: Floats, end: Floats, **said: Any) -> reading.ArcGeometry:
     n = len(begin)
     words = {
         "plane": np.zeros(n, np.int64), "counter": np.ones(n, np.bool_), "ijk": np.full((n, 3), NAN),
@@ -54,7 +54,7 @@ def read(begin: Floats, end: Floats, **said: Any) -> reading.Arcs:
     return reading.arcs(np.array(begin), np.array(end), **(words | said))
 
 
-def assert_made(found: reading.Arcs, one: dict[str, Any], more: Floats | float = 0.0) -> None:
+def assert_made(found: reading.ArcGeometry, one: dict[str, Any], more: Floats | float = 0.0) -> None:
     assert not found.wrong.any()
     np.testing.assert_allclose(found.centre, one["centre"] / 1e3, atol=1e-9)
     np.testing.assert_array_equal(found.normal, one["normal"])
@@ -208,14 +208,14 @@ def test_three_points_that_are_no_arc() -> None:
 
 # Writing: units of 1, decimals of the words
 
-CENTRE, RADIUS, THROUGH = Form.CENTRE, Form.RADIUS, Form.THROUGH
+CENTRE, RADIUS, THROUGH = ArcForm.CENTRE, ArcForm.RADIUS, ArcForm.THROUGH
 
 
 def task(
-    one: dict[str, Any], form: Form, relative: Any, own: Floats, decimals: int, turns: int = 0
-) -> writing.Arcs:
+    one: dict[str, Any], form: ArcForm, relative: Any, own: Floats, decimals: int, turns: int = 0
+) -> writing.ArcsToWrite:
     n = len(one["sweep"])
-    return writing.Arcs(
+    return writing.ArcsToWrite(
         one["begin"], one["end"], one["centre"], one["normal"], one["sweep"] + 2 * np.pi * turns, one["plane"],
         np.full(n, form), ~one["counter"], np.full(n, turns), np.broadcast_to(relative, (n, 3)), own,
         np.full((n, 4), decimals), np.zeros(n),
@@ -228,22 +228,22 @@ def rounded(one: dict[str, Any], decimals: int) -> dict[str, Any]:
     return one | grid
 
 
-def ways(found: reading.Arcs, begin: Floats, end: Floats) -> Floats:
+def ways(found: reading.ArcGeometry, begin: Floats, end: Floats) -> Floats:
     shares = [np.full(len(begin), share) for share in (0.2, 0.4, 0.6, 0.8)]
     return np.stack([on_arc(begin, end, found.centre, found.normal, found.sweep, at) for at in shares])
 
 
-def back(arcs: writing.Arcs, written: writing.WrittenArcs) -> reading.Arcs:
+def back(arcs: writing.ArcsToWrite, written: writing.WrittenArcs) -> reading.ArcGeometry:
     """What a control makes of the numbers, written ones and those that stand there."""
     number = np.where(written.write, written.number, arcs.own)
     scale = 1e-3
     ijk = np.where(np.isnan(number[:, :3]), NAN, number[:, :3]) * scale
-    begin, end, turns = arcs.begin * scale, arcs.end * scale, arcs.turns.astype(float)
-    if arcs.form[0] == Form.THROUGH:
+    begin, end, turns = arcs.start * scale, arcs.end * scale, arcs.turns.astype(float)
+    if arcs.form[0] == ArcForm.THROUGH:
         via = np.where(np.isnan(ijk), 0.0, ijk) + np.where(arcs.relative, begin, 0.0)
         via = np.where(np.isnan(ijk) & ~arcs.relative, begin, via)
         return reading.through(begin, via, end, turns)
-    by_centre = written.convert | (arcs.form == Form.CENTRE)
+    by_centre = written.convert | (arcs.form == ArcForm.CENTRE)
     ijk[~by_centre] = NAN
     radius = np.where(by_centre, NAN, number[:, 3] * scale)
     return reading.arcs(begin, end, arcs.plane, ~arcs.clockwise, ijk, ~arcs.relative, radius, turns)
@@ -254,7 +254,7 @@ def back(arcs: writing.Arcs, written: writing.WrittenArcs) -> reading.Arcs:
 @pytest.mark.parametrize("relative", [True, False])
 @pytest.mark.parametrize("form", [CENTRE, RADIUS, THROUGH])
 def test_written_arcs_are_read_as_they_were_meant(
-    form: Form, relative: bool, turns: int, decimals: int
+    form: ArcForm, relative: bool, turns: int, decimals: int
 ) -> None:
     """Within two steps of what is written, four for a point between; no arc of ordinary size is given up."""
     if form != CENTRE and turns:
@@ -286,9 +286,9 @@ def test_written_arcs_are_read_as_they_were_meant(
     assert np.abs(off[written.write]).max() < 1e-4
     found = back(arcs, written)
     assert not found.wrong.any()
-    planned = reading.Arcs(arcs.centre, arcs.normal, arcs.sweep, np.zeros(200, np.int64))
-    read_again = reading.Arcs(found.centre * 1e3, found.normal, found.sweep, found.wrong)
-    apart = ways(read_again, arcs.begin, arcs.end) - ways(planned, arcs.begin, arcs.end)
+    planned = reading.ArcGeometry(arcs.centre, arcs.normal, arcs.sweep, np.zeros(200, np.int64))
+    read_again = reading.ArcGeometry(found.centre * 1e3, found.normal, found.sweep, found.wrong)
+    apart = ways(read_again, arcs.start, arcs.end) - ways(planned, arcs.start, arcs.end)
     step = 10.0 ** -written.decimals[:, :3].min(axis=1)
     assert (np.linalg.norm(apart, axis=2).max(axis=0) <= (4.01 if form == THROUGH else 2.01) * step).all()
     # The words of the third axis are none of an arc by its centre.
@@ -347,7 +347,7 @@ def test_an_arc_that_turns_the_other_way_is_given_up() -> None:
         ("normal", flat.normal @ tilted.T),
         ("turns", flat.turns + 1),
     ):
-        changed = writing.Arcs(**(vars(flat) | {name: values}))
+        changed = writing.ArcsToWrite(**(vars(flat) | {name: values}))
         assert writing.write_arcs(changed).bad.all(), name
     assert not writing.write_arcs(flat).bad.any()
 

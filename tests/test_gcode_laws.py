@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from gcode_writing import DOWN, WRITING, random_plan, read
 
-from postproc.dialects.dialect import Plan, Program, Settings
-from postproc.dialects.gcode import DIALECTS, kuka_cnc, sinumerik, source
-from postproc.dialects.gcode import reader as reader_module
-from postproc.dialects.gcode import writer as writer_module
-from postproc.dialects.gcode.control import Code, Control, Feed, Group, Move, Once
-from postproc.dialects.gcode.lexing import lex
-from postproc.dialects.gcode.tables import FANUC, LINUXCNC
-from postproc.dialects.gcode.words import How
-from postproc.document import Document, apply
-from postproc.geometry import rotation_from_vector
-from postproc.units import DEG, MM
+from postproc.base.document import Document, apply
+from postproc.base.geometry import rotation_from_vector
+from postproc.base.units import DEG, MM
+from postproc.languages.dialect import Plan, Program, ReadingSettings
+from postproc.languages.gcode import DIALECTS, kuka_cnc, sinumerik, source
+from postproc.languages.gcode import reader as reader_module
+from postproc.languages.gcode import writer as writer_module
+from postproc.languages.gcode.code_tables import FANUC, LINUXCNC
+from postproc.languages.gcode.control import Control, Feed, Group, ModalCode, Move, Once
+from postproc.languages.gcode.lexing import lex
+from postproc.languages.gcode.words import How
 
 ROOT = Path(__file__).parent / "programs"
 NAMES = {dialect.name: dialect for dialect in DIALECTS}
@@ -44,8 +44,8 @@ def dialect_of(path: Path):
     return NAMES[next(part for part in reversed(path.parts) if part in NAMES)]
 
 
-def settings_of(path: Path) -> Settings:
-    return Settings(orientation=DOWN.orientation, integer_words="um" if "_um" in path.stem else "mm")
+def settings_of(path: Path) -> ReadingSettings:
+    return ReadingSettings(orientation=DOWN.orientation, integer_words="um" if "_um" in path.stem else "mm")
 
 
 def program(path: Path) -> Program:
@@ -57,7 +57,7 @@ PLAIN = re.compile(rb"[-+]?[\d. \t]+")
 # Codes
 
 
-def meaning(code: Code) -> str:
+def meaning(code: ModalCode) -> str:
     """``MOTION LINE``, ``UNITS 1``"""
     words = {Group.MOTION: Move, Group.ONCE: Once, Group.FEED: Feed}.get(code.group)
     return f"{code.group.name} {words(code.value).name if words else code.value}"
@@ -78,7 +78,9 @@ def listing(control: Control, named: dict[bytes, tuple[float, ...]]) -> list[str
         f"{what}: {' '.join(names.get(n, f'G{n / 10:g}') for n in sorted(found[what]))}"
         for what in sorted(found)
     ]
-    lines += [f"begins with {meaning(Code(group, value))}" for group, value in sorted(control.start.items())]
+    lines += [
+        f"begins with {meaning(ModalCode(group, value))}" for group, value in sorted(control.start.items())
+    ]
     return [
         *lines,
         f"ends with {' '.join(f'M{n}' for n in sorted(control.endings))}",
@@ -115,6 +117,7 @@ def test_words_stand_where_their_numbers_are(path: Path) -> None:
     assert np.array_equal(lines.line, 1 + np.searchsorted(feeds, lines.start))
 
 
+@pytest.mark.sample(27)
 @cases
 def test_findings_point_into_their_file(path: Path) -> None:
     found = program(path)
@@ -127,12 +130,13 @@ def test_findings_point_into_their_file(path: Path) -> None:
 # Blocks
 
 
+@pytest.mark.sample(2)
 @cases
 def test_parts_do_not_matter(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Read and written in parts of a few rows, a program is the same motions and the same edits."""
     whole = program(path)
     plan = random_plan(whole, 7)
-    edits = dialect_of(path).moved(whole, plan, WRITING)
+    edits = dialect_of(path).edit_targets(whole, plan, WRITING)
     for size in (1, 2, 3, 7):
         monkeypatch.setattr(reader_module, "PART", size)
         monkeypatch.setattr(writer_module, "ROWS", size)
@@ -140,9 +144,9 @@ def test_parts_do_not_matter(path: Path, monkeypatch: pytest.MonkeyPatch) -> Non
         part = program(path)
         assert list(part.toolpath.dump()) == list(whole.toolpath.dump())
         assert part.findings == whole.findings
-        again = dialect_of(path).moved(part, plan, WRITING)
+        again = dialect_of(path).edit_targets(part, plan, WRITING)
         assert list(again.edits) == list(edits.edits)
-        assert again.held == edits.held
+        assert again.unwritten == edits.unwritten
 
 
 # Sinumerik: nothing is misread
@@ -210,6 +214,7 @@ START = {
 }
 
 
+@pytest.mark.sample(8)
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("share", SHARES)
 @pytest.mark.parametrize("name", NAMES)
@@ -220,8 +225,8 @@ def test_a_number_changes_where_another_is_nearer(name: str, share: float, sign:
     for axis in range(3):
         position = found.toolpath.position.copy()
         position[-2, axis] += sign * share * step
-        edits = NAMES[name].moved(found, replace(Plan.of(found.toolpath), position=position), WRITING)
-        assert not edits.held
+        edits = NAMES[name].edit_targets(found, replace(Plan.of(found.toolpath), position=position), WRITING)
+        assert not edits.unwritten
         assert bool(len(edits.edits)) == (share > 0.5)
         raw = apply(found.documents[0], list(edits.edits))
         again = read(NAMES[name], raw).toolpath.position
@@ -236,13 +241,16 @@ def test_a_tool_vector_changes_where_another_is_nearer(share: float) -> None:
     for axis in ([1.0, 0.0, 0.0], [0.0, -1.0, 0.0]):
         rotation = found.toolpath.rotation.copy()
         rotation[-2:] = rotation_from_vector(share * step * np.array(axis)) @ rotation[-2:]
-        edits = NAMES["sinumerik"].moved(found, replace(Plan.of(found.toolpath), rotation=rotation), WRITING)
-        assert not edits.held
+        edits = NAMES["sinumerik"].edit_targets(
+            found, replace(Plan.of(found.toolpath), rotation=rotation), WRITING
+        )
+        assert not edits.unwritten
         again = read(NAMES["sinumerik"], apply(found.documents[0], list(edits.edits))).toolpath.rotation
         apart = np.linalg.norm(np.cross(again[-2:, :, 2], rotation[-2:, :, 2]), axis=1)
         assert apart.max() <= 0.5001 * step
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("words", ["A2=0 B2=0 C2=0", "A2=10 B2=20 C2=30"])
 @pytest.mark.parametrize("share", SHARES)
 def test_angles_change_where_others_are_nearer(words: str, share: float) -> None:
@@ -251,8 +259,10 @@ def test_angles_change_where_others_are_nearer(words: str, share: float) -> None
     for axis in np.eye(3):
         rotation = found.toolpath.rotation.copy()
         rotation[-2:] = rotation_from_vector(share * step * axis) @ rotation[-2:]
-        edits = NAMES["sinumerik"].moved(found, replace(Plan.of(found.toolpath), rotation=rotation), WRITING)
-        assert not edits.held
+        edits = NAMES["sinumerik"].edit_targets(
+            found, replace(Plan.of(found.toolpath), rotation=rotation), WRITING
+        )
+        assert not edits.unwritten
         again = read(NAMES["sinumerik"], apply(found.documents[0], list(edits.edits))).toolpath.rotation
         # The tool may spin: two of the three angles say where it points.
         apart = np.linalg.norm(np.cross(again[-2:, :, 2], rotation[-2:, :, 2]), axis=1)
@@ -263,7 +273,7 @@ def test_angles_change_where_others_are_nearer(words: str, share: float) -> None
 @pytest.mark.parametrize(("unit", "whole"), [("G21", "X1000 Y-2500"), ("G20", "X10000 Y-25000")])
 def test_shifts_count_increments_too(code: str, unit: str, whole: str) -> None:
     """A control that takes X1000 for a millimetre does so wherever it says a length."""
-    micro = Settings(orientation=DOWN.orientation, integer_words="um")
+    micro = ReadingSettings(orientation=DOWN.orientation, integer_words="um")
     ends = []
     for said in (whole, "X1. Y-2.5"):
         text = f"{unit} G90 G17 G54 T1\nG0 X0. Y0. Z0.\n{code} {said}\nG1 X4. Y5. Z6. F100\n"

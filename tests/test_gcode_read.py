@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.dialects import DIALECTS, detect
-from postproc.dialects.dialect import Program, Settings
-from postproc.dialects.gcode import general
-from postproc.dialects.gcode.lexing import lex
-from postproc.dialects.gcode.tables import FANUC, LINUXCNC
-from postproc.dialects.gcode.words import How, key
-from postproc.document import Document
-from postproc.findings import Refusal
-from postproc.geometry import rotation_from_abc
+from postproc.base.document import Document
+from postproc.base.findings import Refusal
+from postproc.base.geometry import rotation_from_abc
+from postproc.base.units import DEG
+from postproc.languages import DIALECTS, detect
+from postproc.languages.dialect import Program, ReadingSettings
+from postproc.languages.gcode import general_lines as general
+from postproc.languages.gcode.code_tables import FANUC, LINUXCNC
+from postproc.languages.gcode.lexing import lex
+from postproc.languages.gcode.words import How, key
 from postproc.toolpath import Kind
-from postproc.units import DEG
 
 CASES = Path(__file__).parent / "programs"
 GOOD = [path for name in ("linuxcnc", "fanuc") for path in sorted((CASES / name).glob("*.n*c"))]
@@ -31,7 +31,7 @@ def read(
     text: str | bytes, dialect: str = "linuxcnc", orientation: np.ndarray | None = DOWN, integers: str = "mm"
 ) -> Program:
     raw = text if isinstance(text, bytes) else text.encode("latin-1")
-    settings = Settings(orientation=orientation, integer_words=integers)
+    settings = ReadingSettings(orientation=orientation, integer_words=integers)
     return DIALECTS[dialect].read((Document(Path("part.nc"), raw),), settings)
 
 
@@ -107,6 +107,7 @@ def spread(found: re.Match[bytes]) -> bytes:
     return re.sub(rb"(?<=[A-Za-z0-9.])(?=[-+.0-9])", b" ", found[0])
 
 
+@pytest.mark.sample(20)
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("path", GOOD, ids=lambda path: path.stem)
 def test_spelling_says_nothing(path: Path, variant: str) -> None:
@@ -227,14 +228,14 @@ def test_rotary_axes_turn_the_tool_under_tcp() -> None:
     np.testing.assert_allclose(
         path.rotation[2], about[0] @ about[1] @ about[2] @ rotation_from_abc(DOWN), atol=1e-12
     )
-    assert path.oriented.tolist()[2]
+    assert path.orientation_programmed.tolist()[2]
     assert np.isnan(read("T1 G21 G0 X0 Y0 Z0\n", orientation=None).toolpath.rotation).all()
 
 
 def test_three_axes_take_the_orientation_that_the_cell_says() -> None:
     path = body("G1 X1\n").toolpath
     np.testing.assert_allclose(path.rotation, np.broadcast_to(rotation_from_abc(DOWN), (2, 3, 3)))
-    assert not path.oriented.any()
+    assert not path.orientation_programmed.any()
 
 
 @pytest.mark.parametrize(
@@ -247,7 +248,7 @@ def test_three_axes_take_the_orientation_that_the_cell_says() -> None:
     ],
 )
 def test_how_far_the_path_may_be_left(text: str, blend: float) -> None:
-    np.testing.assert_allclose(body(text).toolpath.blend[-1], blend)
+    np.testing.assert_allclose(body(text).toolpath.approximation[-1], blend)
 
 
 @pytest.mark.parametrize(
@@ -327,7 +328,7 @@ def test_a_marked_program_shows_its_mark() -> None:
     ],
 )
 def test_ends_that_others_build_on_are_pinned(text: str, pins: list[int]) -> None:
-    assert list(body(text).toolpath.pinned) == pins
+    assert list(body(text).toolpath.locked) == pins
 
 
 @pytest.mark.parametrize(
@@ -340,26 +341,26 @@ def test_ends_that_others_build_on_are_pinned(text: str, pins: list[int]) -> Non
     ],
 )  # fmt: skip
 def test_blocks_that_say_more_than_the_motion_are_whole(text: str, whole: bool) -> None:
-    assert bool(body(text).toolpath.whole) == whole
+    assert bool(body(text).toolpath.no_insert_before) == whole
 
 
 def test_nothing_goes_before_a_block_that_a_jump_leads_to() -> None:
     text = "IF[#101GT3]GOTO60\nG1 X4 F100\nN60 G1 X6 Y0 Z0\nN70 X7\n"
     path = body(text, "fanuc").toolpath
-    assert list(path.whole) == [len(path) - 2]
+    assert list(path.no_insert_before) == [len(path) - 2]
     text = "GOTOF PAST\nG1 X4 F100\nPAST: G1 X6 Y0 Z0\nX7\n"
     path = body(text, "sinumerik").toolpath
-    assert list(path.whole) == [len(path) - 2]
+    assert list(path.no_insert_before) == [len(path) - 2]
 
 
 def test_nothing_goes_before_a_block_that_a_subprogram_returns_to() -> None:
     lines = ["O1", "G21 G90 G17 G54 T1", "G0 X0. Y0. Z0.", "M98 P200", "G54 G90 G1 X4. Y0. Z0. F100"]
     lines += ["N60 G1 X6. Y0. Z0.", "N70 X7.", "M30", "O200", "G1 X1.", "M99 P{}", ""]
     path = read("\n".join(lines).format(60), "fanuc").toolpath
-    whole = {int(path.line[row]): why for row, why in path.whole.items()}
+    whole = {int(path.line[row]): why for row, why in path.no_insert_before.items()}
     assert whole[6] == "a jump leads to its block"
     path = read("\n".join(lines).format(""), "fanuc").toolpath
-    assert 6 not in path.line[list(path.whole)]
+    assert 6 not in path.line[list(path.no_insert_before)]
 
 
 def test_a_call_leaves_nothing_known_but_the_unit() -> None:
@@ -418,6 +419,7 @@ def test_what_is_no_program_is_not_claimed(text: str) -> None:
         detect(Path("file.txt"), text.encode())
 
 
+@pytest.mark.slow
 def test_any_bytes_are_read() -> None:
     """Random, cut and mutated programs: no crash, spans inside, every motion with a place or a reason."""
     rng = random.Random(11)

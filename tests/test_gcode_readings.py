@@ -12,15 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.arrays import Floats
-from postproc.dialects.dialect import Program, Settings, Writing
-from postproc.dialects.gcode import DIALECTS
-from postproc.dialects.gcode.control import Feed
-from postproc.dialects.gcode.writer_text import stated
-from postproc.document import Document
-from postproc.geometry import abc_from_rotation
+from postproc.base.arrays import Floats
+from postproc.base.document import Document
+from postproc.base.geometry import abc_from_rotation
+from postproc.base.units import DEG, MM
+from postproc.languages.dialect import Program, ReadingSettings, WritingSettings
+from postproc.languages.gcode import DIALECTS
+from postproc.languages.gcode.control import Feed
+from postproc.languages.gcode.writer_text import stated
 from postproc.toolpath import Kind
-from postproc.units import DEG, MM
 
 PROGRAMS = Path(__file__).parent / "programs"
 CASES, STATED = (sorted((PROGRAMS / name).glob("*.txt")) for name in ("readings", "stated"))
@@ -32,7 +32,7 @@ RULE = "--------\n"
 def read(head: str, text: str) -> Program:
     name, *words = head.split()
     orientation = None if "unoriented" in words else DOWN
-    settings = Settings(orientation=orientation, integer_words="um" if "um" in words else "mm")
+    settings = ReadingSettings(orientation=orientation, integer_words="um" if "um" in words else "mm")
     return NAMES[name].read((Document(Path("part.nc"), text.encode("latin-1")),), settings)
 
 
@@ -58,36 +58,36 @@ def reading(program: Program) -> Iterator[str]:
                 f"arc {letters('XYZ', centre)} {letters('UVW', normal)} {number(path.sweep[row] / DEG)}deg"
             )
         if text.orient[row] >= 0:
-            ways = "written" if path.oriented[row] else "kept"
+            ways = "written" if path.orientation_programmed[row] else "kept"
             said.append(f"{letters('abc', text.turned_values[row])} {ways}")
             said.append(f"from {letters('abc', text.turned_before[row])}")
-            if np.isfinite(path.free_axis[row, 0]):
-                said.append(f"about {letters('xyz', path.free_axis[row])}")
+            if np.isfinite(path.redundant_axis[row, 0]):
+                said.append(f"about {letters('xyz', path.redundant_axis[row])}")
         said.append(f"F{number(path.feed[row] / MM * 60)}")
         for letter, index in (("G", path.base[row]), ("T", path.tool[row])):
             frame = path.frames[index] if index >= 0 else None
             said.append(f"{letter}{frame.number if frame else '?'}{'w' if frame and frame.pose else ''}")
-        said.append(f"from {letters('XYZ', text.begin[row] / MM)}")
-        said.append(f"blend {number(path.blend[row] / MM)}" if path.blend[row] > 0 else "")
-        said.append("exact" if path.blend[row] == 0 else "")
+        said.append(f"from {letters('XYZ', text.start_position[row] / MM)}")
+        said.append(f"blend {number(path.approximation[row] / MM)}" if path.approximation[row] > 0 else "")
+        said.append("exact" if path.approximation[row] == 0 else "")
         said.append({0: "", 1: "G18", 2: "G19"}.get(int(text.plane[row]), "plane?"))
         said.append("G91" if text.incremental[row] else "")
         said.append("centres absolute" if text.arc_absolute[row] else "")
-        said.append("any plane" if path.any_plane[row] and path.kind[row] == Kind.CIRC else "")
+        said.append("any plane" if path.arc_plane_free[row] and path.kind[row] == Kind.CIRC else "")
         if text.scale[row] != MM or text.increment[row] != MM:
             said.append(f"unit {number(text.scale[row] / MM)} {number(text.increment[row] / MM)}")
         if text.frame[row]:
             said.append(f"frame {letters('XYZ', text.frames.position[text.frame[row]] / MM)}")
         if text.feed_mode[row] != Feed.PER_MINUTE:
             said.append(f"feed {text.feed_mode[row]}")
-        said.append("timed" if path.timed[row] else "")
+        said.append("timed" if path.inverse_time_feed[row] else "")
         yield " ".join(word for word in said if word)
-        for name in ("refused", "pinned"):
+        for name in ("refused", "locked"):
             finding = getattr(path, name).get(row)
             if finding:
                 yield f"  {name} {finding.code} {finding.line}:{finding.column} {finding.message}"
-        if row in path.whole:
-            yield f"  whole: {path.whole[row]}"
+        if row in path.no_insert_before:
+            yield f"  whole: {path.no_insert_before[row]}"
     for note in path.annotations:
         yield f"speaks before {note.row} line {note.line}: {note.text}"
     for note in path.comments:
@@ -95,7 +95,7 @@ def reading(program: Program) -> Iterator[str]:
     yield f"mark {program.marker_at.start}" + (f" in place of {program.marker}" if program.marker else "")
     for finding in program.findings:
         yield f"{finding.code} {finding.line}:{finding.column} {finding.message}"
-        yield f"  {finding.help}"
+        yield f"  {finding.advice}"
 
 
 @pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
@@ -109,7 +109,7 @@ def blocks(program: Program) -> Iterator[str]:
     """Of every column its address and number (r: an increment), the digits with which it is written (r: an increment
     where it is not there yet), and what stands there; the word of the motion, and what is behind the last word."""
     part = program.text.part(0, len(program.toolpath))
-    text, words, raw = stated(part, Writing(mm=3, deg=2)), part.text.words, part.raw
+    text, words, raw = stated(part, WritingSettings(mm=3, deg=2)), part.text.words, part.raw
     for row in range(len(part)):
         said = []
         for column, key in enumerate(text.keys[row].tolist()):

@@ -8,7 +8,7 @@ from conftest import CELL
 from gcode_writing import WRITING, read
 from test_gcode_write import FANUC, HEAD, KUKA, LINUXCNC, NAMES, SINUMERIK, inserted, moved_line
 
-from postproc.dialects.dialect import Plan
+from postproc.languages.dialect import Plan
 
 ROBOT = "G90 G71 G54\nT1 M6\n"
 MILL = "G54 G71 G90\nT1\nG0 X0 Y0 Z0\n"
@@ -19,8 +19,8 @@ FLAT = CELL + "orientation: {a: 0, b: 0, c: 180}\nmax_growth: 20\n"
 def test_a_program_without_motions_has_no_edit(dialect) -> None:
     for text in ("", "\n", "N1", "G21\n", "%\n", "T1 D1\n"):
         program = read(dialect, text)
-        moved = dialect.moved(program, Plan.of(program.toolpath), WRITING)
-        assert (len(moved.edits), dict(moved.held)) == (0, {})
+        moved = dialect.edit_targets(program, Plan.of(program.toolpath), WRITING)
+        assert (len(moved.edits), dict(moved.unwritten)) == (0, {})
 
 
 def test_what_was_lost_on_the_way_is_said_again() -> None:
@@ -35,7 +35,7 @@ def test_what_was_lost_on_the_way_is_said_again() -> None:
 def test_an_orientation_that_no_motion_states_is_inherited() -> None:
     text = "TRAORI\nORIEULER\nG0 X0 Y0 Z50 A2=0 B2=10 C2=0\nA2=0 B2=0 C2=0\nG1 X20 Y5 F100\nX30\n"
     program = read(SINUMERIK, MILL + text)
-    assert len(SINUMERIK.moved(program, Plan.of(program.toolpath), WRITING).edits) == 0
+    assert len(SINUMERIK.edit_targets(program, Plan.of(program.toolpath), WRITING).edits) == 0
     assert "=" not in "".join(moved_line(text, len(program.toolpath) - 2, (0.1, 0, 0), SINUMERIK, MILL)[-2:])
 
 
@@ -61,7 +61,7 @@ def test_numbers_beyond_any_machine_are_none(text: str) -> None:
     assert path.refused[1].code == "GCO005"
     assert np.isnan(path.position[1]).any()
     assert path.known[2:].all()
-    assert len(LINUXCNC.moved(program, Plan.of(path), WRITING).edits) == 0
+    assert len(LINUXCNC.edit_targets(program, Plan.of(path), WRITING).edits) == 0
 
 
 def test_a_coordinate_is_inherited_through_what_is_not_corrected() -> None:
@@ -70,7 +70,7 @@ def test_a_coordinate_is_inherited_through_what_is_not_corrected() -> None:
         ("G1 X1 Y1 Z1 F9\nG28 Z0\nG1 X2 Y#1 Z#1\n", []),
         ("G1 X1 Y1 Z1 F9\nG1 X#1 Y2\nG1 X3 Y#1\n", [1]),
     ):
-        assert list(read(LINUXCNC, HEAD + text).toolpath.pinned) == pins, text
+        assert list(read(LINUXCNC, HEAD + text).toolpath.locked) == pins, text
 
 
 def test_an_arc_without_an_end_has_no_way() -> None:
@@ -87,7 +87,7 @@ def test_far_frames_are_not_known() -> None:
 
 def test_the_time_of_a_motion_stays(compensate, job) -> None:
     program = read(LINUXCNC, HEAD + "G1 X1 F100\nG93 X2 F5\nG94 X3 F100\n")
-    assert program.toolpath.timed.tolist() == [False, False, True, False]
+    assert program.toolpath.inverse_time_feed.tolist() == [False, False, True, False]
     job.cell(FLAT)
     lines = ["G21 G90 G17 G54", "T1 M6", "G0 X0 Y0 Z50", "G1 Z0 F500", "(FORCE 100 100 200 @BASE)", "G1 X10",
              "G93 X50 F4", "G3 X60 Y10 I0 J10 F3", "G94 G1 X100 F500", "(FORCE OFF)", "G0 Z50", "M30"]  # fmt: skip
@@ -112,7 +112,7 @@ def test_inches_and_their_arcs_through_the_whole_job(compensate, job, name: str)
     program = job.write(INCHES[name].split("|"), "\n", name)
     force = ("--force", "0,300,400@base", "--json", "-")
     done = compensate(program, *force)
-    assert (done.code, done.json["left"]) == (0, 0), done.out + done.err
+    assert (done.code, done.json["uncorrected"]) == (0, 0), done.out + done.err
     assert done.json["error_before_mm"]["max"] > 1.0
     assert done.json["error_after_mm"]["max"] <= 0.001
     verified = compensate("verify", program, job.folder / "compensated" / name, *force)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from postproc.arrays import Floats
-from postproc.dialects.gcode.writer_targets import Followed, Wanted, follow, follow_whole
+from postproc.base.arrays import Floats
+from postproc.languages.gcode.writer_targets import Followed, Wanted, follow, follow_whole
 
 NAN = np.nan
 
@@ -66,7 +66,7 @@ def test_a_control_arrives_where_it_was_meant_to(seed: int) -> None:
         np.testing.assert_allclose(into.end[:, column], ends, atol=1e-12)
         half = 0.5 * 10.0 ** -wanted.decimals[:, column]
         assert (np.abs(ends - wanted.wanted[:, column]) <= half + 2e-9).all()
-        np.testing.assert_array_equal(into.begin[:, column], np.append(0.0, into.end[:-1, column]))
+        np.testing.assert_array_equal(into.start[:, column], np.append(0.0, into.end[:-1, column]))
     np.testing.assert_array_equal(wanted.decimals, before)
     digits = into.number * 10.0**before
     assert np.abs(digits - np.rint(digits))[into.write].max() < 1e-6
@@ -79,7 +79,7 @@ def test_a_number_is_written_only_where_it_is_needed(seed: int) -> None:
     into = followed(wanted)
     assert not into.write[wanted.fixed].any()
     for k, column in np.argwhere(~wanted.fixed[:, None] & np.ones((1, 3), np.bool_)).tolist():
-        own, origin = wanted.own[k, column], into.begin[k, column]
+        own, origin = wanted.own[k, column], into.start[k, column]
         there = origin if np.isnan(own) else own + origin * wanted.relative[k, column]
         off = abs(there - wanted.wanted[k, column]) / 10.0 ** -wanted.decimals[k, column]
         assert into.write[k, column] == (off > 0.5 + 1e-4), (k, column, off)
@@ -159,7 +159,7 @@ def test_a_number_alone(
     np.testing.assert_allclose(into.number, [[own if written is None else written]], atol=1e-12)
     np.testing.assert_allclose(into.end, [[end]], atol=1e-12)
     begin = said.get("origin", 10.0) if said.get("resumes") else said.get("start", 10.0)
-    np.testing.assert_array_equal(into.begin, [[begin]])
+    np.testing.assert_array_equal(into.start, [[begin]])
     digits = len(f"{written:.9f}".rstrip("0").partition(".")[2]) if said.get("closed") and written else 2
     assert wanted.decimals.tolist() == [[max(2, digits)]]
 
@@ -169,10 +169,10 @@ def test_only_the_motions_of_a_frame_are_followed() -> None:
     whole, into = followed(wanted), Followed.nothing(wanted)
     follow(wanted, np.zeros(3), 0, 5, into)
     assert np.isnan(into.end[5:]).all()
-    assert np.isnan(into.begin[5:]).all()
+    assert np.isnan(into.start[5:]).all()
     assert not into.write[5:].any()
     follow(wanted, into.end[4], 5, 12, into)
-    for name in ("begin", "end", "write", "number"):
+    for name in ("start", "end", "write", "number"):
         np.testing.assert_array_equal(getattr(into, name), getattr(whole, name))
 
 
@@ -239,7 +239,7 @@ def test_words_that_are_one_whole(
     expected = np.where(written, np.array(end), np.array(own))
     np.testing.assert_allclose(into.number[0], np.asarray(expected, np.float64), atol=1e-12)
     begin = wanted.origin[0] if said.get("resumes") else before
-    np.testing.assert_array_equal(into.begin[0], begin)
+    np.testing.assert_array_equal(into.start[0], begin)
 
 
 def test_words_that_are_one_whole_are_inherited() -> None:
@@ -254,4 +254,4 @@ def test_words_that_are_one_whole_are_inherited() -> None:
     follow_whole(wanted, np.array([0, 0, 1.0]), 0, 3, into, True)
     assert into.write.tolist() == [[False] * 3, [False] * 3, [True] * 3]
     np.testing.assert_allclose(into.end, [[0, 0.1, 1], [0, 0.1, 1], [0, 0.2, 1]])
-    np.testing.assert_allclose(into.begin, [[0, 0, 1], [0, 0.1, 1], [0, 0.1, 1]])
+    np.testing.assert_allclose(into.start, [[0, 0, 1], [0, 0.1, 1], [0, 0.1, 1]])

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.dialects.gcode import kuka_cnc, sinumerik
-from postproc.dialects.gcode.control import Control
-from postproc.dialects.gcode.lexing import lex
-from postproc.dialects.gcode.tables import LINUXCNC
-from postproc.dialects.gcode.words import NAMES, Text
+from postproc.languages.gcode import kuka_cnc, sinumerik
+from postproc.languages.gcode.code_tables import LINUXCNC
+from postproc.languages.gcode.control import Control
+from postproc.languages.gcode.lexing import lex
+from postproc.languages.gcode.words import NAMES, Text
 
 TABLES = Path(__file__).parent / "programs" / "words"
 CONTROLS = {

@@ -11,13 +11,14 @@ from gcode_writing import DOWN, WRITING, assert_reads_as, random_plan, read, rou
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_rs274_oracle import agree, canonical, needs_rs274
+from tiers import examples
 
-from postproc.dialects.dialect import Plan, Role, Settings, Writing
-from postproc.dialects.gcode import DIALECTS
-from postproc.document import Document
-from postproc.geometry import on_arc, rotation_from_vector
+from postproc.base.document import Document
+from postproc.base.geometry import on_arc, rotation_from_vector
+from postproc.base.units import DEG, MM
+from postproc.languages.dialect import Plan, ReadingSettings, Role, WritingSettings
+from postproc.languages.gcode import DIALECTS
 from postproc.toolpath import Kind
-from postproc.units import DEG, MM
 
 ROOT = Path(__file__).parent / "programs"
 NAMES = {dialect.name: dialect for dialect in DIALECTS}
@@ -35,21 +36,23 @@ def dialect_of(path: Path):
     return NAMES[next(part for part in reversed(path.parts) if part in NAMES)]
 
 
-def settings_of(path: Path) -> Settings:
+def settings_of(path: Path) -> ReadingSettings:
     words = "um" if "_um" in path.stem else "mm"
-    return Settings(orientation=DOWN.orientation, integer_words=words)
+    return ReadingSettings(orientation=DOWN.orientation, integer_words=words)
 
 
+@pytest.mark.sample(21)
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 @pytest.mark.parametrize("path", CASES, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_the_same_motions_give_no_edit(path: Path, newline: str) -> None:
     raw = path.read_bytes().replace(b"\r\n", b"\n").replace(b"\n", newline.encode())
     program = dialect_of(path).read((Document(path, raw),), settings_of(path))
-    moved = dialect_of(path).moved(program, Plan.of(program.toolpath), WRITING)
+    moved = dialect_of(path).edit_targets(program, Plan.of(program.toolpath), WRITING)
     assert len(moved.edits) == 0
-    assert not moved.held
+    assert not moved.unwritten
 
 
+@pytest.mark.sample(12)
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("path", CASES, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_cases_moved_at_random_read_as_planned(path: Path, seed: int) -> None:
@@ -146,7 +149,7 @@ def test_increments_do_not_add_up_their_rounding() -> None:
 
 
 def test_integer_words_of_a_control_that_counts_get_a_point() -> None:
-    count = Settings(orientation=DOWN.orientation, integer_words="um")
+    count = ReadingSettings(orientation=DOWN.orientation, integer_words="um")
     program = read(FANUC, "O1\nG21 G90 G54\nT1 M6\nG0 X0 Y0 Z0\nG1 X1000 Y2.5 Z-500 F100\n", count)
     plan = Plan.of(program.toolpath)
     position = plan.position.copy()
@@ -174,7 +177,7 @@ def inserted(text: str, dialect=LINUXCNC, head: str = HEAD, link: bool = True) -
 
     plan = Plan(
         with_row(own.source, last),
-        with_row(own.role, Role.LINK if link else Role.PIECE),
+        with_row(own.role, Role.TRANSITION if link else Role.INTERMEDIATE),
         with_row(own.position, position),
         with_row(own.rotation, path.rotation[last]),
         with_row(own.centre, np.full(3, np.nan)),
@@ -202,7 +205,7 @@ def test_an_inserted_block_always_moves() -> None:
         rows = [*range(last), last - 1, last]
         plan = Plan(
             np.array([*range(last), last, last]),
-            np.array([*[Role.OWN] * last, Role.PIECE, Role.OWN]),
+            np.array([*[Role.ORIGINAL] * last, Role.INTERMEDIATE, Role.ORIGINAL]),
             own.position[rows],
             own.rotation[rows],
             own.centre[rows],
@@ -284,9 +287,9 @@ def held(text: str, change) -> dict[int, str]:
     position, sweep = plan.position.copy(), plan.sweep.copy()
     change(position, sweep)
     moved = Plan(plan.source, plan.role, position, plan.rotation, plan.centre, plan.normal, sweep)
-    found = LINUXCNC.moved(program, moved, WRITING)
+    found = LINUXCNC.edit_targets(program, moved, WRITING)
     assert len(found.edits) == 0
-    return {row: finding.code for row, finding in found.held.items()}
+    return {row: finding.code for row, finding in found.unwritten.items()}
 
 
 def test_arcs_that_no_numbers_state_are_held() -> None:
@@ -307,19 +310,19 @@ def test_arcs_that_no_numbers_state_are_held() -> None:
 def test_what_may_not_move_is_not_moved(text: str) -> None:
     program = read(LINUXCNC, HEAD + text)
     path = program.toolpath
-    rows = [*path.refused, *path.pinned]
+    rows = [*path.refused, *path.locked]
     assert rows
     plan = Plan.of(path)
     position = np.where(np.isnan(plan.position), 0.0, plan.position)
     position[rows] += 1 * MM
     changed = Plan(plan.source, plan.role, position, plan.rotation, plan.centre, plan.normal, plan.sweep)
-    with pytest.raises(ValueError, match="can not be corrected"):
-        LINUXCNC.moved(program, changed, WRITING)
+    with pytest.raises(ValueError, match="cannot be corrected"):
+        LINUXCNC.edit_targets(program, changed, WRITING)
 
 
 @pytest.mark.parametrize("text", ["G1 X1 F1\nM3 X2\n", "G1 X1 F1\nX2 S500\n", "G93\nG1 X2 F3\n"])
 def test_what_acts_before_its_motion_is_not_divided(text: str) -> None:
-    with pytest.raises(ValueError, match="can not be divided"):
+    with pytest.raises(ValueError, match="cannot be divided"):
         inserted(text)
 
 
@@ -394,18 +397,19 @@ def programs(draw: st.DrawFn) -> str:
     return "\n".join([*lines, "M30", ""])
 
 
-@settings(deadline=None, max_examples=250)
+@settings(deadline=None, max_examples=examples(250))
 @given(programs(), st.integers(0, 2**32 - 1))
 def test_programs_moved_at_random_read_as_planned(text: str, seed: int) -> None:
     round_trip(LINUXCNC, text.encode(), seed)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=examples(60))
 @given(programs(), st.integers(0, 2**32 - 1), st.integers(2, 5))
 def test_any_number_of_decimals(text: str, seed: int, decimals: int) -> None:
-    round_trip(LINUXCNC, text.encode(), seed, writing=Writing(decimals, decimals))
+    round_trip(LINUXCNC, text.encode(), seed, writing=WritingSettings(decimals, decimals))
 
 
+@pytest.mark.sample(5)
 @needs_rs274
 @pytest.mark.parametrize("seed", range(40))
 def test_linuxcnc_reads_the_output_as_well(tmp_path: Path, seed: int) -> None:
@@ -426,7 +430,7 @@ def test_linuxcnc_reads_the_output_as_well(tmp_path: Path, seed: int) -> None:
     file.write_bytes(written(LINUXCNC, program, plan))
     after = canonical(file, tmp_path)
     assert after is not None, file.read_text()
-    kind = np.where(plan.role == Role.LINK, Kind.LIN, program.toolpath.kind[plan.source])
+    kind = np.where(plan.role == Role.TRANSITION, Kind.LIN, program.toolpath.kind[plan.source])
     assert [motion.kind for motion in after] == kind.tolist()
     unit = program.text.scale[0]
     step = 10.0 ** -(WRITING.mm + (unit > 2 * MM)) * unit
@@ -445,6 +449,7 @@ def test_linuxcnc_reads_the_output_as_well(tmp_path: Path, seed: int) -> None:
                 assert np.linalg.norm(point - meant) <= 2.5 * step + 2e-4 * unit
 
 
+@pytest.mark.sample(4)
 @needs_rs274
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize(

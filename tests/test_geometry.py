@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays as array_of
 from scipy.spatial.transform import Rotation
 
-from postproc.geometry import (
+from postproc.base.geometry import (
     Poses,
     abc_from_rotation,
     lengths,

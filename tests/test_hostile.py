@@ -15,11 +15,11 @@ from conftest import CELL, LINES
 from faults import Child, once, there
 
 import postproc
-from postproc.files import MAX_BYTES, MAX_LINE, read_file
-from postproc.findings import Refusal
-from postproc.tables import read_table
+from postproc.base.findings import Refusal
+from postproc.base.read_files import MAX_BYTES, MAX_LINE, read_file
+from postproc.base.tables import read_table
+from postproc.base.yaml_section import MAX_NODES, parsed
 from postproc.workflows.preparation import read_document
-from postproc.yamlfile import MAX_NODES, parsed
 
 MB = 1_000_000
 LONG = 50 * MB
@@ -49,7 +49,7 @@ def refused(words: list[object], folder: Path, code: str, text: str = "") -> Non
     assert ended == 1, said
     assert code in said
     assert text in said
-    assert "nothing was written" in said
+    assert "nothing is written" in said
     assert len(said) < 2000
     assert not (folder / "compensated").exists()
 
@@ -57,6 +57,7 @@ def refused(words: list[object], folder: Path, code: str, text: str = "") -> Non
 # YAML
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -106,6 +107,7 @@ YAML_FILES = {
 }
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -128,6 +130,7 @@ def test_bombs_and_tags_in_every_yaml_file(compensate, job, monkeypatch, name, t
     assert tree(job.folder) == before
 
 
+@pytest.mark.slow
 def test_as_many_values_as_are_allowed():
     text = "a: [" + ",".join("1" * (MAX_NODES - 3)) + "]"
     assert parsed(text.encode(), Path("a.yaml")).length("a") == MAX_NODES - 3
@@ -143,6 +146,7 @@ def test_a_key_without_end(job):
 # long lines, deep folds
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "line", [b";", b";FORCE ", b"LIN {X ", b""], ids=["comment", "force", "number", "word"]
 )
@@ -163,6 +167,7 @@ def test_a_line_without_end_in_g_code(job):
     refused([path, "--force=0,0,9"], job.folder, "FIL003", "part.nc:4")
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("row", [b"10," + b"1" * LONG, b"10," * (LONG // 3), b'10,"' + b"1" * LONG])
 def test_a_line_without_end_in_a_table(job, row):
     path = job.folder / "f.csv"
@@ -219,10 +224,11 @@ def test_what_is_no_text_is_told_where_and_only_in_text(tmp_path):
     with pytest.raises(Refusal) as refusal:
         read_document(path)
     assert refusal.value.findings[0].code == "FIL003"
-    assert f"NUL at byte {2 * MAX_LINE}" in refusal.value.findings[0].message
+    assert f"byte {2 * MAX_LINE} is NUL" in refusal.value.findings[0].message
     assert read_file(path) == path.read_bytes()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("closed", [True, False])
 def test_deep_folds(job, closed):
     """Twenty thousand folds, one in the other, about the cut: it is compensated, and not a byte of them changes."""
@@ -288,6 +294,7 @@ def tree(folder: Path) -> set[str]:
     return {path.relative_to(folder).as_posix() for path in folder.rglob("*")}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "name", ["../../evil", "/evil", "..\\evil", "$(touch evil)", "`touch evil`", "a;touch evil"]
 )
@@ -340,6 +347,7 @@ def test_links_are_replaced_and_not_followed(compensate, job, broken):
         assert (job.output.parent / name).stat().st_size > 0
 
 
+@pytest.mark.slow
 def test_links_stay_where_nothing_is_written(job):
     """The disk fails somewhere on the way: the links, which lead nowhere, are there again."""
     outside = job.folder / "outside"
@@ -436,7 +444,7 @@ ATTRIBUTES = frozenset(
 ALLOWED = {
     ("batch/cluster.py", "distributed"),
     ("__init__.py", "import_module"),
-    ("blocks.py", "ctypes"),
+    ("base/batches.py", "ctypes"),
 }
 """The one way out, the cluster that the user names; the package's own names, loaded when they are asked for; and the C
 library of this process, which gives memory back."""
@@ -462,6 +470,7 @@ def misdeeds(tree: ast.AST) -> set[str]:
     return found
 
 
+@pytest.mark.slow
 def test_no_network_no_shell_no_objects_out_of_files():
     root = Path(postproc.__file__).parent
     found = {

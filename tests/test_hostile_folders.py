@@ -36,6 +36,7 @@ def test_results_of_a_program_do_not_follow_a_folder(compensate, shop):
     assert untouched(outside)
 
 
+@pytest.mark.slow
 def test_results_of_a_batch_do_not_follow_a_folder(compensate, shop):
     folder, outside = shop
     (folder / "compensated").symlink_to(outside)
@@ -63,6 +64,7 @@ def test_a_folder_below_the_results(compensate, shop):
         assert untouched(outside)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["folder", "lock", "open end"])
 def test_locks_and_records_do_not_follow_links(compensate, shop, what):
     folder, outside = shop
@@ -79,6 +81,7 @@ def test_locks_and_records_do_not_follow_links(compensate, shop, what):
     assert untouched(outside)
 
 
+@pytest.mark.slow
 def test_a_record_that_is_a_link_is_replaced(compensate, shop):
     folder, outside = shop
     state = folder / "compensated" / ".compensate"
@@ -100,6 +103,7 @@ FORGERIES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FORGERIES)
 def test_a_forged_record_is_no_record(compensate, shop, name):
     """The program is done again, in its time."""
@@ -116,6 +120,7 @@ def test_a_forged_record_is_no_record(compensate, shop, name):
     assert there(folder / "compensated")["p0.src"] == made["p0.src"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("raw", [b"", b"\0", b"{", b"[" * 200_000, b'{"a": NaN}', os.urandom(1000)])
 def test_a_spoilt_record_is_no_record(compensate, shop, raw):
     folder, _ = shop

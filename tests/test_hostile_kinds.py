@@ -74,6 +74,7 @@ def shop(job, monkeypatch):
     return job
 
 
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("make", [pipe, device, memory, folder, nowhere, nul, wide, empty, noise])
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_no_input_is_told(compensate, shop, kind, make):
@@ -110,6 +111,7 @@ def test_a_link_that_leads_to_itself(compensate, shop, kind):
     assert "defect" not in done.err
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize(
     "words",
     [
@@ -146,6 +148,7 @@ ALIKE = [
 ]
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("number", ALIKE)
 def test_what_looks_like_a_number_is_none(compensate, shop, number):
     for spec in (f"0,0,{number}", f"{number},0,0@base"):

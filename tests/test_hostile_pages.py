@@ -108,6 +108,7 @@ def made(compensate, job, monkeypatch):
     return job.folder
 
 
+@pytest.mark.slow
 def test_pages_run_nothing_of_it(made):
     pages = list(made.rglob("*.html")) + list(made.rglob("*.svg"))
     assert len(pages) >= 5
@@ -119,6 +120,7 @@ def test_pages_run_nothing_of_it(made):
     assert shown >= 4
 
 
+@pytest.mark.slow
 def test_pages_are_read_as_they_stand(made):
     """Nothing in them, and in what their scripts are given, turns what is written, or hides."""
     for page in [*made.rglob("*.html"), *made.rglob("*.svg")]:
@@ -130,6 +132,7 @@ def test_pages_are_read_as_they_stand(made):
         assert kinds == set(), page.name
 
 
+@pytest.mark.slow
 def test_tables_hold_no_formula(made):
     tables = [path for path in made.rglob("*.csv") if not path.name.startswith("m<")]
     assert len(tables) >= 4
@@ -137,6 +140,7 @@ def test_tables_hold_no_formula(made):
         assert formulas(table.read_bytes()) == [], table.name
 
 
+@pytest.mark.slow
 def test_robot_files_are_read_again(compensate, made):
     for name in ("identified.yaml", "diagnosed.yaml"):
         if (made / name).exists():

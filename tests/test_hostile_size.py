@@ -56,6 +56,7 @@ PROGRAMS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_deep_programs(job, name):
     """Compensated, left and told, or refused: in its time, and never by the end of a stack."""
@@ -86,6 +87,7 @@ BLOCKS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BLOCKS)
 def test_deep_blocks(job, name):
     job.cell(CELL + "orientation: {a: 0, b: 0, c: 180}\n")
@@ -127,6 +129,7 @@ def endless(path: Path, head: bytes, filler: bytes) -> None:
             stream.write(part)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("filler", [b"\0", b"1 "], ids=["NUL", "numbers"])
 @pytest.mark.parametrize(
     ("name", "words"),

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from postproc.base.tables import as_cell, read_table
 from postproc.measurements import read_measurements
-from postproc.measurements.writing import measurements_csv
+from postproc.measurements.write_csv import measurements_csv
 from postproc.report.residuals import residuals_csv
-from postproc.tables import as_cell, read_table
 
 NUMBER = re.compile(r"[-+]?[0-9]*\.?[0-9]+([eE][-+]?[0-9]+)?")
 JOINTS = tuple((f"A{k}", False) for k in range(1, 7))
@@ -41,6 +41,7 @@ def test_formulas_are_seen():
     assert formulas(b"a,b\n-1.5,'=x\n") == []
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["=cmd.src", "+x.src", "-x.src", "@x.src"])
 def test_corrections_of_a_program_full_of_formulas(compensate, job, name):
     program = job.folder / name

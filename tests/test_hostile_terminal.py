@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from rich.table import Table
 from rich.text import Text
 
+from postproc.base.sanitize import sanitize, sanitize_lines
 from postproc.cli.console import SafeConsole
-from postproc.printable import printable, printable_lines
 from postproc.robot.description import find_robot
 
 EVIL = "\x1b]0;owned\x07\x1b[31m\x9b31m\u202edcba\u2066\u200b\u2028"
@@ -37,7 +37,7 @@ def test_what_is_shown_is_to_be_read(text):
     for one in (Text(text), table):
         console.print(one)
     assert driving(stream.getvalue()) == []
-    for shown, keeps in ((printable(text), ""), (printable_lines(text), "\n")):
+    for shown, keeps in ((sanitize(text), ""), (sanitize_lines(text), "\n")):
         wanted = [one if one in keeps or not (driving(one) or one == "\n") else "?" for one in text]
         assert shown == "".join(wanted)
 
@@ -57,6 +57,7 @@ def evil(job):
     return program, robot
 
 
+@pytest.mark.slow
 def test_nothing_of_it_reaches_the_terminal(compensate, job, evil, monkeypatch):
     program, robot = evil
     monkeypatch.chdir(job.folder)

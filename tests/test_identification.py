@@ -9,14 +9,14 @@ import pytest
 from effects_at_work import TOOL, conditions, made, nulls, random_arm, sampled, with_terms
 from measured import MARKERS, Straight, arm, on_markers, plan, read, robot, scattered, somewhere, taken
 
+from postproc.base.findings import Refusal
+from postproc.base.geometry import Poses, vector_from_rotation
 from postproc.effects import EFFECTS, ComplianceLaw, Offset
-from postproc.findings import Refusal
-from postproc.geometry import Poses, vector_from_rotation
 from postproc.identification.campaign import Campaign
-from postproc.identification.columns import columns
 from postproc.identification.fit import fit
-from postproc.identification.identifiable import insight
+from postproc.identification.identifiable import identifiability
 from postproc.identification.noise import Weighting, noise_of, shared_error
+from postproc.identification.sensitivities import columns
 from postproc.identification.unknowns import Unknown, asked_for
 from postproc.model import StiffnessModel
 from postproc.robot.description import Value
@@ -39,7 +39,7 @@ def unknowns_of(model, term):
 
 
 def put_to(model, term, values):
-    return model.changed({(term, name): value for name, value in values.items()})
+    return model.with_values({(term, name): value for name, value in values.items()})
 
 
 KINDS = ("tracker", "robot frame", "deflections")
@@ -78,6 +78,7 @@ def missed(found, values):
     return off
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", EFFECTS)
 def test_what_is_there_is_found_from_its_null(name, kind):
@@ -122,7 +123,7 @@ def test_growth_counts_from_the_first_reading():
     """What was there before is geometry."""
     readings, model, term, values = hidden("thermal_growth", "robot frame", np.random.default_rng(4))
     campaign = Campaign(readings)
-    grown, still = (campaign.seen(one).tip[campaign.at] for one in (put_to(model, term, values), model))
+    grown, still = (campaign.predicted(one).tip[campaign.at] for one in (put_to(model, term, values), model))
     np.testing.assert_array_equal(grown[0], still[0])
     assert (np.abs(grown - still).max(axis=1)[1:] > 1e-6).all()
 
@@ -134,7 +135,7 @@ def visit(deflection, rng, posed=True):
     """A campaign of two sessions, one stated and two unknown targets, with rotations, its model and where all is."""
     described = arm(random_arm(rng, "rrr"))
     model = asked_for(StiffnessModel(described, ()), ["joint_compliance", "link_geometry"]).model
-    model = model.changed({(0, p.name): p.scale for p in model.terms[0].effect.parameters})
+    model = model.with_values({(0, p.name): p.scale for p in model.terms[0].effect.parameters})
     count = 24
     q, wrench = rng.uniform(-2.0, 2.0, (count, 3)), 1e4 * rng.normal(size=(count, 6))
     words = {"targets": tuple(MARKERS), "places": {"M1": MARKERS["M1"]}, "target": np.arange(count) % 3}
@@ -155,7 +156,7 @@ def difference(one, other):
 @pytest.mark.parametrize("deflection", [False, True])
 def test_nuisance_columns_are_the_derivative_of_what_is_expected(deflection):
     campaign, model, given = visit(deflection, np.random.default_rng(11))
-    seen = campaign.seen(model)
+    seen = campaign.predicted(model)
     found = campaign.nuisance_columns(seen, given)
     names = campaign.nuisance_names
     assert len(names) == (6 if deflection else 2 * 6 + 2 * 3 + 3 * 3)
@@ -174,7 +175,7 @@ def test_nuisance_columns_are_the_derivative_of_what_is_expected(deflection):
 def test_without_rotations_the_columns_are_those_of_the_positions():
     rng = np.random.default_rng(12)
     campaign, model, _ = visit(False, rng, posed=False)
-    given, seen = somewhere(campaign, rng), campaign.seen(model)
+    given, seen = somewhere(campaign, rng), campaign.predicted(model)
     posed = Campaign(replace(campaign.readings, rotation=np.full((len(campaign), 3, 3), np.nan)))
     rows = [
         posed.nuisance_names.index(name) for name in campaign.nuisance_names if name in posed.nuisance_names
@@ -185,6 +186,7 @@ def test_without_rotations_the_columns_are_those_of_the_positions():
     )
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("at_tip", [False, True])
 @pytest.mark.parametrize("deflection", [False, True])
 @pytest.mark.parametrize("name", EFFECTS)
@@ -212,7 +214,7 @@ def test_columns_are_the_derivative_of_what_is_expected(name, deflection, at_tip
     )
     campaign = Campaign(readings)
     given = somewhere(campaign, rng)
-    unknowns, seen = unknowns_of(model, term), campaign.seen(model, None, 1e-14)
+    unknowns, seen = unknowns_of(model, term), campaign.predicted(model, None, 1e-14)
     assert seen.converged.all()
     found = columns(campaign, model, unknowns, seen, given)
     assert np.abs(found).max() > 0 or (deflection and isinstance(effects[term], Offset))
@@ -221,7 +223,9 @@ def test_columns_are_the_derivative_of_what_is_expected(name, deflection, at_tip
         slopes = []
         for step in (0.02 * p.scale, 0.01 * p.scale):
             ends = [
-                campaign.expected(campaign.seen(model.changed({unknown.key: value + way * step})), given)
+                campaign.expected(
+                    campaign.predicted(model.with_values({unknown.key: value + way * step})), given
+                )
                 for way in (1, -1)
             ]
             slopes.append(difference(*ends) * p.scale / (2 * step))
@@ -245,9 +249,10 @@ def test_columns_stop_at_bounds(monkeypatch):
         plain(self, values, *others)
 
     for bound, inward in ((p.lower, 1.0), (p.upper, -1.0)):
-        model = model.changed({(0, p.name): bound})
+        model = model.with_values({(0, p.name): bound})
         ends = [
-            campaign.seen(model.changed({(0, p.name): bound + inward * h * p.scale})) for h in (0.0, 0.01)
+            campaign.predicted(model.with_values({(0, p.name): bound + inward * h * p.scale}))
+            for h in (0.0, 0.01)
         ]
         tried.clear()
         with monkeypatch.context() as patch:
@@ -261,7 +266,7 @@ def test_columns_stop_at_bounds(monkeypatch):
 
 def test_states_without_rest_are_not_expected_anywhere():
     campaign, model, given = visit(True, np.random.default_rng(15))
-    seen = campaign.seen(model)
+    seen = campaign.predicted(model)
     lost = np.arange(len(seen.converged)) == campaign.still[7]
     position, _ = campaign.expected(replace(seen, converged=~lost), given)
     gone = (campaign.at == campaign.still[7]) | (campaign.still == campaign.still[7])
@@ -291,7 +296,7 @@ def drawable():
     rng = np.random.default_rng(20)
     described = arm(random_arm(rng, "rrr"))
     asked = asked_for(StiffnessModel(described, ()), ["joint_compliance"])
-    truth = asked.model.changed({u.key: 5.0 * u.parameter.scale for u in asked.unknowns})
+    truth = asked.model.with_values({u.key: 5.0 * u.parameter.scale for u in asked.unknowns})
     wrench = rng.normal(size=(POSES, 6)) * np.array([1000.0] * 3 + [600.0] * 3)
     q, wrench, words = on_markers(rng.uniform(-2.0, 2.0, (POSES, 3)), wrench)
     campaign = Straight(plan(described, q, wrench, sigma=SIGMA, **words), asked.model, asked.unknowns)
@@ -351,6 +356,7 @@ SETTINGS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", SETTINGS.values(), ids=SETTINGS)
 def test_intervals_cover_the_truth_as_often_as_they_say(setting):
     """400 campaigns of three parameters: 95 % of 1200, with a standard deviation of 0.63 % for independent ones."""
@@ -405,6 +411,7 @@ def test_nothing_more_can_be_taken_off_at_the_solution():
     assert found.factor * found.freedom == pytest.approx(left @ left, rel=1e-6)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("size", [1.0, 0.05])
 @pytest.mark.parametrize("known", [True, False])
 def test_what_poses_share_is_told_apart_from_what_a_fit_took(known, size):
@@ -471,6 +478,7 @@ def test_a_prior_that_is_wrong_makes_no_scatter():
     assert np.sqrt(np.mean(found.residual**2)) > 1.5 * SIGMA
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stated", [SIGMA / 3.0, np.nan], ids=["too small", "not stated"])
 def test_posterior_intervals_cover(stated):
     drawn, rng, inside = drawable(), np.random.default_rng(24), []
@@ -489,16 +497,16 @@ def test_posterior_intervals_cover(stated):
 
 def test_a_vertical_load_does_not_show_the_vertical_joint():
     described, rng = robot("kuka_kr270"), np.random.default_rng(30)
-    model = StiffnessModel.from_robot(described).without(["gravity_compensator"])
+    model = StiffnessModel.from_robot(described).without_effects(["gravity_compensator"])
     asked = asked_for(model, ["joint_compliance"])
     low, high = described.limits.T
     wrench = np.tile([0.0, 0.0, -2600.0, 0.0, 0.0, 0.0], (15, 1))
     readings = read(model, plan(described, rng.uniform(low, high, (15, 6)), wrench, tool=TOOL))
-    started = model.changed({u.key: 2.0 * u.value for u in asked.unknowns})
+    started = model.with_values({u.key: 2.0 * u.value for u in asked.unknowns})
     unknowns = [replace(u, value=2.0 * u.value) for u in asked.unknowns]
     found = fit(Campaign(readings), started, unknowns)
     assert [(d.name, d.why, d.together) for d in found.dropped] == [
-        ("joint_compliance.c1", "no reading moves with it", ())
+        ("joint_compliance.c1", "no reading depends on it", ())
     ]
     for estimate in found.estimates:
         assert 2.0 * estimate.value == pytest.approx(estimate.unknown.value, rel=1e-6)
@@ -508,13 +516,13 @@ def test_a_vertical_load_does_not_show_the_vertical_joint():
 def test_the_first_zero_is_part_of_the_registration():
     described, rng = robot("abb_irb120"), np.random.default_rng(31)
     asked = asked_for(StiffnessModel(described, ()), ["joint_offset"])
-    truth = asked.model.changed({u.key: 0.01 * (k + 1) for k, u in enumerate(asked.unknowns)})
+    truth = asked.model.with_values({u.key: 0.01 * (k + 1) for k, u in enumerate(asked.unknowns)})
     q = rng.uniform(*described.limits.T, (20, 6))
     free = read(truth, plan(described, q, None, False, targets=("M",), tool=TOOL), rng)
     found = fit(Campaign(free), asked.model, asked.unknowns)
     first = found.dropped[0]
     assert (first.name, first.together) == ("joint_offset.o1", ())
-    assert first.why == "only seen together with the registration"
+    assert first.why == "is observable only together with the registration"
     assert {d.name for d in found.dropped} <= {"joint_offset.o1", "joint_offset.o6"}
     fixed = read(truth, plan(described, q, None, False, True, tool=TOOL))
     found = fit(Campaign(fixed), asked.model, asked.unknowns)
@@ -532,13 +540,13 @@ def test_two_joints_on_one_axis_are_told_as_their_sum(way):
     described = arm(joints)
     asked = asked_for(StiffnessModel(described, ()), ["joint_offset"])
     readings = plan(described, rng.uniform(-2.0, 2.0, (20, 3)), None, False, True, tool=TOOL)
-    truth = asked.model.changed({(0, "o1"): 1e-3, (0, "o2"): 4e-3, (0, "o3"): 2e-3})
+    truth = asked.model.with_values({(0, "o1"): 1e-3, (0, "o2"): 4e-3, (0, "o3"): 2e-3})
     found = fit(Campaign(read(truth, readings)), asked.model, asked.unknowns)
     (dropped,) = found.dropped
     assert dropped.name == "joint_offset.o2"
     ((other, weight),) = dropped.together
     assert (other, weight) == ("joint_offset.o1", pytest.approx(way))
-    assert dropped.why == "only seen together with joint_offset.o1"
+    assert dropped.why == "is observable only together with joint_offset.o1"
     np.testing.assert_allclose([e.value for e in found.estimates], [1e-3 + way * 4e-3, 2e-3], atol=1e-9)
 
 
@@ -551,7 +559,7 @@ def test_along_what_is_only_seen_together_no_reading_moves(name):
     found = fit(campaign, model, unknowns)
     sums = [dropped for dropped in found.dropped if dropped.together]
     assert sums
-    here = campaign.points(campaign.seen(found.model), found.point.given.places, campaign.at)
+    here = campaign.points(campaign.predicted(found.model), found.point.given.places, campaign.at)
     for dropped in sums:
         moves = {}
         for hidden_name, share in ((dropped.name, 1.0), *((n, -w) for n, w in dropped.together)):
@@ -559,7 +567,9 @@ def test_along_what_is_only_seen_together_no_reading_moves(name):
             at = found.model.terms[term].values[unknown.parameter.name]
             moves[unknown.key] = at + share * 50.0
         there, alone = (
-            campaign.points(campaign.seen(found.model.changed(m)), found.point.given.places, campaign.at)
+            campaign.points(
+                campaign.predicted(found.model.with_values(m)), found.point.given.places, campaign.at
+            )
             for m in (moves, dict([next(iter(moves.items()))]))
         )
         assert np.abs(there - here).max() < 1e-4 * np.abs(alone - here).max()
@@ -579,7 +589,7 @@ def test_what_is_seen_too_weakly_is_left_as_it_was():
         assert (drawn.unknowns[worst].name in [u.name for u in found.unknowns]) == kept
         if not kept:
             (dropped,) = found.dropped
-            assert dropped.why.startswith("seen too weakly: +- ")
+            assert dropped.why.startswith("is observable too weakly: +- ")
             assert found.model.terms[0].values[drawn.unknowns[worst].parameter.name] == 0.0
             assert dropped.together == ()
 
@@ -644,7 +654,7 @@ def told(unknowns, found, nuisance, prior=None):
     prior = np.zeros((count, count)) if prior is None else prior
     values = np.array([u.value for u in unknowns])
     names = [f"registration.{k}" for k in range(nuisance.shape[1])]
-    return insight(unknowns, found, nuisance, names, prior, values)
+    return identifiability(unknowns, found, nuisance, names, prior, values)
 
 
 def test_the_covariance_is_that_of_the_parameters_among_all_unknowns():
@@ -708,7 +718,7 @@ def test_what_a_registration_does_as_well_is_told_so():
     result = told(unknowns, found, nuisance)
     assert result.kept == (0, 1, 3)
     assert [(d.name, d.why, d.together) for d in result.dropped] == [
-        (unknowns[2].name, "only seen together with the registration", ())
+        (unknowns[2].name, "is observable only together with the registration", ())
     ]
     # known before, it is not: a prior is a reading that the registration does not move
     result = told(unknowns, found, nuisance, np.diag([0.0, 0.0, 0.01, 0.0]))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from postproc.effects import EFFECTS as KINDS
-from postproc.identification.identifiable import insight
+from postproc.identification.identifiable import identifiability
 from postproc.identification.unknowns import Unknown
 from postproc.robot.description import Value, find_robot, load_robot
 
@@ -57,6 +57,7 @@ def identified(compensate, tmp_path):
     return call
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("change", "code", "words"),
     [
@@ -125,5 +126,5 @@ def test_a_stated_value_close_to_its_null_does_not_make_a_good_interval_too_weak
     unknown = Unknown("joint_offset.o2", 0, parameter, 1e-6, stated)
     column = np.full((1, 1), 1.96 * parameter.scale / 4e-6)
     nothing = np.zeros((1, 0))
-    found = insight([unknown], column, nothing, [], np.zeros((1, 1)), np.array([1e-6]))
+    found = identifiability([unknown], column, nothing, [], np.zeros((1, 1)), np.array([1e-6]))
     assert (found.kept, found.dropped) == ((0,), ())

@@ -13,12 +13,12 @@ from conftest import CELL
 from faults import Child, once, stray, there
 
 import postproc
-from postproc.batch.jobs import Job
-from postproc.batch.reading import code_digest
-from postproc.batch.work import Task, work
-from postproc.files import read_file
-from postproc.findings import Refusal
-from postproc.inputs import note, noted
+from postproc.base.findings import Refusal
+from postproc.base.input_files import note, noted
+from postproc.base.read_files import read_file
+from postproc.batch.files_read import code_digest
+from postproc.batch.item import BatchItem, run_item
+from postproc.batch.job_file import Job
 from postproc.workflows.preparation import Request
 from postproc.workflows.program import compensate, predict
 from postproc.workflows.verify import verify
@@ -117,6 +117,7 @@ def changing(path: Path, stage: str = "correcting"):
     return told
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("name", FILES)
 def test_every_input_that_changes_is_told_and_nothing_is_written(request_, job, name):
     before = set(there(job.folder))
@@ -127,6 +128,7 @@ def test_every_input_that_changes_is_told_and_nothing_is_written(request_, job, 
     assert set(there(job.folder)) == before
 
 
+@pytest.mark.slow
 def test_an_input_that_changes_while_the_results_are_written(job):
     """At every request to the system: the results are those of what is there, or there are none."""
     folder, before = job.output.parent, job.program.read_bytes()
@@ -153,6 +155,7 @@ def test_a_prediction_of_inputs_that_change(request_, job, name):
     assert not (job.folder / "out").exists()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["part.src", "compensated/part.src", "arm.urdf", "log.csv", "cell.yaml"])
 def test_a_verification_of_inputs_that_change(request_, job, name):
     whole = at(request_, name)
@@ -166,6 +169,7 @@ def test_a_verification_of_inputs_that_change(request_, job, name):
     assert not result.exists()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", FILES)
 def test_no_input_is_an_output(request_, job, name):
     """Neither of the main job nor of the others, under any of its names."""
@@ -200,18 +204,19 @@ def test_a_force_that_the_cell_names_and_this_run_does_not_read(request_, job):
         compensate(at(request_, "log.csv", json=job.folder / "milling.yaml"))
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["arm.urdf", "log.csv"])
 def test_a_batch_with_an_input_that_changes(request_, job, name):
     whole = at(request_, name, output=job.output)
-    task = Task(Job("part.src", job.output, whole), code_digest())
-    failed = work(task, changing(job.folder / name))
+    task = BatchItem(Job("part.src", job.output, whole), code_digest())
+    failed = run_item(task, changing(job.folder / name))
     assert failed.state == "failed"
     assert [told["code"] for told in failed.result["findings"]] == ["FIL010"]
     assert not job.output.exists()
-    assert work(task).state == "done"
-    assert work(task).state == "unchanged"
+    assert run_item(task).state == "done"
+    assert run_item(task).state == "unchanged"
     changing(job.folder / name)("correcting")
-    assert work(task).state == "done"
+    assert run_item(task).state == "done"
 
 
 def test_a_file_that_is_read_twice_and_is_not_the_same(tmp_path):
@@ -258,12 +263,20 @@ def test_a_run_inside_of_another_has_its_own_inputs(tmp_path):
 
 
 READERS = {"read_bytes", "read_text", "open"}
-ELSEWHERE = ("batch", "publish.py", "files.py", "inputs.py", "report/page.py", "robot/writing.py")
+ELSEWHERE = (
+    "batch/",
+    "output/atomic_write.py",
+    "base/read_files.py",
+    "base/input_files.py",
+    "report/page.py",
+    "robot/write_robot_file.py",
+)
 """What is read there is no input: records, locks, heads of files that a batch looks at, parts of a page, results."""
 
 
+@pytest.mark.slow
 def test_whatever_is_read_is_noted():
-    """``files.read_file`` and ``files.read_plain`` are the only ways to the bytes of a file."""
+    """``read_files.read_file`` and ``read_files.read_text_file`` are the only ways to the bytes of a file."""
     root, found = Path(postproc.__file__).parent, []
     for path in sorted(root.rglob("*.py")):
         name = path.relative_to(root).as_posix()

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from motions import motions
 
-from postproc.compensation.mirror import difference, mirror, predict
+from postproc.base.findings import Finding
+from postproc.base.geometry import Poses, rotation_from_vector, vector_from_rotation
+from postproc.compensation.mirror import mirror, pose_error, predict
 from postproc.effects.effect import Conditions
-from postproc.findings import Finding
-from postproc.geometry import Poses, rotation_from_vector, vector_from_rotation
 from postproc.model import StiffnessModel
 from postproc.robot import newton
+from postproc.robot.axis_track import follow_axes, is_near_singular, nominal_flange, sides, singular_words
 from postproc.robot.description import find_robot, load_robot
 from postproc.robot.geometries import SerialArm
 from postproc.robot.inverse import inverse, status_of
 from postproc.robot.newton import FAR, TOLERANCE, solver_of
-from postproc.robot.track import follow, near_singular, nominal_flange, sides, singular_words
 from postproc.toolpath import Kind
 
 DEG = math.pi / 180
@@ -113,7 +113,7 @@ def test_there_and_back_from_nearby(name, request):
     found = inverse(robot.nominal, pose, np.zeros(len(q), int), near)
     assert found.reachable.all()
     assert left_over(robot, found.q, pose) < 1.01 * TOLERANCE
-    clear = ~near_singular(robot, q)
+    clear = ~is_near_singular(robot, q)
     assert clear.mean() > 0.8
     assert np.abs(found.q - q)[clear].max() < 1e-9
 
@@ -140,7 +140,7 @@ def test_closed_form_and_newton_are_one(on_rail):
     numeric = inverse(general.nominal, pose, np.zeros(1000, int), near)
     assert closed.reachable.all()
     assert numeric.reachable.all()
-    clear = ~near_singular(on_rail, q)
+    clear = ~is_near_singular(on_rail, q)
     assert np.abs(closed.q - numeric.q)[clear].max() < 1e-9
     assert np.array_equal(numeric.q[:, 0], q[:, 0])
 
@@ -210,6 +210,7 @@ def test_unknown_stays_unknown(ur5):
     assert none.q.shape == (0, 6)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["ur5", "seven", "staubli_tx2_90l"])
 def test_far_target_is_found_within_the_limits(name, request):
     """From one posture for all, even a singular one: what can be reached is, within the limits."""
@@ -241,16 +242,16 @@ def test_a_correction_never_jumps_to_another_branch(ur5):
 
 def test_singular_places_are_told(ur5, seven):
     clear = np.radians([20.0, -80, 90, -100, -80, 30])
-    assert not near_singular(ur5, clear[None])[0]
+    assert not is_near_singular(ur5, clear[None])[0]
     for axis, degrees in ((4, 0.0), (4, 0.3), (4, 180.0), (2, 0.0), (2, 0.4)):
         q = clear.copy()
         q[axis] = degrees * DEG
-        assert near_singular(ur5, q[None])[0]
-    assert "posture" in singular_words(ur5)
+        assert is_near_singular(ur5, q[None])[0]
+    assert "move far for a small step" in singular_words(ur5)
     bent = np.radians([10.0, 30, 0, -80, 10, 60, 20])
-    assert not near_singular(seven, bent[None])[0]
+    assert not is_near_singular(seven, bent[None])[0]
     bent[3] = 0.0
-    assert near_singular(seven, bent[None])[0]
+    assert is_near_singular(seven, bent[None])[0]
 
 
 def test_singular_words_name_the_joint(on_rail):
@@ -278,12 +279,13 @@ def winding(robot, count, start=START, wide=0.1, spin=6.0):
     return Poses(rotation_from_vector(turn) @ home.rotation, home.position + place)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("count", [1, 2, 3, 10, 400, 1001])
 def test_path_is_followed_as_if_motion_by_motion(ur5, count):
     target = winding(ur5, count)
-    track = follow(ur5, motions(target), target, START)
+    track = follow_axes(ur5, motions(target), target, START)
     assert track.reachable.all()
-    assert track.turn_holds.all()
+    assert track.turn_matches.all()
     assert track.status.tolist() == [0] * count
     assert left_over(ur5, track.q, target) < 1e-12
     solver, q = solver_of(ur5.nominal), START[None]
@@ -296,13 +298,14 @@ def test_path_is_followed_as_if_motion_by_motion(ur5, count):
 
 def test_path_turns_on_beyond_half_a_turn_and_limits_are_told(ur5):
     target = winding(ur5, 500, spin=8.0)
-    track = follow(ur5, motions(target), target, START)
+    track = follow_axes(ur5, motions(target), target, START)
     assert np.abs(np.diff(track.q, axis=0)).max() < 0.3
     assert abs(track.q[-1, 5]) > 2 * np.pi
     assert np.array_equal(track.within, (np.abs(track.q) <= 2 * np.pi + 1e-9).all(axis=1))
     assert 0 < track.within.sum() < 500
 
 
+@pytest.mark.slow
 def test_a_stretch_begun_elsewhere_is_marched_again(ur5):
     """The ends of the stretches alone would lose the whole turn that the path makes between them."""
     count = 64  # stretches of 8 rows: the tool goes once round in each
@@ -310,7 +313,7 @@ def test_a_stretch_begun_elsewhere_is_marched_again(ur5):
     spin = 2 * np.pi * np.arange(count) / 8
     turn = rotation_from_vector(np.stack([0 * spin, 0 * spin, spin], axis=1))
     target = Poses(turn @ target.rotation, target.position)
-    track = follow(ur5, motions(target), target, START)
+    track = follow_axes(ur5, motions(target), target, START)
     solver, q = solver_of(ur5.nominal), START[None]
     for row in range(count):
         q, *_ = solver.follow(q, target[row : row + 1])
@@ -333,10 +336,10 @@ def test_axis_motion_sets_where_it_goes_on(ur5):
     q[:, 5] += np.arange(6) * 0.1
     q[3:] = flipped(ur5, q)[3:]
     target = nominal_flange(ur5, q)
-    track = follow(ur5, motions(target, axes={3: q[3]}), target, START)
+    track = follow_axes(ur5, motions(target, axes={3: q[3]}), target, START)
     assert np.abs(track.q - q).max() < 1e-8
     # nothing before the axis motion is known without a start
-    track = follow(ur5, motions(target, axes={3: q[3]}), target, None)
+    track = follow_axes(ur5, motions(target, axes={3: q[3]}), target, None)
     assert track.status.tolist() == [-1, -1, -1, 0, 0, 0]
     assert np.isnan(track.q[:3]).all()
     assert track.reachable.all()
@@ -351,7 +354,7 @@ def test_home_is_where_the_program_starts(ur5):
     kinds = [Kind.LIN, Kind.AXIS, Kind.LIN, Kind.PTP, Kind.LIN, Kind.LIN]
     for code, status in (("KRL016", 0), ("KRL003", -1)):
         words = {"kind": kinds, "axes": {1: other}, "refused": {3: Finding(code, "HOME")}}
-        track = follow(ur5, motions(lost, **words), lost, START)
+        track = follow_axes(ur5, motions(lost, **words), lost, START)
         assert track.status.tolist() == [0, 0, 0, status, status, status]
         assert np.isfinite(track.q[4]).all() == (status == 0)
         assert np.sign(track.q[:3, 4]).tolist() == [-1, 1, 1]
@@ -366,12 +369,12 @@ def test_s_of_a_ptp_says_nothing_here(ur5):
     words = {"kind": [Kind.LIN, Kind.OTHER, Kind.PTP, Kind.LIN], "refused": {1: Finding("KRL001", "spline")}}
     lost = Poses(target.rotation.copy(), target.position.copy())
     lost.rotation[1], lost.position[1] = np.nan, np.nan
-    track = follow(ur5, motions(lost, **words, status=6, turn=5), lost, START)
+    track = follow_axes(ur5, motions(lost, **words, status=6, turn=5), lost, START)
     assert track.status.tolist() == [0, -1, -1, -1]
     assert np.isnan(track.q[1:]).all()
-    track = follow(ur5, motions(target, kind=Kind.PTP, status=6, turn=5), target, START)
-    assert np.abs(track.q - follow(ur5, motions(target), target, START).q).max() < 1e-12
-    assert track.turn_holds.all()
+    track = follow_axes(ur5, motions(target, kind=Kind.PTP, status=6, turn=5), target, START)
+    assert np.abs(track.q - follow_axes(ur5, motions(target), target, START).q).max() < 1e-12
+    assert track.turn_matches.all()
 
 
 def test_motion_out_of_reach_is_passed_over(ur5):
@@ -379,10 +382,10 @@ def test_motion_out_of_reach_is_passed_over(ur5):
     position = target.position.copy()
     # turned towards a place behind the robot, the arm is in another posture
     position[[0, 7, 8]] = [3.0, -2.0, -1.0]
-    track = follow(ur5, motions(target), Poses(target.rotation, position), START)
+    track = follow_axes(ur5, motions(target), Poses(target.rotation, position), START)
     assert np.flatnonzero(~track.reachable).tolist() == [0, 7, 8]
     assert np.isnan(track.q[[0, 7, 8]]).all()
-    whole = follow(ur5, motions(target), target, START)
+    whole = follow_axes(ur5, motions(target), target, START)
     rows = track.reachable
     assert np.abs(track.q[rows] - whole.q[rows]).max() < 1e-8
 
@@ -393,7 +396,7 @@ def test_ptp_may_take_another_branch_where_its_own_has_no_way():
     start = np.radians([0.0, 20, 90, 0, 60, 0])
     there = np.radians([[170.0, 30, 80, 10, 50, 0]])
     target = nominal_flange(robot, there)
-    track = follow(robot, motions(target, kind=Kind.PTP), target, start)
+    track = follow_axes(robot, motions(target, kind=Kind.PTP), target, start)
     assert track.reachable.all()
     assert track.within.all()
     assert left_over(robot, track.q, target) < 1e-12
@@ -404,7 +407,7 @@ def straight_ways(robot, count, seed=5):
     solver, rng = solver_of(robot.nominal), np.random.default_rng(seed)
     low, high = robot.limits.T
     starts = rng.uniform(np.maximum(low, -np.pi), np.minimum(high, np.pi), (count, 6))
-    starts = starts[~near_singular(robot, starts)]
+    starts = starts[~is_near_singular(robot, starts)]
     here = nominal_flange(robot, starts)
     way, turn = (size * rng.normal(size=(len(starts), 3)) for size in (0.25 * solver.size, 0.5))
     q, smooth = starts.copy(), np.ones(len(starts), bool)
@@ -422,9 +425,10 @@ def each_from(robot, starts, target, kind):
     twice = Poses(np.repeat(target.rotation, 2, axis=0), np.repeat(target.position, 2, axis=0))
     axes = {2 * row: start for row, start in enumerate(starts)}
     kinds = np.tile([Kind.AXIS, kind], n)
-    return follow(robot, motions(twice, kind=kinds, axes=axes), twice, None).q[1::2]
+    return follow_axes(robot, motions(twice, kind=kinds, axes=axes), twice, None).q[1::2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5", "staubli_tx2_90l"])
 def test_long_straight_motion_stays_in_its_branch(name):
     """One long LIN ends where many small steps lead, and where these lead nowhere it is not reached."""
@@ -439,6 +443,7 @@ def test_long_straight_motion_stays_in_its_branch(name):
     assert reached[~smooth].mean() < 0.1
 
 
+@pytest.mark.slow
 def test_motion_that_is_not_reached_leaves_the_posture(ur5):
     """Out of the start's posture, to where no path leads, and back: the posture is still that of the start."""
     starts, target, _, smooth = straight_ways(ur5, 150)
@@ -451,12 +456,13 @@ def test_motion_that_is_not_reached_leaves_the_posture(ur5):
     axes = {3 * i: starts[row] for i, row in enumerate(rows)}
     path = Poses(rotation, position)
     kinds = np.tile([Kind.AXIS, Kind.LIN, Kind.LIN], n)
-    track = follow(ur5, motions(path, kind=kinds, axes=axes), path, None)
+    track = follow_axes(ur5, motions(path, kind=kinds, axes=axes), path, None)
     lost = ~track.reachable[1::3]
     assert lost.sum() > 20
     assert np.abs(track.q[2::3] - starts[rows])[lost].max() < 1e-9
 
 
+@pytest.mark.slow
 def test_point_to_point_needs_no_straight_way(ur5):
     """The same targets as PTP: all that can be reached at all are, within the limits."""
     starts, target, _, smooth = straight_ways(ur5, 150)
@@ -480,9 +486,9 @@ def test_ptp_takes_a_turn_that_the_limits_allow(ur5):
     q = np.repeat(START[None], 3, axis=0)
     q[:, 5] = np.radians([190.0, 220.0, 230.0])
     target = nominal_flange(ur5, q)
-    track = follow(low, motions(target, kind=[Kind.LIN, Kind.PTP, Kind.LIN]), target, q[0])
+    track = follow_axes(low, motions(target, kind=[Kind.LIN, Kind.PTP, Kind.LIN]), target, q[0])
     assert np.degrees(track.q[:, 5]) == pytest.approx([190, -140, -130])
-    track = follow(low, motions(target), target, q[0])
+    track = follow_axes(low, motions(target), target, q[0])
     assert np.degrees(track.q[:, 5]) == pytest.approx([190, 220, 230])
     assert track.within.tolist() == [True, False, False]
 
@@ -501,7 +507,7 @@ def test_many_motions_are_followed_fast(ur5, monkeypatch):
         newton.Solver, "solve", lambda self, *a, **k: (calls.append(1), solve(self, *a, **k))[1]
     )
     target = winding(ur5, 2500)
-    assert follow(ur5, motions(target), target, START).reachable.all()
+    assert follow_axes(ur5, motions(target), target, START).reachable.all()
     assert len(calls) < 400
 
 
@@ -511,7 +517,7 @@ def test_many_motions_are_followed_fast(ur5, monkeypatch):
 def test_external_joint_keeps_its_start(seven):
     start = np.radians([10.0, 30, 20, -80, 10, 60, 20])
     target = winding(seven, 200, start, wide=0.05, spin=1.0)
-    track = follow(seven, motions(target), target, start)
+    track = follow_axes(seven, motions(target), target, start)
     assert track.reachable.all()
     assert track.q.shape == (200, 7)
     assert track.q[:, 2] == pytest.approx(20 * DEG, abs=0)
@@ -525,9 +531,9 @@ def test_axis_motion_of_seven_joints_states_six(seven):
     q[1:, 0] += 0.3
     target = nominal_flange(seven, q)
     six = np.delete(q[1], 2)
-    track = follow(seven, motions(target, axes={1: six}), target, start)
+    track = follow_axes(seven, motions(target, axes={1: six}), target, start)
     assert np.abs(track.q - q).max() < 1e-9
-    track = follow(seven, motions(target, axes={1: six}), target, None)
+    track = follow_axes(seven, motions(target, axes={1: six}), target, None)
     assert track.status.tolist() == [-1] * 3
     assert np.isnan(track.q).all()
 
@@ -541,15 +547,15 @@ def test_kuka_on_its_rail_is_followed(on_rail):
     moved = Poses(target.rotation, target.position + np.array([0, 2.5, 0]))
     words = {"kind": [Kind.LIN, Kind.PTP, Kind.LIN, Kind.LIN, Kind.LIN], "status": [-1, 6, -1, -1, -1]}
     words |= {"turn": [-1, 0b010010, -1, -1, -1], "axes": {3: q[3]}}
-    ours = follow(on_rail, motions(moved, **words), moved, np.array([2.5, *q[0]]))
-    theirs = follow(floor, motions(target, **words), target, q[0])
+    ours = follow_axes(on_rail, motions(moved, **words), moved, np.array([2.5, *q[0]]))
+    theirs = follow_axes(floor, motions(target, **words), target, q[0])
     assert np.abs(ours.q[:, 1:] - theirs.q).max() < 1e-12
     assert ours.q[:, 0].tolist() == [2.5] * 5
-    for name in ("status", "reachable", "within", "turn_holds"):
+    for name in ("status", "reachable", "within", "turn_matches"):
         assert np.array_equal(getattr(ours, name), getattr(theirs, name))
     assert np.array_equal(sides(on_rail, ours.q), sides(floor, theirs.q))
-    assert np.array_equal(near_singular(on_rail, ours.q), near_singular(floor, theirs.q))
-    lost = follow(on_rail, motions(moved, **words), moved, None)
+    assert np.array_equal(is_near_singular(on_rail, ours.q), is_near_singular(floor, theirs.q))
+    lost = follow_axes(on_rail, motions(moved, **words), moved, None)
     assert lost.status.tolist() == [-1] * 5
 
 
@@ -558,7 +564,7 @@ def test_straight_wrist_of_an_arm_that_counts_otherwise():
     robot = load_robot(find_robot("abb_irb120"))
     q = np.radians([[10.0, 20, 10, 50, 30, 10], [12.0, 20, 10, 120, 0, 20], [14.0, 20, 10, 60, 20, 40]])
     target = nominal_flange(robot, q)
-    track = follow(robot, motions(target), target, q[0])
+    track = follow_axes(robot, motions(target), target, q[0])
     assert np.degrees(track.q[1]) == pytest.approx([12, 20, 10, 50, 0, 90], abs=1e-6)
     assert np.abs(track.q - q)[[0, 2]].max() < 1e-9
     assert left_over(robot, track.q, target) < 1e-12
@@ -590,14 +596,14 @@ def test_mirror_on_a_general_arm(tmp_path):
     model = StiffnessModel.from_robot(load_robot(soft(tmp_path)))
     robot = model.robot
     wanted = winding(robot, 200)
-    track = follow(robot, motions(wanted), wanted, START)
+    track = follow_axes(robot, motions(wanted), wanted, START)
     tool = Poses.identity()
     wrench = np.tile([30.0, -20, 60, 0.5, 0.2, 0.1], (200, 1))
     done = mirror(model, wanted, wanted, tool, wrench, Conditions(), track.status, track.q)
     assert done.converged.all()
     assert np.nanmin(done.history[0]) > 2e-4
     real = predict(model, done.command, tool, wrench, Conditions(), track.status, track.q)
-    shift, turn = difference(real.pose, wanted)
+    shift, turn = pose_error(real.pose, wanted)
     assert np.linalg.norm(shift, axis=1).max() < 1e-8
     assert np.linalg.norm(turn, axis=1).max() < 1e-8
     assert np.abs(done.q - track.q).max() < 0.1
@@ -636,7 +642,7 @@ def test_main_job(compensate, job):
     found = done.json
     assert found["robot"] == "soft"
     assert found["corrected"] == 2
-    assert found["left"] == 0
+    assert found["uncorrected"] == 0
     assert found["error_before_mm"]["max"] > 0.1
     assert found["error_after_mm"]["max"] < 0.002
     assert job.output.exists()
@@ -694,5 +700,5 @@ def test_start_of_another_count_is_told(compensate, job):
     assert done.code == 1
     (finding,) = done.json["findings"]
     assert finding["code"] == "YML004"
-    assert "7 values; kuka_kr270 has 6 joints" in finding["message"]
+    assert "7 values are given; kuka_kr270 has 6 joints" in finding["message"]
     assert finding["line"] == cell[: cell.index("start")].count("\n") + 1

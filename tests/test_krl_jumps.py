@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import examples
 
-from postproc.dialects.dialect import Program
-from postproc.dialects.krl import KrlDialect
-from postproc.document import Document
+from postproc.base.document import Document
+from postproc.languages.dialect import Program
+from postproc.languages.krl import KrlDialect
 
 HEAD = ["DEF part()", "BAS(#BASE,1)", "BAS(#TOOL,1)"]
 FULL = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}"
@@ -121,7 +122,7 @@ def bases(body: list[str], pairs: dict[int, list[int]]) -> dict[int, set[int]]:
     return found
 
 
-@settings(deadline=None, max_examples=1000)
+@settings(deadline=None, max_examples=examples(1000))
 @given(programs())
 def test_a_base_that_is_known_is_that_of_every_way(body: list[str]) -> None:
     path, possible = read(body).toolpath, bases(body, blocks(body))

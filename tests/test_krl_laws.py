@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from fuzz.examine import dividable, movable, planned
 
-from postproc.dialects.dialect import Plan, Program, Settings, Writing
-from postproc.dialects.krl import KrlDialect
-from postproc.document import Document
-from postproc.units import MM
+from postproc.base.document import Document
+from postproc.base.units import MM
+from postproc.languages.dialect import Plan, Program, ReadingSettings, WritingSettings
+from postproc.languages.krl import KrlDialect
 
 KRL = KrlDialect()
 CASES = Path(__file__).parent / "programs" / "krl"
@@ -27,7 +27,7 @@ def case(path: Path) -> Program:
     config = path.with_suffix(".config.dat")
     references = (Document(config, config.read_bytes()),) if config.exists() else ()
     documents = tuple(Document(p, p.read_bytes()) for p in (path, *KRL.companions(path)))
-    return KRL.read(documents, Settings(references=references))
+    return KRL.read(documents, ReadingSettings(references=references))
 
 
 def read(text: str) -> Program:
@@ -41,7 +41,7 @@ def body(text: str) -> Program:
 def runs(program: Program) -> dict[int, bool]:
     """Line -> whether the motions there are known to run, once or more."""
     path = program.toolpath
-    return {int(line): bool(known) for line, known in zip(path.line, path.runs, strict=True)}
+    return {int(line): bool(known) for line, known in zip(path.line, path.executes, strict=True)}
 
 
 @pytest.mark.parametrize("path", [*GOOD, *BAD], **ids)
@@ -56,6 +56,7 @@ def test_findings_point_into_their_file(path: Path) -> None:
         assert 1 <= finding.column <= max(len(line), 1), finding
 
 
+@pytest.mark.sample(23)
 @pytest.mark.parametrize("size", [1, 2, 3, 5])
 @pytest.mark.parametrize("path", GOOD, **ids)
 def test_blocks_of_rows_do_not_matter(path: Path, size: int, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -67,22 +68,22 @@ def test_blocks_of_rows_do_not_matter(path: Path, size: int, monkeypatch: pytest
     free = movable(rows) & (random.random(n) < 0.6)
     free[::7] = False
     divided = np.flatnonzero(dividable(rows) & (random.random(n) < 0.2))
-    writing = Writing(mm=3, deg=3)
+    writing = WritingSettings(mm=3, deg=3)
     for _ in range(20):
         shift, turn = random.normal(0, 0.2 * MM, (n, 3)), random.normal(0, 1e-3, (n, 3))
         plan = planned(rows, free, shift, turn, divided)
-        found = KRL.moved(program, plan, writing)
-        if not found.held:
+        found = KRL.edit_targets(program, plan, writing)
+        if not found.unwritten:
             break
-        free[list(found.held)] = False
-        free[[row - 1 for row in found.held if row]] = False
-        divided = divided[~np.isin(divided, list(found.held))]
+        free[list(found.unwritten)] = False
+        free[[row - 1 for row in found.unwritten if row]] = False
+        divided = divided[~np.isin(divided, list(found.unwritten))]
     for name, module in list(sys.modules.items()):
-        if name.startswith("postproc.dialects") and isinstance(getattr(module, "BLOCK", None), int):
+        if name.startswith("postproc.languages") and isinstance(getattr(module, "BLOCK", None), int):
             monkeypatch.setattr(module, "BLOCK", size)
-    again = KRL.moved(program, plan, writing)
+    again = KRL.edit_targets(program, plan, writing)
     assert list(again.edits) == list(found.edits)
-    assert again.held == found.held
+    assert again.unwritten == found.unwritten
 
 
 LINE = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
@@ -100,7 +101,7 @@ def test_no_motion_of_a_routine_that_nobody_calls_runs(count: int) -> None:
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_all_motions_of_a_routine_that_is_called_run(call: str, count: int) -> None:
     program = read(f"DEF part()\n{FRAMES}{LINE}{call}{LINE}END\nDEF lonely()\n{LINE * count}END\n")
-    assert program.toolpath.runs.all()
+    assert program.toolpath.executes.all()
     assert len(program.toolpath) == 2 + count * call.count("(")
 
 
@@ -124,8 +125,8 @@ def test_what_is_completed_is_spelt_as_what_is_there(said: str, style) -> None:
     program = body(style(text))
     path = program.toolpath
     moved = path.position + np.array([[1.0, 2.0, 3.0], [0.1, 0.2, 0.3], [-1.0, -2.0, -3.0]]) * MM
-    found = KRL.moved(program, replace(Plan.of(path), position=moved), Writing(mm=3, deg=3))
-    assert not found.held
+    found = KRL.edit_targets(program, replace(Plan.of(path), position=moved), WritingSettings(mm=3, deg=3))
+    assert not found.unwritten
     written = b"".join(edit.text for edit in found.edits).decode()
     assert written == style(written)
     assert any(character.isalpha() for character in written)
@@ -159,7 +160,7 @@ END
 def test_a_jump_leaves_the_blocks_of_its_routine_alone() -> None:
     """Those of the caller stay open: what follows the call runs as it stands there."""
     path = read(INSIDE).toolpath
-    reached = [(round(x, 9), round(y, 9)) for x, y, _ in path.position[path.runs] / MM]
+    reached = [(round(x, 9), round(y, 9)) for x, y, _ in path.position[path.executes] / MM]
     assert reached == [(1, 2), (1, 10), (1, 11), (1, 12), (2, 12), (3, 12)]
 
 

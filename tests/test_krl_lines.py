@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.dialects.krl import KrlDialect, effects, lexing
-from postproc.dialects.krl.effects import bas, effects_of, functions_of, read_by
-from postproc.dialects.krl.expressions import DEEPEST, component, evaluate, index_text
-from postproc.dialects.krl.lexing import (
+from postproc.base.document import Document
+from postproc.languages.krl import KrlDialect, effects, lexing
+from postproc.languages.krl.effects import bas, effects_of, functions_of, read_by
+from postproc.languages.krl.expressions import DEEPEST, component, evaluate, index_text
+from postproc.languages.krl.lexing import (
     LONGEST,
     Assignment,
     Call,
@@ -30,11 +31,10 @@ from postproc.dialects.krl.lexing import (
     statement,
     value_end,
 )
-from postproc.dialects.krl.operands import take_apart
-from postproc.dialects.krl.spatial import angles, arc, product, rotation
-from postproc.dialects.krl.target import Target, Unclear, fields, parse, shown
-from postproc.dialects.krl.variables import Variables
-from postproc.document import Document
+from postproc.languages.krl.operands import take_apart
+from postproc.languages.krl.spatial import angles, arc, product, rotation
+from postproc.languages.krl.target import KrlTarget, UnknownValue, fields, parse, shown
+from postproc.languages.krl.variables import Variables
 
 
 def stated(text: bytes) -> Statement:
@@ -136,7 +136,7 @@ def test_lines_of_a_file(raw: bytes, expected: list[tuple[int, int, int]]) -> No
 )  # fmt: skip
 def test_statements(line: bytes, kind: str, word: bytes, said: object) -> None:
     found = stated(line)
-    assert (found.kind, found.word, found.said, found.line, found.at) == (kind, word, said, 7, 0)
+    assert (found.kind, found.word, found.strings, found.line, found.at) == (kind, word, said, 7, 0)
 
 
 def test_a_statement_stands_behind_its_blanks() -> None:
@@ -160,7 +160,7 @@ def test_lines_that_are_too_long_are_none_of_krl() -> None:
 
 
 def test_a_routine_has_at_most_fifty_parameters_that_are_read() -> None:
-    said = stated(b"DEF a(" + b",".join(b"p%d:IN" % i for i in range(60)) + b")").said
+    said = stated(b"DEF a(" + b",".join(b"p%d:IN" % i for i in range(60)) + b")").strings
     assert isinstance(said, Head)
     assert said.parameters == tuple((b"P%d" % i, False) for i in range(50))
 
@@ -220,9 +220,10 @@ def test_the_name_of_a_module(raw: bytes, word: bytes, name: bytes | None) -> No
 
 NAMES: dict[tuple[bytes, bytes], object] = {
     (b"N", b""): 7, (b"R", b""): 2.5, (b"YES", b""): True, (b"K", b"[7]"): 3, (b"K", b"[7,3]"): 4, (b"S", b".A.X"): 5,
-    (b"K", b"[2].X"): 6, (b"P", b""): Target((1.0, 2.0, 3.0, 0.0, 0.0, 90.0), status=2, turn=3),
-    (b"Q", b""): Target((10.0, 0.0, 0.0, 90.0, 0.0, 0.0), status=4, external=((b"E1", 1.0, b"1"),)),
-    (b"PART", b""): Target((1.0, None, None, None, None, None)), (b"LOST", b""): Unclear("KRL019", "it was lost"),
+    (b"K", b"[2].X"): 6, (b"P", b""): KrlTarget((1.0, 2.0, 3.0, 0.0, 0.0, 90.0), status=2, turn=3),
+    (b"Q", b""): KrlTarget((10.0, 0.0, 0.0, 90.0, 0.0, 0.0), status=4, external=((b"E1", 1.0, b"1"),)),
+    (b"PART", b""): KrlTarget((1.0, None, None, None, None, None)),
+    (b"LOST", b""): UnknownValue("KRL019", "it was lost"),
 }  # fmt: skip
 
 
@@ -277,7 +278,7 @@ def value(text: str) -> object:
 def test_the_value_of_an_expression(text: str, expected: object) -> None:
     found = value(text)
     if expected is None:
-        assert isinstance(found, Unclear)
+        assert isinstance(found, UnknownValue)
     else:
         assert type(found) is type(expected)
         assert found == (pytest.approx(expected) if isinstance(expected, float) else expected)
@@ -290,25 +291,27 @@ def test_the_value_of_an_expression(text: str, expected: object) -> None:
         ("1E300*1E300", "'1E300*1E300' has no value"), ("none", "none is not a constant of the program"),
         ("none[1].x+1", "NONE[1].X is not a constant of the program"), ("LOST", "it was lost"),
         ("lost*2", "it was lost"),
-        ("P==1", "points and words are compared"), ("#A<1", "points and words are compared"),
-        ("1==TRUE", "values of different kinds are compared"), ("#A<#B", "values of different kinds are compared"),
-        ("1 AND 2", "AND of what has no such value"), ("1 B_or TRUE", "B_OR of what has no such value"),
+        ("P==1", "it compares points and words"), ("#A<1", "it compares points and words"),
+        ("1==TRUE", "it compares values of different kinds"), ("#A<#B", "it compares values of different kinds"),
+        ("1 AND 2", "AND is applied to a value of another kind"), ("1 B_or TRUE", "B_OR is applied to a"
+        " value of another kind"),
         ("0+1234567890123456789", "it overflows"), ("999999999*9999999999", "it overflows"),
-        ("not 1", "NOT of what has no such value"),
-        ("1:2", "':' of what is no point"), ("P:1", "':' of what is no point"), ("1:P", "':' of what is no point"),
-        ("P:PART", "':' of a point that is not known in all of X, Y, Z, A, B, C"),
-        ("PART:P", "':' of a point that is not known in all of X, Y, Z, A, B, C"),
-        ("'HG'+1", "''HG'+1' is not understood"), ("'BFF'+1", "'BFF' is no number"),
-        ("(" * 50 + "1" + ")" * 50, "it is nested too deep"), ("{X 1+0", "its braces do not close"),
+        ("not 1", "NOT is applied to a value of another kind"),
+        ("1:2", "':' is applied to something that is not a point"), ("P:1", "':' is applied to something"
+        " that is not a point"), ("1:P", "':' is applied to something that is not a point"),
+        ("P:PART", "':' is applied to a point that is not known in all of X, Y, Z, A, B, C"),
+        ("PART:P", "':' is applied to a point that is not known in all of X, Y, Z, A, B, C"),
+        ("'HG'+1", "''HG'+1' is not understood"), ("'BFF'+1", "'BFF' is not a number"),
+        ("(" * 50 + "1" + ")" * 50, "it is nested too deep"), ("{X 1+0", "its braces do not match"),
         ("s.(", "'s.(' is not understood"),
         ("k[TRUE]", "an index of K is not a constant"), ("move(1)", "it calls MOVE"),
-        ("1+TRUE", "it calculates with what is no number"),
-        ("(1", "'(1' is not understood"), ("{X 1,X 2}", "X is given twice"),
+        ("1+TRUE", "it calculates with something that is not a number"),
+        ("(1", "'(1' is not understood"), ("{X 1,X 2}", "X occurs twice"),
     ],
 )  # fmt: skip
 def test_why_an_expression_has_no_value(text: str, message: str) -> None:
     found = value(text)
-    assert isinstance(found, Unclear)
+    assert isinstance(found, UnknownValue)
     assert found.message == message
 
 
@@ -317,14 +320,14 @@ def test_brackets_are_nested_up_to_a_depth(left: str) -> None:
     right, inner = ("]", "7") if left.endswith("[") else (")", "1")
     if right == "]":
         texts = [f"{'K[4+' * depth}{inner}{']' * depth}" for depth in (1, DEEPEST + 1)]
-        assert isinstance(value(texts[0]), Unclear)  # K[11] has no value
+        assert isinstance(value(texts[0]), UnknownValue)  # K[11] has no value
         deep = value(texts[1])
-        assert isinstance(deep, Unclear)
+        assert isinstance(deep, UnknownValue)
         assert deep.message == "it is nested too deep"
         return
     assert value(left * DEEPEST + inner + right * DEEPEST) == 1
     found = value(left * (DEEPEST + 1) + inner + right * (DEEPEST + 1))
-    assert isinstance(found, Unclear)
+    assert isinstance(found, UnknownValue)
     assert found.message == "it is nested too deep"
 
 
@@ -339,7 +342,7 @@ def test_elements_of_elements_are_nested_up_to_a_depth() -> None:
 
 def test_geometric_products_take_status_and_axes_of_the_last() -> None:
     found = value("P:Q")
-    assert isinstance(found, Target)
+    assert isinstance(found, KrlTarget)
     # Rx(90) turns Rz(90) so that x goes along z and z along -y.
     np.testing.assert_allclose(found.values[:3], [11, 2, 3], atol=1e-12)
     np.testing.assert_allclose(
@@ -349,7 +352,7 @@ def test_geometric_products_take_status_and_axes_of_the_last() -> None:
     )
     assert (found.status, found.turn, found.external) == (4, -1, ((b"E1", 1.0, b"1"),))
     again = value("P:Q:P")
-    assert isinstance(again, Target)
+    assert isinstance(again, KrlTarget)
     assert (again.status, again.turn) == (2, 3)
     np.testing.assert_allclose(again.values[:3], [9, -1, 4], atol=1e-12)
 
@@ -373,28 +376,29 @@ def test_indices(text: str, expected: bytes | None) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{}", "the aggregate is empty"), ("{X}", "X has no value"), ("{X 1,X 2}", "X is given twice"),
+        ("{}", "the aggregate is empty"), ("{X}", "X has no value"), ("{X 1,X 2}", "X occurs twice"),
         ("{E1}", "E1 has no value"),
-        ("{X 1,}", "a component is missing behind the last comma"),
-        ("{X 1, }", "a component is missing behind the last comma"),
+        ("{X 1,}", "a component is missing after the last comma"),
+        ("{X 1, }", "a component is missing after the last comma"),
         ("{X 1,A1 2}", "it mixes axes with Cartesian components"), ("{Q 1}", "Q is not a component of a point"),
         ("{S -1}", "S is -1, which is not a bit pattern"), ("{T 0.5}", "T is 0.5, which is not a bit pattern"),
         ("{S 2147483648}", "S is 2.14748e+09, which is not a bit pattern"),
         ("{X n}", "X is 'n', which is not a constant"),
-        ("{THING: X 1}", "the type THING is not one of a point"), ("{X 1,5}", "'5' is not a component and its value"),
+        ("{THING: X 1}", "the type THING is not the type of a point"),
+        ("{X 1,5}", "'5' is not a component with its value"),
         ("{X[1] 5}", "X is '5', which is not a constant"), ("{X TRUE}", "X is 'TRUE', which is not a constant"),
     ],
 )  # fmt: skip
 def test_aggregates_that_are_no_points(text: str, message: str) -> None:
     found = parse(text.encode(), 0, 0, lambda inner: inner == b"TRUE" or None)
-    assert isinstance(found, Unclear)
+    assert isinstance(found, UnknownValue)
     assert found.message == message
 
 
 def test_the_parts_of_an_aggregate_have_places() -> None:
     text = b"{E6POS: X 1.5 ,Y -2,Z 2*f(1,2),S 'B11', T 2147483647 ,E2 k[1,2],B 5}"
     found = parse(text, 1000, 3, lambda inner: 9)
-    assert isinstance(found, Target)
+    assert isinstance(found, KrlTarget)
     assert found.values == (1.5, -2.0, 9.0, None, 5.0, None)
     spots = [text[a - 1000 : b - 1000] for a, b in zip(found.start, found.stop, strict=True) if a >= 0]
     assert spots == [b"1.5", b"-2", b"5"]
@@ -406,19 +410,19 @@ def test_the_parts_of_an_aggregate_have_places() -> None:
     assert found.missing == ["A", "C"]
     assert found.numbers is None
     bare = parse(b"{ S 2}", 10, 0)
-    assert isinstance(bare, Target)
+    assert isinstance(bare, KrlTarget)
     assert (bare.insert, bare.start, bare.axes) == (12, (-1,) * 6, None)
     axes = parse(b"{E6AXIS: E1 5}", 0, 0)
-    assert isinstance(axes, Target)
+    assert isinstance(axes, KrlTarget)
     assert axes.axes == (None,) * 6
     assert axes.missing == ["A1", "A2", "A3", "A4", "A5", "A6"]
 
 
-WHY = Unclear("KRL002", "because")
+WHY = UnknownValue("KRL002", "because")
 
 
 def test_components_of_points_are_read_and_changed() -> None:
-    whole = Target(
+    whole = KrlTarget(
         (1.0, 2.0, 3.0, 4.0, 5.0, 6.0),
         (10,) * 6,
         (11,) * 6,
@@ -436,7 +440,7 @@ def test_components_of_points_are_read_and_changed() -> None:
         None,
     ]
     assert whole.numbers == (1, 2, 3, 4, 5, 6)
-    axes = Target((None,) * 6, axes=(1.0, 2.0, 3.0, 4.0, 5.0, None), turn=0)
+    axes = KrlTarget((None,) * 6, axes=(1.0, 2.0, 3.0, 4.0, 5.0, None), turn=0)
     assert [axes.component(key) for key in (b"A1", b"A5", b"A6", b"X", b"A", b"S", b"T")] == [
         1,
         5,
@@ -449,35 +453,35 @@ def test_components_of_points_are_read_and_changed() -> None:
     assert axes.numbers is None
 
     found = whole.changed(b"Z", 9.0, WHY, (1, 20, 22), b"9.")
-    assert isinstance(found, Target)
+    assert isinstance(found, KrlTarget)
     assert found.values == (1, 2, 9, 4, 5, 6)
     assert (found.start, found.stop) == ((10, 10, 20, 10, 10, 10), (11, 11, 22, 11, 11, 11))
-    assert (found.file, found.lost) == ((0, 0, 1, 0, 0, 0), None)
+    assert (found.file, found.unknown) == ((0, 0, 1, 0, 0, 0), None)
 
     lost = whole.changed(b"Z", None, WHY, (-1, -1, -1), b"n")
-    assert isinstance(lost, Target)
-    assert lost.lost == WHY
+    assert isinstance(lost, KrlTarget)
+    assert lost.unknown == WHY
     assert math.isnan(lost.values[2])  # type: ignore[arg-type]
     assert (lost.numbers, lost.component(b"Z"), lost.component(b"X")) == (None, None, 1.0)
     assert component(lost, b".Z") == WHY
     assert component(lost, b".X") == 1.0
     assert component(lost, b"Z") is None
     assert component(5, b".Z") is None
-    second = lost.changed(b"X", None, Unclear("KRL002", "later"), (-1, -1, -1), b"n")
-    assert isinstance(second, Target)
-    assert second.lost == WHY
+    second = lost.changed(b"X", None, UnknownValue("KRL002", "later"), (-1, -1, -1), b"n")
+    assert isinstance(second, KrlTarget)
+    assert second.unknown == WHY
     once = second.changed(b"Z", 1.0, WHY, (-1, -1, -1), b"1")
-    assert isinstance(once, Target)
-    assert once.lost == WHY
+    assert isinstance(once, KrlTarget)
+    assert once.unknown == WHY
     back = once.changed(b"X", 1.0, WHY, (-1, -1, -1), b"1")
-    assert isinstance(back, Target)
-    assert back.lost is None
+    assert isinstance(back, KrlTarget)
+    assert back.unknown is None
 
     outer = whole.changed(b"E1", 8.0, WHY, (-1, -1, -1), b"8")
-    assert isinstance(outer, Target)
+    assert isinstance(outer, KrlTarget)
     assert outer.external == ((b"E1", 8.0, b"8"),)
     more = whole.changed(b"E2", None, WHY, (-1, -1, -1), b"n")
-    assert isinstance(more, Target)
+    assert isinstance(more, KrlTarget)
     assert more.external == ((b"E1", 7.0, b"7."), (b"E2", None, b"n"))
 
     for bits, held in (
@@ -491,28 +495,28 @@ def test_components_of_points_are_read_and_changed() -> None:
     ):
         state = whole.changed(b"S", bits, WHY, (-1, -1, -1), b"")
         turn = whole.changed(b"T", bits, WHY, (-1, -1, -1), b"")
-        assert isinstance(state, Target)
-        assert isinstance(turn, Target)
+        assert isinstance(state, KrlTarget)
+        assert isinstance(turn, KrlTarget)
         assert (state.status, state.turn, turn.status, turn.turn) == (held, -1, 2, held)
 
     moved = axes.changed(b"A6", 6.0, WHY, (0, 5, 6), b"6")
-    assert isinstance(moved, Target)
+    assert isinstance(moved, KrlTarget)
     assert moved.axes == (1, 2, 3, 4, 5, 6)
     assert moved.start == (-1,) * 6
     for point, key in (whole, b"A1"), (axes, b"X"), (whole, b"Q"):
-        assert point.changed(key, 1.0, WHY, (-1, -1, -1), b"1") == Unclear(
-            "KRL002", f"{key.decode()} is assigned, which it does not have"
+        assert point.changed(key, 1.0, WHY, (-1, -1, -1), b"1") == UnknownValue(
+            "KRL002", f"{key.decode()} is assigned, but it has no such component"
         )
 
 
 def test_a_detached_point_has_no_places() -> None:
     found = parse(b"{X 1}", 5, 0)
-    assert isinstance(found, Target)
-    assert found.detached() == Target((1.0, None, None, None, None, None))
-    bare = Target((1.0,) * 6)
+    assert isinstance(found, KrlTarget)
+    assert found.detached() == KrlTarget((1.0, None, None, None, None, None))
+    bare = KrlTarget((1.0,) * 6)
     assert bare.detached() is bare
-    assert Target((1.0,) * 6, locked="why").detached() == bare
-    assert Target((1.0,) * 6, insert=5, home=0).detached() == bare
+    assert KrlTarget((1.0,) * 6, locked="why").detached() == bare
+    assert KrlTarget((1.0,) * 6, insert=5, home=0).detached() == bare
 
 
 def test_fields_of_other_aggregates() -> None:
@@ -554,9 +558,9 @@ def test_motions_taken_apart(
 ) -> None:
     found = take_apart(code.encode(), 3)
     assert [code[a:b] for a, b in found.points] == points
-    assert found.slurs == slurs
+    assert found.approximations == slurs
     assert (None if found.reference is None else code[slice(*found.reference)]) == reference
-    assert (found.clause.decode(), found.odd.decode()) == (clause, odd)
+    assert (found.clause.decode(), found.not_understood.decode()) == (clause, odd)
 
 
 # frames and arcs
@@ -601,7 +605,7 @@ def test_the_angles_of_frames() -> None:
 
 # what statements change and read
 
-SIX = {"base", "tool", "feed", "apo", "mode"}
+SIX = {"base", "tool", "feed", "apo", "mode", "turning"}
 
 
 @pytest.mark.parametrize(
@@ -611,12 +615,14 @@ SIX = {"base", "tool", "feed", "apo", "mode"}
         ("$BASE=x", {"base"}, ""), ("$tool.X=5", {"tool"}, ""), ("$VEL.CP=1", {"feed"}, ""),
         ("$VEL={CP 1}", {"feed"}, ""),
         ("$VEL.ORI1=1", set(), ""), ("$APO.CDIS=1", {"apo"}, ""), ("$IPO_MODE=#TCP", {"mode"}, ""),
+        ("$ORI_TYPE=#VAR", {"turning"}, ""), ("$CIRC_TYPE=#PATH", {"turning"}, ""), ("$CIRC_MODE.X=1", {"turning"}, ""),
         ("FDAT_ACT=F", {"record"}, ""),
         ("LDAT_ACT=F", {"record"}, ""), ("PDAT_ACT.X=F", {"record"}, ""), ("DECL INT a,b=5,c[2]", {b"B"}, ""),
         ("DECL FRAME P[2]={X 1}", {b"P"}, ""), ("BAS(#BASE,1)", {"base"}, ""), ("BAS(#INITMOV,0)", SIX, ""),
         ("BAS(x)", SIX, ""),
-        ("BAS(#ACC_PTP,5)", set(), ""), ("BAS(#CP_PARAMS,1)", SIX, ""), ("BAS(#PTP_PARAMS,1)", SIX - {"feed"}, ""),
-        ("BAS(#FRAMES)", {"base", "tool", "mode"}, ""), ("BAS(#CP_DAT)", {"feed", "apo"}, ""),
+        ("BAS(#ACC_PTP,5)", set(), ""), ("BAS(#CP_PARAMS,1)", SIX, ""),
+        ("BAS(#PTP_PARAMS,1)", SIX - {"feed", "turning"}, ""),
+        ("BAS(#FRAMES)", {"base", "tool", "mode"}, ""), ("BAS(#CP_DAT)", {"feed", "apo", "turning"}, ""),
         ("BAS(#PTP_DAT)", {"apo"}, ""),
         ("BAS(#VEL_CP,1)", {"feed"}, ""), ("BAS(#TOOL,1)", {"tool"}, ""), ("BAS(#EX_BASE,1)", {"base"}, ""),
         ("go(x,y[i])", {b"X", b"Y", b"I"}, "GO"), ("H50(x)", set(), "H50"), ("SR_x(y)", set(), "SR_X"),
@@ -689,7 +695,7 @@ def test_variables_are_taken_back_to_every_mark() -> None:
         marks = [(0, asked())]
         for step in range(12):
             name, path = chance.choice(names), chance.choice(paths)
-            why = Unclear("KRL002", f"step {step}")
+            why = UnknownValue("KRL002", f"step {step}")
             match chance.randrange(5):
                 case 0 | 1:
                     variables.set(name, path, step)
@@ -714,7 +720,7 @@ def test_variables_are_taken_back_to_every_mark() -> None:
 
 
 def test_components_of_variables() -> None:
-    point = Target((1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
+    point = KrlTarget((1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
     variables = Variables({b"F": {b"": point}})
     assert variables.get(b"F", b".Y") == 2.0
     assert variables.get(b"F", b".Q") is None

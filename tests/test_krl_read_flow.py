@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import examples
 
-from postproc.dialects.dialect import Program
-from postproc.dialects.krl import KrlDialect
-from postproc.document import Document
-from postproc.units import MM
+from postproc.base.document import Document
+from postproc.base.units import MM
+from postproc.languages.dialect import Program
+from postproc.languages.krl import KrlDialect
 
 FULL = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
 
@@ -137,7 +138,7 @@ def test_a_statement_that_stood_elsewhere_counts_in_its_block_too(first: str, se
 
 def test_rows_of_a_line_that_runs_several_times_are_whole() -> None:
     found = body("FOR i=1 TO 2\nLIN {X i}\nENDFOR\n" + FULL)
-    assert list(found.toolpath.whole) == [1, 2]
+    assert list(found.toolpath.no_insert_before) == [1, 2]
     assert found.toolpath.line.tolist() == [6, 8, 8, 10]
 
 
@@ -174,6 +175,7 @@ def test_a_long_loop_that_moves_nothing_is_passed_over() -> None:
     assert not found.findings
 
 
+@pytest.mark.slow
 def test_what_runs_once_in_calls_is_not_limited() -> None:
     subs = "".join(f"DEF s{k}()\n{FULL * 9}$OUT[1]=TRUE\n{'LIN {X 7}' + chr(10)}END\n" for k in range(3000))
     found = body("".join(f"s{k}()\n" for k in range(3000)), subs)
@@ -197,12 +199,14 @@ HOSTILE = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_text_is_read(name: str) -> None:
     piece = HOSTILE[name]
     program("DEF a()\n" + piece * (SIZE // len(piece)))
 
 
+@pytest.mark.slow
 def test_many_variables_and_many_branches() -> None:
     text = "".join(f"V{i}=1\n" for i in range(20_000)) + "IF A THEN\nENDIF\n" * 20_000
     assert not program(f"DEF a()\n{text}END\n").findings
@@ -213,7 +217,7 @@ def test_many_jumps_that_may_happen() -> None:
     assert len(program(f"DEF a()\n{text}END\n").findings) == 10_000
 
 
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=examples(100))
 @given(st.lists(st.sampled_from([
     "FOR i=1 TO 2\n", "ENDFOR\n", "IF i==1 THEN\n", "IF $IN[1] THEN\n", "ELSE\n", "ENDIF\n", "LOOP\n", "EXIT\n",
     "ENDLOOP\n", "i=i+1\n", "i=1\n", "sub(i)\n", "GOTO a\n", "a:\n", "RETURN\n", "LIN {X i}\n", "LIN_REL {Y 1}\n",

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import examples
 
-from postproc.dialects.dialect import Program, Settings
-from postproc.dialects.krl import KrlDialect
-from postproc.dialects.krl.expressions import evaluate
-from postproc.dialects.krl.spatial import angles, arc, product, rotation
-from postproc.dialects.krl.target import Target, Unclear
-from postproc.document import Document
-from postproc.geometry import Poses, abc_from_rotation, rotation_from_abc
+from postproc.base.document import Document
+from postproc.base.geometry import Poses, abc_from_rotation, rotation_from_abc
+from postproc.base.units import DEG, MM
+from postproc.languages.dialect import Program, ReadingSettings
+from postproc.languages.krl import KrlDialect
+from postproc.languages.krl.expressions import evaluate
+from postproc.languages.krl.spatial import angles, arc, product, rotation
+from postproc.languages.krl.target import KrlTarget, UnknownValue
 from postproc.toolpath import Kind
-from postproc.units import DEG, MM
 
 FULL = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
 
@@ -28,7 +29,7 @@ def body(text: str, data: str = "", config: str = "") -> Program:
     if data:
         docs.append(Document(Path("part.dat"), f"DEFDAT part\n{data}ENDDAT\n".encode()))
     given = (Document(Path("$config.dat"), config.encode()),) if config else ()
-    return KrlDialect().read(tuple(docs), Settings(references=given))
+    return KrlDialect().read(tuple(docs), ReadingSettings(references=given))
 
 
 def codes(program: Program) -> dict[int, str]:
@@ -62,13 +63,13 @@ def test_expressions(text: str, value: object) -> None:
      "{X 1}:{X 1}", "N[N.", "(" * 2000, "1=2", "SIN(1,2)", "'HG'", "TRUE==1", "{X 1"],
 )  # fmt: skip
 def test_what_has_no_value_is_unclear(text: str) -> None:
-    assert isinstance(evaluate(text.encode(), lambda name, path: NAMES.get(name)), Unclear)
+    assert isinstance(evaluate(text.encode(), lambda name, path: NAMES.get(name)), UnknownValue)
 
 
 six = st.tuples(*[st.floats(-500, 500)] * 3, *[st.floats(-180, 180)] * 3)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=examples(60))
 @given(six, six)
 def test_the_product_of_frames_is_that_of_their_poses(
     first: tuple[float, ...], second: tuple[float, ...]
@@ -87,7 +88,7 @@ def test_single_angles_are_those_of_batches() -> None:
         np.testing.assert_allclose(np.array(angles(r)) * DEG, abc_from_rotation(np.array(r)), atol=1e-9)
 
 
-@settings(deadline=None, max_examples=80)
+@settings(deadline=None, max_examples=examples(80))
 @given(
     st.floats(0.5, 300),
     st.floats(5, 170),
@@ -177,7 +178,7 @@ def test_behind_a_relative_motion_that_is_not_understood_nothing_is_taken_over(t
     path = body(f"LIN {{X 100,Y 200,Z 300,A 90,B 0,C 0}}\n{text}\nLIN {{Z 0}}\nLIN_REL {{Z 1}}\n").toolpath
     assert [finding.code for finding in path.refused.values()][1:] == ["KRL004", "KRL008"]
     assert not np.isfinite(path.position[1:, 0]).any()
-    assert set(path.pinned) >= {0}
+    assert set(path.locked) >= {0}
 
 
 @pytest.mark.parametrize(
@@ -196,20 +197,20 @@ def test_roundings(setting: str, word: str, blend: float | None) -> None:
     text = FULL.replace("\n", f" {word}\n")
     for lines in (1, 12):  # alone, and as a run
         path = body(f"{setting}\n{lines * text}").toolpath
-        np.testing.assert_equal(path.blend[-1], np.nan if blend is None else blend * MM)
+        np.testing.assert_equal(path.approximation[-1], np.nan if blend is None else blend * MM)
 
 
 def test_a_spline_is_passed_exactly_and_left_whole() -> None:
     program = body(FULL + "SPLINE\nSPL {X 5}\nSLIN {X 9}\nENDSPLINE C_SPL\n" + FULL)
     path = program.toolpath
     assert [Kind(k).name for k in path.kind] == ["LIN", "SPL", "LIN", "LIN"]
-    np.testing.assert_equal(path.blend, [0, 0, np.nan, 0])
-    assert list(path.whole) == [1, 2]
+    np.testing.assert_equal(path.approximation, [0, 0, np.nan, 0])
+    assert list(path.no_insert_before) == [1, 2]
 
 
 def test_what_stands_behind_a_trigger_is_whole() -> None:
     program = body(FULL + "TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE\n;a word\n" + FULL + FULL)
-    assert list(program.toolpath.whole) == [1]
+    assert list(program.toolpath.no_insert_before) == [1]
 
 
 FORM = (
@@ -221,7 +222,7 @@ FORM = (
 def test_an_inline_form_is_whole_where_it_sets_other_frames() -> None:
     text = "".join(FORM.format(n=n, v=v, m=FULL) for n, v in ((1, 0.5), (1, 0.2), (2, 0.2), (2, 0.2)))
     program = body(text + FULL)
-    assert list(program.toolpath.whole) == [2]
+    assert list(program.toolpath.no_insert_before) == [2]
     raw = program.documents[0].raw
     assert sorted(program.text.inline) == [0, 1, 2, 3]
     for row, form in program.text.inline.items():
@@ -330,4 +331,4 @@ def test_a_component_that_is_assigned_has_its_own_place() -> None:
 
 
 def test_a_target_of_the_text_is_a_value() -> None:
-    assert isinstance(evaluate(b"{X 1,Y 2}", lambda name, path: None), Target)
+    assert isinstance(evaluate(b"{X 1,Y 2}", lambda name, path: None), KrlTarget)

@@ -15,17 +15,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from postproc.dialects.dialect import Program
-from postproc.dialects.krl import interpreter
-from postproc.dialects.krl.places import Auxiliary, Variable
-from postproc.dialects.krl.rows import HELP
-from postproc.document import Document
-from postproc.findings import Finding
-from postproc.units import MM
+from postproc.base.document import Document
+from postproc.base.findings import Finding
+from postproc.base.units import MM
+from postproc.languages.dialect import Program
+from postproc.languages.krl import interpreter
+from postproc.languages.krl.source_map import Auxiliary, PointVariable
 
 FULL = b"{X 1,Y 2,Z 3,A 4,B 5,C 6}"
 HEAD = "DEF part()\nBAS(#BASE,1)\nBAS(#TOOL,1)\n"
-BUILDS = re.compile(r"(\w+): the motion in line (\d+) builds on this end point and is not corrected\Z")
+BUILDS = re.compile(r"(\w+): the motion in line (\d+) depends on this end point and is not corrected\Z")
 
 
 def cases() -> dict[str, dict[str, str]]:
@@ -62,7 +61,7 @@ def read(case: dict[str, str], fast: bool = True) -> Program:
 def told(found: Finding, line: int) -> str:
     """A finding of a motion; its place where it is not the begin of its line."""
     assert found.file == "part.src"
-    assert found.help == HELP.get(found.code, "")
+    assert not found.help
     place = "" if (found.line, found.column) == (line, 1) else f" at {found.line}:{found.column}"
     return f"{found.code}{place}: {found.message}"
 
@@ -73,19 +72,19 @@ def story(program: Program) -> list[str]:
     for row, text in enumerate(path.dump()):
         line = int(path.line[row])
         text = text.partition(" refused")[0].replace(" base [1] tool [1]", "")
-        if path.blend[row] != 0:
-            text += f" round {path.blend[row] / MM:.6g}"
-        if not path.runs[row]:
+        if path.approximation[row] != 0:
+            text += f" round {path.approximation[row] / MM:.6g}"
+        if not path.executes[row]:
             text += " apart"
-        if row in path.whole:
-            text += f" - whole: {path.whole[row]}"
+        if row in path.no_insert_before:
+            text += f" - whole: {path.no_insert_before[row]}"
         if row in path.refused:
             text += " - refused " + told(path.refused[row], line)
-        if row in path.pinned:
-            text += " - " + BUILDS.sub(r"kept for \2 \1", told(path.pinned[row], line))
+        if row in path.locked:
+            text += " - " + BUILDS.sub(r"kept for \2 \1", told(path.locked[row], line))
         out.append(text)
     for found in program.findings:
-        assert found.help == HELP.get(found.code, "")
+        assert not found.help
         out.append(f"! {found.line}:{found.column} {found.code}: {found.message}")
     for sign, notes in (";", path.annotations), (",", path.comments):
         out += [f"{sign} {note.row} {note.line} {note.text}".rstrip() for note in notes]
@@ -127,7 +126,7 @@ def insertion(program: Program, home: int, at: int) -> str:
     return f"adds at {home}:{span(program, home, at - 3, at)}|{span(program, home, at, at + 1)}"
 
 
-def point(variable: Variable, program: Program) -> str:
+def point(variable: PointVariable, program: Program) -> str:
     span_of = variable.declared
     declared = "None" if span_of is None else span(program, span_of.file, span_of.start, span_of.stop)
     return (

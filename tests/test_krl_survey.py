@@ -9,30 +9,38 @@ import numpy as np
 import pytest
 from test_krl_readings import CASES, FULL, HEAD
 
-from postproc.dialects.dialect import Program
-from postproc.dialects.krl import KrlDialect, blocks, flow, motions
-from postproc.dialects.krl.calls import MOST_CALLS
-from postproc.dialects.krl.effects import Effects
-from postproc.dialects.krl.jumped import MOST_PAIRS, settle_jumps
-from postproc.dialects.krl.lexing import LONGEST, Statement
-from postproc.dialects.krl.rows import FEW, NAN6, NO_ARC, Reason, Row, Rows
-from postproc.dialects.krl.scan import FEWEST, MOST, scan
-from postproc.dialects.krl.state import Source
-from postproc.dialects.krl.survey import DEEPEST, MOST_EFFECTS, Block, Routine, Survey, survey
-from postproc.document import Document
-from postproc.units import MM
+from postproc.base.document import Document
+from postproc.base.units import MM
+from postproc.languages.dialect import Program
+from postproc.languages.krl import KrlDialect, block_follower, motions, program_flow
+from postproc.languages.krl.calls import MOST_CALLS
+from postproc.languages.krl.effects import MODAL, Effects
+from postproc.languages.krl.external_axes import carried_on, reached, stated
+from postproc.languages.krl.goto_analysis import MOST_PAIRS, resolve_jumps
+from postproc.languages.krl.lexing import LONGEST, Statement
+from postproc.languages.krl.modal_state import Source
+from postproc.languages.krl.motion_rows import FEW, NAN6, NO_ARC, MotionRow, MotionRows, Refusal
+from postproc.languages.krl.program_structure import (
+    DEEPEST,
+    MOST_EFFECTS,
+    Block,
+    ProgramStructure,
+    Routine,
+    program_structure,
+)
+from postproc.languages.krl.scan import FEWEST, MOST, scan
 
 POINT = FULL.decode()
 LINE = f"LIN {POINT}\n"
 
 
-def surveyed(text: str) -> tuple[Survey, list[Statement]]:
+def surveyed(text: str) -> tuple[ProgramStructure, list[Statement]]:
     items = [
         item for item in scan(Document(Path("a.src"), text.encode()), False) if isinstance(item, Statement)
     ]
-    found = survey(enumerate(items))
+    found = program_structure(enumerate(items))
     if found.jumps:
-        settle_jumps(found, enumerate(items))
+        resolve_jumps(found, enumerate(items))
     return found, items
 
 
@@ -76,7 +84,7 @@ def told(text: str) -> Iterator[str]:
         f"changed {names(found.effects)}"
     )
     jumps = " ".join(f"{name.decode()}:{line(a)}-{line(b)}" for (_, name), (a, b) in found.jumps.items())
-    ways = "; ".join(f"{name.decode()}: {names(way)}" for (_, name), way in found.on_the_way.items())
+    ways = "; ".join(f"{name.decode()}: {names(way)}" for (_, name), way in found.passed_through.items())
     yield f"jumps {jumps} on the way {ways}".rstrip()
     yield f"inline {sorted(found.inline)} unclosed {found.unclosed}"
 
@@ -94,7 +102,7 @@ def test_blocks_are_told_apart_up_to_a_depth(deep: int) -> None:
     assert found.unclosed == []
     assert len(found.blocks) == 1 + min(deep, DEEPEST)
     assert len(found.blocks[-1].branches) == (deep <= DEEPEST)
-    assert {block.begin + block.end for block in found.blocks[1:]} == {2 * deep + 3}
+    assert {block.start + block.end for block in found.blocks[1:]} == {2 * deep + 3}
     assert names(found.blocks[-1].effects) == "N"
     assert names(found.blocks[0].effects) == "M N"
 
@@ -120,7 +128,7 @@ def test_calls_are_told_apart_up_to_a_number_of_routines(count: int) -> None:
     called, other = found.blocks[1:3]
     assert names(other.effects) == "Y"
     if count > MOST_EFFECTS:
-        assert called.effects >= {"all", "point", "base", "tool", "feed", "apo", "mode"}
+        assert called.effects >= {"all", "point", *MODAL}
     else:
         assert names(called.effects) == "V0"
 
@@ -131,9 +139,9 @@ def test_labels_are_told_apart_up_to_a_number() -> None:
         assert (count * (branches + count) <= MOST_PAIRS) == apart
         text = "".join(f"l{i}:\nv{i}=1\nGOTO l{i}\n" for i in range(count)) + "IF x THEN\nENDIF\n" * branches
         found, _ = surveyed(f"DEF a()\n{text}END\n")
-        sizes = {len(way) for way in found.on_the_way.values()}
-        assert len(found.on_the_way) == count
-        assert sizes == ({1} if apart else {5 + len(found.effects)})
+        sizes = {len(way) for way in found.passed_through.values()}
+        assert len(found.passed_through) == count
+        assert sizes == ({1} if apart else {len(MODAL) + len(found.effects)})
 
 
 def program(text: str, rest: str = "") -> Program:
@@ -152,7 +160,7 @@ def codes(found: Program) -> list[str]:
 
 @pytest.fixture
 def budget(monkeypatch: pytest.MonkeyPatch) -> int:
-    for module in blocks, flow:
+    for module in block_follower, program_flow:
         monkeypatch.setattr(module, "BUDGET", 12)
     return 12
 
@@ -208,7 +216,7 @@ def test_where_too_much_runs_is_told_and_passed_over() -> None:
     assert codes(found) == ["7 KRL024", "10 KRL006", "15 KRL004"]
     assert (
         found.findings[0].message
-        == "it runs more than the 12 statements that are followed again; it is passed over"
+        == "it executes more than the 12 statements that are followed; it is skipped"
     )
     assert xs(found) == [1, 6]
     found = program("FOR i=1 TO 9\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n" + LINE)
@@ -238,7 +246,7 @@ def test_motions_are_taken_apart_up_to_a_length(length: int) -> None:
     if length > LONGEST:
         assert messages == {
             0: "'LIN {X 1,Y 2,Z 3,A 4,B 5,C 6         ...' is not understood",
-            1: "Y, Z, A, B, C left out, and the position is not known: after the motion in line 5",
+            1: "the point omits Y, Z, A, B, C, and the position is not known: after the motion in line 5",
         }
     else:
         assert messages == {}
@@ -272,12 +280,12 @@ def test_common_lines_are_read_together(count: int, sizes: list[int]) -> None:
 # rows
 
 
-def row(line: int) -> Row:
-    return Row(1, line, (0, 1, 2, 3), NAN6, NAN6, 0.0, 0, 0, 0.0, None, 0, NO_ARC)
+def row(line: int) -> MotionRow:
+    return MotionRow(1, line, (0, 1, 2, 3), NAN6, NAN6, 0.0, 0, 0, 0.0, None, 0, NO_ARC)
 
 
 def test_few_places_are_kept_apart_and_many_are_one() -> None:
-    rows = Rows(Document(Path("a"), b""))
+    rows = MotionRows(Document(Path("a"), b""))
     few: frozenset[Source] = frozenset(range(FEW))
     assert rows.joined(few) == few
     many: frozenset[Source] = frozenset(range(FEW + 1))
@@ -292,14 +300,14 @@ def test_rows_are_taken_out_from_any_on() -> None:
     bulk = next(iter(scan(Document(Path("a.src"), raw), True)))
     assert not isinstance(bulk, Statement)
 
-    def filled(stop: int) -> Rows:
-        rows = Rows(Document(Path("a.src"), raw))
+    def filled(stop: int) -> MotionRows:
+        rows = MotionRows(Document(Path("a.src"), raw))
         for at in range(6):
             if rows.count < stop:
                 rows.add(row(at), None)
             for sparse in (
                 rows.anchors, rows.reasons, rows.variables, rows.locked, rows.arcs, rows.relative, rows.whole,
-                rows.inline, rows.slurred, rows.builds_on,
+                rows.inline, rows.approximated, rows.builds_on,
             ):  # fmt: skip
                 if at < stop and at % 2:
                     sparse[at] = at  # type: ignore[index, assignment]
@@ -312,14 +320,14 @@ def test_rows_are_taken_out_from_any_on() -> None:
         assert rows == wanted or (stop == 0 and rows.chunks == [])
         assert len(rows) == stop
 
-    rows = Rows(Document(Path("a.src"), raw))
-    state = motions.State()
+    rows = MotionRows(Document(Path("a.src"), raw))
+    state = motions.ModalState()
     rows.add(row(0), None)
-    assert rows.add_bulk(bulk, state, Reason("KRL006", "why")) == 9
+    assert rows.add_bulk(bulk, state, Refusal("KRL006", "why")) == 9
     rows.add(row(10), None)
     rows.add(row(11), None)
     assert rows.add_bulk(bulk, state, None) == 20
-    assert rows.ranges == [(1, 10, Reason("KRL006", "why"))]
+    assert rows.ranges == [(1, 10, Refusal("KRL006", "why"))]
     for stop, chunks in (12, 3), (11, 3), (10, 2):
         rows.truncate(stop)
         assert (len(rows), len(rows.chunks), len(rows.ranges)) == (stop, chunks, 1)
@@ -327,16 +335,25 @@ def test_rows_are_taken_out_from_any_on() -> None:
     assert (len(rows), len(rows.chunks), rows.ranges) == (1, 1, [])
 
 
-def test_external_axes_move_where_they_are_first_elsewhere() -> None:
-    rows = Rows(Document(Path("a"), b""))
-    for at, (key, value) in enumerate(
-        [(b"E1", 1.0), (b"E2", 0.0), (b"E1", 1.0), (b"E2", 0.5), (b"E2", 0.0), (b"E3", None), (b"E1", 2.0)]
-    ):
-        rows.follow_external(at, ((key, value, b""),))
-    assert rows.moving == {b"E2": 3, b"E3": 5, b"E1": 6}
+def test_external_axes_stand_where_the_last_motion_put_them() -> None:
+    """What a target leaves out stays; a step goes on from a place that is known, and from no other."""
+    inf, nan = np.inf, np.nan
+    said = ((b"E1", 1.5, b""), (b"E3", None, b""), (b"E6", -2.0, b""))
+    np.testing.assert_array_equal(stated(said), [1.5, nan, inf, nan, nan, -2.0])
+    before = (1.0, 2.0, inf, -inf, nan, 6.0)
+    steps = tuple((b"E%d" % i, 0.5, b"") for i in range(1, 7))
+    np.testing.assert_array_equal(reached(before, said), [1.5, 2, inf, -inf, nan, -2])
+    np.testing.assert_array_equal(reached(before, steps, relative=True), [1.5, 2.5, inf, inf, inf, 6.5])
+    still = tuple((key, 0.0, text) for key, _, text in steps)
+    np.testing.assert_array_equal(reached(before, still, relative=True), before)
+    rows = np.array([[nan, 5, nan, nan, nan, nan], [7, nan, nan, nan, nan, nan], [nan, 6, 1, nan, nan, 0]])
+    wanted = [[1, 5, inf, -inf, nan, 6], [7, 5, inf, -inf, nan, 6], [7, 6, 1, -inf, nan, 0]]
+    np.testing.assert_array_equal(carried_on(before, rows), wanted)
+    np.testing.assert_array_equal(carried_on(before, np.broadcast_to(rows[0], (4, 6))), wanted[0])
+    assert carried_on(before, None) is before
 
 
 def test_a_block_of_a_program_without_routines_is_closed() -> None:
     found, _ = surveyed("IF x THEN\nn=1\nENDIF\n")
-    assert [(block.word, block.begin, block.end) for block in found.blocks] == [(b"", 0, 2), (b"IF", 0, 2)]
+    assert [(block.word, block.start, block.end) for block in found.blocks] == [(b"", 0, 2), (b"IF", 0, 2)]
     assert isinstance(found.blocks[0], Block)

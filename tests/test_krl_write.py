@@ -11,17 +11,18 @@ import pytest
 from fuzz.examine import examined
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import examples
 
-from postproc.arrays import Floats
-from postproc.dialects.dialect import Plan, Program, Writing
-from postproc.dialects.krl import KrlDialect
-from postproc.document import Document, Edit, Span, apply, undone
-from postproc.geometry import rotation_from_abc, rotation_from_vector, vector_from_rotation
-from postproc.units import DEG, MM
+from postproc.base.arrays import Floats
+from postproc.base.document import Document, Edit, Span, apply, undone
+from postproc.base.geometry import rotation_from_abc, rotation_from_vector, vector_from_rotation
+from postproc.base.units import DEG, MM
+from postproc.languages.dialect import Plan, Program, WritingSettings
+from postproc.languages.krl import KrlDialect
 
 KRL = KrlDialect()
 CASES = Path(__file__).parent / "programs" / "krl"
-WRITING = Writing(mm=3, deg=3)
+WRITING = WritingSettings(mm=3, deg=3)
 FRAMES = "DEF part()\nBAS(#BASE,1)\nBAS(#TOOL,1)\n"
 HALF_STEP_MM = 0.00050001
 
@@ -47,8 +48,8 @@ def written(program: Program, edits: list[Edit]) -> tuple[Document, ...]:
 
 def edits(program: Program, position: Floats, rotation: Floats) -> list[Edit]:
     plan = dataclasses.replace(Plan.of(program.toolpath), position=position, rotation=rotation)
-    found = KRL.moved(program, plan, WRITING)
-    assert not found.held
+    found = KRL.edit_targets(program, plan, WRITING)
+    assert not found.unwritten
     return list(found.edits)
 
 
@@ -125,7 +126,7 @@ def programs(draw: st.DrawFn) -> str:
     return FRAMES + draw(st.sampled_from(["\n", "\r\n"])).join([*lines, "END"])
 
 
-@settings(deadline=None, max_examples=250)
+@settings(deadline=None, max_examples=examples(250))
 @given(programs(), st.data())
 def test_moved_rows_reach_their_target_and_the_others_stay(text: str, data: st.DataObject) -> None:
     program = read(text)
@@ -145,7 +146,7 @@ def test_moved_rows_reach_their_target_and_the_others_stay(text: str, data: st.D
         assert documents[0].raw == program.documents[0].raw
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=examples(60))
 @given(st.sampled_from(sorted(CASES.glob("*.src"))), st.integers(0, 2**32 - 1))
 def test_cases_moved_at_random_reach_their_targets(path: Path, seed: int) -> None:
     move_at_random(path, seed)
@@ -241,13 +242,13 @@ def test_points_of_the_dat_are_edited_there() -> None:
 def test_what_can_not_be_written_is_not_taken(line: str) -> None:
     program = read(FRAMES + "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n" + line + "\nEND\n")
     position = np.where(np.isnan(program.toolpath.position), 0.0, program.toolpath.position)
-    with pytest.raises(ValueError, match="can not be corrected"):
+    with pytest.raises(ValueError, match="cannot be corrected"):
         edits(program, position, program.toolpath.rotation)
 
 
 def test_a_pinned_point_is_not_moved() -> None:
     program = read(FRAMES + "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\nLIN_REL {X way}\nEND\n")
-    with pytest.raises(ValueError, match="can not be corrected"):
+    with pytest.raises(ValueError, match="cannot be corrected"):
         edits(program, program.toolpath.position + 1e-3, program.toolpath.rotation)
 
 

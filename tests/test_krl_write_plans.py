@@ -10,13 +10,14 @@ import pytest
 from fuzz.examine import examined
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import examples
 
-from postproc.dialects.dialect import Moved, Plan, Program, Role, Settings, Writing
-from postproc.dialects.krl import KrlDialect
-from postproc.dialects.krl.chain import BLOCK
-from postproc.document import Document, apply, undone
-from postproc.geometry import rotation_from_vector
-from postproc.units import DEG, MM
+from postproc.base.document import Document, apply, undone
+from postproc.base.geometry import rotation_from_vector
+from postproc.base.units import DEG, MM
+from postproc.languages.dialect import EditedTargets, Plan, Program, ReadingSettings, Role, WritingSettings
+from postproc.languages.krl import KrlDialect
+from postproc.languages.krl.dependent_targets import BLOCK
 
 KRL = KrlDialect()
 HEAD = "DEF part()\nBAS(#BASE,1)\nBAS(#TOOL,1)\n"
@@ -41,10 +42,12 @@ def plan(program: Program, **shifts: tuple[float, float, float]) -> Plan:
     return dataclasses.replace(Plan.of(program.toolpath), position=position)
 
 
-def written(program: Program, wanted: Plan, own_points: str = "inline") -> tuple[list[str], list[str]]:
+def written(
+    program: Program, wanted: Plan, shared_points: str = "copy-inline"
+) -> tuple[list[str], list[str]]:
     """The lines behind the head, and of the .dat, of the program with a plan in it, read back and compared."""
-    found = KRL.moved(program, wanted, Writing(3, 3, own_points))
-    assert not found.held
+    found = KRL.edit_targets(program, wanted, WritingSettings(3, 3, shared_points))
+    assert not found.unwritten
     documents = []
     for index, document in enumerate(program.documents):
         edits = [edit for edit in found.edits if edit.span.file == index]
@@ -62,11 +65,11 @@ def written(program: Program, wanted: Plan, own_points: str = "inline") -> tuple
     return texts[0][3:-1], texts[1][1:-1] if len(texts) > 1 else []
 
 
-def held(program: Program, wanted: Plan, own_points: str = "inline") -> Moved:
-    found = KRL.moved(program, wanted, Writing(3, 3, own_points))
+def held(program: Program, wanted: Plan, shared_points: str = "copy-inline") -> EditedTargets:
+    found = KRL.edit_targets(program, wanted, WritingSettings(3, 3, shared_points))
     assert len(found.edits) == 0
-    assert found.held
-    for row, finding in found.held.items():
+    assert found.unwritten
+    for row, finding in found.unwritten.items():
         assert finding.line == program.toolpath.line[row]
     return found
 
@@ -88,11 +91,11 @@ def test_a_point_of_motions_that_differ_stays_with_the_first_and_the_others_get_
     own = "{X 1.5,Y 2.250,Z 3,A 4,B 5,C 6,S 2,T 35,E1 7.0}"
     assert lines == ["LIN XP1 C_DIS ;first", f"LIN {own} C_VEL", f"LIN {own}"]
     assert data == [POINT.replace("X 1.5", "X 2.000").strip()]
-    lines, data = written(program, wanted, "dat")
+    lines, data = written(program, wanted, "copy-dat")
     assert lines == ["LIN XP1 C_DIS ;first", "LIN XP1_1 C_VEL", "LIN XP1_1"]
     assert data == [POINT.replace("X 1.5", "X 2.000").strip(), f"DECL E6POS XP1_1={own}"]
-    assert held(program, wanted, "refuse").held.keys() == {1, 2}
-    assert held(program, wanted, "refuse").held[1].code == "KRL007"
+    assert held(program, wanted, "keep").unwritten.keys() == {1, 2}
+    assert held(program, wanted, "keep").unwritten[1].code == "KRL007"
 
 
 def test_a_point_that_another_motion_needs_where_it_is_stays() -> None:
@@ -108,7 +111,7 @@ def test_names_of_new_points_are_new_and_not_too_long() -> None:
     name = "a" * 24
     data = f"DECL FRAME {name}={{X 1,Y 2,Z 3,A 4,B 5,C 6}}\nDECL INT {'A' * 22}_1\n"
     program = read(f"LIN {name}\nLIN {name}\n", data)
-    lines, after = written(program, plan(program, r1=(0, 0, 1)), "dat")
+    lines, after = written(program, plan(program, r1=(0, 0, 1)), "copy-dat")
     assert lines[1] == "LIN " + "a" * 22 + "_2"
     assert after[1] == "DECL FRAME " + "a" * 22 + "_2={X 1,Y 2,Z 4.000,A 4,B 5,C 6}"
 
@@ -201,8 +204,8 @@ def test_lines_that_run_several_times_move_together_or_not_at_all() -> None:
     same = plan(program, r1=(1, 0, 0), r2=(1, 0, 0), r3=(1, 0, 0))
     lines, _ = written(program, same)
     assert lines[2] == "LIN {X 10.000,Y 2,Z 3,A 4,B 5,C 6}"
-    assert held(program, plan(program, r1=(1, 0, 0), r2=(0, 1, 0))).held.keys() == {1, 2}
-    assert held(program, plan(program, r2=(1, 0, 0))).held.keys() == {2}
+    assert held(program, plan(program, r1=(1, 0, 0), r2=(0, 1, 0))).unwritten.keys() == {1, 2}
+    assert held(program, plan(program, r2=(1, 0, 0))).unwritten.keys() == {2}
 
 
 ARC = "CIRC {X 10,Y 10,Z 0},{X 20,Y 0,Z 0,A 0,B 0,C 0} C_DIS ;arc\n"
@@ -295,8 +298,8 @@ def divided(program: Program, row: int, *parts: tuple[Role, tuple[float, float, 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])
 def test_pieces_and_links_stand_before_the_line(newline: str) -> None:
     program = read(START + "  \tLIN {X 7.50000, Y 2,Z 3,A 4,B 5,C 6 ,E1 9.5} C_DIS ;a cut\n", newline=newline)
-    wanted = divided(program, 1, (Role.LINK, (1, 2, 4)), (Role.PIECE, (4.25, 2, 3.5)))
-    found = KRL.moved(program, wanted, Writing(3, 3))
+    wanted = divided(program, 1, (Role.TRANSITION, (1, 2, 4)), (Role.INTERMEDIATE, (4.25, 2, 3.5)))
+    found = KRL.edit_targets(program, wanted, WritingSettings(3, 3))
     document = program.documents[0]
     after = apply(document, found.edits)
     assert after.count(newline.encode()) == document.raw.count(newline.encode()) + 2
@@ -312,28 +315,28 @@ def test_pieces_and_links_stand_before_the_line(newline: str) -> None:
 def test_pieces_alone_are_copies_of_the_line() -> None:
     line = "  slin{y 2,x+7.5,Z- 3,a 4,b 5,c 6} with $vel.cp=0.1 c_dis;cut"
     program = read(START + line + "\n")
-    lines, _ = written(program, divided(program, 1, (Role.PIECE, (4.25, 2, 3.5))))
+    lines, _ = written(program, divided(program, 1, (Role.INTERMEDIATE, (4.25, 2, 3.5))))
     assert lines[1] == "  slin{y 2,x 4.250,Z 3.500,a 4,b 5,c 6} with $vel.cp=0.1 c_dis"
     assert lines[2] == line
 
 
 def test_a_link_of_a_spline_motion_is_one_with_its_conditions() -> None:
     program = read(START + "SLIN {X 7,Y 2,Z 3,A 4,B 5,C 6} WITH $VEL.CP=0.1 C_DIS\n")
-    lines, _ = written(program, divided(program, 1, (Role.LINK, (4.25, 2, 3.5))))
+    lines, _ = written(program, divided(program, 1, (Role.TRANSITION, (4.25, 2, 3.5))))
     assert lines[1].startswith("SLIN {X 4.250,Y 2,Z 3.500,A 4,B 5,C 6} WITH $VEL.CP=0.1")
 
 
 def test_a_partial_point_behind_a_piece_is_completed() -> None:
     program = read(START + "LIN {X 9}\nLIN {Y 9}\n")
-    lines, _ = written(program, divided(program, 1, (Role.PIECE, (4.25, 2, 3.5))))
-    assert lines[1] == "LIN {X 4.250,Y 2,Z 3.500,A 4,B 5,C 6}"
+    lines, _ = written(program, divided(program, 1, (Role.INTERMEDIATE, (4.25, 2, 3.5))))
+    assert lines[1] == "LIN {X 4.250,Y 2,Z 3.500,A 4,B 5,C 6} C_DIS"
     assert lines[2] == "LIN {X 9,Y 2,Z 3,A 4,B 5,C 6}"
     assert lines[3] == "LIN {Y 9}"
 
 
 def test_a_relative_motion_behind_a_piece_is_absolute() -> None:
     program = read(START + "LIN_REL {X 8} C_DIS\n")
-    lines, _ = written(program, divided(program, 1, (Role.PIECE, (4.25, 2, 3))))
+    lines, _ = written(program, divided(program, 1, (Role.INTERMEDIATE, (4.25, 2, 3))))
     assert lines[1:] == [
         "LIN {X 4.250,Y 2.000,Z 3.000,A 4,B 5,C 6} C_DIS",
         "LIN {X 9.000,Y 2.000,Z 3.000,A 4,B 5,C 6} C_DIS",
@@ -343,7 +346,7 @@ def test_a_relative_motion_behind_a_piece_is_absolute() -> None:
 def test_an_arc_is_divided_in_arcs() -> None:
     program = read(FLAT + ARC)
     path = program.toolpath
-    wanted = divided(program, 1, (Role.PIECE, (10, 10, 0)))
+    wanted = divided(program, 1, (Role.INTERMEDIATE, (10, 10, 0)))
     sweep = wanted.sweep.copy()
     sweep[1:] = np.pi / 2
     wanted = dataclasses.replace(wanted, sweep=sweep)
@@ -355,16 +358,18 @@ def test_an_arc_is_divided_in_arcs() -> None:
 
 def test_nothing_is_inserted_where_it_may_not_be() -> None:
     program = read(START + "SPLINE\nSPL {X 9,Y 2,Z 3,A 4,B 5,C 6}\nENDSPLINE\n")
-    assert 1 in program.toolpath.whole or 1 in program.toolpath.refused
+    assert 1 in program.toolpath.no_insert_before or 1 in program.toolpath.refused
     with pytest.raises(ValueError, match="divided"):
-        KRL.moved(program, divided(program, 1, (Role.PIECE, (4.25, 2, 3.5))), Writing(3, 3))
+        KRL.edit_targets(
+            program, divided(program, 1, (Role.INTERMEDIATE, (4.25, 2, 3.5))), WritingSettings(3, 3)
+        )
 
 
 def test_a_plan_without_a_row_is_an_error() -> None:
     program = read(START + START)
     wanted = Plan.of(program.toolpath)
     with pytest.raises(ValueError, match="every row"):
-        KRL.moved(program, dataclasses.replace(wanted, role=np.array([1, 0])), Writing(3, 3))
+        KRL.edit_targets(program, dataclasses.replace(wanted, role=np.array([1, 0])), WritingSettings(3, 3))
 
 
 NUMBER = st.floats(-500, 500).map(lambda v: f"{v:.3f}")
@@ -415,7 +420,7 @@ def datas(draw: st.DrawFn) -> str:
     return points + "DECL E6POS Q[2]\n" + "".join(f"Q[{i}]={{{value()}}}\n" for i in (1, 2))
 
 
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=examples(400))
 @given(st.lists(lines(), max_size=8), datas(), st.integers(0, 2**32 - 1), st.sampled_from(["\n", "\r\n"]))
 def test_programs_of_all_sorts_make_the_motions_of_random_plans(
     body: list[str], data: str, seed: int, newline: str
@@ -430,11 +435,11 @@ def test_programs_of_all_sorts_make_the_motions_of_random_plans(
 
 def test_a_point_of_a_file_that_is_never_written_gives_way_to_an_aggregate() -> None:
     config = "DEFDAT $CONFIG\nDECL GLOBAL E6POS XSAFE={X 1,Y 2,Z 3,A 4,B 5,C 6,S 2,T 35}\nENDDAT\n"
-    references = Settings(references=(Document(Path("$config.dat"), config.encode()),))
+    references = ReadingSettings(references=(Document(Path("$config.dat"), config.encode()),))
     program = KRL.read((Document(Path("part.src"), (HEAD + "LIN XSAFE C_DIS\nEND\n").encode()),), references)
     assert not program.toolpath.refused
-    for own_points in ("inline", "dat"):
-        found = KRL.moved(program, plan(program, r0=(0, 0, 1)), Writing(3, 3, own_points))
+    for shared_points in ("copy-inline", "copy-dat"):
+        found = KRL.edit_targets(program, plan(program, r0=(0, 0, 1)), WritingSettings(3, 3, shared_points))
         (edit,) = found.edits
         assert edit.text.startswith(b"{X 1")
         assert b"Z 4.000," in edit.text
@@ -451,11 +456,15 @@ def test_pieces_of_the_first_line_stand_behind_a_byte_order_mark() -> None:
     assert len(program.toolpath) == 2
     if 0 in program.toolpath.refused:
         program = KRL.read((Document(Path("part.src"), raw[:3] + settings + raw[3:]),))
-    found = KRL.moved(program, divided(program, 0, (Role.PIECE, (0, 2, 3))), Writing(3, 3))
+    found = KRL.edit_targets(
+        program, divided(program, 0, (Role.INTERMEDIATE, (0, 2, 3))), WritingSettings(3, 3)
+    )
     after = apply(program.documents[0], found.edits)
     assert after.startswith(b"\xef\xbb\xbf")
     assert after.count(b"\xef\xbb\xbf") == 1
-    assert after.endswith(b"LIN {X 0.000,Y 2,Z 3,A 4,B 5,C 6}\r\nLIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\r\nLIN {X 2}")
+    assert after.endswith(
+        b"LIN {X 0.000,Y 2,Z 3,A 4,B 5,C 6} C_DIS\r\nLIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\r\nLIN {X 2}"
+    )
 
 
 def test_a_list_of_partial_points_is_completed_where_a_neighbour_moves() -> None:
@@ -490,7 +499,7 @@ def test_what_is_taken_over_is_judged_by_the_digits_that_are_written() -> None:
 def test_what_is_taken_over_from_a_refused_relative_motion_is_where_that_ends() -> None:
     program = read(START + "CIRC_REL {X .,Y 10},{X 20}\nLIN {Y 500}\nLIN {Y 600}\n")
     assert set(program.toolpath.refused) == {1}
-    assert set(program.toolpath.pinned) == {0}
+    assert set(program.toolpath.locked) == {0}
     lines, _ = written(program, plan(program, r2=(1, 0, 0)))
     assert lines[2] == "LIN {Y 500,X 22.000,Z 3.000,A 4,B 5,C 6}"
     assert lines[3] == "LIN {Y 600,X 21.000}"
@@ -536,15 +545,16 @@ def test_a_point_that_others_may_read_stays(line: str, data: str) -> None:
     lines, after = written(program, plan(program, r0=(0, 0, 1)))
     assert lines[-1] == "LIN {X 1.5,Y 2,Z 4.000,A 4,B 5,C 6,S 2,T 35,E1 7.0}"
     assert after == [data.strip()]
-    assert held(program, plan(program, r0=(0, 0, 1)), "refuse").held.keys() == {0}
+    assert held(program, plan(program, r0=(0, 0, 1)), "keep").unwritten.keys() == {0}
 
 
 def test_an_aggregate_that_runs_several_times_is_not_completed_for_one_of_them() -> None:
     program = read(START + "FOR I=1 TO 2\nLIN {E1 5.0}\nLIN {X 7}\nENDFOR\n")
     assert len(program.toolpath) == 5
-    assert held(program, plan(program, r0=(0, 0, 1))).held.keys() == {1}
+    assert held(program, plan(program, r0=(0, 0, 1))).unwritten.keys() == {1}
 
 
+@pytest.mark.slow
 def test_a_change_is_followed_over_the_blocks_that_rows_are_taken_in() -> None:
     count = BLOCK + 3
     program = read(START + "".join(f"LIN {{Y {i}}}\n" for i in range(count)))

@@ -21,14 +21,18 @@ import numpy as np
 import pytest
 from test_krl_readings import read
 
-from postproc.dialects.dialect import Plan, Program, Role, Writing
-from postproc.dialects.krl import KrlDialect
-from postproc.dialects.krl.components import Components, differs, other_literal, written_decimals
-from postproc.document import Document, apply
-from postproc.geometry import rotation_from_vector
-from postproc.units import DEG, MM
+from postproc.base.arrays import differs
+from postproc.base.document import Document, apply
+from postproc.base.geometry import rotation_from_vector
+from postproc.base.units import DEG, MM
+from postproc.languages.dialect import Plan, Program, Role, WritingSettings
+from postproc.languages.krl import KrlDialect
+from postproc.languages.krl.write_plan import Components, other_literal, written_decimals
 
 KRL = KrlDialect()
+
+ROLES = {"own": Role.ORIGINAL, "piece": Role.INTERMEDIATE, "link": Role.TRANSITION}
+"""The words of the recorded plans."""
 
 
 def cases() -> dict[str, dict[str, str]]:
@@ -44,20 +48,20 @@ def cases() -> dict[str, dict[str, str]]:
 CASES = cases()
 
 
-def planned(program: Program, text: str) -> tuple[Plan, Writing]:
+def planned(program: Program, text: str) -> tuple[Plan, WritingSettings]:
     path = program.toolpath
     plan = Plan.of(path)
     position, rotation = np.array(plan.position), np.array(plan.rotation)
     centre, sweep = plan.centre.copy(), plan.sweep.copy()
     inserted: list[tuple[int, Role, list[float]]] = []
-    writing = Writing(3, 3)
+    writing = WritingSettings(3, 3)
     for line in text.split("\n"):
         first, what, *rest = [*line.split(), "", ""]
         numbers = [float(word) for word in rest if re.fullmatch(r"-?[\d.]+", word)]
         if first == "digits":
             writing = replace(writing, mm=int(what), deg=int(rest[0]))
         elif first == "own":
-            writing = replace(writing, own_points=what)
+            writing = replace(writing, shared_points=what)
         elif first:
             number, _, run = first.partition(".")
             row = int(np.flatnonzero(path.line == int(number))[int(run or 1) - 1])
@@ -78,7 +82,7 @@ def planned(program: Program, text: str) -> tuple[Plan, Writing]:
                 case "sweep":
                     sweep[row] = numbers[0] * DEG
                 case _:
-                    inserted.append((row, Role[what.upper()], numbers))
+                    inserted.append((row, ROLES[what], numbers))
     at = [row for row, _, _ in inserted]
     source = np.insert(plan.source, at, at)
     role = np.insert(plan.role, at, [kind for _, kind, _ in inserted])
@@ -87,9 +91,9 @@ def planned(program: Program, text: str) -> tuple[Plan, Writing]:
     )
     normal = np.insert(plan.normal, at, plan.normal[at], axis=0)
     sweep = np.insert(sweep, at, sweep[at])
-    for there, (_, kind, numbers) in zip(np.flatnonzero(role != Role.OWN), inserted, strict=True):
+    for there, (_, kind, numbers) in zip(np.flatnonzero(role != Role.ORIGINAL), inserted, strict=True):
         position[there] = np.array(numbers[:3]) * MM
-        if kind == Role.LINK:
+        if kind == Role.TRANSITION:
             centre[there] = normal[there] = sweep[there] = np.nan
         elif len(numbers) > 3:
             sweep[there] = numbers[3] * DEG
@@ -99,11 +103,11 @@ def planned(program: Program, text: str) -> tuple[Plan, Writing]:
 def written(case: dict[str, str]) -> Iterator[str]:
     program = read(case)
     plan, writing = planned(program, case["plan"])
-    found = KRL.moved(program, plan, writing)
-    for _, held in sorted(found.held.items()):
+    found = KRL.edit_targets(program, plan, writing)
+    for _, held in sorted(found.unwritten.items()):
         assert held.file == "part.src"
         yield f"held {held.line}:{held.column} {held.code}: {held.message}"
-    if found.held:
+    if found.unwritten:
         assert not len(found.edits)
         return
     after = []
@@ -152,8 +156,8 @@ def test_a_new_point_stands_behind_the_old_one(data: str, after: str, newline: s
             for name, text in zip(("a.src", "a.dat"), texts, strict=True)
         )
     )
-    plan, writing = planned(program, "own dat\n4 move 0 0 1")
-    found = [edit for edit in KRL.moved(program, plan, writing).edits if edit.span.file == 1]
+    plan, writing = planned(program, "own copy-dat\n4 move 0 0 1")
+    found = [edit for edit in KRL.edit_targets(program, plan, writing).edits if edit.span.file == 1]
     wanted = after.replace("NEW", "{X 1,Y 2,Z 4.000,A 4,B 5,C 6}").replace("\n", newline)
     assert apply(program.documents[1], found).decode() == wanted
 

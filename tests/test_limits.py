@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from ways_at_work import START, TOOL, corner, line
 
+from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.correct import correct
-from postproc.compensation.division import Limits, divide
-from postproc.compensation.limits import limits
+from postproc.compensation.subdivision import Limits, subdivide
+from postproc.robot.axis_track import follow_axes, is_near_singular
 from postproc.robot.description import find_robot, load_robot
-from postproc.robot.track import follow, near_singular
 
 
 def judged(task):
     result = correct(task)
-    return limits(task, result, divide(task, result, Limits(max_growth=100.0)))
+    return check_limits(task, subdivide(task, result, Limits(max_growth=100.0)))
 
 
 def codes(task):
@@ -64,7 +64,7 @@ def test_axes_that_are_too_slow_for_the_feed():
     slow = replace(task, model=replace(task.model, robot=replace(robot, axes=axes)))
     found, _ = judged(slow)
     assert [finding.code for finding in found] == ["KIN009"]
-    assert "it can 0.5 deg/s" in found[0].message
+    assert "its speed limit is 0.5 deg/s" in found[0].message
     quick = replace(task, toolpath=replace(task.toolpath, feed=np.full(4, 1e-3)))
     quick = replace(quick, model=slow.model)
     assert codes(quick)[0] == []
@@ -79,14 +79,8 @@ def test_the_motion_that_is_too_fast_is_the_one_that_is_told():
     slow = replace(task, model=replace(task.model, robot=replace(robot, axes=axes)))
     slow = replace(slow, toolpath=replace(path, feed=feed))
     result = correct(slow)
-    found, _ = limits(slow, result, divide(slow, result, Limits(keep=True)))
+    found, _ = check_limits(slow, subdivide(slow, result, Limits(no_insert=True)))
     assert [(finding.code, finding.line) for finding in found] == [("KIN009", path.line[3])]
-
-
-@pytest.mark.parametrize(("blend", "told"), [(0.0, False), (1e-4, False), (1e-2, True), (np.nan, True)])
-def test_roundings_that_are_larger_than_the_correction(blend, told):
-    task = corner(blend=np.full(5, blend))
-    assert ("COR015" in codes(task)[0]) is told
 
 
 def test_a_posture_that_only_the_correction_makes_singular():
@@ -97,8 +91,8 @@ def test_a_posture_that_only_the_correction_makes_singular():
     q[:, 4] = np.arcsin(0.02) + 1e-5
     wanted = model.chain.flange(q) @ TOOL
     path = replace(task.toolpath, position=wanted.position, rotation=wanted.rotation)
-    track = follow(model.robot, path, wanted @ TOOL.inverse(), START)
-    assert not near_singular(model.robot, track.q).any()
+    track = follow_axes(model.robot, path, wanted @ TOOL.inverse(), START)
+    assert not is_near_singular(model.robot, track.q).any()
     found = {}
     for sense in (1, -1):
         force = replace(task.force, values=sense * task.force.values, start=sense * task.force.start[:])

@@ -13,11 +13,12 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import CELL, LINES, without_inserted
+from conftest import CELL, JUMPED_LINES, LINES, without_inserted
+from reference import reference_flange
 
+from postproc.base.document import Document
 from postproc.cell import load_cell
-from postproc.dialects.krl import KrlDialect
-from postproc.document import Document
+from postproc.languages.krl import KrlDialect
 from postproc.robot.chain import Chain
 from postproc.robot.description import find_robot, load_robot
 
@@ -44,17 +45,17 @@ def test_a_cut_is_corrected_and_the_air_is_not(compensate, job):
     done = compensate(job.program, "--force", "--json", "-")
     report = done.json
     assert done.code == 0, done.err
-    assert (report["motions"], report["corrected"], report["left"]) == (12, 5, 0)
+    assert (report["motions"], report["corrected"], report["uncorrected"]) == (12, 5, 0)
     assert 0.3 < report["error_before_mm"]["max"] < 4
     assert report["error_after_mm"]["max"] <= 0.002
     assert report["force"]["max_n"] == pytest.approx(np.linalg.norm([360, 50, 560]), abs=1e-3)
     before, after = job.program.read_bytes().split(b"\r\n"), job.output.read_bytes().split(b"\r\n")
-    # A link to the begin of each cut, and nothing else, is inserted.
-    assert [link["line"] for link in report["links"]] == [10, 19]
+    # Nothing is inserted: the motions in air before the cuts lead into them.
+    assert (report["inserted"], report["transition_moves"], report["lead_ins"]) == (0, [], 2)
     after = without_inserted(after, report)
     changed = [i for i, (old, new) in enumerate(zip(before, after, strict=True)) if old != new]
     # Lines 14 and 20 are air, but leave out what the cut before them moved: they are completed.
-    assert changed == [9, 10, 11, 12, 14, 18, 20]
+    assert changed == [7, 9, 10, 11, 12, 14, 16, 18, 20]
     assert b"; slot" in after[10]
     assert after[10].endswith(b"C_DIS ; slot")
 
@@ -69,10 +70,10 @@ def test_every_motion_ends_where_it_should(compensate, job):
         rows = list(csv.DictReader(stream))
     assert [int(row["line"]) for row in rows] == old.line.tolist()
     # Where the motions of the input are among those of the output.
-    ends = np.cumsum([1 + int(row["links"]) + int(row["points"]) for row in rows]) - 1
+    ends = np.cumsum([1 + int(row["transition_moves"]) + int(row["intermediate_points"]) for row in rows]) - 1
     assert len(new) == ends[-1] + 1
     for i, row in enumerate(rows):
-        if row["state"] == "corrected":
+        if row["state"] in ("corrected", "lead_in"):
             shift = [float(row[f"correction_{c}_mm"]) for c in "xyz"]
             assert np.linalg.norm(shift) > 0.1
         else:
@@ -80,6 +81,7 @@ def test_every_motion_ends_where_it_should(compensate, job):
         if np.isfinite(old.position[i, 0]):
             np.testing.assert_allclose((new.position[ends[i]] - old.position[i]) * 1e3, shift, atol=6e-4)
     assert [row["state"] for row in rows].count("corrected") == 5
+    assert [int(row["line"]) for row in rows if row["state"] == "lead_in"] == [8, 17]
 
 
 def test_without_force_nothing_changes(compensate, job):
@@ -96,6 +98,7 @@ def test_a_rigid_robot_gives_the_file_back(compensate, job):
     assert job.output.read_bytes() == job.program.read_bytes()
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("ending", ["\n", "\r\n"])
 @pytest.mark.parametrize("bom", [b"", b"\xef\xbb\xbf"])
 @pytest.mark.parametrize("last", [True, False])
@@ -138,7 +141,7 @@ def test_a_second_run_over_its_own_output_is_refused(compensate, job):
     assert again.code == 1
     assert "FIL005" in again.err
     assert not (job.output.parent / "compensated").exists()
-    meant = compensate(job.output, "--force", "--cell", job.folder / "cell.yaml", "--again")
+    meant = compensate(job.output, "--force", "--cell", job.folder / "cell.yaml", "--allow-compensated")
     assert meant.code == 0
     twice = (job.output.parent / "compensated" / "part.src").read_bytes()
     assert twice.count(b";COMPENSATED ") == 1
@@ -191,14 +194,14 @@ def test_a_point_that_continues_an_axis_motion(compensate, job):
     assert done.json["corrected"] >= 4
     assert done.json["error_after_mm"]["max"] <= 0.002
     written = without_inserted(job.output.read_bytes().decode().splitlines(), done.json)
-    assert written[5] == "LIN {Z 50.000}"
+    assert written[5].startswith("LIN {Z 50.000,X 0.")  # it leads into the cut behind it
     for component in ",X ", ",Y ", ",A ", ",B ", ",C ":
         assert component in written[7]
         assert component in written[9]
     # Where the axes lead, by Pinocchio: the point behind the cut goes back there.
     robot = load_robot(find_robot("kuka_kr270"))
     chain = Chain(robot.joints, robot.flange)
-    flange = chain.reference_flange(np.deg2rad([[0, -90, 110, 0, 40, 0]]))
+    flange = reference_flange(chain, np.deg2rad([[0, -90, 110, 0, 40, 0]]))
     cell = load_cell(job.folder / "cell.yaml")
     tcp = cell.bases[1].inverse() @ flange[0] @ cell.tools[1].pose
     numbers = dict(word.split() for word in written[9].split("{")[1].split("}")[0].split(","))
@@ -236,7 +239,7 @@ def test_compensate_off_leaves_a_part_alone(compensate, job):
     lines.insert(lines.index(";FORCE 0 200 0"), ";COMPENSATE OFF")
     job.write(lines)
     done = compensate(job.program, "--force", "--json", "-")
-    assert (done.code, done.json["corrected"], done.json["left"]) == (0, 4, 0)
+    assert (done.code, done.json["corrected"], done.json["uncorrected"]) == (0, 4, 0)
 
 
 def test_words_behind_the_switch_are_a_remark(compensate, job):
@@ -244,7 +247,7 @@ def test_words_behind_the_switch_are_a_remark(compensate, job):
     lines.insert(lines.index(";FORCE 0 200 0"), ";COMPENSATE OFF, this is probing")
     job.write(lines)
     done = compensate(job.program, "--force", "--json", "-")
-    assert (done.code, done.json["corrected"], done.json["left"]) == (0, 4, 0)
+    assert (done.code, done.json["corrected"], done.json["uncorrected"]) == (0, 4, 0)
 
 
 def test_a_switch_that_is_none_is_told(compensate, job):
@@ -263,7 +266,7 @@ def test_a_relative_motion_between_cuts_keeps_the_configuration(compensate, job)
     lines[at] = "LIN {X 400.000,Y 300.000,Z 0.000,A 0.000,B 0.000,C 180.000}"
     job.write(lines)
     done = compensate(job.program, "--force", "--json", "-")
-    assert (done.code, done.json["corrected"], done.json["left"]) == (0, 5, 0)
+    assert (done.code, done.json["corrected"], done.json["uncorrected"]) == (0, 5, 0)
 
 
 def test_stated_configurations_that_are_not_the_robots_are_told_once(compensate, job):
@@ -288,7 +291,7 @@ def test_a_refused_motion_takes_only_its_own_cut(compensate, job):
     lines[10] = NOT_UNDERSTOOD
     job.write(lines)
     done = compensate(job.program, "--force", "--json", "-")
-    assert (done.code, done.json["corrected"], done.json["left"]) == (3, 1, 4)
+    assert (done.code, done.json["corrected"], done.json["uncorrected"]) == (3, 1, 4)
     codes = [f["code"] for f in done.json["findings"]]
     assert "KRL002" in codes
     assert codes.count("COR003") == 1
@@ -304,7 +307,8 @@ def test_strict_writes_nothing_on_a_warning(compensate, job):
 
 
 def test_nothing_is_inserted_where_it_is_not_wanted(compensate, job):
-    done = compensate(job.program, "--force", "--keep-points", "--json", "-")
+    job.write(JUMPED_LINES)
+    done = compensate(job.program, "--force", "--no-insert", "--json", "-")
     assert (done.code, done.json["inserted"], done.json["corrected"]) == (3, 0, 5)
     assert "COR006" in [f["code"] for f in done.json["findings"]]
     assert job.output.read_bytes().count(b"\r\n") == job.program.read_bytes().count(b"\r\n") + 1
@@ -317,7 +321,7 @@ def test_a_loose_tolerance_inserts_nothing(compensate, job):
 
 
 def test_the_limit_of_growth_is_told(compensate, job):
-    job.cell(CELL + "max_growth: 1.1\n")
+    job.cell(CELL.replace("tolerance: 0.02", "tolerance: 0.001") + "max_growth: 1.1\n")
     done = compensate(job.program, "--force", "--json", "-")
     assert (done.code, done.json["inserted"], done.json["corrected"]) == (3, 1, 5)
     assert {"COR014", "COR006"} <= {f["code"] for f in done.json["findings"]}
@@ -344,7 +348,7 @@ def test_predict_writes_only_the_report(compensate, job):
 
 def test_absolute_and_process_agree_where_the_robot_does_not_sag(compensate, job):
     one = compensate(job.program, "--force", "--json", "-").json
-    job.cell(CELL + "correct: absolute\n")
+    job.cell(CELL + "correct: absolute\ncontroller: {absolute_accuracy: false}\n")
     two = compensate(job.program, "--force", "--json", "-").json
     assert two["error_before_mm"]["max"] == pytest.approx(one["error_before_mm"]["max"], rel=1e-6)
 
@@ -368,7 +372,7 @@ def test_every_hunk_of_the_diff_stands_where_it_says(compensate, job):
     compensate(job.program, "--force")
     text = job.output.with_name("part.diff").read_bytes()
     hunks = re.split(rb"^@@ -(\d+),(\d+) \+(\d+),(\d+) @@\n", text, flags=re.M)[1:]
-    assert len(hunks) > 5  # more than one
+    assert len(hunks) >= 5
     for at in range(0, len(hunks), 5):
         body = hunks[at + 4].splitlines(keepends=True)
         for sign, first, count, path in ((b"-", 0, 1, job.program), (b"+", 2, 3, job.output)):
@@ -419,7 +423,7 @@ def test_json_alone_on_standard_output(compensate, job):
         "motions",
         "corrected",
         "inserted",
-        "left",
+        "uncorrected",
         "iterations",
         "force",
         "error_before_mm",
@@ -435,6 +439,7 @@ def test_json_alone_on_standard_output(compensate, job):
     ]
 
 
+@pytest.mark.slow
 def test_a_locale_or_hash_seed_changes_no_byte(job):
     outputs = []
     for seed, locale in (("0", "C"), ("1", "de_DE.UTF-8")):

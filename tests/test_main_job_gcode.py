@@ -23,7 +23,7 @@ def test_an_arc_through_a_point_is_corrected_as_one(compensate, job):
              "CIP X200 Y0 Z0 I1=100 J1=100 K1=0", ";FORCE OFF", "G0 Z50", "M30"]  # fmt: skip
     program = job.write(lines, "\n", "part.mpf")
     done = compensate(program, "--force", "--json", "-")
-    assert (done.code, done.json["corrected"], done.json["left"]) == (0, 1, 0), done.out
+    assert (done.code, done.json["corrected"], done.json["uncorrected"]) == (0, 1, 0), done.out
     verified = compensate(
         "verify", program, job.folder / "compensated" / "part.mpf", "--force", "--json", "-"
     )

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import examples
 
-from postproc.findings import Refusal
-from postproc.geometry import Poses, rotation_from_abc
+from postproc.base.findings import Refusal
+from postproc.base.geometry import Poses, rotation_from_abc
+from postproc.base.tables import is_missing
+from postproc.base.units import DEG, MM
 from postproc.measurements import (
     Readings,
     joined,
@@ -19,8 +22,6 @@ from postproc.measurements import (
     read_measurements,
     robot_named,
 )
-from postproc.tables import is_missing
-from postproc.units import DEG, MM
 
 SIX = tuple((f"A{i}", False) for i in range(1, 7))
 ANGLES = "A1,A2,A3,A4,A5,A6"
@@ -171,18 +172,22 @@ def test_joints_that_are_called_like_other_columns(read):
         ("A1,A2,A3,J4,J5,J6,X,Y,Z", "column 'A4' is missing", "A4 (deg)"),
         ("{A},J1,X,Y,Z", "column 'j1' is none of the robot's 6 joints", "A6 (deg)"),
         ("X,Y,Z", "columns of the joints are missing", "A6 (deg); or A1..A6, or J1..J6"),
-        ("{A}", "what was measured are missing", "DX,DY,DZ (loaded minus unloaded)"),
-        ("{A},X,Y,Z,DX,DY,DZ", "'X' and 'DX' stand together", "X,Y,Z (measured place)"),
-        ("{A},X,Z", "column 'Y' is missing beside 'X'", "X,Y,Z"),
-        ("{A},DX,DY", "column 'DZ' is missing beside 'DX'", "DX,DY,DZ"),
-        ("{A},X,Y,Z,A,C", "column 'B' is missing beside 'A'", "A,B,C"),
+        ("{A}", "the measured values are missing", "DX,DY,DZ (loaded minus unloaded)"),
+        ("{A},X,Y,Z,DX,DY,DZ", "'X' and 'DX' exclude each other", "X,Y,Z (measured place)"),
+        ("{A},X,Z", "column 'Y' is missing; 'X' needs it", "X,Y,Z"),
+        ("{A},DX,DY", "column 'DZ' is missing; 'DX' needs it", "DX,DY,DZ"),
+        ("{A},X,Y,Z,A,C", "column 'B' is missing; 'A' needs it", "A,B,C"),
         ("{A},X,Y,Z,DA,DB,DC", "column 'DA' does not belong to X,Y,Z", "A,B,C"),
         ("{A},DX,DY,DZ,A,B,C", "column 'A' does not belong to DX,DY,DZ", "DA,DB,DC"),
-        ("{A},X,Y,Z,tmp", "unknown column 'tmp'; did you mean 'temp'?", "SESSION"),
-        ("{A},X,Y,Z,DIR7", "unknown column 'dir7'", "DIR1..DIR6"),
+        ("{A},X,Y,Z,tmp", "column 'tmp' is unknown; did you mean 'temp'?", "SESSION"),
+        ("{A},X,Y,Z,DIR7", "column 'dir7' is unknown", "DIR1..DIR6"),
         ("{A},X,Y,Z,Y [mm]", "columns 'y' and 'y [mm]' are the same", ""),
-        ("A1 [rad],A2,A3,A4,A5,A6,X,Y,Z", "column 'a1 [rad]': degrees are expected", "convert"),
-        ("{A},X,Y,Z (m)", "column 'z (m)': millimetres are expected", "convert"),
+        (
+            "A1 [rad],A2,A3,A4,A5,A6,X,Y,Z",
+            "the unit of column 'a1 [rad]' is wrong: degrees are expected",
+            "convert",
+        ),
+        ("{A},X,Y,Z (m)", "the unit of column 'z (m)' is wrong: millimetres are expected", "convert"),
         ("{A},X,Y,Z,FX [kN]", "newtons are expected", "convert"),
         ("{A},X,Y,Z,MX [N]", "newton metres are expected", "convert"),
         ("{A},X,Y,Z,T [ms]", "seconds are expected", "convert"),
@@ -207,7 +212,7 @@ def test_wrong_headers(read, header, message, help):
         ("X,Y,Z,A,B,C", "1,2,3,10,,30", "column B: the cell is empty"),
         ("X,Y,Z,SIGMA", "1,2,3,0", "column SIGMA: 0 is not above zero"),
         ("X,Y,Z,SIGMA", "1,2,3,-0.1", "column SIGMA: -0.1 is not above zero"),
-        ("X,Y,Z,DIR6", "1,2,3,2", "column DIR6: '2' is no direction of approach"),
+        ("X,Y,Z,DIR6", "1,2,3,2", "column DIR6: '2' is not a direction of approach"),
         ("X,Y,Z,TARGET", "1,2,3,", "column TARGET: the cell is empty"),
         ("X,Y,Z,SESSION", "1,2,3,", "column SESSION: the cell is empty"),
         ("X,Y,Z,T", "1,2,3,", "column T: the cell is empty"),
@@ -232,10 +237,10 @@ def test_joint_angles_are_never_missing(read, cell):
 @pytest.mark.parametrize(
     ("comment", "message"),
     [
-        ("# robot:", "# robot: nothing is named"),
-        ("# frame: world", "# frame: 'world' is no frame"),
+        ("# robot:", "# robot: the name is missing"),
+        ("# frame: world", "# frame: 'world' is not a frame"),
         ("# frame: trakcer", "did you mean 'tracker'?"),
-        ("# tool: 0 0", "# tool: 2 numbers where x y z [a b c] (mm, deg) is expected"),
+        ("# tool: 0 0", "# tool: 2 numbers are given where x y z [a b c] (mm, deg) is expected"),
         ("# tool: 0 0 x", "# tool: '0 0 x' is not understood"),
         ("# tool: 1,5, 2,5, 3,5", "is not understood"),
         ("# tool: 0,0,200 0,0,0", "is not understood"),
@@ -244,10 +249,10 @@ def test_joint_angles_are_never_missing(read, cell):
         ("# sigma_mm: 0", "# sigma_mm: 0 is not above zero"),
         ("# sigma_deg: -1", "# sigma_deg: -1 is not above zero"),
         ("# sigma_mm: nan", "is not understood"),
-        ("# target M1: 1 2", "# target M1: 2 numbers where x y z (mm) is expected"),
-        ("# target: 1 2 3", "# target: names no target"),
-        ("# frame: robot\n# Frame: robot", "# frame stands in line 2 already"),
-        ("# target M1: 1 2 3\n# target M1: 1 2 3", "# target M1 stands in line 2 already"),
+        ("# target M1: 1 2", "# target M1: 2 numbers are given where x y z (mm) is expected"),
+        ("# target: 1 2 3", "# target: the name of the target is missing"),
+        ("# frame: robot\n# Frame: robot", "# frame occurs in line 2 already"),
+        ("# target M1: 1 2 3\n# target M1: 1 2 3", "# target M1 occurs in line 2 already"),
     ],
 )
 def test_wrong_comments(read, comment, message):
@@ -335,14 +340,14 @@ def test_rows_without_a_reading(read):
     assert r.sessions == ("a", "c")
     assert np.allclose(r.value[1], [np.nan, 0.002, np.nan], equal_nan=True)
     assert told(r) == [("MEA003", 3)]
-    assert "7 (lines 3, 4, 5, 6, 7 and 2 more)" in r.findings[0].message
+    assert "7 rows have no reading and are excluded (lines 3, 4, 5, 6, 7 and 2 more)" in r.findings[0].message
     assert r.findings[0].severity == "info"
 
 
 def test_a_plan_that_is_not_filled_in(read):
     finding = refused(read, "{A},DX,DY,DZ", "{Q},,,", "{Q},,,")
     assert finding.code == "MEA002"
-    assert "holds no readings yet" in finding.message
+    assert "contains no readings yet" in finding.message
 
 
 def test_targets_against_stated_places(read):
@@ -358,7 +363,7 @@ def test_targets_against_stated_places(read):
 
     r = read("# target Ma: 1 2 3", "{A},X,Y,Z", "{Q},1,2,3")
     assert told(r) == [("MEA005", 1)]
-    assert "there is no column TARGET" in r.findings[0].message
+    assert "the file has no column TARGET" in r.findings[0].message
 
     # two targets may differ by case alone, if both are stated
     r = read("# target a: 1 2 3", "# target A: 4 5 6", "{A},X,Y,Z,TARGET", "{Q},1,2,3,A", "{Q},1,2,3,a")
@@ -490,16 +495,16 @@ def test_sessions_of_files_with_the_same_name(read, tmp_path):
 @pytest.mark.parametrize(
     ("comments", "columns", "cells", "what"),
     [
-        ((), "DX,DY,DZ,TARGET", "1,2,3,M", "values: DX,DY,DZ, but X,Y,Z"),
-        (("# frame: robot",), "X,Y,Z,TARGET", "1,2,3,M", "frame: robot, but tracker"),
-        (("# tool: 0 0 1.5",), "X,Y,Z,TARGET", "1,2,3,M", "tool: 0 0 1.5 0 0 0, but not stated"),
-        (("# target M: 1 2 4",), "X,Y,Z,TARGET", "1,2,3,M", "place of target M: 1 2 4, but 1 2 3"),
-        (("# robot: other",), "X,Y,Z,TARGET", "1,2,3,M", "robot: other, but one"),
-        (("# sigma_deg: 2",), "X,Y,Z,TARGET", "1,2,3,M", "sigma_deg: 2, but 1"),
-        ((), "X,Y,Z", "1,2,3", "column TARGET: none, but given"),
-        ((), "X,Y,Z,TARGET,TEMP", "1,2,3,M,20", "column TEMP: given, but none"),
-        ((), "X,Y,Z,TARGET,T", "1,2,3,M,20", "column T: given, but none"),
-        ((), "X,Y,Z,TARGET,DIR2", "1,2,3,M,1", "column DIR1: given, but none"),
+        ((), "DX,DY,DZ,TARGET", "1,2,3,M", "values: DX,DY,DZ here, but X,Y,Z"),
+        (("# frame: robot",), "X,Y,Z,TARGET", "1,2,3,M", "frame: robot here, but tracker"),
+        (("# tool: 0 0 1.5",), "X,Y,Z,TARGET", "1,2,3,M", "tool: 0 0 1.5 0 0 0 here, but not stated"),
+        (("# target M: 1 2 4",), "X,Y,Z,TARGET", "1,2,3,M", "place of target M: 1 2 4 here, but 1 2 3"),
+        (("# robot: other",), "X,Y,Z,TARGET", "1,2,3,M", "robot: other here, but one"),
+        (("# sigma_deg: 2",), "X,Y,Z,TARGET", "1,2,3,M", "sigma_deg: 2 here, but 1"),
+        ((), "X,Y,Z", "1,2,3", "column TARGET: none here, but given"),
+        ((), "X,Y,Z,TARGET,TEMP", "1,2,3,M,20", "column TEMP: given here, but none"),
+        ((), "X,Y,Z,TARGET,T", "1,2,3,M,20", "column T: given here, but none"),
+        ((), "X,Y,Z,TARGET,DIR2", "1,2,3,M,1", "column DIR1: given here, but none"),
     ],
 )
 def test_files_that_do_not_belong_together(read, comments, columns, cells, what):
@@ -518,9 +523,9 @@ def test_files_that_do_not_belong_together(read, comments, columns, cells, what)
 def test_files_of_other_joints_and_the_same_file_twice(read):
     a = read("{A},X,Y,Z", "{Q},1,2,3", name="a.csv")
     b = read("E1,{A},X,Y,Z", "5,{Q},1,2,3", joints=(("E1", True), *SIX), name="b.csv")
-    with pytest.raises(Refusal, match=r"b.csv: MEA008 joints: .*E1 \(mm\).*but .*a.csv"):
+    with pytest.raises(Refusal, match=r"b.csv: MEA008 the files differ in joints: .*E1 \(mm\).*but .*a.csv"):
         joined([a, b])
-    with pytest.raises(Refusal, match=r"c.csv: MEA008 holds the same bytes as .*a.csv"):
+    with pytest.raises(Refusal, match=r"c.csv: MEA008 the file equals .*a.csv"):
         joined([a, read("{A},X,Y,Z", "{Q},1,2,3", name="c.csv")])
 
 
@@ -547,7 +552,7 @@ def test_a_plan_is_filled_in_and_read(csv):
         "E1,A1,A2,A3,A4,A5,A6,FZ,MY,DX,DY,DZ,REPEAT",
         "1500.0000,0.0000,-57.2958,57.2958,0.0000,28.6479,0.0000,-2500,12.5,,,,1",
     ]
-    with pytest.raises(Refusal, match="holds no readings yet"):
+    with pytest.raises(Refusal, match="contains no readings yet"):
         read_measurements(csv(text), joints)
     filled = read_measurements(csv(text.replace(",,,,", ",0.1,0.2,-1.5,")), joints)
     assert np.allclose(filled.q, q, atol=1e-4 * DEG)
@@ -641,7 +646,7 @@ def same(one, other, absolute, relative=0.0):
     return np.allclose(one, other, atol=absolute, rtol=relative, equal_nan=True)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(readings())
 def test_what_is_written_reads_back(tmp_path_factory, r):
     path = tmp_path_factory.getbasetemp() / "written.csv"
@@ -675,7 +680,7 @@ def test_what_is_written_reads_back(tmp_path_factory, r):
     assert same(read_measurements(path, r.joints).q, back.q, 0)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(st.text('A1,;XYZ=:#. -\n\t"nm[]', max_size=60), st.integers(0, 2))
 def test_no_text_ends_in_anything_but_a_refusal(tmp_path_factory, text, where):
     parts = ["# tool: 0 0 1\n", "A1,X,Y,Z,REPEAT\n", "1,2,3,4,5\n"]

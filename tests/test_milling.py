@@ -4,9 +4,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import examples
 
-from postproc.forces.materials import find_material
-from postproc.forces.milling import Coefficients, Cut, engagement, force, mean_force, peak_share
+from postproc.process.materials import find_material
+from postproc.process.milling_forces import (
+    Coefficients,
+    Engagement,
+    engagement,
+    force,
+    mean_force,
+    peak_share,
+)
 
 # Table 5 of doi 10.1186/s10033-021-00536-9, row [190]: EN AW-7075-T6, in N/mm2 and N/mm
 KTC, KRC, KAC, KTE, KRE, KAE = 767.01, 168.8, 222.0, 27.7, 26.6, 0.7
@@ -15,7 +23,7 @@ MM = 1e-3
 
 
 def cut_of(direction="down", width=8.0, diameter=16.0, teeth=3, depth=5.0, helix=30.0, coefficients=ALLOY):
-    return Cut(
+    return Engagement(
         diameter * MM,
         teeth,
         np.radians(helix),
@@ -25,7 +33,7 @@ def cut_of(direction="down", width=8.0, diameter=16.0, teeth=3, depth=5.0, helix
     )
 
 
-def edge_by_edge(cut: Cut, feed: float) -> np.ndarray:
+def edge_by_edge(cut: Engagement, feed: float) -> np.ndarray:
     """Mean over one turn of what one edge element does, by geometry and Gauss' quadrature, times teeth and height.
 
     Its own way: the tooth is a point on a circle, its velocity and the outward radius are vectors, the chip is what
@@ -54,7 +62,7 @@ def edge_by_edge(cut: Cut, feed: float) -> np.ndarray:
     return np.array(total) * cut.teeth * cut.depth / (2 * np.pi)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(
     st.sampled_from(["up", "down", "slot"]),
     st.floats(0.02, 1.0),
@@ -70,6 +78,7 @@ def test_the_mean_is_the_integral_of_the_instantaneous_force(direction, share, t
     assert np.allclose(found, wanted, rtol=0, atol=1e-9 * np.linalg.norm(wanted))
 
 
+@pytest.mark.sample(9)
 @pytest.mark.parametrize("direction", ["up", "down", "slot"])
 @pytest.mark.parametrize("helix", [0.0, 10.0, 30.0, -45.0])
 @pytest.mark.parametrize("teeth", [1, 3, 4])

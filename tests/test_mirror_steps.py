@@ -9,8 +9,8 @@ import pytest
 from motions import milling_angles
 from plant import kr270, random_tools
 
-from postproc.compensation.mirror import MAX_ITERATIONS, mirror, partly
-from postproc.geometry import Poses, rotation_from_vector
+from postproc.base.geometry import Poses, rotation_from_vector
+from postproc.compensation.mirror import MAX_ITERATIONS, interpolate_pose, mirror
 from postproc.model import NOTHING
 from postproc.robot.inverse import status_of
 
@@ -173,7 +173,7 @@ def test_of_an_orientation_only_what_can_be_corrected_is():
     turns = np.array([np.eye(3), np.zeros((3, 3)), across])
     turn = np.array([1e-3, 2e-3, -1e-3])
     problem = Off(3, [1e-4, 0.0, 0.0], 0.0, turn)
-    done = problem.mirror(turns=turns)
+    done = problem.mirror(orientation_projection=turns)
     assert done.converged.all()
     for k in range(3):
         expected = rotation_from_vector(-turns[k] @ turn) @ problem.wanted.rotation[k]
@@ -182,7 +182,7 @@ def test_of_an_orientation_only_what_can_be_corrected_is():
     assert done.angle.max() < 1e-8
     # rows that go on later have their own
     problem = Off(3, [1e-4, 0.0, 0.0], np.array([0.0, 0.3, 0.3]), turn)
-    done = problem.mirror(turns=turns)
+    done = problem.mirror(orientation_projection=turns)
     np.testing.assert_array_equal(done.command.rotation[1], problem.wanted.rotation[1])
     assert done.iterations.tolist() == [1, 8, 8]
 
@@ -193,7 +193,7 @@ def test_a_begin_is_where_the_first_prediction_is_made():
     position[1] += [0.0, 3e-4, 0.0]
     begin = Poses(problem.wanted.rotation.copy(), position.copy())
     bent = np.tile(np.array([[7.0], [8.0], [9.0]]), (1, 6))
-    done = problem.mirror(begin=(begin, bent))
+    done = problem.mirror(guess=(begin, bent))
     assert done.iterations.tolist() == [0, 1, 0]
     np.testing.assert_allclose(done.history[0], [0.0, 3e-4, 0.0], atol=1e-12)
     np.testing.assert_array_equal(begin.position, position)  # it is not changed
@@ -212,12 +212,12 @@ def test_the_share_of_all_is_all():
     one, other = (
         Poses(rotation_from_vector(rng.normal(size=(3, 3))), rng.normal(size=(3, 3))) for _ in range(2)
     )
-    assert partly(one, other, 1.0) is other
-    each = partly(one, other, np.array([[0.0], [1.0], [0.5]]))
+    assert interpolate_pose(one, other, 1.0) is other
+    each = interpolate_pose(one, other, np.array([[0.0], [1.0], [0.5]]))
     np.testing.assert_allclose(each.position[0], one.position[0])
     np.testing.assert_allclose(each.position[1], other.position[1])
     np.testing.assert_allclose(each.rotation[1], other.rotation[1], atol=1e-12)
     np.testing.assert_allclose(each.position[2], 0.5 * (one.position[2] + other.position[2]))
-    half = partly(one, other, 0.5)
+    half = interpolate_pose(one, other, 0.5)
     np.testing.assert_allclose(half.position[2], each.position[2])
     np.testing.assert_allclose(half.rotation[2], each.rotation[2])

@@ -8,19 +8,17 @@ import numpy as np
 import pytest
 from motions import motions
 from plant import kr270
-from ways_at_work import line
 
-import postproc.blocks
-from postproc.compensation.correct import State, correct
-from postproc.compensation.division import Division
-from postproc.compensation.limits import limits
-from postproc.compensation.task import Task
-from postproc.forces import Wrenches
-from postproc.geometry import Poses
+import postproc.base.batches
+from postproc.base.geometry import Poses
+from postproc.compensation.axis_limits import check_limits
+from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.subdivision import Subdivision
 from postproc.model import NOTHING, StiffnessModel
+from postproc.process import Wrenches
+from postproc.robot.axis_track import AxisTrack, is_near_singular, singular_words
 from postproc.robot.description import load_robot
 from postproc.robot.inverse import status_of
-from postproc.robot.track import Track, near_singular, singular_words
 from postproc.toolpath import Role
 
 TOOL = Poses(np.eye(3), np.array([0.02, 0.0, 0.3]))
@@ -84,14 +82,14 @@ def told(robot, before, after, source=None, moved=None, status=None, feed=None, 
     tool = Poses(np.tile(TOOL.rotation, (n, 1, 1)), np.tile(TOOL.position, (n, 1)))
     world = Poses(np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)))
     force = Wrenches(np.zeros((n, 6)), np.zeros((n, 6)), ~yes, "test", (), ~yes)
-    track = Track(before, branch if status is None else np.array(status), yes, yes, yes)
-    task = Task(
+    track = AxisTrack(before, branch if status is None else np.array(status), yes, yes, yes)
+    task = CompensationProblem(
         "part.src", path, model, track, wanted, world, tool, force, NOTHING, True, 1.0, 1.0, 1e-3, 1e-2
     )
     none = np.full((m, 3), np.nan)
-    division = Division(
+    division = Subdivision(
         np.arange(m) if source is None else np.array(source),
-        np.full(m, Role.OWN),
+        np.full(m, Role.ORIGINAL),
         np.ones(m),
         command,
         none,
@@ -99,7 +97,7 @@ def told(robot, before, after, source=None, moved=None, status=None, feed=None, 
         none[:, 0],
         np.ones(m, bool) if moved is None else np.array(moved),
     )
-    findings, held = limits(task, correct(task), division)
+    findings, held = check_limits(task, division)
     assert all(one.file == "part.src" for one in (*findings, *held.values()))
     return (
         [(one.code, one.line, one.message) for one in findings],
@@ -114,7 +112,7 @@ def posed(**angles):
 
 def near(name, left, count=1, unit="deg"):
     more = f" ({count} motions)" if count > 1 else ""
-    return f"the correction brings {name} to {left} {unit} from its limit{more}"
+    return f"the correction moves {name} to {left} {unit} from its limit{more}"
 
 
 # limits of the KR 270: A1 -185 .. 185, A2 -146 .. 0, A6 -350 .. 350
@@ -153,7 +151,7 @@ def test_of_all_motions_the_nearest_is_told_and_all_are_counted():
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 100])
 def test_what_is_worst_is_found_in_whatever_block_it_stands(monkeypatch, rows):
-    monkeypatch.setattr(postproc.blocks, "ROWS", rows)
+    monkeypatch.setattr(postproc.base.batches, "ROWS", rows)
     robot = with_speeds(kr270(), [10.0] + [np.nan] * 5)
     for place in range(5):
         before = [posed(A1=183.0, A5=5.0 + 0.01 * i) for i in range(5)]
@@ -165,7 +163,7 @@ def test_what_is_worst_is_found_in_whatever_block_it_stands(monkeypatch, rows):
             (
                 "KIN003",
                 10 + place,
-                f"the correction leads near to a singular posture ({singular_words(robot)})",
+                f"the corrected pose is close to a singularity ({singular_words(robot)})",
             ),
         ]
         assert not held
@@ -189,7 +187,7 @@ def test_a_motion_beyond_a_limit_holds_its_row(after, axis):
     found, held = told(
         kr270(), [posed(), start], [posed(), start, posed(**after), start], [0, 1, 1, 1], lines=[40, 50]
     )
-    assert held == {1: ("COR008", 50, f"a motion inserted here brings {axis} beyond its limit")}
+    assert held == {1: ("COR008", 50, f"an inserted motion moves {axis} beyond its limit")}
     assert found == []
 
 
@@ -215,9 +213,9 @@ def test_a_posture_that_was_singular_before_is_no_news():
     robot = kr270()
     before = [posed(A5=angle) for angle in (5.0, 0.5, 5.0, 0.5, 5.0)]
     after = [posed(A5=angle) for angle in (4.0, 0.6, 0.8, 4.0, 0.7)]
-    assert near_singular(robot, np.radians(before)).tolist() == [False, True, False, True, False]
+    assert is_near_singular(robot, np.radians(before)).tolist() == [False, True, False, True, False]
     found, _ = told(robot, before, after)
-    words = "the correction leads near to a singular posture"
+    words = "the corrected pose is close to a singularity"
     assert found == [
         ("KIN003", 12, f"{words} (A5 near 0, the wrist over axis 1, or the arm stretched) (2 motions)")
     ]
@@ -237,7 +235,7 @@ def test_a_slide_near_to_its_limit(gantry):
     found, _ = told(gantry, [at(A=170)], [at(A=179.5)], closed=False)
     assert found == [("KIN008", 10, near("A", "0.50"))]
     found, held = told(gantry, [at(Y=1494)], [at(Y=1500.5)], closed=False)
-    assert held == {0: ("COR008", 10, "a motion inserted here brings Y beyond its limit")}
+    assert held == {0: ("COR008", 10, "an inserted motion moves Y beyond its limit")}
     assert found == []
 
 
@@ -261,12 +259,12 @@ def chord(robot, one, other):
 
 def fast(name, needed, can, count=1, unit="deg/s"):
     more = f" ({count} motions)" if count > 1 else ""
-    return f"{name} has to move at {needed} {unit} at the programmed feed, it can {can} {unit}{more}"
+    return f"{name} needs {needed} {unit} at the programmed feed, its speed limit is {can} {unit}{more}"
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 100])
 def test_the_axis_that_is_too_fast_is_found_in_whatever_block_it_moves(monkeypatch, rows):
-    monkeypatch.setattr(postproc.blocks, "ROWS", rows)
+    monkeypatch.setattr(postproc.base.batches, "ROWS", rows)
     robot = with_speeds(kr270(), [10.0] * 6)
     for first, second in (("A1", "A6"), ("A6", "A1")):
         path = [posed()]
@@ -336,41 +334,3 @@ def test_a_link_takes_the_feed_of_the_motion_that_it_belongs_to():
     assert found == []
     found, _ = told(robot, before, after, [0, 1, 1], feed=[1e-6, 9.6 * slow], lines=[40, 50])
     assert found == [("KIN009", 50, fast("A1", "9.6", "10", 2))]
-
-
-# roundings
-
-
-@pytest.mark.parametrize(
-    ("blend", "size", "told_"),
-    [
-        ([0.0, 1e-3, 4e-3], [2e-3, 2e-3, 2e-3], (1, 12, "by up to 4 mm")),
-        ([3e-3, 1.5e-3, 4.5e-3], [2e-3, 2e-3, 2e-3], (2, 10, "by up to 4.5 mm")),
-        ([0.0, np.nan, 1e-3], [2e-3, 2e-3, 2e-3], (1, 11, "by a distance that is not known")),
-        ([0.0, np.nan, 2.5e-3], [2e-3, 2e-3, 2e-3], (2, 11, "by up to 2.5 mm")),
-        ([3e-3, 3e-3, 3e-3], [4e-3, 3e-3, 0.0], (1, 12, "by up to 3 mm")),
-        ([0.0, 0.0, 0.0], [0.0, 1e-3, 0.0], None),
-        ([-1.0, 5e-3, -1.0], [0.0, 1e-3, 0.0], None),
-    ],
-)
-def test_points_that_are_rounded_off_by_more_than_they_move(blend, size, told_):
-    """Those that are corrected; of the last case none of them is."""
-    task = line(blend=np.array([0.0, *blend]))
-    result = correct(task)
-    state = np.full(4, State.LEFT if blend[0] == -1.0 else State.CORRECTED)
-    correction = np.outer([0.0, *size], [0.6, 0.0, -0.8])
-    division = Division(
-        np.arange(4), np.zeros(4, int), np.ones(4), task.wanted, *[np.full((4, 3), np.nan)] * 2,
-        np.full(4, np.nan), np.ones(4, bool),
-    )  # fmt: skip
-    found, _ = limits(task, replace(result, state=state, correction=correction), division)
-    if told_ is None:
-        assert found == []
-        return
-    count, line_, by = told_
-    (one,) = found
-    assert (one.code, one.line, one.file) == ("COR015", line_ + 1, "part.src")
-    assert one.message == (
-        f"{count} corrected points are approximated {by}, more than they are moved: where the path turns there the"
-        " controller passes beside them"
-    )

@@ -10,15 +10,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import CELL, LINES
+from conftest import CELL
+from conftest import JUMPED_LINES as LINES
 
-import postproc.compensation.task as task_module
+import postproc.compensation.problem as task_module
+import postproc.output.write as writing_module
 import postproc.workflows.program as program_module
-import postproc.writing as writing_module
-from postproc.compensation.division import Division
-from postproc.dialects import DIALECTS
-from postproc.document import Edit, Span
-from postproc.geometry import PoseRows, Poses, rotation_from_vector
+from postproc.base.document import Edit, Span
+from postproc.base.geometry import PoseRows, Poses, rotation_from_vector
+from postproc.compensation.subdivision import Subdivision
+from postproc.languages import DIALECTS
 
 FRAMES = CELL.replace(
     "bases:",
@@ -32,7 +33,7 @@ STATED[6] = STATED[6].replace("}", ",S 2,T 2}")
 STATED[10] = STATED[10].replace("}", ",S 2,T 2}")
 
 BLOCKS = [
-    "%", "(PART)", "G21 G90 G17 G94", "G54", "T1 M6", "G64 P0.01", "G0 X0 Y0 Z50", "M8", "G1 Z0 F3000",
+    "%", "(PART)", "G21 G90 G17 G94", "G54", "T1 M6", "G64 P0.01", "G0 X0 Y0 Z50", "M8", "G0 Z0", "F3000",
     "(FORCE -360 50 560 @base)", "G1 X100 Y0 Z-2", "X200", "G3 X250 Y50 I0 J50", "G1 Y150", "(FORCE OFF)",
     "G0 Z50", "G0 X0", "M9", "M30", "%",
 ]  # fmt: skip
@@ -44,15 +45,15 @@ BLOCKS = [
 def more_edits(monkeypatch, change: Callable[[list[Edit], bytes], list[Edit]]) -> None:
     """What a dialect makes of a plan, changed."""
     for dialect in {type(one) for one in DIALECTS.values()}:
-        real = dialect.moved
+        real = dialect.edit_targets
 
         def moved(self, program, plan, writing, real=real):
             made = real(self, program, plan, writing)
-            if made.held:
+            if made.unwritten:
                 return made
             return replace(made, edits=change(list(made.edits), program.documents[0].raw))
 
-        monkeypatch.setattr(dialect, "moved", moved)
+        monkeypatch.setattr(dialect, "edit_targets", moved)
 
 
 def instead(raw: bytes, text: bytes, new: bytes) -> Edit:
@@ -178,11 +179,11 @@ def corrections(change: Callable[[Poses, Poses], None]):
     return breaks
 
 
-def divisions(change: Callable[[Division, np.ndarray, Poses], None]):
+def divisions(change: Callable[[Subdivision, np.ndarray, Poses], None]):
     """``change(division, moved, command)`` alters which motions of the output move, and where."""
 
     def breaks(monkeypatch) -> None:
-        real = program_module.divide
+        real = program_module.subdivide
 
         def divide(task, result, limits):
             made = real(task, result, limits)
@@ -191,14 +192,14 @@ def divisions(change: Callable[[Division, np.ndarray, Poses], None]):
             change(made, moved, command)
             return replace(made, moved=moved, command=PoseRows(len(made), lambda rows: command[rows]))
 
-        monkeypatch.setattr(program_module, "divide", divide)
+        monkeypatch.setattr(program_module, "subdivide", divide)
 
     return breaks
 
 
-def own(division: Division, row: int) -> int:
+def own(division: Subdivision, row: int) -> int:
     """The motion of the output that takes the text of a row."""
-    return int(np.flatnonzero(division.own & (division.source == row))[0])
+    return int(np.flatnonzero(division.original & (division.source == row))[0])
 
 
 CUT, AIR = 4, 8
@@ -222,12 +223,12 @@ def shifted(command: Poses, at: object, mm: float) -> None:
     command.position[at] += [0.0, 0.0, 1e-3 * mm]
 
 
-def let_stay(division: Division, moved: np.ndarray, _command: Poses) -> None:
+def let_stay(division: Subdivision, moved: np.ndarray, _command: Poses) -> None:
     moved[own(division, CUT)] = False
 
 
 def air(change: Callable[[Poses, int], None]):
-    def breaks(division: Division, moved: np.ndarray, command: Poses) -> None:
+    def breaks(division: Subdivision, moved: np.ndarray, command: Poses) -> None:
         at = own(division, AIR)
         moved[at] = True
         change(command, at)
@@ -236,14 +237,14 @@ def air(change: Callable[[Poses, int], None]):
 
 
 def link(mm: float):
-    return divisions(lambda d, m, c: shifted(c, np.flatnonzero(d.links)[-1], mm))
+    return divisions(lambda d, m, c: shifted(c, np.flatnonzero(d.transitions)[-1:], mm))
 
 
 def end(mm: float):
     return divisions(lambda d, m, c: shifted(c, own(d, CUT), mm))
 
 
-def exchanged(division: Division, _moved: np.ndarray, command: Poses) -> None:
+def exchanged(division: Subdivision, _moved: np.ndarray, command: Poses) -> None:
     one, two = own(division, CUT), own(division, CUT + 1)
     command.position[[one, two]] = command.position[[two, one]]
 
@@ -296,7 +297,7 @@ def shop(compensate, job):
 
 def refused(done, output) -> None:
     assert done.code == 1, done.out
-    assert "nothing was written" in done.err
+    assert "nothing is written" in done.err
     assert "Traceback" not in done.err
     assert not output.parent.exists()
 
@@ -310,6 +311,7 @@ def test_as_they_are_nothing_is_told(shop):
     assert shop(BLOCKS, name="part.ngc")[0].code in (0, 3)
 
 
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", REFUSED_EDITS)
 def test_edits_that_change_a_motion_are_refused(shop, monkeypatch, name):
     more_edits(monkeypatch, REFUSED_EDITS[name])
@@ -322,6 +324,7 @@ def test_edits_beside_the_motions_are_refused(shop, monkeypatch, name):
     refused(*shop(STATED))
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("name", IN_BLOCKS)
 def test_edits_that_change_a_block_are_refused(shop, monkeypatch, name):
     more_edits(monkeypatch, IN_BLOCKS[name])
@@ -339,6 +342,7 @@ def test_bytes_that_no_edit_covers_are_refused(shop, monkeypatch):
     refused(*shop(LINES))
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("gain", ["1", "0.5"])
 @pytest.mark.parametrize("name", MEANT)
 def test_corrections_that_are_wrong_are_refused_or_told(shop, monkeypatch, name, gain):

@@ -21,15 +21,15 @@ from conftest import CELL, LINES
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.compensation.correct import State, correct
-from postproc.compensation.division import Division
-from postproc.document import Document, Edit, Span, apply
-from postproc.findings import Finding
-from postproc.geometry import Poses
+from postproc.base.document import Document, Edit, Span, apply
+from postproc.base.findings import Finding
+from postproc.base.geometry import Poses
+from postproc.compensation.correct import MotionOutcome, correct
+from postproc.compensation.subdivision import Subdivision
 from postproc.report.page import FOLDER, embedded, finding_rows, linked, program_page
-from postproc.report.page_data import Place, page_data, source_texts
-from postproc.report.page_rows import SHOWN, shown_rows, worst_rows
-from postproc.report.page_words import badge, left_over, program_verdict
+from postproc.report.page_data import WorstPlace, page_data, source_texts
+from postproc.report.page_rows import SHOWN, rows_to_draw, worst_rows
+from postproc.report.page_words import badge, program_verdict, reasons
 from postproc.report.report import Spread
 from postproc.toolpath import Role
 from postproc.workflows.preparation import Request, prepare
@@ -42,7 +42,7 @@ def written(folder, lines=LINES, **request):
     """A compensated program and its page."""
     (folder / "cell.yaml").write_text(CELL)
     (folder / "part.src").write_text("\n".join(lines) + "\n")
-    report = compensate(Request(folder / "part.src", force="", keep_points=True, **request))
+    report = compensate(Request(folder / "part.src", force="", no_insert=True, **request))
     return report, (folder / "compensated" / "part.report.html").read_text(encoding="utf-8")
 
 
@@ -93,7 +93,7 @@ def many(n, rng):
     quantities += [(1, figures.between), (1, size)]
 
     def shown(limit):
-        return shown_rows(n, [n // 3], figures.cut[1:] != figures.cut[:-1], quantities, limit)
+        return rows_to_draw(n, [n // 3], figures.cut[1:] != figures.cut[:-1], quantities, limit)
 
     return figures, shown
 
@@ -109,12 +109,12 @@ def test_the_page_shows_the_figures_of_the_corrections(tmp_path):
     assert given_["motions"] == len(rows) == len(found["line"]) == report.motions
     assert found["line"].tolist() == [int(row["line"]) for row in rows]
     assert [given_["kinds"][k] for k in found["kind"]] == [row["kind"] for row in rows]
-    assert (found["state"] == State.CORRECTED).sum() == report.corrected == 5
+    assert (found["state"] == MotionOutcome.CORRECTED).sum() == report.corrected == 5
 
     def column(*names):
         return np.array([[float(row[name] or "nan") for name in names] for row in rows])
 
-    cutting = found["state"] != State.AIR
+    cutting = found["state"] != MotionOutcome.AIR
     for name, names in (
         ("before", ["error_before_mm"]),
         ("after", ["error_after_mm"]),
@@ -139,25 +139,25 @@ def test_the_length_of_the_path_is_that_of_the_cuts(tmp_path):
     _, page = written(tmp_path)
     found, _ = columns(page)
     # 100 + 100 + 150 + 150 mm and 50 mm, where the first step goes 2 mm down as well
-    steps = np.diff(found["way"], prepend=0.0)
+    steps = np.diff(found["path_length"], prepend=0.0)
     lines = dict(zip(found["line"].tolist(), steps.tolist(), strict=True))
     assert lines[10] == pytest.approx(np.hypot(100, 2), abs=1e-3)
     assert [lines[line] for line in (11, 12, 13, 19)] == pytest.approx([100, 150, 150, 50], abs=1e-3)
-    assert found["way"][-1] == pytest.approx(np.hypot(100, 2) + 450, abs=1e-3)
+    assert found["path_length"][-1] == pytest.approx(np.hypot(100, 2) + 450, abs=1e-3)
 
 
 def test_the_band_is_the_doubt(predicted, data):
-    doubt = predicted.report.doubt
+    doubt = predicted.report.uncertainty
     assert len(doubt.rows) > 3
-    np.testing.assert_allclose(data.widths[doubt.rows], doubt.widths / MM, rtol=1e-12)
-    assert np.isnan(data.widths[predicted.result.state == State.AIR]).all()
+    np.testing.assert_allclose(data.widths[doubt.rows], doubt.expanded / MM, rtol=1e-12)
+    assert np.isnan(data.widths[predicted.result.state == MotionOutcome.AIR]).all()
 
 
 def test_a_band_between_motions_that_were_evaluated_is_interpolated(predicted):
-    doubt = predicted.report.doubt
+    doubt = predicted.report.uncertainty
     first, last = doubt.rows[0], doubt.rows[3]
-    few = replace(doubt, rows=np.array([first, last]), widths=np.array([[1e-5, 5e-5], [4e-5, np.nan]]))
-    report = replace(predicted.report, doubt=few)
+    few = replace(doubt, rows=np.array([first, last]), expanded=np.array([[1e-5, 5e-5], [4e-5, np.nan]]))
+    report = replace(predicted.report, uncertainty=few)
     data = page_data(predicted.task, predicted.result, report, predicted.documents)
     middle = first + 1
     assert data.rows.tolist() == list(range(data.motions))
@@ -168,30 +168,30 @@ def test_a_band_between_motions_that_were_evaluated_is_interpolated(predicted):
 
 def test_inserted_motions_and_the_way_belong_to_their_motion(predicted):
     n = len(predicted.task.toolpath)
-    cutting = np.flatnonzero(predicted.result.state != State.AIR)
+    cutting = np.flatnonzero(predicted.result.state != MotionOutcome.AIR)
     source = np.sort(np.concatenate([np.arange(n), [cutting[1], cutting[1], cutting[2]]]))
     last = np.append(source[1:] != source[:-1], True)
-    role = np.where(last, Role.OWN, Role.PIECE)
+    role = np.where(last, Role.ORIGINAL, Role.INTERMEDIATE)
     nowhere = np.full((len(source), 3), np.nan)
-    division = Division(
+    division = Subdivision(
         source, role, np.ones(len(source)), Poses(np.tile(np.eye(3), (len(source), 1, 1)), nowhere),
         nowhere, nowhere, nowhere[:, 0], np.ones(len(source), bool),
     )  # fmt: skip
     between = np.full(len(source), np.nan)
     between[source == cutting[1]] = [1e-6, 7e-6, 3e-6]
-    output = SimpleNamespace(edits=(), division=division, between=between)
+    output = SimpleNamespace(edits=(), division=division, path_error=between)
     data = page_data(predicted.task, predicted.result, predicted.report, predicted.documents, output)
     assert data.inserted.sum() == 3
     assert data.inserted[cutting[[1, 2]]].tolist() == [2, 1]
-    assert data.between[cutting[1]] == pytest.approx(7e-3)
-    assert np.isnan(np.delete(data.between, cutting[1])).all()
+    assert data.path_error[cutting[1]] == pytest.approx(7e-3)
+    assert np.isnan(np.delete(data.path_error, cutting[1])).all()
 
 
 def test_arcs_are_drawn_by_points_on_them(predicted):
     """A quarter of a circle of 100 mm about the end point before, in the plane of the base."""
-    task, row = predicted.task, int(np.flatnonzero(predicted.result.state != State.AIR)[2])
-    ways, position = task.ways, np.zeros((len(task.toolpath), 3))
-    begin, end = ways.begin[[row]].position[0], ways.end[[row]].position[0]
+    task, row = predicted.task, int(np.flatnonzero(predicted.result.state != MotionOutcome.AIR)[2])
+    ways, position = task.desired_path, np.zeros((len(task.toolpath), 3))
+    begin, end = ways.start[[row]].position[0], ways.end[[row]].position[0]
     middle, half = 0.5 * (begin + end), 0.5 * np.linalg.norm(end - begin)
     base = task.base[row]
     centre, normal, sweep = position * np.nan, position * np.nan, position[:, 0] * np.nan
@@ -199,14 +199,14 @@ def test_arcs_are_drawn_by_points_on_them(predicted):
     normal[row], sweep[row] = base.rotation.T @ [0, 0, 1], np.pi
     path = replace(task.toolpath, centre=centre, normal=normal, sweep=sweep)
     bent = replace(task)
-    bent.__dict__["ways"] = replace(ways, path=path)
+    bent.__dict__["desired_path"] = replace(ways, path=path)
     data = page_data(bent, predicted.result, predicted.report, predicted.documents)
     assert data.arcs.tolist() == [row]
-    np.testing.assert_allclose(np.linalg.norm(data.bends[0] - middle / MM, axis=1), half / MM, rtol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(data.arc_points[0] - middle / MM, axis=1), half / MM, rtol=1e-9)
     found, given_ = columns(program_page(data, {}).decode())
     assert found["arc"].tolist() == [row]
-    assert found["bends"].shape == (given_["each"], 3)
-    np.testing.assert_allclose(found["bends"], data.bends[0], rtol=1e-6)
+    assert found["arc_points"].shape == (given_["each"], 3)
+    np.testing.assert_allclose(found["arc_points"], data.arc_points[0], rtol=1e-6)
 
 
 # Many motions.
@@ -246,16 +246,26 @@ def test_where_many_motions_are_left_out_the_columns_are_those_of_the_shown(tmp_
     sweep = np.where(np.arange(n) % 3 == 0, 0.5, np.nan)
     round_ = np.where(np.isfinite(sweep)[:, None], [0.0, 0.0, 1.0], np.nan)
     path = replace(task.toolpath, centre=round_, normal=round_, sweep=sweep)
-    task.__dict__["ways"] = replace(long.task.ways, path=path)
+    task.__dict__["desired_path"] = replace(long.task.desired_path, path=path)
     every, few = (
         page_data(task, long.result, long.report, long.documents, limit=limit) for limit in (n, 100)
     )
     assert few.motions == every.motions == len(every.rows) == n
     assert 50 < len(few.rows) <= 100 < n
     assert {0, n - 1, *every.rows[[place.row for place in every.places]].tolist()} <= set(few.rows.tolist())
-    for name in ("line", "kind", "state", "cut", "way", "position", "force", "deflection", "correction"):
+    for name in (
+        "line",
+        "kind",
+        "state",
+        "cut",
+        "path_length",
+        "position",
+        "force",
+        "deflection",
+        "correction",
+    ):
         np.testing.assert_array_equal(getattr(few, name), getattr(every, name)[few.rows], name)
-    for name in ("before", "after", "between", "inserted", "widths"):
+    for name in ("before", "after", "path_error", "inserted", "widths"):
         np.testing.assert_array_equal(getattr(few, name), getattr(every, name)[few.rows], name)
     assert [few.line[place.row] for place in few.places] == [every.line[place.row] for place in every.places]
     assert [place.source for place in few.places] == [place.source for place in every.places]
@@ -264,7 +274,7 @@ def test_where_many_motions_are_left_out_the_columns_are_those_of_the_shown(tmp_
     assert 5 < len(rows) < len(every.arcs)
     assert (few.rows[few.arcs - 1] == rows - 1).all()
     assert set(rows) == {row for row in every.rows[every.arcs] if {row - 1, row} <= set(few.rows)}
-    np.testing.assert_array_equal(few.bends, every.bends[np.isin(every.rows[every.arcs], rows)])
+    np.testing.assert_array_equal(few.arc_points, every.arc_points[np.isin(every.rows[every.arcs], rows)])
 
 
 def test_the_worst_are_the_largest_then_the_largest_of_each_cut_then_the_next():
@@ -276,7 +286,8 @@ def test_the_worst_are_the_largest_then_the_largest_of_each_cut_then_the_next():
     rows = worst_rows(result, cut >= 0, between, True)
     assert [row for row, _ in rows] == [2, 4, 7, 6, 10, 3, 1]
     assert [why for _, why in rows[:5]] == [
-        "largest before", "largest after", "largest on the way after", "largest of cut 2", "largest of cut 3",
+        "largest before", "largest after", "largest path error between points after", "largest of cut 2",
+        "largest of cut 3",
     ]  # fmt: skip
     assert [why for _, why in worst_rows(result, cut >= 0, between, False)[:1]] == ["largest before"]
     assert worst_rows(result, cut >= 9, between, True) == []
@@ -289,11 +300,12 @@ def test_a_page_of_many_motions_is_not_too_large(data):
     nothing, vectors = np.zeros(len(rows)), rng.normal(size=(len(rows), 3))
     big = replace(
         data, corrected=True, motions=n, rows=rows, line=rows + 10, kind=np.full(len(rows), 2),
-        state=np.full(len(rows), int(State.CORRECTED)), cut=figures.cut[rows], way=rows / 1e3, position=vectors,
-        arcs=np.zeros(0, np.int64), bends=np.zeros((0, 3, 3)), force=vectors, deflection=vectors,
+        state=np.full(len(rows), int(MotionOutcome.CORRECTED)),
+        cut=figures.cut[rows], path_length=rows / 1e3, position=vectors,
+        arcs=np.zeros(0, np.int64), arc_points=np.zeros((0, 3, 3)), force=vectors, deflection=vectors,
         correction=figures.correction[rows], before=figures.before[rows], after=figures.after[rows],
-        between=figures.between[rows], inserted=nothing.astype(int), widths=np.zeros((len(rows), 2)),
-        places=(Place(int(np.searchsorted(rows, n // 3)), "", "LIN", ("LIN",)),),
+        path_error=figures.between[rows], inserted=nothing.astype(int), widths=np.zeros((len(rows), 2)),
+        places=(WorstPlace(int(np.searchsorted(rows, n // 3)), "", "LIN", ("LIN",)),),
     )  # fmt: skip
     page = program_page(big, {})
     assert len(page) < 15e6
@@ -393,10 +405,10 @@ def test_hostile_text_is_text_wherever_it_stands(data):
         digests={HOSTILE: HOSTILE},
         findings=(Finding("COR003", HOSTILE, HOSTILE, 3, help=HOSTILE),),
     )  # fmt: skip
-    places = (Place(data.places[0].row, HOSTILE, HOSTILE, (HOSTILE,)),)
+    places = (WorstPlace(data.places[0].row, HOSTILE, HOSTILE, (HOSTILE,)),)
     hostile = replace(data, report=report, places=places, corrected=True)
     page = program_page(hostile, {HOSTILE: HOSTILE}).decode()
-    seen = _Tags(page)
+    seen = Tags(page)
     assert seen.tags.count("script") == 2  # the data and the script of the page
     assert seen.tags.count("style") == 1
     assert "img" not in seen.tags
@@ -417,7 +429,7 @@ def test_a_file_name_that_is_no_text_makes_a_page(data):
 
 def test_a_page_is_well_formed_and_can_be_read_aloud(tmp_path):
     _, page = written(tmp_path)
-    seen = _Tags(page)
+    seen = Tags(page)
     assert seen.open == []
     assert len(set(seen.ids)) == len(seen.ids)
     for name in ("for", "aria-labelledby", "aria-describedby"):
@@ -486,7 +498,14 @@ def _told(data, **changes):
 def test_verdicts(data):
     length = Spread(1.5e-3, 1e-3, 1.4e-3)
     small = Spread(1e-6, 1e-6, 1e-6)
-    done = {"cutting": 5, "corrected": 5, "before": length, "after": small, "between": small, "inserted": 0}
+    done = {
+        "cutting": 5,
+        "corrected": 5,
+        "before": length,
+        "after": small,
+        "path_error": small,
+        "inserted": 0,
+    }
     assert _told(data, **done).startswith(
         "Every cutting motion is corrected: the largest predicted error falls from"
     )
@@ -497,10 +516,10 @@ def test_verdicts(data):
     assert "2 motions were inserted" in _told(data, **{**done, "inserted": 2})
     assert "50% of the correction" in _told(data, **{**done, "gain": 0.5})
     nothing = Spread(np.nan, np.nan, np.nan)
-    assert "nothing bends" in _told(data, **{**done, "before": nothing})
+    assert "no deflection" in _told(data, **{**done, "before": nothing})
     assert "(95 %)" in _told(data, **done)
-    unknown = replace(data.report.doubt, before=np.nan, after=np.nan)
-    assert "95 %" not in _told(data, **{**done, "doubt": unknown})
+    unknown = replace(data.report.uncertainty, before=np.nan, after=np.nan)
+    assert "95 %" not in _told(data, **{**done, "uncertainty": unknown})
 
 
 def test_what_was_left_is_told_with_its_reason(tmp_path):
@@ -508,15 +527,15 @@ def test_what_was_left_is_told_with_its_reason(tmp_path):
     lines.insert(lines.index("LIN {X 400.000}"), ";COMPENSATE ON")
     report, page = written(tmp_path, lines)
     assert (report.cutting, report.corrected) == (5, 1)
-    left = re.search(r'<details class="left".*?</details>', page, re.S)[0]
-    assert "is left as it was" in left
+    left = re.search(r'<details class="uncorrected".*?</details>', page, re.S)[0]
+    assert "is not corrected" in left
     assert "between COMPENSATE OFF and ON" in left
     assert "1 of 5 cutting motions are corrected" in page
 
 
 def test_left_cuts_beyond_some_are_counted(data):
     findings = tuple(Finding("COR003", f"cut {k}", "a", k) for k in range(1, 30))
-    told = left_over(replace(data, corrected=True, report=replace(data.report, findings=findings)))
+    told = reasons(replace(data, corrected=True, report=replace(data.report, findings=findings)))
     assert told[0] == "cut 1"
     assert told[-1] == "and 21 more cuts, see the findings"
 
@@ -534,7 +553,7 @@ def test_findings_the_gravest_first_and_not_without_end():
     assert len(rows) == 300
 
 
-class _Tags(HTMLParser):
+class Tags(HTMLParser):
     """Tags, attributes and text of a page; ``open``: what was not closed."""
 
     EMPTY = ("meta", "link", "input", "img", "br")
@@ -567,5 +586,5 @@ class _Tags(HTMLParser):
 
 def _plain(text):
     stream = io.StringIO()
-    stream.write(_Tags(f"<p>{text}</p>").text)
+    stream.write(Tags(f"<p>{text}</p>").text)
     return stream.getvalue()

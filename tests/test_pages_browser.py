@@ -10,6 +10,7 @@ import pytest
 from conftest import CELL, LINES
 
 pytest_plugins = ("browser",)
+pytestmark = pytest.mark.slow
 
 HOSTILE = ";</code></script><script>window.hacked=1</script><img src=x onerror='window.hacked=1'>&amp;"
 """What a comment behind a motion may say."""
@@ -27,7 +28,7 @@ def done(tmp_path_factory):
     lines = [line + HOSTILE if "C_DIS" in line else line for line in LINES]
     lines.insert(8, ";FORCE <script>window.hacked=1</script>")
     (folder / "part.src").write_text("\n".join(lines) + "\n")
-    compensate(Request(folder / "part.src", force="", keep_points=True))
+    compensate(Request(folder / "part.src", force="", no_insert=True))
     return folder / "compensated"
 
 
@@ -81,11 +82,11 @@ def test_the_path_is_drawn(window, done):
     ink = np.abs(drawn - ground).sum(axis=2) > 60
     assert ink.sum() > 3000
     assert len({tuple(colour) for colour in drawn[ink].reshape(-1, 3)[::7].tolist()}) > 20
-    # another quantity, arrows, the bent path, and another view each change what is seen
+    # another quantity, arrows, the deflected path, and another view each change what is seen
     for act in (
         lambda page: page.select_option("#quantity", "force"),
         lambda page: page.uncheck("#arrows"),
-        lambda page: page.check("#bent"),
+        lambda page: page.check("#deflected"),
         lambda page: page.click("text=top"),
     ):
         before = shown.pixels("#space")

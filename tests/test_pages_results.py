@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
-from test_pages import HOSTILE, _Tags
+from test_pages import HOSTILE, Tags
 
-from postproc.findings import Finding, Refusal
+from postproc.base.findings import Finding, Refusal
 from postproc.report.diagnosed_terminal import show_diagnosed
 from postproc.report.identified_terminal import show_identified
+from postproc.report.mapped import show_map
 from postproc.report.page_results import diagnosed_page, identified_page, mapped_page
-from postproc.report.workspace import show_map
 from postproc.workflows.diagnose import DiagnoseRequest, diagnose_robot
 from postproc.workflows.identify import IdentifyRequest, identify
-from postproc.workflows.workspace import MapRequest, map_workspace
+from postproc.workflows.map import MapRequest, map_workspace
 
 pytest_plugins = ("browser",)
 
@@ -69,11 +69,12 @@ def one(request, made):
     return made[request.param]
 
 
+@pytest.mark.slow
 def test_the_page_says_what_the_terminal_says(one):
     result, page, show, _ = one
     stream = io.StringIO()
     show(Console(file=stream, width=4000, highlight=False), result, True)
-    seen = " ".join(_Tags(page.read_text(encoding="utf-8")).text.split())
+    seen = " ".join(Tags(page.read_text(encoding="utf-8")).text.split())
     said = [
         line
         for line in stream.getvalue().splitlines()
@@ -90,10 +91,7 @@ def test_the_page_is_among_the_outputs_and_leads_to_the_others(one):
     result, page, *_ = one
     assert str(page) in result.outputs
     links = {
-        value
-        for _, attributes in _Tags(page.read_text()).found
-        for value in [attributes.get("href")]
-        if value
+        value for _, attributes in Tags(page.read_text()).found for value in [attributes.get("href")] if value
     }
     wanted = {"./" + Path(path).relative_to(page.parent).as_posix() for path in result.outputs} - {
         f"./{page.name}"
@@ -101,10 +99,11 @@ def test_the_page_is_among_the_outputs_and_leads_to_the_others(one):
     assert wanted <= links
 
 
+@pytest.mark.sample(1)
 def test_hostile_names_are_text(one):
     result, _, _, make = one
     said = Finding("FIL001", HOSTILE, HOSTILE, help=HOSTILE)
-    seen = _Tags(
+    seen = Tags(
         make(
             replace(result, robot=HOSTILE.replace("\x1b", ""), findings=(said,)), {HOSTILE: HOSTILE}
         ).decode()

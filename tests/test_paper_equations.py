@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from motions import load_of
 from plant import kr270, random_angles, random_tools, with_compensator
 
+from postproc.base.geometry import Poses, rotation_from_abc, vector_from_rotation
+from postproc.base.units import DEG
 from postproc.effects.gravity_compensator import GravityCompensator
-from postproc.geometry import Poses, rotation_from_abc, vector_from_rotation
 from postproc.model import StiffnessModel
 from postproc.robot.inverse import inverse
-from postproc.units import DEG
 
 A2 = 1
 TABLE_1 = {"K_c": 1 / 0.144e-6, "s0": 0.458, "L": 0.18472, "a_x": 0.68593, "a_y": 0.12030, "h": 0.0}
@@ -43,7 +43,7 @@ def model(**change):
 
 
 def compliance_only():
-    return model().without(["gravity_compensator"])
+    return model().without_effects(["gravity_compensator"])
 
 
 # Eq. (1)
@@ -93,8 +93,8 @@ def test_size_of_the_printed_spring():
     torque = np.abs(spring(TABLE_1, np.linspace(low, high, 2001)).torque).max()
     assert torque == pytest.approx(346.76e3, rel=1e-4)
     acting, balanced = model(preload="acting"), model()
-    assert [finding.code for finding in acting.doubts()] == ["MOD001"]
-    assert balanced.doubts() == []
+    assert [finding.code for finding in acting.plausibility_findings()] == ["MOD001"]
+    assert balanced.plausibility_findings() == []
 
 
 # Eqs (3), (4)
@@ -150,11 +150,17 @@ def test_preload_is_the_torque_at_the_motor_angle():
         np.testing.assert_allclose(acting[A2], torque, rtol=1e-14)
 
 
+def joint_compliance(robot, q):
+    """(N, 6) of the joints of the unloaded robot: eq. (6), inverted."""
+    state = robot.state(q, np.zeros((len(q), 6)), Poses.identity())
+    return robot.compliance(state)[:, robot.chain.motor_rows]
+
+
 def test_printed_sign_flips_the_increment():
     q = random_angles(kr270(), 50, np.random.default_rng(6))
-    bare = 1 / compliance_only().joint_compliance(q)
-    energy = 1 / model().joint_compliance(q) - bare
-    printed = 1 / model(sign="as_printed").joint_compliance(q) - bare
+    bare = 1 / joint_compliance(compliance_only(), q)
+    energy = 1 / joint_compliance(model(), q) - bare
+    printed = 1 / joint_compliance(model(sign="as_printed"), q) - bare
     np.testing.assert_allclose(printed, -energy, atol=1e-6)
     expected = [
         TABLE_1["K_c"] * math.hypot(0.68593, 0.12030) * 0.18472 * eta(TABLE_1, angle) for angle in q[:, A2]
@@ -168,7 +174,7 @@ def test_printed_sign_flips_the_increment():
 
 def test_joint_stiffness_is_the_sum_on_the_diagonal():
     q = random_angles(kr270(), 50, np.random.default_rng(7))
-    bare, whole = compliance_only().joint_compliance(q), model().joint_compliance(q)
+    bare, whole = joint_compliance(compliance_only(), q), joint_compliance(model(), q)
     table = np.array([3.774, 0.302, 0.406, 3.002, 3.303, 2.365]) * 1e-6
     np.testing.assert_allclose(bare, np.broadcast_to(table, bare.shape), rtol=1e-14)
     slope = spring(TABLE_1, q[:, A2]).slope
@@ -189,7 +195,7 @@ def test_cartesian_stiffness_is_that_of_the_solved_equilibrium(build):
         measured[:, :3, i] = (up.position - down.position) / 2
         turn = up.rotation @ np.swapaxes(down.rotation, 1, 2)
         measured[:, 3:, i] = vector_from_rotation(turn) / 2
-    stiffness = robot.cartesian_stiffness(q, tool)
+    stiffness = np.linalg.inv(robot.cartesian_compliance(q, None, tool))
     compliance = np.linalg.inv(stiffness)
     scale = np.abs(compliance).max(axis=(1, 2), keepdims=True)
     assert (np.abs(measured - compliance) / scale).max() < 1e-8

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from postproc.dialects import DIALECTS
-from postproc.dialects.permitted import refuse_other
-from postproc.document import Document, Edit, Edits, Span
-from postproc.findings import Refusal
+from postproc.base.document import Document, Edit, Edits, Span
+from postproc.base.findings import Refusal
+from postproc.languages import DIALECTS
+from postproc.languages.permitted import refuse_other
 
 KRL = b"""\xef\xbb\xbfDEF part()
 ;FOLD INI
@@ -167,6 +167,7 @@ def test_blocks_keep_what_is_no_coordinate(name, raw):
             judged(raw, dialect, edit)
 
 
+@pytest.mark.slow
 def test_one_wrong_edit_among_many_is_found():
     """In whichever block of edits it is, and the first of several is told."""
     lines = b"".join(

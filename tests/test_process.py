@@ -8,10 +8,10 @@ import pytest
 from test_forces import DOWN, FRAMES, cell_of, codes, path_of, refused, run
 from test_milling import ALLOY, MM, cut_of
 
-from postproc.forces.milling import Coefficients, mean_force
-from postproc.forces.operations import join
-from postproc.forces.process import read_process
-from postproc.geometry import rotation_from_abc
+from postproc.base.geometry import rotation_from_abc
+from postproc.process.milling_forces import Coefficients, mean_force
+from postproc.process.operations import join
+from postproc.process.process_file import read_process
 from postproc.toolpath import Annotation, FrameRef, Kind
 
 OPERATION = """
@@ -63,7 +63,7 @@ def test_the_mean_force_of_each_motion_in_the_feed_frame(tmp_path):
     (told,) = result.findings
     assert (told.code, told.severity, told.line) == ("FRC015", "info", 3)
     assert (
-        "5 motions in lines 11 to 16, feed per tooth 0.1 mm, mean force 62.5, 293.6, -55.6 N @feed"
+        "5 motions in lines 11 to 16 have a feed per tooth of 0.1 mm, the mean force is 62.5, 293.6, -55.6 N @feed"
         in told.message
     )
     assert "EN AW-7075-T6, +- 47 %" in told.message
@@ -86,7 +86,10 @@ def test_joined_by_tool_number_and_lines(tmp_path):
     result = run(path, operations(tmp_path, "tool: 2"), cell)
     assert result.carries.tolist() == [False] * 5 + [True, True]
     assert codes(result) == ["FRC007", "FRC015"]
-    assert "taken as air: 3; the first is in line 11" in result.findings[0].message
+    assert (
+        "3 motions belong to no operation and count as air; the first is in line 11"
+        in result.findings[0].message
+    )
     result = run(path, operations(tmp_path, "lines: [12, 13]", "tool: 2"), cell)
     assert result.carries.tolist() == [False, False, True, True, False, True, True]
 
@@ -102,7 +105,7 @@ operations:
     path = program([(2, "FINISH")])
     result = run(path, str(process(tmp_path, text)))
     found = [f.message for f in result.findings if f.code == "FRC015"]
-    assert [message.split(",")[0] for message in found] == [
+    assert [message.split(" have a feed")[0] for message in found] == [
         "operation tool 1: 1 motions in lines 11 to 11",
         "operation 'FINISH': 3 motions in lines 12 to 16",
         "operation lines 13 to 13: 1 motions in lines 13 to 13",
@@ -125,7 +128,7 @@ def test_a_name_stands_as_whole_words(tmp_path, text, rows):
     if rows is None:
         (finding,) = refused(program([(1, text)]), spec)
         assert (finding.code, finding.line) == ("FRC011", 3)
-        assert f"comments of the program: '{text}'" in finding.help
+        assert f"the program has the comments '{text}'" in finding.help
     else:
         assert np.flatnonzero(run(program([(1, text)]), spec).carries).tolist() == rows
 
@@ -156,7 +159,7 @@ def test_a_cut_behind_a_comment_without_a_name_is_told(tmp_path):
     result = run(program([(0, "POCKET A"), (4, "POCKET B")]), spec)
     (told,) = [f for f in result.findings if f.code == "FRC018"]
     assert (told.severity, told.line) == ("info", 13)
-    assert "1 cuts begin" in told.message
+    assert "1 cuts start" in told.message
     assert "'POCKET B'" in told.message
     # a comment inside a cut begins none, and one of several may name the operation
     for comments in (
@@ -171,12 +174,12 @@ def test_a_program_of_another_process(tmp_path):
     (finding,) = refused(program(), spec)
     assert finding.code == "FRC011"
     assert (
-        "no operation of milling.yaml has a motion in part.src; lines 10 to 16 hold motions"
+        "no operation of milling.yaml has a motion in part.src; lines 10 to 16 contain motions"
         in finding.message
     )
-    assert finding.help == "the program has no comments to join a name with"
+    assert finding.help == "the program has no comments that could match a name"
     (finding,) = refused(program(), operations(tmp_path, "tool: 7"))
-    assert finding.help == "tools of the program: 1"
+    assert finding.help == "the program uses the tools 1"
 
 
 def test_an_unknown_feed_is_refused_with_its_line(tmp_path):
@@ -212,7 +215,7 @@ def test_an_approach_from_an_axis_position_is_air(tmp_path):
     result = run(path, operations(tmp_path, "lines: [1, 99]"))
     assert result.carries.tolist() == [False, False, False, True]
     (told,) = [f for f in result.findings if f.code == "FRC014"]
-    assert told.message == "motions without a force: 1 along the spindle, 1 from axis positions"
+    assert told.message == "1 motions along the spindle and 1 from axis positions have no computed force"
 
 
 def test_a_fast_move_that_counts_as_cutting_is_told(tmp_path):
@@ -252,7 +255,7 @@ operations:
 
 def test_the_process_of_the_cell_is_the_last_source(tmp_path):
     operations(tmp_path, "lines: [1, 99]")
-    cell = cell_of(path=tmp_path / "cell.yaml", process="milling.yaml", process_line=4)
+    cell = cell_of(path=tmp_path / "cell.yaml", process="milling.yaml")
     assert run(program(), "", cell).source == "cell: milling.yaml"
     noted = program(notes=[(0, "FORCE 1 0 0", 3)])
     assert run(noted, "", cell).source == "FORCE comments"
@@ -282,21 +285,21 @@ GOOD = OPERATION.format(by="lines: [1, 99]")
         ("EN AW-7075-T6", "granite", "YML004", 11, "'granite' is not known", "coefficients: {ktc: ..."),
         ("    material: EN AW-7075-T6\n", "", "YML003", 3, "the key 'material' is missing", "EN AW-6061-T6"),
         ("direction: down", "direction: dwon", "YML004", 9, "did you mean 'down'", ""),
-        ("direction: down", "direction: slot", "YML004", 8, "8 mm is no slot", "up or down"),
+        ("direction: down", "direction: slot", "YML004", 8, "8 mm is not a slot", "up or down"),
         ("helix: 30", "helix: 95", "YML004", 6, "95 is not within -75 .. 75", ""),
         ("diameter: 16", "diameter: -16", "YML004", 4, "-16 is not within 0.01 .. 1000", ""),
         ("diameter: 16", "diamter: 16", "YML002", 4, "did you mean 'diameter'", "radial_width"),
         ("axial_depth: 5", "axial_depth: nan", "YML004", 7, "'nan' is not a number", ""),
-        ("lines: [1, 99]", "lines: [9, 1]", "YML004", 3, "9 to 1 is no range of lines", ""),
+        ("lines: [1, 99]", "lines: [9, 1]", "YML004", 3, "9 to 1 is not a range of lines", ""),
         ("lines: [1, 99]", "tool: 0", "YML004", 3, "0 is not a whole number", ""),
         ("lines: [1, 99]", "name: ' '", "YML004", 3, "is empty", ""),
-        ("lines: [1, 99]", "tool: 1\n    name: A", "YML004", 4, "stands beside 'tool'", "one of: name"),
+        ("lines: [1, 99]", "tool: 1\n    name: A", "YML004", 4, "excludes 'tool'", "one of: name"),
         (
             "lines: [1, 99]\n    diameter",
             "diameter",
             "YML003",
             3,
-            "says not which motions it has",
+            "does not state which motions belong to it",
             "one of: name",
         ),
     ],
@@ -314,9 +317,9 @@ def test_mistakes_are_told_with_their_line(tmp_path, old, new, code, line, words
 @pytest.mark.parametrize(
     ("by", "words"),
     [
-        (("name: A", "name: a"), "'a' stands twice, first in line 3"),
+        (("name: A", "name: a"), "'a' is defined twice, first in line 3"),
         (("tool: 3", "tool: 3"), "tool 3 has an operation already, in line 3"),
-        (("lines: [1, 20]", "lines: [20, 30]"), "lines 20 to 30 meet those of the operation in line 3"),
+        (("lines: [1, 20]", "lines: [20, 30]"), "lines 20 to 30 overlap those of the operation in line 3"),
     ],
 )
 def test_operations_that_claim_the_same_motions(tmp_path, by, words):
@@ -329,10 +332,10 @@ def test_operations_that_claim_the_same_motions(tmp_path, by, words):
     ("text", "words"),
     [
         ("defaults: {teeth: 3}\n", "the key 'operations' is missing"),
-        ("operations: []\n", "no operation stands here"),
+        ("operations: []\n", "contains no operation"),
         ("operation: []\n", "did you mean 'operations'"),
         ("operations: 3\n", "must be a list"),
-        ("defaults: {name: A}\noperations: []\n", "unknown key"),
+        ("defaults: {name: A}\noperations: []\n", "the key is unknown"),
     ],
 )
 def test_files_that_are_no_process(tmp_path, text, words):

@@ -8,7 +8,7 @@ import pytest
 from conftest import CELL, LINES
 from test_milling import MM, cut_of
 
-from postproc.forces.milling import mean_force
+from postproc.process.milling_forces import mean_force
 
 BRACKET = Path(__file__).parents[1] / "samples" / "kr270_milling" / "bracket.src"
 
@@ -50,17 +50,11 @@ def test_the_sample_has_three_operations_with_an_interval_each(compensate):
     ]
     assert "+- 47 %" in told[0]
     assert "own coefficients, +- 15 %" in told[2]
-    readme = BRACKET.with_name("README.md").read_text()
-    for message in told:
-        mean, peak = re.search(r"mean force (.*) N @feed, up to (\d+) N", message).groups()
-        assert f"| {mean} | up to {peak} |" in readme
-    assert f"of {report['error_before_mm']['max']:.2f} mm before the correction" in readme
-    assert f"{report['error_before_mm']['ci95']:.1f} mm (95 %)" in readme
     # nothing rapid, no plunge and no retract is milling
     assert report["cutting"] == 9
     assert report["cuts"] == 3
-    assert report["doubt"]["blame"][0]["parameter"] == "force"
-    assert "force" not in report["doubt"]["without_interval"]
+    assert report["uncertainty"]["budget"][0]["parameter"] == "force"
+    assert "force" not in report["uncertainty"]["without_interval"]
     assert report["error_before_mm"]["ci95"] > 0.3 * report["error_before_mm"]["max"]
 
 
@@ -115,10 +109,10 @@ def test_a_log_over_the_path_length(compensate, milling):
 @pytest.mark.parametrize(
     ("edit", "code", "words"),
     [
-        (lambda text: "\n".join(text.splitlines()[:400]) + "\n", "FRC019", "the log ends at s = 398 mm"),
+        (lambda text: "\n".join(text.splitlines()[:400]) + "\n", "FRC019", "it ends at s = 398 mm"),
         (lambda text: text.replace("\n5,0,300", "\n5,nan,300"), "FRC003", "'nan' is not a number"),
-        (lambda text: text.replace("0,base\n9,", "0,bsae\n9,"), "FRC003", "no frame 'bsae'"),
-        (lambda text: text.replace("\n7,", "\n70,"), "FRC003", "must not go back"),
+        (lambda text: text.replace("0,base\n9,", "0,bsae\n9,"), "FRC003", "'bsae' is not a frame"),
+        (lambda text: text.replace("\n7,", "\n70,"), "FRC003", "must not decrease"),
     ],
 )
 def test_a_wrong_log_writes_nothing(compensate, milling, edit, code, words):
@@ -134,10 +128,10 @@ def test_a_wrong_log_writes_nothing(compensate, milling, edit, code, words):
 
 
 def test_the_offset_option_needs_air_and_a_log(compensate, milling):
-    done = compensate("predict", milling.program, "--force", log_of(milling, 1200), "--force-offset")
+    done = compensate("predict", milling.program, "--force", log_of(milling, 1200), "--tare")
     assert done.code == 1
-    assert "FRC020 no reading of this log lies in air" in done.err
-    done = compensate("predict", milling.program, "--force-offset")
+    assert "FRC020 no reading of this log is in air" in done.err
+    done = compensate("predict", milling.program, "--tare")
     assert done.code == 1
     assert "there is no --force" in done.err
     lines = [line for line in LINES if not line.startswith(";FORCE ")]
@@ -148,7 +142,7 @@ def test_the_offset_option_needs_air_and_a_log(compensate, milling):
         milling.program,
         "--force",
         log_of(milling, 1200, offset=5.0),
-        "--force-offset",
+        "--tare",
         "--json",
         "-",
     )

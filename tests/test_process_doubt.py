@@ -7,8 +7,8 @@ import pytest
 from test_doubt import job, paper, restated
 
 from postproc.compensation.correct import correct
-from postproc.compensation.doubt import FORCE, doubt_of
-from postproc.report.terminal import _doubt
+from postproc.compensation.uncertainty import FORCE, evaluate_uncertainty
+from postproc.report.terminal import describe_budget
 
 
 def with_shares(task, ci95):
@@ -22,44 +22,47 @@ def known(**intervals):
 def test_the_same_share_in_all_motions_is_one_share():
     task = job(known(), 8)
     result = correct(task)
-    one, each = doubt_of(task, result, 0.3), doubt_of(with_shares(task, [0.3] * 8), result)
+    one, each = (
+        evaluate_uncertainty(task, result, 0.3),
+        evaluate_uncertainty(with_shares(task, [0.3] * 8), result),
+    )
     assert (each.before, each.after) == (pytest.approx(one.before), pytest.approx(one.after))
-    assert np.allclose(each.widths, one.widths)
-    assert each.tenth == one.tenth == ()
+    assert np.allclose(each.expanded, one.expanded)
+    assert each.effect_of_10_percent == one.effect_of_10_percent == ()
     assert not each.force_differs
-    assert "force, one scale for all motions" in _doubt(each)
+    assert "force, one scale for all motions" in describe_budget(each)
 
 
 def test_every_operation_has_its_own_share():
     task = job(known(), 8)
     result = correct(task)
-    told = doubt_of(with_shares(task, [0.5] * 4 + [0.1] * 4), result)
-    rough, fine = (doubt_of(task, result, share).widths for share in (0.5, 0.1))
-    assert np.allclose(told.widths[:4], rough[:4])
-    assert np.allclose(told.widths[4:], fine[4:])
+    told = evaluate_uncertainty(with_shares(task, [0.5] * 4 + [0.1] * 4), result)
+    rough, fine = (evaluate_uncertainty(task, result, share).expanded for share in (0.5, 0.1))
+    assert np.allclose(told.expanded[:4], rough[:4])
+    assert np.allclose(told.expanded[4:], fine[4:])
     assert told.force_differs
     share = 0.5 if told.worst < 4 else 0.1
-    assert told.before == pytest.approx(doubt_of(task, result, share).before)
-    assert "force, each operation with its own" in _doubt(told)
+    assert told.before == pytest.approx(evaluate_uncertainty(task, result, share).before)
+    assert "force, one scale per operation" in describe_budget(told)
 
 
 def test_the_cell_counts_before_the_process():
     task = job(known(), 5)
     result = correct(task)
-    told = doubt_of(with_shares(task, [0.5] * 5), result, 0.1)
-    assert told.before == pytest.approx(doubt_of(task, result, 0.1).before)
+    told = evaluate_uncertainty(with_shares(task, [0.5] * 5), result, 0.1)
+    assert told.before == pytest.approx(evaluate_uncertainty(task, result, 0.1).before)
 
 
 def test_an_operation_without_an_interval_makes_a_lower_bound():
     task = job(known(), 8)
     result = correct(task)
-    told = doubt_of(with_shares(task, [0.5] * 4 + [np.nan] * 4), result)
+    told = evaluate_uncertainty(with_shares(task, [0.5] * 4 + [np.nan] * 4), result)
     assert told.lower_bound
-    assert [name for name, _ in told.tenth] == [FORCE]
-    assert np.allclose(told.widths[:4], doubt_of(task, result, 0.5).widths[:4])
-    assert np.allclose(told.widths[4:], doubt_of(task, result, 0.0).widths[4:])
-    nothing = doubt_of(with_shares(task, [np.nan] * 8), result)
-    assert [name for name, _ in nothing.tenth] == [FORCE]
+    assert [name for name, _ in told.effect_of_10_percent] == [FORCE]
+    assert np.allclose(told.expanded[:4], evaluate_uncertainty(task, result, 0.5).expanded[:4])
+    assert np.allclose(told.expanded[4:], evaluate_uncertainty(task, result, 0.0).expanded[4:])
+    nothing = evaluate_uncertainty(with_shares(task, [np.nan] * 8), result)
+    assert [name for name, _ in nothing.effect_of_10_percent] == [FORCE]
 
 
 def test_air_needs_no_interval():
@@ -68,6 +71,6 @@ def test_air_needs_no_interval():
     wrench[3] = 0
     carries = np.arange(6) != 3
     task = replace(task, force=replace(task.force, values=wrench, start=wrench, carries=carries))
-    told = doubt_of(with_shares(task, np.where(carries, 0.3, np.nan)), correct(task))
-    assert told.tenth == ()
+    told = evaluate_uncertainty(with_shares(task, np.where(carries, 0.3, np.nan)), correct(task))
+    assert told.effect_of_10_percent == ()
     assert not told.force_differs

@@ -11,8 +11,8 @@ import time
 
 import pytest
 
-from postproc.findings import Refusal
-from postproc.publish import publish, sweep
+from postproc.base.findings import Refusal
+from postproc.output.atomic_write import sweep, write_atomically
 
 
 def names(folder) -> list[str]:
@@ -21,9 +21,9 @@ def names(folder) -> list[str]:
 
 def test_writes_all_and_leaves_no_other_file(tmp_path):
     files = {tmp_path / "new" / "a.src": b"a", tmp_path / "new" / "a.dat": b"b"}
-    publish(files, last=tmp_path / "new" / "a.src")
+    write_atomically(files, last=tmp_path / "new" / "a.src")
     assert names(tmp_path / "new") == ["a.dat", "a.src"]
-    publish({path: content * 2 for path, content in files.items()}, last=tmp_path / "new" / "a.src")
+    write_atomically({path: content * 2 for path, content in files.items()}, last=tmp_path / "new" / "a.src")
     assert {path.read_bytes() for path in files} == {b"aa", b"bb"}
     assert names(tmp_path / "new") == ["a.dat", "a.src"]
 
@@ -31,7 +31,7 @@ def test_writes_all_and_leaves_no_other_file(tmp_path):
 @pytest.mark.parametrize("failing", [1, 2, 3, 4])
 def test_a_failing_rename_brings_the_old_files_back(tmp_path, monkeypatch, failing):
     files = {tmp_path / "a.src": b"old src", tmp_path / "a.dat": b"old dat"}
-    publish(files)
+    write_atomically(files)
     real, calls = os.replace, [0]
 
     def replace(source, target):
@@ -42,7 +42,7 @@ def test_a_failing_rename_brings_the_old_files_back(tmp_path, monkeypatch, faili
 
     monkeypatch.setattr(os, "replace", replace)
     with pytest.raises(Refusal) as refusal:
-        publish(dict.fromkeys(files, b"new"), last=tmp_path / "a.src")
+        write_atomically(dict.fromkeys(files, b"new"), last=tmp_path / "a.src")
     assert refusal.value.findings[0].code == "FIL004"
     assert {path: path.read_bytes() for path in files} == files
     assert names(tmp_path) == ["a.dat", "a.src"]
@@ -51,7 +51,7 @@ def test_a_failing_rename_brings_the_old_files_back(tmp_path, monkeypatch, faili
 def test_a_name_that_is_a_folder(tmp_path):
     (tmp_path / "a.src").mkdir()
     with pytest.raises(Refusal):
-        publish({tmp_path / "a.dat": b"1", tmp_path / "a.src": b"2"}, last=tmp_path / "a.src")
+        write_atomically({tmp_path / "a.dat": b"1", tmp_path / "a.src": b"2"}, last=tmp_path / "a.src")
     assert (tmp_path / "a.src").is_dir()
     assert not (tmp_path / "a.dat").exists()
 
@@ -65,7 +65,7 @@ def test_parts_are_made_while_they_are_written(tmp_path):
             assert not (tmp_path / "a.csv").exists()
             yield b"%d" % number * 100_000
 
-    publish({tmp_path / "a.csv": parts(), tmp_path / "a.src": b"src"}, last=tmp_path / "a.src")
+    write_atomically({tmp_path / "a.csv": parts(), tmp_path / "a.src": b"src"}, last=tmp_path / "a.src")
     assert (tmp_path / "a.csv").read_bytes() == b"".join(b"%d" % number * 100_000 for number in range(3))
     assert names(tmp_path) == ["a.csv", "a.src"]
 
@@ -79,7 +79,7 @@ def test_parts_that_can_not_be_made_leave_nothing(tmp_path, error):
         raise error
 
     with pytest.raises(type(error)):
-        publish({tmp_path / "a.src": b"src", tmp_path / "a.csv": parts()}, last=tmp_path / "a.src")
+        write_atomically({tmp_path / "a.src": b"src", tmp_path / "a.csv": parts()}, last=tmp_path / "a.src")
     assert names(tmp_path) == ["a.csv"]
     assert (tmp_path / "a.csv").read_bytes() == b"old"
 
@@ -104,7 +104,7 @@ def test_a_file_that_is_being_written_is_not_swept(tmp_path):
         goes_on.wait()
         yield b" and whole"
 
-    writer = threading.Thread(target=publish, args=({path: parts()},))
+    writer = threading.Thread(target=write_atomically, args=({path: parts()},))
     writer.start()
     begun.wait()
     sweeper = threading.Thread(target=sweep, args=([path],))
@@ -122,7 +122,7 @@ def test_a_file_that_is_being_written_is_not_swept(tmp_path):
 LOOP = """
 import sys
 from pathlib import Path
-from postproc.publish import publish
+from postproc.output.atomic_write import publish
 folder = Path(sys.argv[1])
 n = 0
 while True:

@@ -7,7 +7,7 @@ import pytest
 from effects_at_work import TOOL
 from measured import plan, robot, scattered, somewhere, taken
 
-from postproc.geometry import vector_from_rotation
+from postproc.base.geometry import vector_from_rotation
 from postproc.identification.campaign import Campaign
 from postproc.identification.registration import registered
 from postproc.model import StiffnessModel
@@ -34,7 +34,7 @@ def visit(name, count, rng, targets=(), places=(), sessions=1, posed=False, tool
     campaign, model = Campaign(readings), StiffnessModel(described, ())
     given = somewhere(campaign, rng, 0.5)
     campaign.readings = taken(campaign, model, given)
-    return campaign, campaign.seen(model), given
+    return campaign, campaign.predicted(model), given
 
 
 def left(campaign, seen, given):
@@ -46,6 +46,7 @@ def everything(campaign):
     return np.ones(len(campaign), bool)
 
 
+@pytest.mark.slow
 def test_any_turn_of_a_tracker_is_found_and_any_place_of_its_target():
     """200 draws: no turn is too far from where the search begins."""
     rng = np.random.default_rng(1)
@@ -72,6 +73,7 @@ def test_several_targets_stated_or_not(name, places, seed):
     np.testing.assert_array_equal(found.places[stated], campaign.stated_places[stated])
 
 
+@pytest.mark.sample(3)
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("posed", [False, True])
 def test_every_session_has_its_station(posed, seed):
@@ -153,6 +155,6 @@ def test_in_the_robot_frame_nothing_is_registered():
     assert campaign.nuisance_names == ()
     model = StiffnessModel(described, ())
     campaign.readings = replace(taken(campaign, model), value=rng.normal(size=(5, 3)))
-    found = registered(campaign, campaign.seen(model), everything(campaign))
+    found = registered(campaign, campaign.predicted(model), everything(campaign))
     np.testing.assert_array_equal(found.frames.rotation, [np.eye(3)])
     np.testing.assert_array_equal(found.places, campaign.stated_places)

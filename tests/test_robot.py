@@ -8,15 +8,16 @@ import pinocchio as pin
 import pytest
 from motions import milling_angles, motions
 from plant import kr270, random_angles, random_tools
+from reference import reference_flange
 
-from postproc.findings import Finding, Refusal
-from postproc.geometry import Poses, vector_from_rotation, wrapped
+from postproc.base.findings import Finding, Refusal
+from postproc.base.geometry import Poses, vector_from_rotation, wrapped
 from postproc.model import StiffnessModel
+from postproc.robot.axis_track import follow_axes, is_near_singular, sides
 from postproc.robot.chain import Chain, generalized_force
 from postproc.robot.description import find_robot, load_robot, robot_files
 from postproc.robot.geometries import KukaLengths
 from postproc.robot.inverse import inverse, status_of, turn_of
-from postproc.robot.track import follow, near_singular, sides
 from postproc.toolpath import Kind
 
 DEG = math.pi / 180
@@ -54,7 +55,7 @@ def test_batch_is_pinocchios(robot):
     for arm in (robot.arm, OTHER):
         arms = chain_of(arm, robot)
         q = random_angles(robot, 200, np.random.default_rng(1))
-        ours, reference = arms.flange(q), arms.reference_flange(q)
+        ours, reference = arms.flange(q), reference_flange(arms, q)
         assert np.abs(ours.position - reference.position).max() < 1e-14
         assert np.abs(ours.rotation - reference.rotation).max() < 1e-14
 
@@ -90,7 +91,7 @@ def test_jacobian_is_the_derivative(chain, robot):
 def test_generalized_force_is_the_jacobian_transposed(chain, robot):
     rng = np.random.default_rng(4)
     q, tool, wrench = random_angles(robot, 50, rng), random_tools(50, rng), rng.normal(size=(50, 6))
-    swept = chain.sweep(np.ascontiguousarray(q.T), tool)
+    swept = chain.evaluate(np.ascontiguousarray(q.T), tool)
     torque = generalized_force(swept, swept.position, wrench.T)
     assert np.abs(torque.T - np.einsum("nij,ni->nj", chain.jacobian(q, tool), wrench)).max() < 1e-14
 
@@ -157,7 +158,7 @@ def test_inverse_of_forward_in_all_branches(robot, arm):
     far, turned = apart(arms.flange(found.q), pose)
     assert far < 1e-9
     assert turned < 1e-9
-    clear = ~near_singular(replace(robot, nominal=arm), q)
+    clear = ~is_near_singular(replace(robot, nominal=arm), q)
     assert clear.sum() > 3000
     assert np.array_equal(status_of(arm, found.q[clear]), branch[clear])
     assert np.abs(found.q - q)[clear].max() < 1e-10
@@ -259,15 +260,15 @@ def test_turn_bits():
 
 def test_near_singular_places(robot):
     clear = np.radians([0.0, -60, 80, 0, 45, 0])
-    assert not near_singular(robot, clear[None])[0]
+    assert not is_near_singular(robot, clear[None])[0]
     for axis, degrees in ((4, 1.0), (4, -1.0), (2, -2.86), (2, -2.0)):
         q = clear.copy()
         q[axis] = degrees * DEG
-        assert near_singular(robot, q[None])[0]
+        assert is_near_singular(robot, q[None])[0]
     for axis, degrees in ((4, 1.3), (2, -1.5)):
         q = clear.copy()
         q[axis] = degrees * DEG
-        assert not near_singular(robot, q[None])[0]
+        assert not is_near_singular(robot, q[None])[0]
     upright = math.acos(-0.35 / math.hypot(1.1, 0.055)) + math.pi / 2 - math.atan2(0.055, 1.1)
     for off, expected in (
         (0.0, True),
@@ -275,7 +276,7 @@ def test_near_singular_places(robot):
         (0.04, False),
     ):  # wrist that far (rad x 1.1 m) from axis 1
         q = np.array([[0.0, -math.pi / 2, upright - off, 0, 0.8, 0]])
-        assert near_singular(robot, q)[0] == expected
+        assert is_near_singular(robot, q)[0] == expected
 
 
 # follow: the axes along a program
@@ -284,7 +285,7 @@ def test_near_singular_places(robot):
 def tracked(robot, chain, q, start, **words):
     """The track of motions whose flange poses are those of ``q``."""
     target = chain.flange(q)
-    return follow(robot, motions(target, **words), target, start)
+    return follow_axes(robot, motions(target, **words), target, start)
 
 
 def steps(**axes):
@@ -344,7 +345,7 @@ def test_stated_turn_resets_the_turns(robot, chain, sign):
         turn=[-1, turn_of(q)[1], -1],
     )
     assert np.abs(track.q - q).max() < 1e-9
-    assert track.turn_holds.all()
+    assert track.turn_matches.all()
 
 
 def test_path_motions_do_not_obey_s_and_t(robot, chain):
@@ -354,7 +355,7 @@ def test_path_motions_do_not_obey_s_and_t(robot, chain):
     track = tracked(robot, chain, q, q[0], status=[-1, 6], turn=[-1, other])
     assert np.abs(track.q - q).max() < 1e-9
     assert track.status.tolist() == [2, 2]
-    assert track.turn_holds.tolist() == [True, False]
+    assert track.turn_matches.tolist() == [True, False]
 
 
 def test_ptp_takes_the_branch_of_its_s(robot, chain):
@@ -373,7 +374,7 @@ def test_turn_of_a_defined_axis_that_is_wrong_is_told(robot, chain, axis):
     stated = int(turn_of(q)[0]) ^ (1 << axis)
     track = tracked(robot, chain, q, q[0], kind=Kind.PTP, status=2, turn=stated)
     # A1, A4, A6 can obey by a whole turn (A1 then leaves its limits); the others can not
-    assert track.turn_holds[0] == (axis in (0, 3, 5))
+    assert track.turn_matches[0] == (axis in (0, 3, 5))
     assert track.within[0] == (axis != 0)
 
 
@@ -381,7 +382,7 @@ def test_turn_near_zero_is_not_held_against_rounding(robot, chain):
     q = steps(A4=[0.005, -0.005])
     track = tracked(robot, chain, q, q[0], kind=Kind.PTP, status=2, turn=[0b001010, 0b000010])
     assert np.abs(track.q - q).max() < 1e-9
-    assert track.turn_holds.all()
+    assert track.turn_matches.all()
 
 
 def test_home_is_where_the_program_starts(robot, chain):
@@ -391,13 +392,13 @@ def test_home_is_where_the_program_starts(robot, chain):
     target = chain.flange(q)
     unknown = Poses(target.rotation.copy(), target.position.copy())
     unknown.rotation[3], unknown.position[3] = np.nan, np.nan
-    track = follow(robot, motions(unknown, **words, refused={3: home}), unknown, q[0])
+    track = follow_axes(robot, motions(unknown, **words, refused={3: home}), unknown, q[0])
     assert track.status.tolist() == [2, 6, 6, 2, 2]
     assert np.abs(track.q - q)[[0, 1, 2, 4]].max() < 1e-9
     assert np.isnan(track.q[3]).all()
     # a PTP to a place that nothing tells loses the branch instead, until something says it
     other = {3: Finding("KRL003", "not declared")}
-    track = follow(robot, motions(unknown, **words, refused=other), unknown, q[0])
+    track = follow_axes(robot, motions(unknown, **words, refused=other), unknown, q[0])
     assert track.status.tolist() == [2, 6, 6, -1, -1]
     assert np.isnan(track.q[3:]).all()
     assert track.reachable.all()
@@ -410,7 +411,7 @@ def test_motion_of_unknown_kind_loses_the_branch_where_it_leads_nowhere_known(ro
     assert known.status.tolist() == [2, 2, 2, 2]
     target = chain.flange(q)
     target.rotation[1], target.position[1] = np.nan, np.nan
-    track = follow(robot, motions(target, kind=kinds, axes={3: q[3]}), target, q[0])
+    track = follow_axes(robot, motions(target, kind=kinds, axes={3: q[3]}), target, q[0])
     assert track.status.tolist() == [2, -1, -1, 2]
 
 
@@ -420,7 +421,7 @@ def test_unknown_start(robot, chain):
     assert track.status.tolist() == [-1, -1, -1]
     assert np.isnan(track.q).all()
     assert track.reachable.all()
-    assert track.turn_holds.all()
+    assert track.turn_matches.all()
     empty = tracked(robot, chain, np.empty((0, 6)), None)
     assert empty.q.shape == (0, 6)
 
@@ -446,7 +447,7 @@ def test_out_of_reach_is_flagged_and_passed(robot, chain):
     target = chain.flange(q)
     position = target.position.copy()
     position[1] += 5.0
-    track = follow(robot, motions(target), Poses(target.rotation, position), q[0])
+    track = follow_axes(robot, motions(target), Poses(target.rotation, position), q[0])
     assert track.reachable.tolist() == [True, False, True]
     assert np.isnan(track.q[1]).any()
     assert np.abs(track.q[[0, 2]] - q[[0, 2]]).max() < 1e-9
@@ -457,7 +458,7 @@ def test_nominal_geometry_is_the_controllers(robot, chain):
     believed = replace(robot, nominal=OTHER)
     q = steps(A4=[20.0, 30.0])
     target = chain_of(OTHER, robot).flange(q)
-    assert np.abs(follow(believed, motions(target), target, q[0]).q - q).max() < 1e-9
+    assert np.abs(follow_axes(believed, motions(target), target, q[0]).q - q).max() < 1e-9
 
 
 # Robot files
@@ -513,8 +514,8 @@ def refused(action):
 
 
 ERRORS = {
-    "unit of a length": ("{unit: mm, d1", "{unit: deg, d1", "YML005", "allowed here: m, mm"),
-    "unit of the limits": ("  unit: deg", "  unit: mm", "YML005", "allowed here: rad, deg"),
+    "unit of a length": ("{unit: mm, d1", "{unit: deg, d1", "YML005", "these are allowed here: m, mm"),
+    "unit of the limits": ("  unit: deg", "  unit: mm", "YML005", "these are allowed here: rad, deg"),
     "unit of a compliance": ("0.302e-6, unit: rad/(N m)", "0.302e-6, unit: N m/rad", "YML005", "rad/(N m)"),
     "unit of another compliance": (
         "0.302e-6, unit: rad/(N m)",
@@ -526,13 +527,13 @@ ERRORS = {
     "unknown key at the top": ("effects:", "efects:", "YML002", "did you mean 'effects'"),
     "unknown key of the geometry": ("  kuka: {", "  kukka: {", "YML002", "did you mean 'kuka'"),
     "unknown length": ("d6: 230", "d7: 230", "YML002", "did you mean"),
-    "unknown joint": ("  A6: [", "  A7: [", "YML002", "did you mean"),
+    "the joint is unknown": ("  A6: [", "  A7: [", "YML002", "did you mean"),
     "unknown key of an effect": ("    options: {", "    option: {", "YML002", "did you mean 'options'"),
     "unknown option": ("preload: balanced", "prelaod: balanced", "YML002", "did you mean 'preload'"),
     "unknown parameter": ("      c2: {", "      cc2: {", "YML002", "did you mean"),
     "unknown key of a parameter": ("ci: 0.115e-6", "ci98: 0.115e-6", "YML002", "did you mean"),
     "reversed limits": ("A2: [-146, 0]", "A2: [0, -146]", "YML004", "the lower limit must be below"),
-    "limits in the wrong unit": ("  unit: deg", "  unit: rad", "YML004", "more than 1000 deg"),
+    "limits in the wrong unit": ("  unit: deg", "  unit: rad", "YML004", "exceeds 1000 deg"),
     "one limit only": ("A2: [-146, 0]", "A2: [-146]", "YML004", "a list of 2 numbers"),
     "no forearm": ("d4: 1100", "d4: 0", "YML004", "must be positive"),
     "negative compliance": (

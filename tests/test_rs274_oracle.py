@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from postproc.dialects.gcode import LINUXCNC, GcodeDialect
-from postproc.document import Document
-from postproc.geometry import on_arc
+from postproc.base.document import Document
+from postproc.base.geometry import on_arc
+from postproc.languages.gcode import LINUXCNC, GcodeDialect
 from postproc.toolpath import Kind
 
 RS274 = shutil.which("rs274")
@@ -304,6 +304,7 @@ class Made:
         )
 
 
+@pytest.mark.sample(10)
 @needs_rs274
 @pytest.mark.parametrize("program", sorted(CASES.glob("*.ngc")), ids=lambda path: path.stem)
 def test_case_files(program: Path, tmp_path: Path) -> None:
@@ -316,6 +317,7 @@ def test_most_case_files_are_accepted(tmp_path: Path) -> None:
     assert sum(agree(program, tmp_path) > 0 for program in programs) >= 0.5 * len(programs) > 0
 
 
+@pytest.mark.slow
 @needs_rs274
 def test_made_up_programs(tmp_path: Path) -> None:
     compared = refused = 0

@@ -11,16 +11,16 @@ import pytest
 import yaml
 from conftest import CELL
 
-from postproc.batch.jobs import JOB_KEYS, PROGRAM_KEYS, jobs_of
+from postproc.base.findings import Refusal
+from postproc.base.yaml_section import parsed
+from postproc.batch.job_file import FORMER_KEYS, JOB_KEYS, PROGRAM_KEYS, jobs_of
 from postproc.cell import KEYS, load_cell
 from postproc.effects import EFFECTS
-from postproc.findings import Refusal
 from postproc.model import StiffnessModel
 from postproc.robot.description import load_robot
 from postproc.schemas import SCHEMAS, schema_of
-from postproc.schemas import cell as cell_module
-from postproc.schemas import job as job_module
-from postproc.yamlfile import parsed
+from postproc.schemas.cell_schema import CELL as CELL_KEYS
+from postproc.schemas.job_schema import BATCH, PROGRAM
 
 ROOT = Path(__file__).resolve().parent.parent
 CELLS = sorted((ROOT / "samples").rglob("cell.yaml"))
@@ -35,13 +35,16 @@ FULL_CELL = """\
 robot: kuka_kr270
 robot_base: {x: 0, y: 1.5, z: 0, a: 1, b: 2, c: 3}
 tools:
-  1: {x: 1, y: 2, z: 3, a: 0, b: 90, c: 0, axis: -X, mass: 42, com: [1, 2, 3]}
+  1: {x: 1, y: 2, z: 3, a: 0, b: 90, c: 0, axis: -X, mass: 42, com: [1, 2, 3], diameter: 12}
   2: {x: 1, y: 2, z: 3, axis: [0, 0, 2]}
 bases:
   12: {x: 1, y: 2, z: 3}
 force: 0,360,560@base
-force_ci95: 0.2
-correct: absolute
+force_ci95: {scale: 0.2, direction_deg: 10, fx: 20, fy: 20, fz: 30}
+force_ramp: 6
+correct: touched_off
+touch_points: {1: [[0, 0, 0], [900, 0, 0]], 2: [[0, 0, 0], [900, 0, 0], [0, 600, 0]]}
+temperature: 24
 start: [0, -90, 90, 0, 90, 0]
 orientation: {a: 0, c: 180}
 tolerance: 0.02
@@ -49,7 +52,7 @@ tolerance_deg: 1e-2
 max_correction: 10
 min_segment: 1.0
 max_growth: 2
-controller: {absolute_accuracy: true, gravity_compensated: false}
+controller: {absolute_accuracy: true, gravity_compensated: false, cycle_ms: 4}
 dialect: {integer_words: um}
 """
 
@@ -159,14 +162,14 @@ robot: kuka_kr270
 force: true
 gain: 0.5
 strict: false
-again: true
+allow_compensated: true
 config_dat: cell.yaml
-force_offset: false
-keep_points: true
-own_points: dat
+tare: false
+no_insert: true
+shared_points: copy-dat
 output: out
 overrides:
-  a.src: {force: '0,1,2', gain: 1, cell: cell.yaml, robot: ur5, strict: true, again: false, output: x.src}
+  a.src: {force: '0,1,2', gain: 1, cell: cell.yaml, robot: ur5, strict: true, allow_compensated: false, output: x.src}
 """
 
 
@@ -211,6 +214,7 @@ def readers(tmp_path):
     return path, {"cell": read_cell, "robot": read_robot, "job": read_job}
 
 
+@pytest.mark.slow
 def test_the_schemas_are_schemas():
     for name in SCHEMAS:
         jsonschema.Draft202012Validator.check_schema(schema_of(name))
@@ -236,9 +240,9 @@ def test_the_job_file_of_the_samples_is_valid():
 
 
 def test_every_key_is_described():
-    assert set(cell_module.CELL) == set(KEYS)
-    assert set(job_module.BATCH) == set(JOB_KEYS)
-    assert set(job_module.PROGRAM) == set(PROGRAM_KEYS)
+    assert set(CELL_KEYS) == set(KEYS)
+    assert set(BATCH) == {*JOB_KEYS, *FORMER_KEYS}
+    assert set(PROGRAM) == set(PROGRAM_KEYS)
     named = schema_of("robot")["properties"]["effects"]["items"]["oneOf"]
     assert [one["properties"]["effect"]["const"] for one in named] == list(EFFECTS)
 
@@ -309,6 +313,7 @@ def lenient(what, here):
     return isinstance(here, str) and what in ("as bool", "as float")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "text"),
     [("cell", FULL_CELL), ("robot", FULL_ROBOT), ("robot", KUKA_ROBOT), ("job", FULL_JOB)],
@@ -340,12 +345,23 @@ def test_schema_and_reader_agree(readers, kind, text):
     assert count > 60
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize(
     ("kind", "text", "old", "new"),
     [
-        ("cell", FULL_CELL, "correct: absolute", "correct: relative"),
+        ("cell", FULL_CELL, "correct: touched_off", "correct: relative"),
+        ("cell", FULL_CELL, "correct: touched_off", "correct: absolute"),
+        ("cell", FULL_CELL, "fz: 30", "fz: -30"),
+        ("cell", FULL_CELL, "direction_deg: 10", "direction_deg: 91"),
+        ("cell", FULL_CELL, "{scale: 0.2, direction_deg: 10, fx: 20, fy: 20, fz: 30}", "{}"),
+        ("cell", FULL_CELL, "{1: [[0, 0, 0], [900, 0, 0]], 2: [[0, 0, 0], [900, 0, 0], [0, 600, 0]]}", "[]"),
+        ("cell", FULL_CELL, "[900, 0, 0]]", "[900, 0]]"),
+        ("cell", FULL_CELL, "force_ramp: 6", "force_ramp: -1"),
+        ("cell", FULL_CELL, "cycle_ms: 4", "cycle_ms: 0"),
+        ("cell", FULL_CELL, "temperature: 24", "temperature: 297"),
+        ("cell", FULL_CELL, "diameter: 12", "diameter: 0"),
         ("cell", FULL_CELL, "axis: -X", "axis: up"),
-        ("cell", FULL_CELL, "force_ci95: 0.2", "force_ci95: 1.2"),
+        ("cell", FULL_CELL, "scale: 0.2", "scale: 1.2"),
         ("cell", FULL_CELL, "tolerance: 0.02", "tolerance: 0"),
         ("cell", FULL_CELL, ", com: [1, 2, 3]", ""),
         ("cell", FULL_CELL, "  12: {", "  x12: {"),

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tiers import examples
 
-from postproc.files import MAX_LINE
-from postproc.findings import Finding, Refusal
-from postproc.tables import comments_above, finite_number, read_table
-from postproc.tables.cells import BLOCK, ROWS
+from postproc.base.findings import Finding, Refusal
+from postproc.base.read_files import MAX_LINE
+from postproc.base.tables import comments_above, finite_number, read_table
+from postproc.base.tables.csv_cells import BLOCK, ROWS
 
 
 def write(folder: Path, text: str | bytes) -> Path:
@@ -130,8 +131,8 @@ def test_arrays_are_read_only(tmp_path):
         ("# only\n\n", "FIL002", 0, "no header"),
         (b"a\0b", "FIL003", 0, "NUL"),
         ("line,fx\n", "FRC003", 1, "no rows"),
-        ("line,fx\n1,2\n1\n", "FRC003", 3, "1 cells where the header has 2: column fx is missing"),
-        ("line,fx\n1,2,5\n", "FRC003", 2, "3 cells where the header has 2"),
+        ("line,fx\n1,2\n1\n", "FRC003", 3, "1 cells are found where the header has 2: column fx is missing"),
+        ("line,fx\n1,2,5\n", "FRC003", 2, "3 cells are found where the header has 2"),
         ("line,fx\n\n1,x\n", "FRC003", 3, "column fx: 'x' is not a number"),
         ("line,fx\n1,nan\n", "FRC003", 2, "column fx: 'nan' is not a number"),
         ("line,fx\n1,inf\n", "FRC003", 2, "column fx: 'inf' is not a number"),
@@ -142,9 +143,9 @@ def test_arrays_are_read_only(tmp_path):
         ('line,fx\n1,"1,5"\n', "FRC003", 2, "'1,5' is not a number"),
         ("line;fx\n1;1.234,5\n", "FRC003", 2, "'1.234,5' is not a number"),
         ("line;fx\n1;1,2,3\n", "FRC003", 2, "'1,2,3' is not a number"),
-        ("line,fx,fx\n1,2,3\n", "FRC003", 1, "column 3 of the header has the name 'fx'"),
+        ("line,fx,fx\n1,2,3\n", "FRC003", 1, "column 3 of the header repeats the name 'fx'"),
         ("line,fx,\n1,2,\n", "FRC003", 1, "column 3 of the header has no name"),
-        ('line,fx\n1,2\n"3,4\n5,6\n', "FRC003", 3, "quote does not close"),
+        ('line,fx\n1,2\n"3,4\n5,6\n', "FRC003", 3, "quote does not end"),
         ('line,fx\n1,"2"x\n', "FRC003", 2, "quotes"),
         ('line,fx\n1,2\n3,"4\n', "FRC003", 3, "quotes"),
     ],
@@ -162,7 +163,7 @@ def test_decimal_comma_between_commas_gets_a_hint(tmp_path):
 
 def test_unknown_columns_name_the_nearest(tmp_path):
     table = read_table(write(tmp_path, "line,fxx\n1,2\n"), "FRC003")
-    with pytest.raises(Refusal, match="unknown column 'fxx'; did you mean 'fx'"):
+    with pytest.raises(Refusal, match="column 'fxx' is unknown; did you mean 'fx'"):
         table.only("line", "fx")
 
 
@@ -256,7 +257,7 @@ def number_of(cell: str, separator: str):
     return float(written) if NUMBER.fullmatch(written) and abs(float(written)) < math.inf else None
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=examples(300), deadline=None)
 @given(
     st.lists(
         st.one_of(
@@ -325,7 +326,7 @@ def test_lines_that_are_too_long(tmp_path, number):
     for text in ("a,b\n" + "\n".join(rows), "a,b\n" + "\n".join(rows[: number - 1])):
         finding = refused(write(tmp_path, text))
         assert (finding.code, finding.line) == ("FRC003", number)
-        assert "a line of more than" in finding.message
+        assert "the line has more than" in finding.message
     rows[number - 2] = "1," + " " * 200_000 + "2"
     table = read_table(write(tmp_path, "a,b\n" + "\n".join(rows)), "FRC003")
     assert table.numbers("b").tolist() == [2.0] * 40_000

@@ -9,12 +9,12 @@ import pytest
 from plant import SOFTER
 from test_mirror import CARRIES, TOOL, full, joints_only, task
 
+from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.compensation.correct import correct
-from postproc.compensation.mirror import difference, predict
-from postproc.forces import Wrenches
-from postproc.geometry import Poses, rotation_from_vector
+from postproc.compensation.mirror import pose_error, predict
 from postproc.model import NOTHING
-from postproc.robot.track import nominal_flange
+from postproc.process import Wrenches
+from postproc.robot.axis_track import nominal_flange
 
 ROWS = np.array([7, 1, 5])
 NONE, Z, ACROSS = np.full(3, np.nan), np.array([0.0, 0.0, 1.0]), np.array([0.6, 0.0, 0.8])
@@ -38,7 +38,7 @@ def test_the_goal_is_the_wanted_pose_or_where_the_robot_takes_it_without_force()
     np.testing.assert_array_equal(absolute.rotation, wanted.rotation)
     # a robot that nothing bends but the force stands where it is sent
     model = joints_only()
-    assert model.slack
+    assert model.zero_without_load
     slack = task(model=model).goal(ROWS, wanted)
     np.testing.assert_array_equal(slack.position, wanted.position)
 
@@ -52,9 +52,9 @@ def test_the_command_brings_the_tool_to_its_goal_under_the_force(process):
     done = job.command(ROWS, wanted, wrench, goal)
     assert done.converged.all()
     there = predicted(job, ROWS, done.command, wrench)
-    for off in difference(there.pose, goal):
+    for off in pose_error(there.pose, goal):
         assert np.linalg.norm(off, axis=1).max() <= 1.2e-8
-    real = job.real(ROWS, done.command, wrench)
+    real = job.simulated(ROWS, done.command, wrench)
     np.testing.assert_allclose(real.pose.position, there.pose.position, atol=1e-9)
     np.testing.assert_allclose(real.q, there.q, atol=1e-12)
 
@@ -85,7 +85,7 @@ def saying(*names):
     oriented, free = np.ones(9, bool), np.full((9, 3), np.nan)
     for row, name in enumerate(names):
         oriented[row], free[row] = SAID[name]
-    return task(oriented=oriented, free_axis=free)
+    return task(orientation_programmed=oriented, redundant_axis=free)
 
 
 @pytest.mark.parametrize("name", SAID)
@@ -100,7 +100,7 @@ def test_what_a_text_can_say_of_an_orientation(name, row):
     )
     assert job.turn_freely(rows) == (name == "all")
     assert job.turn_freely(np.array([3, 4]))
-    found = job.turns(rows, turns)
+    found = job.orientation_projection(rows, turns)
     if name == "all":
         assert found is None
         return
@@ -109,7 +109,7 @@ def test_what_a_text_can_say_of_an_orientation(name, row):
     expected = np.tile(np.eye(3), (3, 1, 1))
     expected[row] = (np.eye(3) - np.outer(axis, axis)) if oriented else 0.0
     np.testing.assert_allclose(found, expected, atol=1e-15)
-    assert job.turns(np.array([3, 8]), turns[:2]) is None
+    assert job.orientation_projection(np.array([3, 8]), turns[:2]) is None
 
 
 def test_what_is_off_is_what_can_be_corrected_and_what_shows_is_what_the_part_sees():
@@ -121,7 +121,7 @@ def test_what_is_off_is_what_can_be_corrected_and_what_shows_is_what_the_part_se
     goal = Poses(rotation_from_vector(rng.normal(size=(6, 3))), rng.normal(size=(6, 3)))
     shift, turn = rng.normal(size=(6, 3)) * 1e-3, rng.normal(size=(6, 3)) * 1e-2
     real = Poses(rotation_from_vector(turn) @ goal.rotation, goal.position + shift)
-    off, seen = job.off(rows, real, goal), job.seen(rows, real, goal)
+    off, seen = job.pose_errors(rows, real, goal), job.visible_errors(rows, real, goal)
     for k, row in enumerate(rows):
         oriented, free = SAID[names[row]] if row < len(names) else SAID["all"]
         axis = goal.rotation[k] @ np.nan_to_num(free)
@@ -131,7 +131,7 @@ def test_what_is_off_is_what_can_be_corrected_and_what_shows_is_what_the_part_se
         np.testing.assert_allclose(seen[1][k], shows, atol=1e-12)
         np.testing.assert_allclose(off[1][k], shows if oriented else np.zeros(3), atol=1e-12)
     free = np.array([5, 6])
-    for off in (job.off, job.seen):
+    for off in (job.pose_errors, job.visible_errors):
         np.testing.assert_allclose(off(free, real[:2], goal[:2])[1], turn[:2], atol=1e-12)
 
 

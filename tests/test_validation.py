@@ -31,7 +31,7 @@ def measured(poses, rng, deflection=True, straight=False):
     """Readings of a bending arm, three targets a pose; of absolute places two of them where nothing is stated."""
     described = arm(random_arm(rng, "rrr"))
     asked = asked_for(StiffnessModel(described, ()), ["joint_compliance"])
-    truth = asked.model.changed({u.key: 5.0 * u.parameter.scale for u in asked.unknowns})
+    truth = asked.model.with_values({u.key: 5.0 * u.parameter.scale for u in asked.unknowns})
     wrench = rng.normal(size=(poses, 6)) * np.array([1000.0] * 3 + [600.0] * 3)
     q, wrench, words = on_markers(rng.uniform(-2.0, 2.0, (poses, 3)), wrench)
     if not deflection:
@@ -147,7 +147,7 @@ def test_a_fit_of_scatter_gains_nothing_where_it_was_not_fitted():
 def again(case, rng, given, **changes):
     """The campaign's robot, targets and truth at other poses, seen from ``given``."""
     old = case.campaign.readings
-    truth = case.model.changed({u.key: 5.0 * u.parameter.scale for u in case.unknowns})
+    truth = case.model.with_values({u.key: 5.0 * u.parameter.scale for u in case.unknowns})
     q, wrench, _ = on_markers(rng.uniform(-2.0, 2.0, (8, 3)), 900.0 * rng.normal(size=(8, 6)))
     readings = replace(old.part(slice(0, 24)), q=q, wrench=wrench, **changes)
     campaign = Campaign(readings)
@@ -252,6 +252,7 @@ def test_on_well_posed_data_the_bootstrap_agrees_with_the_covariance():
     assert (ratio < 1.25).all()
 
 
+@pytest.mark.slow
 def test_of_few_readings_the_bootstrap_is_not_too_narrow():
     """Half of the numbers go into where tracker and target are; what is left of an error is that much smaller."""
     rng, ratio = np.random.default_rng(15), []
@@ -271,12 +272,13 @@ def test_of_few_readings_the_bootstrap_is_not_too_narrow():
     assert 0.85 < np.mean(ratio) < 1.2
 
 
+@pytest.mark.slow
 def test_where_the_readings_that_count_most_scatter_most_the_bootstrap_is_wider():
     """Equal weights say too little of them then: with tails, and a scatter that grows with the lever."""
     rng, ratio = np.random.default_rng(12), []
     case = measured(40, rng, straight=True)
     exact = case.campaign.readings
-    truth = case.model.changed({u.key: 5.0 * u.parameter.scale for u in case.unknowns})
+    truth = case.model.with_values({u.key: 5.0 * u.parameter.scale for u in case.unknowns})
     exact = taken(case.campaign, truth)
     plain = replace(exact, sigma=np.full(len(exact), np.nan))
     lever = np.linalg.norm(exact.value, axis=1)
@@ -288,6 +290,7 @@ def test_where_the_readings_that_count_most_scatter_most_the_bootstrap_is_wider(
     assert np.mean(ratio) > 1.25
 
 
+@pytest.mark.slow
 def test_readings_that_share_an_error_are_drawn_together():
     rng = np.random.default_rng(13)
     case = measured(30, rng, straight=True)

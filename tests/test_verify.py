@@ -1,4 +1,4 @@
-"""``verify``: what the tool does along the written ways, and which motions belong together."""
+"""``verify``: what the tool does along the written paths, and which motions belong together."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import LINES
-from ways_at_work import circle, corner, line
+from ways_at_work import circle, line
+from ways_at_work import task as hand_made
 
+from postproc.base.units import MM
 from postproc.compensation.correct import correct
-from postproc.compensation.division import Limits, divide
-from postproc.geometry import Poses
+from postproc.compensation.subdivision import Limits, subdivide
+from postproc.output.write import plan_motions
 from postproc.toolpath import Kind, Toolpath
-from postproc.units import MM
-from postproc.verification import Different, _alignment, matched, simulate, worst_places
+from postproc.verification.comparison import Simulator
+from postproc.verification.pairing import Different, pair_motions
 from postproc.workflows.preparation import Request, prepare
-from postproc.writing import planned
 
 
 def prepared(path):
@@ -26,9 +27,9 @@ def prepared(path):
 def as_run(task, limits=None, gain=1.0):
     """The task of the program that a correction makes of ``task``, without going through a text."""
     task = replace(task, gain=gain)
-    division = divide(task, correct(task), limits or Limits(max_growth=100.0))
-    plan, old = planned(task, division), task.toolpath
-    kind = np.where(division.links, Kind.LIN, old.kind[plan.source])
+    division = subdivide(task, correct(task), limits or Limits(max_growth=100.0))
+    plan, old = plan_motions(task, division), task.toolpath
+    kind = np.where(division.transitions, Kind.LIN, old.kind[plan.source])
     path = Toolpath(
         kind=kind,
         position=plan.position[:],
@@ -44,6 +45,8 @@ def as_run(task, limits=None, gain=1.0):
         centre=plan.centre,
         normal=plan.normal,
         sweep=plan.sweep,
+        approximation=old.approximation[plan.source],
+        stops=old.stops[plan.source],
     )
     base, tool = task.base[plan.source], task.tool[plan.source]
     track = replace(task.track, q=task.track.q[plan.source], status=task.track.status[plan.source])
@@ -51,52 +54,46 @@ def as_run(task, limits=None, gain=1.0):
     return run, division
 
 
-@pytest.mark.parametrize("build", [line, circle, corner])
+def simulated(task, run):
+    """``run`` in the place of ``task``, and the original itself."""
+    pairing = pair_motions(task, run)
+    simulator, cuts = Simulator.of(task, pairing), pairing.stretches
+    return simulator.run(task, cuts.start, cuts.stop), simulator.run(run, pairing.start, pairing.stop)
+
+
+def bend():
+    """A right angle under one force."""
+    points = [[1.5, 0, 0.6], [1.5, 0, 0.5], [1.6, 0, 0.5], [1.6, 0.1, 0.5], [1.6, 0.1, 0.6]]
+    return hand_made(points, [False, False, True, True, False])
+
+
+@pytest.mark.parametrize("build", [line, circle, bend])
 def test_a_correction_holds_on_another_way_of_looking(build):
     task = build()
     run, division = as_run(task)
-    match = matched(task, run)
-    np.testing.assert_array_equal(match, np.flatnonzero(division.own))
-    before = simulate(task, task, np.arange(len(task.toolpath)))
-    after = simulate(task, run, match)
-    assert before.distance.max() > 1 * MM
-    assert after.distance[~after.link].max() <= task.tolerance
-    assert after.links == division.links.sum()
-    ends = after.distance[after.first | after.last]
-    assert len(ends) == 2
-    assert ends.max() <= task.tolerance
-
-
-def test_a_narrow_view_matches_the_same(monkeypatch):
-    task = circle(diameter=1.2, tolerance=1e-6)
-    run, division = as_run(task, Limits(max_growth=1000.0, min_segment=1e-3))
-    whole = matched(task, run)
-    np.testing.assert_array_equal(whole, np.flatnonzero(division.own))
-    rows = np.arange(1000)
-    more = 40
-    place = np.cumsum(np.tile([1e-3, 0, 0], (1000, 1)), axis=0)
-    extra = np.sort(np.random.default_rng(2).choice(999, more, replace=False))
-    longer = np.insert(place, extra, place[extra] + [0, 2e-3, 0], axis=0)
-    one, other = (replace(task, wanted=Poses.from_abc(at, np.zeros_like(at))) for at in (place, longer))
-    monkeypatch.setattr("postproc.verification.STATES", 0)
-    monkeypatch.setattr("postproc.verification.LEAST_WIDTH", 8)
-    found = _alignment(one, place, other, rows, 0, more)
-    np.testing.assert_array_equal(longer[found], place)
+    before, after = simulated(task, run)
+    assert before.samples.distance.max() > 1 * MM
+    assert after.converged
+    assert after.largest <= task.tolerance
+    assert len(after.approaches) == division.transitions.sum() == 1
+    assert after.change <= 2e-7
+    assert (after.samples.first | after.samples.last).sum() == 2
 
 
 def test_without_points_of_its_own_the_middle_is_seen():
     task = line()
     run, _ = as_run(task, Limits(min_segment=10.0, max_growth=100.0))
-    after = simulate(task, run, matched(task, run))
-    assert 0.05 * MM < after.distance[~after.link].max() < 0.2 * MM
+    _, after = simulated(task, run)
+    assert 0.05 * MM < after.largest < 0.2 * MM
+    middle = after.samples.share[np.argmax(after.samples.distance)]
+    assert 0.3 < middle < 0.7
 
 
 def test_half_a_correction_leaves_half_the_error():
-    task = corner()
-    before = simulate(task, task, np.arange(len(task.toolpath)))
+    task = line()
     run, _ = as_run(task, gain=0.5)
-    after = simulate(task, run, matched(task, run))
-    assert after.distance[~after.link].max() == pytest.approx(before.distance.max() / 2, rel=0.02)
+    before, after = simulated(task, run)
+    assert after.largest == pytest.approx(before.largest / 2, rel=0.02)
 
 
 def test_what_lies_beside_the_path_is_measured(job):
@@ -111,11 +108,10 @@ def test_what_lies_beside_the_path_is_measured(job):
     ]
     other = job.write(beside, name="beside.src")
     task, run = prepared(source), prepared(other)
-    found = simulate(task, run, matched(task, run))
-    assert found.distance.max() == pytest.approx(0.3 * MM, rel=1e-3)
-    (at, error, axis, _), *_ = worst_places(found, run.toolpath)
-    assert (at, axis) == (11, "Y") or (at, axis) == (10, "Y")
-    assert error == pytest.approx(0.3 * MM, rel=1e-3)
+    _, found = simulated(task, run)
+    assert found.largest == pytest.approx(0.3 * MM, rel=1e-3)
+    worst = int(np.argmax(found.samples.distance))
+    assert run.toolpath.line[found.samples.motion[worst]] in (10, 11)
 
 
 def test_points_on_the_way_change_nothing(job):
@@ -125,11 +121,9 @@ def test_points_on_the_way_change_nothing(job):
     for x in (180, 160, 140, 120):
         more.insert(at, f"LIN {{X {x}.000,Y 0.000,Z -2.000,A 0.000,B 0.000,C 180.000}} C_DIS")
     other = job.write(more, name="more.src")
-    task, run = prepared(source), prepared(other)
-    one = simulate(task, task, np.arange(len(task.toolpath)))
-    two = simulate(task, run, matched(task, run))
-    assert two.distance.max() == pytest.approx(one.distance.max(), rel=1e-3)
-    assert not two.link.any()
+    one, two = simulated(prepared(source), prepared(other))
+    assert two.largest == pytest.approx(one.largest, rel=1e-3)
+    assert not len(two.approaches)
 
 
 @pytest.mark.parametrize("lost", [4, 9, 14, 18])
@@ -138,7 +132,7 @@ def test_a_program_that_lacks_a_motion_is_another_one(job, lost):
     other = job.write([*LINES[:lost], *LINES[lost + 1 :]], name="other.src")
     task, run = prepared(source), prepared(other)
     with pytest.raises(Different):
-        matched(task, run)
+        pair_motions(task, run)
 
 
 def test_the_command(compensate, job):
@@ -148,8 +142,12 @@ def test_the_command(compensate, job):
     assert done.json["original"]["max"] > 1
     assert done.json["compensated"]["max"] <= 0.02
     assert done.json["compensated"]["cut_ends"]["max"] <= 0.05
-    assert done.json["compensated"]["links"]["count"] == 2
-    assert done.json["samples"] > 500
+    assert done.json["compensated"]["stops"] <= done.json["original"]["stops"]
+    assert done.json["compensated"]["backwards"] == 0
+    assert done.json["compensated"]["converged"]
+    assert done.json["compensated"]["orientation_deg"] <= 0.01
+    assert done.json["compensated"]["doubling"]["mm"] <= 2e-4
+    assert done.json["samples"] > 100
     assert len(done.json["compensated"]["worst"]) <= 10
     said = compensate("verify", job.program, job.output, "--force")
     assert "compensated" in said.out

@@ -9,8 +9,8 @@ import pytest
 from test_mirror import full
 from ways_at_work import circle, line
 
-from postproc.compensation.between import Pieces, errors_between
-from postproc.geometry import Poses, rotation_from_vector
+from postproc.base.geometry import Poses, rotation_from_vector
+from postproc.compensation.path_error import PathSegments, path_errors
 
 MIDDLE, THREE = (0.5,), (0.25, 0.5, 0.75)
 
@@ -20,10 +20,10 @@ def straight(job, lengths, turns, begin=0.1, push=(0.0, 0.0, 0.0)):
     n = len(lengths)
     rows, first = np.full(n, 2), np.full(n, begin)
     last = first + np.asarray(lengths) / 0.8
-    start, end = job.ways.at(rows, first), job.ways.at(rows, last)
+    start, end = job.desired_path.at(rows, first), job.desired_path.at(rows, last)
     turn = rotation_from_vector(np.outer(turns, [0.6, 0.0, 0.8]))
     start = Poses(start.rotation, start.position + push)
-    return Pieces.straight(rows, first, last, start, Poses(turn @ end.rotation, end.position + push))
+    return PathSegments.straight(rows, first, last, start, Poses(turn @ end.rotation, end.position + push))
 
 
 def off(job, pieces, k, shares, left=0.0):
@@ -31,22 +31,22 @@ def off(job, pieces, k, shares, left=0.0):
     one, found = pieces[np.array([k])], []
     for share in shares:
         along = one.first + share * (one.last - one.first)
-        wrench, wanted = job.force.along(one.rows, along), job.ways.at(one.rows, along)
+        wrench, wanted = job.force.along(one.rows, along), job.desired_path.at(one.rows, along)
         goal = job.goal(one.rows, wanted)
-        real = job.real(one.rows, one.at(np.array([share])), wrench)
+        real = job.simulated(one.rows, one.at(np.array([share])), wrench)
         if not (real.reachable[0] and real.settled[0]):
             return np.inf, np.inf
-        shift, turn = (values[0] for values in job.off(one.rows, real.pose, goal))
-        bent = job.off(one.rows, job.real(one.rows, wanted, wrench).pose, goal)
+        shift, turn = (values[0] for values in job.pose_errors(one.rows, real.pose, goal))
+        bent = job.pose_errors(one.rows, job.simulated(one.rows, wanted, wrench).pose, goal)
         shift, turn = shift - left * bent[0][0], turn - left * bent[1][0]
-        way = job.ways.tangent(one.rows, along)[0]
+        way = job.desired_path.tangent(one.rows, along)[0]
         found.append((np.linalg.norm(shift - (shift @ way) * way), np.linalg.norm(turn)))
     return tuple(max(values) for values in zip(*found, strict=True))
 
 
 def agrees(job, pieces, shares, left=0.0, from_begin=None):
     """``shares``: of each piece, where it is looked at."""
-    found = errors_between(job, pieces, from_begin, left)
+    found = path_errors(job, pieces, from_begin, left)
     expected = np.array([off(job, pieces, k, at, left) for k, at in enumerate(shares)])
     np.testing.assert_allclose(found[0], expected[:, 0], atol=1e-9)
     np.testing.assert_allclose(found[1], expected[:, 1], atol=1e-9)
@@ -66,7 +66,7 @@ def test_pieces_of_30_mm_that_turn_by_3_degrees_are_looked_at_in_the_middle():
     for k in range(6):
         alone = np.array([k])
         np.testing.assert_allclose(
-            errors_between(job, pieces[alone])[0], off(job, pieces, k, shares[k])[0], atol=1e-9
+            path_errors(job, pieces[alone])[0], off(job, pieces, k, shares[k])[0], atol=1e-9
         )
 
 
@@ -75,7 +75,7 @@ def test_some_pieces_are_looked_at_where_they_begin_as_well(rows):
     job = line()
     pieces = straight(job, [0.01, 0.2, 0.02], np.radians([2.0, -30.0, 0.0]), push=(1e-4, 0.0, 2e-4))
     pieces = replace(
-        pieces, begin=Poses(pieces.begin.rotation, pieces.begin.position + np.array([3e-4, 0, 0]))
+        pieces, start=Poses(pieces.start.rotation, pieces.start.position + np.array([3e-4, 0, 0]))
     )
     mask = np.isin(np.arange(3), rows)
     shares = [(0.0, *at) if chosen else at for at, chosen in zip((MIDDLE, THREE, MIDDLE), mask, strict=True)]
@@ -91,8 +91,8 @@ def test_a_share_of_the_error_that_is_meant_to_stay_is_none(left, process):
     )
     # on the wanted way itself, all of it is meant to stay
     wanted = straight(job, [0.01, 0.2], [0.0, 0.0])
-    still = errors_between(job, wanted, left=left)
-    bare = errors_between(job, wanted)
+    still = path_errors(job, wanted, left=left)
+    bare = path_errors(job, wanted)
     for part, whole in zip(still, bare, strict=True):
         np.testing.assert_allclose(part, (1 - left) * whole, atol=1e-9)
         assert (whole > 1e-6).all()
@@ -101,9 +101,9 @@ def test_a_share_of_the_error_that_is_meant_to_stay_is_none(left, process):
 def test_arcs_are_looked_at_in_three_places_however_short():
     job = circle(sweep=1.0)
     rows, first, last = np.array([2, 2]), np.array([0.2, 0.5]), np.array([0.22, 0.9])
-    begin, via, end = (job.ways.at(rows, share) for share in (first, 0.5 * (first + last), last))
+    begin, via, end = (job.desired_path.at(rows, share) for share in (first, 0.5 * (first + last), last))
     none = np.full((2, 3), np.nan)
-    pieces = Pieces.round(rows, first, last, begin, via, end, none)
+    pieces = PathSegments.round(rows, first, last, begin, via, end, none)
     agrees(job, pieces, [THREE, THREE])
 
 
@@ -115,13 +115,13 @@ def test_what_is_off_is_infinite_where_the_robot_can_not_be():
     end[0] += [5.0, 0.0, 0.0]
     end[1] += [1.5, 0.0, 0.0]  # in reach where it begins
     pieces = replace(pieces, end=Poses(pieces.end.rotation, end))
-    found = errors_between(job, pieces)
+    found = path_errors(job, pieces)
     assert np.isinf(found[0]).tolist() == np.isinf(found[1]).tolist() == [True, True, False]
     soft = replace(job, model=full(K_c=3e9))
     pieces = straight(soft, [0.01, 0.01], [0.0, 0.0])
-    here = soft.real(pieces.rows, pieces.at(np.full(2, 0.5)), np.tile(job.wrench[2], (2, 1)))
+    here = soft.simulated(pieces.rows, pieces.at(np.full(2, 0.5)), np.tile(job.wrench[2], (2, 1)))
     assert here.reachable.all()
-    found = errors_between(soft, pieces)
+    found = path_errors(soft, pieces)
     assert (
         np.isinf(found[0]).tolist() == np.isinf(found[1]).tolist() == (~here.settled).tolist() == [True, True]
     )

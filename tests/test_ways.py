@@ -10,11 +10,11 @@ from motions import motions
 from plant import kr270
 from scipy.spatial.transform import Rotation, Slerp
 
-import postproc.blocks
-from postproc.compensation.between import Pieces
-from postproc.compensation.ways import Ways, begins, between
-from postproc.geometry import Poses, rotation_from_abc, rotation_from_vector
-from postproc.robot.track import Track
+import postproc.base.batches
+from postproc.base.geometry import Poses, rotation_from_abc, rotation_from_vector
+from postproc.compensation.desired_path import DesiredPath, interpolate_poses, start_poses
+from postproc.compensation.path_error import PathSegments
+from postproc.robot.axis_track import AxisTrack
 from postproc.toolpath import Kind
 
 BASE = Poses(rotation_from_abc([0.4, -0.3, 1.1]), np.array([1.2, -0.3, 0.4]))
@@ -55,10 +55,10 @@ def every(kinds, tools=None, axes=None, lost=(), turnless=(), arcs=None, seed=3,
     for row, values in (axes or {}).items():
         q[row] = values
     yes = np.ones(n, bool)
-    track = Track(q, np.full(n, 2), yes, yes, yes)
+    track = AxisTrack(q, np.full(n, 2), yes, yes, yes)
     base = tiled(BASE, n)
     wanted = base @ target
-    return Ways.of(path, wanted, base, tool, robot, track), wanted, tool, track
+    return DesiredPath.of(path, wanted, base, tool, robot, track), wanted, tool, track
 
 
 AXES = np.radians([10.0, -70.0, 95.0, 15.0, 50.0, 30.0])
@@ -91,11 +91,11 @@ of row 9; behind known axes a way begins where they bring the tool."""
 
 @pytest.mark.parametrize("rows", [1, 3, 1 << 13])
 def test_a_way_is_known_from_a_known_place_to_a_known_place(monkeypatch, rows):
-    monkeypatch.setattr(postproc.blocks, "ROWS", rows)
+    monkeypatch.setattr(postproc.base.batches, "ROWS", rows)
     ways, wanted, tool, _ = every(**PROGRAM)
-    assert ways.known.tolist() == [bool(known) for known in KNOWN]
-    begin = ways.begin[:]
-    for row in np.flatnonzero(ways.known):
+    assert ways.traceable.tolist() == [bool(known) for known in KNOWN]
+    begin = ways.start[:]
+    for row in np.flatnonzero(ways.traceable):
         if row == 5:
             start = kr270().nominal_chain.flange(AXES[None])[0] @ tool[row]
         else:
@@ -103,7 +103,7 @@ def test_a_way_is_known_from_a_known_place_to_a_known_place(monkeypatch, rows):
         np.testing.assert_allclose(begin.position[row], start.position, atol=1e-14)
         np.testing.assert_allclose(begin.rotation[row], start.rotation, atol=1e-14)
         assert ways.length[row] == pytest.approx(np.linalg.norm(wanted.position[row] - start.position))
-    assert not ways.length[~ways.known].any()
+    assert not ways.length[~ways.traceable].any()
     assert not ways.arc.any()
 
 
@@ -111,13 +111,13 @@ def test_a_way_is_known_from_a_known_place_to_a_known_place(monkeypatch, rows):
 def test_only_of_lines_and_arcs_the_way_is_known(kind):
     arcs = {1: ARCS["a quarter"]} if kind == Kind.CIRC else {}
     ways = every([K.LIN, kind, K.LIN], arcs=arcs)[0]
-    assert ways.known.tolist() == [False, kind in (Kind.LIN, Kind.CIRC), True]
+    assert ways.traceable.tolist() == [False, kind in (Kind.LIN, Kind.CIRC), True]
 
 
 def test_where_the_motion_before_is_not_known_a_motion_begins_nowhere():
     _, wanted, tool, track = every(**PROGRAM)
     path = every(**PROGRAM)[0].path
-    begin = begins(wanted, path, tool, kr270(), track)
+    begin = start_poses(wanted, path, tool, kr270(), track)
     assert len(begin) == len(path)
     lost = [0, 7, 12]
     assert np.isnan(begin[lost].position).all()
@@ -130,11 +130,11 @@ def test_where_the_motion_before_is_not_known_a_motion_begins_nowhere():
     # the axes of the first motion do not make it begin there
     first = replace(track, q=np.tile(AXES, (len(path), 1)))
     unknown = replace(path, tool=np.full(len(path), -1))
-    assert np.isnan(begins(wanted, unknown, tool, kr270(), first)[[0]].position).all()
+    assert np.isnan(start_poses(wanted, unknown, tool, kr270(), first)[[0]].position).all()
     # axes of which some are not known bring the tool nowhere
     q = np.array(track.q)
     q[4, 2] = NAN
-    assert np.isnan(begins(wanted, path, tool, kr270(), replace(track, q=q))[[5]].position).all()
+    assert np.isnan(start_poses(wanted, path, tool, kr270(), replace(track, q=q))[[5]].position).all()
 
 
 UP, TILTED = np.array([0.0, 0.0, 1.0]), np.array([0.36, 0.48, 0.8])
@@ -152,7 +152,7 @@ def test_an_arc_leads_round_its_centre_and_along_its_normal(arc):
     ways, wanted, _, _ = every([K.LIN, K.LIN, K.CIRC, K.LIN], arcs={2: ARCS[arc]})
     normal, sweep, rise = ARCS[arc][1:]
     centre = ways.path.centre[2]
-    assert ways.known.tolist() == [False, True, True, True]
+    assert ways.traceable.tolist() == [False, True, True, True]
     assert ways.arc.tolist() == [False, False, True, False]
     there = BASE @ Poses(np.eye(3), centre)
     found = ways.circles(np.array([2]))
@@ -212,7 +212,7 @@ def test_between_two_poses_the_share_of_each_counts():
         Poses(rotation_from_vector(rng.normal(0.0, 0.6, (4, 3))), rng.normal(size=(4, 3))) for _ in range(2)
     )
     share = np.array([0.0, 0.25, 0.5, 1.0])
-    found = between(one, other, share)
+    found = interpolate_poses(one, other, share)
     np.testing.assert_allclose(
         found.position, one.position + share[:, None] * (other.position - one.position)
     )
@@ -236,7 +236,7 @@ def test_pieces_through_three_points_lie_in_their_plane_or_turn_about_the_normal
     end = posed([-1, 0, 0], [-1, 0, 0.5], [2, 0, 0], [-1, 0, 0.5])
     normal = np.array([[NAN] * 3, [0, 0, 1.0], [NAN] * 3, [0, 0, -1.0]])
     rows, first, last = np.arange(4), np.full(4, 0.1), np.full(4, 0.6)
-    arcs = Pieces.round(rows, first, last, begin, via, end, normal)
+    arcs = PathSegments.round(rows, first, last, begin, via, end, normal)
     assert len(arcs) == 4
     np.testing.assert_allclose(arcs.centre[:2], [[0, 0, 0], [0, 0, 0]], atol=1e-12)
     np.testing.assert_allclose(arcs.normal[:2], [[0, -1, 0], [0, 0, 1]], atol=1e-12)
@@ -255,7 +255,9 @@ def test_pieces_that_are_chosen_are_the_same_pieces():
     begin, end = (
         Poses(rotation_from_vector(rng.normal(size=(5, 3))), rng.normal(size=(5, 3))) for _ in range(2)
     )
-    pieces = Pieces.straight(np.arange(5) + 7, np.linspace(0, 0.4, 5), np.linspace(0.5, 0.9, 5), begin, end)
+    pieces = PathSegments.straight(
+        np.arange(5) + 7, np.linspace(0, 0.4, 5), np.linspace(0.5, 0.9, 5), begin, end
+    )
     assert np.isnan(pieces.sweep).all()
     pieces = replace(
         pieces,

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from postproc.findings import Finding, Refusal
-from postproc.yamlfile import MAX_BYTES, MAX_DEPTH, Section, load
+from postproc.base.findings import Finding, Refusal
+from postproc.base.yaml_section import MAX_BYTES, MAX_DEPTH, YamlSection, load
 
 
 def write(folder: Path, text: str | bytes) -> Path:
@@ -17,7 +17,7 @@ def write(folder: Path, text: str | bytes) -> Path:
     return path
 
 
-def section(folder: Path, text: str) -> Section:
+def section(folder: Path, text: str) -> YamlSection:
     return load(write(folder, text))
 
 
@@ -82,7 +82,7 @@ def test_wrong_values_are_told_with_key_and_line(tmp_path, text, ask, code, line
 
 def test_a_number_with_its_unit_is_told_the_unit(tmp_path):
     finding = refused(lambda: section(tmp_path, "a: 0.02 mm\n").number("a", unit="mm"))
-    assert finding.help == "a number in mm, written without the unit"
+    assert finding.help == "write a number in mm, without the unit"
 
 
 @pytest.mark.parametrize(
@@ -92,8 +92,8 @@ def test_a_number_with_its_unit_is_told_the_unit(tmp_path):
         (b"# nothing\n", "FIL002", 0, "empty"),
         (b"- 1\n", "YML001", 1, "keys and values"),
         (b"a: 1\nb: [1\n", "YML001", 3, ""),
-        (b"a: 1\na: 2\n", "YML004", 2, "a stands twice"),
-        (b"s: {a: 1, a: 2}\n", "YML004", 1, "s.a stands twice"),
+        (b"a: 1\na: 2\n", "YML004", 2, "a is defined twice"),
+        (b"s: {a: 1, a: 2}\n", "YML004", 1, "s.a is defined twice"),
         (b"a: 1\n? [x]\n: 2\n", "YML001", 2, "plain word"),
         (b"a: &x 1\nb: *x\n", "YML001", 2, "aliases"),
         (b"a: 1\nb: !!python/object:os.system x\n", "YML001", 2, "tags"),

@@ -1,1 +1,3 @@
-"""Many programs: checked before the first begins, done beside each other, resumable, summed up."""
+"""Many programs: checked before the first starts, done beside each other, resumable, summed up."""
+
+from postproc.batch import codes as codes

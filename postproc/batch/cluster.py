@@ -9,10 +9,10 @@ from collections.abc import Generator, Sequence
 from concurrent.futures import CancelledError
 from typing import Any
 
-from postproc.batch.reading import code_digest
-from postproc.batch.running import Stages, died
-from postproc.batch.work import Task, failed, work
-from postproc.findings import Finding, Refusal
+from postproc.base.findings import Finding, Refusal
+from postproc.batch.files_read import code_digest
+from postproc.batch.item import BatchItem, failed, run_item
+from postproc.batch.processes import Stages, died
 from postproc.report.batched import Outcome
 
 PATIENCE = 30.0
@@ -24,7 +24,7 @@ EXTRA = "pip install 'postproc[cluster]'"
 
 
 def run_on_cluster(
-    tasks: Sequence[Task], address: str, stages: Stages
+    tasks: Sequence[BatchItem], address: str, stages: Stages
 ) -> Generator[tuple[int, Outcome], None, None]:
     """Do the tasks on the cluster whose scheduler is at ``address``; yields (number, outcome) as they are done.
 
@@ -33,7 +33,9 @@ def run_on_cluster(
     the cluster is not there, has no workers, or workers of another version.
     """
     if not _ADDRESS.fullmatch(address):  # the client would wait for it, and end in a traceback
-        raise _unusable(f"{address!r} is no address of a scheduler", "such as tcp://127.0.0.1:8786")
+        raise _unusable(
+            f"{address!r} is not the address of a scheduler", "write an address such as tcp://127.0.0.1:8786"
+        )
     distributed = _distributed()
     try:
         client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
@@ -43,7 +45,7 @@ def run_on_cluster(
         _check(client, address)
         name = uuid.uuid4().hex
         pending = {
-            client.submit(work, task, key=f"compensate-{name}-{number}", pure=False): number
+            client.submit(run_item, task, key=f"compensate-{name}-{number}", pure=False): number
             for number, task in enumerate(tasks)
         }
         try:
@@ -68,18 +70,18 @@ def _ready(distributed: Any, client: Any, futures: list[Any]) -> tuple[set[Any],
         with client.as_current():
             return distributed.wait(futures, PATIENCE, "FIRST_COMPLETED").done, ""
     except TimeoutError:
-        return set(), "" if client.scheduler_info()["workers"] else "the cluster has lost all of its workers"
+        return set(), "" if client.scheduler_info()["workers"] else "the cluster has no workers any more"
     except CancelledError:
         return {
             future for future in futures if future.status == "finished"
         }, "the connection to the cluster is lost"
 
 
-def _outcome(distributed: Any, task: Task, future: Any) -> Outcome:
+def _outcome(distributed: Any, task: BatchItem, future: Any) -> Outcome:
     try:
         outcome: Outcome = future.result()
     except distributed.KilledWorker as error:
-        return died(task, f"the workers that had it died: {_line(error)}")
+        return died(task, f"the workers that computed it died: {_line(error)}")
     except (Exception, CancelledError) as error:
         return died(task, f"{type(error).__name__}: {_line(error)}")
     return outcome
@@ -94,11 +96,11 @@ def _check(client: Any, address: str) -> None:
     try:
         found = client.run(code_digest)
     except Exception as error:  # whatever keeps a worker from importing this package
-        raise _unusable(f"a worker can not run this package: {_line(error)}") from None
+        raise _unusable(f"a worker cannot run this package: {_line(error)}") from None
     others = sorted(worker for worker, digest in found.items() if digest != code_digest())
     if others:
         raise _unusable(
-            f"workers with another version of this package, of Python or of numpy: {', '.join(others)}"
+            f"some workers have another version of this package, of Python or of numpy: {', '.join(others)}"
         )
 
 

@@ -9,7 +9,7 @@ import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from postproc.findings import Finding, Refusal
+from postproc.output.atomic_write import refused
 
 RACES = 1000
 """Attempts to make a folder that others take away; it does not fail as often in a row but for another reason."""
@@ -25,9 +25,11 @@ def locked(path: Path, waits: Callable[[], None] = lambda: None) -> Iterator[Non
     try:
         handle = _acquired(path, waits)
     except OSError as error:
-        message = f"can not be locked: {error.strerror or error}"
-        help = "the results' folder must be writable, on a file system with locks (flock)"
-        raise Refusal(Finding("FIL004", message, str(path), help=help)) from None
+        raise refused(
+            path,
+            f"the folder of the results cannot be locked: {error.strerror or error}",
+            "the folder must be writable, on a file system with locks (flock)",
+        ) from None
     try:
         yield
     finally:
@@ -45,7 +47,7 @@ def _acquired(path: Path, waits: Callable[[], None]) -> int:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             if path.parent.is_symlink():
-                raise NotADirectoryError(errno.ENOTDIR, "a link stands in the place of its folder")
+                raise NotADirectoryError(errno.ENOTDIR, "its folder is a symbolic link")
             handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o666)
         except (FileNotFoundError, FileExistsError):  # the last holder took the folders away just now
             races += 1

@@ -6,9 +6,9 @@ import os
 from dataclasses import dataclass
 from pathlib import Path
 
+from postproc.base.findings import Finding
 from postproc.cell import NAME as CELL
-from postproc.dialects import DIALECTS
-from postproc.findings import Finding
+from postproc.languages import DIALECTS
 
 HEAD = 1 << 16
 """Bytes of a file by which its language is looked for."""
@@ -32,11 +32,11 @@ class Found:
         """Why there is no program."""
         if self.passed_over:
             known = ", ".join(DIALECTS)
-            message = f"{word!r}: {len(self.passed_over)} files, but none is a program ({known})"
+            message = f"{word!r}: {len(self.passed_over)} files match, but none is a program ({known})"
         else:
             message = f"{word!r} matches nothing in {self.anchor}"
         return Finding(
-            "BAT001", message, help="`**/` in a pattern looks into folders below; a folder alone does not"
+            "BAT001", message, help="`**/` in a pattern includes the folders below; a folder alone does not"
         )
 
 
@@ -90,5 +90,5 @@ def _is_program(path: Path) -> bool:
         with path.open("rb") as stream:
             head = stream.read(HEAD)
     except OSError:
-        return True  # whoever compensates it says what is wrong
+        return True  # whoever compensates it states what is wrong
     return any(dialect.claims(path, head) for dialect in DIALECTS.values())

@@ -13,11 +13,11 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from postproc import publish
-from postproc.batch.jobs import Job
-from postproc.batch.reading import ABSENT, code_digest, digest_of
+from postproc.base.findings import Refusal
+from postproc.batch.files_read import ABSENT, code_digest, digest_of
+from postproc.batch.job_file import Job
 from postproc.cell import find_cell
-from postproc.findings import Refusal
+from postproc.output import atomic_write
 
 STATE = ".compensate"
 """Folder of records and locks, in each folder of results."""
@@ -72,7 +72,7 @@ def lock_path(target: Path) -> Path:
 
 
 def load_record(job: Job) -> Record | None:
-    """The record of a job; None where there is none that can be read, or something else stands in its place."""
+    """The record of a job; None where there is none that can be read, or something else is in its place."""
     path = _path(job)
     try:
         record = Record(**json.loads(path.read_bytes())) if path.is_file() else None
@@ -83,12 +83,12 @@ def load_record(job: Job) -> Record | None:
 
 def save_record(job: Job, record: Record) -> None:
     text = json.dumps(asdict(record), indent=1, allow_nan=False) + "\n"
-    publish.publish({_path(job): text.encode()})
+    atomic_write.write_atomically({_path(job): text.encode()})
 
 
 def sweep(job: Job, outputs: Iterable[str]) -> None:
     """Take away what a run that was killed left half-written of the job's outputs and its record."""
-    publish.sweep([job.target, _path(job), *map(Path, outputs)])
+    atomic_write.sweep([job.target, _path(job), *map(Path, outputs)])
 
 
 def _path(job: Job) -> Path:

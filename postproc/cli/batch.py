@@ -11,12 +11,21 @@ from typing import TYPE_CHECKING
 
 import click
 
-from postproc.cli.common import ROBOT, Out, language_options, result_options
-from postproc.cli.ending import Stopped
+from postproc.cli.common import (
+    ROBOT,
+    Out,
+    RenamedOption,
+    allow_compensated_option,
+    insertion_options,
+    language_options,
+    result_options,
+    tare_option,
+)
+from postproc.cli.signals import Stopped
 
 if TYPE_CHECKING:
-    from postproc.batch.jobs import Jobs
-    from postproc.batch.run import Watch
+    from postproc.batch.batch import Watch
+    from postproc.batch.job_file import Jobs
     from postproc.report.batched import Outcome
 
 
@@ -26,13 +35,11 @@ if TYPE_CHECKING:
     "--force",
     metavar="[SPEC]",
     default=None,
-    help="Machining force of every program. Alone: the forces that belong to each program; with a value: 0,360,560@base"
-    " or a CSV, as in the main job.",
+    help="Machining force of every program. Without a value: the forces that belong to each program; with a value: "
+    "0,360,560@base or a CSV, as in the main job.",
 )
-@click.option(
-    "--force-offset", is_flag=True, help="Take the mean of each force CSV in air off all its readings."
-)
-@click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Robot instead of the cells'.")
+@tare_option
+@click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cells'.")
 @language_options
 @click.option("--gain", type=click.FloatRange(0.0, 1.0), help="Share of the correction that is applied [1].")
 @click.option(
@@ -40,51 +47,46 @@ if TYPE_CHECKING:
     "--output",
     type=click.Path(path_type=Path, file_okay=False),
     metavar="DIR",
-    help="Folder of the results; those of folders below lie in folders below [compensated/ where JOBS are].",
+    help="Folder of the results; it repeats the folder structure of the programs [compensated/ beside JOBS].",
 )
-@click.option("--keep-points", is_flag=True, help="Insert no motion; what that leaves on the way is told.")
-@click.option(
-    "--own-points",
-    type=click.Choice(["inline", "dat", "refuse"]),
-    help="What a named point that serves several motions becomes [inline].",
-)
-@click.option("--strict", is_flag=True, help="Warnings count as errors.")
-@click.option("--again", is_flag=True, help="Compensate programs that are compensated already.")
-@click.option("--dry-run", is_flag=True, help="Do everything but write.")
+@insertion_options
+@click.option("--strict", is_flag=True, help="Treat warnings as errors.")
+@allow_compensated_option
+@click.option("--dry-run", is_flag=True, help="Do everything but write files.")
 @click.option(
     "-j",
     "--workers",
     type=click.IntRange(min=1),
     metavar="N",
-    help="Processes beside each other [all cores].",
+    help="Number of parallel processes [all cores].",
 )
-@click.option(
-    "--dask", metavar="ADDRESS", help="Run on the Dask cluster whose scheduler is there: tcp://host:8786."
-)
+@click.option("--dask", metavar="ADDRESS", help="Run on the Dask cluster of this scheduler: tcp://host:8786.")
 @click.option("--fail-fast", is_flag=True, help="Stop at the first program that fails.")
-@click.option("--force-rerun", is_flag=True, help="Do again what is done and unchanged.")
 @click.option(
-    "--allow-outside", is_flag=True, help="A job file may name programs and outputs beyond its folder."
+    "--rerun", cls=RenamedOption, is_flag=True, help="Compensate all programs, also those done and unchanged."
+)
+@click.option(
+    "--allow-outside", is_flag=True, help="Allow a job file to name programs and outputs outside its folder."
 )
 @result_options
 def batch(
     jobs: tuple[str, ...],
     force: str | None,
-    force_offset: bool,
+    tare: bool,
     robot: str | None,
     cell: Path | None,
     config_dat: Path | None,
     gain: float | None,
     output: Path | None,
-    keep_points: bool,
-    own_points: str | None,
+    no_insert: bool,
+    shared_points: str | None,
     strict: bool,
-    again: bool,
+    allow_compensated: bool,
     dry_run: bool,
     workers: int | None,
     dask: str | None,
     fail_fast: bool,
-    force_rerun: bool,
+    rerun: bool,
     allow_outside: bool,
     json_to: str | None,
     quiet: bool,
@@ -92,10 +94,10 @@ def batch(
 ) -> None:
     """Compensate many programs: JOBS are a job file (YAML), or folders, files and patterns.
 
-    Programs are done beside each other; one that fails stops no other. Run again, what is done and unchanged (program,
-    cell, robot, forces, options, version, and the results themselves) is left as it is: a batch that was interrupted,
-    or killed, goes on where it was. summary.html and summary.json lie with the results. What the command line says
-    wins over the job file.
+    Programs run in parallel; one that fails does not stop the others. A second run skips every program that is done and
+    unchanged (program, cell, robot, forces, options, version, and the results themselves), so an interrupted or killed
+    batch continues where it stopped. summary.html and summary.json are written to the folder of the results. Options
+    of the command line override the job file.
 
     \b
     A job file (`compensate schema job` describes it):
@@ -112,19 +114,19 @@ def batch(
       compensate batch "parts/**/*.src" --force=-60,0,120@feed -j 4
       compensate batch night.yaml --dask tcp://127.0.0.1:8786
 
-    Exit codes, as for the worst program: 0 done; 3 written, but something was left or deserves a look; 1 one could not
-    be done, or was not run; 2 command line.
+    Exit codes, of the worst program: 0 done; 3 written, but not everything is corrected or something needs review; 1
+    failed or not run; 2 wrong command line.
     """
     import os
 
     if not jobs:
         lost = force is not None and force.lower().endswith((".yaml", ".yml"))
-        hint = f"; {force} was taken as the value of --force: put it first" if lost else ""
+        hint = f"; --force uses {force} as its value: write the programs before --force" if lost else ""
         raise click.UsageError(f"name a job file, a folder, or programs{hint}")
     if dask is not None and workers is not None:
-        raise click.UsageError("--workers is for this machine; a Dask cluster has its own")
+        raise click.UsageError("--workers applies to this machine; a Dask cluster has its own workers")
 
-    from postproc.batch.run import BatchRequest, run_batch
+    from postproc.batch.batch import BatchRequest, run_batch
     from postproc.report.batched_terminal import show_batched
 
     if force is not None and force.lower().endswith((".csv", ".yaml", ".yml")):
@@ -137,36 +139,38 @@ def batch(
         "cell": None if cell is None else Path(os.path.abspath(cell)),
         "config_dat": None if config_dat is None else Path(os.path.abspath(config_dat)),
         "gain": gain,
-        "force_offset": force_offset or None,
-        "keep_points": keep_points or None,
-        "own_points": own_points,
+        "tare": tare or None,
+        "no_insert": no_insert or None,
+        "shared_points": shared_points,
         "strict": strict or None,
-        "again": again or None,
+        "allow_compensated": allow_compensated or None,
         "dry_run": dry_run or None,
     }
     out = Out(json_to, quiet, verbose)
     request = BatchRequest(
         words=jobs,
-        said={key: value for key, value in said.items() if value is not None},
+        options={key: value for key, value in said.items() if value is not None},
         output=output,
         workers=workers,
         dask=dask,
         fail_fast=fail_fast,
-        rerun=force_rerun,
+        rerun=rerun,
         allow_outside=allow_outside,
         json=out.json_file,
     )
     try:
-        with out.refusals("batch"), _watched(out) as watch:
+        with out.refusals(), _watched(out) as watch:
             done = run_batch(request, watch)
     except Stopped as end:
-        end.words = "interrupted; what is done is done: the same command goes on from there"
+        end.words = (
+            "the batch is interrupted; the finished programs remain: the same command continues from there"
+        )
         raise
     out.result(done.as_json(), written=not dry_run)
     if not out.quiet:
         show_batched(out.console(), done, verbose)
         if dry_run:
-            click.echo("dry run: nothing was written")
+            click.echo("this is a dry run: nothing is written")
     raise SystemExit(done.exit)
 
 
@@ -179,8 +183,8 @@ def _watched(out: Out) -> Iterator[Watch | None]:
     from rich.markup import escape
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from postproc.batch.run import Watch
-    from postproc.printable import printable
+    from postproc.base.sanitize import sanitize
+    from postproc.batch.batch import Watch
 
     columns = (
         BarColumn(bar_width=24),
@@ -199,7 +203,7 @@ def _watched(out: Out) -> Iterator[Watch | None]:
             self.motions, self.began = 0, time.monotonic()
             self.task = progress.add_task("", total=None, rate="")
 
-        def begun(self, jobs: Jobs) -> None:
+        def started(self, jobs: Jobs) -> None:
             progress.update(self.task, total=len(jobs.jobs))
 
         def stage(self, name: str, stage: str) -> None:
@@ -213,7 +217,7 @@ def _watched(out: Out) -> Iterator[Watch | None]:
             self._tell()
 
         def _tell(self) -> None:
-            words = ", ".join(f"{escape(printable(name))}: {stage}" for name, stage in self.at.items())
+            words = ", ".join(f"{escape(sanitize(name))}: {stage}" for name, stage in self.at.items())
             rate = self.motions / max(time.monotonic() - self.began, 1e-3)
             progress.update(
                 self.task, description=words, rate=f"{rate:.0f} motions/s" if self.motions else ""

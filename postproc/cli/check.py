@@ -1,4 +1,4 @@
-"""``compensate check``: read a program and say what is not understood."""
+"""``compensate check``: read a program and report what is not understood."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from postproc.cli.common import Out, language_options, result_options
 
 @click.command()
 @click.argument("program", type=click.Path(path_type=Path), required=False)
-@click.option("--dump", is_flag=True, help="Print the canonical list of motions (mm, deg), one a line.")
+@click.option("--dump", is_flag=True, help="Print the canonical list of motions (mm, deg), one per line.")
 @click.option("--list-codes", is_flag=True, help="List the codes of all findings.")
-@click.option("--explain", metavar="CODE", help="Explain one code.")
+@click.option("--explain", metavar="CODE", help="Explain the code of a finding.")
 @language_options
 @result_options
 def check(
@@ -27,7 +27,7 @@ def check(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Read PROGRAM only: findings with line and column, and a summary of its motions.
+    """Read PROGRAM only, and report findings with line and column, and a summary of its motions.
 
     \b
     Examples:
@@ -35,9 +35,10 @@ def check(
       compensate check panel.src --dump
       compensate check --explain KRL007
 
-    Exit codes: 0 all understood; 3 findings; 1 unreadable.
+    Exit codes: 0 everything understood; 3 findings; 1 unreadable; 2 wrong command line.
     """
-    from postproc.findings import CODES, nearest
+    from postproc.base.findings import nearest
+    from postproc.codes import ALL as CODES
 
     if list_codes:
         for name, listed in CODES.items():
@@ -46,8 +47,10 @@ def check(
     if explain:
         code = CODES.get(explain.upper())
         if code is None:
-            raise click.UsageError(f"no code {explain!r}{nearest(explain.upper(), CODES)}")
-        click.echo(f"{explain.upper()} ({code.severity}): {code.title}\n{code.explanation}")
+            raise click.UsageError(f"the code {explain!r} is unknown{nearest(explain.upper(), CODES)}")
+        click.echo(f"{explain.upper()} ({code.severity}): {code.title}")
+        for part in (code.meaning, code.consequence, code.action, f"Example: {code.example}"):
+            click.echo(part)
         return
     if program is None:
         raise click.UsageError("name a PROGRAM to check")
@@ -56,7 +59,7 @@ def check(
     from postproc.workflows.listing import check as run
 
     out = Out(json_to, quiet, verbose)
-    with out.refusals(""):
+    with out.refusals(str(program), writes=False):
         done = run(program, cell, config_dat)
         out.result(done.as_json())
     if dump and json_to != "-":

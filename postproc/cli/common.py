@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 import json
 import math
 import re
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
 
-from postproc.findings import Finding, Refusal
+from postproc.base.findings import Finding, Refusal
+from postproc.workflows.option_names import SHARED_POINTS, former_names_of, present_value
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
 
@@ -44,12 +46,52 @@ class _RobotName(click.ParamType):
 ROBOT = _RobotName()
 
 
+FORMER_NAMES = "postproc.former_names"
+"""Key of a context's ``meta``: notes on former names that the command line uses."""
+
+
+class RenamedOption(click.Option):
+    """An option that is also taken under its former names and with its former values (``FORMER_OPTIONS``); help and
+    completion show the present ones only."""
+
+    @property
+    def _former(self) -> dict[str, str]:
+        """Former option as it is typed -> the key of its value in what the parser gives."""
+        return {
+            f"--{name.replace('_', '-')}": f"{name} (former)" for name in former_names_of(self.name or "")
+        }
+
+    def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
+        super().add_to_parser(parser, ctx)
+        for word, key in self._former.items():
+            former = copy.copy(self)
+            former.opts, former.name = [word], key
+            click.Option.add_to_parser(former, parser, ctx)
+
+    def consume_value(self, ctx: click.Context, opts: Mapping[str, Any]) -> tuple[Any, Any]:
+        """The value, under whichever name it is given.  Raises BadParameter where both are."""
+        value, source = super().consume_value(ctx, opts)
+        for word, key in self._former.items():
+            if key not in opts:
+                continue
+            if self.name in opts:
+                raise click.BadParameter(
+                    f"is the former name of {self.opts[0]}, which is given too", param_hint=word
+                )
+            value, source = opts[key], click.core.ParameterSource.COMMANDLINE
+            ctx.meta.setdefault(FORMER_NAMES, []).append(f"{word} is now called {self.opts[0]}")
+        present = present_value(self.name or "", value)
+        if present is not value:
+            ctx.meta.setdefault(FORMER_NAMES, []).append(f"{self.opts[0]} {value} is now called {present}")
+        return present, source
+
+
 def number(word: str, limit: float) -> float:
-    """The number that ``word`` is, at most ``limit`` in size."""
+    """The number that ``word`` is, at most ``limit`` in size.  Raises BadParameter."""
     if not _NUMBER.match(word) or not math.isfinite(float(word)):
         raise click.BadParameter(f"{word[:40]!r} is not a number")
     if abs(float(word)) > limit:
-        raise click.BadParameter(f"{word[:40]} is beyond {limit:g}")
+        raise click.BadParameter(f"{word[:40]} exceeds {limit:g}")
     return float(word)
 
 
@@ -59,7 +101,7 @@ def numbers(counts: tuple[int, ...], names: str) -> Callable[[click.Context, cli
     def parse(_context: click.Context, _option: click.Parameter, text: str) -> Numbers:
         values = tuple(number(word.strip(), FAR) for word in text.split(","))
         if len(values) not in counts:
-            raise click.BadParameter(f"{len(values)} numbers where {names} is needed")
+            raise click.BadParameter(f"{len(values)} numbers are given where {names} is needed")
         return values
 
     return parse
@@ -91,6 +133,50 @@ def _json_name(_context: click.Context, _option: click.Parameter, value: str | N
     raise click.BadParameter(f"{value!r} must end in .json, or be - for standard output")
 
 
+def tare_option(command: _Command) -> _Command:
+    """The zero of a measured force."""
+    return click.option(
+        "--tare",
+        cls=RenamedOption,
+        is_flag=True,
+        help="Subtract the mean force in air from all readings of the force CSV.",
+    )(command)
+
+
+def insertion_options(command: _Command) -> _Command:
+    """What the output may hold that the input does not: inserted motions and copies of points."""
+    for decorate in reversed(
+        (
+            click.option(
+                "--no-insert",
+                cls=RenamedOption,
+                is_flag=True,
+                help="Insert no motions; the path error that remains between the points is reported.",
+            ),
+            click.option(
+                "--shared-points",
+                cls=RenamedOption,
+                type=click.Choice(SHARED_POINTS),
+                help="What happens to a named point that several motions use: each motion gets a copy in its own line, "
+                "or as a new point in the .dat, or the point is kept and these motions are not corrected "
+                f"[{SHARED_POINTS[0]}].",
+            ),
+        )
+    ):
+        command = decorate(command)
+    return command
+
+
+def allow_compensated_option(command: _Command) -> _Command:
+    """Whether a program may be compensated twice."""
+    return click.option(
+        "--allow-compensated",
+        cls=RenamedOption,
+        is_flag=True,
+        help="Accept a program that carries the mark of an earlier compensation.",
+    )(command)
+
+
 def program_options(command: _Command) -> _Command:
     """PROGRAM and what predicts it."""
     for decorate in reversed(
@@ -100,18 +186,16 @@ def program_options(command: _Command) -> _Command:
                 "--force",
                 metavar="[SPEC]",
                 default=None,
-                help="Machining force. Alone: FORCE comments, <stem>.force.csv, or `force:` or `process:` of the cell, "
-                "whichever comes first. With a value: 0,360,560@base (world, tool, feed; six numbers with moments), a "
-                "CSV (by line, s_mm or t_s), or the YAML of a cutting process.",
+                help="Machining force. Without a value: FORCE comments, <stem>.force.csv, or `force:` or `process:` "
+                "of the cell, whichever comes first. With a value: 0,360,560@base (world, tool, feed; six numbers "
+                "with moments), a CSV (by line, s_mm or t_s), or the YAML file of a cutting process.",
             ),
+            tare_option,
             click.option(
-                "--force-offset",
-                is_flag=True,
-                help="Take the mean of the force CSV in air off all its readings.",
+                "--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cell's."
             ),
-            click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Robot instead of the cell's."),
             language_options,
-            click.option("--strict", is_flag=True, help="Warnings count as errors."),
+            click.option("--strict", is_flag=True, help="Treat warnings as errors."),
         )
     ):
         command = decorate(command)
@@ -119,17 +203,19 @@ def program_options(command: _Command) -> _Command:
 
 
 def language_options(command: _Command) -> _Command:
-    """What a program does not say of itself."""
+    """What a program does not state itself."""
     for decorate in reversed(
         (
             click.option(
-                "--cell", type=click.Path(path_type=Path), help="Cell file instead of the nearest cell.yaml."
+                "--cell",
+                type=click.Path(path_type=Path),
+                help="Use this cell file instead of the nearest cell.yaml.",
             ),
             click.option(
                 "--config-dat",
                 type=click.Path(path_type=Path),
                 metavar="FILE",
-                help="The controller's $config.dat, for points and frames that stand there [the cell's].",
+                help="The controller's $config.dat, for points and frames defined there [the cell's].",
             ),
         )
     ):
@@ -138,7 +224,7 @@ def language_options(command: _Command) -> _Command:
 
 
 def readings_options(command: _Command) -> _Command:
-    """DATA, of which robot and tool they are, and the robot file that comes out."""
+    """DATA, their robot and tool, and the new robot file."""
     for decorate in reversed(
         (
             click.argument("data", type=click.Path(path_type=Path), nargs=-1, required=True),
@@ -146,7 +232,7 @@ def readings_options(command: _Command) -> _Command:
                 "--robot",
                 type=ROBOT,
                 metavar="NAME|FILE",
-                help="The robot [the one that the data name: # robot: NAME].",
+                help="Robot [the one named in the data: # robot: NAME].",
             ),
             click.option(
                 "-o",
@@ -154,13 +240,13 @@ def readings_options(command: _Command) -> _Command:
                 type=click.Path(path_type=Path, dir_okay=False),
                 metavar="NEW.yaml",
                 callback=ending(".yaml", ".yml"),
-                help="Write the robot file with what was found; without it there is only the report.",
+                help="Write a new robot file with the identified values [only report].",
             ),
             click.option(
                 "--tool",
                 metavar="X,Y,Z[,A,B,C]",
                 callback=tool_place,
-                help="TCP on the flange, mm and deg, where the data do not state it (# tool: x y z) [the flange].",
+                help="TCP on the flange, mm and deg, if the data do not state it (# tool: x y z) [the flange].",
             ),
         )
     ):
@@ -175,8 +261,27 @@ def page_option(command: _Command) -> _Command:
         type=click.Path(path_type=Path, dir_okay=False),
         metavar="FILE.html",
         callback=ending(".html"),
-        help="All of it as one page for a browser; needs no network.",
+        help="Write the result as one HTML page that needs no network.",
     )(command)
+
+
+def residual_options(command: _Command) -> _Command:
+    """What is left of every reading as a table, and how warnings count."""
+    for decorate in reversed(
+        (
+            click.option(
+                "--csv",
+                "csv_to",
+                type=click.Path(path_type=Path, dir_okay=False),
+                metavar="FILE.csv",
+                callback=ending(".csv"),
+                help="The residual of every reading, one row each.",
+            ),
+            click.option("--strict", is_flag=True, help="Warnings count as errors: then nothing is written."),
+        )
+    ):
+        command = decorate(command)
+    return command
 
 
 def result_options(command: _Command) -> _Command:
@@ -188,10 +293,15 @@ def result_options(command: _Command) -> _Command:
                 "json_to",
                 metavar="PATH|-",
                 callback=_json_name,
-                help="Machine-readable result, into a .json file; - is standard output.",
+                help="Write the machine-readable result to a .json file; - is standard output.",
             ),
-            click.option("-q", "--quiet", is_flag=True, help="Only errors."),
-            click.option("-v", "--verbose", is_flag=True, help="With every finding, what to do."),
+            click.option("-q", "--quiet", is_flag=True, help="Print errors only."),
+            click.option(
+                "-v",
+                "--verbose",
+                is_flag=True,
+                help="Print with every finding what to do, and long lists in full.",
+            ),
         )
     ):
         command = decorate(command)
@@ -205,6 +315,10 @@ class Out:
         self.json_to = json_to
         self.quiet = quiet or json_to == "-"
         self.verbose = verbose
+        context = click.get_current_context()
+        self.command = context.command.name or ""
+        for note in () if self.quiet else context.meta.get(FORMER_NAMES, ()):
+            click.echo(f"note: {note}", err=True)
 
     def console(self, error: bool = False) -> Any:
         from postproc.cli.console import SafeConsole
@@ -224,9 +338,9 @@ class Out:
         if self.json_to == "-":
             click.echo(text, nl=False)
             return
-        from postproc.publish import publish
+        from postproc.output.atomic_write import write_atomically
 
-        publish({Path(self.json_to): text.encode()})
+        write_atomically({Path(self.json_to): text.encode()})
 
     @contextlib.contextmanager
     def stages(self) -> Iterator[Callable[[str], None]]:
@@ -249,20 +363,23 @@ class Out:
             progress.stop()
 
     @contextlib.contextmanager
-    def refusals(self, program: str) -> Iterator[None]:
-        """Turn a Refusal into findings on standard error and exit code 1."""
+    def refusals(self, program: str = "", writes: bool = True) -> Iterator[None]:
+        """Turn a Refusal into findings on standard error and exit code 1.  program: that the command is about; writes:
+        whether the command writes files."""
         try:
             yield
         except Refusal as refusal:
-            self.refused(program, refusal.findings)
+            self.refused(program, refusal.findings, writes)
 
-    def refused(self, program: str, findings: Sequence[Finding]) -> None:
+    def refused(self, program: str, findings: Sequence[Finding], writes: bool) -> None:
+        """Shows the findings of a refusal and writes them as the result.  Raises SystemExit with exit code 1."""
         from postproc.report.report import failure
         from postproc.report.terminal import show_findings
 
         with contextlib.suppress(Refusal):
-            self.result(failure(program, findings))
+            self.result(failure(self.command, program, findings))
         console = self.console(error=True)
         show_findings(console, findings)
-        console.print("nothing was written" if program else "")
+        if writes:
+            console.print("nothing is written")
         raise SystemExit(1)

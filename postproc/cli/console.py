@@ -8,7 +8,7 @@ from typing import TextIO
 from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 
-from postproc.printable import printable_lines
+from postproc.base.sanitize import sanitize_lines
 
 WIDTH = 160
 """Columns where the output is no terminal."""
@@ -22,4 +22,4 @@ class SafeConsole(Console):
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         for segment in super().render(renderable, options):
-            yield segment if segment.control else Segment(printable_lines(segment.text), segment.style)
+            yield segment if segment.control else Segment(sanitize_lines(segment.text), segment.style)

@@ -1,4 +1,4 @@
-"""``compensate diagnose``: what a robot file misses, by its name."""
+"""``compensate diagnose``: the effects that a robot file misses."""
 
 from __future__ import annotations
 
@@ -6,7 +6,15 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Numbers, Out, ending, page_option, readings_options, result_options
+from postproc.cli.common import (
+    Numbers,
+    Out,
+    ending,
+    page_option,
+    readings_options,
+    residual_options,
+    result_options,
+)
 
 
 @click.command()
@@ -16,25 +24,17 @@ from postproc.cli.common import Numbers, Out, ending, page_option, readings_opti
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.csv",
     callback=ending(".csv"),
-    help="Where two explanations fit alike: a plan of poses that tell them apart [beside NEW.yaml].",
+    help="If two explanations fit alike: write a plan of poses that distinguish them [beside NEW.yaml].",
 )
 @click.option(
     "--picture",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.png|svg",
     callback=ending(".png", ".svg"),
-    help="Draw the gap per pose before and after, what betrays the effect, and the evidence per candidate.",
+    help="Draw the gap per pose before and after, residual patterns, and the evidence per candidate.",
 )
 @page_option
-@click.option(
-    "--csv",
-    "csv_to",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.csv",
-    callback=ending(".csv"),
-    help="What is left of every reading, one row each.",
-)
-@click.option("--strict", is_flag=True, help="Warnings count as errors: then nothing is written.")
+@residual_options
 @result_options
 def diagnose(
     data: tuple[Path, ...],
@@ -50,12 +50,12 @@ def diagnose(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Find where the robot file and the measurements in DATA (CSV) disagree, and name the effect that is missing.
+    """Find where the robot file and the measurements in DATA (CSV) differ, and name the missing effect.
 
-    The verdict is one of: nothing missing (what is left is scatter, or old parameters have moved); named; partly named
-    (more is missing than could be named); ambiguous (several effects explain the readings alike: a plan of poses that
-    tell them apart is made); unknown (something is missing, and it is no effect that is known). A name is only given
-    for what also holds on poses that were left out, and fits clearly better than anything else.
+    The verdict is one of: nothing missing (the residual is scatter, or old parameters have changed); named; partly
+    named (more is missing than can be named); ambiguous (several effects explain the readings alike: a plan of poses
+    that distinguish them is written); unknown (an effect is missing, and it is none of the known ones). An effect is
+    only named if it also reduces the residual on held-out poses and fits clearly better than any other.
 
     \b
     Examples:
@@ -63,8 +63,8 @@ def diagnose(
       compensate diagnose loads.csv --robot kuka_kr270 -o kr270_shop.yaml --picture why.png
       compensate diagnose loads.csv which.csv -o kr270_shop.yaml --json -
 
-    Exit codes: 0 named, or nothing is missing; 3 partly named, ambiguous or unknown, or something deserves a look; 1
-    could not, nothing was written; 2 command line.
+    Exit codes: 0 named, or nothing missing; 3 partly named, ambiguous or unknown, or something needs review; 1 failed,
+    nothing was written; 2 wrong command line.
     """
     from postproc.report.diagnosed_terminal import show_diagnosed
     from postproc.workflows.diagnose import DiagnoseRequest, diagnose_robot
@@ -82,7 +82,7 @@ def diagnose(
         json=out.json_file,
         strict=strict,
     )
-    with out.refusals("diagnose"), out.stages() as stage:
+    with out.refusals(), out.stages() as stage:
         done = diagnose_robot(request, stage)
     out.result(done.as_json(), written=True)
     if not out.quiet:

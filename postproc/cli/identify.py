@@ -7,17 +7,25 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Numbers, Out, ending, page_option, readings_options, result_options
+from postproc.cli.common import (
+    Numbers,
+    Out,
+    ending,
+    page_option,
+    readings_options,
+    residual_options,
+    result_options,
+)
 
 FEWEST_DRAWS = 20
-"""Fewer say nothing of a spread."""
+"""Fewer draws do not determine an interval."""
 
 
 def _words(_context: click.Context, _option: click.Parameter, text: str) -> tuple[str, ...]:
     """``a,b.c`` as its words."""
     words = tuple(word.strip() for word in text.split(","))
     if not all(words):
-        raise click.BadParameter(f"{text[:40]!r} has an empty name; write effect,effect.parameter")
+        raise click.BadParameter(f"{text[:40]!r} contains an empty name; write effect,effect.parameter")
     if len(set(words)) < len(words):
         raise click.BadParameter(f"{text[:40]!r} names an effect twice")
     return words
@@ -28,7 +36,7 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
 
     def check(_context: click.Context, _option: click.Parameter, number: int | None) -> int | None:
         if number is not None and 0 < number < least:
-            raise click.BadParameter(f"{number} is too few: {least} or more, or 0 for none")
+            raise click.BadParameter(f"{number} is too few: use {least} or more, or 0 for none")
         return number
 
     return check
@@ -40,22 +48,22 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     required=True,
     metavar="EFFECT[.PARAMETER],...",
     callback=_words,
-    help="What to look for: effects, or single parameters of them. One that the robot file does not have is added.",
+    help="Effects to identify, or single parameters of them. An effect that the robot file does not have is added.",
 )
 @readings_options
 @click.option(
     "--priors",
     is_flag=True,
-    help="Every interval of the robot file counts as a reading, not only those of dimensions of hardware.",
+    help="Use every interval of the robot file as prior information, not only those of dimensions of hardware.",
 )
-@click.option("--robust", is_flag=True, help="Readings far off are weighed down (Huber).")
-@click.option("--drop-outliers", is_flag=True, help="Leave out the readings that are told as outliers.")
+@click.option("--robust", is_flag=True, help="Reduce the weight of outliers (Huber).")
+@click.option("--drop-outliers", is_flag=True, help="Exclude outliers from the fit.")
 @click.option(
     "--validate",
     type=click.Path(path_type=Path),
     metavar="OTHER.csv",
     multiple=True,
-    help="Readings that are predicted and not fitted; may be given several times.",
+    help="Readings that are predicted but not fitted; repeat the option for several files.",
 )
 @click.option(
     "--folds",
@@ -63,14 +71,14 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     default=5,
     show_default=True,
     callback=_none_or(2),
-    help="Poses are left out in so many turns, and predicted by a fit of the others; 0 is not at all.",
+    help="Number of folds of the cross-validation on held-out poses; 0 skips it.",
 )
 @click.option(
     "--bootstrap",
     type=click.IntRange(0, 100_000),
     metavar="N",
     callback=_none_or(FEWEST_DRAWS),
-    help="Check the intervals by so many draws; 0 is not at all [200 where poses are few].",
+    help="Check the intervals with so many bootstrap draws; 0 skips it [200 for few poses].",
 )
 @click.option(
     "--picture",
@@ -80,15 +88,7 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     help="Draw the residuals by joint, direction, load and order.",
 )
 @page_option
-@click.option(
-    "--csv",
-    "csv_to",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE.csv",
-    callback=ending(".csv"),
-    help="What is left of every reading, one row each.",
-)
-@click.option("--strict", is_flag=True, help="Warnings count as errors: then nothing is written.")
+@residual_options
 @result_options
 def identify(
     data: tuple[Path, ...],
@@ -110,20 +110,20 @@ def identify(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Find parameters of effects from the measurements in DATA (CSV), with 95 % intervals.
+    """Identify parameters of effects from the measurements in DATA (CSV), with 95 % intervals.
 
-    What the readings can not tell is left as it is and named: parameters that no reading moves with, that only show
-    as a sum, or that the place of the tracker imitates. Where the tracker and its targets stand is found with every
-    fit. What is left is told of the readings fitted, and of poses that were not.
+    Parameters that the readings do not determine keep their values and are listed: those without influence, those that
+    only show as a sum, and those that the position of the tracker imitates. Every fit includes the positions of tracker
+    and targets where they are not stated. Residuals are reported for the fitted readings and for held-out poses.
 
     \b
     Examples:
       compensate identify loads.csv --effects joint_compliance,gravity_compensator -o kr270_shop.yaml
       compensate identify poses.csv --robot ur5 --effects joint_offset,link_geometry --validate later.csv
-      compensate identify loads.csv --effects gravity_compensator.K_c --picture left.png --csv left.csv --json -
+      compensate identify loads.csv --effects gravity_compensator.K_c --picture fit.png --csv residuals.csv --json -
 
-    Exit codes: 0 all found, nothing to look at; 3 done, but something was not found or deserves a look (outliers,
-    bounds, no gain on other poses); 1 could not, nothing was written; 2 command line.
+    Exit codes: 0 all parameters identified; 3 done, but not all identified or something needs review (outliers, bounds,
+    no improvement on held-out poses); 1 failed, nothing was written; 2 wrong command line.
     """
     from postproc.report.identified_terminal import show_identified
     from postproc.workflows.identify import IdentifyRequest
@@ -148,7 +148,7 @@ def identify(
         json=out.json_file,
         strict=strict,
     )
-    with out.refusals("identify"), out.stages() as stage:
+    with out.refusals(), out.stages() as stage:
         done = run(request, stage, lambda name, at, of: stage(f"{name} {at} of {of}"))
     out.result(done.as_json(), written=True)
     if not out.quiet:

@@ -10,12 +10,12 @@ from collections.abc import Sequence
 import click
 
 from postproc import __version__
-from postproc.blocks import large_apart
+from postproc.base.batches import use_mmap_for_large_arrays
+from postproc.base.findings import nearest
 from postproc.cli.batch import batch
 from postproc.cli.check import check
 from postproc.cli.completion import Commands, completion
 from postproc.cli.diagnose import diagnose
-from postproc.cli.ending import ended_in_words
 from postproc.cli.identify import identify
 from postproc.cli.map import map_
 from postproc.cli.plan import plan
@@ -23,8 +23,8 @@ from postproc.cli.predict import predict
 from postproc.cli.program import program
 from postproc.cli.robots import robots
 from postproc.cli.schema import schema
+from postproc.cli.signals import ended_in_words
 from postproc.cli.verify import verify
-from postproc.findings import nearest
 
 COMMANDS = {
     "program": program,
@@ -45,7 +45,7 @@ COMMANDS = {
 @click.group(cls=Commands, commands=COMMANDS, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="compensate")
 def main() -> None:
-    """Make an industrial robot cut as if it did not bend.
+    """Compensate the deflection of an industrial robot in its milling program.
 
     Without a command, PROGRAM is compensated:
 
@@ -53,30 +53,30 @@ def main() -> None:
       compensate panel.src --force                    forces that belong to the program
       compensate panel.src --force=-60,0,120@feed     one force, in the feed frame
       compensate panel.src --force --gain 0.5         a first cut with half the correction
-      compensate check panel.src                      only read it, say what is not understood
+      compensate check panel.src                      read it only, report what is not understood
       compensate predict panel.src --force            the deflection at every pose
-      compensate verify panel.src compensated/panel.src --force     is the tool on the path, all along it
-      compensate map --robot kuka_kr270 ...           where in the workspace the robot is stiff
-      compensate identify loads.csv --effects ...     the robot's parameters from measurements
+      compensate verify panel.src compensated/panel.src --force     the path error of both programs
+      compensate map --robot kuka_kr270 ...           the deflection over the workspace
+      compensate identify loads.csv --effects ...     parameters of the robot from measurements
       compensate plan --effects ... --poses 15 ...    the poses and loads worth measuring
-      compensate diagnose loads.csv                   what the robot file misses, by its name
-      compensate batch parts --force                  many programs, beside each other
+      compensate diagnose loads.csv                   the effects that the robot file misses
+      compensate batch parts --force                  many programs in parallel
     """
 
 
 def run(argv: Sequence[str] | None = None) -> None:
-    """Entry point of the console script."""
+    """Entry point of the console script.  Raises SystemExit with the exit code."""
     words = list(sys.argv[1:] if argv is None else argv)
     # the matrices here are small: threads for them cost more than they give, and runs beside each other fight
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    large_apart()
+    use_mmap_for_large_arrays()
     for stream in (sys.stdout, sys.stderr):
-        # A name or a comment that the terminal can not show is no reason to stop.
+        # A name or a comment that the terminal cannot show is no reason to stop.
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     if words and words[0].isalpha() and words[0] not in COMMANDS and not os.path.exists(words[0]):
         hint = nearest(words[0], COMMANDS)
-        click.echo(f"Error: no command and no file {words[0]!r}{hint}", err=True)
+        click.echo(f"Error: neither a command nor an existing file has the name {words[0]!r}{hint}", err=True)
         raise SystemExit(2)
     with ended_in_words(and_exits=argv is None):
         main.main(args=normalized(words), prog_name="compensate")
@@ -91,7 +91,7 @@ def normalized(arguments: list[str]) -> list[str]:
         return arguments or ["--help"]
     if "--force" not in arguments:
         return arguments if arguments[0] in COMMANDS else ["program", *arguments]
-    from postproc.forces.stated import is_force_word
+    from postproc.process.stated_forces import is_force_word
 
     words = arguments if arguments[0] in COMMANDS else ["program", *arguments]
     result: list[str] = []

@@ -15,7 +15,9 @@ def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numb
     if len(values) > 2:
         raise click.BadParameter(f"{text[:40]!r} is neither one value nor a range a:b")
     if len(values) == 2 and not values[0] < values[1]:
-        raise click.BadParameter(f"range {text[:40]!r} must rise: {values[0]:g} is not below {values[1]:g}")
+        raise click.BadParameter(
+            f"the range {text[:40]!r} must ascend: {values[0]:g} is not below {values[1]:g}"
+        )
     return values
 
 
@@ -31,7 +33,7 @@ def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numb
     type=click.IntRange(1, 1_000_000),
     default=21,
     show_default=True,
-    help="Points along each range; with 1, its middle.",
+    help="Points along each range; 1 is its middle.",
 )
 @click.option(
     "--tool",
@@ -52,29 +54,31 @@ def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numb
     "--force",
     required=True,
     metavar="SPEC",
-    help="What acts on the tool at its TCP: 0,360,560@base (or world, the same here; or tool), N; six numbers with "
-    "moments in N m.",
+    help="Force on the tool at the TCP: 0,360,560@base (or world, which is the same here; or tool), N; six numbers "
+    "with moments in N m.",
 )
 @click.option(
-    "--linear", is_flag=True, help="Linearized, eq. (5), instead of the balance on the deflected pose."
+    "--linear",
+    is_flag=True,
+    help="Use the linear model, eq. (5), instead of the equilibrium on the deflected pose.",
 )
 @click.option(
     "--sign",
     type=click.Choice(["energy", "as_printed"]),
-    help="How eq. (3) of the gravity compensator is read [as the robot file says].",
+    help="Reading of eq. (3) of the gravity compensator [that of the robot file].",
 )
 @click.option("--ignore-limits", is_flag=True, help="Count cells beyond the axis limits as reached.")
 @click.option(
     "--status",
     type=click.IntRange(0, 7),
-    help="Branch of a KUKA-type arm, S: 1 wrist overhead, 2 elbow up, 4 A5 below zero, added up [2].",
+    help="KUKA Status (S) of the arm, the sum of 1 wrist overhead, 2 elbow up, 4 A5 below zero [2].",
 )
 @click.option(
     "--picture",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.png|svg",
     callback=ending(".png", ".svg"),
-    help="Draw the map; of a box, slices along z.",
+    help="Draw the map; for a box, slices along z.",
 )
 @page_option
 @click.option(
@@ -83,7 +87,7 @@ def _range(_context: click.Context, _option: click.Parameter, text: str) -> Numb
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.csv",
     callback=ending(".csv"),
-    help="One row a cell.",
+    help="Write one row per cell.",
 )
 @result_options
 def map_(
@@ -106,9 +110,9 @@ def map_(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Map how far a force moves the tool over the workspace, and how much of it the gravity compensator changes.
+    """Map the deflection by a force over the workspace, and how much the gravity compensator changes it.
 
-    Two ranges make a plane, three a box, one a line; the deflection is that of the force alone, loaded minus unloaded.
+    Two ranges give a plane, three a box, one a line; the deflection is that of the force alone, loaded minus unloaded.
 
     \b
     Examples:
@@ -116,31 +120,31 @@ def map_(
       compensate map --robot kuka_kr270 --x 800:2200 --y 0 --z 200:1800 --force 0,0,-500@tool --picture map.png
       compensate map --robot kuka_kr270 --x 800:2200 --y=-900:900 --z 300:1500 --grid 15 --force 300,0,0 --csv box.csv
 
-    Exit codes: 0 done; 3 nothing in reach, or something deserves a look; 1 could not; 2 command line.
+    Exit codes: 0 done; 3 nothing in reach, or something needs review; 1 failed; 2 wrong command line.
     """
-    from postproc.forces.stated import FEED, FORM, FRAMES, NotAForce, parse_force
-    from postproc.report.workspace import show_map
-    from postproc.workflows.workspace import MapRequest, map_workspace
-    from postproc.workspace import MAX_CELLS
+    from postproc.placement.workspace_map import MAX_CELLS
+    from postproc.process.stated_forces import FEED, FORM, FRAMES, NotAForce, parse_force
+    from postproc.report.mapped import show_map
+    from postproc.workflows.map import MapRequest, map_workspace
 
     try:
         wrench, frame = parse_force(force)
     except NotAForce as error:
-        raise click.BadParameter(f"{error}; a map takes {FORM}", param_hint="--force") from None
+        raise click.BadParameter(f"{error}; a map accepts {FORM}", param_hint="--force") from None
     if frame == FEED:
         raise click.BadParameter(
-            "nothing is fed in a map: give the force @base or @tool", param_hint="--force"
+            "a map has no feed direction: give the force @base or @tool", param_hint="--force"
         )
     if not any(wrench):
-        raise click.BadParameter("a force of zero bends nothing", param_hint="--force")
+        raise click.BadParameter("a force of zero deflects nothing", param_hint="--force")
     ranged = sum(len(values) == 2 for values in (x, y, z))
     if grid**ranged > MAX_CELLS:
         raise click.BadParameter(
-            f"{grid} points along {ranged} ranges make {grid**ranged:.3g} cells, more than {MAX_CELLS}",
+            f"{grid} points along {ranged} ranges make {grid**ranged:.3g} cells, more than the limit of {MAX_CELLS}",
             param_hint="--grid",
         )
     if picture is not None and (ranged == 0 or grid == 1):
-        raise click.BadParameter("there is nothing to draw of a single cell", param_hint="--picture")
+        raise click.BadParameter("a single cell cannot be drawn", param_hint="--picture")
 
     out = Out(json_to, quiet, verbose)
     request = MapRequest(
@@ -160,7 +164,7 @@ def map_(
         csv=csv_to,
         json=out.json_file,
     )
-    with out.refusals("map"), out.stages() as stage:
+    with out.refusals(), out.stages() as stage:
         done = map_workspace(request, stage)
     out.result(done.as_json(), written=True)
     if not out.quiet:

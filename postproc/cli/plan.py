@@ -11,7 +11,7 @@ from postproc.cli.common import FAR, ROBOT, Numbers, Out, ending, number, number
 from postproc.cli.identify import _words
 
 MOST = 200
-"""Poses that somebody may want to set up."""
+"""Largest number of poses of a plan."""
 
 Range = tuple[float, float]
 
@@ -20,7 +20,7 @@ def _loads(_context: click.Context, _option: click.Parameter, text: str | None) 
     """``kg,kg``, none below zero."""
     loads = tuple(number(word.strip(), FAR) for word in text.split(",")) if text else ()
     if any(load < 0 for load in loads):
-        raise click.BadParameter("a weight can not be below zero")
+        raise click.BadParameter("a weight cannot be below zero")
     return loads
 
 
@@ -34,7 +34,7 @@ def _targets(
         if not equals or not name or any(sign in name for sign in ',;"#:'):
             raise click.BadParameter(f"{text[:40]!r} is not NAME=x,y,z")
         if name.casefold() in map(str.casefold, found):
-            raise click.BadParameter(f"{name!r} is named twice")
+            raise click.BadParameter(f"{name!r} occurs twice")
         found[name] = numbers((3,), "x,y,z")(context, option, place)
     return tuple(found.items())
 
@@ -48,7 +48,7 @@ def _ends(text: str) -> Range:
     low, colon, high = (part.strip() for part in text.partition(":"))
     ends = (number(low, FAR) if low else -math.inf), (number(high, FAR) if high else math.inf)
     if not colon or not ends[0] < ends[1]:
-        raise click.BadParameter(f"{text[:40]!r} is not a range a:b that rises")
+        raise click.BadParameter(f"{text[:40]!r} is not an ascending range a:b")
     return ends
 
 
@@ -56,7 +56,7 @@ def _box(_context: click.Context, _option: click.Parameter, text: str) -> tuple[
     ranges = tuple(_ends(part) for part in text.split(","))
     if len(ranges) != 3:
         raise click.BadParameter(
-            f"{len(ranges)} ranges where x0:x1,y0:y1,z0:z1 is needed; leave an end open as in :,:,0:"
+            f"{len(ranges)} ranges are given where x0:x1,y0:y1,z0:z1 is needed; an end may be open as in :,:,0:"
         )
     return ranges
 
@@ -71,7 +71,7 @@ def _limits(
         if not equals or not name:
             raise click.BadParameter(f"{text[:40]!r} is not JOINT=a:b")
         if name.casefold() in map(str.casefold, found):
-            raise click.BadParameter(f"{name!r} is named twice")
+            raise click.BadParameter(f"{name!r} occurs twice")
         found[name] = _ends(ends)
     return tuple(found.items())
 
@@ -93,9 +93,9 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     required=True,
     metavar="EFFECT[.PARAMETER],...",
     callback=_words,
-    help="What is to be identified: effects, or single parameters of them.",
+    help="Effects to identify, or single parameters of them.",
 )
-@click.option("--poses", required=True, type=click.IntRange(1, MOST), help="How many poses are to be set up.")
+@click.option("--poses", required=True, type=click.IntRange(1, MOST), help="Number of poses of the plan.")
 @click.option(
     "-o",
     "--output",
@@ -103,23 +103,21 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="PLAN.csv",
     callback=ending(".csv"),
-    help="The plan: a file to fill in with readings, and to give to `identify` then.",
+    help="The plan: a file to fill in with readings, then the input of `identify`.",
 )
 @click.option(
     "--loads",
     metavar="KG,KG",
     callback=_loads,
-    help="Weights that can be hung at the TCP; all of them at every pose [absolute: none].",
+    help="Loads that can be hung at the TCP; all of them at every pose [absolute: none].",
 )
-@click.option(
-    "--one-load", is_flag=True, help="At each pose one of the loads, the one that tells most there."
-)
+@click.option("--one-load", is_flag=True, help="Use one load per pose, the most informative one.")
 @click.option(
     "--tool",
     metavar="X,Y,Z[,A,B,C]",
     default="0,0,0",
     callback=tool_place,
-    help="TCP on the flange, mm and deg: where the load hangs; beside the last axis, or that is not seen [the flange].",
+    help="TCP on the flange, mm and deg, where the load hangs; off the last axis, to load it too [the flange].",
 )
 @click.option(
     "--target",
@@ -127,15 +125,17 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     metavar="NAME=X,Y,Z",
     multiple=True,
     callback=_targets,
-    help="A reflector and its place on the flange, mm; may be given several times [the TCP is measured].",
+    help="A reflector and its position on the flange, mm; repeat the option for several [the TCP is measured].",
 )
 @click.option(
-    "--rough-targets", is_flag=True, help="The reflectors' places are rough; `identify` is to find them."
+    "--rough-targets",
+    is_flag=True,
+    help="The positions of the reflectors are approximate; `identify` has to find them.",
 )
 @click.option(
     "--kind",
     type=click.Choice(["deflection", "absolute"]),
-    help="What is measured: loaded minus unloaded, or places by a tracker [deflection for what a load shows].",
+    help="What is measured: loaded minus unloaded, or positions by a tracker [deflection for effects of load].",
 )
 @click.option(
     "--sigma",
@@ -143,7 +143,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     default=0.03,
     show_default=True,
     metavar="MM",
-    help="Scatter of each coordinate of what is measured (of the difference, for deflections), one sigma.",
+    help="Scatter of each measured coordinate (of the difference, for deflections), one sigma.",
 )
 @click.option(
     "--criterion",
@@ -155,24 +155,26 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     "--wanted",
     metavar="[NAME=]VALUE",
     multiple=True,
-    help="Wanted 95 % interval, half width: c2=1%, s0=20mm, or 2% for all [those of the robot file].",
+    help="Wanted half width of the 95 % interval: c2=1%, s0=20mm, or 2% for all [those of the robot file].",
 )
 @click.option(
     "--test",
     "test_program",
     type=click.Path(path_type=Path),
     metavar="PROGRAM",
-    help="A program: the error at its cuts is to be small. With its cell and its forces, as in the main job.",
+    help="A program whose error at the cuts is to be small. With its cell and its forces, as in the main job.",
 )
 @click.option("--force", metavar="[SPEC]", help="Machining force of --test [the forces that belong to it].")
 @click.option(
-    "--cell", type=click.Path(path_type=Path), help="Cell of --test instead of the nearest cell.yaml."
+    "--cell",
+    type=click.Path(path_type=Path),
+    help="Use this cell for --test instead of the nearest cell.yaml.",
 )
 @click.option(
     "--tracker",
     metavar="X,Y,Z",
     callback=_place,
-    help="Place of the tracker in the robot base, mm; only reflectors that it sees are planned [all are seen].",
+    help="Position of the tracker in the robot base, mm; only visible reflectors are planned [all are visible].",
 )
 @click.option(
     "--cone",
@@ -180,7 +182,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     default=60.0,
     show_default=True,
     metavar="DEG",
-    help="A reflector is seen within this angle of where it faces: straight away from the flange's axis.",
+    help="A reflector is visible within this angle of its axis, which points away from the flange's axis.",
 )
 @click.option(
     "--box",
@@ -188,14 +190,14 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     default=":,:,0:",
     show_default=True,
     callback=_box,
-    help="Where TCP, flange and reflectors may be, mm, robot base; ends may be left open.",
+    help="Allowed space of TCP, flange and reflectors, mm, robot base; ends may be open.",
 )
 @click.option(
     "--limits",
     metavar="JOINT=A:B",
     multiple=True,
     callback=_limits,
-    help="Narrower range of an axis, deg or mm; may be given several times [the robot file's, less 1 deg].",
+    help="Narrower range of an axis, deg or mm; repeat the option for several [the robot file's, less 1 deg].",
 )
 @click.option(
     "--spacing",
@@ -203,24 +205,28 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     default=5.0,
     show_default=True,
     metavar="DEG",
-    help="Two poses differ by this in one axis at least.",
+    help="Smallest difference of two poses in their most different axis.",
 )
 @click.option(
     "--measured",
     type=click.Path(path_type=Path),
     metavar="DATA.csv",
     multiple=True,
-    help="Readings that exist already and count; without their own `# tool:` with that of --tool. May be given several "
-    "times.",
+    help="Existing readings to include; with the tool of --tool where they state none. Repeat the option for several "
+    "files.",
 )
 @click.option(
     "--discriminate",
     metavar="A,B",
     callback=_pair,
-    help="Poses that tell these two effects apart, each fitted together with --effects.",
+    help="Choose poses that distinguish these two effects, each fitted together with --effects.",
 )
 @click.option(
-    "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Of the random poses."
+    "--seed",
+    type=click.IntRange(0, 2**31 - 1),
+    default=1,
+    show_default=True,
+    help="Seed of the random poses.",
 )
 @result_options
 def plan(
@@ -252,11 +258,11 @@ def plan(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Plan which poses and loads to measure, so that `identify` finds the parameters of EFFECTS as well as it can.
+    """Plan which poses and loads to measure, so that `identify` finds the parameters of EFFECTS precisely.
 
-    Poses lie within the limits of the axes, the room and the sight of the tracker. Predicted are the 95 % intervals
-    that `identify` will state, for 10, 15, 20, 30 and the wanted number of poses, beside random poses; and what can not
-    be seen, and why. Collisions are not looked at.
+    Poses are within the axis limits, the box and the view of the tracker. The result predicts the 95 % intervals that
+    `identify` will state, for 10, 15, 20, 30 and the wanted number of poses and for random poses, and lists parameters
+    that are not observable, and why. Collisions are not checked.
 
     \b
     Examples:
@@ -267,9 +273,9 @@ def plan(
       compensate plan --robot kuka_kr270 --effects joint_compliance --discriminate gravity_compensator,link_compliance
           --poses 6 --loads 265 --tool 0,500,300 -o which.csv
 
-    Exit codes: 0 done; 3 done, but something that was asked for can not be seen; 1 could not; 2 command line.
+    Exit codes: 0 done; 3 done, but a requested parameter is not observable; 1 failed; 2 wrong command line.
     """
-    from postproc.report.plan import show_plan
+    from postproc.report.planned import show_plan
     from postproc.workflows.plan import PlanRequest
     from postproc.workflows.plan import plan as run
 
@@ -283,9 +289,7 @@ def plan(
     if one_load and len(loads) < 2:
         raise click.BadParameter("needs several --loads to choose from", param_hint="--one-load")
     if discriminate is not None and (criterion or test_program or measured):
-        raise click.BadParameter(
-            "goes with no --criterion, --test and --measured", param_hint="--discriminate"
-        )
+        raise click.BadParameter("excludes --criterion, --test and --measured", param_hint="--discriminate")
 
     out = Out(json_to, quiet, verbose)
     request = PlanRequest(
@@ -315,7 +319,7 @@ def plan(
         seed=seed,
         json=out.json_file,
     )
-    with out.refusals("plan"), out.stages() as stage:
+    with out.refusals(), out.stages() as stage:
         done = run(request, stage)
     out.result(done.as_json(), written=True)
     if not out.quiet:

@@ -15,12 +15,12 @@ from postproc.cli.common import Out, program_options
     "--report",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="Write <stem>.deflection.csv and <stem>.prediction.json there.",
+    help="Write <stem>.deflection.csv, <stem>.prediction.json and <stem>.prediction.html to this folder.",
 )
 def predict(
     program: Path,
     force: str | None,
-    force_offset: bool,
+    tare: bool,
     robot: str | None,
     cell: Path | None,
     config_dat: Path | None,
@@ -30,12 +30,14 @@ def predict(
     verbose: bool,
     report: Path | None,
 ) -> None:
-    """Predict how far the tool is from PROGRAM's poses; no program is written.
+    """Predict how far the tool is off at every pose of PROGRAM; no program is written.
 
     \b
     Examples:
       compensate predict panel.src --force
       compensate predict panel.src --force 0,360,560 --report reports
+
+    Exit codes: 0 done; 3 something needs review; 1 failed; 2 wrong command line.
     """
     from postproc.report.terminal import show
     from postproc.workflows.preparation import Request
@@ -45,7 +47,7 @@ def predict(
     request = Request(
         program=program,
         force=force,
-        force_offset=force_offset,
+        tare=tare,
         cell=cell,
         config_dat=config_dat,
         robot=robot,

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Out, program_options
+from postproc.cli.common import Out, allow_compensated_option, insertion_options, program_options
+from postproc.workflows.option_names import SHARED_POINTS
 
 
 @click.command()
@@ -16,7 +17,7 @@ from postproc.cli.common import Out, program_options
     type=click.FloatRange(0.0, 1.0),
     default=1.0,
     show_default=True,
-    help="Share of the correction that is applied; first cuts are made with 0.5.",
+    help="Share of the correction that is applied; make first cuts with 0.5.",
 )
 @click.option(
     "-o",
@@ -26,23 +27,18 @@ from postproc.cli.common import Out, program_options
     help="File or folder of the result [compensated/<same name>]. Another stem renames the module.",
 )
 @click.option(
-    "--report", type=click.Path(path_type=Path), metavar="DIR", help="Folder of the reports [beside it]."
+    "--report",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Folder of the reports [beside the result].",
 )
-@click.option("--keep-points", is_flag=True, help="Insert no motion; what that leaves on the way is told.")
-@click.option(
-    "--own-points",
-    type=click.Choice(["inline", "dat", "refuse"]),
-    default="inline",
-    show_default=True,
-    help="A named point that serves several motions: each gets its own as numbers in its line, as a new point in the "
-    ".dat, or none of them is moved.",
-)
-@click.option("--dry-run", is_flag=True, help="Do everything but write.")
-@click.option("--again", is_flag=True, help="Compensate a program that is compensated already.")
+@insertion_options
+@click.option("--dry-run", is_flag=True, help="Do everything but write files.")
+@allow_compensated_option
 def program(
     program: Path,
     force: str | None,
-    force_offset: bool,
+    tare: bool,
     robot: str | None,
     cell: Path | None,
     config_dat: Path | None,
@@ -53,10 +49,10 @@ def program(
     gain: float,
     output: str | None,
     report: Path | None,
-    keep_points: bool,
-    own_points: str,
+    no_insert: bool,
+    shared_points: str | None,
     dry_run: bool,
-    again: bool,
+    allow_compensated: bool,
 ) -> None:
     """Compensate PROGRAM for the deflection of the robot (the default command).
 
@@ -70,7 +66,8 @@ def program(
       compensate panel.src --force panel.force.csv --gain 0.5 --json -
       compensate panel.src --force milling.yaml
 
-    Exit codes: 0 done; 3 written, but something was left or deserves a look; 1 nothing written; 2 command line.
+    Exit codes: 0 done; 3 written, but not everything is corrected or something needs review; 1 nothing was written; 2
+    wrong command line.
     """
     from postproc.report.terminal import show
     from postproc.workflows.preparation import Request
@@ -85,7 +82,7 @@ def program(
             Request(
                 program=program,
                 force=force,
-                force_offset=force_offset,
+                tare=tare,
                 cell=cell,
                 robot=robot,
                 gain=gain,
@@ -93,10 +90,10 @@ def program(
                 report=report,
                 strict=strict,
                 dry_run=dry_run,
-                again=again,
+                allow_compensated=allow_compensated,
                 json=out.json_file,
-                keep_points=keep_points,
-                own_points=own_points,
+                no_insert=no_insert,
+                shared_points=shared_points or SHARED_POINTS[0],
                 config_dat=config_dat,
             ),
             stage,
@@ -105,5 +102,5 @@ def program(
     if not out.quiet:
         show(out.console(), done, verbose)
         if dry_run:
-            click.echo("dry run: nothing was written")
+            click.echo("this is a dry run: nothing is written")
     raise SystemExit(done.exit)

@@ -18,12 +18,12 @@ def robots(name: str | None, json_to: str | None, quiet: bool, verbose: bool) ->
       compensate robots
       compensate robots kuka_kr270
     """
-    from postproc.report.robot import list_robots, robot_json, show_robot
+    from postproc.report.robot_words import list_robots, robots_json, show_robot
     from postproc.workflows.listing import robots as run
 
     out = Out(json_to, quiet, verbose)
-    with out.refusals(""):
+    with out.refusals(writes=False):
         models = run(name)
-        out.result({"robots": [robot_json(model) for model in models]})
+        out.result(robots_json(models))
     if not out.quiet:
         (show_robot if name else list_robots)(out.console(), models)

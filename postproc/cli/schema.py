@@ -1,4 +1,4 @@
-"""``compensate schema``: JSON Schemas of the files that people write."""
+"""``compensate schema``: JSON Schemas of the files that people write, and of the results."""
 
 from __future__ import annotations
 
@@ -6,21 +6,38 @@ import json
 
 import click
 
-NAMES = ("cell", "robot", "job")
+FILES = ("cell", "robot", "job")
+RESULTS = (
+    "report",
+    "predict",
+    "check",
+    "verify",
+    "map",
+    "identify",
+    "plan",
+    "diagnose",
+    "batch",
+    "robots",
+    "corrections",
+)
 
 
 @click.command()
-@click.argument("name", type=click.Choice(NAMES))
+@click.argument("name", type=click.Choice(FILES + RESULTS))
 def schema(name: str) -> None:
-    """Print the JSON Schema (draft 2020-12) of a cell file, a robot file, or a job file of `batch`, for editors.
+    """Print the JSON Schema (draft 2020-12) of a file or of a result.
+
+    Files: the cell file, the robot file, the job file of `batch`. Results: what `--json` gives; `report` is that of the
+    main job, and `corrections` describes the columns of <stem>.corrections.csv. Every key has a description, every
+    number its unit; keys marked deprecated are former names, which go with the next version.
 
     \b
     Examples:
       compensate schema cell > cell.schema.json
       compensate schema robot
-      compensate schema job
+      compensate schema report > report.schema.json
 
-    Then, in the first line of a file: # yaml-language-server: $schema=cell.schema.json
+    For editors, in the first line of a file: # yaml-language-server: $schema=cell.schema.json
     """
     from postproc.schemas import schema_of
 

@@ -6,35 +6,33 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import ROBOT, Out, language_options, result_options
+from postproc.cli.common import ROBOT, Out, language_options, result_options, tare_option
 
 
 @click.command()
 @click.argument("original", type=click.Path(path_type=Path))
 @click.argument("compensated", type=click.Path(path_type=Path))
 @click.option(
-    "--force", metavar="[SPEC]", default=None, help="Machining force of the original, as for the main job."
+    "--force", metavar="[SPEC]", default=None, help="Machining force on the original, as for the main job."
 )
-@click.option(
-    "--force-offset", is_flag=True, help="Take the offset that a force log shows in air off its forces."
-)
-@click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Robot instead of the cell's.")
+@tare_option
+@click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cell's.")
 @language_options
 @click.option(
     "--step",
     type=click.FloatRange(0.01, 1000.0),
-    default=1.0,
+    default=4.0,
     show_default=True,
     metavar="MM",
-    help="Distance of the samples along the path; each motion has five at least.",
+    help="Distance of the first samples along the path; samples are doubled until the errors no longer change.",
 )
-@click.option("--strict", is_flag=True, help="Warnings count as errors.")
+@click.option("--strict", is_flag=True, help="Treat warnings as errors.")
 @result_options
 def verify(
     original: Path,
     compensated: Path,
     force: str | None,
-    force_offset: bool,
+    tare: bool,
     robot: str | None,
     cell: Path | None,
     config_dat: Path | None,
@@ -44,19 +42,22 @@ def verify(
     quiet: bool,
     verbose: bool,
 ) -> None:
-    """Simulate ORIGINAL and what was made of it along their interpolated paths, and tell the path error of each.
+    """Simulate ORIGINAL and COMPENSATED along their paths as the controller interpolates them, and report the errors.
 
-    Both are read from their files and sampled densely; the force at each place is that of the original's path there.
+    Both files are read and sampled until twice as many samples no longer change the errors.  The force on the tool is
+    that at the nearest point of the original's path.  Other differences are reported: stops, backward motions, missing
+    points, frames, feeds, external axes, points in air.
 
     \b
     Examples:
       compensate verify panel.src compensated/panel.src --force
       compensate verify part.ngc compensated/part.ngc --force 0,360,560@base --step 0.5 --json -
 
-    Exit codes: 0 within the tolerance; 3 above it, or something could not be simulated; 1 not the same program.
+    Exit codes: 0 within the tolerances and no other difference; 3 above a tolerance, another difference, or an error
+    that could not be computed; 1 not the same program; 2 wrong command line.
     """
+    from postproc.base.units import MM
     from postproc.report.verified import show
-    from postproc.units import MM
     from postproc.workflows.preparation import Request
     from postproc.workflows.verify import verify as run
 
@@ -64,7 +65,7 @@ def verify(
     request = Request(
         program=original,
         force=force,
-        force_offset=force_offset,
+        tare=tare,
         cell=cell,
         robot=robot,
         strict=strict,

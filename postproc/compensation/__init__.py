@@ -1,0 +1,1 @@
+from postproc.compensation import codes as codes

@@ -2,38 +2,46 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.blocks import each_block, in_blocks
-from postproc.compensation.cuts import cuts_of, left_findings, spread, switch_findings, switched_on
-from postproc.compensation.mirror import Correction, difference
-from postproc.compensation.task import Task
-from postproc.findings import Finding, Refusal
-from postproc.geometry import Placed, PoseRows, Poses, lengths, product, rotation_from_vector
-from postproc.robot.track import near_singular, sides, singular_words
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.batches import each_block, in_blocks
+from postproc.base.findings import Finding, Refusal
+from postproc.base.geometry import Placed, PoseRows, Poses, lengths, product, rotation_from_vector
+from postproc.base.units import DEG, MM
+from postproc.compensation.cuts import (
+    feed_motions,
+    number_cuts,
+    spread_over_cuts,
+    switch_findings,
+    uncorrected_findings,
+)
+from postproc.compensation.mirror import Correction, pose_error
+from postproc.compensation.problem import CompensationProblem
+from postproc.robot.axis_track import is_near_singular, sides, singular_words
 from postproc.toolpath import Kind
-from postproc.units import DEG, MM
 
 
-class State(IntEnum):
+class MotionOutcome(IntEnum):
     AIR = 0  # nothing to correct
     CORRECTED = 1
-    LEFT = 2  # could not be corrected, told
+    UNCORRECTED = 2  # could not be corrected, told
     OFF = 3  # left alone on the program's own word (COMPENSATE OFF)
+    LEAD_IN = 4  # in air, and ends where the cut after it starts corrected
 
 
 @dataclass(frozen=True)
-class Result:
+class CorrectionResult:
     """state (N,) State; cut (N,), -1 in air; command (N): TCP commands in the robot base; correction (N, 3) [m]: their
     place minus the wanted one, 0 where nothing is corrected; turn (N, 3) [rad]: by how much they are
-    meant to be turned, NaN behind the writing; before, after (N,) [m] predicted position error, NaN where
+    meant to be turned, NaN after the writing; before, after (N,) [m] predicted position error, NaN where
     nothing is predicted, and before_angle, after_angle (N,) [rad]; deflection (N, 3) [m] before; iterations (N,);
-    history (K + 1, N) [m]; findings."""
+    history (K + 1, N) [m]; findings.  across_after (N,) [m]: the part of the error after across the feed, known behind
+    the writing."""
 
     state: Ints
     cut: Ints
@@ -48,13 +56,20 @@ class Result:
     iterations: Ints
     history: Floats
     findings: tuple[Finding, ...]
+    across_after: Floats = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def scope(self) -> Bools:
+        """(N,) motions of cuts, corrected or not."""
+        return np.asarray(self.cut >= 0)
 
     @property
     def corrected(self) -> Bools:
-        return self.state == State.CORRECTED
+        """(N,) the motion is corrected."""
+        return self.state == MotionOutcome.CORRECTED
 
 
-def correct(task: Task) -> Result:
+def correct(task: CompensationProblem) -> CorrectionResult:
     """Correct every motion that can be.
 
     Raises Refusal: a cutting pose out of reach (KIN001), a configuration that nothing says (KIN004), a correction
@@ -66,25 +81,25 @@ def correct(task: Task) -> Result:
     scope = forced if task.process else forced | cartesian
     # In air every motion stands for itself; a cut stands and falls as a whole.
     cut = (
-        cuts_of(scope, path.runs)
+        number_cuts(scope, path.executes)
         if task.process
         else np.where(scope, np.cumsum(scope & ~(forced & _shifted(forced))) - 1, -1)
     )
-    on = switched_on(path)
+    on = feed_motions(path)
     findings = switch_findings(task.file, path)
-    why = _held(task, scope, scope & on, findings)
+    why = _uncorrectable(task, scope, scope & on, findings)
     off = scope & ~on
-    for row in np.flatnonzero(on & scope & spread(off, cut)):
+    for row in np.flatnonzero(on & scope & spread_over_cuts(off, cut)):
         why.setdefault(int(row), _at(task, int(row), "COR004", "COMPENSATE is switched inside this cut"))
 
     # What the force does, everywhere it can be predicted; the correction, where it may be made.
     seen = np.flatnonzero(scope & cartesian & (track.status >= 0) & track.reachable)
-    may = on & ~spread(_in(why, n), cut)
-    found = _Found(n)
-    for block in in_blocks(lambda part: _tried(task, seen[part], may[seen[part]]), len(seen)):
+    may = on & ~spread_over_cuts(_in(why, n), cut)
+    found = _Findings(n)
+    for block in in_blocks(lambda part: _correct_block(task, seen[part], may[seen[part]]), len(seen)):
         found.put(block)
     found.judged(task, why, findings)
-    keeps = found.tried & ~spread(_in(why, n), cut)
+    keeps = found.tried & ~spread_over_cuts(_in(why, n), cut)
 
     shift, turn = task.gain * found.shift, task.gain * found.turn
     shift[~keeps], turn[~keeps] = 0.0, 0.0
@@ -94,21 +109,21 @@ def correct(task: Task) -> Result:
         size > task.max_correction,
         "COR002",
         f"the correction is {size.max(initial=0.0) / MM:.2f} mm,"
-        f" more than max_correction ({task.max_correction / MM:g} mm)",
-        "check force, base and tool; if it is meant, raise max_correction in the cell",
+        f" which exceeds max_correction ({task.max_correction / MM:g} mm)",
+        "check force, base and tool; raise max_correction in the cell if the correction is intended",
     )
 
-    state = np.full(n, State.AIR, np.int8)
-    state[scope] = State.LEFT
-    state[off] = State.OFF
-    state[keeps] = State.CORRECTED
-    findings += left_findings(task.file, path, cut, why)
+    state = np.full(n, MotionOutcome.AIR, np.int8)
+    state[scope] = MotionOutcome.UNCORRECTED
+    state[off] = MotionOutcome.OFF
+    state[keeps] = MotionOutcome.CORRECTED
+    findings += uncorrected_findings(task.file, path, cut, why)
     found.warn_sides(task, keeps, findings)
     _warn_singular(task, seen[forced[seen]], findings)
     moved = np.flatnonzero(keeps)
     after, after_angle = found.before.copy(), found.before_angle.copy()
     after[moved], after_angle[moved] = found.error[moved], found.angle[moved]
-    result = Result(
+    result = CorrectionResult(
         state,
         cut,
         PoseRows(n, lambda rows: _moved(task.wanted[rows], shift[rows], turn[rows])),
@@ -133,26 +148,36 @@ def _moved(wanted: Poses, shift: Floats, turn: Floats) -> Poses:
     return Poses(product(rotation_from_vector(turn), wanted.rotation), wanted.position + shift)
 
 
-def with_residual(task: Task, result: Result, command: Placed) -> Result:
+def with_residual(task: CompensationProblem, result: CorrectionResult, command: Placed) -> CorrectionResult:
     """The result with its residual predicted for ``command``, the poses as they were really written."""
     rows = np.flatnonzero(result.corrected)
     after, after_angle = result.before.copy(), result.before_angle.copy()
     correction = result.correction.copy()
+    beside = np.full(len(result.state), np.nan, np.float32)
 
     def predicted(part: slice) -> None:
         at = rows[part]
         there, wanted = command[at], task.wanted[at]
-        here = task.real(at, there, task.wrench[at])
-        shift, turn = task.seen(at, here.pose, task.goal(at, wanted))
+        here = task.simulated(at, there, task.wrench[at], corrected=True)
+        shift, turn = task.visible_errors(at, here.pose, task.goal(at, wanted))
         after[at] = np.where(here.reachable & here.settled, lengths(shift), np.inf)
         after_angle[at] = lengths(turn)
+        ahead = np.sum(shift * task.desired_path.tangent(at, np.ones(len(at))), axis=1)
+        beside[at] = np.sqrt(np.maximum(np.einsum("ni,ni->n", shift, shift) - ahead**2, 0.0))
         correction[at] = there.position - wanted.position
 
     each_block(predicted, len(rows))
-    return replace(result, command=command, correction=correction, after=after, after_angle=after_angle)
+    return replace(
+        result,
+        command=command,
+        correction=correction,
+        after=after,
+        after_angle=after_angle,
+        across_after=np.asarray(beside),
+    )
 
 
-class _Block(NamedTuple):
+class _CorrectedBlock(NamedTuple):
     """What a block of motions is found to do.  rows (K,): all that were predicted, with deflection (K, 3) [m], before
     (K,) [m] and before_angle [rad]; tried (T,): those of them that were corrected, by shift (T, 3) [m] and turn (T, 3)
     [rad]; crossed (T,): to the other side of what S or T states; beyond (T,): the limits of an axis."""
@@ -169,39 +194,39 @@ class _Block(NamedTuple):
     beyond: Bools
 
 
-def _tried(task: Task, rows: Ints, may: Bools) -> _Block:
+def _correct_block(task: CompensationProblem, rows: Ints, may: Bools) -> _CorrectedBlock:
     """Predict the motions ``rows`` (K,), and correct those that ``may`` (K,) be."""
     wanted, wrench = task.wanted[rows], task.wrench[rows]
     goal = task.goal(rows, wanted)
     q = task.track.q[rows]
-    begin, bent = task.begin(rows, wanted, wrench, goal, q if goal is wanted else None)
-    here = task.real(rows, wanted, wrench, bent, q)
-    shift, turn = task.seen(rows, here.pose, goal)
+    start, bent = task.start_command(rows, wanted, wrench, goal, q if goal is wanted else None)
+    here = task.simulated(rows, wanted, wrench, bent, q)
+    shift, turn = task.visible_errors(rows, here.pose, goal)
     shift[~here.settled], turn[~here.settled] = np.nan, np.nan
     tried, wanted = rows[may], wanted[may]
-    done = task.command(tried, wanted, wrench[may], goal[may], (begin[may], bent[may]))
+    done = task.command(tried, wanted, wrench[may], goal[may], (start[may], bent[may]))
     path, robot = task.toolpath, task.model.robot
     low, high = robot.limits.T
     crossed = ((path.status[tried] >= 0) | (path.turn[tried] >= 0)) & (path.kind[tried] == Kind.PTP)
     if crossed.any():
         one, two = sides(robot, task.track.q[tried]), sides(robot, done.q)
         crossed &= (one[0] != two[0]) | (one[1] != two[1])
-    return _Block(
+    return _CorrectedBlock(
         rows,
         shift,
         lengths(shift),
         lengths(turn),
         tried,
-        *difference(done.command, wanted),
+        *pose_error(done.command, wanted),
         done,
         crossed,
         ((done.q < low) | (done.q > high)).any(axis=1),
     )
 
 
-class _Found:
-    """What was found of all N motions, as in ``Result``; shift, turn (N, 3): whole corrections; tried (N,): those
-    that were corrected."""
+class _Findings:
+    """What was found of all N motions, as in ``CorrectionResult``; shift, turn (N, 3): whole corrections; tried (N,):
+    those that were corrected."""
 
     def __init__(self, n: int) -> None:
         self.tried = np.zeros(n, bool)
@@ -215,7 +240,7 @@ class _Found:
         self.crossed: list[int] = []
         self.axes: Floats = np.empty((0, 0))
 
-    def put(self, block: _Block) -> None:
+    def put(self, block: _CorrectedBlock) -> None:
         """Takes what was found of a block."""
         rows, tried, done = block.rows, block.tried, block.done
         self.deflection[rows], self.before[rows] = block.deflection, block.before
@@ -223,7 +248,7 @@ class _Found:
         self.tried[tried] = True
         self.shift[tried], self.turn[tried] = block.shift, block.turn
         self.error[tried], self.angle[tried] = done.error, done.angle
-        # What the mirror begins with is a first step from the wanted pose.
+        # What the mirror starts with is a first step from the wanted pose.
         self.iterations[tried] = done.iterations + 1
         more = len(done.history) + 1 - len(self.history)
         if more > 0:
@@ -231,7 +256,7 @@ class _Found:
         self.history[0, tried] = self.before[tried]
         self.history[1 : len(done.history) + 1, tried] = done.history
         self.crossed += tried[block.crossed].tolist()
-        beyond = block.beyond & done.converged  # what is not is told as that
+        beyond = block.beyond & done.converged  # what is not is reported as that
         for code, failed in (
             ("COR009", ~done.reachable),
             ("MOD002", ~done.settled),
@@ -242,34 +267,40 @@ class _Found:
         if beyond.any() and not len(self.axes):
             self.axes = done.q[beyond][:1]
 
-    def judged(self, task: Task, why: dict[int, Finding], findings: list[Finding]) -> None:
-        """Notes why motions that were tried can not be corrected after all."""
+    def judged(self, task: CompensationProblem, why: dict[int, Finding], findings: list[Finding]) -> None:
+        """Notes why motions that were tried cannot be corrected after all."""
         words = {
-            "COR009": "the correction leads out of reach",
-            "MOD002": "the robot has no stable rest under this force",
-            "COR001": "the correction does not settle",
-            "COR008": "the correction brings " + (_axis_beyond(task, self.axes[0]) if len(self.axes) else ""),
+            "COR009": "the corrected pose is out of reach",
+            "MOD002": "the robot has no equilibrium under this force",
+            "COR001": "the correction does not converge",
+            "COR008": "the corrected pose exceeds the limits: "
+            + (_axis_beyond(task, self.axes[0]) if len(self.axes) else ""),
         }
         for code, parts in self.failed.items():
             rows = np.concatenate(parts)
             _note(task, why, findings, rows[~_in(why, len(self.before))[rows]], code, words[code])
 
-    def warn_sides(self, task: Task, keeps: Bools, findings: list[Finding]) -> None:
+    def warn_sides(self, task: CompensationProblem, keeps: Bools, findings: list[Finding]) -> None:
         """S and T stand verbatim in the text: they must still be those of the corrected pose."""
         crossed = np.array([row for row in self.crossed if keeps[row]], np.int64)
         if len(crossed):
-            message = "the corrected pose crosses the side that S or T states" + _more(task, crossed)
+            message = (
+                "the target has a Status/Turn mismatch: the corrected pose is on the other side of an axis angle"
+                + _further_findings(task, crossed)
+            )
             findings.append(_at(task, int(crossed[0]), "KIN006", message))
 
 
-def _held(task: Task, scope: Bools, tried: Bools, findings: list[Finding]) -> dict[int, Finding]:
-    """Motions that can not be corrected as they are programmed, and why; Refusal where the input must be wrong."""
+def _uncorrectable(
+    task: CompensationProblem, scope: Bools, tried: Bools, findings: list[Finding]
+) -> dict[int, Finding]:
+    """Motions that cannot be corrected as they are programmed, and why; Refusal where the input must be wrong."""
     path, track, n = task.toolpath, task.track, len(task.toolpath)
     cartesian = path.known & ~path.on_axes
     lost = np.flatnonzero(tried & ~cartesian)
     unknown = _at(task, int(lost[0]), "COR003", "its target is not known") if len(lost) else None
     why = {row: unknown for row in lost.tolist() if unknown}
-    for stops in (path.pinned, path.refused):
+    for stops in (path.locked, path.refused):
         why.update({row: stop for row, stop in stops.items() if tried[row]})
     free = tried & cartesian & ~_in(why, n)
     _refuse(
@@ -277,7 +308,7 @@ def _held(task: Task, scope: Bools, tried: Bools, findings: list[Finding]) -> di
         free & (track.status < 0),
         "KIN004",
         "the robot's configuration is not known here",
-        "give `start:` (axes before the first motion) in the cell, or S and T with the PTP before it",
+        "add `start:` (axes before the first motion) to the cell, or state S and T in the PTP before it",
     )
     _refuse(
         task,
@@ -298,52 +329,57 @@ def _held(task: Task, scope: Bools, tried: Bools, findings: list[Finding]) -> di
     return why
 
 
-def _which_axis(task: Task, mask: Bools) -> str:
+def _which_axis(task: CompensationProblem, mask: Bools) -> str:
     """The axis that is farthest beyond its limits at the first motion of ``mask``, in words."""
     return _axis_beyond(task, task.track.q[np.argmax(mask)]) if mask.any() else ""
 
 
-def _axis_beyond(task: Task, q: Floats) -> str:
+def _axis_beyond(task: CompensationProblem, q: Floats) -> str:
     """The axis of ``q`` (n,) that is farthest beyond its limits, in words."""
     low, high = task.model.robot.limits.T
     axis = int(np.argmax(np.maximum(low - q, q - high)))
     joint = task.model.robot.joints[axis]
     word, unit = ("deg", DEG) if joint.kind == "revolute" else ("mm", MM)
     return (
-        f"{joint.name} at {q[axis] / unit:.1f} {word},"
-        f" limits {low[axis] / unit:g} .. {high[axis] / unit:g} {word}"
+        f"{joint.name} is at {q[axis] / unit:.1f} {word},"
+        f" beyond its limits {low[axis] / unit:g} .. {high[axis] / unit:g} {word}"
     )
 
 
 def _note(
-    task: Task, why: dict[int, Finding], findings: list[Finding], rows: Ints, code: str, message: str
+    task: CompensationProblem,
+    why: dict[int, Finding],
+    findings: list[Finding],
+    rows: Ints,
+    code: str,
+    message: str,
 ) -> None:
     """Say it once for all ``rows``, and remember it for each."""
     if len(rows):
         why.update(dict.fromkeys(rows.tolist(), _at(task, int(rows[0]), code, message)))
-        findings.append(_at(task, int(rows[0]), code, message + _more(task, rows)))
+        findings.append(_at(task, int(rows[0]), code, message + _further_findings(task, rows)))
 
 
-def _refuse(task: Task, mask: Bools, code: str, message: str, help: str) -> None:
+def _refuse(task: CompensationProblem, mask: Bools, code: str, message: str, help: str) -> None:
     rows = np.flatnonzero(mask)
     if len(rows):
-        raise Refusal(_at(task, int(rows[0]), code, message + _more(task, rows), help))
+        raise Refusal(_at(task, int(rows[0]), code, message + _further_findings(task, rows), help))
 
 
-def _warn_singular(task: Task, rows: Ints, findings: list[Finding]) -> None:
+def _warn_singular(task: CompensationProblem, rows: Ints, findings: list[Finding]) -> None:
     robot, q = task.model.robot, task.track.q
-    parts = in_blocks(lambda part: rows[part][near_singular(robot, q[rows[part]])], len(rows))
+    parts = in_blocks(lambda part: rows[part][is_near_singular(robot, q[rows[part]])], len(rows))
     close = np.concatenate([rows[:0], *parts])
     if len(close):
-        message = singular_words(robot) + _more(task, close)
+        message = singular_words(robot) + _further_findings(task, close)
         findings.append(_at(task, int(close[0]), "KIN003", message))
 
 
-def _more(task: Task, rows: Ints) -> str:
+def _further_findings(task: CompensationProblem, rows: Ints) -> str:
     return "" if len(rows) == 1 else f" ({len(rows)} motions, to line {task.toolpath.line[rows[-1]]})"
 
 
-def _at(task: Task, row: int, code: str, message: str, help: str = "") -> Finding:
+def _at(task: CompensationProblem, row: int, code: str, message: str, help: str = "") -> Finding:
     return Finding(code, message, task.file, int(task.toolpath.line[row]), help=help)
 
 

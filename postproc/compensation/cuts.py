@@ -7,30 +7,30 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints
-from postproc.findings import Finding
+from postproc.base.arrays import Bools, Ints
+from postproc.base.findings import Finding
 from postproc.toolpath import Toolpath
 
 _SWITCH = re.compile(r"COMPENSATE\s+(ON|OFF)(?![A-Z0-9_])", re.IGNORECASE)
 
 
-def cuts_of(in_scope: Bools, runs: Bools | None = None) -> Ints:
+def number_cuts(in_scope: Bools, runs: Bools | None = None) -> Ints:
     """(N,) number of the cut that a motion belongs to, from 0; -1 for motions outside of any.
 
-    ``in_scope`` (N,): the motion carries force.  ``runs`` (N,): as of a Toolpath; where it changes another cut begins.
+    ``in_scope`` (N,): the motion carries force.  ``runs`` (N,): as of a Toolpath; where it changes another cut starts.
     """
-    begins = in_scope & ~np.concatenate([[False], in_scope[:-1]])
+    starts = in_scope & ~np.concatenate([[False], in_scope[:-1]])
     if runs is not None:
-        begins[1:] |= in_scope[1:] & (runs[1:] != runs[:-1])
-    return np.where(in_scope, np.cumsum(begins, dtype=np.int32) - 1, -1)
+        starts[1:] |= in_scope[1:] & (runs[1:] != runs[:-1])
+    return np.where(in_scope, np.cumsum(starts, dtype=np.int32) - 1, -1)
 
 
-def spread(blocked: Bools, cut: Ints) -> Bools:
-    """(N,) motions whose cut holds a blocked motion."""
+def spread_over_cuts(blocked: Bools, cut: Ints) -> Bools:
+    """(N,) motions whose cut holds a ``blocked`` (N,) motion; ``cut`` (N,) the number of the cut, -1 in none."""
     return np.isin(cut, cut[blocked & (cut >= 0)])
 
 
-def switched_on(toolpath: Toolpath) -> Bools:
+def feed_motions(toolpath: Toolpath) -> Bools:
     """(N,) what ``COMPENSATE OFF`` / ``COMPENSATE ON`` comments say; a motion before the first of them is on."""
     on = np.ones(len(toolpath), bool)
     for note in toolpath.annotations:
@@ -40,11 +40,11 @@ def switched_on(toolpath: Toolpath) -> Bools:
 
 
 def switch_findings(file: str, toolpath: Toolpath) -> list[Finding]:
-    """The comments that begin with COMPENSATE and switch nothing."""
+    """The comments that start with COMPENSATE and switch nothing."""
     return [
         Finding(
             "COR011",
-            f"{note.text.strip()[:60]!r} is neither COMPENSATE OFF nor COMPENSATE ON; it was not used",
+            f"{note.text.strip()[:60]!r} is neither COMPENSATE OFF nor COMPENSATE ON; it is ignored",
             file,
             note.line,
         )
@@ -53,15 +53,17 @@ def switch_findings(file: str, toolpath: Toolpath) -> list[Finding]:
     ]
 
 
-def left_findings(file: str, toolpath: Toolpath, cut: Ints, why: Mapping[int, Finding]) -> list[Finding]:
-    """One finding for every cut that is left as it was, with the first reason in it."""
+def uncorrected_findings(
+    file: str, toolpath: Toolpath, cut: Ints, why: Mapping[int, Finding]
+) -> list[Finding]:
+    """One finding for every cut (``cut`` (N,), -1 in none) that is not changed, with the first reason in it."""
     findings = []
     inside, held = np.flatnonzero(cut >= 0), np.array(sorted(why), int)
     held = held[cut[held] >= 0]
     held = held[np.unique(cut[held], return_index=True)[1]]  # the first of each cut
-    begin, stop = (np.searchsorted(cut[inside], cut[held], side) for side in ("left", "right"))
+    start, stop = (np.searchsorted(cut[inside], cut[held], side) for side in ("left", "right"))
     for row, first, last, count in zip(
-        held.tolist(), inside[begin], inside[stop - 1], stop - begin, strict=True
+        held.tolist(), inside[start], inside[stop - 1], stop - start, strict=True
     ):
         reason = why[row]
         place = f"line {toolpath.line[row]}: " if toolpath.line[row] else ""
@@ -69,10 +71,10 @@ def left_findings(file: str, toolpath: Toolpath, cut: Ints, why: Mapping[int, Fi
             Finding(
                 "COR003",
                 f"the cut of lines {toolpath.line[first]} to {toolpath.line[last]} ({count} motions)"
-                f" is left as it was; {place}{reason.code} {reason.message}",
+                f" is not corrected; {place}{reason.code} {reason.message}",
                 file,
                 int(toolpath.line[first]),
-                help=reason.help,
+                help=reason.advice,
             )
         )
     return findings

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.geometry import Poses, lengths, product, rotation_from_vector, turn_between
 from postproc.effects import Conditions
-from postproc.geometry import Poses, lengths, product, rotation_from_vector, turn_between
 from postproc.model import StiffnessModel
 from postproc.robot.inverse import Inverse, inverse
 
@@ -33,8 +33,9 @@ MAX_ITERATIONS = 20
 
 @dataclass(frozen=True)
 class Prediction:
-    """Where the tool really is: ``pose`` of the TCP in the robot base, ``q`` (N, 6) motor angles [rad];
-    ``reachable`` and ``settled`` (N,): the command is in reach, and the deflected robot found a stable rest."""
+    """Where the tool really is: ``pose`` of the TCP in the robot base, ``q`` (N, n) motors [rad, m]; ``displacement``
+    (N, m) [rad, m] of the coordinates by load; ``reachable`` and ``settled`` (N,): the command is in reach, and the
+    deflected robot found a stable rest."""
 
     pose: Poses
     q: Floats
@@ -50,20 +51,20 @@ def predict(
     wrench: Floats,
     conditions: Conditions,
     status: Ints,
-    near: Floats,
+    q_reference: Floats,
     start: Floats | None = None,
     q: Floats | None = None,
 ) -> Prediction:
     """The tool's pose when the controller is sent to ``command`` (N TCP poses in the robot base) under ``wrench``
     (N, 6), in the branch ``status`` (N,), with turns nearest to ``near`` (N, 6) [rad].
 
-    ``start`` (N, m): the displacement of a state nearby, to begin the equilibrium with; ``q`` (N, 6): motor angles at
+    ``start`` (N, m): the displacement of a state nearby, to start the equilibrium with; ``q`` (N, 6): motor angles at
     ``command``, where they are known.
     """
     if q is not None:
         found = Inverse(q, np.asarray(np.isfinite(q).all(axis=1)))
     else:
-        found = inverse(model.robot.nominal, command @ tool.inverse(), status, near)
+        found = inverse(model.robot.nominal, command @ tool.inverse(), status, q_reference)
     rest = model.equilibrium(found.q, wrench, tool, conditions, start, REST)
     return Prediction(rest.pose, found.q, rest.displacement, found.reachable, rest.converged)
 
@@ -96,23 +97,24 @@ def mirror(
     wrench: Floats,
     conditions: Conditions,
     status: Ints,
-    near: Floats,
-    turns: Floats | None = None,
-    begin: tuple[Poses, Floats] | None = None,
+    q_reference: Floats,
+    orientation_projection: Floats | None = None,
+    guess: tuple[Poses, Floats] | None = None,
 ) -> Correction:
-    """Correct N commands that start at ``wanted`` so that the predicted tool comes to ``goal``.
+    """Correct N commands that start at ``wanted`` so that the predicted tool comes to ``goal``, under ``wrench`` (N, 6)
+    [N, N m] in the branch ``status`` (N,) near ``q_reference`` (N, n) [rad, m].
 
-    ``turns`` (N, 3, 3): projection onto the rotation vectors that can be corrected (all of them without it); nothing
-    else of the orientation is corrected, nor judged.  ``begin``: commands to begin with instead of ``wanted``, and
-    displacements (N, m) to begin their equilibria with; the result does not depend on them.
+    ``orientation_projection`` (N, 3, 3): projection onto the rotation vectors that can be corrected (all of them
+    without it); nothing else of the orientation is corrected, nor judged.  ``guess``: commands to start with instead of
+    ``wanted``, and displacements (N, m) [rad, m] to start their equilibria with; the result does not depend on them.
 
-    A motion stops when it is within tolerance, out of reach, without equilibrium, or when an iteration does not
-    at least halve its error (it would not settle): ``converged`` says which, nothing diverges silently.
+    A motion stops when it is within tolerance, out of reach, without equilibrium, or when an iteration does not at
+    least halve its error (it would not settle): ``converged`` states which, nothing diverges silently.
     """
     n = len(wanted)
-    first, bent = (wanted, None) if begin is None else begin
+    first, bent = (wanted, None) if guess is None else guess
     rotation, position = first.rotation.copy(), first.position.copy()
-    q, iterations = near.copy(), np.zeros(n, np.int64)
+    q, iterations = q_reference.copy(), np.zeros(n, np.int64)
     reachable, settled, converged = np.ones(n, bool), np.ones(n, bool), np.zeros(n, bool)
     history: list[Floats] = []
     last = np.full(n, np.inf)
@@ -127,12 +129,12 @@ def mirror(
             wrench[some],
             conditions.part(some),
             status[some],
-            near[some],
+            q_reference[some],
             bent,
         )
-        shift, turn = difference(here.pose, goal[some])
-        if turns is not None:
-            turn = (turns[some] @ turn[..., None])[..., 0]
+        shift, turn = pose_error(here.pose, goal[some])
+        if orientation_projection is not None:
+            turn = (orientation_projection[some] @ turn[..., None])[..., 0]
         error, angle = lengths(shift), lengths(turn)
         good = here.reachable & here.settled
         q[some], reachable[some], settled[some] = here.q, here.reachable, here.settled | ~here.reachable
@@ -172,7 +174,7 @@ def mirror(
     )
 
 
-def beginning(
+def initial_guess(
     model: StiffnessModel,
     wanted: Poses,
     goal: Poses,
@@ -184,33 +186,34 @@ def beginning(
     farthest: float,
     q: Floats | None = None,
 ) -> tuple[Poses, Floats]:
-    """What ``mirror`` can begin with: commands whose loaded joints stand where the goal is, and how far they are bent
-    there; the wanted pose where that is out of reach, or more than ``farthest`` [m] away.  ``q`` (N, 6): motor angles
-    at the goal, where they are known."""
+    """What ``mirror`` can start with: commands whose loaded joints are where the goal is, and how far they are
+    deflected there (N, m) [rad, m] under ``wrench`` (N, 6) [N, N m], in the branch ``status`` (N,) near ``near`` (N, n)
+    [rad, m]; the wanted pose where that is out of reach, or more than ``farthest`` [m] away.  ``q`` (N, n) [rad, m]:
+    motors at the goal, where they are known."""
     if q is None:
         q = inverse(model.robot.nominal, goal @ tool.inverse(), status, near).q
     known = np.asarray(np.isfinite(q).all(axis=1))
     joints = q if known.all() else np.where(known[:, None], q, near)
-    motors, bent = model.motors_at(joints, wrench, tool, conditions)
-    begin = model.robot.nominal_chain.flange(motors) @ tool
-    good = known & (lengths(begin.position - wanted.position) <= farthest) & np.isfinite(bent).all(axis=1)
+    motors, bent = model.inverse_equilibrium(joints, wrench, tool, conditions)
+    start = model.robot.nominal_chain.flange(motors) @ tool
+    good = known & (lengths(start.position - wanted.position) <= farthest) & np.isfinite(bent).all(axis=1)
     if good.all():
-        return begin, bent
+        return start, bent
     return Poses(
-        np.where(good[:, None, None], begin.rotation, wanted.rotation),
-        np.where(good[:, None], begin.position, wanted.position),
+        np.where(good[:, None, None], start.rotation, wanted.rotation),
+        np.where(good[:, None], start.position, wanted.position),
     ), np.where(good[:, None], bent, 0.0)
 
 
-def difference(real: Poses, goal: Poses) -> tuple[Floats, Floats]:
+def pose_error(real: Poses, goal: Poses) -> tuple[Floats, Floats]:
     """real (-) goal: position difference (N, 3) [m] and rotation vector (N, 3) [rad], both in base axes."""
     return real.position - goal.position, turn_between(goal.rotation, real.rotation)
 
 
-def partly(wanted: Poses, command: Poses, gain: float | Floats) -> Poses:
+def interpolate_pose(wanted: Poses, command: Poses, gain: float | Floats) -> Poses:
     """The share ``gain`` (0..1; one for all, or (N, 1)) of the way from ``wanted`` to ``command``."""
     if isinstance(gain, float) and gain == 1.0:
         return command
-    shift, turn = difference(command, wanted)
+    shift, turn = pose_error(command, wanted)
     turned = product(rotation_from_vector(gain * turn), wanted.rotation)
     return Poses(turned, wanted.position + gain * shift)

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.base.arrays import Floats
 from postproc.effects import EFFECTS, Effect
 from postproc.identification.campaign import Campaign, Nuisances
-from postproc.identification.columns import columns
 from postproc.identification.noise import Weighting
+from postproc.identification.sensitivities import columns
 from postproc.identification.unknowns import Unknown, unknowns_of, with_mechanism
 from postproc.model import StiffnessModel
 
@@ -36,9 +36,10 @@ class Candidate:
     """An effect on one joint ("" where it has none, or ``EVERY``) that the model may lack.
 
     ``unknowns``: its parameters in ``model``, the model with the effect added at its null; columns (R, 3 or 6, p) what
-    they move, per scale; ``bent``: in its usual size it does not do what its columns at the null say; ``upto``: of an
-    effect that is there on no joint alone, the last joint whose parameters it has; begin (p,) [SI]: values that a fit
-    may begin with, () at the null; ``asleep``: names of parameters that move nothing where the others are at the null.
+    they move, per scale; ``nonlinear``: in its usual size it does not do what its columns at the null say;
+    ``up_to_joint``: of an effect that is there on no joint alone, the last joint whose parameters it has; start (p,)
+    [SI]: values that a fit may start with, () at the null; ``dormant_parameters``: names of parameters that move
+    nothing where the others are at the null.
     """
 
     effect: Effect
@@ -46,10 +47,10 @@ class Candidate:
     model: StiffnessModel
     unknowns: tuple[Unknown, ...]
     columns: Floats
-    bent: bool = False
-    upto: str = ""
-    begin: tuple[float, ...] = ()
-    asleep: frozenset[str] = frozenset()
+    nonlinear: bool = False
+    up_to_joint: str = ""
+    start: tuple[float, ...] = ()
+    dormant_parameters: frozenset[str] = frozenset()
     only: tuple[Unknown, ...] = ()
 
     @property
@@ -58,7 +59,7 @@ class Candidate:
         return self.only or self.unknowns
 
     def fitted(self, columns: Floats, unknowns: Sequence[Unknown]) -> Candidate:
-        """The candidate with the columns of those ``unknowns`` that a fit found."""
+        """The candidate with the columns (R, k, P) of those ``unknowns`` that a fit found."""
         return replace(self, columns=columns, only=tuple(unknowns))
 
     @property
@@ -76,7 +77,7 @@ class Candidate:
     @property
     def key(self) -> tuple[str, str]:
         """The form of the effect, and its joint."""
-        return f"{self.name} {self.effect.described()}", self.joint or self.upto
+        return f"{self.name} {self.effect.described()}", self.joint or self.up_to_joint
 
     @property
     def name(self) -> str:
@@ -92,8 +93,8 @@ class Candidate:
             words += f" (by {options['variable']})"
         if "varies" in options:
             words += f" varying {options['varies']}"
-        if self.upto:
-            words += f" (up to {self.upto})"
+        if self.up_to_joint:
+            words += f" (up to {self.up_to_joint})"
         return f"{words} on {self.joint}" if self.joint else words
 
 
@@ -108,10 +109,10 @@ def candidates(campaign: Campaign, model: StiffnessModel, given: Nuisances) -> t
             lacking = [
                 u for u in unknowns_of(model, term) if u.stated is None and u.value == u.parameter.null
             ]
-            found += _by_joint(campaign, model, given, [u for u in lacking if not u.held])
+            found += _by_joint(campaign, model, given, [u for u in lacking if not u.fixed])
         for wider in () if known else _widened(model, effect):
             found += _by_joint(
-                campaign, wider, given, [u for u in unknowns_of(wider, len(model.terms)) if not u.held]
+                campaign, wider, given, [u for u in unknowns_of(wider, len(model.terms)) if not u.fixed]
             )
     return tuple(found)
 
@@ -120,7 +121,7 @@ def _widened(model: StiffnessModel, effect: type[Effect]) -> list[StiffnessModel
     """The model with ``effect`` in each form in which it may be there."""
     if any(mechanism.kind == effect.name for mechanism in model.robot.mechanisms):
         return [with_mechanism(model, effect)]
-    return [model.added(form) for form in effect.variants(model.robot.joints)]
+    return [model.with_effect(form) for form in effect.variants(model.robot.joints)]
 
 
 def _by_joint(
@@ -130,12 +131,12 @@ def _by_joint(
     if not unknowns:
         return []
     effect = model.terms[unknowns[0].term].effect
-    here = campaign.seen(model)
+    here = campaign.predicted(model)
     moves = np.nan_to_num(columns(campaign, model, unknowns, here, given))
-    sized = model.changed({u.key: u.parameter.null + u.parameter.scale for u in unknowns})
-    there = campaign.seen(sized, here.displacement)
+    sized = model.with_values({u.key: u.parameter.null + u.parameter.scale for u in unknowns})
+    there = campaign.predicted(sized, here.displacement)
     still = np.asarray(~moves.any(axis=(0, 1)))
-    bent = _bent(campaign.residual(here, given) - campaign.residual(there, given), moves.sum(axis=2))
+    bent = _is_nonlinear(campaign.residual(here, given) - campaign.residual(there, given), moves.sum(axis=2))
     if still.any() and bent:
         # a parameter may show only where others have a size: a length where the spring has a stiffness
         moves[:, :, still] = np.nan_to_num(columns(campaign, sized, unknowns, there, given))[:, :, still]
@@ -144,18 +145,18 @@ def _by_joint(
     )
     named = dict.fromkeys(u.parameter.joint for u in unknowns)
     if not effect.apart:
-        whole = Candidate(effect, "", model, tuple(unknowns), moves, bent, asleep=asleep)
+        whole = Candidate(effect, "", model, tuple(unknowns), moves, bent, dormant_parameters=asleep)
         return _in_steps(whole, [j for j in named if j])
     found = []
     # a whole arm may be off at once, as a geometry that was never calibrated
     for joint in [*named, EVERY] if effect.whole and len(named) > 1 else named:
         own = [i for i, u in enumerate(unknowns) if joint in (EVERY, u.parameter.joint)]
         mine = tuple(unknowns[i] for i in own)
-        found.append(Candidate(effect, joint, model, mine, moves[:, :, own], bent, asleep=asleep))
+        found.append(Candidate(effect, joint, model, mine, moves[:, :, own], bent, dormant_parameters=asleep))
     return found
 
 
-def _bent(does: Floats, foreseen: Floats) -> bool:
+def _is_nonlinear(does: Floats, foreseen: Floats) -> bool:
     """Whether what an effect does (R, 3 or 6) is clearly not what was foreseen."""
     does = np.nan_to_num(does)
     return bool(np.linalg.norm(does - foreseen) > STRAIGHT * np.linalg.norm(does))
@@ -169,11 +170,13 @@ def _in_steps(whole: Candidate, joints: Sequence[str]) -> list[Candidate]:
         if not whole.columns[:, :, own].any():
             continue
         some = tuple(whole.unknowns[i] for i in own)
-        found.append(replace(whole, unknowns=some, columns=whole.columns[:, :, own], upto=joints[last]))
+        found.append(
+            replace(whole, unknowns=some, columns=whole.columns[:, :, own], up_to_joint=joints[last])
+        )
     return [*found, whole]
 
 
-def shows(candidate: Candidate, weights: Weighting) -> bool:
+def is_visible(candidate: Candidate, weights: Weighting) -> bool:
     """Whether the readings would show the effect at all."""
     size = np.linalg.norm(weights(candidate.columns), axis=0)
     return bool((size > candidate.least).any())

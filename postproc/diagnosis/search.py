@@ -7,28 +7,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.diagnosis.candidates import Candidate, candidates, shows
-from postproc.diagnosis.foils import Foil, foils
-from postproc.diagnosis.growth import Outside, grown, whole
+from postproc.base.arrays import Floats
+from postproc.diagnosis.candidates import Candidate, candidates, is_visible
+from postproc.diagnosis.decoys import AlternativeForm, decoys
+from postproc.diagnosis.nonlinear_effects import Outside, evaluate_at_size, whole
 from postproc.diagnosis.selection import (
     Explained,
     Problem,
     basis_of,
     beside,
+    complexity_penalty,
     counts,
     explained,
-    left_of,
     outside,
-    price,
     problem,
+    residual_of,
     scatter,
     selected,
 )
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
+from postproc.identification.least_squares import Point, at, prior_rows, scales
 from postproc.identification.noise import Weighting
-from postproc.identification.solve import Point, at, prior_rows, scales
 from postproc.identification.unknowns import Unknown, unknowns_of, with_mechanism
 from postproc.model import StiffnessModel
 
@@ -42,8 +42,8 @@ IMITATED = 1e-3
 """Share of a column that must lie outside of what the robot file's own parameters do."""
 
 CLOSE, CLOSE_SHARE, RIVALS = 30.0, 0.05, 3
-"""Rivals are fitted where -2 ln(likelihood) is linearly worse by less than this, or than this share of the gain; so
-many at most."""
+"""Alternatives are fitted where -2 ln(likelihood) is linearly worse by less than this, or than this share of the gain;
+so many at most."""
 
 FORM = 0.01
 """Share of what another effect explains that one must explain itself: no form in the library is exact, and what a large
@@ -76,7 +76,7 @@ class Linear:
 
 
 @dataclass(frozen=True, eq=False)
-class Rival:
+class Alternative:
     """A ``candidate`` in the place of the choice ``of``: by how much -2 ln(likelihood) is ``worse``, and what it pays
     ``more`` for its parameters (negative: less); ``fitted``, or only linearly so."""
 
@@ -94,15 +94,15 @@ class Rival:
     @property
     def foil(self) -> bool:
         """Whether it is never named itself."""
-        return isinstance(self.candidate.effect, Foil)
+        return isinstance(self.candidate.effect, AlternativeForm)
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
     """What a search came to.
 
-    base: the model as it is, its own parameters fitted anew; final: with what was ``chosen``; untestable: candidates
-    that these readings can not show; linear, explained: the last choice; rivals: those of
+    base: the model as it is, its own parameters refitted; final: with what was ``chosen``; untestable: candidates
+    that these readings cannot show; linear, explained: the last choice; rivals: those of
     what was chosen, nearest first.
     """
 
@@ -112,10 +112,10 @@ class Search:
     untestable: tuple[Candidate, ...]
     linear: Linear
     explained: Explained
-    rivals: tuple[Rival, ...]
+    rivals: tuple[Alternative, ...]
 
 
-def own_unknowns(model: StiffnessModel) -> tuple[Unknown, ...]:
+def model_unknowns(model: StiffnessModel) -> tuple[Unknown, ...]:
     """The parameters that the robot file states: they may have changed since, but a known arm is not any arm.
 
     Each has a prior as wide as ``LOOSE`` of its value and ``BESIDE`` of the largest of its kind in the effect; none
@@ -123,7 +123,7 @@ def own_unknowns(model: StiffnessModel) -> tuple[Unknown, ...]:
     """
     found: list[Unknown] = []
     for term in range(len(model.terms)):
-        own = [u for u in unknowns_of(model, term) if u.stated is not None and not u.held]
+        own = [u for u in unknowns_of(model, term) if u.stated is not None and not u.fixed]
         for unknown in own:
             parameter = unknown.parameter
             if parameter.hardware:
@@ -137,27 +137,27 @@ def own_unknowns(model: StiffnessModel) -> tuple[Unknown, ...]:
 
 def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
     """Chooses among all effects of the library those that the readings ask for, beyond ``base``: the model of the robot
-    file with its own parameters fitted anew.  ``banned``: candidates that were found not to hold."""
+    file with its own parameters refitted.  ``banned``: candidates that were found not to hold."""
     chosen: tuple[Candidate, ...] = ()
     fitted = base
     tried: set[frozenset[Key]] = set()
     # what a missing effect does to all readings of a pose looks like an error that they share
     weights = replace(base.weights, shared=0.0)
-    every = _not_imitated(base, weights, candidates(campaign, base.model, base.point.given))
-    shown = [c for c in every if shows(c, weights) and c.key not in banned]
-    hidden = tuple(c for c in every if not shows(c, weights))
+    every = drop_confounded(base, weights, candidates(campaign, base.model, base.point.given))
+    shown = [c for c in every if is_visible(c, weights) and c.key not in banned]
+    hidden = tuple(c for c in every if not is_visible(c, weights))
     while True:
         linear = _linear(campaign, base, weights, fitted, chosen, shown)
         if not chosen:
             shown = list(linear.candidates)
         before = {c.key for c in chosen}
-        begin = [i for i, c in enumerate(linear.candidates) if c.key in before]
-        found = selected(linear.problem, range(len(linear.candidates)), begin)
+        start = [i for i, c in enumerate(linear.candidates) if c.key in before]
+        found = selected(linear.problem, range(len(linear.candidates)), start)
         now = tuple(linear.candidates[g] for g in found.groups)
         keys = frozenset(c.key for c in now)
         if keys == before or keys in tried or len(tried) >= PASSES:
-            last = explained(linear.problem, begin)
-            against = _rivals(campaign, base, fitted, linear, last)
+            last = explained(linear.problem, start)
+            against = _alternatives(campaign, base, fitted, linear, last)
             better = next((r for r in against if r.fitted and not r.foil and r.margin < -1.0), None)
             done = Search(base, fitted, chosen, hidden, linear, last, against)
             if better is None or len(tried) >= PASSES:
@@ -168,10 +168,10 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
                 return done
         tried.add(keys)
         chosen, fitted = _confirmed(campaign, base, now, shown)
-        weights = _sharing(base, fitted)
+        weights = limit_shared_scatter(base, fitted)
 
 
-def _not_imitated(base: Fit, weights: Weighting, every: Sequence[Candidate]) -> list[Candidate]:
+def drop_confounded(base: Fit, weights: Weighting, every: Sequence[Candidate]) -> list[Candidate]:
     """The candidates without those parameters that, in their usual size, do nothing to be seen but what parameters of
     the robot file, or tracker and targets, do as well: a gain of the force is a softer arm."""
     basis = basis_of(np.nan_to_num(np.concatenate([weights(part) for part in base.point.taken], axis=1)))
@@ -182,7 +182,7 @@ def _not_imitated(base: Fit, weights: Weighting, every: Sequence[Candidate]) -> 
         own = np.linalg.norm(outside(basis, columns), axis=0) > np.maximum(IMITATED * size, c.least)
         if own.any():
             # of those that only shape what another does nothing is said by themselves
-            own |= np.array([u.parameter.name in c.asleep for u in c.unknowns])
+            own |= np.array([u.parameter.name in c.dormant_parameters for u in c.unknowns])
         if own.any() and not own.all():
             c = replace(
                 c,
@@ -200,13 +200,13 @@ def _confirmed(
     that are not small beside others; the weakest first.  And the fit with them."""
     fitted, among = with_effects(campaign, base, chosen) if chosen else base, len(shown)
     while chosen:
-        linear = _linear(campaign, base, _sharing(base, base), fitted, chosen, chosen)
+        linear = _linear(campaign, base, limit_shared_scatter(base, base), fitted, chosen, chosen)
         places = range(len(chosen))
         without = [explained(linear.problem, [g for g in places if g != gone]) for gone in places]
         weakest = int(np.argmin([one.squares for one in without]))
         rest = tuple(c for k, c in enumerate(chosen) if k != weakest)
         fit_of_rest = with_effects(campaign, base, rest) if rest else base
-        weights = _sharing(base, fit_of_rest)
+        weights = limit_shared_scatter(base, fit_of_rest)
         given = _linear(campaign, base, weights, fitted, chosen, chosen).problem
         others = [g for g in places if g != weakest]
         gains = [one.squares - explained(linear.problem, places).squares for one in without]
@@ -218,7 +218,7 @@ def _confirmed(
     return chosen, fitted
 
 
-def _sharing(base: Fit, fitted: Fit) -> Weighting:
+def limit_shared_scatter(base: Fit, fitted: Fit) -> Weighting:
     """The weights of ``fitted`` for what was fitted; readings of a pose share no more than scatter can be."""
     shared = fitted.weights.shared
     if base.noise.known:
@@ -254,7 +254,7 @@ def _linear(
     beyond = basis_of(np.concatenate([common, *with_chosen], axis=1)) if with_chosen else basis
     looked = tuple(
         _as_grown(campaign, fitted, c, lambda columns: outside(beyond, readings(columns)))
-        if c.bent and not c.only and not (c.begin and chosen)
+        if c.nonlinear and not c.only and not (c.start and chosen)
         else c
         for c in looked
     )
@@ -270,8 +270,8 @@ def _linear(
 def _as_grown(campaign: Campaign, fitted: Fit, candidate: Candidate, beyond: Outside) -> Candidate:
     """The candidate with its columns at the size that explains the most of what ``fitted`` leaves."""
     model, unknowns = composed(fitted.model, [candidate])
-    large = grown(campaign, fitted.point, model, unknowns, beyond)
-    return replace(candidate, columns=large.columns, begin=tuple(large.values.tolist()))
+    large = evaluate_at_size(campaign, fitted.point, model, unknowns, beyond)
+    return replace(candidate, columns=large.columns, start=tuple(large.values.tolist()))
 
 
 def in_scales(fitted: Fit, unknowns: Sequence[Unknown]) -> Floats:
@@ -298,20 +298,22 @@ def squares_of(fitted: Fit, weights: Weighting, variance: float) -> float:
     return float(left @ left) + float(priors)
 
 
-def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Explained) -> tuple[Rival, ...]:
+def _alternatives(
+    campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Explained
+) -> tuple[Alternative, ...]:
     """Other candidates in the place of each choice that explain at least half of what it does, nearest first; the
     nearest are fitted: what is linear is only nearly so."""
     given, chosen = linear.problem, [linear.candidates[g] for g in last.groups]
     variance = scatter(given, last)
     here = squares_of(fitted, fitted.weights, variance)
-    found: list[Rival] = []
+    found: list[Alternative] = []
     for group in last.groups:
         mine = linear.candidates[group]
         rest = explained(given, tuple(g for g in last.groups if g != group))
-        gain, left = rest.squares - last.squares, left_of(given, rest)
+        gain, left = rest.squares - last.squares, residual_of(given, rest)
 
         def paid(columns: Floats, rest: Explained = rest, left: Floats = left) -> float:
-            return price(beside(given, rest, columns), left, variance)
+            return complexity_penalty(beside(given, rest, columns), left, variance)
 
         def scaled(g: int) -> Floats:
             return given.matrix[:, given.places[g]] * given.size[given.places[g]]
@@ -319,19 +321,19 @@ def _rivals(campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Ex
         own, of_mine = paid(scaled(group)), []
         against = [
             *enumerate(linear.candidates),
-            *((-1, foil) for foil in foils(base.model, campaign.readings.q, mine)),
+            *((-1, decoy) for decoy in decoys(base.model, campaign.readings.q, mine)),
         ]
         for other, candidate in against:
             if other in last.groups or candidate.contains(mine) or mine.contains(candidate):
                 continue
-            if candidate.bent:
+            if candidate.nonlinear:
                 instead, squares, columns = _instead(campaign, fitted, linear, rest, mine, candidate)
             else:
                 instead, squares = candidate, explained(given, (*rest.groups, other)).squares
                 columns = scaled(other)
             if rest.squares - squares > 0.5 * gain:
                 worse = float(squares - last.squares) / variance
-                of_mine.append(Rival(mine.key, instead, worse, paid(columns) - own, False))
+                of_mine.append(Alternative(mine.key, instead, worse, paid(columns) - own, False))
         of_mine.sort(key=lambda rival: rival.margin)
         for k, rival in enumerate(of_mine[:RIVALS]):
             if rival.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
@@ -356,42 +358,46 @@ def _instead(
         below = np.zeros((linear.priors, columns.shape[2]))
         return np.nan_to_num(np.concatenate([linear.weights(columns), below]))
 
-    large = grown(campaign, without, model, unknowns, lambda columns: outside(beyond, readings(columns)))
+    large = evaluate_at_size(
+        campaign, without, model, unknowns, lambda columns: outside(beyond, readings(columns))
+    )
     gain = float(large.target @ large.target - large.left @ large.left)
-    rival = replace(other, columns=large.columns, begin=tuple(large.values.tolist()))
-    return rival, rest.squares - gain, outside(basis, readings(large.columns))
+    alternative = replace(other, columns=large.columns, start=tuple(large.values.tolist()))
+    return alternative, rest.squares - gain, outside(basis, readings(large.columns))
 
 
 def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> Fit:
     """The non-linear fit with the effects ``chosen`` added to ``base``, its own unknowns fitted along."""
     model, unknowns = composed(base.model, chosen)
-    begin: dict[tuple[int, str], float] = {}
+    start: dict[tuple[int, str], float] = {}
     for candidate in chosen:
-        begin |= _begun(campaign, base, model, candidate)
+        start |= _begun(campaign, base, model, candidate)
     own = [u for u in base.asked if u.key in {b.key for b in base.unknowns}]
     # what turns out not to be seen stays where it is begun with: without a length a spring is none
-    looked = [replace(u, value=begin.get(u.key, u.value)) if u.prior is None else u for u in unknowns]
-    return fit(campaign, model.changed(begin), [*own, *looked], given=base.point.given)
+    looked = [replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in unknowns]
+    return fit(campaign, model.with_values(start), [*own, *looked], given=base.point.given)
 
 
 def _begun(
     campaign: Campaign, base: Fit, model: StiffnessModel, candidate: Candidate
 ) -> dict[tuple[int, str], float]:
-    """Values to begin a fit of ``candidate`` in ``model`` with; those that no reading sees stay at their null."""
+    """Values to start a fit of ``candidate`` in ``model`` with; those that no reading sees stay at their null."""
     term = _term_of(model, candidate)
-    if term is None or not candidate.begin:
+    if term is None or not candidate.start:
         return {}
     nulls = {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
-    begin = dict(zip(nulls, candidate.begin, strict=True))
-    there = at(campaign, model.changed(begin), base.point.given)
-    if not there.seen.converged.all():
+    start = dict(zip(nulls, candidate.start, strict=True))
+    there = at(campaign, model.with_values(start), base.point.given)
+    if not there.predicted.converged.all():
         return {}
     for key, null in nulls.items():
-        without = at(campaign, model.changed({**begin, key: null}), base.point.given, there.seen.displacement)
+        without = at(
+            campaign, model.with_values({**start, key: null}), base.point.given, there.predicted.displacement
+        )
         moved = np.linalg.norm(base.weights(np.nan_to_num(without.residual - there.residual)))
-        if without.seen.converged.all() and moved < 1.0:
-            begin[key] = null
-    return begin
+        if without.predicted.converged.all() and moved < 1.0:
+            start[key] = null
+    return start
 
 
 def composed(
@@ -405,7 +411,7 @@ def composed(
             if any(mechanism.kind == candidate.name for mechanism in model.robot.mechanisms):
                 model = with_mechanism(model, type(candidate.effect))
             else:
-                model = model.added(candidate.effect)
+                model = model.with_effect(candidate.effect)
             term = len(model.terms) - 1
         names = {u.parameter.name for u in candidate.unknowns}
         known = {u.key for u in unknowns}
@@ -435,7 +441,7 @@ def _as_fitted(
         if not at:
             continue
         columns = np.nan_to_num(own[:, :, at])
-        if candidate.bent:
+        if candidate.nonlinear:
             does = _without(campaign, fitted, [candidate]).residual - fitted.point.residual
             columns = whole(columns, np.nan_to_num(does), values[at])
         there[candidate.key] = candidate.fitted(columns, [fitted.unknowns[i] for i in at])
@@ -451,7 +457,7 @@ def _without(campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate]) -> Po
             nulls |= {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
     if not nulls:
         return fitted.point
-    return at(campaign, fitted.model.changed(nulls), fitted.point.given)
+    return at(campaign, fitted.model.with_values(nulls), fitted.point.given)
 
 
 def _reach(candidate: Candidate) -> Floats:

@@ -1,6 +1,6 @@
 """Which of many groups of columns explain a residual: arrays only, nothing of robots.
 
-Everything is whitened (independent readings of unit variance) and stands outside of what is explained anyway: tracker,
+Everything is whitened (independent readings of unit variance) and is outside of what is explained anyway: tracker,
 targets, refitted parameters.  A group is in or out as a whole.
 """
 
@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.base.arrays import Floats, Ints
 
 WORTH = 0.1
 """Share of the squares left that an effect must explain where the model leaves more than scatter: what is not
@@ -22,7 +22,7 @@ CHANCE = 0.001
 """Probability that among all groups any is taken in although none is there."""
 
 APART = 1e-3
-"""A column whose part outside of the others is smaller than this share of it can not be told from them."""
+"""A column whose part outside of the others is smaller than this share of it cannot be distinguished from them."""
 
 EXCEEDED = 1.5
 """Variance left over the stated one from which on the model is taken to leave more than scatter."""
@@ -57,10 +57,12 @@ class Problem:
 
     @cached_property
     def gram(self) -> Floats:
+        """(P, P) matrix^T matrix."""
         return self.matrix.T @ self.matrix
 
     @cached_property
     def aim(self) -> Floats:
+        """(P,) matrix^T residual."""
         return self.matrix.T @ self.residual
 
     @cached_property
@@ -76,7 +78,7 @@ def basis_of(common: Floats) -> Floats:
 
 
 def outside(basis: Floats, columns: Floats) -> Floats:
-    """``columns`` (n, p) without what lies in ``basis`` (n, r)."""
+    """(n, p) ``columns`` (n, p) without what lies in ``basis`` (n, r)."""
     left = columns - basis @ (basis.T @ columns)
     return np.asarray(left - basis @ (basis.T @ left))
 
@@ -103,7 +105,8 @@ def problem(
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """A residual with some ``groups`` taken in: squares left, ``rank`` of what they added, their coefficients."""
+    """A residual with some ``groups`` taken in: squares left, ``rank`` of what they added, their ``columns`` (p,) of
+    the matrix and ``coefficients`` (p,)."""
 
     groups: tuple[int, ...]
     squares: float
@@ -140,11 +143,11 @@ def _bounded(value: Floats, vector: Floats, aim: Floats, low: Floats, high: Floa
 
 
 def beside(given: Problem, rest: Explained, columns: Floats) -> Floats:
-    """``columns`` (n, p) without what the groups of ``rest`` do as well."""
+    """(n, p) ``columns`` (n, p) without what the groups of ``rest`` do as well."""
     return outside(basis_of(given.matrix[:, rest.columns]), columns) if len(rest.columns) else columns
 
 
-def price(columns: Floats, left: Floats, variance: float) -> float:
+def complexity_penalty(columns: Floats, left: Floats, variance: float) -> float:
     """What an effect has to pay for the parameters that it fits: by how much -2 ln(likelihood) falls more in the fit
     than it does on the average over all that its parameters might have been.  ``columns`` (n, p) per scale, ``left``
     (n,): outside of what is explained anyway.
@@ -171,14 +174,14 @@ def price(columns: Floats, left: Floats, variance: float) -> float:
     return float((gradient**2 / information).sum() - average)
 
 
-def left_of(given: Problem, last: Explained) -> Floats:
+def residual_of(given: Problem, last: Explained) -> Floats:
     """(n,) what is left of the residual."""
     return np.asarray(given.residual - given.matrix[:, last.columns] @ last.coefficients)
 
 
 def clipped_squares(given: Problem, last: Explained) -> float:
     """The squares left, wild readings clipped, as large as those of normal ones would be."""
-    left = left_of(given, last)
+    left = residual_of(given, last)
     rows = np.abs(left[left != 0])
     # the median tells the level at which readings are wild
     level = float(np.median(rows)) / 0.6745 if len(rows) else 0.0
@@ -204,12 +207,12 @@ def probability(given: Problem, squares: float, rank: int, variance: float, free
 
 
 def selected(
-    given: Problem, candidates: Sequence[int], begin: Sequence[int] = (), limit: int = 12
+    given: Problem, candidates: Sequence[int], start: Sequence[int] = (), limit: int = 12
 ) -> Explained:
-    """Groups taken in one by one from ``begin`` on, the one with the best evidence first, exchanged and left out again
+    """Groups taken in one by one from ``start`` on, the one with the best evidence first, exchanged and left out again
     as long as that is better.  A group stays if by chance, among all ``candidates``, its gain has a probability below
     ``CHANCE``."""
-    now = _pruned(given, explained(given, begin), len(candidates))
+    now = _pruned(given, explained(given, start), len(candidates))
     penalty = np.log(given.freedom)
     for _ in range(limit):
         tried = [(explained(given, (*now.groups, g)), g) for g in candidates if g not in now.groups]

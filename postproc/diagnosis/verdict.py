@@ -1,4 +1,4 @@
-"""What may be said of a search: four gates before a name is spoken."""
+"""What may be said of a search: four gates before an effect is named."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.base.arrays import Floats, Ints
 from postproc.diagnosis.candidates import EVERY, Candidate, names_of
-from postproc.diagnosis.foils import FOILED
-from postproc.diagnosis.screens import Where, where
-from postproc.diagnosis.search import Rival, Search
+from postproc.diagnosis.decoys import FOILED
+from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
+from postproc.diagnosis.search import Alternative, Search
 from postproc.diagnosis.selection import (
     Explained,
     Problem,
@@ -43,7 +43,7 @@ CLEAR, THERE = 1.5, 1.0
 """Intervals by which a value must be off to be clearly elsewhere, and to be there at all."""
 
 BUILT = 4.6
-"""By how much -2 ln(likelihood) of what is no such thing must be better to put in doubt hardware that the robot file
+"""By how much -2 ln(likelihood) of what is no such thing must be better to question hardware that the robot file
 describes: odds of 10 to 1."""
 
 UNUSUAL = 3.0
@@ -63,7 +63,7 @@ EXPLAINS = 0.9
 
 
 OTHER_COURSE = "the readings follow another course than that of this effect"
-BEYOND_TELLING = "it would have to be unusually large, and the readings hardly tell its size"
+BEYOND_TELLING = "it would have to be unusually large, and the readings hardly determine its size"
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Evidence:
     alias: Candidate | None
 
     @property
-    def holds(self) -> bool:
+    def is_sufficient(self) -> bool:
         """Whether the gain is there on readings that were left out."""
         gains = (self.heldout, self.regions, self.sessions)
         return all(gain > 0 for gain in gains if np.isfinite(gain))
@@ -96,7 +96,7 @@ class Named:
     joints: tuple[str, ...]
     estimates: tuple[Estimate, ...]
     evidence: Evidence
-    held: tuple[tuple[str, float], ...] = ()
+    fixed: tuple[tuple[str, float], ...] = ()
 
     @property
     def effect(self) -> str:
@@ -107,7 +107,7 @@ class Named:
 class Verdict:
     """``word`` of ``VERDICTS``.  named: where the verdict is named, partly_named or ambiguous; alternatives: sets of
     candidates that explain the same; refitted: own parameters of the model that clearly moved; lack: variance left over
-    the stated one; conditional: nothing states the scatter, so a lack of fit can not be seen; left: patterns in what
+    the stated one; conditional: nothing states the scatter, so a lack of fit cannot be seen; left: patterns in what
     all that was chosen leaves."""
 
     word: str
@@ -115,13 +115,13 @@ class Verdict:
     alternatives: tuple[tuple[Candidate, ...], ...]
     not_testable: tuple[str, ...]
     refitted: tuple[Estimate, ...]
-    lack: float
+    reduced_chi2: float
     conditional: bool
     rejected: tuple[tuple[Candidate, str], ...] = ()
-    left: tuple[Where, ...] = ()
+    remainder: tuple[ResidualPattern, ...] = ()
 
 
-def judged(found: Search) -> Verdict:
+def judge(found: Search) -> Verdict:
     """The verdict on a search."""
     linear, last = found.linear, found.explained
     named, rejected, aliases = [], [], []
@@ -129,12 +129,12 @@ def judged(found: Search) -> Verdict:
         candidate, its = linear.candidates[g], _evidence(found, last, g)
         estimates = _estimates(found.final, candidate, found)
         bounded = all(e.at_bound for e in estimates)
-        several = _alternatives(found, g, not bounded and _told(candidate, estimates))
+        several = ambiguity_set(found, g, not bounded and _is_observable(candidate, estimates))
         if _of_another_course(found, candidate):
             rejected.append((candidate, OTHER_COURSE))
-        elif not its.holds:
-            rejected.append((candidate, "no gain on readings that were left out"))
-        elif _beyond_telling(estimates):
+        elif not its.is_sufficient:
+            rejected.append((candidate, "no gain on held-out readings"))
+        elif is_implausible(estimates):
             rejected.append((candidate, BEYOND_TELLING))
         elif bounded and len(several) == 1:
             rejected.append((candidate, "its parameters would have to lie at their bounds"))
@@ -142,11 +142,11 @@ def judged(found: Search) -> Verdict:
             joints, held = _joints(candidate, estimates), _held(found.final, candidate, estimates)
             named.append(Named(candidate, joints, estimates, its, held))
             aliases.append(several)
-    lack, lacking = lack_of_fit(found, last)
-    left = where(found.final, chance=STRUCTURE)
+    lack, lacking = reduced_chi2_of(found, last)
+    left = residual_patterns(found.final, chance=STRUCTURE)
     lacking = lacking or bool(left)
-    bare, _ = lack_of_fit(found, explained(linear.problem, ()))
-    # two forms of one effect on one joint are no doubt about its name
+    bare, _ = reduced_chi2_of(found, explained(linear.problem, ()))
+    # two forms of one effect on one joint leave its name certain
     sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
     formless = any(why == OTHER_COURSE for _, why in rejected)
     enough = not linear.problem.known or lack - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)
@@ -173,14 +173,14 @@ def judged(found: Search) -> Verdict:
     )
 
 
-def _told(candidate: Candidate, estimates: Sequence[Estimate]) -> bool:
+def _is_observable(candidate: Candidate, estimates: Sequence[Estimate]) -> bool:
     """Whether the readings tell all parameters of an effect that something else imitates, and that it is there."""
     if candidate.name not in FOILED:
         return True
     found = {
         e.unknown.parameter.name: abs(e.value - e.unknown.parameter.null) > THERE * e.ci95 for e in estimates
     }
-    there = all(clear for name, clear in found.items() if name not in candidate.asleep)
+    there = all(clear for name, clear in found.items() if name not in candidate.dormant_parameters)
     return there and found.keys() >= {p.name for p in candidate.effect.parameters if not p.hardware}
 
 
@@ -202,7 +202,7 @@ def _held(final: Fit, candidate: Candidate, estimates: Sequence[Estimate]) -> tu
     return tuple((name, float(term.values[name])) for name in names if term.values[name] != nulls[name])
 
 
-def lack_of_fit(found: Search, last: Explained) -> tuple[float, bool]:
+def reduced_chi2_of(found: Search, last: Explained) -> tuple[float, bool]:
     """Variance left over the stated one, and whether that is clearly more; where nothing states it, never."""
     given = found.linear.problem
     freedom = max(1, given.freedom - last.rank)
@@ -222,7 +222,7 @@ def _evidence(found: Search, last: Explained, group: int) -> Evidence:
     chance = probability(given, squares, last.rank - without.rank, variance, given.freedom - last.rank)
     campaign = found.base.campaign
     heldout, regions, sessions = (
-        _left_out(found, last, group, rows)
+        held_out_gain(found, last, group, rows)
         for rows in (folds_of(campaign, min(FOLDS, campaign.poses)), _regions(found), _sessions(found))
     )
     nearest = next(iter(_against(found, linear.candidates[group])), None)
@@ -232,7 +232,7 @@ def _evidence(found: Search, last: Explained, group: int) -> Evidence:
     return Evidence(gain, min(1.0, chance * among), heldout, regions, sessions, margin, alias)
 
 
-def _alternatives(found: Search, group: int, seen: bool) -> tuple[Candidate, ...]:
+def ambiguity_set(found: Search, group: int, seen: bool) -> tuple[Candidate, ...]:
     """The candidate, and what explains the same.  Hardware that the robot file describes is taken to be there where its
     parameters are ``seen``, as long as what is no such thing explains no more."""
     mine = found.linear.candidates[group]
@@ -242,7 +242,7 @@ def _alternatives(found: Search, group: int, seen: bool) -> tuple[Candidate, ...
     return (mine, *near)
 
 
-def _beyond_telling(estimates: Sequence[Estimate]) -> bool:
+def is_implausible(estimates: Sequence[Estimate]) -> bool:
     """Whether all that was found is beyond plausible sizes, with intervals of more than half of it: past the load at
     which a tooth changes sides, say, readings do not tell how wide its gap is."""
     sizes = [(abs(e.value - e.unknown.parameter.null), e.unknown.parameter.scale, e.ci95) for e in estimates]
@@ -255,17 +255,18 @@ def _of_another_course(found: Search, candidate: Candidate) -> bool:
     return any(r.margin < -MARGIN for r in against)
 
 
-def _against(found: Search, mine: Candidate) -> list[Rival]:
+def _against(found: Search, mine: Candidate) -> list[Alternative]:
     """What may be taken for ``mine``, nearest first; other courses where they are no mere variants of it."""
     return [r for r in found.rivals if r.of == mine.key and (mine.name in FOILED or not r.foil)]
 
 
-def _left_out(found: Search, last: Explained, group: int, part: Ints | None) -> float:
-    """Fall of -2 ln(likelihood) of readings left out, part by part, with the group; NaN without parts.
+def held_out_gain(found: Search, last: Explained, group: int, part: Ints | None) -> float:
+    """Fall of -2 ln(likelihood) of readings left out, part by part, with the group; ``part`` (R,): the part of each
+    reading, -1 in none; NaN without parts.
 
-    A reading is predicted with the doubt that the fit of the others leaves: where that has to extrapolate, it says
-    little.  Wild readings count up to 5 standard deviations.  A part that is more than half of all is never left out:
-    a few poses measured later do not foretell a whole campaign.
+    A reading is predicted with the uncertainty that the fit of the others leaves: where that has to extrapolate, it
+    says little.  Wild readings count up to 5 standard deviations.  A part that is more than half of all is never left
+    out: a few poses measured later do not foretell a whole campaign.
     """
     if part is None:
         return np.nan
@@ -286,7 +287,7 @@ def _left_out(found: Search, last: Explained, group: int, part: Ints | None) -> 
         matrix = np.concatenate([matrix, np.diag(own)[own > 0]])
         more = len(matrix) - len(of)
         target = np.append(linear.residual, np.zeros(more))
-        return _surprise(matrix, target, np.append(of, np.full(more, -1)), variance)
+        return _misfit(matrix, target, np.append(of, np.full(more, -1)), variance)
 
     return surprise([g for g in last.groups if g != group]) - surprise(last.groups)
 
@@ -299,7 +300,7 @@ def _expected(given: Problem, last: Explained, group: int) -> Floats:
     return np.full(len(given.places[group]), 1.0 / (USUAL * found) if found > 0 else 0.0)
 
 
-def _surprise(matrix: Floats, target: Floats, part: Ints, variance: float) -> float:
+def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> float:
     """-2 ln(likelihood) of ``target`` (n,), each part predicted from the others by ``matrix`` (n, k)."""
     size = np.linalg.norm(matrix, axis=0)
     scaled = matrix[:, size > 0] / size[size > 0]
@@ -309,9 +310,9 @@ def _surprise(matrix: Floats, target: Floats, part: Ints, variance: float) -> fl
         value, vector = np.linalg.eigh(whole - out.T @ out)
         root = vector / np.sqrt(np.maximum(value, SEEN))
         x = root @ (root.T @ (aim - out.T @ target[part == k]))
-        doubt = variance * (1.0 + ((out @ root) ** 2).sum(axis=1))
-        away = (target[part == k] - out @ x) ** 2 / doubt
-        total += float((np.minimum(away, WILD**2) + np.log(doubt)).sum())
+        uncertainty = variance * (1.0 + ((out @ root) ** 2).sum(axis=1))
+        away = (target[part == k] - out @ x) ** 2 / uncertainty
+        total += float((np.minimum(away, WILD**2) + np.log(uncertainty)).sum())
     return total
 
 
@@ -361,7 +362,7 @@ def refitted(final: Fit) -> tuple[Estimate, ...]:
         stated = estimate.unknown.stated
         if stated is None or estimate.unknown.parameter.hardware:
             continue
-        doubt = np.hypot(estimate.ci95, stated.interval or 0.0)
-        if abs(estimate.value - stated.value) > CLEAR * doubt:
+        uncertainty = np.hypot(estimate.ci95, stated.interval or 0.0)
+        if abs(estimate.value - stated.value) > CLEAR * uncertainty:
             moved.append(estimate)
     return tuple(moved)

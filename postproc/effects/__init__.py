@@ -6,6 +6,7 @@ from postproc.effects.backlash import Backlash
 from postproc.effects.base_compliance import BaseCompliance
 from postproc.effects.base_offset import BaseOffset
 from postproc.effects.effect import (
+    ChainState,
     ComplianceLaw,
     Conditions,
     Effect,
@@ -13,7 +14,6 @@ from postproc.effects.effect import (
     Load,
     Offset,
     Parameter,
-    State,
     Values,
 )
 from postproc.effects.force_sensor import ForceSensor
@@ -58,6 +58,7 @@ EFFECTS: dict[str, type[Effect]] = {
 
 __all__ = [
     "EFFECTS",
+    "ChainState",
     "ComplianceLaw",
     "Conditions",
     "Effect",
@@ -65,6 +66,5 @@ __all__ = [
     "Load",
     "Offset",
     "Parameter",
-    "State",
     "Values",
 ]

@@ -7,17 +7,22 @@ from typing import Self
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.effects.effect import ComplianceLaw, State, Values, column, per_joint
+from postproc.base.arrays import Floats
+from postproc.base.yaml_section import YamlSection
+from postproc.effects.effect import ChainState, ComplianceLaw, Values, column, per_joint
 from postproc.robot.geometries import Joint
-from postproc.yamlfile import Section
 
 
 class Backlash(ComplianceLaw):
-    """theta_i = (b_i / 2) tanh(2 (tau_i / friction - d_i)), b_i [rad] the whole gap.
+    """theta_i = (b_i / 2) ((1 + d_i) L(-1) + (1 - d_i) L(1)) / 2, L(s) = tanh(2 (tau_i / friction + s)), b_i [rad] the
+    whole gap.
 
-    The load chooses the side; a load below the ``friction`` [N m, N] of the joint leaves it on the side that it came
-    from (d_i = -1, 0, 1 the sense of approach, 0 where it is not known).
+    The load chooses the side; one below the ``friction`` [N m, N] of the joint leaves it where the motor brought it: at
+    -tanh(2) d_i b_i / 2.  d_i in -1..1 is the share of half the gap by which the motor is ahead (see ``play``): -1 or 1
+    after a motion larger than the gap, 0 where nothing is known, which is the mean of both.
+
+    theta_i adds to the displacement of the joint's own coordinate; tau_i [N m, N] is the whole generalized force on it,
+    wrench and loads.  dtheta_i/dtau_i = (b_i / 2) ((1 + d_i) (1 - L(-1)^2) + (1 - d_i) (1 - L(1)^2)) / friction.
     """
 
     name = "backlash"
@@ -30,7 +35,7 @@ class Backlash(ComplianceLaw):
         self.parameters = per_joint(joints, "b", ("rad", "m"), 0.0, 0.02, source)
 
     @classmethod
-    def from_options(cls, options: Section, joints: Sequence[Joint]) -> Self:
+    def from_options(cls, options: YamlSection, joints: Sequence[Joint]) -> Self:
         options.only("friction")
         return cls(joints, options.number("friction", 20.0, 0.1, 1e5))
 
@@ -38,10 +43,11 @@ class Backlash(ComplianceLaw):
         return {"friction": self.friction}
 
     def add_displacement(
-        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
+        self, values: Values, state: ChainState, force: Floats, displacement: Floats, slope: Floats
     ) -> None:
         half, motors = 0.5 * column(values, self.parameters), state.chain.motors
         came = 0.0 if state.conditions.direction is None else state.conditions.direction.T
-        side = np.tanh(2.0 * (force[motors] / self.friction - came))
-        displacement[motors] += half * side
-        slope[motors] += half * (1 - side * side) * 2.0 / self.friction
+        ahead, behind = (np.tanh(2.0 * (force[motors] / self.friction + side)) for side in (-1.0, 1.0))
+        displacement[motors] += half * 0.5 * ((1 + came) * ahead + (1 - came) * behind)
+        rises = (1 + came) * (1 - ahead * ahead) + (1 - came) * (1 - behind * behind)
+        slope[motors] += half * rises / self.friction

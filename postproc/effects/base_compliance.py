@@ -1,4 +1,4 @@
-"""Base compliance: the foundation gives way under the whole robot."""
+"""Base compliance: the foundation deflects under the whole robot."""
 
 from __future__ import annotations
 
@@ -9,8 +9,13 @@ from postproc.robot.geometries import Joint
 
 
 class BaseCompliance(LinearCompliance):
-    """Three shifts c_x, c_y, c_z [m/N] along and three turns c_rx, c_ry, c_rz [rad/(N m)] about the axes of the robot
-    base, in this order from the ground up."""
+    """theta = c tau: three shifts along, c_x, c_y, c_z [m/N], and three turns about, c_rx, c_ry, c_rz [rad/(N m)], the
+    axes of the robot base, through its origin.
+
+    They are before the first joint in this order from the ground up, each in the frame that the ones before moved: T
+    = Tx Ty Tz Rx Ry Rz.  tau: force [N] along and moment [N m] about that axis, of the wrench at the TCP and of all
+    weights, at the deflected pose.
+    """
 
     name = "base_compliance"
     family = "elastic"

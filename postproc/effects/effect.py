@@ -1,7 +1,14 @@
 """What an effect is: a named piece of physics with parameters, added to one chain.
 
 An effect acts on the generalized coordinates of the chain in one of three ways: as an *offset* of coordinates, as a
-*load* on them, or as a *compliance law* (displacement under a generalized force).  The solver in ``model`` only sums.
+*load* on them, or as a *compliance law* (displacement under a generalized force).  The solver in ``model`` only sums:
+
+    z = motors + sum of offsets(motors) + theta,    theta = sum of laws(F),    F = J(z)^T w + sum of loads(z)
+
+Coordinates z stand in the order of ``robot.chain``, whatever the order of the effects; effects on one coordinate add.
+Offsets follow from the motors as commanded, not from each other.  The wrench w acts at the TCP where it comes to lie,
+in axes of the robot base that do not turn with it.
+
 Arrays are component first: n joints, m coordinates, N states.  A parameter at its null value is the same as no effect.
 """
 
@@ -15,10 +22,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
-from postproc.robot.chain import Chain, Sweep
+from postproc.base.arrays import Floats, Ints
+from postproc.base.yaml_section import YamlSection
+from postproc.robot.chain import Chain, ChainKinematics
 from postproc.robot.geometries import Joint
-from postproc.yamlfile import Section
 
 Values = Mapping[str, float]
 
@@ -45,8 +52,8 @@ SIZES = {
 class Parameter:
     """Name, SI unit, null value (effect absent), bounds, where its definition comes from, and the joint it is of.
 
-    ``hardware``: a dimension of built hardware, known from a drawing rather than from how the robot bends.  ``size``:
-    one that is felt, the unit in which fits count; 0 takes that of the SI unit.
+    ``hardware``: a dimension of built hardware, known from a drawing rather than from how the robot deflects.
+    ``size``: one that is felt, the unit in which fits count; 0 takes that of the SI unit.
     """
 
     name: str
@@ -69,9 +76,10 @@ class Parameter:
 class Conditions:
     """What else is known of N states; None where it is not.
 
-    spindle (N, 3): unit vector of the spindle, tip-ward, in tool axes; direction (N, n): sense in which each joint came
-    to its place (-1, 0, 1); temperature (N,) [K] over that of the calibration; time (N,) [s] since then; payload_mass
-    (N,) [kg] and payload_com (N, 3) [m, flange axes]: what hangs on the flange.
+    spindle (N, 3): unit vector of the spindle, tip-ward, in tool axes; direction (N, n): how far each motor is ahead
+    of its joint, -1..1, as a share of half the gap; -1, 0, 1 where only the sense in which it came is known;
+    temperature (N,) [K] over that of the calibration; time (N,) [s] since then; payload_mass (N,) [kg] and payload_com
+    (N, 3) [m, flange axes]: what is mounted on the flange.
     """
 
     spindle: Floats | None = None
@@ -88,7 +96,7 @@ class Conditions:
 
 
 @dataclass(frozen=True)
-class State:
+class ChainState:
     """N states of a chain as an effect sees them.
 
     motors (n, N): as commanded; rest (m, N): coordinates without load, motors and offsets; coordinates (m, N): where
@@ -100,12 +108,12 @@ class State:
     motors: Floats
     rest: Floats
     coordinates: Floats
-    swept: Sweep
+    swept: ChainKinematics
     wrench: Floats
     conditions: Conditions
 
-    def part(self, rows: Ints) -> State:
-        """Copies of some of the states; ``swept`` is still that of all."""
+    def part(self, rows: Ints) -> ChainState:
+        """Copies of the states ``rows`` (K,); ``swept`` is still that of all."""
         return replace(
             self,
             motors=self.motors[:, rows],
@@ -122,7 +130,7 @@ class Effect:
     ``family``: what a controller may already correct (``geometric``, ``weight``), or ``elastic``, ``gear``.
     ``coordinates``: extra coordinates of the chain that it needs.  ``by_direction``: it asks how joints came to their
     place.  ``whole``: an arm that was never calibrated has it in all of its joints.  ``apart``: it may be there on one
-    joint and not on another.  ``slack``: without a wrench it moves nothing.
+    joint and not on another.  ``zero_without_load``: without a wrench it moves nothing.
     """
 
     name: ClassVar[str]
@@ -130,12 +138,12 @@ class Effect:
     by_direction: ClassVar[bool] = False
     whole: ClassVar[bool] = False
     apart: ClassVar[bool] = True
-    slack: bool = False
+    zero_without_load: bool = False
     parameters: tuple[Parameter, ...]
     coordinates: tuple[str, ...] = ()
 
     @classmethod
-    def from_options(cls, options: Section, joints: Sequence[Joint]) -> Self:
+    def from_options(cls, options: YamlSection, joints: Sequence[Joint]) -> Self:
         """The effect as the ``options:`` of a robot file describe it.  Raises Refusal with the line."""
         options.only()
         return cls(joints)
@@ -157,15 +165,19 @@ class Effect:
         """The options, for reports."""
         return {}
 
+    def gaps(self, values: Values) -> Floats:
+        """(n,) [rad, m] by which a motor turns round before its joint does; of an effect ``by_direction``."""
+        return column(values, self.parameters)[:, 0]
+
 
 class Offset(Effect, ABC):
-    """Coordinates that stand elsewhere than the controller believes."""
+    """Coordinates that are elsewhere than the controller believes."""
 
     @abstractmethod
     def add_offset(
         self, values: Values, chain: Chain, motors: Floats, conditions: Conditions, offset: Floats
     ) -> None:
-        """Add to ``offset`` (m, N) [rad, m], in place."""
+        """Add to ``offset`` (m, N) [rad, m], in place, at ``motors`` (n, N) [rad, m] as commanded."""
 
 
 class ComplianceLaw(Effect, ABC):
@@ -173,23 +185,24 @@ class ComplianceLaw(Effect, ABC):
 
     @abstractmethod
     def add_displacement(
-        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
+        self, values: Values, state: ChainState, force: Floats, displacement: Floats, slope: Floats
     ) -> None:
-        """Add to ``displacement`` (m, N) [rad, m] under ``force`` (m, N) [N m, N], and its derivative to ``slope``,
-        coordinate by coordinate; both in place."""
+        """Add to ``displacement`` (m, N) [rad, m] under ``force`` (m, N) [N m, N], and its derivative to ``slope`` (m,
+        N) [rad/(N m), m/N], coordinate by coordinate; both in place."""
 
 
 class LinearCompliance(ComplianceLaw):
-    """theta_i = c_i tau_i: one parameter a coordinate of ``coordinates``, in that order."""
+    """theta_i = c_i tau_i, dtheta_i/dtau_i = c_i: one parameter a coordinate of ``coordinates``, in that order; tau_i
+    the whole generalized force on it, of the wrench and of the loads, at the deflected pose."""
 
-    slack = True
+    zero_without_load = True
 
     def rows(self, chain: Chain) -> Any:
-        """Where the coordinates stand in the chain."""
+        """Where the coordinates are in the chain."""
         return [chain.index[name] for name in self.coordinates]
 
     def add_displacement(
-        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
+        self, values: Values, state: ChainState, force: Floats, displacement: Floats, slope: Floats
     ) -> None:
         rows, compliance = self.rows(state.chain), column(values, self.parameters)
         displacement[rows] += compliance * force[rows]
@@ -200,15 +213,16 @@ class Load(Effect, ABC):
     """A generalized force on coordinates."""
 
     @abstractmethod
-    def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
-        """Add to ``force`` (m, N) [N m, N] and its derivative by the own coordinate to ``slope``; both in place."""
+    def add_force(self, values: Values, state: ChainState, force: Floats, slope: Floats) -> None:
+        """Add to ``force`` (m, N) [N m, N] and its derivative by the own coordinate to ``slope`` (m, N) [N m/rad, N/m];
+        both in place."""
 
 
 class EnergyLoad(Load):
     """A load that is the negative gradient of an energy."""
 
     @abstractmethod
-    def energy(self, values: Values, state: State) -> Floats:
+    def energy(self, values: Values, state: ChainState) -> Floats:
         """Energy (N,) [J]."""
 
 

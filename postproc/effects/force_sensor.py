@@ -6,15 +6,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.effects.effect import Load, Parameter, State, Values
+from postproc.base.arrays import Floats
+from postproc.effects.effect import ChainState, Load, Parameter, Values
 from postproc.robot.chain import generalized_force
 from postproc.robot.geometries import Joint
 
 
 class ForceSensor(Load):
     """The wrench that acts is (1 + gain) (stated - bias): ``gain`` [1], ``fx``, ``fy``, ``fz`` [N] and ``mx``, ``my``,
-    ``mz`` [N m] of the bias in axes of the robot base.
+    ``mz`` [N m] of the bias in axes of the robot base.  What it adds to the stated wrench w acts at the TCP: tau += J^T
+    (gain w - (1 + gain) bias).
 
     A wrench of zero is a tool that touches nothing, not a reading: it stays zero.
     """
@@ -30,7 +31,7 @@ class ForceSensor(Load):
             *(Parameter(f"m{axis}", "N m", 0.0, -1000.0, 1000.0, source) for axis in "xyz"),
         )
 
-    def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
+    def add_force(self, values: Values, state: ChainState, force: Floats, slope: Floats) -> None:
         bias = np.array([values[name] for name in ("fx", "fy", "fz", "mx", "my", "mz")])[:, None]
         gain = values["gain"]
         error = gain * state.wrench - (1 + gain) * bias

@@ -1,18 +1,19 @@
-"""A frame that stands elsewhere than stated: what tool_offset and base_offset have in common."""
+"""A frame that is elsewhere than stated: what tool_offset and base_offset have in common."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import ClassVar
 
-from postproc.arrays import Floats
+from postproc.base.arrays import Floats
 from postproc.effects.effect import Conditions, Offset, Parameter, Values, column
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
 
 class FrameOffset(Offset):
-    """Three shifts x, y, z [m], then three turns rx, ry, rz [rad], each in the frame that the ones before moved."""
+    """Three shifts x, y, z [m], then three turns rx, ry, rz [rad], each in the frame that the ones before moved: T =
+    Tx(x) Ty(y) Tz(z) Rx(rx) Ry(ry) Rz(rz)."""
 
     site: ClassVar[str]
     source: ClassVar[str]

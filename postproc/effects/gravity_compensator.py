@@ -1,7 +1,8 @@
 """Gravity compensator: a spring between two neighbouring links, from its energy.
 
 Klimchik, Caro, Wu, Chablat, Furet, Pashkevich, "Stiffness modeling of robotic manipulator with gravity
-compensator", eqs (1) to (4).  The spring runs from P0 on link i - 1 to P1 on link i:
+compensator", Computational Kinematics (CK 2013), Springer 2014, eqs (1) to (4).  The spring runs from P0 on link i - 1
+to P1 on link i:
 
     s^2 = a^2 + L^2 + 2 a L cos(alpha + q) + h^2        (1), h = 0 there
     U   = K_c (s - s0)^2 / 2
@@ -20,19 +21,19 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.effects.effect import EnergyLoad, Parameter, State, Values
+from postproc.base.arrays import Floats
+from postproc.base.units import DEG
+from postproc.base.yaml_section import YamlSection
+from postproc.effects.effect import ChainState, EnergyLoad, Parameter, Values
 from postproc.robot.chain import sine_and_cosine
 from postproc.robot.geometries import Joint
-from postproc.units import DEG
-from postproc.yamlfile import Section
 
 _SOURCE = "Klimchik et al., Fig. 1 and eqs (1)-(4)"
 
 
 class SpringState(NamedTuple):
-    """The spring at joint angles (N,), with its stiffness and rest length.  ``length`` s [m]; ``ratio`` s0 / s;
-    ``product`` a L [m2]; ``sine``, ``cosine`` of the angle between a and L."""
+    """The spring at joint angles (N,), with its stiffness and rest length.  ``stiffness`` K_c [N/m]; ``rest`` s0 [m];
+    ``length`` (N,) s [m]; ``ratio`` (N,) s0 / s; ``product`` a L [m2]; ``sine``, ``cosine`` (N,) of alpha + q."""
 
     stiffness: float
     rest: float
@@ -54,17 +55,22 @@ class SpringState(NamedTuple):
 
     @property
     def slope(self) -> Floats:
-        """(N,) dM_c/dq [N m/rad]."""
+        """(N,) dM_c/dq = K_c a L eta_q [N m/rad]."""
         share = self.product / (self.length * self.length) * self.sine * self.sine
         return np.asarray(self.stiffness * self.product * (self.cosine - self.ratio * (share + self.cosine)))
 
 
 class GravityCompensator(EnergyLoad):
-    """A spring across one joint.  P0 lies at (-a_x, -a_y) and P1 at distance L along the link, seen from the axis;
-    ``h`` is their distance along the axis.
+    """A spring across one joint.  Seen from the joint's axis, P0 lies at (-a_x, -a_y) on the link before and P1 at
+    distance L along the link after it: a = hypot(a_x, a_y), alpha = atan2(a_y, a_x), and q of the paper is the joint's
+    angle, bent as it is under load, less ``zero`` [rad].  Only the sum alpha + q counts: no more of the frames is asked
+    for.  ``h`` [m] is the distance of P0 and P1 along the axis.
 
-    ``preload``: ``balanced``, the torque is cancelled at the unloaded pose (only its change acts); ``acting``, the
-    whole torque acts.  ``zero``: angle of the joint [rad] at which q of the paper is zero.
+    On the joint's own coordinate acts, with q_0 its angle without load (motor and offsets):
+
+        tau = M_c(q) - M_c(q_0), U(q) + M_c(q_0) q      ``preload: balanced``: cancelled at the unloaded pose
+        tau = M_c(q), U(q)                              ``preload: acting``: the whole torque
+        tau = M_c(q_0) [acting] - (M_c(q) - M_c(q_0))   ``sign: as_printed``: the change with the other sign
     """
 
     name = "gravity_compensator"
@@ -81,7 +87,7 @@ class GravityCompensator(EnergyLoad):
         self.joint = joint
         self.joint_name = joints[joint].name
         self.preload = preload
-        self.slack = preload == "balanced"
+        self.zero_without_load = preload == "balanced"
         self.sign = sign
         self.zero = zero
         at, along = self.joint_name, "distance of the two ends along the joint axis"
@@ -95,7 +101,7 @@ class GravityCompensator(EnergyLoad):
         )
 
     @classmethod
-    def from_options(cls, options: Section, joints: Sequence[Joint]) -> Self:
+    def from_options(cls, options: YamlSection, joints: Sequence[Joint]) -> Self:
         options.only("joint", "preload", "sign", "zero_deg")
         names = [joint.name for joint in joints if joint.kind == "revolute"]
         name = options.text("joint", choices=names)
@@ -127,7 +133,7 @@ class GravityCompensator(EnergyLoad):
         }
 
     def spring(self, values: Values, angle: Floats) -> SpringState:
-        """The spring at joint angles (N,) [rad]."""
+        """The spring at joint angles ``angle`` (N,) [rad], as the controller counts them."""
         k, s0, length = values["K_c"], values["s0"], values["L"]
         a, alpha = math.hypot(values["a_x"], values["a_y"]), math.atan2(values["a_y"], values["a_x"])
         phi = alpha + angle - self.zero
@@ -136,7 +142,7 @@ class GravityCompensator(EnergyLoad):
         s = np.sqrt(np.maximum(a * a + length * length + 2 * product * cosine + values["h"] ** 2, 1e-18))
         return SpringState(k, s0, product, s, s0 / s, sine, cosine)
 
-    def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
+    def add_force(self, values: Values, state: ChainState, force: Floats, slope: Floats) -> None:
         row = state.chain.motor_rows[self.joint]
         here = self.spring(values, state.coordinates[row])
         rest = self.spring(values, state.rest[row]).torque
@@ -144,7 +150,7 @@ class GravityCompensator(EnergyLoad):
         force[row] += sign * (here.torque - rest) + (rest if self.preload == "acting" else 0.0)
         slope[row] += sign * here.slope
 
-    def energy(self, values: Values, state: State) -> Floats:
+    def energy(self, values: Values, state: ChainState) -> Floats:
         row = state.chain.motor_rows[self.joint]
         rest = self.spring(values, state.rest[row]).torque if self.preload == "balanced" else 0.0
         return np.asarray(self.spring(values, state.coordinates[row]).energy + rest * state.coordinates[row])

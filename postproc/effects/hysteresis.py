@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from postproc.arrays import Floats
+from postproc.base.arrays import Floats
 from postproc.effects.effect import Conditions, Offset, Values, column, per_joint
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
 
 class Hysteresis(Offset):
-    """offset_i = -(w_i / 2) d_i with w_i [rad] the whole width and d_i = -1, 0, 1 the sense in which joint i came.
+    """offset_i = -(w_i / 2) d_i with w_i [rad] the whole width and d_i in -1..1 the share of half of it by which the
+    motor of joint i is ahead (see ``play``): -1 or 1 the sense in which it came, where that was further than the width.
 
-    Where the sense is not measured it follows from the order of the states.
+    The offset adds to the joint's own coordinate; it is none where the conditions know no direction.  Along a path it
+    follows from the order of the motions, of measured states where it is not stated with them.
     """
 
     name = "hysteresis"

@@ -1,4 +1,4 @@
-"""Joint compliance: each actuator gives way in proportion to the torque on it (virtual joint model)."""
+"""Joint compliance: each actuator deflects in proportion to the torque on it (virtual joint model)."""
 
 from __future__ import annotations
 
@@ -11,9 +11,12 @@ from postproc.robot.geometries import Joint
 
 
 class JointCompliance(LinearCompliance):
-    """theta_i = c_i tau_i, c_i [rad/(N m)] (a sliding joint: [m/N]); zero is a rigid joint.
+    """theta_i = c_i tau_i, c_i [rad/(N m)] (a sliding joint: [m/N]); zero is a rigid joint.  theta_i adds to the
+    joint's own coordinate; tau_i is the whole generalized force on it at the deflected pose: J^T w and all loads
+    (weights, springs).
 
-    The inverse of K_theta^0 in eq. (6) of Klimchik et al.; c_i are the k_i of their Table 1.
+    The inverse of K_theta^0 in eq. (6) of Klimchik et al. (2014; see ``gravity_compensator``); c_i are the k_i of their
+    Table 1.
     """
 
     name = "joint_compliance"

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from postproc.arrays import Floats
+from postproc.base.arrays import Floats
 from postproc.effects.effect import Conditions, Offset, Parameter, Values
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
 
 class JointCoupling(Offset):
-    """offset_i = sum of r_ik q_k for the last three joints, k < i: an error of the ratios that the controller uses."""
+    """offset_i = sum of r_ik q_k [rad] for the last three joints, k < i, q_k [rad] the motor as commanded: an error of
+    the ratios that the controller uses.  The offset adds to the joint: it is at q_i + offset_i."""
 
     name = "joint_coupling"
     family = "geometric"

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from postproc.arrays import Floats
+from postproc.base.arrays import Floats
 from postproc.effects.effect import Conditions, Offset, Values, column, per_joint
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
 
 class JointOffset(Offset):
-    """offset_i = o_i [rad] (a sliding joint: [m])."""
+    """offset_i = o_i [rad] (a sliding joint: [m]): joint i is at what the controller believes, plus o_i."""
 
     name = "joint_offset"
     family = "geometric"

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.base.arrays import Floats
+from postproc.base.geometry import Poses
 from postproc.effects.effect import Conditions, Offset, Parameter, Values, column
-from postproc.geometry import Poses
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
@@ -19,11 +19,12 @@ _INDEPENDENT = 1e-6
 
 class LinkGeometry(Offset):
     """The axis of each joint after the first, moved in the frame of that joint: shifts d_x, d_y [m] and turns r_x, r_y
-    [rad] across the axis.
+    [rad] across the axis, before its own motion: Tx(d_x) Ty(d_y) Rx(r_x) Ry(r_y) Rz(q), about the origin of the joint's
+    frame (see ``LinkCompliance`` for where that lies).
 
-    Only parameters that are not redundant are there: those that joint_offset, base_offset, tool_offset or earlier
-    ones can not imitate, found from the Jacobian at random states (Meggiolaro and Dubowsky's question of redundant
-    error parameters, answered numerically).
+    Only parameters that are not redundant are there: those that joint_offset, base_offset, tool_offset or earlier ones
+    cannot imitate, found from the Jacobian at random states (Meggiolaro and Dubowsky's question of redundant error
+    parameters, ICRA 2000, answered numerically).
     """
 
     name = "link_geometry"

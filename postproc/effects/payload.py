@@ -1,4 +1,4 @@
-"""Payload: what hangs on the flange bends the arm."""
+"""Payload: what is mounted on the flange deflects the arm."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.effects.effect import EnergyLoad, Parameter, State, Values
+from postproc.base.arrays import Floats
+from postproc.effects.effect import ChainState, EnergyLoad, Parameter, Values
 from postproc.robot.chain import weight_about
 from postproc.robot.geometries import Joint
 
@@ -16,7 +16,10 @@ class Payload(EnergyLoad):
     """A weight on the flange: ``mass`` [kg] with its centre at ``x``, ``y``, ``z`` [m] in flange axes, besides the tool
     that the cell states (its mass and centre come with the conditions).
 
-    U = -m g . p_c
+    U = -m g . p_c, p_c = p_flange + R_flange (x, y, z)
+
+    A weight acts on every coordinate up to the last joint, with g [m/s2] and axis z_i in the robot base: tau_i = m z_i
+    . ((p_c - p_i) x g) on a turn, m z_i . g on a shift.  Tool and spindle coordinates carry none.
     """
 
     name = "payload"
@@ -29,7 +32,7 @@ class Payload(EnergyLoad):
             *(Parameter(axis, "m", 0.0, -5.0, 5.0, source, size=0.1) for axis in "xyz"),
         )
 
-    def _weights(self, values: Values, state: State) -> list[tuple[Floats, Floats]]:
+    def _weights(self, values: Values, state: ChainState) -> list[tuple[Floats, Floats]]:
         """Mass (N,) or scalar and centre (3, N) in the robot base of each weight."""
         columns, position = state.swept.flange
         centre = sum((values[axis] * column for axis, column in zip("xyz", columns, strict=True)), position)
@@ -40,9 +43,9 @@ class Payload(EnergyLoad):
             weights.append((given.payload_mass, np.asarray(hung)))
         return weights
 
-    def add_force(self, values: Values, state: State, force: Floats, slope: Floats) -> None:
+    def add_force(self, values: Values, state: ChainState, force: Floats, slope: Floats) -> None:
         swept, g = state.swept, state.gravity
-        before = state.chain.motor_rows[-1] + 1  # what stands before the flange carries it
+        before = state.chain.motor_rows[-1] + 1  # what is before the flange carries it
         for mass, centre in self._weights(values, state):
             for i in range(before):
                 axis = swept.axes[i]
@@ -53,7 +56,7 @@ class Payload(EnergyLoad):
                 else:
                     force[i] += mass * (g @ axis)
 
-    def energy(self, values: Values, state: State) -> Floats:
+    def energy(self, values: Values, state: ChainState) -> Floats:
         return np.asarray(
             sum(-mass * (state.gravity @ centre) for mass, centre in self._weights(values, state))
         )

@@ -7,22 +7,27 @@ from typing import Self
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.base.arrays import Floats
+from postproc.base.yaml_section import YamlSection
 from postproc.effects.effect import Conditions, Offset, Parameter, Values, column
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
-from postproc.yamlfile import Section
 
 
 class ThermalGrowth(Offset):
     """The distance from one joint to the next grows by g_i times the temperature over that of the calibration [m/K]
-    (option ``variable: temperature``), or times the time since then [m/s] (``time``)."""
+    (option ``variable: temperature``), or times the time since then [m/s] (``time``).
+
+    Option ``reference`` [degC]: the temperature of the calibration, from which a cell's ``temperature`` counts.
+    """
 
     name = "thermal_growth"
     family = "geometric"
 
-    def __init__(self, joints: Sequence[Joint], variable: str = "temperature") -> None:
-        self.variable = variable
+    def __init__(
+        self, joints: Sequence[Joint], variable: str = "temperature", reference: float | None = None
+    ) -> None:
+        self.variable, self.reference = variable, reference
         unit = "m/K" if variable == "temperature" else "m/s"
         grown = [(i, j) for i, j in enumerate(joints, 1) if np.linalg.norm(j.placement.position) > 1e-9]
         self.coordinates = tuple(f"{joint.name}.growth" for _, joint in grown)
@@ -34,9 +39,16 @@ class ThermalGrowth(Offset):
         )
 
     @classmethod
-    def from_options(cls, options: Section, joints: Sequence[Joint]) -> Self:
-        options.only("variable")
-        return cls(joints, options.text("variable", "temperature", ("temperature", "time")))
+    def from_options(cls, options: YamlSection, joints: Sequence[Joint]) -> Self:
+        options.only("variable", "reference")
+        variable = options.text("variable", "temperature", ("temperature", "time"))
+        if "reference" not in options:
+            return cls(joints, variable)
+        if variable == "time":
+            raise options.error(
+                "YML004", "excludes 'variable: time'; only a temperature has a reference", "reference"
+            )
+        return cls(joints, variable, options.number("reference", low=-10.0, high=60.0, unit="degC"))
 
     @classmethod
     def variants(cls, joints: Sequence[Joint]) -> tuple[Self, ...]:

@@ -1,16 +1,21 @@
-"""Tool compliance: cutter, holder and spindle give way at the tool centre point."""
+"""Tool compliance: cutter, holder and spindle deflect at the tool centre point."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from postproc.arrays import Floats
-from postproc.effects.effect import ComplianceLaw, Parameter, State, Values
+from postproc.base.arrays import Floats
+from postproc.effects.effect import ChainState, ComplianceLaw, Parameter, Values
 from postproc.robot.geometries import Joint
 
 
 class ToolCompliance(ComplianceLaw):
-    """Shifts of the TCP: ``radial`` [m/N] across the spindle, alike in all directions, ``axial`` [m/N] along it."""
+    """theta = c f: shifts of the TCP, ``radial`` [m/N] across the spindle, alike in all directions, ``axial`` [m/N]
+    along it, by the force f [N] on the TCP in those directions.  The tool is not turned, and its mount stays.
+
+    The spindle is the direction that the conditions state in tool axes, tip-ward; tool z without one.  A moment at the
+    TCP moves nothing here.
+    """
 
     name = "tool_compliance"
     family = "elastic"
@@ -23,7 +28,7 @@ class ToolCompliance(ComplianceLaw):
         )
 
     def add_displacement(
-        self, values: Values, state: State, force: Floats, displacement: Floats, slope: Floats
+        self, values: Values, state: ChainState, force: Floats, displacement: Floats, slope: Floats
     ) -> None:
         for name in self.coordinates:
             row = state.chain.index[name]

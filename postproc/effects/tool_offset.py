@@ -6,7 +6,8 @@ from postproc.effects.frame_offset import FrameOffset
 
 
 class ToolOffset(FrameOffset):
-    """The TCP is not where the tool data say: shift and turn in tool axes."""
+    """The TCP is not where the tool data say: shift and turn in tool axes.  After the stated TCP, about it; a wrench
+    acts at the TCP that was moved."""
 
     name = "tool_offset"
     site = "tool"

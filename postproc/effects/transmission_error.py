@@ -7,15 +7,16 @@ from typing import Self
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.base.arrays import Floats
+from postproc.base.yaml_section import YamlSection
 from postproc.effects.effect import Conditions, Offset, Parameter, Values
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
-from postproc.yamlfile import Section
 
 
 class TransmissionError(Offset):
-    """offset_i = sum over harmonics h of s_i_h sin(h q_i) + c_i_h cos(h q_i) [rad]; turning joints only."""
+    """offset_i = sum over harmonics h of s_i_h sin(h q_i) + c_i_h cos(h q_i) [rad]; turning joints only.  q_i [rad] is
+    the motor as commanded, counted as the controller counts it; the joint is at q_i + offset_i."""
 
     name = "transmission_error"
     family = "geometric"
@@ -38,13 +39,13 @@ class TransmissionError(Offset):
         )  # fmt: skip
 
     @classmethod
-    def from_options(cls, options: Section, joints: Sequence[Joint]) -> Self:
+    def from_options(cls, options: YamlSection, joints: Sequence[Joint]) -> Self:
         options.only("harmonics")
         if "harmonics" not in options:
             return cls(joints)
         harmonics = options.numbers("harmonics", None)
         if any(harmonic <= 0 for harmonic in harmonics) or len(set(harmonics)) < len(harmonics):
-            raise options.error("YML004", "harmonics must be positive, each once", "harmonics")
+            raise options.error("YML004", "harmonics must be positive and distinct", "harmonics")
         return cls(joints, harmonics)
 
     @classmethod

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
 
 SHARP = 8
 """Power in which ratios count while the worst of them is looked for."""
@@ -25,28 +25,31 @@ NOTHING = 1e-12
 
 
 class Criterion(Protocol):
-    """What is to be made small.
+    """What is to be made small."""
 
-    score: of information (..., p, p), a logarithm; more information never makes it larger.  directions (p, k): a
-    setup J lowers the score of M, in the first order, in proportion to the squared length of J directions.
-    """
+    def score(self, information: Floats) -> Floats:
+        """(...) a logarithm, of ``information`` (..., p, p): more of it never makes this larger."""
+        ...
 
-    def score(self, information: Floats) -> Floats: ...
-
-    def directions(self, information: Floats) -> Floats: ...
+    def directions(self, information: Floats) -> Floats:
+        """(p, k) of ``information`` (p, p): a setup J lowers the score, in the first order, in proportion to the
+        squared length of J directions."""
+        ...
 
 
 @dataclass(frozen=True)
 class Minimax:
-    """The largest ratio of those coordinates that count."""
+    """The largest ratio of those coordinates that count, ``counts`` (p,)."""
 
     counts: Bools
 
     def score(self, information: Floats) -> Floats:
+        """(...) the logarithm of the largest ratio, of ``information`` (..., p, p)."""
         ratio = np.sqrt(np.diagonal(np.linalg.inv(information), axis1=-2, axis2=-1)[..., self.counts])
         return np.asarray(np.log(ratio.max(axis=-1) + SHARE * ratio.mean(axis=-1)))
 
     def directions(self, information: Floats) -> Floats:
+        """(p, k) directions in which a setup lowers the score of ``information`` (p, p): see ``Criterion``."""
         covariance = np.linalg.inv(information)[:, self.counts]
         variance = np.diag(covariance[self.counts])
         return np.asarray(covariance * np.sqrt((variance / variance.max()) ** (SHARP - 1)))
@@ -54,16 +57,18 @@ class Minimax:
 
 @dataclass(frozen=True)
 class Determinant:
-    """D-optimal: the logarithm of the volume of the joint interval, per coordinate that counts."""
+    """D-optimal: the logarithm of the volume of the joint interval, per coordinate that counts, ``counts`` (p,)."""
 
     counts: Bools
 
     def score(self, information: Floats) -> Floats:
+        """(...) the logarithm of the volume, of ``information`` (..., p, p)."""
         rest = information[..., ~self.counts, :][..., ~self.counts]
         volume = np.linalg.slogdet(information)[1] - np.linalg.slogdet(rest)[1]
         return np.asarray(-0.5 * volume / self.counts.sum())
 
     def directions(self, information: Floats) -> Floats:
+        """(p, k) directions in which a setup lowers the score of ``information`` (p, p): see ``Criterion``."""
         covariance = np.linalg.inv(information)[:, self.counts]
         cross = information[np.ix_(self.counts, ~self.counts)]
         rest = information[np.ix_(~self.counts, ~self.counts)]
@@ -82,10 +87,12 @@ class AtTestPoses:
     root: Floats
 
     def score(self, information: Floats) -> Floats:
+        """(...) the logarithm of the error at the test poses, of ``information`` (..., p, p)."""
         covariance = np.linalg.inv(information)
         return np.asarray(0.5 * np.log(np.einsum("ki,...ij,kj->...", self.root, covariance, self.root)))
 
     def directions(self, information: Floats) -> Floats:
+        """(p, k) directions in which a setup lowers the score of ``information`` (p, p): see ``Criterion``."""
         return np.asarray(np.linalg.inv(information) @ self.root.T)
 
 
@@ -93,21 +100,23 @@ class AtTestPoses:
 class Disagreement:
     """T-optimal: how far two explanations stay apart when each is fitted to what the other would show.
 
-    pairs: (shows, fits) of each as coordinates of M: its own pattern, and what the fit of the other consists of.
-    The separation is the mean square over the patterns, in standard deviations, that the fit leaves:
-    M_ss - M_sf M_ff^-1 M_fs.
+    pairs: (shows (k,), fits (f,)) of each as coordinates of M: its own pattern, and what the fit of the other consists
+    of. The separation is the mean square over the patterns, in standard deviations, that the fit leaves: M_ss - M_sf
+    M_ff^-1 M_fs.
     """
 
     pairs: tuple[tuple[Ints, Ints], ...]
 
     def separations(self, information: Floats) -> Floats:
-        """(..., 2) noncentrality of each of the two."""
+        """(..., 2) noncentrality of each of the two, at ``information`` (..., p, p)."""
         return np.stack([self._left(information, *pair)[0] for pair in self.pairs], axis=-1)
 
     def score(self, information: Floats) -> Floats:
+        """(...) the logarithm of the smaller separation, with the sign turned, of ``information`` (..., p, p)."""
         return np.asarray(-0.5 * np.log(self.separations(information).min(axis=-1) + NOTHING))
 
     def directions(self, information: Floats) -> Floats:
+        """(p, k) directions in which a setup lowers the score of ``information`` (p, p): see ``Criterion``."""
         size = self.separations(information) + NOTHING
         found = []
         for (shows, fits), weight in zip(self.pairs, size.min() / size, strict=True):

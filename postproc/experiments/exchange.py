@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
+from postproc.base.arrays import Bools, Floats
 from postproc.experiments.criteria import Criterion
 
 TRIED = 48
@@ -29,7 +29,7 @@ ENOUGH = 1e-3
 
 
 @dataclass(frozen=True)
-class Choices:
+class CandidateSet:
     """C setups: rows (C, r, p) whitened; axes q (C, n), by ``spacing`` (n,) of which two chosen ones differ in one at
     least; base (p, p): information that is there before, positive definite."""
 
@@ -48,7 +48,7 @@ class Choices:
         return np.asarray((np.abs(self.q - self.q[setup]) < self.spacing).all(axis=1))
 
     def blocked(self, chosen: Sequence[int]) -> Bools:
-        """(C,) setups that can not be chosen beside ``chosen``."""
+        """(C,) setups that cannot be chosen beside ``chosen``."""
         found = np.zeros(len(self.q), bool)
         for setup in chosen:
             found |= self.near(setup)
@@ -69,8 +69,11 @@ class Choices:
         return np.asarray(squares.reshape(self.rows.shape[:2]).sum(axis=1))
 
 
-def best(choices: Choices, criterion: Criterion, information: Floats, blocked: Bools) -> tuple[int, float]:
-    """The setup to add to a choice with ``information``, -1 where all are ``blocked``, and the score with it."""
+def best(
+    choices: CandidateSet, criterion: Criterion, information: Floats, blocked: Bools
+) -> tuple[int, float]:
+    """The setup to add to a choice with ``information`` (p, p), -1 where all are ``blocked`` (C,), and the score with
+    it."""
     gain = choices.gains(criterion.directions(information))
     gain[blocked] = -1.0
     tried = np.argpartition(-gain, min(TRIED, len(gain) - 1))[:TRIED]
@@ -83,7 +86,7 @@ def best(choices: Choices, criterion: Criterion, information: Floats, blocked: B
     return int(tried[at]), float(score[at])
 
 
-def grown(choices: Choices, criterion: Criterion, chosen: Sequence[int], count: int) -> list[int]:
+def grown(choices: CandidateSet, criterion: Criterion, chosen: Sequence[int], count: int) -> list[int]:
     """``chosen`` with the best setup added until there are ``count``, or no other is distinct enough."""
     chosen = list(chosen)
     blocked, information = choices.blocked(chosen), choices.information(chosen)
@@ -97,7 +100,7 @@ def grown(choices: Choices, criterion: Criterion, chosen: Sequence[int], count: 
     return chosen
 
 
-def exchanged(choices: Choices, criterion: Criterion, chosen: Sequence[int]) -> tuple[list[int], float]:
+def exchanged(choices: CandidateSet, criterion: Criterion, chosen: Sequence[int]) -> tuple[list[int], float]:
     """``chosen`` after each of its setups was exchanged for a better one as long as there is any; and the score, which
     is never larger than that of ``chosen``."""
     chosen = list(chosen)
@@ -117,7 +120,7 @@ def exchanged(choices: Choices, criterion: Criterion, chosen: Sequence[int]) -> 
     return chosen, score
 
 
-def random_choice(choices: Choices, count: int, rng: np.random.Generator) -> list[int]:
+def random_choice(choices: CandidateSet, count: int, rng: np.random.Generator) -> list[int]:
     """``count`` setups at random that are distinct enough, or as many as there are."""
     chosen: list[int] = []
     for setup in rng.permutation(len(choices.q)).tolist():

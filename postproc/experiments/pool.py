@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.experiments.offer import Offer, Setups, around
-from postproc.experiments.seen import Shown
-from postproc.findings import Finding, Refusal
+from postproc.base.findings import Finding, Refusal
+from postproc.base.units import DEG
+from postproc.experiments.candidate_setups import CandidateSetups, Setups, around
+from postproc.experiments.observability import Observability
 from postproc.model import StiffnessModel
-from postproc.units import DEG
 
 CANDIDATES = 4000
 """Random poses to choose from."""
@@ -24,7 +24,7 @@ NEARBY = 1200
 """Such poses together, about."""
 
 Stage = Callable[[str], None]
-"""Is told the name of each stage as it begins."""
+"""Is told the name of each stage as it starts."""
 
 Choice = Mapping[int, Sequence[int]]
 """Number of setups -> their rows in a pool."""
@@ -42,7 +42,7 @@ class Pool:
     """Setups, and what they show."""
 
     setups: Setups
-    shown: Shown
+    shown: Observability
 
     def __len__(self) -> int:
         return len(self.setups)
@@ -54,7 +54,7 @@ class Pool:
         return Pool(self.setups + other.setups, self.shown + other.shown)
 
 
-def pooled(setups: Setups, shown: Shown) -> Pool:
+def pooled(setups: Setups, shown: Observability) -> Pool:
     """The setups under which the robot comes to rest."""
     rests = np.isfinite(shown.columns).all(axis=(1, 2)) & np.isfinite(shown.nuisance).all(axis=(1, 2))
     return Pool(setups[rests], shown[rests])
@@ -64,23 +64,24 @@ def rested(model: StiffnessModel, setups: Setups, evaluated: Evaluated) -> Pool:
     """The first pool.  Raises Refusal PLN003 where the robot never comes to rest."""
     pool = evaluated(setups)
     if not len(pool):
-        message = f"none of {len(setups)} poses has a stable rest under these loads"
+        message = f"none of {len(setups)} poses has an equilibrium under these loads"
         raise Refusal(Finding("PLN003", message, str(model.robot.path)))
     return pool
 
 
-def enough(model: StiffnessModel, offer: Offer, wanted: int, found: int) -> None:
+def enough(model: StiffnessModel, offer: CandidateSetups, wanted: int, found: int) -> None:
     """Raises Refusal PLN004 where fewer distinct poses than wanted were found."""
     if found < wanted:
         message = (
-            f"{found} poses differ by {offer.spacing / DEG:g} deg in one axis at least, {wanted} are wanted"
+            f"{found} poses differ by {offer.spacing / DEG:g} deg in one axis at least, and"
+            f" {wanted} are requested"
         )
         raise Refusal(Finding("PLN004", message, str(model.robot.path)))
 
 
 def refined(
     model: StiffnessModel,
-    offer: Offer,
+    offer: CandidateSetups,
     start: Pool,
     evaluated: Evaluated,
     chosen_from: Callable[[Pool, Choice], Choice],

@@ -7,10 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
+from postproc.base.arrays import Bools, Floats
+from postproc.base.findings import Finding, Refusal
+from postproc.base.units import MM
+from postproc.experiments.candidate_setups import CandidateSetups, Setups, drawn, spacings
 from postproc.experiments.criteria import AtTestPoses, Criterion, Determinant, Minimax
-from postproc.experiments.exchange import Choices, exchanged, grown, random_choice
-from postproc.experiments.offer import Offer, Setups, drawn, spacings
+from postproc.experiments.exchange import CandidateSet, exchanged, grown, random_choice
+from postproc.experiments.observability import Observability, influential, judged, observability
 from postproc.experiments.pool import (
     CANDIDATES,
     Choice,
@@ -22,20 +25,17 @@ from postproc.experiments.pool import (
     rested,
     silent,
 )
-from postproc.experiments.seen import Shown, awake, judged, shown
-from postproc.experiments.unseen import reason
-from postproc.findings import Finding, Refusal
+from postproc.experiments.unobservable import reason
 from postproc.identification.identifiable import COVERAGE, UNSEEN, Dropped, basis
-from postproc.identification.solve import prior_rows, scales
+from postproc.identification.least_squares import prior_rows, scales
 from postproc.identification.unknowns import Unknown
 from postproc.model import StiffnessModel
-from postproc.units import MM
 
 FEW = 300
 """Of them, to see whether an effect is asleep."""
 
 STARTS = 3
-"""Random designs that the exchange also begins with."""
+"""Random designs that the exchange also starts with."""
 
 RANDOM = 20
 """Random designs to compare with."""
@@ -46,11 +46,9 @@ LOOSE = 1e-6
 HOPELESS = 10.0
 """What stays so many times as wide as wanted is given up, and the others are not spoiled for it."""
 
-CRITERIA = ("minimax", "d", "test")
-
 
 @dataclass(frozen=True)
-class Task:
+class DesignProblem:
     """What is asked for.
 
     wanted (P,) [SI]: half widths of the 95 % intervals; counts (P,): whether an unknown is to be made precise.  before:
@@ -60,11 +58,11 @@ class Task:
 
     model: StiffnessModel
     unknowns: tuple[Unknown, ...]
-    offer: Offer
+    setups: CandidateSetups
     wanted: Floats
     counts: Bools
     criterion: str = "minimax"
-    before: Shown | None = None
+    before: Observability | None = None
     tests: Floats | None = None
 
 
@@ -82,8 +80,8 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Lost:
-    """A parameter that can not be seen, or not well enough, and why in words.  imitated: a place of the tracker or of
+class UnobservableParameter:
+    """A parameter that cannot be seen, or not well enough, and why in words.  imitated: a place of the tracker or of
     its targets does the same, which is no loss."""
 
     name: str
@@ -106,13 +104,13 @@ class Designs:
     chosen: dict[int, Design]
     at_random: dict[int, tuple[Floats, float]]
     before: Floats | None
-    unseen: tuple[Lost, ...]
-    left_out: tuple[Lost, ...]
-    weak: tuple[Lost, ...]
+    unobservable: tuple[UnobservableParameter, ...]
+    left_out: tuple[UnobservableParameter, ...]
+    weak: tuple[UnobservableParameter, ...]
 
 
 def designs(
-    task: Task,
+    task: DesignProblem,
     poses: int,
     others: Iterable[int] = (),
     seed: int = 1,
@@ -124,21 +122,21 @@ def designs(
     Others for which there are not enough distinct poses are left out.  Raises Refusal PLN001 (no pose can be measured),
     PLN002 (nothing that is asked for can be seen), PLN003 (no rest), PLN004 (not enough distinct poses).
     """
-    rng, offer, unknowns = np.random.default_rng(seed), task.offer, task.unknowns
+    rng, offer, unknowns = np.random.default_rng(seed), task.setups, task.unknowns
     stage("looking for poses")
     setups = drawn(task.model, offer, candidates, rng)
-    model = awake(task.model, unknowns, offer, setups[:FEW])
+    model = influential(task.model, unknowns, offer, setups[:FEW])
 
     def evaluated(some: Setups) -> Pool:
-        return pooled(some, shown(model, unknowns, offer, some))
+        return pooled(some, observability(model, unknowns, offer, some))
 
     stage("computing what poses show")
     start = rested(model, setups, evaluated)
     whole = judged(model, unknowns, start.shown, task.before)[1]
-    unseen = tuple(_lost(task, model, start, dropped) for dropped in whole.dropped)
+    unseen = tuple(_unobservable(task, model, start, dropped) for dropped in whole.dropped)
     if not whole.kept:
         lost = "; ".join(f"{one.name}: {one.why}" for one in unseen)
-        message = f"no pose shows anything of what is asked for: {lost}"
+        message = f"no parameter is observable at any pose: {lost}"
         raise Refusal(Finding("PLN002", message, str(model.robot.path)))
     kept = list(whole.kept)
     sizes = sorted({poses, *others})
@@ -170,18 +168,18 @@ def designs(
         chosen=best,
         at_random={size: _at_random(hopeful, model, start, some, size, rng) for size in chosen},
         before=before,
-        unseen=unseen,
-        left_out=tuple(_lost(task, model, start, dropped) for dropped in missed),
+        unobservable=unseen,
+        left_out=tuple(_unobservable(task, model, start, dropped) for dropped in missed),
         weak=_weak(task, model, start, best[poses]),
     )
 
 
-def predicted(task: Task, model: StiffnessModel, setups: Setups) -> Design:
+def predicted(task: DesignProblem, model: StiffnessModel, setups: Setups) -> Design:
     """What any setups will show."""
-    return _design(task, model, Pool(setups, shown(model, task.unknowns, task.offer, setups)))
+    return _design(task, model, Pool(setups, observability(model, task.unknowns, task.setups, setups)))
 
 
-def choices_of(task: Task, kept: Sequence[int], pool: Pool) -> Choices:
+def choices_of(task: DesignProblem, kept: Sequence[int], pool: Pool) -> CandidateSet:
     """The pool for the exchange: the unknowns ``kept`` in wanted standard deviations, and nuisances [mm, mrad]."""
     unit = task.wanted[list(kept)] / COVERAGE
     per_scale = unit / scales(task.unknowns)[list(kept)]
@@ -196,10 +194,10 @@ def choices_of(task: Task, kept: Sequence[int], pool: Pool) -> Choices:
         own = own - frames @ (frames.T @ own)
         block = block + own.T @ own
     base[: len(kept), : len(kept)] += block
-    return Choices(rows, pool.setups.q, spacings(task.model.robot, task.offer.spacing), base)
+    return CandidateSet(rows, pool.setups.q, spacings(task.model.robot, task.setups.spacing), base)
 
 
-def _criterion(task: Task, kept: Sequence[int], nuisances: int) -> Criterion:
+def _criterion(task: DesignProblem, kept: Sequence[int], nuisances: int) -> Criterion:
     counts = task.counts[list(kept)]
     counts = np.concatenate([counts if counts.any() else np.ones(len(kept), bool), np.zeros(nuisances, bool)])
     if task.criterion == "minimax":
@@ -212,7 +210,7 @@ def _criterion(task: Task, kept: Sequence[int], nuisances: int) -> Criterion:
 
 
 def _by_size(
-    choices: Choices, criterion: Criterion, sizes: Sequence[int], begun: Choice, rng: np.random.Generator
+    choices: CandidateSet, criterion: Criterion, sizes: Sequence[int], begun: Choice, rng: np.random.Generator
 ) -> Choice:
     """The best choice of each size: begun with the given ones, or with the best next setups and at random; and with the
     next smaller choice."""
@@ -232,7 +230,7 @@ def _by_size(
     return found
 
 
-def _design(task: Task, model: StiffnessModel, pool: Pool) -> Design:
+def _design(task: DesignProblem, model: StiffnessModel, pool: Pool) -> Design:
     ci95, found = judged(model, task.unknowns, pool.shown, task.before)
     ratio = np.where(np.isnan(ci95), np.inf, ci95) / task.wanted
     test = np.nan
@@ -244,7 +242,12 @@ def _design(task: Task, model: StiffnessModel, pool: Pool) -> Design:
 
 
 def _at_random(
-    task: Task, model: StiffnessModel, pool: Pool, choices: Choices, size: int, rng: np.random.Generator
+    task: DesignProblem,
+    model: StiffnessModel,
+    pool: Pool,
+    choices: CandidateSet,
+    size: int,
+    rng: np.random.Generator,
 ) -> tuple[Floats, float]:
     """Medians over random designs of the intervals (P,), infinite where one is left out, and of the worst ratio."""
     tried = [_design(task, model, pool[random_choice(choices, size, rng)]) for _ in range(RANDOM)]
@@ -252,25 +255,29 @@ def _at_random(
     return np.median(wide, axis=0), float(np.median([one.worst for one in tried]))
 
 
-def _lost(task: Task, model: StiffnessModel, pool: Pool, dropped: Dropped) -> Lost:
+def _unobservable(
+    task: DesignProblem, model: StiffnessModel, pool: Pool, dropped: Dropped
+) -> UnobservableParameter:
     """Why an unknown is left out, with what the offered loads and poses have to do with it."""
     at = [unknown.name for unknown in task.unknowns].index(dropped.name)
-    redundant = dropped.why.startswith("only seen together")
+    redundant = dropped.why.startswith("is observable only together")
     if redundant:
-        return Lost(dropped.name, dropped.why, imitated=not dropped.together)
+        return UnobservableParameter(dropped.name, dropped.why, imitated=not dropped.together)
     still = bool(np.linalg.norm(pool.shown.columns[:, :, at]) < UNSEEN)
-    more = reason(model, task.unknowns[at], task.offer, pool.setups, still)
-    return Lost(dropped.name, f"{dropped.why}; {more}" if more else dropped.why)
+    more = reason(model, task.unknowns[at], task.setups, pool.setups, still)
+    return UnobservableParameter(dropped.name, f"{dropped.why}; {more}" if more else dropped.why)
 
 
-def _weak(task: Task, model: StiffnessModel, pool: Pool, design: Design) -> tuple[Lost, ...]:
+def _weak(
+    task: DesignProblem, model: StiffnessModel, pool: Pool, design: Design
+) -> tuple[UnobservableParameter, ...]:
     """What a design shows less precisely than wanted."""
     ratio = np.where(task.counts, np.nan_to_num(design.ci95 / task.wanted), 0.0)
     told = []
     for at in np.argsort(-ratio, kind="stable"):
         if ratio[at] <= 1.0:
             break
-        more = reason(model, task.unknowns[at], task.offer, pool.setups, still=False)
-        what = f"{ratio[at]:.2g} times the wanted interval"
-        told.append(Lost(task.unknowns[at].name, f"{what}; {more}" if more else what))
+        more = reason(model, task.unknowns[at], task.setups, pool.setups, still=False)
+        what = f"{ratio[at]:.2g} times as wide as requested"
+        told.append(UnobservableParameter(task.unknowns[at].name, f"{what}; {more}" if more else what))
     return tuple(told)

@@ -1,4 +1,4 @@
-"""What the readings of a campaign see of a model, and what stands between the two: tracker and targets.
+"""What the readings of a campaign see of a model, and what is between the two: tracker and targets.
 
 A reading sees one point of the robot at one state: a target on the flange, or without targets the TCP.
 
@@ -16,15 +16,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.geometry import Poses, rotation_from_vector, skew, vector_from_rotation
 from postproc.effects import Conditions
-from postproc.geometry import Poses, rotation_from_vector, skew, vector_from_rotation
 from postproc.measurements import Readings
 from postproc.model import StiffnessModel, approach
 from postproc.robot.chain import jacobian
 
 ONE_POSE = 1e-6
-"""[rad, m] Motors that differ by less stand in one pose."""
+"""[rad, m] Motors that differ by less are in one pose."""
 
 
 REST = 1e-14
@@ -32,9 +32,9 @@ REST = 1e-14
 
 
 @dataclass(frozen=True)
-class Seen:
+class PredictedReadings:
     """The tool at every state of a campaign: ``rotation`` (S, 3, 3); ``body`` (S, 3) [m], the place of the TCP without
-    what the spindle gives, ``tip`` (S, 3) with it; ``displacement`` (S, m), to begin a model nearby with; ``converged``
+    what the spindle gives, ``tip`` (S, 3) with it; ``displacement`` (S, m), to start a model nearby with; ``converged``
     (S,)."""
 
     rotation: Floats
@@ -104,7 +104,7 @@ class Campaign:
         return new
 
     def shifted(self, by: Floats) -> Campaign:
-        """The campaign with its measured positions and rotations moved by (R, 3 or 6) [m, rad]."""
+        """The campaign with its measured positions and rotations moved by ``by`` (R, 3 or 6) [m, rad]."""
         new = copy(self)
         rotation = self.readings.rotation
         if rotation is not None:
@@ -137,19 +137,24 @@ class Campaign:
         self.pose: Ints = pose.reshape(-1)
         self.poses = int(self.pose.max()) + 1
 
-    def seen(self, model: StiffnessModel, start: Floats | None = None, tolerance: float = REST) -> Seen:
+    def predicted(
+        self, model: StiffnessModel, start: Floats | None = None, tolerance: float = REST
+    ) -> PredictedReadings:
         """All states at rest under ``model``; ``start`` (S, m): displacement of a model nearby; ``tolerance`` as of the
         equilibrium."""
         rest = model.equilibrium(self.q, self.wrench, self.tool, self.conditions, start, tolerance)
-        return Seen(rest.pose.rotation, rest.mount, rest.pose.position, rest.displacement, rest.converged)
+        return PredictedReadings(
+            rest.pose.rotation, rest.mount, rest.pose.position, rest.displacement, rest.converged
+        )
 
-    def points(self, seen: Seen, places: Floats, at: Ints) -> Floats:
-        """(R, 3) [m] what each reading would see in states ``at`` (R,), robot base."""
+    def points(self, seen: PredictedReadings, places: Floats, at: Ints) -> Floats:
+        """(R, 3) [m] what each reading would see in states ``at`` (R,), robot base, with the targets at ``places`` (T,
+        3) [m] on the flange."""
         origin = seen.tip if self.at_tip else seen.body
         place = places[self.readings.target]
         return np.asarray(origin[at] + (seen.rotation[at] @ place[:, :, None])[:, :, 0])
 
-    def expected(self, seen: Seen, given: Nuisances) -> tuple[Floats, Floats | None]:
+    def expected(self, seen: PredictedReadings, given: Nuisances) -> tuple[Floats, Floats | None]:
         """(R, 3) [m], and rotations (R, 3, 3) where they are measured, in the axes of the readings; NaN where the model
         has no rest."""
         points = self.points(seen, given.places, self.at)
@@ -168,7 +173,7 @@ class Campaign:
             rotation = frame.rotation @ rotation
         return points, rotation if self.posed else None
 
-    def residual(self, seen: Seen, given: Nuisances) -> Floats:
+    def residual(self, seen: PredictedReadings, given: Nuisances) -> Floats:
         """(R, 3) [m], or (R, 6) [m, rad] where rotations are measured: measured minus expected, in the axes of the
         readings; NaN where nothing was measured or the model has no rest."""
         position, rotation = self.expected(seen, given)
@@ -181,8 +186,8 @@ class Campaign:
         return np.concatenate([left, away], axis=1)
 
     def in_base(self, residual: Floats, given: Nuisances) -> Floats:
-        """A residual (R, 3 or 6) in axes of the robot base.  A coordinate that was not measured counts as none left; a
-        place or turn of which nothing is known stays NaN."""
+        """(R, 3 or 6) [m, rad] of a ``residual`` (R, 3 or 6) in axes of the robot base.  A coordinate that was not
+        measured counts as none left; a place or turn of which nothing is known stays NaN."""
         if not self.tracked:
             return residual
         back = np.swapaxes(given.frames.rotation, 1, 2)[self.readings.session]
@@ -223,7 +228,7 @@ class Campaign:
             names += [f"{what}{f' {of}' if of else ''}.{axis}" for axis in axes]
         return names
 
-    def nuisance_columns(self, seen: Seen, given: Nuisances) -> Floats:
+    def nuisance_columns(self, seen: PredictedReadings, given: Nuisances) -> Floats:
         """(R, 3 or 6, U) derivative of ``expected`` by the steps of ``moved``."""
         found = np.zeros((len(self), 6, len(self.nuisance_names)))
         points = self.points(seen, given.places, self.at)
@@ -246,7 +251,9 @@ class Campaign:
             found[of, rows, columns] = axes[of] @ rotation if self.tracked else rotation
         return found if self.posed else found[:, :3]
 
-    def columns(self, model: StiffnessModel, seen: Seen, given: Nuisances, moved: Floats) -> Floats:
+    def columns(
+        self, model: StiffnessModel, seen: PredictedReadings, given: Nuisances, moved: Floats
+    ) -> Floats:
         """(R, 3 or 6, P) what moves in ``expected`` where the coordinates of the states move by ``moved`` (S, m, P);
         NaN where the model has no rest."""
         state = model.state(self.q, self.wrench, self.tool, self.conditions, seen.displacement)

@@ -8,13 +8,13 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
-from postproc.findings import Finding, Refusal
+from postproc.base.arrays import Bools, Floats
+from postproc.base.findings import Finding, Refusal
 from postproc.identification.campaign import Campaign, Nuisances
-from postproc.identification.identifiable import Dropped, Insight, basis, insight
+from postproc.identification.identifiable import Dropped, Identifiability, basis, identifiability
+from postproc.identification.least_squares import Point, at, descended, prior_rows, scales, with_columns
 from postproc.identification.noise import Noise, Weighting, noise_of, shared_error, weighting
 from postproc.identification.registration import registered
-from postproc.identification.solve import Point, at, descended, prior_rows, scales, with_columns
 from postproc.identification.unknowns import Unknown
 from postproc.model import StiffnessModel
 
@@ -50,7 +50,7 @@ class Estimate:
 class Fit:
     """A campaign fitted.
 
-    start, asked: the model to begin with and the unknowns asked for; weights: as used, plain_weights: before a robust
+    start, asked: the model to start with and the unknowns asked for; weights: as used, plain_weights: before a robust
     fit changed them; point: the model found and what it leaves; unknowns (k,): found; dropped: asked for, and left as
     they were; covariance (k, k) [SI]; condition: see ``Insight``; factor: variance of the readings over what ``noise``
     says, scatter_exceeded if that is clearly more; freedom: of the residuals; quantile: half width of an interval over
@@ -109,29 +109,29 @@ def fit(
 ) -> Fit:
     """The weighted least squares of the readings ``rows`` (R,) (all without it) over the unknowns and nuisances.
 
-    Unknowns that the readings can not give stay as they are and are named.  Intervals come from the covariance of the
+    Unknowns that the readings cannot give stay as they are and are named.  Intervals come from the covariance of the
     linearized problem at the solution; where the residuals are clearly larger than the stated scatter, or none is
     stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).
-    ``given``: tracker and targets to begin with, where they are about known.
+    ``given``: tracker and targets to start with, where they are about known.
 
-    Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to begin with has no rest.
+    Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to start with has no rest.
     """
     noise, start = noise_of(campaign.readings), model
     rows = np.ones(len(campaign), bool) if rows is None else rows
     point = at(campaign, model, campaign.start())
-    if not point.seen.converged.all():
-        lost = int((~point.seen.converged).sum())
+    if not point.predicted.converged.all():
+        lost = int((~point.predicted.converged).sum())
         raise Refusal(
             Finding(
-                "IDN003", f"{lost} of {len(campaign.q)} states have no stable rest", str(model.robot.path)
+                "IDN003", f"{lost} of {len(campaign.q)} states have no equilibrium", str(model.robot.path)
             )
         )
     if given is None:
-        given = registered(campaign, point.seen, rows)
-    point = replace(point, given=given, residual=campaign.residual(point.seen, given))
+        given = registered(campaign, point.predicted, rows)
+    point = replace(point, given=given, residual=campaign.residual(point.predicted, given))
     weights = plain = weighting(campaign, noise, point.residual).times(rows.astype(float))
     _enough(campaign, weights, unknowns)
-    point = _awake(campaign, point, unknowns)
+    point = _influential(campaign, point, unknowns)
     begin = point
     free, dropped = list(unknowns), list[Dropped]()
     factor, again = 1.0, PRIOR_ROUNDS if any(u.prior is not None for u in unknowns) else 0
@@ -162,7 +162,7 @@ def fit(
         if all(point.model.terms[t].values[name] == value for (t, name), value in values.items()):
             point = replace(point, columns=point.taken[0][:, :, kept])
         else:
-            point = at(campaign, point.model.changed(values), point.given, begin.seen.displacement)
+            point = at(campaign, point.model.with_values(values), point.given, begin.predicted.displacement)
     scale = scales(free)
     return Fit(
         campaign, start, tuple(unknowns), noise, weights, plain, point, tuple(free), tuple(dropped),
@@ -182,16 +182,17 @@ def _enough(campaign: Campaign, weights: Weighting, unknowns: Sequence[Unknown])
         raise Refusal(
             Finding(
                 "IDN002",
-                f"{counts} different measured numbers for {wanted} unknowns: {len(unknowns) - priors} parameters and"
+                f"{counts} different measured numbers are too few for {wanted} unknowns:"
+                f" {len(unknowns) - priors} parameters and"
                 f" {len(campaign.nuisance_names)} of the tracker and its targets",
                 campaign.readings.where(0)[0],
-                help="measure more poses, or ask for fewer effects with --effects",
+                help="measure more poses, or identify fewer effects with --effects",
             )
         )
 
 
-def _awake(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Point:
-    """The point with its columns; effects that move nothing at all where they stand are put to the sizes of their
+def _influential(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Point:
+    """The point with its columns; effects that move nothing at all where they are are put to the sizes of their
     parameters first."""
     point = with_columns(campaign, point, unknowns)
     moves = np.abs(np.nan_to_num(point.taken[0])).max(axis=(0, 1), initial=0.0) > 0
@@ -199,7 +200,7 @@ def _awake(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Poi
     asleep = {
         u.key: u.parameter.scale for u in unknowns if u.term not in moving and u.value == u.parameter.null
     }
-    return at(campaign, point.model.changed(asleep), point.given) if asleep else point
+    return at(campaign, point.model.with_values(asleep), point.given) if asleep else point
 
 
 def _robust(
@@ -228,15 +229,16 @@ def _robust(
 
 
 def lengths(residual: Floats, weights: Weighting) -> Floats:
-    """(R,) length of each residual in standard deviations of one coordinate, made that of three where fewer count."""
+    """(R,) length of each ``residual`` (R, 3 or 6) in standard deviations of one coordinate, made that of three where
+    fewer count."""
     on = weights.weight > 0
     square = np.where(on, np.nan_to_num(residual) * weights.weight, 0.0) ** 2
     return np.sqrt(3.0 * square.sum(axis=1) / np.maximum(on.sum(axis=1), 1))
 
 
 def spread_of(length: Floats, known: bool) -> float:
-    """One standard deviation of a coordinate by the median of lengths in space (1.538: the median of chi with 3 degrees
-    of freedom); at least the assumed one where that is ``known``."""
+    """One standard deviation of a coordinate by the median of ``length`` (R,) in space (1.538: the median of chi with 3
+    degrees of freedom); at least the assumed one where that is ``known``."""
     return max(1.0 if known else ROUNDING, float(np.median(length)) / 1.538)
 
 
@@ -259,10 +261,10 @@ def _with_turns(campaign: Campaign, point: Point, noise: Noise, weights: Weighti
 
 def _insight(
     campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, factor: float
-) -> Insight:
+) -> Identifiability:
     columns, nuisance = (np.nan_to_num(weights(part)) for part in point.taken)
     prior, values = prior_rows(free) * np.sqrt(factor), point.values(free)
-    return insight(free, columns, nuisance, campaign.nuisance_names, prior, values, factor)
+    return identifiability(free, columns, nuisance, campaign.nuisance_names, prior, values, factor)
 
 
 def _variance(
@@ -272,7 +274,7 @@ def _variance(
     weights: Weighting,
     plain: Weighting,
     noise: Noise,
-    found: Insight,
+    found: Identifiability,
 ) -> tuple[float, bool, int, float]:
     """Variance of the readings over the assumed one, whether that is clearly more, degrees of freedom, and the 97.5 %
     quantile that goes with them.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Floats
+from postproc.base.arrays import Floats
 from postproc.identification.unknowns import Unknown
 
 UNSEEN = 1e-4
@@ -28,7 +28,7 @@ COVERAGE = 1.96
 
 @dataclass(frozen=True)
 class Dropped:
-    """An unknown that the readings can not give: ``why`` in words, and with which others (name -> weight) it only shows
+    """An unknown that the readings cannot give: ``why`` in words, and with which others (name -> weight) it only shows
     together."""
 
     name: str
@@ -37,7 +37,7 @@ class Dropped:
 
 
 @dataclass(frozen=True)
-class Insight:
+class Identifiability:
     """kept: unknowns that can be found; dropped: the others; covariance (k, k) of the kept ones in units of their
     ``scale``, for readings of unit variance; condition: of the kept columns, each made as long as the next."""
 
@@ -47,7 +47,7 @@ class Insight:
     condition: float
 
 
-def insight(
+def identifiability(
     unknowns: Sequence[Unknown],
     columns: Floats,
     nuisance: Floats,
@@ -55,12 +55,12 @@ def insight(
     prior: Floats,
     values: Floats,
     factor: float = 1.0,
-) -> Insight:
+) -> Identifiability:
     """What whitened ``columns`` (n, P) of the unknowns, per scale, and ``nuisance`` (n, U) tell.
 
     prior (P, P): rows of the priors; values (P,) [SI] at hand; factor: variance of the readings over the assumed one.
     Columns are judged after what the nuisances explain is taken out, in their order: one that those before it can
-    imitate is left out.  Then the least certain is, as long as one says nothing: its 95 % interval is wider than its
+    imitate is left out.  Then the least certain is, as long as one states nothing: its 95 % interval is wider than its
     value, and than the stated one or, where none is stated, ``FAR`` times the parameter's usual size.
     """
     frames = basis(nuisance)
@@ -72,7 +72,7 @@ def insight(
     for k, unknown in enumerate(unknowns):
         size = float(np.linalg.norm(whole[:, k]))
         if size < UNSEEN:
-            dropped.append(Dropped(unknown.name, "no reading moves with it"))
+            dropped.append(Dropped(unknown.name, "no reading depends on it"))
             continue
         rest = outside[:, k] - frame @ (frame.T @ outside[:, k])
         rest -= frame @ (frame.T @ rest)
@@ -91,16 +91,20 @@ def insight(
         if wide[worst] <= limit[worst]:
             length = np.linalg.norm(part, axis=0)
             values_of = np.linalg.svd(part / length, compute_uv=False)
-            return Insight(tuple(kept), tuple(dropped), covariance, float(values_of[0] / values_of[-1]))
+            return Identifiability(
+                tuple(kept), tuple(dropped), covariance, float(values_of[0] / values_of[-1])
+            )
         unknown = unknowns[kept[worst]]
         wider = wide[worst] * unknown.parameter.scale
-        dropped.append(Dropped(unknown.name, f"seen too weakly: +- {wider:.2g} {unknown.parameter.unit}"))
+        dropped.append(
+            Dropped(unknown.name, f"is observable too weakly: +- {wider:.2g} {unknown.parameter.unit}")
+        )
         del kept[worst]
-    return Insight((), tuple(dropped), np.zeros((0, 0)), np.nan)
+    return Identifiability((), tuple(dropped), np.zeros((0, 0)), np.nan)
 
 
 def _limit(unknown: Unknown, value: float) -> float:
-    """[SI] An interval wider than this says nothing of the unknown."""
+    """[SI] An interval wider than this states nothing of the unknown."""
     null = unknown.parameter.null
     stated = unknown.stated
     usual = 0.0 if stated is None else abs(stated.value - null)
@@ -110,7 +114,7 @@ def _limit(unknown: Unknown, value: float) -> float:
 
 
 def basis(columns: Floats) -> Floats:
-    """Orthonormal columns that span ``columns`` (n, U), as far as they are independent."""
+    """(n, r) orthonormal columns that span ``columns`` (n, U), as far as they are independent."""
     length = np.linalg.norm(columns, axis=0)
     used = columns[:, length > 0] / length[length > 0]
     if not used.shape[1]:
@@ -152,13 +156,13 @@ def _explained(
     )
     frames = sorted({nuisance_names[i - len(kept)].split(".")[0] for i in parts if i >= len(kept)})
     words = [name for name, _ in together] + [f"the {frame}" for frame in frames]
-    return Dropped(unknowns[k].name, f"only seen together with {', '.join(words)}", together)
+    return Dropped(unknowns[k].name, f"is observable only together with {', '.join(words)}", together)
 
 
 def strong_correlations(
     names: Sequence[str], covariance: Floats, above: float
 ) -> tuple[tuple[str, str, float], ...]:
-    """Pairs with a correlation of more than ``above``, strongest first."""
+    """Pairs of ``covariance`` (P, P) with a correlation of more than ``above``, strongest first."""
     deviation = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(deviation, deviation)
     pairs = [

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
+from postproc.base.arrays import Floats, Ints
 from postproc.identification.campaign import Campaign
 from postproc.identification.identifiable import basis
 from postproc.measurements import Readings
@@ -86,7 +86,8 @@ class Weighting:
     shared: float = 0.0
 
     def __call__(self, values: Floats) -> Floats:
-        """(R 3 or 6, ...) of ``values`` (R, 3 or 6, ...): independent, of unit variance; 0 where nothing counts."""
+        """(R * k, ...), k 3 or 6, of ``values`` (R, 3 or 6, ...): independent, of unit variance; 0 where nothing
+        counts."""
         extra = (None,) * (values.ndim - 2)
         weight = self.weight[(..., *extra)]
         scaled = np.where(weight > 0, values * weight, 0.0)
@@ -119,9 +120,9 @@ def weighting(campaign: Campaign, noise: Noise, measured: Floats) -> Weighting:
 def shared_error(residual: Floats, weights: Weighting, columns: Floats, known: bool) -> float:
     """[m] ``shared`` of a weighting: one sigma of what readings of one pose have in common; 0 where that is not clear.
 
-    Two moments of the residuals z [standard deviations] tell it from what each reading has for itself, phi: z'z, and
-    z'Vz of the pairs of one pose.  A fit with ``columns`` (R, 3 or 6, k), Q of which is a basis, leaves M = 1 - Q Q' of
-    what was there, and their means are
+    Two moments of the ``residual`` (R, 3 or 6) [m, rad], z [standard deviations] tell it from what each reading has for
+    itself, phi: z'z, and z'Vz of the pairs of one pose.  A fit with ``columns`` (R, 3 or 6, k), Q of which is a basis,
+    leaves M = 1 - Q Q' of what was there, and their means are
 
         E z'z  = phi tr M   + shared^2 tr M U        U = V + D: u_i u_j within a pose, D its diagonal
         E z'Vz = phi tr V M + shared^2 tr V M U M

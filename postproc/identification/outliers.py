@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.identification.fit import Fit, fit, lengths, spread_of
 
 CHANCE = 0.01
-"""Probability that among all readings of a campaign without outliers any is told as one."""
+"""Probability that among all readings of a campaign without outliers any is reported as one."""
 
 CLEARLY = 0.2
 """An explanation leaves at most this share of what there is without it."""
@@ -76,7 +76,7 @@ def _explained(fitted: Fit, row: int, limit: float) -> str:
     """What the reading ``row`` fits better, in words."""
     campaign, readings = fitted.campaign, fitted.campaign.readings
     sigma = float(fitted.noise.sigma[row])
-    expected, _ = campaign.expected(fitted.point.seen, fitted.point.given)
+    expected, _ = campaign.expected(fitted.point.predicted, fitted.point.given)
     measured = readings.value[row]
     here = float(np.linalg.norm(measured - expected[row]))
     close = max(limit * sigma, CLEARLY * here * 0.1)
@@ -88,10 +88,10 @@ def _explained(fitted: Fit, row: int, limit: float) -> str:
         other = others[np.argmin(away[others])]
         return (
             f"fits target {names[readings.target[other]]} (line {readings.where(int(other))[1]}) instead of"
-            f" {names[readings.target[row]]}: mistaken for each other?"
+            f" {names[readings.target[row]]}: are they mistaken for each other?"
         )
     if readings.deflection and np.linalg.norm(measured + expected[row]) < close:
-        return "fits with the opposite sign: unloaded minus loaded?"
+        return "fits with the opposite sign: is it unloaded minus loaded?"
     for a, b in ((0, 1), (0, 2), (1, 2)):
         turned = measured.copy()
         turned[[a, b]] = turned[[b, a]]
@@ -101,8 +101,8 @@ def _explained(fitted: Fit, row: int, limit: float) -> str:
     rest = ~same & (np.arange(len(campaign)) != row) & (campaign.pose != campaign.pose[row]) & (away < close)
     if rest.any() and _distinct(expected, campaign.pose, close):
         other = int(np.argmin(np.where(rest, away, np.inf)))
-        return f"fits the state of line {readings.where(other)[1]}: a row in the wrong place?"
-    return "fits nothing here: a broken beam, or a joint that did not stand where the row says?"
+        return f"fits the state of line {readings.where(other)[1]}: is the row in the wrong place?"
+    return "fits no other value: was the beam interrupted, or a joint at another angle than in the row?"
 
 
 def _distinct(expected: Floats, pose: Ints, close: float) -> bool:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.geometry import Poses
-from postproc.identification.campaign import Campaign, Nuisances, Seen
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.geometry import Poses
+from postproc.identification.campaign import Campaign, Nuisances, PredictedReadings
 
 MAX_STEPS = 60
 SAMPLE = 300
@@ -18,7 +18,7 @@ FOLLOWED = 4
 """Starts that are followed after their first steps."""
 
 
-def registered(campaign: Campaign, seen: Seen, rows: Bools) -> Nuisances:
+def registered(campaign: Campaign, seen: PredictedReadings, rows: Bools) -> Nuisances:
     """Nuisances with the least squares of ``rows`` (R,), every session by itself, the largest first.
 
     The turn of a tracker may be any, and the place of a target on the flange enters together with it: Gauss-Newton
@@ -37,7 +37,7 @@ def registered(campaign: Campaign, seen: Seen, rows: Bools) -> Nuisances:
     return given
 
 
-def _session(campaign: Campaign, seen: Seen, given: Nuisances, k: int, own: Ints) -> Nuisances:
+def _session(campaign: Campaign, seen: PredictedReadings, given: Nuisances, k: int, own: Ints) -> Nuisances:
     some = own[np.linspace(0, len(own) - 1, min(len(own), SAMPLE)).round().astype(int)]
     tries = []
     for turn in _cube_turns():
@@ -54,7 +54,7 @@ def _size(tried: tuple[Nuisances, float]) -> float:
 
 
 def _descended(
-    campaign: Campaign, seen: Seen, given: Nuisances, rows: Ints, steps: int
+    campaign: Campaign, seen: PredictedReadings, given: Nuisances, rows: Ints, steps: int
 ) -> tuple[Nuisances, float]:
     """Gauss-Newton on positions: the nuisances, and the mean square that is left [m2]."""
     last, before = np.inf, given
@@ -71,7 +71,9 @@ def _descended(
     return given, last
 
 
-def _turned_targets(campaign: Campaign, seen: Seen, given: Nuisances, usable: Bools) -> Nuisances:
+def _turned_targets(
+    campaign: Campaign, seen: PredictedReadings, given: Nuisances, usable: Bools
+) -> Nuisances:
     """The axes of targets whose turn is not stated: the mean of what each reading says."""
     readings, turns = campaign.readings, given.turns.copy()
     assert readings.rotation is not None

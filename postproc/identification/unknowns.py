@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from postproc.base.findings import Finding, Refusal, nearest
 from postproc.effects import EFFECTS, Effect, Parameter
-from postproc.findings import Finding, Refusal, nearest
 from postproc.model import StiffnessModel
 from postproc.robot.description import Value
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """A parameter to be found: ``name`` as effect.parameter; ``term``: its effect in the model; ``value`` (SI) to begin
+    """A parameter to be found: ``name`` as effect.parameter; ``term``: its effect in the model; ``value`` (SI) to start
     with; ``stated``: what the robot file says of it; ``prior``: its standard deviation there, where that counts as a
     reading of ``value``; ``held``: a dimension that is taken as it stands."""
 
@@ -23,7 +23,7 @@ class Unknown:
     value: float
     stated: Value | None = None
     prior: float | None = None
-    held: bool = False
+    fixed: bool = False
 
     @property
     def key(self) -> tuple[int, str]:
@@ -31,16 +31,16 @@ class Unknown:
 
 
 @dataclass(frozen=True)
-class Asked:
+class FitRequest:
     """``model``: with all the effects asked for; ``unknowns``; ``held``: names of dimensions of hardware that no
     interval is stated of, taken as they stand."""
 
     model: StiffnessModel
     unknowns: tuple[Unknown, ...]
-    held: tuple[str, ...]
+    fixed: tuple[str, ...]
 
 
-def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False) -> Asked:
+def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False) -> FitRequest:
     """The unknowns that ``words`` name: effects, or single parameters as effect.parameter.
 
     An effect that the model does not have is added at its null, with the dimensions of a mechanism of its kind where
@@ -54,7 +54,7 @@ def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False)
     for word in words:
         effect, _, single = word.partition(".")
         if effect not in EFFECTS:
-            raise _unknown_name(f"{effect!r} is no effect{nearest(effect, EFFECTS)}", ", ".join(EFFECTS))
+            raise _unknown_name(f"{effect!r} is not an effect{nearest(effect, EFFECTS)}", ", ".join(EFFECTS))
         if all(term.effect.name != effect for term in model.terms):
             model = with_mechanism(model, EFFECTS[effect])
         terms = [index for index, term in enumerate(model.terms) if term.effect.name == effect]
@@ -66,17 +66,17 @@ def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False)
         for index in terms:
             for unknown in unknowns_of(model, index, priors):
                 if single in ("", unknown.parameter.name):
-                    if unknown.held and not single:
+                    if unknown.fixed and not single:
                         held[unknown.name] = None
                     else:
                         unknowns[unknown.name] = unknown
-    return Asked(model, tuple(unknowns.values()), tuple(held))
+    return FitRequest(model, tuple(unknowns.values()), tuple(held))
 
 
 def unknowns_of(model: StiffnessModel, term: int, priors: bool = False) -> tuple[Unknown, ...]:
     """All parameters of the ``term``-th effect as unknowns.
 
-    Dimensions of hardware count with their interval as a prior; without one they are held, unless nothing at all is
+    Dimensions of hardware count with their interval as a prior; without one they are fixed, unless nothing at all is
     known of the effect's hardware.  ``priors``: every stated interval counts as a prior.
     """
     of, label = model.terms[term], model.label(term)
@@ -106,9 +106,9 @@ def with_mechanism(model: StiffnessModel, kind: type[Effect]) -> StiffnessModel:
                 model.robot.joints, mechanism.joint, {key: value.value for key, value in stated.items()}
             )
             own = {p.name: stated[p.name] for p in effect.parameters if p.name in stated}
-            return model.added(effect, own)
-    return model.added(kind(model.robot.joints))
+            return model.with_effect(effect, own)
+    return model.with_effect(kind(model.robot.joints))
 
 
 def _unknown_name(message: str, known: str) -> Refusal:
-    return Refusal(Finding("IDN001", message, help=f"known: {known}"))
+    return Refusal(Finding("IDN001", message, help=f"these are known: {known}"))

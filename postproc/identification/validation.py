@@ -1,4 +1,4 @@
-"""How a fit stands on readings that it did not see, and whether its intervals hold without their assumptions."""
+"""How a fit is on readings that it did not see, and whether its intervals hold without their assumptions."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.geometry import Poses
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.geometry import Poses
 from postproc.identification.campaign import Campaign, Nuisances
 from postproc.identification.fit import Fit
+from postproc.identification.least_squares import at, descended
 from postproc.identification.registration import registered
-from postproc.identification.solve import at, descended
 
 SEED = 20260101
 
@@ -38,9 +38,10 @@ def folds_of(campaign: Campaign, folds: int, seed: int = SEED) -> Ints:
 def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
     """(R, 3) [m] residuals of every reading, robot base axes, by a fit without its fold; NaN where it does not count.
 
-    Each fold's fit starts from the one of all readings and keeps its columns: what is told is to first order, as the
-    residuals that leverages give (PRESS; Allen, Technometrics 16 (1974)).  Where the readings of the other folds hardly
-    tell a parameter, a fit of its own might run far away along it, which says more of the fold than of the model.
+    Each fold's fit starts from the one of all readings and keeps its columns: what is reported is to first order, as
+    the residuals that leverages give (PRESS; Allen, Technometrics 16 (1974)).  Where the readings of the other folds
+    hardly tell a parameter, a fit of its own might run far away along it, which says more of the fold than of the
+    model.
     """
     campaign = fitted.campaign
     fold = folds_of(campaign, folds)
@@ -74,22 +75,22 @@ class Validation:
 def validated(before: Fit, after: Fit, campaign: Campaign) -> Validation:
     """What both fits say of readings ``campaign`` that neither has seen.
 
-    Targets are where the fit found them.  The tracker stands where it stood for the fit, if it is the same session (or
-    there is but one on either side) and that holds; else it is registered anew from these readings.
+    Targets are where the fit found them.  The tracker is where it stood for the fit, if it is the same session (or
+    there is but one on either side) and that holds; else it is registered again from these readings.
     """
     anew, left = False, []
     for fitted in (before, after):
         known = campaign.knowing(fitted.campaign, fitted.point.given)
         point = at(known, fitted.model, known.start())
-        given = registered(known, point.seen, np.ones(len(known), bool))
+        given = registered(known, point.predicted, np.ones(len(known), bool))
         if known.tracked:
             kept, others = _stations(fitted, known, given)
-            own, there = (np.nanmean(known.residual(point.seen, g)[:, :3] ** 2) for g in (given, kept))
+            own, there = (np.nanmean(known.residual(point.predicted, g)[:, :3] ** 2) for g in (given, kept))
             if there <= OTHER_STATION**2 * own:
                 given, anew = kept, anew or others
             else:
                 anew = True
-        left.append(known.in_base(known.residual(point.seen, given), given)[:, :3])
+        left.append(known.in_base(known.residual(point.predicted, given), given)[:, :3])
     return Validation(campaign, left[0], left[1], anew)
 
 
@@ -118,7 +119,7 @@ class Bootstrap:
 
 def bootstrap(fitted: Fit, draws: int, progress: Progress = nothing) -> Bootstrap:
     """Wild bootstrap (Liu 1988): each reading's residual, made as large as it was before the fit took its part, with a
-    random sign on what is expected, and fitted anew.  Readings of one pose that share an error share the sign."""
+    random sign on what is expected, and refitted.  Readings of one pose that share an error share the sign."""
     campaign, point = fitted.campaign, fitted.point
     rng = np.random.default_rng(SEED)
     values = point.values(fitted.unknowns)
@@ -130,13 +131,13 @@ def bootstrap(fitted: Fit, draws: int, progress: Progress = nothing) -> Bootstra
             sign = rng.choice([-1.0, 1.0], len(campaign))
         moved = sign[:, None] * grown - point.residual
         drawn = campaign.shifted(moved)
-        begin = replace(point, residual=point.residual + moved)
+        start = replace(point, residual=point.residual + moved)
         # a prior is a reading like the others: it would have been another one
         unknowns = [
             u if u.prior is None else replace(u, value=float(rng.normal(value, u.prior)))
             for u, value in zip(fitted.unknowns, values, strict=True)
         ]
-        ends = descended(drawn, begin, unknowns, fitted.weights, True, 6, fitted.factor)
+        ends = descended(drawn, start, unknowns, fitted.weights, True, 6, fitted.factor)
         found[draw] = ends.values(unknowns)
         progress(draw + 1, draws)
     return Bootstrap(found.std(axis=0, ddof=1), draws)

@@ -11,10 +11,11 @@ Comments that state something, a header row, then one row a reading, in the orde
 The file is in mm, deg, N, N m, s and degC.  ``read_measurements`` reads it, ``measurements_csv`` writes it.
 """
 
-from postproc.measurements.comments import robot_named
+from postproc.measurements import codes as codes
+from postproc.measurements.header_comments import robot_named
 from postproc.measurements.joining import joined
-from postproc.measurements.reading import read_measurements
+from postproc.measurements.read_csv import read_measurements
 from postproc.measurements.readings import Readings, planned
-from postproc.measurements.writing import measurements_csv
+from postproc.measurements.write_csv import measurements_csv
 
 __all__ = ["Readings", "joined", "measurements_csv", "planned", "read_measurements", "robot_named"]

@@ -6,8 +6,8 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
-from postproc.findings import Refusal, nearest
-from postproc.tables import Table
+from postproc.base.findings import Refusal, nearest
+from postproc.base.tables import CsvTable
 
 WRENCH = ("FX", "FY", "FZ", "MX", "MY", "MZ")
 PLACE, ANGLES = ("X", "Y", "Z"), ("A", "B", "C")
@@ -44,10 +44,10 @@ def expected_joints(names: Sequence[str], joints: Sequence[tuple[str, bool]]) ->
     """In words, which columns the ``joints`` have under these ``names``."""
     units = ("mm" if slides else "deg" for _, slides in joints)
     listed = ", ".join(f"{name} ({unit})" for name, unit in zip(names, units, strict=True))
-    return f"one column a joint, as commanded: {listed}"
+    return f"one column per joint, with the commanded values: {listed}"
 
 
-def split_columns(table: Table, joints: Sequence[tuple[str, bool]]) -> tuple[Table, Table, bool]:
+def split_columns(table: CsvTable, joints: Sequence[tuple[str, bool]]) -> tuple[CsvTable, CsvTable, bool]:
     """The columns of the joints in their order, the others under their own names, and whether they hold deflections.
 
     Refusal: a column that is missing, unknown, of another unit, or one too many.
@@ -74,13 +74,15 @@ def split_columns(table: Table, joints: Sequence[tuple[str, bool]]) -> tuple[Tab
             raise _unknown(table, head, own, joints, spelled)
         words, expected = _UNITS[units[spelled[name]]]
         if unit and unit not in words:
-            raise table.header_error(f"column {head!r}: {expected}", "convert the column and its header")
+            raise table.header_error(
+                f"the unit of column {head!r} is wrong: {expected}", "convert the column and its header"
+            )
     axes = {name: table.columns[heads[name.lower()][0]] for name in own}
     rest = {spelled[name]: table.columns[heads[name][0]] for name in others}
     return replace(table, columns=axes), replace(table, columns=rest), deflection
 
 
-def _heads(table: Table, joints: Sequence[tuple[str, bool]]) -> Mapping[str, tuple[str, str]]:
+def _heads(table: CsvTable, joints: Sequence[tuple[str, bool]]) -> Mapping[str, tuple[str, str]]:
     """Name of a column without its unit -> name as it stands, unit or ""."""
     own = [name.lower() for name, _ in joints]
     heads: dict[str, tuple[str, str]] = {}
@@ -93,53 +95,59 @@ def _heads(table: Table, joints: Sequence[tuple[str, bool]]) -> Mapping[str, tup
     return heads
 
 
-def _joint_columns(table: Table, heads: Collection[str], joints: Sequence[tuple[str, bool]]) -> list[str]:
+def _joint_columns(table: CsvTable, heads: Collection[str], joints: Sequence[tuple[str, bool]]) -> list[str]:
     """The robot's own names of its joints where the header has them, else A1..An or J1..Jn."""
     own = [name for name, _ in joints]
     count = len(own)
-    # T or B may be a joint as well as a time or an angle: alone it says nothing
+    # T or B may be a joint as well as a time or an angle: alone it states nothing
     schemes = [(own, [name for name in own if name.lower() not in RESERVED])]
     schemes += [(names, names) for names in ([f"{letter}{i + 1}" for i in range(count)] for letter in "AJ")]
     for names, telling in schemes:
         if any(name.lower() in heads for name in telling):
             for name in names:
                 if name.lower() not in heads:
-                    raise table.header_error(f"column {name!r} is missing", expected_joints(names, joints))
+                    raise table.header_error(
+                        f"column {name!r} is missing", f"add {expected_joints(names, joints)}"
+                    )
             return names
     message = "the columns of the joints are missing"
-    raise table.header_error(message, f"{expected_joints(own, joints)}; or A1..A{count}, or J1..J{count}")
+    raise table.header_error(message, f"add {expected_joints(own, joints)}; or A1..A{count}, or J1..J{count}")
 
 
-def _is_deflection(table: Table, heads: Collection[str]) -> bool:
+def _is_deflection(table: CsvTable, heads: Collection[str]) -> bool:
     """Whether values are DX,DY,DZ; Refusal unless they are all of one kind."""
     here: dict[tuple[str, ...], list[str]] = {
         names: [name for name in names if name.lower() in heads] for names in (PLACE, SHIFT, ANGLES, TURN)
     }
-    forms = "X,Y,Z (measured place) or DX,DY,DZ (loaded minus unloaded)"
+    forms = "use X,Y,Z (measured place) or DX,DY,DZ (loaded minus unloaded)"
     if here[PLACE] and here[SHIFT]:
-        raise table.header_error(f"columns {here[PLACE][0]!r} and {here[SHIFT][0]!r} stand together", forms)
+        raise table.header_error(
+            f"columns {here[PLACE][0]!r} and {here[SHIFT][0]!r} exclude each other", forms
+        )
     deflection = bool(here[SHIFT])
     values, angles = value_columns(deflection)
     others = value_columns(not deflection)[1]
     if not here[values]:
-        raise table.header_error("the columns of what was measured are missing", forms)
+        raise table.header_error("the columns of the measured values are missing", forms)
     if here[others]:
         message = f"column {here[others][0]!r} does not belong to {','.join(values)}"
         raise table.header_error(message, f"the angles are {','.join(angles)} here")
     for names in (values, angles):
         if here[names] and len(here[names]) < 3:
             missing = next(name for name in names if name not in here[names])
-            message = f"column {missing!r} is missing beside {here[names][0]!r}"
-            raise table.header_error(message, f"{','.join(names)}; leave cells empty where there is no value")
+            message = f"column {missing!r} is missing; {here[names][0]!r} needs it"
+            raise table.header_error(
+                message, f"add {','.join(names)}; cells may be empty where no value exists"
+            )
     return deflection
 
 
 def _unknown(
-    table: Table, head: str, own: Sequence[str], joints: Sequence[tuple[str, bool]], known: Collection[str]
+    table: CsvTable, head: str, own: Sequence[str], joints: Sequence[tuple[str, bool]], known: Collection[str]
 ) -> Refusal:
     if _JOINT_LIKE.match(head):
         message = f"column {head!r} is none of the robot's {len(joints)} joints"
         return table.header_error(message, expected_joints(own, joints))
     names = (*own, *WRENCH, *PLACE, *ANGLES, *SHIFT, *TURN, *OPTIONAL, f"DIR1..DIR{len(joints)}")
-    message = f"unknown column {head!r}{nearest(head, known)}"
+    message = f"column {head!r} is unknown{nearest(head, known)}"
     return table.header_error(message, "columns: " + ", ".join(names))

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
-from postproc.findings import Finding, Refusal
-from postproc.measurements.comments import FRAMES
+from postproc.base.arrays import Floats, Ints
+from postproc.base.findings import Finding, Refusal
+from postproc.base.units import DEG, MM
 from postproc.measurements.header import expected_joints, value_columns
+from postproc.measurements.header_comments import FRAMES
 from postproc.measurements.readings import ARRAYS, Readings, numbered
-from postproc.measurements.writing import number_texts, pose_text
-from postproc.units import DEG, MM
+from postproc.measurements.write_csv import number_texts, pose_text
 
 
 def joined(several: Sequence[Readings]) -> Readings:
@@ -66,8 +66,8 @@ def joined(several: Sequence[Readings]) -> Readings:
 
 def _apart(parts: Sequence[Ints], counts: Sequence[int]) -> list[Ints]:
     """The numbers of each part after those of the parts before it, which have ``counts`` numbers; -1 stays."""
-    begins = np.cumsum([0, *counts[:-1]])
-    return [np.where(part < 0, -1, part + begin) for part, begin in zip(parts, begins, strict=True)]
+    starts = np.cumsum([0, *counts[:-1]])
+    return [np.where(part < 0, -1, part + start) for part, start in zip(parts, starts, strict=True)]
 
 
 def _labels(several: Sequence[Readings]) -> list[str]:
@@ -79,13 +79,15 @@ def _labels(several: Sequence[Readings]) -> list[str]:
 def _check_alike(one: Readings, other: Readings) -> None:
     """Refusal MEA008 unless the two can be read as one."""
     if set(one.digests) & set(other.digests):
-        message = f"holds the same bytes as {_named(one)}: every reading would count twice"
+        message = f"the file equals {_named(one)}: every reading would count twice"
         raise Refusal(Finding("MEA008", message, _named(other), help="name each file once"))
     here, there = _facts(one), _facts(other)
     for what, said in here.items():
         if what in there and there[what] != said:
-            message = f"{what}: {there[what]}, but {said} in {_named(one)}"
-            raise Refusal(Finding("MEA008", message, _named(other), help="identify from each on its own"))
+            message = f"the files differ in {what}: {there[what]} here, but {said} in {_named(one)}"
+            raise Refusal(
+                Finding("MEA008", message, _named(other), help="identify from each file on its own")
+            )
 
 
 def _facts(readings: Readings) -> dict[str, str]:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from postproc.arrays import Floats, Ints, frozen
-from postproc.findings import Finding
-from postproc.geometry import Poses
-from postproc.units import DEG, MM
+from postproc.base.arrays import Floats, Ints, frozen
+from postproc.base.findings import Finding
+from postproc.base.geometry import Poses
+from postproc.base.units import DEG, MM
 
 INDICES = ("target", "repeat", "session", "file", "line")
 ARRAYS = ("q", "wrench", "value", "rotation", "sigma", "time", "temperature", "direction", *INDICES)
@@ -40,7 +40,7 @@ class Readings:
     repeat (R,): rows that repeat one state share a number from 0, -1 elsewhere; session (R,) index into ``sessions``;
     time (R,) [s], temperature (R,) [degC], direction (R, n) sense of approach -1, 0, 1, each None where not stated.
 
-    file (R,) index into ``files`` and line (R,): where the row stands, -1 and 0 for a row of no file.
+    file (R,) index into ``files`` and line (R,): where the row is, -1 and 0 for a row of no file.
     """
 
     files: tuple[Path, ...]
@@ -110,8 +110,8 @@ def planned(
     direction: Floats | None = None,
 ) -> Readings:
     """Readings that are still to be taken, of no file: ``q`` (R, n) [rad, m] under ``wrench`` (R, 6) [N, N m];
-    ``target`` (R,) index into ``targets``, ``direction`` (R, n) sense of approach.  Values are NaN, places will be in
-    the tracker's frame; rows of one state repeat each other."""
+    ``target`` (R,) index into ``targets``, ``direction`` (R, n) sense of approach, ``places``: name -> (3,) [m] on the
+    flange.  Values are NaN, places will be in the tracker's frame; rows of one state repeat each other."""
     r = len(q)
     target = np.zeros(r, np.int64) if target is None else target
     return Readings(
@@ -154,10 +154,10 @@ def alike(*columns: ArrayLike | None) -> Ints:
     if not len(keys):
         return np.empty(0, np.int64)
     order = np.lexsort(keys.T)
-    begins = np.append(True, (keys[order][1:] != keys[order][:-1]).any(axis=1))
+    starts = np.append(True, (keys[order][1:] != keys[order][:-1]).any(axis=1))
     group = np.empty(len(keys), np.int64)
-    group[order] = np.cumsum(begins) - 1
-    first = order[begins]  # the sort is stable
+    group[order] = np.cumsum(starts) - 1
+    first = order[starts]  # the sort is stable
     several = np.flatnonzero(np.bincount(group) > 1)
     number = np.full(len(first), -1)
     number[several[np.argsort(first[several])]] = np.arange(len(several))
@@ -165,7 +165,7 @@ def alike(*columns: ArrayLike | None) -> Ints:
 
 
 def numbered(texts: Sequence[str]) -> tuple[tuple[str, ...], Ints]:
-    """The different texts in the order of their first, and the number of each one."""
+    """The different texts in the order of their first, and the number (R,) of each one."""
     known: dict[str, int] = {}
     numbers = [known.setdefault(text, len(known)) for text in texts]
     return tuple(known), np.array(numbers, dtype=np.int64)

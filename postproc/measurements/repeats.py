@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.findings import Finding
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.findings import Finding
+from postproc.base.tables import is_missing
+from postproc.base.units import DEG, MM
 from postproc.measurements.readings import Readings, alike, numbered
-from postproc.tables import is_missing
-from postproc.units import DEG, MM
 
 SAME_ANGLE, SAME_WAY, SAME_LOAD, SAME_SHARE = 0.1 * DEG, 1.0 * MM, 10.0, 0.1
 """[rad], [m], [N, N m] and share of the load that rows of one REPEAT id may differ by, as a new command and a new
@@ -20,7 +20,7 @@ hanging of the same weight do."""
 
 def with_repeats(readings: Readings, ids: Sequence[str]) -> Readings:
     """With the numbers of repeated states: by their REPEAT ``ids`` (R,), or of rows that say the same where no id is
-    given.  An id that stands for several states is told (MEA007)."""
+    given.  An id that stands for several states is reported (MEA007)."""
     one = readings
     given = np.array([not is_missing(text) for text in ids], bool)
     if not given.any():
@@ -35,8 +35,8 @@ def with_repeats(readings: Readings, ids: Sequence[str]) -> Readings:
         return replace(one, repeat=repeat)
     row = int(np.argmax(other))
     message = (
-        f"column REPEAT: {ids[row]!r} stands with other joint angles or loads in line {one.line[first[row]]};"
-        " of this id only rows that say the same were taken as repeats"
+        f"column REPEAT: {ids[row]!r} has other joint angles or loads in line {one.line[first[row]]};"
+        " only rows of this id that agree count as repeats"
     )
     finding = Finding("MEA007", message, *one.where(row))
     state = alike(one.q, one.wrench)

@@ -1,4 +1,4 @@
-"""What a batch came to: one outcome a program, and the worst of them."""
+"""The result of a batch: one outcome per program, and the worst of them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from postproc.findings import SEVERITIES, Finding
+from postproc.base.findings import SEVERITIES, Finding
+from postproc.report.result_keys import complete_result
 
 DONE, UNCHANGED, FAILED, NOT_RUN = "done", "unchanged", "failed", "not run"
 STATES = (DONE, UNCHANGED, FAILED, NOT_RUN)
@@ -19,23 +20,24 @@ STATES = (DONE, UNCHANGED, FAILED, NOT_RUN)
 RANKS = (0, 3, 1)
 """Exit codes from the best to the worst."""
 
-_TOLD = (
+WORDS_OF_SUMMARY = (
     "program",
     "dialect",
     "robot",
     "motions",
     "corrected",
     "inserted",
-    "left",
+    "uncorrected",
     "force",
     "error_before_mm",
     "error_after_mm",
     "correction_mm",
+    "verdict",
     "findings",
     "outputs",
     "exit",
 )
-"""Keys of a program's own result that the summary repeats; all else stands in its report."""
+"""Keys of a program's own result that the summary repeats; all others are in its report."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Outcome:
 
     @property
     def gravest(self) -> Finding | None:
-        """The first finding of the gravest severity that needs a look."""
+        """The first finding of the gravest severity, of those that need review."""
         order = [finding for finding in self.findings if finding.severity != SEVERITIES[0]]
         return max(order, key=lambda one: SEVERITIES.index(one.severity), default=None)
 
@@ -72,6 +74,11 @@ class Outcome:
         """A figure of ``error_before_mm`` and its like; None where there is none."""
         spread = self.result.get(key)
         return spread.get(of) if spread else None
+
+    @property
+    def verdict(self) -> str:
+        """The verdict in words; ``-`` where nothing was written."""
+        return str(self.result.get("verdict") or "-").replace("_", " ")
 
     def output_ending(self, *endings: str) -> Path | None:
         """The output with the first of ``endings`` that there is."""
@@ -85,18 +92,19 @@ class Outcome:
         return {
             "name": self.name,
             "state": self.state,
-            **{key: self.result[key] for key in _TOLD if key in self.result},
+            **{key: self.result[key] for key in WORDS_OF_SUMMARY if key in self.result},
         }
 
 
 @dataclass(frozen=True)
 class Batched:
-    """A batch.  ``root``: the folder of its results; ``outputs``: the files of its summary; ``seconds``: of the run."""
+    """A batch.  ``root``: the folder of its results; ``outputs``: the files of its summary; ``skipped_files``:
+    that match and are no programs; ``seconds``: of the run."""
 
     root: Path
     outcomes: tuple[Outcome, ...]
     outputs: tuple[str, ...] = ()
-    passed_over: tuple[str, ...] = ()
+    skipped_files: tuple[str, ...] = ()
     seconds: float = 0.0
 
     @property
@@ -111,19 +119,20 @@ class Batched:
         return {state: found[state] for state in STATES}
 
     def as_json(self) -> dict[str, object]:
-        """The machine-readable result; the keys are public.  It says nothing of time: the same run gives the same."""
+        """The machine-readable result; the keys are public.  It states no times: the same run gives the same result."""
         counts = {state.replace(" ", "_"): count for state, count in self.counts.items()}
-        return {
+        result = {
             **counts,
             "programs": [outcome.as_json() for outcome in self.outcomes],
-            "passed_over": list(self.passed_over),
+            "skipped_files": list(self.skipped_files),
             "outputs": list(self.outputs),
             "exit": self.exit,
         }
+        return complete_result("batch", result)
 
 
 def not_run(name: str, program: str) -> Outcome:
-    """The outcome of a program that was not begun, or not brought to its end."""
+    """The outcome of a program that was not started or not completed."""
     return Outcome(name, NOT_RUN, {"program": program, "findings": [], "outputs": [], "exit": 1})
 
 

@@ -9,7 +9,7 @@ from urllib.parse import quote
 from postproc.report.batched import DONE, FAILED, NOT_RUN, UNCHANGED, Batched, Outcome
 from postproc.report.page import FINDINGS, finding_rows, rendered
 from postproc.report.page_words import printed
-from postproc.report.words import count
+from postproc.report.words import count, in_decimals
 
 _SIGNS = {
     DONE: ("", "✓", "done"),
@@ -20,7 +20,7 @@ _SIGNS = {
 
 
 def batch_page(batched: Batched) -> bytes:
-    """The page of a batch that lies in its root.  It says nothing of time: the same run gives the same bytes."""
+    """The page of a batch, in its root folder.  It states no times: the same run gives the same bytes."""
     failures = [finding for outcome in batched.outcomes if outcome.exit == 1 for finding in outcome.findings]
     return rendered(
         "batch.html.j2",
@@ -32,15 +32,15 @@ def batch_page(batched: Batched) -> bytes:
         findings=finding_rows(failures),
         more_findings=max(0, len(failures) - FINDINGS),
         goes=False,
-        passed_over=[printed(path) for path in batched.passed_over],
-        links=[("the same for scripts", "summary.json", "./summary.json")],
+        skipped_files=[printed(path) for path in batched.skipped_files],
+        links=[("result (JSON)", "summary.json", "./summary.json")],
     )
 
 
 def _badge(batched: Batched) -> tuple[str, str, str]:
     if batched.exit == 1:
-        return "bad", "✗", "not all done"
-    return ("look", "!", "deserves a look") if batched.exit else ("good", "✓", "done")
+        return "bad", "✗", "not all programs done"
+    return ("look", "!", "needs review") if batched.exit else ("good", "✓", "done")
 
 
 def _verdict(batched: Batched) -> str:
@@ -48,8 +48,9 @@ def _verdict(batched: Batched) -> str:
     counts = batched.counts
     whole = count(len(batched.outcomes), "program")
     well = counts[DONE] + counts[UNCHANGED]
+    written = "is" if len(batched.outcomes) == 1 else "are"
     words = (
-        f"All of {whole} are written" if well == len(batched.outcomes) else f"{well} of {whole} are written"
+        f"{whole} {written} written" if well == len(batched.outcomes) else f"{well} of {whole} are written"
     )
     parts = [
         f"{counts[state]} {word}"
@@ -58,10 +59,10 @@ def _verdict(batched: Batched) -> str:
     ]
     look = sum(outcome.exit == 3 for outcome in batched.outcomes)
     if look:
-        parts.append(f"{look} with something that deserves a look")
+        parts.append(f"{look} need{'s' if look == 1 else ''} review")
     text = "; ".join([words, *parts]) + "."
     if counts[UNCHANGED]:
-        text += f" {counts[UNCHANGED]} of them by an earlier run; nothing of theirs has changed."
+        text += f" {counts[UNCHANGED]} of them by an earlier run, unchanged since."
     before, after = (
         max(
             (value for outcome in batched.outcomes if (value := outcome.figure(key)) is not None),
@@ -70,7 +71,7 @@ def _verdict(batched: Batched) -> str:
         for key in ("error_before_mm", "error_after_mm")
     )
     if before is not None and after is not None:
-        text += f" The largest predicted error of all is {before:.3f} mm before and {after:.4f} mm after."
+        text += f" The largest predicted error of all programs is {before:.3f} mm before and {after:.4f} mm after."
     return text
 
 
@@ -78,7 +79,7 @@ def _row(outcome: Outcome, root: Path) -> dict[str, object]:
     gravest = outcome.gravest
     state = _SIGNS[outcome.state]
     if outcome.exit == 3:
-        state = ("warning", "!", f"{state[2]}, deserves a look")
+        state = ("warning", "!", f"{state[2]}, needs review")
     report = outcome.output_ending(".report.html", ".report.json")
     diff = outcome.output_ending(".diff")
     return {
@@ -86,10 +87,11 @@ def _row(outcome: Outcome, root: Path) -> dict[str, object]:
         "state": state,
         "report": _address(report, root),
         "diff": _address(diff, root),
-        **{key: outcome.result.get(key, "–") for key in ("motions", "corrected", "left")},
-        "before": _mm(outcome.figure("error_before_mm"), 3),
-        "after": _mm(outcome.figure("error_after_mm"), 4),
-        "correction": _mm(outcome.figure("correction_mm"), 3),
+        **{key: outcome.result.get(key, "–") for key in ("motions", "corrected", "uncorrected")},
+        "before": in_decimals(outcome.figure("error_before_mm"), 3, "–"),
+        "after": in_decimals(outcome.figure("error_after_mm"), 4, "–"),
+        "correction": in_decimals(outcome.figure("correction_mm"), 3, "–"),
+        "verdict": outcome.verdict,
         "finding": "" if gravest is None else f"{gravest.code} {printed(gravest.message)}",
     }
 
@@ -99,7 +101,3 @@ def _address(path: Path | None, root: Path) -> str:
     if path is None:
         return ""
     return "./" + quote(os.fsencode(Path(os.path.relpath(path, root)).as_posix()))
-
-
-def _mm(value: float | None, digits: int) -> str:
-    return "–" if value is None else f"{value:.{digits}f}"

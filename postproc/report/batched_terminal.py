@@ -1,4 +1,4 @@
-"""The summary of a batch on a terminal: one line a program, then what there is to say."""
+"""The summary of a batch on a terminal: one line a program, then findings and totals."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from postproc.printable import printable
+from postproc.base.sanitize import sanitize
 from postproc.report.batched import DONE, FAILED, NOT_RUN, UNCHANGED, Batched, Outcome
 from postproc.report.terminal import show_findings
-from postproc.report.words import count
+from postproc.report.words import count, in_decimals
 
 _STYLES = {DONE: "", UNCHANGED: "dim", FAILED: "bold red", NOT_RUN: "yellow"}
 
@@ -20,22 +20,23 @@ def show_batched(console: Console, batched: Batched, verbose: bool = False) -> N
     table = Table(box=None, pad_edge=False)
     for head in ("program", "state"):
         table.add_column(head, overflow="fold")
-    for head in ("motions", "corrected", "left", "before mm", "after mm"):
+    for head in ("motions", "corrected", "not corrected", "before mm", "after mm"):
         table.add_column(head, justify="right")
-    table.add_column("deserves a look", overflow="fold")
+    table.add_column("verdict", overflow="fold")
+    table.add_column("needs review", overflow="fold")
     for outcome in batched.outcomes:
         table.add_row(*_row(outcome), style="yellow" if outcome.exit == 3 else _STYLES[outcome.state])
     console.print(table)
     for outcome in batched.outcomes:
         if outcome.exit == 1 or verbose:
             show_findings(console, outcome.findings, verbose)
-    if batched.passed_over:
-        console.print(f"passed over, no programs: {count(len(batched.passed_over), 'file')}")
-        for path in batched.passed_over if verbose else ():
-            console.print(Text("    " + printable(path)), soft_wrap=True)
+    if batched.skipped_files:
+        console.print(f"skipped {count(len(batched.skipped_files), 'file')}: not a program")
+        for path in batched.skipped_files if verbose else ():
+            console.print(Text("    " + sanitize(path)), soft_wrap=True)
     console.print(closing(batched), markup=False)
     for path in batched.outputs:
-        console.print(Text(f"wrote {printable(path)}"), soft_wrap=True)
+        console.print(Text(f"wrote {sanitize(path)}"), soft_wrap=True)
 
 
 def closing(batched: Batched) -> str:
@@ -47,14 +48,11 @@ def closing(batched: Batched) -> str:
 def _row(outcome: Outcome) -> tuple[str, ...]:
     gravest = outcome.gravest
     return (
-        escape(printable(outcome.name)),
+        escape(sanitize(outcome.name)),
         outcome.state,
-        *(str(outcome.result.get(key, "-")) for key in ("motions", "corrected", "left")),
-        _mm(outcome.figure("error_before_mm"), 3),
-        _mm(outcome.figure("error_after_mm"), 4),
+        *(str(outcome.result.get(key, "-")) for key in ("motions", "corrected", "uncorrected")),
+        in_decimals(outcome.figure("error_before_mm"), 3),
+        in_decimals(outcome.figure("error_after_mm"), 4),
+        outcome.verdict,
         "" if gravest is None else escape(gravest.code),
     )
-
-
-def _mm(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"

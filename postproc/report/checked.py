@@ -1,4 +1,4 @@
-"""What ``compensate check`` has to say of a program."""
+"""The result of ``compensate check``."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from postproc.dialects.dialect import Program
-from postproc.findings import CODES, Finding
+from postproc.base.findings import CODES, Finding
+from postproc.languages.dialect import Program
 from postproc.report.report import exit_code, in_order_of_place
+from postproc.report.result_keys import complete_result
 from postproc.toolpath import Kind, Toolpath
 
 
@@ -38,18 +39,18 @@ class Checked:
 
     @property
     def refused(self) -> dict[str, int]:
-        """code -> motions that can not be corrected for it."""
+        """Code -> number of motions that cannot be corrected for this reason."""
         return dict(sorted(Counter(finding.code for finding in self.toolpath.refused.values()).items()))
 
     def summary(self) -> Iterator[str]:
         total, refused = len(self.toolpath), sum(self.refused.values())
         kinds = ", ".join(f"{count} {name}" for name, count in self.kinds.items())
-        yield f"{total} motions{f' ({kinds})' if kinds else ''}: {total - refused} understood, {refused} refused"
+        yield f"{total} motions{f' ({kinds})' if kinds else ''}: {total - refused} can be corrected, {refused} not"
         for code, count in self.refused.items():
             yield f"  {count} x {code} {CODES[code].title}"
 
     def as_json(self) -> dict[str, object]:
-        return {
+        result = {
             "program": str(self.program.documents[0].path),
             "dialect": self.program.dialect,
             "files": [str(document.path) for document in self.program.documents],
@@ -59,3 +60,4 @@ class Checked:
             "findings": [finding.as_json() for finding in self.findings],
             "exit": self.exit,
         }
+        return complete_result("check", result)

@@ -1,4 +1,4 @@
-"""What ``compensate diagnose`` found: a verdict, its evidence, and what is left of the readings; as JSON and CSV."""
+"""The result of ``compensate diagnose``: a verdict, its evidence, and residuals; as JSON and CSV."""
 
 from __future__ import annotations
 
@@ -8,26 +8,27 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
+from postproc.base.arrays import Bools, Floats
+from postproc.base.findings import Finding
 from postproc.diagnosis.candidates import Candidate, names_of
-from postproc.diagnosis.diagnose import Diagnosis
-from postproc.diagnosis.screens import Where, where
+from postproc.diagnosis.diagnosis import Diagnosis
+from postproc.diagnosis.effect_sizes import Gains, Smallest, gains, moved, smallest
+from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search import Key
-from postproc.diagnosis.sizes import Gains, Smallest, gains, moved, smallest
-from postproc.diagnosis.verdict import Evidence, Named, Verdict, lack_of_fit
-from postproc.findings import Finding
+from postproc.diagnosis.verdict import Evidence, Named, Verdict, reduced_chi2_of
 from postproc.identification.fit import Estimate, Fit
 from postproc.measurements import Readings
 from postproc.model import STANDARD_GRAVITY
 from postproc.report.report import exit_code
 from postproc.report.residuals import Sizes, gap_of, joint_variables, lengths_of, mm, residuals_csv
+from postproc.report.result_keys import complete_result
 from postproc.robot.provenance import GAP
 
 CLEAR = ("named", "nothing_missing")
-"""Verdicts that leave nothing to look at."""
+"""Verdicts that need no review."""
 
 NEARLY_ALL = 0.9
-"""Share of the candidates that would have shown at the size that is told."""
+"""Share of the candidates that would have shown at the reported size."""
 
 USUAL = 10.0
 """An effect that only shows beyond so many times its usual size was hardly tested."""
@@ -58,11 +59,11 @@ class NextPoses:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosed:
-    """What ``diagnose`` found.
+    """The result of ``diagnose``.
 
-    data: name and SHA-256 of each file; heldout_before, heldout_after (R, 3) [m]: what fits without the pose leave of
-    it, of the robot file as it is and of the model to go on with; robot_file, next_poses_file: as written, None where
-    not; outputs: all files written.
+    data: name and SHA-256 of each file; held_out_before, held_out_after (R, 3) [m]: residuals of each pose by fits
+    without this pose, of the robot file as it is and of the final model; robot_file, next_poses_file: as written, None
+    where not; outputs: all files written.
     """
 
     robot: str
@@ -70,8 +71,8 @@ class Diagnosed:
     robot_path: Path
     data: tuple[tuple[str, str], ...]
     diagnosis: Diagnosis
-    heldout_before: Floats
-    heldout_after: Floats
+    held_out_before: Floats
+    held_out_after: Floats
     next_poses: NextPoses | None
     findings: tuple[Finding, ...] = ()
     robot_file: str | None = None
@@ -85,18 +86,18 @@ class Diagnosed:
 
     @property
     def final(self) -> Fit:
-        """The model to go on with."""
+        """The final model."""
         return self.diagnosis.final
 
     @property
     def exit(self) -> int:
-        """As of the findings; 3 where the verdict leaves something open."""
+        """As of the findings; 3 where the verdict needs review."""
         code = exit_code(self.findings, self.strict)
         return code if code == 1 or self.verdict.word in CLEAR else 3
 
     @property
     def improves(self) -> bool:
-        """Whether a new robot file would say more than the old one."""
+        """Whether a new robot file would be better than the old one."""
         word = self.verdict.word
         return word in ("named", "partly_named") or (
             word == "nothing_missing" and bool(self.verdict.refitted)
@@ -104,15 +105,15 @@ class Diagnosed:
 
     @cached_property
     def clear(self) -> tuple[Named, ...]:
-        """The effects that are named beyond doubt: without those that something else explains as well."""
-        doubtful = {alternatives[0].key for alternatives in self.verdict.alternatives}
-        return tuple(named for named in self.verdict.named if named.candidate.key not in doubtful)
+        """The named effects without those that another explanation fits as well."""
+        ambiguous = {alternatives[0].key for alternatives in self.verdict.alternatives}
+        return tuple(named for named in self.verdict.named if named.candidate.key not in ambiguous)
 
     @property
     def lacking(self) -> bool:
-        """Whether clearly more is left than scatter, of all that was found."""
+        """Whether the residual clearly exceeds the scatter, with all that was found."""
         found = self.diagnosis.search
-        return lack_of_fit(found, found.explained)[1] or bool(self.verdict.left)
+        return reduced_chi2_of(found, found.explained)[1] or bool(self.verdict.remainder)
 
     # Residuals.
 
@@ -123,14 +124,14 @@ class Diagnosed:
 
     @cached_property
     def lengths(self) -> dict[str, Floats]:
-        """(R,) [m] lengths of residuals: under the names that ``gap`` begins with, and of two more fits.  ``refitted``:
-        the robot file's own parameters fitted anew; ``explained``: with all that was chosen, named or not."""
+        """(R,) [m] lengths of residuals: under the names that ``gap`` starts with, and of two more fits.  ``refitted``:
+        the robot file's own parameters refitted; ``explained``: with all that was chosen, named or not."""
         search, measured = self.diagnosis.search, np.isfinite(self.final.campaign.readings.value)
         residuals = {
             "before": self.diagnosis.stated.residual,
             "after": self.final.residual,
-            "heldout_before": self.heldout_before,
-            "heldout_after": self.heldout_after,
+            "held_out_before": self.held_out_before,
+            "held_out_after": self.held_out_after,
             "refitted": search.base.residual,
             "explained": search.final.residual,
         }
@@ -199,15 +200,15 @@ class Diagnosed:
         return names_of(self.diagnosis.search.linear.candidates)
 
     @cached_property
-    def patterns(self) -> tuple[Where, ...]:
-        """What betrays a missing effect: patterns in what the robot file leaves, its own parameters fitted anew."""
-        return where(self.diagnosis.search.base, self.diagnosis.search.final)
+    def patterns(self) -> tuple[ResidualPattern, ...]:
+        """Patterns in the residuals of the robot file with its own parameters refitted: signs of a missing effect."""
+        return residual_patterns(self.diagnosis.search.base, self.diagnosis.search.final)
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public."""
         verdict, campaign = self.verdict, self.final.campaign
         gap = self.gap_mm()
-        return {
+        result = {
             "robot": self.robot,
             "robot_path": str(self.robot_path),
             "robot_digest": self.robot_digest,
@@ -228,11 +229,11 @@ class Diagnosed:
             "hardly_testable": list(self.hardly_tested),
             "detectable_rms_mm": None if self.detectable is None else mm(self.detectable),
             "refitted": [_refitted(estimate) for estimate in verdict.refitted],
-            "where": [_where(one) for one in self.diagnosis.where],
-            "where_refitted": [_where(one) for one in self.patterns],
-            "where_left": [_where(one) for one in verdict.left],
+            "residual_patterns": [_where(one) for one in self.diagnosis.where],
+            "residual_patterns_refitted": [_where(one) for one in self.patterns],
+            "residual_patterns_final": [_where(one) for one in verdict.remainder],
             "gap": {key: gap.get(key) for key in GAP} | {"refitted_rms_mm": mm(self.rms["refitted"])},
-            "lack": None if verdict.conditional else _finite(verdict.lack),
+            "reduced_chi2": None if verdict.conditional else _finite(verdict.reduced_chi2),
             "next_poses": None if self.next_poses is None else self.next_poses.poses,
             "next_poses_file": self.next_poses_file,
             "next_poses_between": None
@@ -246,6 +247,7 @@ class Diagnosed:
             "outputs": list(self.outputs),
             "exit": self.exit,
         }
+        return complete_result("diagnose", result)
 
     def _named(self, named: Named) -> dict[str, object]:
         size = self.moved[named.candidate.key]
@@ -254,20 +256,20 @@ class Diagnosed:
             "joints": list(named.joints),
             "options": named.candidate.effect.described(),
             "parameters": {e.unknown.parameter.name: _parameter(e) for e in named.estimates},
-            "held": dict(named.held),
-            "moves_rms_mm": mm(size.rms) if size else None,
-            "moves_max_mm": mm(size.max) if size else None,
+            "fixed": dict(named.fixed),
+            "displacement_rms_mm": mm(size.rms) if size else None,
+            "displacement_max_mm": mm(size.max) if size else None,
             "evidence": _evidence(named.evidence),
         }
 
 
 def diagnosed_csv(result: Diagnosed) -> bytes:
-    """One row a reading: where it stands, its axes, what is left of it by the robot file, by the model to go on with,
-    and by that as one that was not fitted."""
+    """One row per reading: its place, its axes, its residual by the robot file, by the final model, and by a fit of the
+    latter without its pose."""
     residuals = {
         "before": result.diagnosis.stated.residual,
         "after": result.final.residual,
-        "heldout": result.heldout_after,
+        "held_out": result.held_out_after,
     }
     fitted = [str(int(counts)) for counts in result.counts]
     return residuals_csv(result.final.campaign, residuals, {"fitted": fitted})
@@ -296,14 +298,18 @@ def _refitted(estimate: Estimate) -> dict[str, object]:
 
 
 def _evidence(evidence: Evidence) -> dict[str, object]:
-    numbers = {
-        key: _finite(getattr(evidence, key))
-        for key in ("gain", "chance", "heldout", "regions", "sessions", "margin")
+    return {
+        "likelihood_gain": _finite(evidence.gain),
+        "expected_by_chance": _finite(evidence.chance),
+        "held_out_poses": _finite(evidence.heldout),
+        "held_out_regions": _finite(evidence.regions),
+        "held_out_sessions": _finite(evidence.sessions),
+        "margin_to_next": _finite(evidence.margin),
+        "next": None if evidence.alias is None else _candidate(evidence.alias),
     }
-    return numbers | {"alias": None if evidence.alias is None else _candidate(evidence.alias)}
 
 
-def _where(one: Where) -> dict[str, object]:
+def _where(one: ResidualPattern) -> dict[str, object]:
     return {"variable": one.variable, "pattern": one.pattern, "share": round(one.share, 4)}
 
 

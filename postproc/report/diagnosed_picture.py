@@ -1,7 +1,7 @@
 """A diagnosis as a picture: the gap at each pose before and after, residuals over what betrays the missing effect, and
 what each candidate explains.
 
-Grey, two blues, green and orange (Okabe and Ito) can be told apart by everybody; points and bars differ by form too.
+Grey, two blues, green and orange (Okabe and Ito) can be distinguished by everybody; points and bars differ by form too.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 
-from postproc.arrays import Floats
-from postproc.diagnosis.screens import patterns
+from postproc.base.arrays import Floats
+from postproc.base.sanitize import sanitize, sanitize_lines
+from postproc.base.units import MM
+from postproc.diagnosis.residual_patterns import patterns
 from postproc.diagnosis.search import Key
 from postproc.identification.fit import Fit
-from postproc.printable import printable, printable_lines
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_words import headline
-from postproc.report.identified_picture import shown_rows
+from postproc.report.identified_picture import rows_to_draw
 from postproc.report.picture import rendered
-from postproc.report.residuals import Sizes, Variable, poses_in_order
-from postproc.units import MM
+from postproc.report.residuals import ResidualVariable, Sizes, poses_in_order
 
 PANELS = 2
 """Variables that residuals are drawn over."""
@@ -39,21 +39,21 @@ LINE = 150
 """Letters in a line of the title."""
 
 LEAST = 1e-6
-"""[mm] The scale of the gap begins no lower."""
+"""[mm] The scale of the gap starts no lower."""
 
 _NAMES = {
     "before": "robot file",
-    "refitted": "its parameters fitted anew",
-    "explained": "with all that was found",
-    "after": "model to go on with",
-    "heldout_after": "the same, poses not fitted",
+    "refitted": "its parameters refitted",
+    "explained": "with all effects found",
+    "after": "final model",
+    "held_out_after": "final model, held-out poses",
 }
 _STYLES: dict[str, dict[str, Any]] = {
     "before": {"color": "#7f7f7f", "marker": "s", "markersize": 4.5},
     "refitted": {"color": "#56b4e9", "marker": "^", "markersize": 4.5},
     "explained": {"color": "#009e73", "marker": "v", "markersize": 4.5},
     "after": {"color": "#0072b2", "marker": "o", "markersize": 5.0},
-    "heldout_after": {"color": "#d55e00", "marker": "D", "markersize": 3.0},
+    "held_out_after": {"color": "#d55e00", "marker": "D", "markersize": 3.0},
 }
 _SCATTER: dict[str, Any] = {"color": "black", "linestyle": ":", "linewidth": 0.9}
 _NEEDED: dict[str, Any] = {
@@ -65,8 +65,8 @@ _NEEDED: dict[str, Any] = {
 }
 _BARS: dict[str, dict[str, Any]] = {
     "named": {"facecolor": "#0072b2", "edgecolor": "#0072b2"},
-    "can not be told apart": {"facecolor": "#d55e00", "edgecolor": "white", "hatch": "////"},
-    "nearest other explanation": {"facecolor": "#7f7f7f", "edgecolor": "white", "hatch": "...."},
+    "indistinguishable": {"facecolor": "#d55e00", "edgecolor": "white", "hatch": "////"},
+    "next explanation": {"facecolor": "#7f7f7f", "edgecolor": "white", "hatch": "...."},
     "rejected": {"facecolor": "white", "edgecolor": "#7f7f7f", "hatch": "xxxx"},
     "another": {"facecolor": "#cccccc", "edgecolor": "#cccccc"},
 }
@@ -79,7 +79,7 @@ def diagnosed_picture(result: Diagnosed, kind: str) -> bytes:
 
 def _figure(result: Diagnosed) -> Figure:
     figure = Figure(figsize=(13.5, 7.4), layout="constrained")
-    figure.suptitle(printable_lines(_title(result)), fontsize=10, parse_math=False)
+    figure.suptitle(sanitize_lines(_title(result)), fontsize=10, parse_math=False)
     grid = figure.add_gridspec(2, PANELS + 1, width_ratios=[1.0] * PANELS + [1.15])
     _gap(figure.add_subplot(grid[0, :PANELS]), result)
     several = betrayals(result)
@@ -134,10 +134,10 @@ def _gap(axes: Axes, result: Diagnosed) -> None:
 
 
 class Betrayal(NamedTuple):
-    """Residuals [mm] over a variable, before and after: along what a turn of its joint moves (``turning``), else their
-    lengths.  share: of the squares that follow it, NaN where nothing does."""
+    """Residuals ``before`` (R,) [mm] and ``after`` (R,) [mm] over a variable: along what a turn of its joint moves
+    (``turning``), else their lengths.  share: of the squares that follow it, NaN where nothing does."""
 
-    variable: Variable
+    variable: ResidualVariable
     before: Floats
     after: Floats
     turning: bool
@@ -146,7 +146,7 @@ class Betrayal(NamedTuple):
 
 def betrayals(result: Diagnosed) -> list[Betrayal]:
     """The variables that what is missing goes with, those of the joints that are named first; without any the order of
-    the readings.  Before: the robot file, its own parameters fitted anew; after: with all that was chosen."""
+    the readings.  Before: the robot file, its own parameters refitted; after: with all that was chosen."""
     search = result.diagnosis.search
     joints = {joint for named in result.verdict.named for joint in named.joints}
     several = sorted(result.patterns, key=lambda one: one.variable.partition(" ")[0] not in joints)
@@ -158,7 +158,7 @@ def betrayals(result: Diagnosed) -> list[Betrayal]:
     ]
 
 
-def _along(fitted: Fit) -> dict[str, tuple[Variable, Floats, bool]]:
+def _along(fitted: Fit) -> dict[str, tuple[ResidualVariable, Floats, bool]]:
     """Of each variable that residuals are screened by: its values, the residuals [mm], whether along a turn."""
     residual, found = fitted.point.residual[:, :3], {}
     for name, values, turns, (unit, size) in patterns(fitted, fitted.campaign):
@@ -167,14 +167,14 @@ def _along(fitted: Fit) -> dict[str, tuple[Variable, Floats, bool]]:
         else:
             length = np.maximum(np.linalg.norm(turns, axis=1), 1e-12)
             along = np.nansum(residual * turns, axis=1) / length
-        found[name] = (Variable(name, unit, values / size), along / MM, turns is not None)
+        found[name] = (ResidualVariable(name, unit, values / size), along / MM, turns is not None)
     return found
 
 
 def _betrayed(axes: Axes, betrayal: Betrayal, result: Diagnosed) -> None:
     """Readings as points, and the mean of each part of them as a line."""
     variable = betrayal.variable
-    rows = shown_rows(np.abs(betrayal.before))
+    rows = rows_to_draw(np.abs(betrayal.before))
     parts = variable.parts()
     middle = [float(np.median(variable.values[part])) for part in parts]
     drawn = series(result)
@@ -188,11 +188,11 @@ def _betrayed(axes: Axes, betrayal: Betrayal, result: Diagnosed) -> None:
         axes.axhline(0.0, color="0.5", linewidth=0.8)
     else:
         _scatter_line(axes, result)
-    share = f" ({100 * betrayal.share:.0f} % of what is left)" if np.isfinite(betrayal.share) else ""
-    axes.set_title(printable(f"{variable.name}{share}"), fontsize=9, parse_math=False)
-    axes.set_xlabel(printable(f"{variable.name}, {variable.unit}").rstrip(", "), fontsize=9, parse_math=False)
+    share = f" ({100 * betrayal.share:.0f} % of the residual)" if np.isfinite(betrayal.share) else ""
+    axes.set_title(sanitize(f"{variable.name}{share}"), fontsize=9, parse_math=False)
+    axes.set_xlabel(sanitize(f"{variable.name}, {variable.unit}").rstrip(", "), fontsize=9, parse_math=False)
     joint = variable.name.partition(" ")[0]
-    along = f"residual along a turn of {joint}, mm" if betrayal.turning else "residual, mm"
+    along = f"residual along a rotation of {joint}, mm" if betrayal.turning else "residual, mm"
     axes.set_ylabel(along, fontsize=9, parse_math=False)
 
 
@@ -205,17 +205,17 @@ def _evidence(axes: Axes, result: Diagnosed) -> None:
     order = sorted(order[:BARS], key=lambda g: -gains.alone[g])
     for row, g in enumerate(order):
         role = roles.get(candidates[g].key, "another")
-        axes.barh(row, gains.alone[g], height=0.7, label=f"{role}: what it explains alone", **_BARS[role])
+        axes.barh(row, gains.alone[g], height=0.7, label=f"{role}: explained alone", **_BARS[role])
         if result.diagnosis.search.chosen:
-            axes.barh(row, gains.beside[g], height=0.25, facecolor="black", label="beside what was chosen")
-    axes.plot(gains.needed[order], range(len(order)), label="needed to count", **_NEEDED)
+            axes.barh(row, gains.beside[g], height=0.25, facecolor="black", label="explained in addition")
+    axes.plot(gains.needed[order], range(len(order)), label="required", **_NEEDED)
     axes.set_xscale("symlog", linthresh=10.0)
     axes.xaxis.set_major_formatter("{x:g}")
-    axes.set_yticks(range(len(order)), [printable(candidates[g].label) for g in order])
+    axes.set_yticks(range(len(order)), [sanitize(candidates[g].label) for g in order])
     for label in axes.get_yticklabels():
         label.set_parse_math(False)
     axes.set_ylim(max(len(order), 1) - 0.5, -0.5)
-    axes.set_xlabel("fall of -2 ln(likelihood)", fontsize=9)
+    axes.set_xlabel("likelihood gain, 2 ln(likelihood ratio)", fontsize=9)
     axes.set_title("evidence per candidate", fontsize=9)
 
 
@@ -224,8 +224,8 @@ def roles_of(result: Diagnosed) -> dict[Key, str]:
     verdict = result.verdict
     roles = {candidate.key: "rejected" for candidate, _ in verdict.rejected}
     aliases = [named.evidence.alias for named in verdict.named]
-    roles |= {alias.key: "nearest other explanation" for alias in aliases if alias is not None}
-    roles |= {c.key: "can not be told apart" for one in verdict.alternatives for c in one}
+    roles |= {alias.key: "next explanation" for alias in aliases if alias is not None}
+    roles |= {c.key: "indistinguishable" for one in verdict.alternatives for c in one}
     return roles | {named.candidate.key: "named" for named in result.clear}
 
 
@@ -244,6 +244,6 @@ def _title(result: Diagnosed) -> str:
     gap, campaign = result.gap_mm(), result.final.campaign
     of = f"{len(campaign)} readings at {campaign.poses} poses"
     told = f"{gap['before_rms_mm']:.3f} mm RMS before, {gap['after_rms_mm']:.3f} mm after"
-    if "heldout_after_rms_mm" in gap:
-        told += f", {gap['heldout_after_rms_mm']:.3f} mm on poses not fitted"
+    if "held_out_after_rms_mm" in gap:
+        told += f", {gap['held_out_after_rms_mm']:.3f} mm on held-out poses"
     return f"{result.robot}, {of}: {told}\n{fill(headline(result), LINE)}"

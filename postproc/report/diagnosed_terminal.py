@@ -1,4 +1,4 @@
-"""What ``compensate diagnose`` found, on a terminal: the verdict in words, then what it stands on, in tables."""
+"""The result of ``compensate diagnose`` on a terminal: the verdict in words, then its evidence in tables."""
 
 from __future__ import annotations
 
@@ -9,41 +9,36 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from postproc.printable import printable
+from postproc.base.sanitize import sanitize
+from postproc.base.units import MM
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_words import headline, paragraph
 from postproc.report.identified_terminal import add_sizes
-from postproc.report.terminal import show_findings
+from postproc.report.terminal import show_findings, show_rows
 from postproc.report.words import campaign_in_words, count, fixed, shown_unit, some
 from postproc.robot.description import robot_words
-from postproc.units import MM
 
 WIDE = 110
 """Columns of the paragraph at most: longer lines are hard to read."""
 
 
 def show_diagnosed(console: Console, result: Diagnosed, verbose: bool = False) -> None:
-    """Verdict, paragraph, parameters, evidence, where it shows, what is left, next poses, findings."""
-    console.print(Text(printable(headline(result)), style="bold"), soft_wrap=True)
-    console.print(Text(printable(paragraph(result))), width=min(WIDE, console.width))
-    head = Table(box=None, show_header=False, pad_edge=False)
-    head.add_column(style="bold")
-    head.add_column()
-    for key, value in _rows(result):
-        head.add_row(key, Text(printable(value)))
-    console.print(head)
-    tables = (_parameters, _evidence, _alternatives, _refitted, _where, _left, _next_poses)
+    """Verdict, paragraph, parameters, evidence, residual patterns, residuals, next poses, findings."""
+    console.print(Text(sanitize(headline(result)), style="bold"), soft_wrap=True)
+    console.print(Text(sanitize(paragraph(result))), width=min(WIDE, console.width))
+    show_rows(console, ((key, Text(sanitize(value))) for key, value in _rows(result)))
+    tables = (_parameters, _evidence, _alternatives, _refitted, _where, _residuals, _next_poses)
     for make in tables:
         table = make(result, verbose)
         if table.row_count:
             console.print(table)
     if result.next_poses is not None and result.next_poses.readings.direction is not None:
-        console.print("each axis comes there in the sense that the columns DIR of the plan say")
+        console.print("approach each axis in the direction of the columns DIR of the plan")
     show_findings(console, result.findings, verbose)
     for path in result.outputs:
-        console.print(Text(printable(f"wrote {path}")), soft_wrap=True)
+        console.print(Text(sanitize(f"wrote {path}")), soft_wrap=True)
     if result.improves and result.robot_file is None:
-        console.print("-o NEW.yaml writes the robot file with it")
+        console.print("-o NEW.yaml writes the new robot file")
     if result.next_poses is not None and result.next_poses_file is None:
         console.print("--next-poses FILE.csv writes the poses to measure next")
 
@@ -55,7 +50,7 @@ def _rows(result: Diagnosed) -> Iterator[tuple[str, str]]:
     yield "robot", robot_words(result.robot, result.robot_path)
     yield (
         "scatter",
-        f"{result.scatter / MM:.4f} mm RMS in space, from: {final.noise.source}",
+        f"{result.scatter / MM:.4f} mm 3-D RMS, from: {final.noise.source}",
     )
     linear = result.diagnosis.search.linear
     yield "tried", f"{count(len(linear.candidates), 'candidate')}: {', '.join(result.tried)}"
@@ -85,14 +80,21 @@ def _parameters(result: Diagnosed, _verbose: bool) -> Table:
 
 
 def _evidence(result: Diagnosed, verbose: bool) -> Table:
-    """For each effect that is named or might be: what it gains in -2 ln(likelihood), and where."""
+    """The likelihood gain of each named or rejected candidate, in the fit and on held-out data."""
     table = _table(
-        "evidence, -2 ln(likelihood)", "gain", "by chance", "poses", "regions", "sessions", "margin", ""
+        "evidence, 2 ln(likelihood ratio)",
+        "likelihood\ngain",
+        "expected\nby chance",
+        "held-out\nposes",
+        "held-out\nregions",
+        "held-out\nsessions",
+        "margin\nto next",
+        "",
     )
     for named in result.verdict.named:
         its = named.evidence
         numbers = (its.heldout, its.regions, its.sessions, its.margin)
-        nearest = "" if its.alias is None else f"over {its.alias.label}"
+        nearest = "" if its.alias is None else f"next: {its.alias.label}"
         cells = [_number(its.gain), f"{its.chance:.1g}", *map(_number, numbers)]
         table.add_row(named.candidate.label, *cells, nearest)
     for candidate, why in result.verdict.rejected:
@@ -101,13 +103,13 @@ def _evidence(result: Diagnosed, verbose: bool) -> Table:
 
 
 def _alternatives(result: Diagnosed, _verbose: bool) -> Table:
-    """What each explanation of a set gains alone."""
-    table = _table("can not be told apart", "gain alone")
+    """The likelihood gain of each explanation of a set alone."""
+    table = _table("indistinguishable", "likelihood gain alone")
     keys = [candidate.key for candidate in result.diagnosis.search.linear.candidates]
     alone = dict(zip(keys, result.gains.alone.tolist(), strict=True))
-    for rival in result.diagnosis.search.rivals:
+    for alternative in result.diagnosis.search.rivals:
         # what is never looked for by itself gains as much less than the first as it fits worse
-        alone.setdefault(rival.candidate.key, alone.get(rival.of, np.nan) - rival.worse)
+        alone.setdefault(alternative.candidate.key, alone.get(alternative.of, np.nan) - alternative.worse)
     for number, alternatives in enumerate(result.verdict.alternatives):
         if number:
             table.add_section()
@@ -117,7 +119,7 @@ def _alternatives(result: Diagnosed, _verbose: bool) -> Table:
 
 
 def _refitted(result: Diagnosed, _verbose: bool) -> Table:
-    table = _table("robot file's own, moved", "before", "value", "+- 95 %", "unit")
+    table = _table("changed in the robot file", "before", "value", "+- 95 %", "unit")
     for estimate in result.verdict.refitted:
         word, size = shown_unit(estimate.unknown.parameter.unit)
         wide = estimate.ci95 / size
@@ -127,8 +129,8 @@ def _refitted(result: Diagnosed, _verbose: bool) -> Table:
 
 
 def _where(result: Diagnosed, verbose: bool) -> Table:
-    """Patterns in what the robot file leaves, its own parameters fitted anew."""
-    table = _table("what is missing goes with", "of it", "")
+    """Patterns in the residuals of the robot file with its own parameters refitted."""
+    table = _table("residual depends on", "share", "")
     rows = {one.variable: one for one in result.patterns}
     for name in some(list(rows), verbose):
         one = rows.get(name)
@@ -139,15 +141,15 @@ def _where(result: Diagnosed, verbose: bool) -> Table:
     return table
 
 
-def _left(result: Diagnosed, _verbose: bool) -> Table:
-    """Residuals before and after: of what was fitted, of poses that were not."""
+def _residuals(result: Diagnosed, _verbose: bool) -> Table:
+    """Residuals before and after: of the fit, of held-out poses."""
     table = _table("residuals, mm", "RMS", "mean", "max", "readings")
     rows = {
-        "before": "the robot file",
-        "refitted": "its own parameters fitted anew",
-        "after": "the model to go on with",
-        "heldout_before": "poses not fitted, the robot file",
-        "heldout_after": "poses not fitted, the model to go on with",
+        "before": "robot file",
+        "refitted": "its own parameters refitted",
+        "after": "final model",
+        "held_out_before": "held-out poses, robot file",
+        "held_out_after": "held-out poses, final model",
     }
     if not result.diagnosis.search.base.unknowns:
         del rows["refitted"]

@@ -1,4 +1,4 @@
-"""A diagnosis in one paragraph, for whoever cuts with it: no more than the readings bear."""
+"""A diagnosis in one paragraph for the user of the robot: no more than the readings support."""
 
 from __future__ import annotations
 
@@ -6,35 +6,35 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from postproc.base.units import MM
 from postproc.diagnosis.candidates import EVERY, Candidate
-from postproc.diagnosis.foils import Foil
+from postproc.diagnosis.decoys import AlternativeForm
 from postproc.diagnosis.verdict import MARGIN, Named
 from postproc.effects import EFFECTS, ComplianceLaw
 from postproc.identification.fit import Estimate, Fit
-from postproc.identification.suspicion import LOADED
+from postproc.identification.sanity_checks import LOADED
 from postproc.report.diagnosed import USUAL, Diagnosed
 from postproc.report.terminal import _once
 from postproc.report.words import count, fixed, shown_unit
-from postproc.units import MM
 
 NOUNS = {
-    "joint_compliance": "compliance of {joints}: the gear gives way in proportion to the torque",
-    "tool_compliance": "compliance of the tool: cutter, holder and spindle give way",
+    "joint_compliance": "compliance of {joints}: the gear deflects in proportion to the torque",
+    "tool_compliance": "compliance of the tool: cutter, holder and spindle deflect",
     "gravity_compensator": "a gravity compensator across {joints}: a spring whose torque follows the angle",
-    "link_gravity": "the arm's own weight beyond {joints}: it bends the arm",
-    "payload": "a weight on the flange: it bends the arm",
+    "link_gravity": "the arm's own weight beyond {joints}: it deflects the arm",
+    "payload": "a weight on the flange: it deflects the arm",
     "base_compliance": "compliance of the foundation: the whole robot tilts under load",
     "link_compliance": "compliance of {joints} across the axis: bearings and links tilt under load",
     "joint_stiffening": "stiffening of {joints}: the gear grows stiffer with load",
-    "backlash": "backlash in {joints}: the gear has a gap",
-    "hysteresis": "hysteresis of {joints}: friction stops the joint short, on the side that it came from",
-    "transmission_error": "a transmission error of {joints}: the gear runs ahead and behind with the angle",
+    "backlash": "backlash in {joints}: the gear has play",
+    "hysteresis": "hysteresis of {joints}: friction stops the joint before its target, on the side of approach",
+    "transmission_error": "a transmission error of {joints}: the gear ratio varies with the angle",
     "joint_offset": "a wrong zero of {joints}",
-    "link_geometry": "wrong geometry at {joints}: the axes do not lie where the links say",
-    "joint_coupling": "a coupling in the wrist: other motors turn {joints} along",
-    "tool_offset": "a shifted tool or target: it is not where it is stated",
-    "base_offset": "a shifted base: the robot does not stand where it is stated",
-    "thermal_growth": "growth of the links before {joints}: they lengthen as the robot warms up",
+    "link_geometry": "wrong geometry at {joints}: the axes differ from the stated link geometry",
+    "joint_coupling": "a coupling in the wrist: other motors also rotate {joints}",
+    "tool_offset": "a tool offset: tool or target differ from the stated position",
+    "base_offset": "a base offset: the robot differs from the stated position",
+    "thermal_growth": "thermal growth of the links before {joints}: they lengthen as the robot warms up",
     "force_sensor": "an error of the stated forces: in their scale or their zero",
 }
 """What an effect is, to those who do not know its name."""
@@ -46,7 +46,7 @@ KEY = 10
 """One of so many poses may show what no other does."""
 
 PARAMETERS = 3
-"""So many of an effect stand in the paragraph, all in the table."""
+"""So many of an effect are in the paragraph, all in the table."""
 
 OVERSTATED = 0.5
 """Variance over the stated one below which readings scatter by less than is stated."""
@@ -56,7 +56,7 @@ FAR_OFF = 1.5
 
 
 def paragraph(result: Diagnosed) -> str:
-    """What the verdict says, how sure it is, what it does not say."""
+    """The verdict, its uncertainty, its limits."""
     told = {
         "nothing_missing": _nothing_missing,
         "named": _named,
@@ -77,34 +77,34 @@ def headline(result: Diagnosed) -> str:
         "named": f"named: {names}",
         "partly_named": f"partly named: {names}",
         "ambiguous": f"ambiguous: {sets}{f'; named: {names}' if names else ''}",
-        "unknown": "unknown: no effect that was tried explains it"
+        "unknown": "unknown: no effect that was tried explains the residual"
         if result.lacking
-        else "unknown: not clear whether something is missing",
+        else "unknown: not clear whether an effect is missing",
     }[verdict.word]
-    return f"{told} (if what is left is scatter)" if verdict.conditional else told
+    return f"{told} (if the residual is scatter)" if verdict.conditional else told
 
 
 def _nothing_missing(result: Diagnosed) -> Iterator[str]:
-    moved, is_ = result.verdict.refitted, "is seen to be" if result.verdict.conditional else "is"
+    moved, is_ = result.verdict.refitted, "appears to be" if result.verdict.conditional else "is"
     if moved:
         yield (
             f"No effect {is_} missing, but {count(len(moved), 'parameter')} of the robot file"
-            f" {'has' if len(moved) == 1 else 'have'} gone stale: {_changes(moved)}. With its parameters fitted anew"
-            f" {_mm(result.rms['before'])} mm RMS become {_mm(result.rms['after'])}."
+            f" {'has' if len(moved) == 1 else 'have'} changed: {_changes(moved)}. Refitting its parameters reduces"
+            f" the residual from {_mm(result.rms['before'])} to {_mm(result.rms['after'])} mm RMS."
         )
         yield from _closed(result)
     else:
-        yield f"Nothing {is_} missing."
+        yield f"No effect {is_} missing."
         if result.rms["before"] > FAR_OFF * result.rms["after"]:
             yield (
-                f"The robot file as it is leaves {_mm(result.rms['before'])} mm RMS, with its parameters fitted anew"
+                f"The residual of the robot file is {_mm(result.rms['before'])} mm RMS, with its parameters refitted"
                 f" {_mm(result.rms['after'])} mm."
             )
     yield from _rest(result)
     if result.detectable is not None:
         yield (
-            f"A missing effect would have shown from about {_mm(result.detectable)} mm RMS on, unless parameters of the"
-            " robot file imitate it."
+            f"A missing effect of about {_mm(result.detectable)} mm RMS or more would have been found, unless"
+            " parameters of the robot file imitate it."
         )
 
 
@@ -116,34 +116,37 @@ def _named(result: Diagnosed) -> Iterator[str]:
     if result.verdict.word == "named":
         yield from _rest(result)
     else:
-        yield from _more(result, "That is not all:", "after")
+        yield from _more(result, "More is missing:", "after")
     yield from _moved_too(result)
 
 
 def _ambiguous(result: Diagnosed) -> Iterator[str]:
-    anew = "even with its parameters fitted anew " if result.diagnosis.search.base.unknowns else ""
+    anew = ", with its parameters refitted," if result.diagnosis.search.base.unknowns else ""
     yield (
-        f"Something is missing: {anew}the robot file leaves {_mm(result.rms['refitted'])} mm RMS"
+        f"An effect is missing: the residual of the robot file{anew} is {_mm(result.rms['refitted'])} mm RMS"
         f"{_against_scatter(result)}."
     )
     if result.clear:
         yield from _missing(result, result.clear)
     for alternatives in result.verdict.alternatives:
         one_of = " or ".join(candidate.label for candidate in alternatives)
-        yield f"Whether it is {one_of}, these readings can not tell: each explains them nearly as well as the first."
-    yield f"With all that was found {_mm(result.rms['explained'])} mm would be left; no robot file is made of a guess."
-    yield from _more(result, "It would not be all:", "explained")
+        yield f"These readings can not distinguish {one_of}: each explains them nearly as well as the first."
+    yield (
+        f"With all effects found the residual would be {_mm(result.rms['explained'])} mm; no robot file is written from"
+        " an ambiguous result."
+    )
+    yield from _more(result, "More is missing:", "explained")
     planned = result.next_poses
     if planned is None:
-        yield "No pose within the limits, with what was hung so far, tells them apart: other loads or targets may."
+        yield "No pose within the limits, with the loads used so far, distinguishes them: other loads or targets may."
         return
     first, second = (candidate.label for candidate in planned.between)
     apart = min(planned.separation)
     if apart < SETTLES:
         yield (
-            f"The best {count(len(planned.poses), 'pose')} with what was hung so far would not settle it: there {first}"
-            f" and {second} differ by {apart:.1f} standard deviations, {SETTLES:.1f} are needed. Other loads or"
-            " targets, or less scatter, may."
+            f"The best {count(len(planned.poses), 'pose')} with the loads used so far would not distinguish them: there"
+            f" {first} and {second} differ by {apart:.1f} standard deviations, {SETTLES:.1f} are required. Other loads"
+            " or targets, or less scatter, may."
         )
         return
     where = f" ({result.next_poses_file})" if result.next_poses_file else ""
@@ -156,48 +159,48 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
 def _unknown(result: Diagnosed) -> Iterator[str]:
     search = result.diagnosis.search
     if not result.lacking:
-        yield "Whether something is missing is not clear."
+        yield "It is not clear whether an effect is missing."
     else:
         yield (
-            f"Something is missing: {_mm(result.rms['after'])} mm RMS are left{_against_scatter(result)}. It is none of"
-            f" the {len(result.tried)} effects that were tried."
+            f"An effect is missing: the residual is {_mm(result.rms['after'])} mm RMS{_against_scatter(result)}. It is"
+            f" none of the {len(result.tried)} effects that were tried."
         )
     rejected = {candidate.key for candidate, _ in result.verdict.rejected}
     near = [candidate.label for candidate in search.chosen if candidate.key not in rejected]
     if near:
         yield (
-            f"The most that was found is {_list(near)}, and with it still {_mm(result.rms['explained'])} mm would be"
-            " left: too much for a name."
+            f"The best explanation is {_list(near)}, but the residual would still be"
+            f" {_mm(result.rms['explained'])} mm: too much to name an effect."
         )
     yield from _rejected(result)
     if result.patterns:
         first = result.patterns[0]
         yield (
-            f"What is left goes with {first.variable} ({100 * first.share:.0f} % of its squares; {first.pattern}): look"
-            " there, at the robot and at the measurement."
+            f"The residual depends on {first.variable} ({100 * first.share:.0f} % of its squares; {first.pattern}):"
+            " check robot and measurement there."
         )
     yield from _moved_too(result)
 
 
 def _missing(result: Diagnosed, several: Sequence[Named]) -> Iterator[str]:
-    """What each effect is, its size, what it does."""
+    """Each effect, its parameters and its displacement."""
     if len(several) > 1:
         yield f"{len(several)} effects are missing."
     for number, named in enumerate(several, 1):
-        begin = f"({number})" if len(several) > 1 else "What is missing is"
+        start = f"({number})" if len(several) > 1 else "The missing effect is"
         size = result.moved[named.candidate.key]
         does = ""
         if size is not None:
-            does = f"; in these readings it makes {_mm(size.rms)} mm RMS, {_mm(size.max)} mm at most"
-        yield f"{begin} {noun(named)} ({named.effect}: {_parameters(named)}){does}."
-        if named.held:
-            yield f"The readings do not tell {_held(named)}: what stands above holds for that."
+            does = f"; it displaces these readings by {_mm(size.rms)} mm RMS, {_mm(size.max)} mm at most"
+        yield f"{start} {noun(named)} ({named.effect}: {_parameters(named)}){does}."
+        if named.fixed:
+            yield f"The readings do not determine {_fixed(named)}: the values above apply with these fixed."
 
 
-def _held(named: Named) -> str:
-    """``s0 (300 mm taken)``"""
+def _fixed(named: Named) -> str:
+    """``s0 (fixed at 300 mm)``"""
     units = {u.parameter.name: shown_unit(u.parameter.unit) for u in named.candidate.unknowns}
-    told = [f"{name} ({value / units[name][1]:.4g} {units[name][0]} taken)" for name, value in named.held]
+    told = [f"{name} (fixed at {value / units[name][1]:.4g} {units[name][0]})" for name, value in named.fixed]
     return _list(told)
 
 
@@ -208,7 +211,7 @@ def noun(named: Named) -> str:
 
 
 def _parameters(named: Named) -> str:
-    """The parameters that are seen best."""
+    """The parameters with the smallest relative intervals."""
     several = sorted(
         named.estimates, key=lambda e: e.ci95 / max(abs(e.value - e.unknown.parameter.null), 1e-300)
     )
@@ -226,46 +229,46 @@ def with_interval(estimate: Estimate) -> str:
 
 
 def _attributed(result: Diagnosed) -> Iterator[str]:
-    """What is owed to the effects, and not to parameters that were there already."""
+    """The contribution of the effects, apart from that of refitted parameters."""
     if result.diagnosis.search.base.unknowns:
-        several = "them" if len(result.verdict.named) > 1 else "it"
+        several = "these effects" if len(result.verdict.named) > 1 else "this effect"
         yield (
-            f"The robot file leaves {_mm(result.rms['before'])} mm RMS, {_mm(result.rms['refitted'])} mm with its own"
-            f" parameters fitted anew, and {_mm(result.rms['after'])} mm with {several}."
+            f"The residual of the robot file is {_mm(result.rms['before'])} mm RMS,"
+            f" {_mm(result.rms['refitted'])} mm with its own parameters refitted,"
+            f" and {_mm(result.rms['after'])} mm with {several}."
         )
 
 
 def _closed(result: Diagnosed) -> Iterator[str]:
-    """What holds on poses that were not fitted."""
-    before, after = result.rms["heldout_before"], result.rms["heldout_after"]
+    """The result on held-out poses."""
+    before, after = result.rms["held_out_before"], result.rms["held_out_after"]
     if not np.isfinite(before + after):
         return
     if after >= before:
         kept, others = _most_poses(result)
         if kept < before:
             yield (
-                f"On poses that were left out of the fit {_mm(before)} mm RMS become {_mm(kept)}, but for"
-                f" {count(others, 'pose')} that can not be left out: the others do not show what"
+                f"On held-out poses the residual falls from {_mm(before)} to {_mm(kept)} mm RMS, except at"
+                f" {count(others, 'pose')} that can not be held out: the other poses do not show what"
                 f" {'it shows' if others == 1 else 'they show'}."
             )
             return
         yield (
-            f"But on poses that were left out of the fit it brings nothing: {_mm(before)} mm RMS before,"
-            f" {_mm(after)} mm after."
+            f"But on held-out poses the residual does not fall: {_mm(before)} mm RMS before, {_mm(after)} mm after."
         )
         return
     scatter = result.scatter if not result.verdict.conditional else 0.0
-    of = " of what is more than scatter" if scatter else ""
+    of = " of the part above the scatter." if scatter else "."
     share = 100.0 * min(1.0, (before - after) / max(before - scatter, 1e-300))
     yield (
-        f"On poses that were left out of the fit {_mm(before)} mm RMS become {_mm(after)}: {np.floor(share):.0f} %{of}"
-        " is closed."
+        f"On held-out poses the residual falls from {_mm(before)} to {_mm(after)} mm RMS:"
+        f" by {np.floor(share):.0f} %{of}"
     )
 
 
 def _most_poses(result: Diagnosed) -> tuple[float, int]:
-    """[m] root mean square of what is left of poses not fitted, without the worst of them, and how many those are."""
-    pose, left = result.final.campaign.pose, result.lengths["heldout_after"]
+    """[m] root mean square of the residuals of held-out poses, without the worst of them, and how many those are."""
+    pose, left = result.final.campaign.pose, result.lengths["held_out_after"]
     squares = np.array([np.nansum(left[pose == k] ** 2) for k in range(result.final.campaign.poses)])
     worst = np.argsort(-squares)[: max(1, len(squares) // KEY)]
     rest = left[~np.isin(pose, worst)]
@@ -273,55 +276,55 @@ def _most_poses(result: Diagnosed) -> tuple[float, int]:
 
 
 def _nearest(several: Sequence[Named]) -> Iterator[str]:
-    """The explanation that comes nearest to one that was named."""
+    """The next best explanation."""
     named = min(several, key=lambda one: one.evidence.margin)
     alias, margin = named.evidence.alias, named.evidence.margin
-    of = f" to {named.candidate.label}" if len(several) > 1 else ""
+    of = f" after {named.candidate.label}" if len(several) > 1 else ""
     if alias is None:
-        yield "No other effect that was tried comes near."
+        yield "No other effect that was tried explains nearly as much."
     elif (alias.name, alias.joint) == (named.candidate.name, named.candidate.joint) and margin < MARGIN:
-        yield f"Another form of it, {alias.label}, explains nearly as much (by {margin:.0f} in -2 ln(likelihood) less)."
+        yield f"Another form of it, {alias.label}, explains nearly as much (its likelihood gain is {margin:.0f} lower)."
     elif margin < MARGIN:
         yield (
-            f"The nearest other explanation{of}, {alias.label}, fits worse by {margin:.0f} in -2 ln(likelihood) only;"
-            f" the {named.effect} is taken because the robot file describes one."
+            f"The next best explanation{of}, {alias.label}, has a likelihood gain only {margin:.0f} lower; the"
+            f" {named.effect} is named because the robot file describes one."
         )
     else:
         yield (
-            f"The nearest other explanation{of}, {alias.label}, fits clearly worse: by {margin:.0f} in"
-            f" -2 ln(likelihood), where {MARGIN:.0f} are asked for."
+            f"The next best explanation{of}, {alias.label}, fits clearly worse: its likelihood gain is {margin:.0f}"
+            f" lower, {MARGIN:.0f} are required."
         )
 
 
 def _rest(result: Diagnosed) -> Iterator[str]:
-    """What is left, where that is no lack of fit."""
+    """The residual, where that is no lack of fit."""
     left = _mm(result.rms["after"])
     if result.verdict.conditional:
         return
-    if result.verdict.lack < OVERSTATED:
+    if result.verdict.reduced_chi2 < OVERSTATED:
         yield (
-            f"What is left, {left} mm RMS, is clearly less than the scatter ({_mm(result.scatter)} mm, from:"
-            f" {result.final.noise.source}): if that is too large, small effects hide behind it."
+            f"The residual, {left} mm RMS, is clearly smaller than the scatter ({_mm(result.scatter)} mm, from:"
+            f" {result.final.noise.source}): if that is overstated, it hides small effects."
         )
     elif result.rms["after"] > FAR_OFF * result.scatter:
         yield (
-            f"What is left is {left} mm RMS where readings scatter by {_mm(result.scatter)} mm: a few of them lie far"
-            " off, the others scatter as they should."
+            f"The residual is {left} mm RMS where readings scatter by {_mm(result.scatter)} mm: a few of them are far"
+            " off, the others agree with the scatter."
         )
     else:
-        yield f"What is left, {left} mm RMS, is the scatter of the readings ({_mm(result.scatter)} mm)."
+        yield f"The residual, {left} mm RMS, is the scatter of the readings ({_mm(result.scatter)} mm)."
 
 
-def _more(result: Diagnosed, begin: str, fit: str) -> Iterator[str]:
-    """What stays unexplained by a fit."""
+def _more(result: Diagnosed, start: str, fit: str) -> Iterator[str]:
+    """The part that a fit does not explain."""
     if result.lacking:
         yield (
-            f"{begin} {_mm(result.rms[fit])} mm RMS are left{_against_scatter(result)}, and none of the"
+            f"{start} the residual is {_mm(result.rms[fit])} mm RMS{_against_scatter(result)}, and none of the"
             f" {len(result.tried)} effects that were tried explains the rest."
         )
-        if result.verdict.left:
-            first = result.verdict.left[0]
-            yield f"It goes with {first.variable} ({first.pattern})."
+        if result.verdict.remainder:
+            first = result.verdict.remainder[0]
+            yield f"It depends on {first.variable} ({first.pattern})."
     yield from _rejected(result)
 
 
@@ -332,12 +335,17 @@ def _rejected(result: Diagnosed) -> Iterator[str]:
 
 def _course(result: Diagnosed, candidate: Candidate) -> str:
     """Which course explains clearly more than an effect; "" where none does."""
-    for rival in result.diagnosis.search.rivals:
-        course = rival.candidate.effect
-        if rival.of == candidate.key and isinstance(course, Foil) and rival.fitted and rival.margin < -MARGIN:
-            what = f"{course.about} {rival.candidate.joint}".strip()
+    for alternative in result.diagnosis.search.rivals:
+        course = alternative.candidate.effect
+        if (
+            alternative.of == candidate.key
+            and isinstance(course, AlternativeForm)
+            and alternative.fitted
+            and alternative.margin < -MARGIN
+        ):
+            what = f"{course.about} {alternative.candidate.joint}".strip()
             return (
-                f"; {what}, no effect of the library, fits better by {-rival.margin:.0f} in -2 ln(likelihood)"
+                f"; {what}, no effect of the library, has a likelihood gain {-alternative.margin:.0f} higher"
             )
     return ""
 
@@ -345,7 +353,7 @@ def _course(result: Diagnosed, candidate: Candidate) -> str:
 def _moved_too(result: Diagnosed) -> Iterator[str]:
     moved = result.verdict.refitted
     if moved:
-        yield f"The robot file's own values have moved as well: {_changes(moved)}."
+        yield f"Parameters of the robot file have changed as well: {_changes(moved)}."
 
 
 def _changes(moved: Sequence[Estimate]) -> str:
@@ -368,25 +376,25 @@ def _against_scatter(result: Diagnosed) -> str:
 def _conditional(result: Diagnosed) -> Iterator[str]:
     if result.verdict.conditional:
         yield (
-            f"All this holds if readings scatter by as much as the residuals say, {_mm(result.scatter)} mm RMS: neither"
-            " SIGMA nor repeated readings state it, and an effect of that size would be taken for scatter."
+            f"This verdict assumes that readings scatter as much as the residuals, {_mm(result.scatter)} mm RMS:"
+            " neither SIGMA nor repeated readings state it, and an effect of that size would be mistaken for scatter."
         )
 
 
 def _not_tested(result: Diagnosed) -> Iterator[str]:
-    """What was not looked for, or only for much of it, and which readings would show it."""
-    for names, begin in (
+    """The effects that were not tested, or only at large size, and which readings would show them."""
+    for names, start in (
         (result.verdict.not_testable, "Not tested:"),
-        (result.hardly_tested, f"Tested only for {USUAL:.0f} times their usual size or more:"),
+        (result.hardly_tested, f"Tested only at {USUAL:.0f} times their usual size or more:"),
     ):
         advised: dict[str, list[str]] = {}
         for name in names:
-            advised.setdefault(shown_by(name, result.final), []).append(name)
+            advised.setdefault(evidence_words(name, result.final), []).append(name)
         if advised:
-            yield f"{begin} {'; '.join(f'{_list(of)} (shown by {what})' for what, of in advised.items())}."
+            yield f"{start} {'; '.join(f'{_list(of)} (shown by {what})' for what, of in advised.items())}."
 
 
-def shown_by(name: str, fitted: Fit) -> str:
+def evidence_words(name: str, fitted: Fit) -> str:
     """What would show an effect that readings and model of a fit do not."""
     effect, campaign = EFFECTS[name], fitted.campaign
     readings = campaign.readings
@@ -395,9 +403,9 @@ def shown_by(name: str, fitted: Fit) -> str:
     if effect.family in ("geometric", "weight") and readings.deflection:
         return "absolute positions"
     if name == "tool_offset" and not campaign.place_known.all():
-        return "targets whose places are stated"
+        return "targets with stated positions"
     if effect.family == "weight" and not any(isinstance(t.effect, ComplianceLaw) for t in fitted.model.terms):
-        return "a robot file that states how joints give way"
+        return "a robot file with joint compliance"
     if effect.family in LOADED and not readings.wrench.any():
         return "readings with and without a weight"
     if effect.by_direction:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Ints, sums
-from postproc.blocks import in_blocks
-from postproc.document import Document, Edit, Edits, gathered
+from postproc.base.arrays import Bools, Ints, sums
+from postproc.base.batches import in_blocks
+from postproc.base.document import Document, Edit, Edits, gathered
 
 CONTEXT = 3
 """Lines shown around a change, as diff -u does."""
@@ -57,19 +57,19 @@ class _Hunks:
 
 
 def unified_diff(document: Document, name: str, edits: Iterable[Edit], written: bytes) -> Iterator[bytes]:
-    """The change of one document into ``written`` by ``edits``, in parts; every changed line stands before its new form
+    """The change of one document into ``written`` by ``edits``, in parts; every changed line is before its new form
     (lines keep their bytes, CR included)."""
     found = Edits.joined(edits)
     if not found:
         return
-    old, new = _Lines(document), _Lines(Document(document.path, written))
+    old, new = _DiffLines(document), _DiffLines(Document(document.path, written))
     blocks = _blocks(old, new, found)
     hunks = _hunks(old, blocks)
     yield b"--- %s\n+++ %s\n" % (os.fsencode(document.path.name), os.fsencode(name))
     yield from in_blocks(lambda rows: _part(old, new, hunks, blocks, rows), len(blocks), BLOCKS)
 
 
-class _Lines:
+class _DiffLines:
     """The lines of a text, with their endings; one without an ending has what diff says of it."""
 
     def __init__(self, document: Document) -> None:
@@ -81,23 +81,23 @@ class _Lines:
     def of(self, offsets: Ints) -> Ints:
         """The lines (K,), from 0, that hold these bytes (K,), which ascend."""
         low, high = np.searchsorted(self.starts, [offsets[0], offsets[-1]], side="right")
-        begin = np.searchsorted(offsets, self.starts[low:high])
-        return low - 1 + np.cumsum(np.bincount(begin, minlength=len(offsets)))
+        start = np.searchsorted(offsets, self.starts[low:high])
+        return low - 1 + np.cumsum(np.bincount(start, minlength=len(offsets)))
 
     def part(self, first: int, stop: int) -> tuple[bytes, Ints]:
-        """The lines first .. stop - 1, and where in them each begins and the last one ends."""
+        """The lines first .. stop - 1, and where in them each starts and the last one ends."""
         bounds = self.bounds[first : stop + 1]
         text = self.raw[int(bounds[0]) : int(bounds[-1])]
         return text + _OPEN if self._open and stop == self.count else text, bounds - bounds[0]
 
 
-def _blocks(old: _Lines, new: _Lines, edits: Edits) -> _Blocks:
-    """All blocks; of those at the end of a text the line behind its last ending is none."""
+def _blocks(old: _DiffLines, new: _DiffLines, edits: Edits) -> _Blocks:
+    """All blocks; of those at the end of a text the line after its last ending is none."""
     parts = [_touched(old, edits, low, high) for low, high in _apart(old.raw, edits)]
     first, last, grown = np.concatenate(parts, axis=1)
-    begin = (first + sums(grown)[:-1]).astype(np.int32)
-    stop = np.minimum(begin + last - first + 1 + grown, new.count)
-    return _Blocks(first, np.minimum(last, old.count - 1), begin, stop - begin)
+    start = (first + sums(grown)[:-1]).astype(np.int32)
+    stop = np.minimum(start + last - first + 1 + grown, new.count)
+    return _Blocks(first, np.minimum(last, old.count - 1), start, stop - start)
 
 
 def _apart(raw: bytes, edits: Edits) -> Iterator[tuple[int, int]]:
@@ -116,7 +116,7 @@ def _apart(raw: bytes, edits: Edits) -> Iterator[tuple[int, int]]:
         low = high
 
 
-def _touched(old: _Lines, edits: Edits, low: int, high: int) -> Ints:
+def _touched(old: _DiffLines, edits: Edits, low: int, high: int) -> Ints:
     """(3, B) first and last line of the blocks of the edits low .. high - 1, and the lines by which each grows."""
     at, last = _joined(old, edits, low, high)
     start, stop, ends = edits.start[at], edits.stop[last], edits.ends[np.append(at, high)]
@@ -126,20 +126,20 @@ def _touched(old: _Lines, edits: Edits, low: int, high: int) -> Ints:
     last = np.where(cut & to_begin, behind - 1, behind)
     breaks = np.flatnonzero(np.frombuffer(edits.texts, np.uint8)[ends[0] : ends[-1]] == _LF) + int(ends[0])
     growth = np.diff(np.searchsorted(breaks, ends)) - (behind - first)
-    # Whole lines that are inserted touch no line; a line whose ending goes, joins the one behind it.
+    # Whole lines that are inserted touch no line; a line whose ending goes, joins the one after it.
     whole = ~cut & at_begin & ended
     joined = cut & to_begin & ~(ended | (emptied & at_begin))
     last = np.where(joined, behind, last)
     last = np.where(whole, first - 1, last)
     reached = np.maximum.accumulate(last)
-    begins = np.ones(len(start), dtype=bool)
-    begins[1:] = first[1:] > reached[:-1]
-    at = np.flatnonzero(begins)
+    starts = np.ones(len(start), dtype=bool)
+    starts[1:] = first[1:] > reached[:-1]
+    at = np.flatnonzero(starts)
     lines = np.stack([first[at], np.maximum.reduceat(last, at), np.add.reduceat(growth, at)])
     return lines.astype(np.int32)
 
 
-def _joined(old: _Lines, edits: Edits, low: int, high: int) -> tuple[Ints, Ints]:
+def _joined(old: _DiffLines, edits: Edits, low: int, high: int) -> tuple[Ints, Ints]:
     """Runs of edits that abut: their first ones and their last ones.  A run ends where a line does on both sides."""
     parted = edits.start[low + 1 : high] > edits.stop[low : high - 1]
     k = np.flatnonzero(~parted) + low + 1
@@ -150,14 +150,14 @@ def _joined(old: _Lines, edits: Edits, low: int, high: int) -> tuple[Ints, Ints]
     return np.append(low, begin), np.append(begin, high) - 1
 
 
-def _ended(texts: bytes, begin: Ints, end: Ints) -> Bools:
+def _ended(texts: bytes, start: Ints, end: Ints) -> Bools:
     """(K,) whether each of these parts of ``texts`` ends a line; an empty one does not."""
-    found = end > begin
+    found = end > start
     found[found] = np.frombuffer(texts, np.uint8)[end[found] - 1] == _LF
     return found
 
 
-def _hunks(old: _Lines, blocks: _Blocks) -> _Hunks:
+def _hunks(old: _DiffLines, blocks: _Blocks) -> _Hunks:
     far = np.flatnonzero(blocks.first[1:] - blocks.last[:-1] - 1 > 2 * CONTEXT) + 1
     at = np.concatenate([[0], far, [len(blocks)]])
     top = np.maximum(blocks.first[at[:-1]] - CONTEXT, 0)
@@ -167,27 +167,27 @@ def _hunks(old: _Lines, blocks: _Blocks) -> _Hunks:
     return _Hunks(at, top, count, top + blocks.new[at[:-1]] - blocks.first[at[:-1]], count + grown)
 
 
-def _part(old: _Lines, new: _Lines, hunks: _Hunks, blocks: _Blocks, rows: slice) -> bytes:
+def _part(old: _DiffLines, new: _DiffLines, hunks: _Hunks, blocks: _Blocks, rows: slice) -> bytes:
     """The text of some blocks: of each the head of its hunk, the lines before it, its old ones and its new ones, and
-    the lines behind it; a head before the first of a hunk only, lines behind it after the last."""
+    the lines after it; a head before the first of a hunk only, lines after it after the last."""
     here, number = blocks[rows], np.arange(rows.start, rows.stop)
     hunk = np.searchsorted(hunks.at, number, side="right") - 1
-    begins, ends = hunks.at[hunk] == number, hunks.at[hunk + 1] == number + 1
-    before = np.where(begins, hunks.top[hunk], blocks.last[number - 1] + 1)
+    starts, ends = hunks.at[hunk] == number, hunks.at[hunk + 1] == number + 1
+    before = np.where(starts, hunks.top[hunk], blocks.last[number - 1] + 1)
     stop = np.where(ends, hunks.top[hunk] + hunks.old[hunk], here.last + 1)
-    heads = _heads(hunks, hunk[begins])
+    heads = _heads(hunks, hunk[starts])
     old_text, old_bounds = old.part(before[0], stop[-1])
     new_text, new_bounds = new.part(here.new[0], here.new[-1] + here.count[-1])
     # All lines of the part in one table, and the place of each run of lines in it.
     texts = (_SIGNS, b"".join(heads), old_text, new_text)
     at = sums(np.array([len(text) for text in texts]))
     bounds = (sums(np.array([len(head) for head in heads], np.int64)), old_bounds, new_bounds)
-    table = np.concatenate([own + begin for own, begin in zip(bounds, at[1:-1], strict=True)])
+    table = np.concatenate([own + start for own, start in zip(bounds, at[1:-1], strict=True)])
     to_old = len(heads) + 1 - before[0]
     to_new = len(heads) + 1 + len(old_bounds) - here.new[0]
     first = np.stack(
         [
-            np.cumsum(begins) - 1,
+            np.cumsum(starts) - 1,
             before + to_old,
             here.first + to_old,
             here.new + to_new,
@@ -196,7 +196,7 @@ def _part(old: _Lines, new: _Lines, hunks: _Hunks, blocks: _Blocks, rows: slice)
         axis=1,
     ).ravel()
     count = np.stack(
-        [begins, here.first - before, here.last - here.first + 1, here.count, stop - here.last - 1], axis=1
+        [starts, here.first - before, here.last - here.first + 1, here.count, stop - here.last - 1], axis=1
     ).ravel()
     place = sums(count)
     line = np.arange(place[-1]) + np.repeat(first - place[:-1], count)

@@ -1,4 +1,4 @@
-"""What ``compensate identify`` found: parameters with intervals, and what they leave; as JSON and CSV."""
+"""The result of ``compensate identify``: parameters with intervals, and residuals; as JSON and CSV."""
 
 from __future__ import annotations
 
@@ -9,19 +9,28 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
-from postproc.findings import Finding
+from postproc.base.arrays import Bools, Floats
+from postproc.base.findings import Finding
 from postproc.identification.fit import Estimate, Fit
 from postproc.identification.identifiable import strong_correlations
 from postproc.identification.outliers import Outlier
 from postproc.identification.validation import Bootstrap, Validation
 from postproc.report.report import exit_code
-from postproc.report.residuals import Sizes, Variable, gap_of, joint_variables, lengths_of, mm, residuals_csv
+from postproc.report.residuals import (
+    ResidualVariable,
+    Sizes,
+    gap_of,
+    joint_variables,
+    lengths_of,
+    mm,
+    residuals_csv,
+)
+from postproc.report.result_keys import complete_result
 from postproc.robot.chain import generalized_force
 from postproc.robot.provenance import GAP
 
 STRONG = 0.9
-"""Correlations above are told."""
+"""Correlations above are reported."""
 
 SAME_FORCE = 0.01
 """Share by which forces must differ before readings are sorted by them."""
@@ -29,7 +38,7 @@ SAME_FORCE = 0.01
 
 @dataclass(frozen=True)
 class Sum:
-    """Parameters that only show together: ``of`` name -> weight, of which the first was found and the others held;
+    """Parameters that only show together: ``of`` name -> weight, of which the first is found and the others are fixed;
     ``value`` and ``ci95`` (SI) of their sum."""
 
     of: Mapping[str, float]
@@ -40,11 +49,11 @@ class Sum:
 
 @dataclass(frozen=True)
 class Identified:
-    """What ``identify`` found.
+    """The result of ``identify``.
 
-    data: name and SHA-256 of each file; effects: the words asked for; before, after: without and with the unknowns;
-    held: dimensions of hardware taken as they stand; heldout_before, heldout_after (R, 3) [m]: what fits without the
-    pose leave of it; outliers: rows of the campaign, left out of both fits or not.
+    data: name and SHA-256 of each file; effects: as asked for; before, after: without and with the unknowns; fixed:
+    dimensions of hardware that are not fitted; held_out_before, held_out_after (R, 3) [m]: residuals of each pose by
+    fits without this pose; outliers: rows of the campaign, excluded from both fits or not.
     """
 
     robot: str
@@ -54,9 +63,9 @@ class Identified:
     effects: tuple[str, ...]
     before: Fit
     after: Fit
-    held: tuple[str, ...]
-    heldout_before: Floats | None
-    heldout_after: Floats | None
+    fixed: tuple[str, ...]
+    held_out_before: Floats | None
+    held_out_after: Floats | None
     folds: int
     validation: Validation | None
     outliers: tuple[Outlier, ...]
@@ -79,9 +88,9 @@ class Identified:
 
     @cached_property
     def residuals(self) -> dict[str, Floats]:
-        """(R, 3) [m] of all readings, under the names that ``gap`` begins with; NaN where nothing was measured."""
+        """(R, 3) [m] of all readings, under the names that ``gap`` starts with; NaN where nothing was measured."""
         known = {"before": self.before.residual, "after": self.after.residual}
-        held = {"heldout_before": self.heldout_before, "heldout_after": self.heldout_after}
+        held = {"held_out_before": self.held_out_before, "held_out_after": self.held_out_after}
         return known | {name: values for name, values in held.items() if values is not None}
 
     @cached_property
@@ -113,30 +122,30 @@ class Identified:
         return float(np.sqrt(np.mean(noise.sigma**2) * (1.0 if noise.known else self.after.factor)))
 
     @cached_property
-    def joints(self) -> tuple[Variable, ...]:
+    def joints(self) -> tuple[ResidualVariable, ...]:
         """Where each joint stood."""
         return joint_variables(self.after.campaign.readings)
 
     @cached_property
-    def load(self) -> Variable | None:
+    def load(self) -> ResidualVariable | None:
         """The force, or where that is always the same the largest torque on a joint; None where nothing acts."""
         campaign, model = self.after.campaign, self.after.model
         force = np.linalg.norm(campaign.readings.wrench[:, :3], axis=1)
         if np.ptp(force) > SAME_FORCE * force.max():
-            return Variable("force", "N", force)
+            return ResidualVariable("force", "N", force)
         if not campaign.readings.wrench.any():
             return None
         swept = model.state(campaign.q, campaign.wrench, campaign.tool, campaign.conditions).swept
         torque = generalized_force(swept, swept.position, campaign.wrench.T)[model.chain.motor_rows]
         turning = [not slides for _, slides in campaign.readings.joints]
-        return Variable(
+        return ResidualVariable(
             "largest joint torque", "N m", np.abs(torque[turning]).max(axis=0, initial=0.0)[campaign.at]
         )
 
     @property
-    def order(self) -> Variable:
+    def order(self) -> ResidualVariable:
         """The number of each reading, in the order of time."""
-        return Variable("reading", "", np.arange(1.0, len(self.after.campaign) + 1.0))
+        return ResidualVariable("reading", "", np.arange(1.0, len(self.after.campaign) + 1.0))
 
     # Parameters.
 
@@ -187,7 +196,7 @@ class Identified:
             effects.setdefault(effect, {})[parameter] = self._parameter(estimate)
         units = {unknown.name: unknown.parameter.unit for unknown in after.asked}
         values = {u.name: after.model.terms[u.term].values[u.parameter.name] for u in after.asked}
-        return {
+        result = {
             "robot": self.robot,
             "robot_file": str(self.robot_file),
             "robot_digest": self.robot_digest,
@@ -218,7 +227,7 @@ class Identified:
                 {"name": one.name, "why": one.why, "value": values[one.name], "unit": units[one.name]}
                 for one in after.dropped
             ],
-            "held": list(self.held),
+            "fixed": list(self.fixed),
             "at_bound": [estimate.unknown.name for estimate in after.estimates if estimate.at_bound],
             "correlations": [[a, b, round(size, 6)] for a, b, size in self.correlations],
             "bootstrap": None if self.bootstrap is None else {"draws": self.bootstrap.draws},
@@ -239,11 +248,12 @@ class Identified:
                 }
                 for one in self.outliers
             ],
-            "outliers_left_out": self.outliers_left_out,
+            "outliers_excluded": self.outliers_left_out,
             "findings": [finding.as_json() for finding in self.findings],
             "outputs": list(self.outputs),
             "exit": self.exit,
         }
+        return complete_result("identify", result)
 
     def _parameter(self, estimate: Estimate) -> dict[str, object]:
         unknown = estimate.unknown
@@ -276,7 +286,7 @@ class Identified:
         told: dict[str, object] = {
             "data": [path.name for path in self.validation.campaign.readings.files],
             "readings": len(self.validation.campaign),
-            "registered_anew": self.validation.registered_anew,
+            "registration_refitted": self.validation.registered_anew,
         }
         for name, lengths in self.validation_lengths.items():
             size = Sizes.of(lengths)
@@ -302,7 +312,7 @@ class Identified:
             "order": self._by(self.order),
         }
 
-    def _by(self, variable: Variable) -> dict[str, object]:
+    def _by(self, variable: ResidualVariable) -> dict[str, object]:
         parts = []
         for rows in variable.parts():
             inside = variable.values[rows]
@@ -319,11 +329,11 @@ class Identified:
 
 
 def identified_csv(result: Identified) -> bytes:
-    """One row a reading: where it stands, its axes, what is left of it before, after and as one that was not fitted."""
+    """One row per reading: its place, its axes, its residual before, after, and of a fit without its pose."""
     residuals = {
         "before": result.before.residual,
         "after": result.after.residual,
-        "heldout": result.heldout_after,
+        "held_out": result.held_out_after,
     }
     outlier = {one.row for one in result.outliers}
     more = {

@@ -1,7 +1,7 @@
-"""What an identification leaves, as a picture: the size of each residual before and after, by each joint, direction,
+"""The residuals of an identification as a picture: the size of each before and after, by each joint, direction,
 load and in the order of time, on a logarithmic scale.
 
-Grey, blue and orange (Okabe and Ito) can be told apart by everybody; lines and points differ by their form too.
+Grey, blue and orange (Okabe and Ito) can be distinguished by everybody; lines and points differ by their form too.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
-from postproc.arrays import Floats, Ints
-from postproc.printable import printable, printable_lines
+from postproc.base.arrays import Floats, Ints
+from postproc.base.sanitize import sanitize, sanitize_lines
+from postproc.base.units import MM
 from postproc.report.identified import Identified
 from postproc.report.picture import rendered
-from postproc.report.residuals import Sizes, Variable
-from postproc.units import MM
+from postproc.report.residuals import ResidualVariable, Sizes
 
 COLUMNS = 3
 MAX_POINTS = 900
@@ -35,14 +35,14 @@ SMALL = 2.0
 """[%] Of the fitted residuals, so many lie below the scale and are drawn at its edge."""
 
 LEAST = 1e-6
-"""[mm] The scale begins no lower."""
+"""[mm] The scale starts no lower."""
 
-_NAMES = {"before": "before", "after": "fitted", "heldout_after": "poses not fitted"}
-_COLOURS = {"before": "#7f7f7f", "after": "#0072b2", "heldout_after": "#d55e00"}
+_NAMES = {"before": "before", "after": "fitted", "held_out_after": "held-out poses"}
+_COLOURS = {"before": "#7f7f7f", "after": "#0072b2", "held_out_after": "#d55e00"}
 _LINES: dict[str, dict[str, Any]] = {
     "before": {"linestyle": "-", "linewidth": 1.8, "marker": "s", "markersize": 3.5},
     "after": {"linestyle": "-", "linewidth": 2.2, "marker": "o", "markersize": 4.5},
-    "heldout_after": {"linestyle": "--", "linewidth": 1.2, "marker": "D", "markersize": 2.0},
+    "held_out_after": {"linestyle": "--", "linewidth": 1.2, "marker": "D", "markersize": 2.0},
 }
 _POINTS = {"before": "s", "after": "o"}
 _SCATTER: dict[str, Any] = {"color": "black", "linestyle": ":", "linewidth": 0.9}
@@ -65,7 +65,7 @@ def _figure(result: Identified) -> Figure:
     count = len(by) + 1
     rows = -(-count // COLUMNS)
     figure = Figure(figsize=(3.7 * COLUMNS, 2.5 * rows + 1.1), layout="constrained")
-    figure.suptitle(printable_lines(_title(result)), fontsize=10, parse_math=False)
+    figure.suptitle(sanitize_lines(_title(result)), fontsize=10, parse_math=False)
     panels = figure.subplots(rows, COLUMNS, squeeze=False, sharey=True).ravel()
     ends = _scale(result)
     for axes, variable in zip(panels, by, strict=False):
@@ -87,14 +87,14 @@ def _figure(result: Identified) -> Figure:
     return figure
 
 
-def _scattered(axes: Axes, result: Identified, variable: Variable, least: float) -> None:
+def _scattered(axes: Axes, result: Identified, variable: ResidualVariable, least: float) -> None:
     """Readings as points, and the root mean square of each part of them as a line."""
     few = len(result.after.campaign) <= FEW
     style: dict[str, Any] = {"markeredgewidth": 0, "linestyle": "none"}
     style |= {"markersize": 4.5, "alpha": 0.7} if few else {"markersize": 2.6, "alpha": 0.35}
     for name, marker in _POINTS.items():
         size = result.lengths[name] / MM
-        rows = shown_rows(size)
+        rows = rows_to_draw(size)
         height = np.maximum(size[rows], least)
         axes.plot(variable.values[rows], height, marker=marker, color=_COLOURS[name], **style)
     parts = variable.parts()
@@ -107,7 +107,7 @@ def _scattered(axes: Axes, result: Identified, variable: Variable, least: float)
     axes.plot(variable.values[far], result.lengths["after"][far] / MM, **_OUTLIER)
     if result.after.noise.known:
         axes.axhline(result.after.noise.rms / MM, **_SCATTER)
-    axes.set_xlabel(printable(f"{variable.name}, {variable.unit}").rstrip(", "), fontsize=9, parse_math=False)
+    axes.set_xlabel(sanitize(f"{variable.name}, {variable.unit}").rstrip(", "), fontsize=9, parse_math=False)
 
 
 def _directions(axes: Axes, result: Identified) -> None:
@@ -123,8 +123,8 @@ def _directions(axes: Axes, result: Identified) -> None:
     axes.set_xlabel("direction, robot base (one coordinate)", fontsize=9)
 
 
-def shown_rows(size: Floats) -> Ints:
-    """Rows of ``size`` (R,) that are drawn: all, or ``MAX_POINTS`` of them, the largest among them."""
+def rows_to_draw(size: Floats) -> Ints:
+    """Rows (K,) of ``size`` (R,) that are drawn: all, or ``MAX_POINTS`` of them, the largest among them."""
     seen = np.flatnonzero(np.isfinite(size))
     if len(seen) <= MAX_POINTS:
         return seen
@@ -135,7 +135,7 @@ def shown_rows(size: Floats) -> Ints:
 
 
 def _scale(result: Identified) -> tuple[float, float]:
-    """[mm] Where the scale begins and ends."""
+    """[mm] Where the scale starts and ends."""
     seen = [lengths[np.isfinite(lengths)] / MM for lengths in (result.lengths[name] for name in _POINTS)]
     least = max(0.8 * float(np.percentile(seen[1], SMALL)), LEAST)
     return least, max(1.4 * max(float(lengths.max()) for lengths in seen), 2.0 * least)
@@ -167,7 +167,7 @@ def _legend(figure: Figure, result: Identified) -> None:
 def _title(result: Identified) -> str:
     gap, campaign = result.gap_mm(), result.after.campaign
     told = f"{gap['before_rms_mm']:.3f} mm RMS before, {gap['after_rms_mm']:.3f} mm fitted"
-    if "heldout_after_rms_mm" in gap:
-        told += f", {gap['heldout_after_rms_mm']:.3f} mm on poses not fitted"
+    if "held_out_after_rms_mm" in gap:
+        told += f", {gap['held_out_after_rms_mm']:.3f} mm on held-out poses"
     of = f"{len(campaign)} readings at {campaign.poses} poses"
     return f"{result.robot}, {', '.join(result.effects)}: {of}\n{told}"

@@ -1,4 +1,4 @@
-"""What ``compensate identify`` found, on a terminal: a verdict, the parameters, what they leave, what to look at."""
+"""The result of ``compensate identify`` on a terminal: verdict, parameters, residuals, findings."""
 
 from __future__ import annotations
 
@@ -9,63 +9,60 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from postproc.arrays import Floats
+from postproc.base.arrays import Floats
+from postproc.base.sanitize import sanitize
+from postproc.base.units import MM
 from postproc.identification.fit import Estimate
 from postproc.identification.validation import WIDER
-from postproc.printable import printable
 from postproc.report.identified import STRONG, Identified, Sum
 from postproc.report.residuals import Sizes
-from postproc.report.terminal import _once, show_findings
+from postproc.report.terminal import _once, show_findings, show_rows
 from postproc.report.words import campaign_in_words, count, fixed, shown_unit, some
 from postproc.robot.description import robot_words
-from postproc.units import MM
 
 IN_TABLES = frozenset({"IDN018", "IDN019", "IDN020", "IDN021", "IDN022", "IDN025", "IDN026"})
-"""Findings that stand in the tables already: told once more, with what to do, by ``--verbose``."""
+"""Findings whose content is in the tables: ``--verbose`` shows them too, with what to do."""
 
 
 def show_identified(console: Console, result: Identified, verbose: bool = False) -> None:
-    """The verdict, what was fitted to what, the parameters, what could not be found, what is left, and findings."""
+    """The verdict, the data, the parameters, what was not found, the residuals, and findings."""
     console.print(Text(verdict(result), style="bold"), soft_wrap=True)
-    head = Table(box=None, show_header=False, pad_edge=False)
-    head.add_column(style="bold")
-    head.add_column()
-    for key, value in _rows(result):
-        head.add_row(key, Text(printable(value)))
-    console.print(head)
+    show_rows(console, ((key, Text(sanitize(value))) for key, value in _rows(result)))
     console.print(_parameters(result))
     for line in _notes(result, verbose):
-        console.print(Text(printable(line)), soft_wrap=True)
-    console.print(_left(result))
+        console.print(Text(sanitize(line)), soft_wrap=True)
+    console.print(_residuals(result))
     for line in _outliers(result, verbose):
-        console.print(Text(printable(line)), soft_wrap=True)
+        console.print(Text(sanitize(line)), soft_wrap=True)
     show_findings(console, [f for f in result.findings if verbose or f.code not in IN_TABLES], verbose)
     for path in result.outputs:
-        console.print(Text(printable(f"wrote {path}")), soft_wrap=True)
+        console.print(Text(sanitize(f"wrote {path}")), soft_wrap=True)
 
 
 def verdict(result: Identified) -> str:
-    """How many parameters were found, what they bring, and how that stands against the scatter of the readings."""
+    """How many parameters were found, the residuals, and how these compare with the scatter of the readings."""
     after, gap = result.after, result.gap_mm()
     found, asked = len(after.unknowns), len(after.asked)
     told = f"{found} of {asked} parameters found." if found < asked else f"All {asked} parameters found."
     if asked == 1:
         told = "The parameter was found."
-    told += f" What is left falls from {gap['before_rms_mm']:.3f} to {gap['after_rms_mm']:.3f} mm RMS"
-    without, held = gap.get("heldout_before_rms_mm"), gap.get("heldout_after_rms_mm")
-    told += "." if held is None else f", to {held:.3f} mm on poses that were not fitted."
+    told += f" The residual falls from {gap['before_rms_mm']:.3f} to {gap['after_rms_mm']:.3f} mm RMS"
+    without, held = gap.get("held_out_before_rms_mm"), gap.get("held_out_after_rms_mm")
+    told += "." if held is None else f", to {held:.3f} mm on held-out poses."
     if held is not None and without is not None and held >= without:
-        return f"{told} There the fit is no better than before: it does not hold."
+        return f"{told} There the fit is no better than before: do not use it."
     if result.outliers and not result.outliers_left_out:
-        return f"{told} {count(len(result.outliers), 'outlier')} among the readings: look there first."
+        return f"{told} {count(len(result.outliers), 'outlier')} among the readings: check these first."
     if after.freedom == 0:
-        return f"{told} There are as many unknowns as measured numbers: that would always be so."
+        return f"{told} There are as many unknowns as measured numbers: this proves nothing."
     if not after.noise.known:
-        return f"{told} How much of it is scatter is not known: no SIGMA is stated and nothing repeats."
+        return (
+            f"{told} How much of it is scatter is not known: no SIGMA is stated and no reading is repeated."
+        )
     scatter = f"{gap['noise_mm']:.3f} mm"
     if after.scatter_exceeded:
-        return f"{told} Readings scatter by {scatter}: the model lacks something, or they scatter by more."
-    return f"{told} Readings scatter by {scatter}: nothing more is to be seen in them."
+        return f"{told} Readings scatter by {scatter}: the model lacks an effect, or the scatter is larger."
+    return f"{told} Readings scatter by {scatter}: they show nothing more."
 
 
 def _rows(result: Identified) -> Iterator[tuple[str, str]]:
@@ -74,8 +71,9 @@ def _rows(result: Identified) -> Iterator[tuple[str, str]]:
     yield "", campaign_in_words(after.campaign)
     yield "robot", robot_words(result.robot, result.robot_file)
     yield "effects", ", ".join(result.effects)
-    if result.held:
-        yield "held", f"{', '.join(_once(result.held))}: hardware without an interval, as the robot file says"
+    if result.fixed:
+        names = ", ".join(_once(result.fixed))
+        yield "fixed", f"{names}: dimensions of hardware without an interval, from the robot file"
     shared = after.shared_error
     together = f"; readings of one pose share another {shared / MM:.3f} mm" if shared > 0 else ""
     yield (
@@ -84,7 +82,7 @@ def _rows(result: Identified) -> Iterator[tuple[str, str]]:
     )
     how = "95 %, from the covariance"
     if not after.noise.known or after.scatter_exceeded:
-        how += ", as wide as the residuals ask for"
+        how += ", scaled to the residuals"
     if result.bootstrap is not None:
         how += f"; checked by a bootstrap of {result.bootstrap.draws} draws"
     yield "intervals", how
@@ -116,7 +114,7 @@ def _cells(result: Identified, estimate: Estimate) -> list[str]:
     if estimate.at_bound:
         notes.append("at its bound")
     if unknown.prior is not None:
-        notes.append("its stated interval counts")
+        notes.append("its stated interval is used")
     drawn = result.bootstrap_ci95.get(unknown.name)
     if drawn is not None and drawn > WIDER * estimate.ci95:
         notes.append(f"+- {fixed(drawn / size, wide)} by bootstrap")
@@ -131,7 +129,7 @@ def _cells(result: Identified, estimate: Estimate) -> list[str]:
 
 
 def _notes(result: Identified, verbose: bool) -> Iterator[str]:
-    """Condition and correlations, what was left out and why, and the sums that are known instead."""
+    """Condition and correlations, excluded parameters and why, and the sums that are known instead."""
     after = result.after
     pairs = [f"{' / '.join(_once([a, b]))} {size:+.2f}" for a, b, size in result.correlations]
     strong = "; ".join(some(pairs, verbose)) or "none"
@@ -141,7 +139,7 @@ def _notes(result: Identified, verbose: bool) -> Iterator[str]:
         reasons.setdefault(dropped.why, []).append(dropped.name)
     lines = [f"{', '.join(_once(names))}: {why}" for why, names in reasons.items()]
     for line in some(lines, verbose):
-        yield f"left out     {line}"
+        yield f"excluded     {line}"
     for line in some([_sum(one, result) for one in result.sums], verbose):
         yield f"sum          {line}"
 
@@ -160,8 +158,8 @@ def _sum(one: Sum, result: Identified) -> str:
     return f"{text} = {fixed(one.value / size, wide)} +- {fixed(wide, wide)} {word}".rstrip()
 
 
-def _left(result: Identified) -> Table:
-    """Residuals before and after: of what was fitted, of poses that were not, of other data."""
+def _residuals(result: Identified) -> Table:
+    """Residuals before and after: of the fit, of held-out poses, of validation data."""
     table = Table(box=None, pad_edge=False)
     table.add_column("residuals, mm")
     for head in ("RMS", "mean", "max", "readings"):
@@ -170,11 +168,11 @@ def _left(result: Identified) -> Table:
     rows = {
         "before": "the robot file" if deflection else "registration alone",
         "after": "fitted",
-        "heldout_before": f"poses not fitted ({result.folds}-fold), before",
-        "heldout_after": f"poses not fitted ({result.folds}-fold), after",
+        "held_out_before": f"held-out poses ({result.folds}-fold), before",
+        "held_out_after": f"held-out poses ({result.folds}-fold), after",
     }
     add_sizes(table, {rows[name]: lengths for name, lengths in result.lengths.items()})
-    anew = ", registered anew" if result.validation and result.validation.registered_anew else ""
+    anew = ", registration refitted" if result.validation and result.validation.registered_anew else ""
     named = {f"validation{anew}, {name}": lengths for name, lengths in result.validation_lengths.items()}
     add_sizes(table, named)
     noise = result.gap_mm().get("noise_mm")
@@ -195,9 +193,9 @@ def add_sizes(table: Table, lengths: Mapping[str, Floats]) -> None:
 def _outliers(result: Identified, verbose: bool) -> Iterator[str]:
     if result.outliers:
         how = (
-            "left out"
+            "excluded"
             if result.outliers_left_out
-            else "fitted with the others; --drop-outliers leaves them out"
+            else "fitted with the others; --drop-outliers excludes them"
         )
         yield f"{count(len(result.outliers), 'outlier')} ({how})"
     lines = [

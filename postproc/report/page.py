@@ -22,29 +22,29 @@ import numpy as np
 from markupsafe import Markup
 
 from postproc import __version__
-from postproc.compensation.correct import State
-from postproc.findings import CODES, Finding
+from postproc.base.findings import CODES, Finding
+from postproc.compensation.correct import MotionOutcome
 from postproc.report.page_data import PageData
 from postproc.report.page_words import (
     badge,
-    left_over,
     parameter_rows,
     printed,
     program_facts,
     program_tiles,
     program_verdict,
+    reasons,
 )
 from postproc.toolpath import Kind
 
 FOLDER = Path(__file__).parent / "html"
 
 FINDINGS = 300
-"""A page tells so many findings at most; all are in the JSON."""
+"""A page shows so many findings at most; all are in the JSON."""
 
 SCRIPTS = ("figures.js", "space.js", "hands.js", "chart.js", "program.js")
 STYLE = "page.css"
 
-_SEVERITY = {"info": ("i", "note"), "warning": ("!", "look"), "error": ("x", "error")}
+_SEVERITY = {"info": ("i", "note"), "warning": ("!", "warning"), "error": ("x", "error")}
 
 
 def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
@@ -58,11 +58,11 @@ def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
         verdict=program_verdict(data),
         badge=badge(report.exit, report.corrected if data.corrected else None),
         tiles=program_tiles(data),
-        left=left_over(data),
+        uncorrected=reasons(data),
         facts=program_facts(report),
         places=_places(data),
         inserted=report.inserted,
-        inserted_links=[(link.line, f"{link.length_mm:.3f}") for link in report.links],
+        transition_moves=[(move.line, f"{move.length_mm:.3f}") for move in report.transition_moves],
         findings=finding_rows(report.findings),
         more_findings=max(0, len(report.findings) - FINDINGS),
         parameters=parameter_rows(report.model),
@@ -74,7 +74,7 @@ def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
         corrected=data.corrected,
         interval=bool(np.isfinite(data.widths).any()),
         evaluated=data.evaluated,
-        lower_bound=report.doubt.lower_bound,
+        lower_bound=report.uncertainty.lower_bound,
         data=embedded(_figures(data)),
     )
 
@@ -98,7 +98,7 @@ def rendered(template: str, script: Markup | None = None, **what: Any) -> bytes:
 
 
 def embedded(value: object) -> Markup:
-    """JSON that may stand in a script element of a page: no ``<``, ``>``, ``&`` and no line separators in it."""
+    """JSON that may be in a script element of a page: no ``<``, ``>``, ``&`` and no line separators in it."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     for letter in "<>&\u2028\u2029":
         text = text.replace(letter, f"\\u{ord(letter):04x}")
@@ -106,7 +106,7 @@ def embedded(value: object) -> Markup:
 
 
 def finding_rows(findings: Sequence[Finding]) -> list[dict[str, object]]:
-    """The first findings as a page tells them, the gravest first."""
+    """The first findings of a page, the gravest first."""
     order = list(_SEVERITY)
     rows = []
     for finding in sorted(findings, key=lambda one: -order.index(one.severity))[:FINDINGS]:
@@ -122,7 +122,7 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, object]]:
                 "place": finding.place,
                 "line": finding.line,
                 "message": finding.message,
-                "help": finding.help or code.explanation,
+                "help": finding.advice,
             }
         )
     return rows
@@ -155,12 +155,12 @@ def _places(data: PageData) -> list[dict[str, object]]:
             "before": _number(data.before[place.row], 3),
             "correction": _number(size[place.row], 3),
             "after": _number(data.after[place.row], 4),
-            "between": _number(data.between[place.row], 4),
+            "path_error": _number(data.path_error[place.row], 4),
             "force": f"{force[place.row]:.0f}",
             "source": place.source,
             "written": list(place.written),
             "same": place.written == (place.source,),
-            "state": State(data.state[place.row]).name.lower(),
+            "state": MotionOutcome(data.state[place.row]).name.lower(),
         }
         for place in data.places
     ]
@@ -178,38 +178,39 @@ def _figures(data: PageData) -> dict[str, object]:
         "cut": (data.cut, "i4"),
         "kind": (data.kind, "u1"),
         "state": (data.state, "u1"),
-        "way": (data.way, "f4"),
+        "path_length": (data.path_length, "f4"),
         "position": (data.position, "f4"),
         "force": (data.force, "f4"),
         "deflection": (data.deflection, "f4"),
         "correction": (data.correction, "f4"),
         "before": (data.before, "f4"),
         "after": (data.after, "f4"),
-        "between": (data.between, "f4"),
+        "path_error": (data.path_error, "f4"),
         "inserted": (data.inserted, "i4"),
         "before_width": (data.widths[:, 0], "f4"),
         "after_width": (data.widths[:, 1], "f4"),
         "arc": (data.arcs, "i4"),
-        "bends": (data.bends.reshape(-1, 3), "f4"),
+        "arc_points": (data.arc_points.reshape(-1, 3), "f4"),
     }
     return {
         "count": len(data.rows),
-        "each": data.bends.shape[1],
+        "each": data.arc_points.shape[1],
         "motions": data.motions,
         "corrected": data.corrected,
         "tolerance": data.tolerance,
         "kinds": [kind.name for kind in Kind],
-        "states": [_STATES[state] for state in State],
+        "states": [_STATES[state] for state in MotionOutcome],
         "places": [int(data.rows[place.row]) for place in data.places],
         "columns": {name: _column(values, form) for name, (values, form) in columns.items()},
     }
 
 
 _STATES = {
-    State.AIR: "nothing to correct",
-    State.CORRECTED: "corrected",
-    State.LEFT: "left as it was",
-    State.OFF: "left on the program's word",
+    MotionOutcome.AIR: "nothing to correct",
+    MotionOutcome.CORRECTED: "corrected",
+    MotionOutcome.UNCORRECTED: "not corrected",
+    MotionOutcome.OFF: "not corrected, as the program says",
+    MotionOutcome.LEAD_IN: "lead-in in air to the corrected start of a cut",
 }
 
 

@@ -9,40 +9,42 @@ from typing import Protocol
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.blocks import ROWS, in_blocks
-from postproc.compensation.correct import Result, State
-from postproc.compensation.division import Division
-from postproc.compensation.task import Task
-from postproc.document import Document, Edit, Edits, Span, apply
-from postproc.printable import printable
-from postproc.report.page_rows import SHOWN, shown_rows, worst_rows
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.batches import ROWS, in_blocks
+from postproc.base.document import Document, Edit, Edits, Span, apply
+from postproc.base.sanitize import sanitize
+from postproc.base.units import MM
+from postproc.compensation.correct import CorrectionResult, MotionOutcome
+from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.subdivision import Subdivision
+from postproc.report.page_rows import SHOWN, rows_to_draw, worst_rows
 from postproc.report.report import Report
-from postproc.units import MM
 
-BENDS, EACH = 60_000, (3, 23)
+ARC_POINTS, EACH = 60_000, (3, 23)
 """Points that draw arcs, in all about so many; of each arc no fewer and no more."""
 
 LINES = 5
-"""Lines of the text behind a motion at most; a motion that was divided has as many as it has parts."""
+"""Lines of the text after a motion at most; a motion that was divided has as many as it has parts."""
 
 
 class Output(Protocol):
     """What was written: ``edits`` on the program, the motions of the output, and ``between`` (M,) [m] how far the tool
-    is from the wanted way inside of each of them, NaN where that was not looked at."""
+    is from the wanted path inside of each of them, NaN where that was not looked at."""
 
     @property
     def edits(self) -> Sequence[Edit]: ...
     @property
-    def division(self) -> Division: ...
+    def division(self) -> Subdivision: ...
     @property
-    def between(self) -> Floats: ...
+    def path_error(self) -> Floats:
+        """(M,) [m] the largest distance from the wanted path inside of each motion, NaN where it is not known."""
+        ...
 
 
 @dataclass(frozen=True)
-class Place:
-    """A motion worth a look.  row: of the columns; why: what makes it one; source, written: its text before and after,
-    line by line; ``written`` is () where nothing was written."""
+class WorstPlace:
+    """A motion with a large error.  row: of the columns; why: what makes it one; source, written: its text before and
+    after, line by line; ``written`` is () where nothing was written."""
 
     row: int
     why: str
@@ -56,13 +58,13 @@ class PageData:
 
     report: figures, findings, model and digests.  tolerance: what the output may keep.  off: motions that are left
     alone on the program's own word.  rows (K,): the motions shown, ascending.  line, kind, state, cut (K,): as in
-    Toolpath and Result; cut -1 in air.  way (K,) [mm]: length of the cutting path to the end of each motion.
-    position (K, 3): wanted end point; arcs (A,): which of the K are arcs from the one before, and bends (A, B, 3)
-    points on their way; force (K, 3) [N]; deflection (K, 3) before: all in the robot base.  correction (K, 3): command
-    minus wanted, in the axes of the programmed base.  before, after (K,): predicted error at the end points; between
-    (K,): the largest on the way there after the correction.  inserted (K,): motions of the output before this one.
+    Toolpath and Result; cut -1 in air.  path_length (K,) [mm]: length of the cutting path to the end of each motion.
+    position (K, 3): wanted end point; arcs (A,): which of the K are arcs from the one before, and arc_points (A, B, 3)
+    points inside of them; force (K, 3) [N]; deflection (K, 3) before: all in the robot base. correction (K, 3): command
+    minus wanted, in the axes of the programmed base. before, after (K,): predicted error at the end points; path_error
+    (K,): the largest between the points after the correction. inserted (K,): motions of the output before this one.
     widths (K, 2): half widths of the 95 % intervals of before and after; evaluated: motions at which they were
-    computed, between them they are interpolated.  NaN wherever a figure is not known.
+    computed, between them they are interpolated. NaN wherever a figure is not known.
     """
 
     report: Report
@@ -75,25 +77,25 @@ class PageData:
     kind: Ints
     state: Ints
     cut: Ints
-    way: Floats
+    path_length: Floats
     position: Floats
     arcs: Ints
-    bends: Floats
+    arc_points: Floats
     force: Floats
     deflection: Floats
     correction: Floats
     before: Floats
     after: Floats
-    between: Floats
+    path_error: Floats
     inserted: Ints
     widths: Floats
     evaluated: int
-    places: tuple[Place, ...]
+    places: tuple[WorstPlace, ...]
 
 
 def page_data(
-    task: Task,
-    result: Result,
+    task: CompensationProblem,
+    result: CorrectionResult,
     report: Report,
     documents: Sequence[Document],
     output: Output | None = None,
@@ -102,47 +104,47 @@ def page_data(
     """All that the page of ``result`` shows, ``limit`` motions at most.  documents: of the program that was read;
     output: None where nothing is corrected (a prediction)."""
     path, n = task.toolpath, len(task.toolpath)
-    state, cut, scope = result.state, result.cut, result.state != State.AIR
+    state, cut, scope = result.state, result.cut, result.scope
     first = np.arange(n + 1)
     between = np.full(n, np.nan)
     if output is not None:
         first = np.searchsorted(output.division.source, first)
-        between = np.fmax.reduceat(output.between, first[:-1])
+        between = np.fmax.reduceat(output.path_error, first[:-1])
     found = worst_rows(result, scope, between, output is not None)
     before, after, between = (_known(values, scope) for values in (result.before, result.after, between))
     size = np.sqrt(np.einsum("ni,ni->n", result.correction, result.correction))
     turns = (cut[1:] != cut[:-1]) | (state[1:] != state[:-1])
     quantities = [(1, before), (-1, before), (1, after), (-1, after), (1, between), (1, size)]
-    rows = shown_rows(n, [row for row, _ in found], turns, quantities, limit)
+    rows = rows_to_draw(n, [row for row, _ in found], turns, quantities, limit)
     lines = [int(path.line[row]) for row, _ in found]
     texts = source_texts(documents[0], lines, () if output is None else output.edits)
-    arcs, bends = _bends(task, rows)
+    arcs, arc_points = _arc_points(task, rows)
     return PageData(
         report=report,
         corrected=output is not None,
         tolerance=task.tolerance / MM,
         motions=n,
-        off=int(np.count_nonzero(state == State.OFF)),
+        off=int(np.count_nonzero(state == MotionOutcome.OFF)),
         rows=rows,
         line=path.line[rows],
         kind=path.kind[rows],
         state=state[rows],
         cut=cut[rows],
-        way=np.cumsum(np.where(scope, task.ways.length, 0.0))[rows] / MM,
+        path_length=np.cumsum(np.where(scope, task.desired_path.length, 0.0))[rows] / MM,
         position=_by_blocks(lambda some: task.wanted[some].position, rows) / MM,
         arcs=arcs,
-        bends=bends,
+        arc_points=arc_points,
         force=task.wrench[rows, :3],
         deflection=result.deflection[rows] / MM,
         correction=_by_blocks(lambda some: _correction(task, result, some), rows) / MM,
         before=before[rows] / MM,
         after=after[rows] / MM,
-        between=between[rows] / MM,
+        path_error=between[rows] / MM,
         inserted=first[rows + 1] - first[rows] - 1,
         widths=np.where(scope[rows, None], _widths(report, rows), np.nan),
-        evaluated=len(report.doubt.widths),
+        evaluated=len(report.uncertainty.expanded),
         places=tuple(
-            Place(int(np.searchsorted(rows, row)), why, source, () if output is None else written)
+            WorstPlace(int(np.searchsorted(rows, row)), why, source, () if output is None else written)
             for (row, why), (source, written) in zip(found, texts, strict=True)
         ),
     )
@@ -154,21 +156,21 @@ def _by_blocks(made: Callable[[Ints], Floats], rows: Ints, each: int = 1) -> Flo
     return np.concatenate([np.empty((0, 3)), *parts])
 
 
-def _correction(task: Task, result: Result, rows: Ints) -> Floats:
+def _correction(task: CompensationProblem, result: CorrectionResult, rows: Ints) -> Floats:
     command = task.base.shared(rows).inverse() @ result.command[rows]
     return command.position - task.toolpath.position[rows]
 
 
-def _bends(task: Task, rows: Ints) -> tuple[Ints, Floats]:
-    """Which of ``rows`` (K,) are arcs of which the begin is among them as well (A,), and (A, B, 3) [mm] points evenly
+def _arc_points(task: CompensationProblem, rows: Ints) -> tuple[Ints, Floats]:
+    """Which of ``rows`` (K,) are arcs of which the start is among them as well (A,), and (A, B, 3) [mm] points evenly
     inside of them; few of each where the program has many arcs."""
-    arc = task.ways.known & task.ways.arc
-    each = int(np.clip(BENDS // max(int(arc.sum()), 1), *EACH))
+    arc = task.desired_path.traceable & task.desired_path.arc
+    each = int(np.clip(ARC_POINTS // max(int(arc.sum()), 1), *EACH))
     places = np.flatnonzero(arc[rows[1:]] & (np.diff(rows) == 1)) + 1
     shares = np.arange(1, each + 1) / (each + 1)
 
     def points(arcs: Ints) -> Floats:
-        return task.ways.at(np.repeat(arcs, each), np.tile(shares, len(arcs))).position / MM
+        return task.desired_path.at(np.repeat(arcs, each), np.tile(shares, len(arcs))).position / MM
 
     return places, _by_blocks(points, rows[places], each).reshape(len(places), each, 3)
 
@@ -195,7 +197,7 @@ def source_texts(
 
 
 def _moved(edit: Edit, start: int) -> Edit:
-    """The edit in a piece of its document that begins at ``start``."""
+    """The edit in a part of its document that starts at ``start``."""
     return Edit(Span(0, edit.span.start - start, edit.span.stop - start), edit.text)
 
 
@@ -205,7 +207,7 @@ def _text(raw: bytes) -> str:
         text = raw.decode("utf-8")
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
-    return printable(text.replace("\t", "    "))
+    return sanitize(text.replace("\t", "    "))
 
 
 def _known(values: Floats, scope: Bools) -> Floats:
@@ -214,9 +216,9 @@ def _known(values: Floats, scope: Bools) -> Floats:
 
 def _widths(report: Report, rows: Ints) -> Floats:
     """(K, 2) [mm] half widths at ``rows`` (K,), between those that were evaluated interpolated."""
-    found, doubt = np.full((len(rows), 2), np.nan), report.doubt
-    for width, evaluated in zip(found.T, doubt.widths.T, strict=True):
+    found, uncertainty = np.full((len(rows), 2), np.nan), report.uncertainty
+    for width, evaluated in zip(found.T, uncertainty.expanded.T, strict=True):
         known = np.isfinite(evaluated)
         if known.any():
-            width[:] = np.interp(rows, doubt.rows[: len(known)][known], evaluated[known] / MM)
+            width[:] = np.interp(rows, uncertainty.rows[: len(known)][known], evaluated[known] / MM)
     return found

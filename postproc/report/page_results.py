@@ -10,7 +10,8 @@ from markupsafe import Markup
 from rich.table import Table
 from rich.text import Text
 
-from postproc.findings import Finding
+from postproc.base.findings import Finding
+from postproc.base.units import MM
 from postproc.report import diagnosed_terminal, identified_terminal
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_picture import diagnosed_picture
@@ -18,24 +19,23 @@ from postproc.report.diagnosed_words import headline, paragraph
 from postproc.report.identified import Identified
 from postproc.report.identified_picture import identified_picture
 from postproc.report.identified_terminal import verdict
+from postproc.report.mapped import Mapped, _list
+from postproc.report.mapped import _rows as map_rows
 from postproc.report.page import FINDINGS, finding_rows, linked, rendered
 from postproc.report.page_words import badge
 from postproc.report.picture import picture
-from postproc.report.workspace import Mapped, _list
-from postproc.report.workspace import _rows as map_rows
-from postproc.units import MM
 
 
 @dataclass(frozen=True)
-class Shown:
-    """A table of a page.  heads: of its columns, with whether the column stands on the right; rows: cells; a row with
+class PageTable:
+    """A table of a page.  heads: of its columns, with whether the column is on the right; rows: cells; a row with
     one cell is a heading."""
 
     heads: tuple[tuple[str, bool], ...]
     rows: tuple[tuple[str, ...], ...]
 
 
-def shown(table: Table) -> Shown:
+def shown(table: Table) -> PageTable:
     """The table that the terminal shows, for a page."""
     columns = [[_plain(cell) for cell in column.cells] for column in table.columns]
     names = [
@@ -47,7 +47,7 @@ def shown(table: Table) -> Shown:
     rows = []
     for cells in zip(*columns, strict=True):
         rows.append(cells[:1] if len(cells) > 1 and not any(cells[1:]) else cells)
-    return Shown(heads, tuple(rows))
+    return PageTable(heads, tuple(rows))
 
 
 def identified_page(result: Identified, links: Mapping[str, str]) -> bytes:
@@ -59,10 +59,10 @@ def identified_page(result: Identified, links: Mapping[str, str]) -> bytes:
         [],
         result.exit,
         identified_terminal._rows(result),
-        [identified_terminal._parameters(result), identified_terminal._left(result)],
+        [identified_terminal._parameters(result), identified_terminal._residuals(result)],
         [*identified_terminal._notes(result, True), *identified_terminal._outliers(result, True)],
         identified_picture(result, "svg"),
-        "size of each residual before and after, by joint, direction, load and order; the tables tell the same",
+        "size of each residual before and after, by joint, direction, load and order; the tables show the same",
         result.findings,
         {result.robot: result.robot_digest, **dict(result.data)},
         links,
@@ -78,7 +78,7 @@ def diagnosed_page(result: Diagnosed, links: Mapping[str, str]) -> bytes:
         terminal._alternatives,
         terminal._refitted,
         terminal._where,
-        terminal._left,
+        terminal._residuals,
         terminal._next_poses,
     )
     return _page(
@@ -91,7 +91,7 @@ def diagnosed_page(result: Diagnosed, links: Mapping[str, str]) -> bytes:
         [make(result, True) for make in makers],
         [],
         diagnosed_picture(result, "svg"),
-        "gap at each pose before and after, residuals over what betrays the missing effect, evidence of each candidate",
+        "gap at each pose before and after, residual patterns, evidence of each candidate",
         result.findings,
         {result.robot: result.robot_digest, **dict(result.data)},
         links,
@@ -113,7 +113,7 @@ def mapped_page(mapped: Mapped, links: Mapping[str, str]) -> bytes:
         "No cell is in reach."
         if extremes is None
         else (
-            f"This force moves the tool by {extremes[0].value / MM:.3f} to {extremes[1].value / MM:.3f} mm:"
+            f"This force deflects the tool by {extremes[0].value / MM:.3f} to {extremes[1].value / MM:.3f} mm:"
             f" least at {_place(mapped, extremes[0].row)}, most at {_place(mapped, extremes[1].row)} mm."
         )
     )

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.compensation.correct import Result
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.compensation.correct import CorrectionResult
 
 PLACES = 12
 """Worst places that the page tells, with their text."""
@@ -16,13 +16,16 @@ SHOWN = 50_000
 """Motions that the figures of a page show at most."""
 
 
-def worst_rows(result: Result, scope: Bools, between: Floats, corrected: bool) -> list[tuple[int, str]]:
-    """Rows of the largest errors with why: before, after, on the way; then the largest of each cut, and the next."""
+def worst_rows(
+    result: CorrectionResult, scope: Bools, between: Floats, corrected: bool
+) -> list[tuple[int, str]]:
+    """Rows of the largest errors in ``scope`` (N,) and why: before, after, ``between`` points (N,) [m]; the largest of
+    each cut; then the next."""
     before = np.where(scope & np.isfinite(result.before), result.before, -1.0)
     if before.max(initial=-1.0) < 0:
         return []
     found = {int(np.argmax(before)): "largest before"}
-    after = (("largest after", result.after), ("largest on the way after", between))
+    after = (("largest after", result.after), ("largest path error between points after", between))
     for why, values in after if corrected else ():
         error = np.where(scope & np.isfinite(values), values, -1.0)
         if error.max() > 0:
@@ -52,7 +55,7 @@ def _largest_of_each(values: Floats, group: Ints) -> Ints:
     return rows[np.argsort(-values[rows], kind="stable")]
 
 
-def shown_rows(
+def rows_to_draw(
     n: int, must: Sequence[int], turns: Bools, quantities: Sequence[tuple[int, Floats]], limit: int = SHOWN
 ) -> Ints:
     """Rows of ``n`` that figures show: all, or at most ``limit`` of many.
@@ -70,16 +73,16 @@ def shown_rows(
     kept = np.unique(np.concatenate([[0, n - 1], must, turn, turn + 1])).astype(np.int64)
     room = limit - len(kept)
     stretches = room // 2 // len(quantities)
-    begins = -(-np.arange(stretches) * n // stretches)
+    starts = -(-np.arange(stretches) * n // stretches)
     chosen = [kept, np.linspace(0, n - 1, room // 2).astype(np.int64)]
     for sign, values in quantities:
-        chosen.append(_last_largest(np.where(np.isnan(values), -np.inf, sign * values), begins))
+        chosen.append(_last_largest(np.where(np.isnan(values), -np.inf, sign * values), starts))
     return np.unique(np.concatenate(chosen))
 
 
-def _last_largest(values: Floats, begins: Ints) -> Ints:
+def _last_largest(values: Floats, starts: Ints) -> Ints:
     """The last row with the largest of the ``values`` (N,) of each stretch (K,)."""
-    largest = np.repeat(np.maximum.reduceat(values, begins), np.diff(begins, append=len(values)))
+    largest = np.repeat(np.maximum.reduceat(values, starts), np.diff(starts, append=len(values)))
     rows = np.flatnonzero(values == largest)
-    stretch = np.searchsorted(begins, rows, side="right")
+    stretch = np.searchsorted(starts, rows, side="right")
     return rows[np.append(stretch[1:] != stretch[:-1], True)]

@@ -1,4 +1,4 @@
-"""The verdict of a page in words: what becomes better, how sure that is, what was left and why."""
+"""The verdict of a page in words: what becomes better, its uncertainty, what is not corrected and why."""
 
 from __future__ import annotations
 
@@ -9,21 +9,22 @@ from dataclasses import dataclass
 import numpy as np
 from rich.text import Text
 
-from postproc.compensation.doubt import Doubt
-from postproc.printable import printable_lines
+from postproc.base.sanitize import sanitize_lines
+from postproc.base.units import MM
+from postproc.compensation.uncertainty import Uncertainty
 from postproc.report.page_data import PageData
+from postproc.report.program_verdict import verdict_sentence
 from postproc.report.report import Report
-from postproc.report.terminal import _rows, _two_digits
-from postproc.report.words import count
-from postproc.units import MM
+from postproc.report.terminal import _rows, missing_intervals
+from postproc.report.words import count, two_digits
 
-LEFT = 8
-"""Cuts that were left are told one by one up to so many."""
+LISTED = 8
+"""Cuts that are not corrected are listed up to so many."""
 
 
 @dataclass(frozen=True)
 class Tile:
-    """A figure that stands large: its name, value and what to know of it."""
+    """A large figure: its name, value and a note."""
 
     name: str
     value: str
@@ -32,7 +33,7 @@ class Tile:
 
 def printed(text: str) -> str:
     """Text of a program or a file name as a page can hold it; its lines stay lines."""
-    return printable_lines(text.encode("utf-8", "replace").decode("utf-8"))
+    return sanitize_lines(text.encode("utf-8", "replace").decode("utf-8"))
 
 
 def badge(exit: int, changed: int | None) -> tuple[str, str, str]:
@@ -40,48 +41,52 @@ def badge(exit: int, changed: int | None) -> tuple[str, str, str]:
     if exit == 1:
         return "bad", "✗", "not written"
     if exit:
-        return "look", "!", "deserves a look"
+        return "look", "!", "needs review"
     if changed == 0:
         return "none", "–", "nothing changed"
     return "good", "✓", "done"
 
 
 def program_verdict(data: PageData) -> str:
-    """One sentence: what was off, what is left of it, and how sure that is."""
+    """One sentence: the error before and after, and its uncertainty."""
     report = data.report
     if math.isnan(report.before.max):
-        return "No motion cuts with a force: nothing bends, and nothing is corrected."
-    before = f"{report.before.max / MM:.3f} mm{_interval(report.doubt, report.doubt.before)}"
+        return "No motion cuts with a force: no deflection, and nothing is corrected."
+    before = f"{report.before.max / MM:.3f} mm{_interval(report.uncertainty, report.uncertainty.before)}"
     if not data.corrected or report.after is None:
         return (
-            f"Uncorrected, the tool is predicted up to {before} away from where the program wants it,"
+            f"Without correction, the predicted error of the tool is up to {before}"
             f" over {count(report.cutting, 'cutting motion')}; nothing was changed."
         )
     if not report.corrected:
-        return f"Nothing was corrected: the tool stays up to {before} away from where the program wants it."
-    after = f"{report.after.max / MM:.4f} mm{_interval(report.doubt, report.doubt.after)}"
-    if report.between is not None and np.isfinite(report.between.max):
-        after += f" at the points, and is at most {report.between.max / MM:.4f} mm on the way between them"
+        return f"Nothing was corrected: the predicted error of the tool is up to {before}."
+    after = f"{report.after.max / MM:.4f} mm{_interval(report.uncertainty, report.uncertainty.after)}"
+    if report.path_error is not None and np.isfinite(report.path_error.max):
+        after += (
+            f" at the points; the path error between points is at most {report.path_error.max / MM:.4f} mm"
+        )
     share = f" {report.gain:.0%} of the correction was applied, as asked." if report.gain < 1 else ""
     if report.corrected == report.cutting:
         which = "Every cutting motion is corrected"
     else:
         which = f"{report.corrected} of {count(report.cutting, 'cutting motion')} are corrected"
     if report.inserted:
-        share = f" For that {count(report.inserted, 'motion')} were inserted.{share}"
+        share = f" {count(report.inserted, 'motion')} {'was' if report.inserted == 1 else 'were'} inserted.{share}"
     allowed = f" (tolerance {data.tolerance:g} mm)"
-    return f"{which}: the largest predicted error falls from {before} to {after}{allowed}.{share}"
+    sentence = verdict_sentence(report)
+    told = f" {sentence[0].upper()}{sentence[1:]}." if sentence else ""
+    return f"{which}: the largest predicted error falls from {before} to {after}{allowed}.{share}{told}"
 
 
 def program_tiles(data: PageData) -> list[Tile]:
-    """Before, after, the worst place, how sure, what was left."""
+    """Before, after, the worst place, the uncertainty, what is not corrected."""
     report = data.report
     tiles = [Tile("error before", _mm(report.before.max, 3), _rest(report.before.rms, report.before.p95))]
     if data.corrected and report.after is not None:
         tiles.append(Tile("error after", _mm(report.after.max, 4), _rest(report.after.rms, report.after.p95)))
-        if report.between is not None and np.isfinite(report.between.max):
-            between = _rest(report.between.rms, report.between.p95)
-            tiles.append(Tile("after, on the way", _mm(report.between.max, 4), between))
+        if report.path_error is not None and np.isfinite(report.path_error.max):
+            between = _rest(report.path_error.rms, report.path_error.p95)
+            tiles.append(Tile("path error between points", _mm(report.path_error.max, 4), between))
     if data.places:
         row = data.places[0].row
         place = ", ".join(f"{value:.1f}" for value in data.position[row])
@@ -93,32 +98,36 @@ def program_tiles(data: PageData) -> list[Tile]:
                 f"{cut}{data.before[row]:.3f} mm before; at {place} mm in the robot base",
             )
         )
-    tiles.append(_how_sure(report))
+    tiles.append(_uncertainty(report))
     if data.corrected:
         note = f"of {count(report.cutting, 'cutting motion')}"
-        note += f"; {data.off} more on the program's own word" if data.off else ""
-        tiles.append(Tile("left as it was", count(report.left, "motion"), note))
+        note += f"; {data.off} more between COMPENSATE OFF and ON" if data.off else ""
+        tiles.append(Tile("not corrected", count(report.uncorrected, "motion"), note))
     return tiles
 
 
-def _how_sure(report: Report) -> Tile:
-    doubt = report.doubt
-    if doubt.worst < 0 or math.isnan(doubt.before):
-        return Tile("how sure", "not known", "nothing that the prediction hangs on has an interval")
-    width = doubt.before if math.isnan(doubt.after) or report.after is None else doubt.after
-    value = f"± {_two_digits(width / MM)} mm" + (" or more" if doubt.lower_bound else "")
-    told = f"95 %, mostly {doubt.blame[0][0]}" if doubt.blame else "95 %"
-    return Tile("how sure", value, told + ("; not everything has an interval" if doubt.lower_bound else ""))
+def _uncertainty(report: Report) -> Tile:
+    uncertainty = report.uncertainty
+    if uncertainty.worst < 0 or math.isnan(uncertainty.before):
+        return Tile("uncertainty", "not known", "no input has an interval")
+    width = uncertainty.before if math.isnan(uncertainty.after) or report.after is None else uncertainty.after
+    if uncertainty.unknown:
+        return Tile("uncertainty", "not known", missing_intervals(uncertainty))
+    value = f"{'at least ' if uncertainty.lower_bound else ''}± {two_digits(width / MM)} mm"
+    told = f"95 %, mostly {uncertainty.budget[0][0]}" if uncertainty.budget else "95 %"
+    return Tile(
+        "uncertainty", value, told + ("; not every input has an interval" if uncertainty.lower_bound else "")
+    )
 
 
-def left_over(data: PageData) -> list[str]:
-    """What was left and why, cut by cut; [] where nothing was."""
+def reasons(data: PageData) -> list[str]:
+    """What is not corrected and why, cut by cut; [] where everything is."""
     if not data.corrected:
         return []
     told = [f.message for f in data.report.findings if f.code == "COR003"]
-    more = [f"and {len(told) - LEFT} more cuts, see the findings"] if len(told) > LEFT else []
+    more = [f"and {len(told) - LISTED} more cuts, see the findings"] if len(told) > LISTED else []
     off = f"{count(data.off, 'motion')} between COMPENSATE OFF and ON, as the program says"
-    return told[:LEFT] + more + ([off] if data.off else [])
+    return told[:LISTED] + more + ([off] if data.off else [])
 
 
 def program_facts(report: Report) -> list[tuple[str, str]]:
@@ -155,11 +164,11 @@ def parameter_rows(model: Mapping[str, object]) -> list[dict[str, str]]:
     return rows
 
 
-def _interval(doubt: Doubt, half_width: float) -> str:
-    """`` ± 0.11 mm or more (95 %)``; empty where nothing is known."""
-    if math.isnan(half_width):
+def _interval(uncertainty: Uncertainty, half_width: float) -> str:
+    """`` ± 0.11 mm (95 %)``; empty where that is not known."""
+    if math.isnan(half_width) or uncertainty.unknown:
         return ""
-    return f" ± {_two_digits(half_width / MM)} mm{' or more' if doubt.lower_bound else ''} (95 %)"
+    return f" ± {'at least ' if uncertainty.lower_bound else ''}{two_digits(half_width / MM)} mm (95 %)"
 
 
 def _rest(rms: float, p95: float) -> str:

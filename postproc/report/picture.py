@@ -19,10 +19,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from postproc.arrays import Floats
-from postproc.printable import printable
-from postproc.report.workspace import Mapped, Quantity, slices_shown
-from postproc.units import MM
+from postproc.base.arrays import Floats
+from postproc.base.sanitize import sanitize
+from postproc.base.units import MM
+from postproc.report.mapped import Mapped, MappedQuantity, slices_shown
 
 DPI = 100
 COLOURS = {"deflection_mm": "viridis", "compensator_difference_mm": "cividis"}
@@ -125,7 +125,7 @@ def _coordinates(mapped: Mapped, axis: int) -> Floats:
     return np.asarray(np.round((grid.x, grid.y, grid.z)[axis] / MM, 9))
 
 
-def _cube(mapped: Mapped, quantity: Quantity) -> Floats:
+def _cube(mapped: Mapped, quantity: MappedQuantity) -> Floats:
     """[mm] over the grid's shape, NaN where there is no value."""
     values = np.full(mapped.cells, np.nan) if quantity.values is None else quantity.values
     return np.asarray(values / MM).reshape(mapped.survey.grid.shape)
@@ -177,7 +177,7 @@ def _contours(axes: Axes, across: Floats, up: Floats, values: Floats) -> None:
     axes.clabel(lines, fmt="%g", fontsize=7.5, inline_spacing=3)
 
 
-def _mark(axes: Axes, mapped: Mapped, quantity: Quantity, ranged: list[int]) -> None:
+def _mark(axes: Axes, mapped: Mapped, quantity: MappedQuantity, ranged: list[int]) -> None:
     if quantity.extremes is None:
         return
     for extreme, marker in zip(quantity.extremes, "ov", strict=True):
@@ -229,10 +229,10 @@ def _title(mapped: Mapped) -> str:
     how = ["linear, eq. (5)" if mapped.load.linear else "deflected equilibrium"]
     if mapped.sign:
         how.append(f"compensator sign {mapped.sign}")
-    return f"{printable(mapped.robot)}, force {mapped.force}\n{', '.join([*held, *how])}"
+    return f"{sanitize(mapped.robot)}, force {mapped.force}\n{', '.join([*held, *how])}"
 
 
-def _heading(quantity: Quantity, values: Floats) -> str:
+def _heading(quantity: MappedQuantity, values: Floats) -> str:
     name = {"deflection_mm": "deflection"}.get(quantity.key, "compensator on/off, difference")
     least, greatest = _bounds(values)
     decimals = int(np.clip(2 - np.floor(np.log10(max(greatest, 1e-9))), 3, 9))

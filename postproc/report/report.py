@@ -1,18 +1,24 @@
-"""What is reported of one program: figures that were computed elsewhere, put into words and files."""
+"""The report of one program: figures that are computed elsewhere, as words and files."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.compensation.doubt import Doubt
-from postproc.findings import SEVERITIES, Finding
-from postproc.units import MM
+from postproc.base.arrays import Floats
+from postproc.base.findings import SEVERITIES, Finding
+from postproc.base.units import MM
+from postproc.compensation.comparison import Transitions
+from postproc.compensation.uncertainty import Uncertainty
+from postproc.report.result_keys import complete_result
+
+WITHIN, UNCERTAIN, REVIEW, NOT_CORRECTED = "within_tolerance", "uncertain", "needs_review", "not_corrected"
+VERDICTS = (WITHIN, UNCERTAIN, REVIEW, NOT_CORRECTED)
+"""The verdicts on a correction."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +31,7 @@ class Spread:
 
     @staticmethod
     def of(values: Floats) -> Spread:
+        """Of ``values`` (N,) [m]; those that are not finite are left out."""
         seen = values[np.isfinite(values)]
         if not len(seen):
             return Spread(np.nan, np.nan, np.nan)
@@ -37,7 +44,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class Worst:
-    """A motion worth a look: its line, and figures in mm and N."""
+    """A motion with a large error: its line, and figures in mm and N."""
 
     line: int
     before_mm: float
@@ -47,17 +54,50 @@ class Worst:
 
 
 @dataclass(frozen=True)
-class Link:
-    """A motion that leads from one correction to the next: the line before which it stands, and its length."""
+class TransitionMove:
+    """An inserted motion between two corrections: the line that it precedes, and its length."""
 
     line: int
     length_mm: float
 
 
 @dataclass(frozen=True)
+class PathFigures:
+    """Errors [m] at the end points of cutting motions along the feed and across it, before and after the correction;
+    ``ramp`` [m]: over which a force that steps inside a cut goes over at least; ``ramps``: how many there are;
+    ``transitions``: what the output does where the correction changes."""
+
+    along_before: Spread
+    across_before: Spread
+    along_after: Spread
+    across_after: Spread
+    ramp: float
+    ramps: int
+    transitions: Transitions
+
+    def as_json(self) -> dict[str, object]:
+        made = self.transitions
+        return {
+            "along_feed_mm": {"before": self.along_before.as_mm(), "after": self.along_after.as_mm()},
+            "across_feed_mm": {"before": self.across_before.as_mm(), "after": self.across_after.as_mm()},
+            "force_ramp_mm": round(self.ramp / MM, 6),
+            "force_ramps": self.ramps,
+            "lead_ins": made.lead_ins,
+            "stops_added": made.stops,
+            "backwards": made.backwards,
+            "correction_rate": {
+                "mm_per_mm": _finite(made.rate),
+                "mm_per_s": _finite(made.speed / MM),
+                "line": made.rate_line,
+            },
+        }
+
+
+@dataclass(frozen=True)
 class Report:
-    """One program.  ``after``, ``between`` (the way between points) and ``correction`` are None where nothing was
-    corrected (predict)."""
+    """One program.  ``after``, ``path_error`` (between the points) and ``correction`` are None where nothing was to be
+    corrected (predict).  ``uncorrected``: motions that stay as they were although they need a correction.
+    ``tolerance`` [m] of the cell."""
 
     program: str
     dialect: str
@@ -67,8 +107,8 @@ class Report:
     cutting: int
     corrected: int
     inserted: int
-    links: tuple[Link, ...]
-    left: int
+    transition_moves: tuple[TransitionMove, ...]
+    uncorrected: int
     iterations: int
     gain: float
     mode: str
@@ -77,22 +117,44 @@ class Report:
     force_peak_n: float
     before: Spread
     after: Spread | None
-    between: Spread | None
+    path_error: Spread | None
     correction: Spread | None
     angle_before_deg: float
     angle_after_deg: float | None
     worst: tuple[Worst, ...]
-    doubt: Doubt
+    uncertainty: Uncertainty
     model: dict[str, object]
     digests: dict[str, str]
     findings: tuple[Finding, ...]
     outputs: tuple[str, ...] = ()
     exit: int = 0
-    extra: dict[str, object] = field(default_factory=dict)
+    path: PathFigures | None = None
+    path_error_deg: float | None = None
+    tolerance: float = np.inf
+
+    @property
+    def largest_after(self) -> float:
+        """[m] the largest predicted error after the correction, at the points and between them; NaN without any."""
+        ends = [spread.max for spread in (self.after, self.path_error) if spread is not None]
+        return float(np.fmax.reduce(ends)) if ends else np.nan
+
+    @property
+    def verdict(self) -> str | None:
+        """Error plus uncertainty against the tolerance, one of ``VERDICTS``; None where nothing was to be corrected
+        (predict)."""
+        if self.after is None:
+            return None
+        if not self.corrected:
+            return NOT_CORRECTED
+        off = self.largest_after
+        if any(finding.severity != SEVERITIES[0] for finding in self.findings) or off > self.tolerance:
+            return REVIEW
+        sure = off + self.uncertainty.after <= self.tolerance and not self.uncertainty.lower_bound
+        return WITHIN if sure else UNCERTAIN
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public."""
-        return {
+        result = {
             "program": self.program,
             "dialect": self.dialect,
             "robot": self.robot,
@@ -101,8 +163,10 @@ class Report:
             "cutting": self.cutting,
             "corrected": self.corrected,
             "inserted": self.inserted,
-            "links": [{"line": link.line, "mm": round(link.length_mm, 6)} for link in self.links],
-            "left": self.left,
+            "transition_moves": [
+                {"line": move.line, "length_mm": round(move.length_mm, 6)} for move in self.transition_moves
+            ],
+            "uncorrected": self.uncorrected,
             "iterations": self.iterations,
             "gain": self.gain,
             "correct": self.mode,
@@ -111,23 +175,48 @@ class Report:
                 "max_n": round(self.force_max_n, 3),
                 "peak_n": _finite(round(self.force_peak_n, 3)),
             },
-            "error_before_mm": {**self.before.as_mm(), "ci95": _finite(self.doubt.before / MM)},
-            "error_after_mm": {**self.after.as_mm(), "ci95": _finite(self.doubt.after / MM)}
+            "error_before_mm": {**self.before.as_mm(), "ci95": _finite(self.uncertainty.before / MM)},
+            "error_after_mm": {**self.after.as_mm(), "ci95": _finite(self.uncertainty.after / MM)}
             if self.after
             else None,
-            "way_after_mm": self.between.as_mm() if self.between else None,
+            "path_error_mm": self.path_error.as_mm() if self.path_error else None,
+            **(self.path.as_json() if self.path else {}),
             "correction_mm": self.correction.as_mm() if self.correction else None,
             "angle_before_deg": {"max": _finite(self.angle_before_deg)},
             "angle_after_deg": None
             if self.angle_after_deg is None
             else {"max": _finite(self.angle_after_deg)},
-            "doubt": _doubt(self.doubt),
+            "path_error_deg": None if self.path_error_deg is None else {"max": _finite(self.path_error_deg)},
+            "uncertainty": self._uncertainty(),
+            "tolerance_mm": _finite(self.tolerance / MM),
+            "verdict": self.verdict,
             "model": self.model,
             "digests": self.digests,
             "findings": [finding.as_json() for finding in self.findings],
             "outputs": list(self.outputs),
             "exit": self.exit,
-            **self.extra,
+        }
+        return complete_result("predict" if self.after is None else "program", result)
+
+    def _uncertainty(self) -> dict[str, object]:
+        """``known``: the intervals determine it; ``before_mm``, ``after_mm``: half widths (95 %) from the stated
+        intervals; ``bound_after_mm``: the largest error after stays below with 95 %, None where the uncertainty is not
+        known; ``no_equilibrium``: motions without one within the intervals."""
+        uncertainty, after = self.uncertainty, self.after
+        bound = np.nan if after is None or uncertainty.unknown else after.max + uncertainty.after
+        return {
+            "known": not uncertainty.unknown,
+            "lower_bound": uncertainty.lower_bound,
+            "before_mm": _finite(uncertainty.before / MM),
+            "after_mm": None if after is None else _finite(uncertainty.after / MM),
+            "bound_after_mm": _finite(bound / MM),
+            "budget": [{"parameter": name, "share": round(share, 6)} for name, share in uncertainty.budget],
+            "effect_of_10_percent_mm": {
+                name: _finite(length / MM) for name, length in uncertainty.effect_of_10_percent
+            },
+            "without_interval": [name for name, _ in uncertainty.effect_of_10_percent],
+            "level_unstated": list(uncertainty.level_unstated),
+            "no_equilibrium": uncertainty.unstable,
         }
 
 
@@ -138,39 +227,26 @@ class Jsonable(Protocol):
 
 
 def exit_code(findings: Sequence[Finding], strict: bool = False) -> int:
-    """0 done, 3 something was left or deserves a look, 1 nothing was written; ``strict``: warnings are errors."""
+    """0 done, 3 not everything is corrected or something needs review, 1 nothing was written; ``strict``: warnings are
+    errors."""
     worst = max((SEVERITIES.index(finding.severity) for finding in findings), default=0)
     return (0, 1 if strict else 3, 1)[worst]
 
 
-def failure(program: str, findings: Sequence[Finding]) -> dict[str, object]:
-    """The machine-readable result where nothing could be done."""
-    return {
+def failure(command: str, program: str, findings: Sequence[Finding]) -> dict[str, object]:
+    """The machine-readable result of a command that failed; ``program``: "" where it is about none."""
+    result = {
         "program": program,
         "findings": [finding.as_json() for finding in findings],
         "outputs": [],
         "exit": 1,
     }
+    return complete_result(command, result)
 
 
 def in_order_of_place(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     """By file and line, each said once."""
     return tuple(sorted(dict.fromkeys(findings), key=lambda f: (f.file, f.line, f.column, f.code)))
-
-
-def with_outputs(report: Report, outputs: Sequence[str]) -> Report:
-    return replace(report, outputs=tuple(outputs))
-
-
-def _doubt(doubt: Doubt) -> dict[str, object]:
-    return {
-        "lower_bound": doubt.lower_bound,
-        "without_interval": [name for name, _ in doubt.tenth],
-        "ten_percent_mm": {name: _finite(length / MM) for name, length in doubt.tenth},
-        "level_unstated": list(doubt.level_unstated),
-        "blame": [{"parameter": name, "share": round(share, 6)} for name, share in doubt.blame],
-        "unstable": doubt.unstable,
-    }
 
 
 def _finite(value: float) -> float | None:

@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.tables import as_cell
+from postproc.base.units import DEG, MM
 from postproc.identification.campaign import Campaign
 from postproc.identification.noise import Noise
 from postproc.measurements import Readings
-from postproc.report.workspace import _texts
-from postproc.tables import as_cell
-from postproc.units import DEG, MM
+from postproc.report.mapped import _texts
 
 PARTS, EACH = 8, 10
 """Into how many parts of about as many readings the range of a joint or load is cut at most, each of ``EACH`` or more.
@@ -37,7 +37,7 @@ class Sizes(NamedTuple):
 
     @classmethod
     def of(cls, lengths: Floats) -> Sizes | None:
-        """None where there is no length; NaN are left out."""
+        """Of ``lengths`` (R,) [m]; None where there is none; NaN are left out."""
         seen = lengths[np.isfinite(lengths)]
         if not len(seen):
             return None
@@ -45,15 +45,15 @@ class Sizes(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Variable:
-    """A quantity of each reading, (R,) in ``unit``, that residuals are looked at by."""
+class ResidualVariable:
+    """A quantity of each reading, ``values`` (R,) in ``unit``, that residuals are looked at by."""
 
     name: str
     unit: str
     values: Floats
 
     def parts(self) -> list[Ints]:
-        """The rows of readings that are alike: of each value where there are few, or of ranges."""
+        """The rows (K,) of readings that are alike: of each value where there are few, or of ranges."""
         distinct, of = np.unique(np.round(self.values, 6), return_inverse=True)
         if len(distinct) > PARTS:
             count = int(np.clip(len(self.values) // EACH, 2, PARTS))
@@ -62,10 +62,10 @@ class Variable:
         return [np.flatnonzero(of == k) for k in np.unique(of)]
 
 
-def joint_variables(readings: Readings) -> tuple[Variable, ...]:
+def joint_variables(readings: Readings) -> tuple[ResidualVariable, ...]:
     """Where each joint stood."""
     return tuple(
-        Variable(name, "mm" if slides else "deg", column / (MM if slides else DEG))
+        ResidualVariable(name, "mm" if slides else "deg", column / (MM if slides else DEG))
         for (name, slides), column in zip(readings.joints, readings.q.T, strict=True)
     )
 
@@ -80,7 +80,7 @@ def lengths_of(residual: Floats, measured: Bools) -> Floats:
 
 
 def gap_of(lengths: Mapping[str, Floats], noise: Noise) -> dict[str, float]:
-    """Root mean squares [mm] of ``lengths`` [m], and the scatter of the readings; what is not known is left out."""
+    """Root mean squares [mm] of ``lengths`` (R,) [m], and the scatter of the readings; what is unknown is left out."""
     sizes = {name: Sizes.of(values) for name, values in lengths.items()}
     known = {f"{name}_rms_mm": size.rms / MM for name, size in sizes.items() if size}
     if noise.known:
@@ -89,7 +89,7 @@ def gap_of(lengths: Mapping[str, Floats], noise: Noise) -> dict[str, float]:
 
 
 def poses_in_order(pose: Ints) -> Ints:
-    """(R,) the number of the pose of each reading, from 1 in the order in which they were first measured."""
+    """(R,) the number of the ``pose`` (R,) of each reading, from 1 in the order in which they were first measured."""
     _, first, of = np.unique(pose, return_index=True, return_inverse=True)
     number = np.empty(len(first), np.int64)
     number[np.argsort(first)] = np.arange(1, len(first) + 1)
@@ -99,7 +99,7 @@ def poses_in_order(pose: Ints) -> Ints:
 def residuals_csv(
     campaign: Campaign, residuals: Mapping[str, Floats | None], more: Mapping[str, Sequence[str]]
 ) -> bytes:
-    """One row a reading: where it stands, its axes, ``residuals`` (R, 3) [m] as coordinates and length under their
+    """One row a reading: where it is, its axes, ``residuals`` (R, 3) [m] as coordinates and length under their
     names (empty where they are None), and ``more`` columns."""
     readings = campaign.readings
     places = [readings.where(row) for row in range(len(readings))]

@@ -1,4 +1,4 @@
-"""The report on a terminal: a short table, then what there is to say."""
+"""The report on a terminal: a short table, then the findings."""
 
 from __future__ import annotations
 
@@ -10,30 +10,37 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from postproc.compensation.doubt import FORCE, Doubt
-from postproc.findings import CODES, Finding
-from postproc.printable import printable
-from postproc.report.report import Report, Spread
-from postproc.units import MM
+from postproc.base.findings import Finding
+from postproc.base.sanitize import sanitize
+from postproc.base.units import MM
+from postproc.compensation.uncertainty import DIRECTION, FORCE, Uncertainty
+from postproc.report.program_verdict import verdict_sentence
+from postproc.report.report import PathFigures, Report, Spread
+from postproc.report.words import two_digits
 
 _STYLES = {"info": "cyan", "warning": "yellow", "error": "bold red"}
 NAMED = 3
-"""Parameters that the line on the doubt names."""
+"""Parameters that the line on the uncertainty names."""
 
 
 def show(console: Console, report: Report, verbose: bool = False) -> None:
     """The table of one program, its findings, and where things are."""
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(style="bold")
-    table.add_column()
-    for key, value in _rows(report):
-        table.add_row(key, value)
-    console.print(table)
+    show_rows(console, _rows(report))
     if report.worst:
         console.print(_worst(report))
     show_findings(console, report.findings, verbose)
     for path in report.outputs:
         console.print(Text(f"wrote {path}"), soft_wrap=True)
+
+
+def show_rows(console: Console, rows: Iterable[tuple[str, str | Text]]) -> None:
+    """Keys, in bold, and what belongs to them."""
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(style="bold")
+    table.add_column()
+    for key, value in rows:
+        table.add_row(key, value)
+    console.print(table)
 
 
 def _rows(report: Report) -> Iterable[tuple[str, str]]:
@@ -47,38 +54,68 @@ def _rows(report: Report) -> Iterable[tuple[str, str]]:
     peak = "" if math.isnan(report.force_peak_n) else f", peaks up to {report.force_peak_n:.0f} N"
     yield "force", escape(f"{report.force_source}, at most {report.force_max_n:.0f} N{peak}")
     yield "errors", "predicted, at the end points of cutting motions"
-    before = _spread(report.before, _interval(report.doubt, report.doubt.before))
+    before = _spread(report.before, _interval(report.uncertainty, report.uncertainty.before))
     yield "error before", f"{before}, orientation {_deg(report.angle_before_deg)}"
     if report.after is not None and report.correction is not None and report.angle_after_deg is not None:
         share = "" if report.gain == 1.0 else f"; gain {report.gain:g}"
-        after = _spread(report.after, _interval(report.doubt, report.doubt.after))
+        after = _spread(report.after, _interval(report.uncertainty, report.uncertainty.after))
         yield "error after", f"{after}, orientation {_deg(report.angle_after_deg)}"
-        if report.between is not None:
-            yield "on the way", f"{_spread(report.between)}, between the points as written"
+        if report.path_error is not None:
+            turned = report.path_error_deg
+            angle = "" if turned is None or math.isnan(turned) else f", orientation {_deg(turned)}"
+            yield "path error", f"{_spread(report.path_error)}{angle}, between the points as written"
+        if report.path is not None:
+            yield "across feed", _before_after(report.path.across_before, report.path.across_after)
+            yield "along feed", _before_after(report.path.along_before, report.path.along_after)
         yield "correction", f"{_spread(report.correction)} ({_count(report.iterations, 'iteration')}{share})"
         yield (
             "motions",
             (
-                f"{report.corrected} corrected, {report.left} left, {report.motions - report.corrected - report.left}"
-                f" with nothing to correct; {report.inserted} inserted{_links(report)}"
+                f"{report.corrected} corrected, {report.uncorrected} not corrected,"
+                f" {report.motions - report.corrected - report.uncorrected} with nothing to correct;"
+                f" {report.inserted} inserted{_transition_moves(report)}"
             ),
         )
-    if report.doubt.worst >= 0:
-        yield "doubt", escape(_doubt(report.doubt))
-        if report.doubt.lower_bound:
-            yield "", escape(_left_out(report.doubt))
+        if report.path is not None:
+            yield "transitions", _transitions(report.path)
+    if report.uncertainty.worst >= 0:
+        first, *more = _uncertainty(report)
+        yield "uncertainty", escape(first)
+        for line in more:
+            yield "", escape(line)
+    if sentence := verdict_sentence(report):
+        yield "verdict", escape(sentence)
 
 
 def _count(number: int, word: str) -> str:
     return f"{number} {word}" if number == 1 else f"{number} {word}s"
 
 
-def _links(report: Report) -> str:
-    """Links are counted apart: they lead from one correction to the next, mostly at the begin of a cut."""
-    if not report.links:
+def _transition_moves(report: Report) -> str:
+    """How many of the inserted motions lead from one correction to the next, mostly at the start of a cut."""
+    if not report.transition_moves:
         return ""
-    longest = max(report.links, key=lambda link: link.length_mm)
-    return f", {_count(len(report.links), 'link')} among them, up to {longest.length_mm:.3f} mm (line {longest.line})"
+    longest = max(report.transition_moves, key=lambda move: move.length_mm)
+    number = _count(len(report.transition_moves), "transition move")
+    return f", of these {number}, up to {longest.length_mm:.3f} mm (line {longest.line})"
+
+
+def _before_after(before: Spread, after: Spread) -> str:
+    """Two spreads of one kind of error, in mm."""
+    one, two = (f"max {s.max / MM:.4f}, rms {s.rms / MM:.4f} mm" for s in (before, after))
+    return f"{one} before; {two} after"
+
+
+def _transitions(path: PathFigures) -> str:
+    """Lead-ins, and what the output does where its correction changes."""
+    made = path.transitions
+    ramps = f", {_count(path.ramps, 'force ramp')} of at least {path.ramp / MM:g} mm" if path.ramps else ""
+    speed = f", {made.speed / MM:.1f} mm/s" if math.isfinite(made.speed) else ""
+    return (
+        f"{_count(made.lead_ins, 'lead-in')} in air{ramps}; in cuts {_count(made.stops, 'stop')} added,"
+        f" {_count(made.backwards, 'backward motion')}, correction changes by at most {made.rate:.3f} mm/mm{speed}"
+        f" (line {made.rate_line})"
+    )
 
 
 def _worst(report: Report) -> Table:
@@ -97,61 +134,76 @@ def show_findings(console: Console, findings: Sequence[Finding], verbose: bool =
     for finding in findings:
         line = Text()
         if finding.place:
-            line.append(printable(finding.place) + " ")
+            line.append(sanitize(finding.place) + " ")
         line.append(finding.code, style=_STYLES[finding.severity])
-        line.append(" " + printable(finding.message))
+        line.append(" " + sanitize(finding.message))
         console.print(line, soft_wrap=True)
         if verbose or finding.severity == "error":
-            advice = finding.help or CODES[finding.code].explanation
+            advice = finding.advice
             for part in advice.splitlines():
-                console.print(Text("    " + printable(part), style="dim"), soft_wrap=True)
+                console.print(Text("    " + sanitize(part), style="dim"), soft_wrap=True)
 
 
-def _interval(doubt: Doubt, half_width: float) -> str:
-    """`` +- 0.11 (95 %)``; empty where nothing is known."""
-    if math.isnan(half_width):
+def _interval(uncertainty: Uncertainty, half_width: float) -> str:
+    """`` +- 0.11 (95 %)``; empty where that is not known."""
+    if math.isnan(half_width) or uncertainty.unknown:
         return ""
-    return f" +- {_two_digits(half_width / MM)}{' or more' if doubt.lower_bound else ''} (95 %)"
+    return f" +- {'at least ' if uncertainty.lower_bound else ''}{two_digits(half_width / MM)} (95 %)"
 
 
-def _doubt(doubt: Doubt) -> str:
+def _uncertainty(report: Report) -> list[str]:
+    """The uncertainty of the errors, its budget, and what the intervals do not cover."""
+    uncertainty = report.uncertainty
+    missing = missing_intervals(uncertainty)
+    if not uncertainty.unknown:
+        return [describe_budget(uncertainty), *([f"at least: {missing}"] if missing else [])]
+    if not uncertainty.intervals:
+        return ["not known: no input has an interval", *([missing] if missing else [])]
+    width = uncertainty.before if report.after is None else uncertainty.after
+    alone = f"the stated intervals alone: {two_digits(width / MM)} mm (95 %), {describe_budget(uncertainty)}"
+    return [f"not known: {missing}", *([] if math.isnan(width) else [alone])]
+
+
+def describe_budget(uncertainty: Uncertainty) -> str:
     """Where the intervals come from."""
-    if not doubt.intervals:
-        return "not known, nothing has an interval"
     seen, told = 0.0, []
-    for name, share in doubt.blame[:NAMED]:
+    for name, share in uncertainty.budget[:NAMED]:
         if name == FORCE:
-            name += ", each operation with its own" if doubt.force_differs else ", one scale for all motions"
+            name += (
+                ", one scale per operation" if uncertainty.force_differs else ", one scale for all motions"
+            )
+        if name == DIRECTION:
+            name = "direction of the force"
         told.append(f"{name} ({100 * share:.0f} %)")
         seen += share
         if seen > 0.95:
             break
-    parts = ["mostly " + ", ".join(_once(told)) if told else "none from the intervals"]
-    if len(doubt.level_unstated) == 1:
+    parts = ["mostly " + ", ".join(_once(told)) if told else "no contribution of the intervals"]
+    if len(uncertainty.level_unstated) == 1:
         parts.append("the level of 1 interval is not stated")
-    elif doubt.level_unstated:
-        parts.append(f"levels of {len(doubt.level_unstated)} intervals are not stated")
+    elif uncertainty.level_unstated:
+        parts.append(f"levels of {len(uncertainty.level_unstated)} intervals are not stated")
     return "; ".join(parts)
 
 
-def _left_out(doubt: Doubt) -> str:
-    """What the intervals leave out, and what a tenth of it is worth."""
-    names = [(name, length) for name, length in doubt.tenth if name != FORCE]
+def missing_intervals(uncertainty: Uncertainty) -> str:
+    """Inputs without an interval, and the effect of 10 % of each; empty where every input has one."""
+    names = [(name, length) for name, length in uncertainty.effect_of_10_percent if name != FORCE]
     parts = []
     if names:
         words = ", ".join(_once([name for name, _ in names[:NAMED]]))
         more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-        has = f"has no interval (10 % of it: {_two_digits(names[0][1] / MM)} mm)"
+        has = f"has no interval (10 % of it: {two_digits(names[0][1] / MM)} mm)"
         if len(names) > 1:
-            each = ", ".join(_two_digits(length / MM) for _, length in names[:NAMED])
+            each = ", ".join(two_digits(length / MM) for _, length in names[:NAMED])
             has = f"have no interval (10 % of each: {each} mm)"
         parts.append(f"{words}{more} {has}")
-    for _, length in (entry for entry in doubt.tenth if entry[0] == FORCE):
-        tenth = f"(10 % of it: {_two_digits(length / MM)} mm)"
+    for _, length in (entry for entry in uncertainty.effect_of_10_percent if entry[0] == FORCE):
+        tenth = f"(10 % of it: {two_digits(length / MM)} mm)"
         parts.append(f"nor has the force {tenth}" if parts else f"the force has no interval {tenth}")
-    if doubt.unstable:
-        parts.append(f"{doubt.unstable} motions have no stable rest within the intervals")
-    return "at least: " + ", ".join(parts)
+    if uncertainty.unstable:
+        parts.append(f"{uncertainty.unstable} motions have no equilibrium within the intervals")
+    return ", ".join(parts)
 
 
 def _once(names: Sequence[str]) -> list[str]:
@@ -160,13 +212,6 @@ def _once(names: Sequence[str]) -> list[str]:
     return [
         name.partition(".")[2] if i and effects[i] == effects[i - 1] else name for i, name in enumerate(names)
     ]
-
-
-def _two_digits(value: float) -> str:
-    """Two significant digits without an exponent."""
-    if value == 0 or not math.isfinite(value):
-        return "0" if value == 0 else "-"
-    return f"{value:.{max(0, 1 - math.floor(math.log10(abs(value))))}f}"
 
 
 def _spread(spread: Spread, interval: str = "") -> str:

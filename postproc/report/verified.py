@@ -1,4 +1,4 @@
-"""What is reported of two programs that were simulated."""
+"""The report on two programs that were simulated."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from postproc.findings import Finding
+from postproc.base.findings import Finding
+from postproc.base.units import DEG, MM
 from postproc.report.report import Spread
+from postproc.report.result_keys import complete_result
 from postproc.report.terminal import show_findings
-from postproc.units import MM
+from postproc.report.words import in_decimals
 
 
 @dataclass(frozen=True)
-class Place:
+class WorstError:
     """A place on the path: its line, the error [mm], the axis of the base along which it is largest, the force [N]."""
 
     line: int
@@ -26,29 +28,46 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Way:
-    """One program.  samples; error: along its cuts; ends: first and last samples of cuts; links, link_length [m] and
-    on_links: motions that only lead from one correction to the next; skipped: motions that were not simulated."""
+class PathComparison:
+    """One program.  samples; error: distance of the tool from the desired path, along its cuts; ends: at the first and
+    last places of cuts, along_at_ends [m] the share of it along the path; missed [m]: the largest distance of an end
+    point of the desired path from the path of the tool; turn [rad]: the largest error of the orientation; change [m],
+    change_turn [rad]: what twice as many samples changed of the largest; stops: exact stops inside cuts; backwards:
+    motions against the feed;
+    approaches, approach_length [m]: motions in air to where a cut starts corrected; unknown_corners: approximated by a
+    distance that is not known, run as they are programmed; skipped: motions that were not simulated; converged: force
+    and place agree everywhere, else there are no figures."""
 
     samples: int
     error: Spread
     ends: Spread
-    links: int
-    link_length: float
-    on_links: Spread
+    along_at_ends: float
+    missed: float
+    turn: float
+    change: float
+    change_turn: float
+    stops: int
+    backwards: int
+    approaches: int
+    approach_length: float
+    unknown_corners: int
     skipped: int
-    worst: tuple[Place, ...]
+    converged: bool
+    worst: tuple[WorstError, ...]
 
     def as_json(self) -> dict[str, object]:
         return {
             **self.error.as_mm(),
             "samples": self.samples,
-            "cut_ends": self.ends.as_mm(),
-            "links": {
-                "count": self.links,
-                "length_mm": round(self.link_length / MM, 3),
-                **self.on_links.as_mm(),
-            },
+            "converged": self.converged,
+            "orientation_deg": _rounded(self.turn / DEG),
+            "missed": _rounded(self.missed / MM),
+            "cut_ends": {**self.ends.as_mm(), "along": _rounded(self.along_at_ends / MM)},
+            "doubling": {"mm": _rounded(self.change / MM), "deg": _rounded(self.change_turn / DEG)},
+            "stops": self.stops,
+            "backwards": self.backwards,
+            "approaches": {"count": self.approaches, "length_mm": round(self.approach_length / MM, 3)},
+            "unknown_corners": self.unknown_corners,
             "skipped": self.skipped,
             "worst": [
                 {"line": p.line, "mm": round(p.error_mm, 6), "axis": p.axis, "force_n": round(p.force_n, 3)}
@@ -59,7 +78,7 @@ class Way:
 
 @dataclass(frozen=True)
 class Verified:
-    """Two programs under the same forces; step, tolerance [m]."""
+    """Two programs under the same forces; step, tolerance [m], tolerance_angle [rad]."""
 
     original_file: str
     compensated_file: str
@@ -69,14 +88,15 @@ class Verified:
     compensated_motions: int
     step: float
     tolerance: float
-    original: Way
-    compensated: Way
+    tolerance_angle: float
+    original: PathComparison
+    compensated: PathComparison
     findings: tuple[Finding, ...]
     exit: int
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public."""
-        return {
+        result = {
             "programs": [self.original_file, self.compensated_file],
             "robot": self.robot,
             "force": {"source": self.force_source},
@@ -84,12 +104,15 @@ class Verified:
             "growth": round(self.compensated_motions / max(self.motions, 1), 6),
             "step_mm": self.step / MM,
             "tolerance_mm": self.tolerance / MM,
+            "tolerance_deg": self.tolerance_angle / DEG,
+            "converged": self.original.converged and self.compensated.converged,
             "samples": self.compensated.samples,
             "original": self.original.as_json(),
             "compensated": self.compensated.as_json(),
             "findings": [finding.as_json() for finding in self.findings],
             "exit": self.exit,
         }
+        return complete_result("verify", result)
 
 
 def show(console: Console, done: Verified, verbose: bool = False) -> None:
@@ -100,22 +123,45 @@ def show(console: Console, done: Verified, verbose: bool = False) -> None:
         soft_wrap=True,
     )
     console.print(
-        f"robot {escape(done.robot)}, force: {escape(done.force_source)}; a sample every {done.step / MM:g} mm at"
-        f" least, tolerance {done.tolerance / MM:g} mm",
+        f"robot {escape(done.robot)}, force: {escape(done.force_source)}; tolerance {done.tolerance / MM:g} mm,"
+        f" {done.tolerance_angle / DEG:g} deg",
         soft_wrap=True,
     )
     table = Table(box=None, pad_edge=False)
-    for head in ("path error, mm", "max", "rms", "95 % below", "cut ends max", "links", "samples"):
-        table.add_column(head, justify="left" if head.startswith("path") else "right")
+    heads = (
+        "distance from the path, mm",
+        "max",
+        "rms",
+        "95 % below",
+        "cut ends",
+        "along",
+        "orientation, deg",
+        "stops",
+        "backward",
+    )
+    for number, head in enumerate((*heads, "samples")):
+        table.add_column(head, justify="right" if number else "left")
     for name, way in (("original", done.original), ("compensated", done.compensated)):
-        links = f"{way.links} ({way.link_length / MM:.1f} mm)" if way.links else "0"
         table.add_row(
             name,
-            *(_mm(v) for v in (way.error.max, way.error.rms, way.error.p95, way.ends.max)),
-            links,
-            str(way.samples),
+            *(
+                in_decimals(v / MM, 4)
+                for v in (way.error.max, way.error.rms, way.error.p95, way.ends.max, way.along_at_ends)
+            ),
+            "-" if math.isnan(way.turn) else f"{way.turn / DEG:.4f}",
+            *(str(count) for count in (way.stops, way.backwards, way.samples)),
         )
     console.print(table)
+    console.print(_describe_sampling(done.compensated), soft_wrap=True)
+    way = done.compensated
+    if way.approaches:
+        console.print(f"{way.approaches} lead-ins and lead-outs in air, {way.approach_length / MM:.1f} mm")
+    if way.unknown_corners:
+        console.print(
+            f"{way.unknown_corners} points have an unknown approximation distance; both programs are simulated"
+            " through these points",
+            soft_wrap=True,
+        )
     if done.compensated.worst:
         console.print("worst places of the compensated program")
         places = Table(box=None, pad_edge=False)
@@ -127,5 +173,16 @@ def show(console: Console, done: Verified, verbose: bool = False) -> None:
     show_findings(console, done.findings, verbose)
 
 
-def _mm(value: float) -> str:
-    return "-" if math.isnan(value) else f"{value / MM:.4f}"
+def _describe_sampling(way: PathComparison) -> str:
+    if not way.converged:
+        return "force and position do not converge everywhere in the compensated program: its errors are not known"
+    if math.isnan(way.change):
+        return "the samples are not doubled: there are too many"
+    return (
+        f"twice as many samples change the largest error by {way.change / MM * 1e3:.2f} um,"
+        f" and the largest orientation error by {way.change_turn / DEG:.5f} deg"
+    )
+
+
+def _rounded(value: float) -> float | None:
+    return round(value, 7) if math.isfinite(value) else None

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from postproc.base.units import MM
 from postproc.identification.campaign import Campaign
-from postproc.units import MM
 
 UNITS = {
     "m": ("mm", MM),
@@ -32,6 +32,11 @@ def shown_unit(unit: str) -> tuple[str, float]:
     return UNITS.get(unit, (unit, 1.0))
 
 
+def in_decimals(value: float | None, decimals: int, missing: str = "-") -> str:
+    """``value`` with so many decimals; ``missing`` where there is none."""
+    return missing if value is None or not math.isfinite(value) else f"{value:.{decimals}f}"
+
+
 def fixed(value: float, interval: float) -> str:
     """``value`` to two digits of ``interval``, without an exponent where that can be read."""
     if not math.isfinite(value):
@@ -42,6 +47,13 @@ def fixed(value: float, interval: float) -> str:
     if decimals > 9 or abs(value) >= 1e9:
         return f"{value:.3e}"
     return f"{round(value, decimals) + 0.0:.{max(0, decimals)}f}"
+
+
+def two_digits(value: float) -> str:
+    """Two significant digits without an exponent."""
+    if value == 0 or not math.isfinite(value):
+        return "0" if value == 0 else "-"
+    return f"{value:.{max(0, 1 - math.floor(math.log10(abs(value))))}f}"
 
 
 def some(lines: Sequence[str], verbose: bool) -> list[str]:

@@ -1,0 +1,1 @@
+from postproc.robot import codes as codes

@@ -22,8 +22,8 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from postproc.arrays import Bools, Floats
-from postproc.geometry import Poses
+from postproc.base.arrays import Bools, Floats
+from postproc.base.geometry import Poses
 from postproc.robot.geometries import Joint
 
 TOOL = Poses.identity()
@@ -35,13 +35,14 @@ _Z_ALONG = [np.roll(np.eye(3), shift, axis=1) for shift in (2, 1, 0)]
 
 
 @dataclass(frozen=True)
-class Sweep:
+class ChainKinematics:
     """The chain at N states, component first.
 
-    axes, origins: (3, N) of each of the m coordinates, in the robot base; turns (m,): a turn, or else a shift; apart
-    (m,): it has another origin than the one before it; spindles: how many of them, the last ones, are the spindle's;
-    position (3, N) [m] of the TCP; mount (3, N) [m]: the same without what the spindle's coordinates shift it, where
-    the tool's body is; flange: columns and position of the flange; links: the columns of the frame behind each motor.
+    axes, origins [m]: m times (3, N), of each of the m coordinates, in the robot base; turns (m,): a turn, or else a
+    shift; apart (m,): it has another origin than the one before it; spindles: how many of them, the last ones, are the
+    spindle's; position (3, N) [m] of the TCP; mount (3, N) [m]: the same without what the spindle's coordinates shift
+    it, where the tool's body is; flange: three columns (3, N) and position (3, N) [m] of the flange; links: the three
+    columns (3, N) of the frame after each motor.
     """
 
     axes: tuple[Floats, ...]
@@ -68,7 +69,7 @@ class Sweep:
         """The TCP (N) in the robot base."""
         return _poses(self.tcp, self.position)
 
-    def nudged(self, step: Floats) -> Sweep:
+    def first_order_update(self, step: Floats) -> ChainKinematics:
         """The TCP and the mount after a small ``step`` (m, N) [rad, m] of the coordinates; all else stays as it is.
 
         w = sum of s_i z_i over the turns; dp = sum of s_i z_i x (p - p_i) over the turns, and of s_i z_i over the
@@ -101,7 +102,8 @@ class Sweep:
 class Chain:
     """A serial chain of ``joints`` with a ``flange``, and the extra coordinates named in ``extras``.
 
-    names (m,): of the coordinates; motors: where the joints stand among them (a slice without extras).
+    names (m,): of the coordinates; motors: where the joints are among them (a slice without extras).  Raises
+    ValueError where ``extras`` names a coordinate that is not there.
     """
 
     def __init__(self, joints: Sequence[Joint], flange: Poses, extras: Iterable[str] = ()) -> None:
@@ -156,7 +158,7 @@ class Chain:
         return names
 
     def _add(self, name: str, axes: Floats, turns: bool) -> None:
-        """A coordinate about or along the z column of ``axes``; what follows stands in the axes before it."""
+        """A coordinate about or along the z column of ``axes``; what follows is in the axes before it."""
         placement = self._at @ Poses(axes, np.zeros(3))
         joint = pin.JointModelRZ() if turns else pin.JointModelPZ()
         self._parent = self.model.addJoint(self._parent, joint, _se3(placement), name)
@@ -164,7 +166,7 @@ class Chain:
         self._arm.append((described.rotation.copy(), described.translation.copy(), turns))
         self._at = Poses(axes.T, np.zeros(3))
 
-    def sweep(self, coordinates: Floats, tool: Poses, spindle: Floats | None = None) -> Sweep:
+    def evaluate(self, coordinates: Floats, tool: Poses, spindle: Floats | None = None) -> ChainKinematics:
         """Evaluate at ``coordinates`` (m, N) [rad, m].
 
         ``tool``: TCP on the flange, one pose or N; ``spindle`` (N, 3): unit vector of the spindle, tip-ward, in tool
@@ -213,7 +215,7 @@ class Chain:
                 axes.append(direction)
                 origins.append(position)
                 position = position + coordinates[self.index[name]] * direction
-        return Sweep(
+        return ChainKinematics(
             _of_all(axes, count),
             _of_all(origins, count),
             self.turns,
@@ -249,24 +251,14 @@ class Chain:
 
     def flange(self, q: Floats) -> Poses:
         """Flange poses (N) of the rigid robot at ``q`` (N, n) [rad], in the robot base."""
-        return _poses(*self.sweep(self.placed(q), TOOL).flange)
+        return _poses(*self.evaluate(self.placed(q), TOOL).flange)
 
     def jacobian(self, q: Floats, tool: Poses) -> Floats:
         """Geometric Jacobians (N, 6, m) of the TCP at ``q`` (N, n): linear part first, axes of the robot base."""
-        return jacobian(self.sweep(self.placed(q), tool))
-
-    def reference_flange(self, q: Floats) -> Poses:
-        """``flange`` by Pinocchio itself, state by state: the reference for the batch evaluation."""
-        data = self.model.createData()
-        rotation, position = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
-        for row, state in enumerate(self.placed(q)[: self.model.nq].T):
-            pin.framesForwardKinematics(self.model, data, state)
-            rotation[row] = data.oMf[self.flange_id].rotation
-            position[row] = data.oMf[self.flange_id].translation
-        return Poses(rotation, position)
+        return jacobian(self.evaluate(self.placed(q), tool))
 
 
-def jacobian(swept: Sweep) -> Floats:
+def jacobian(swept: ChainKinematics) -> Floats:
     """Geometric Jacobians (N, 6, m) of the TCP: column [z x (p - p_i); z] of a turn, [z; 0] of a shift."""
     turns, axes = swept.turns[:, None, None], np.array(swept.axes)
     lever = np.cross(axes, swept.position[None] - np.array(swept.origins), axis=1)
@@ -274,7 +266,7 @@ def jacobian(swept: Sweep) -> Floats:
     return np.moveaxis(np.concatenate([linear, angular], axis=1), (0, 1, 2), (2, 1, 0))
 
 
-def generalized_force(swept: Sweep, point: Floats, wrench: Floats) -> Floats:
+def generalized_force(swept: ChainKinematics, point: Floats, wrench: Floats) -> Floats:
     """J^T w (m, N) [N m, N] of a wrench (6, N) [N, N m] that acts at ``point`` (3, N) [m]; robot base axes.
 
     tau_i = z_i . (m + (p - p_i) x f) for a turn, z_i . f for a shift.
@@ -301,7 +293,7 @@ def generalized_force(swept: Sweep, point: Floats, wrench: Floats) -> Floats:
 
 
 def cross(a: Floats, b: Floats) -> Floats:
-    """a x b of (3, N) arrays."""
+    """a x b (3, N) of ``a``, ``b`` (3, N)."""
     found = np.empty(np.broadcast_shapes(a.shape, b.shape))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         np.multiply(a[j], b[k], out=found[i])
@@ -311,7 +303,8 @@ def cross(a: Floats, b: Floats) -> Floats:
 
 def weight_about(axis: Floats, moment: Floats, gravity: Floats) -> tuple[Floats, Floats]:
     """Torque (N,) [N m] about ``axis`` (3, N) of a weight whose first moment from the axis is ``moment`` (3, N) [kg m],
-    and its derivative by the turn: a . (M x g) and a . ((a x M) x g) = (a . M)(a . g) - M . g."""
+    under ``gravity`` (3,) [m/s2], and its derivative by the turn: a . (M x g) and a . ((a x M) x g) = (a . M)(a . g) -
+    M . g."""
     (ax, ay, az), (mx, my, mz), (gx, gy, gz) = axis, moment, gravity.tolist()
     if gx == 0.0 and gy == 0.0:  # the robot stands upright
         return gz * (ax * my - ay * mx), gz * ((ax * mx + ay * my + az * mz) * az - mz)
@@ -321,7 +314,8 @@ def weight_about(axis: Floats, moment: Floats, gravity: Floats) -> tuple[Floats,
 
 
 def sine_and_cosine(angle: Floats) -> tuple[Floats, Floats]:
-    """sin and cos of ``angle``, to 1e-15, by t = tan(angle / 2): numpy's tan is several times as fast as the two."""
+    """sin (...) and cos (...) of ``angle`` (...) [rad], to 1e-15, by t = tan(angle / 2): numpy's tan is several times
+    as fast as the two."""
     t = np.tan(0.5 * angle)
     share = t * t
     share += 1.0

@@ -10,16 +10,16 @@ from statistics import NormalDist
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints, frozen
-from postproc.files import read_file
-from postproc.findings import Finding, Refusal, nearest
-from postproc.geometry import Poses
+from postproc.base.arrays import Floats, Ints, frozen
+from postproc.base.findings import Finding, Refusal, nearest
+from postproc.base.geometry import Poses
+from postproc.base.read_files import read_file
+from postproc.base.units import UNITS
+from postproc.base.yaml_section import YamlSection, parsed, read
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Axis, Geometry, Joint, KukaVariant, SerialArm
 from postproc.robot.provenance import Identification, correlations, read_identification
-from postproc.robot.reading import geometry_kind, read_axes, read_geometry, unit_factor
-from postproc.units import UNITS
-from postproc.yamlfile import Section, parsed, read
+from postproc.robot.read_geometry import geometry_kind, read_axes, read_geometry, unit_factor
 
 COVERAGE = 1.96
 """Half width of a 95 % interval over the standard deviation (normal distribution)."""
@@ -49,7 +49,7 @@ class EffectEntry:
     """One entry of ``effects:``; what it may hold is the business of the effect itself."""
 
     name: str
-    section: Section
+    section: YamlSection
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,8 @@ class Robot:
     """A robot file.  ``arm``: geometry of the actual robot, ``nominal``: the one that the controller believes.
 
     All values of joints are the controller's (see ``geometries``).  ``external``: column of the joint of seven that a
-    program does not place the flange with; it stays where it was.  ``identified``: runs of the tool that gave it new
+    program does not place the flange with; it is where the program has the external axis of its name (E1..E6), and
+    without one it stays where it was.  ``identified``: runs of the tool that gave it new
     values, in order.  ``raw``: the bytes of the file.
     """
 
@@ -170,9 +171,9 @@ def find_robot(name: str, beside: Path | None = None) -> Path:
             Finding(
                 "CEL003",
                 f"robot {name!r} is not known{nearest(name, known)}",
-                help="known robots: "
+                help="the known robots are "
                 + ", ".join(sorted(known))
-                + "; or give the path of a robot file (.yaml)",
+                + "; or state the path of a robot file (.yaml)",
             )
         )
     path = Path(name)
@@ -252,7 +253,7 @@ def _external(arm: Geometry) -> int | None:
     return 0 if isinstance(arm, KukaVariant) and arm.rail is not None else None
 
 
-def _masses(section: Section, names: list[str], arm: Geometry) -> tuple[Mass, ...]:
+def _masses(section: YamlSection, names: list[str], arm: Geometry) -> tuple[Mass, ...]:
     """{mass, com} of links, by the joint that moves them; com in the link's own frame of the geometry."""
     section.only("source", "unit", "com_unit", *names)
     kilogram, metre = unit_factor(section, "kg"), unit_factor(section, "m", "com_unit")
@@ -268,13 +269,13 @@ def _masses(section: Section, names: list[str], arm: Geometry) -> tuple[Mass, ..
     return tuple(masses)
 
 
-def _mechanisms(top: Section, names: list[str]) -> tuple[Mechanism, ...]:
+def _mechanisms(top: YamlSection, names: list[str]) -> tuple[Mechanism, ...]:
     """{name, kind, source[, joint, about]} and numbers, each {value, unit[, source]}; several of a name are refused."""
     found: dict[str, Mechanism] = {}
     for section in top.sections("mechanisms"):
         name = section.text("name")
         if name in found:
-            raise section.error("YML004", f"{name!r} stands in line {found[name].line} already", "name")
+            raise section.error("YML004", f"{name!r} occurs in line {found[name].line} already", "name")
         quantities = {
             key: _quantity(section.section(key))
             for key in section
@@ -292,17 +293,19 @@ def _mechanisms(top: Section, names: list[str]) -> tuple[Mechanism, ...]:
     return tuple(found.values())
 
 
-def _quantity(section: Section) -> Quantity:
+def _quantity(section: YamlSection) -> Quantity:
     section.only("value", "unit", "source")
     word = section.text("unit")
     unit = UNITS.get(" ".join(word.split()))
     if unit is None:
-        raise section.error("YML005", f"{word!r} is no unit{nearest(word, UNITS)}", "unit", ", ".join(UNITS))
+        raise section.error(
+            "YML005", f"{word!r} is not a unit{nearest(word, UNITS)}", "unit", ", ".join(UNITS)
+        )
     values = section.numbers("value", 3) if section.is_list("value") else [section.number("value")]
     return Quantity(frozen(np.array(values) * unit[1]), unit[0], section.text("source", ""))
 
 
-def parameter_value(section: Section, si_unit: str) -> Value:
+def parameter_value(section: YamlSection, si_unit: str) -> Value:
     """One parameter: {value, unit, ci95 | ci with ci_level: unstated, source}.  An interval is a half width."""
     section.only("value", "unit", "ci95", "ci", "ci_level", "source")
     factor = unit_factor(section, si_unit)

@@ -12,8 +12,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from postproc.arrays import Floats, frozen
-from postproc.geometry import Poses, rotation_from_vector
+from postproc.base.arrays import Floats, frozen
+from postproc.base.geometry import Poses, rotation_from_vector
 
 Limits = Sequence[tuple[float, float]]
 
@@ -109,9 +109,9 @@ class KukaLengths:
 
 @dataclass(frozen=True, eq=False)
 class KukaVariant:
-    """A KUKA-type arm whose controller counts otherwise, or that stands on a linear axis.
+    """A KUKA-type arm whose controller counts otherwise, or that is on a linear axis.
 
-    ``axes``: of the rail, if there is one, and of the six joints; ``rail`` (3,): the way of the linear axis, a unit
+    ``axes``: of the rail, if there is one, and of the six joints; ``rail`` (3,): the path of the linear axis, a unit
     vector in the robot base.
     """
 
@@ -138,10 +138,12 @@ class KukaVariant:
 
     @property
     def signs(self) -> Floats:
+        """(n,) 1 or -1: how the controller counts."""
         return np.array([axis.sign for axis in self.axes])
 
     @property
     def offsets(self) -> Floats:
+        """(n,) [rad, m] added to what the controller counts."""
         return np.array([axis.offset for axis in self.axes])
 
 
@@ -180,7 +182,7 @@ Geometry = KukaLengths | KukaVariant | SerialArm
 
 
 @dataclass(frozen=True)
-class Row:
+class DhRow:
     """One row of a Denavit-Hartenberg table [m, rad]; ``theta`` or ``d`` is the constant part beside the motion."""
 
     a: float
@@ -189,7 +191,7 @@ class Row:
     theta: float = 0.0
 
 
-def standard_dh(rows: Sequence[Row]) -> list[Link]:
+def standard_dh(rows: Sequence[DhRow]) -> list[Link]:
     """Rz(theta) Tz(d) Tx(a) Rx(alpha): the joint moves about or along the z axis of the link before."""
     links = []
     for row in rows:
@@ -198,7 +200,7 @@ def standard_dh(rows: Sequence[Row]) -> list[Link]:
     return links
 
 
-def modified_dh(rows: Sequence[Row]) -> list[Link]:
+def modified_dh(rows: Sequence[DhRow]) -> list[Link]:
     """Rx(alpha) Tx(a) Rz(theta) Tz(d), alpha and a of the link before (Craig): it moves about or along its own z."""
     links = []
     for row in rows:
@@ -215,7 +217,7 @@ def based(links: Sequence[Link], base: Poses) -> tuple[Link, ...]:
 
 
 def turn_about(axis: str, angle: float) -> Floats:
-    """Rotation about a coordinate axis; quarter turns are made of zeros and ones."""
+    """Rotation (3, 3) by ``angle`` [rad] about a coordinate axis; quarter turns are made of zeros and ones."""
     quarters = angle / (np.pi / 2)
     rotation = rotation_from_vector(angle * np.eye(3)["xyz".index(axis)])
     return np.round(rotation) if abs(quarters - round(quarters)) < 1e-12 else np.asarray(rotation)
@@ -257,7 +259,7 @@ def _held(pose: Poses) -> Poses:
 
 
 def frame_with_z(axis: Floats) -> Floats:
-    """A rotation whose z column is ``axis``, of zeros and ones only where the axis is."""
+    """A rotation (3, 3) whose z column is the unit vector ``axis`` (3,), of zeros and ones only where the axis is."""
     z = np.asarray(axis, dtype=float)
     x = np.array([0.0, 0.0, 1.0]) if abs(z[2]) < 0.5 else np.array([1.0, 0.0, 0.0])
     x = x - (x @ z) * z

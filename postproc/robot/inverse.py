@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.geometry import Poses, wrapped
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.geometry import Poses, wrapped
 from postproc.robot.chain import sine_and_cosine
 from postproc.robot.geometries import Geometry, KukaLengths, KukaVariant, SerialArm
-from postproc.robot.newton import inverse_near
+from postproc.robot.newton import solve_near
 
 _SINGULAR = 1e-9
 
@@ -33,10 +33,10 @@ def inverse(arm: Geometry, flange: Poses, status: Ints, near: Floats) -> Inverse
 
     ``near`` (N, n) [rad, m]: each axis is given the multiple of a turn nearest to it, and its value where an axis is
     not defined or is the external one.  KUKA-type arms take the branch ``status`` (N,), others that of ``near`` (see
-    ``newton.inverse_near``).
+    ``newton.solve_near``).
     """
     if isinstance(arm, SerialArm):
-        return Inverse(*inverse_near(arm, flange, near))
+        return Inverse(*solve_near(arm, flange, near))
     if isinstance(arm, KukaLengths):
         return _closed_form(arm, flange, status, near)
     if arm.rail is not None:
@@ -54,8 +54,8 @@ def kuka_angles(arm: KukaLengths | KukaVariant, q: Floats) -> Floats:
 
 
 def controller_values(arm: KukaLengths | KukaVariant, angles: Floats, like: Floats) -> Floats:
-    """(N, n) the other way: A2, A3 and A5 within half a turn of the middle of their limits; a linear axis keeps its
-    value of ``like`` (N, n)."""
+    """(N, n) [rad, m] the other way, of ``angles`` (N, n): A2, A3 and A5 within half a turn of the middle of their
+    limits; a linear axis keeps its value of ``like`` (N, n)."""
     if isinstance(arm, KukaLengths):
         return angles
     values = like.copy()

@@ -3,7 +3,7 @@
     J dq = e,  dq = (J^T J + (|e|^2 / 2 + w) I)^-1 J^T e        (damping after Sugihara, IEEE T-RO 27, 2011)
 
 e: what is left to the target, position over the arm's size and rotation vector.  The damping goes with the error, so
-that the last steps are Newton's own.  A target that is far is gone to in steps along the straight way to it, so that
+that the last steps are Newton's own.  A target that is far is gone to in steps along the straight path to it, so that
 the solution stays in the branch of its start.
 """
 
@@ -14,8 +14,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
-from postproc.geometry import Poses, rotation_from_vector, vector_from_rotation
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.geometry import Poses, rotation_from_vector, vector_from_rotation
 from postproc.robot.chain import TOOL, Chain, jacobian
 from postproc.robot.geometries import SerialArm
 
@@ -51,12 +51,12 @@ class Solver:
         self.size = float(sum(np.linalg.norm(place) for place in places))
         self.first = int(self.free[0])
         after = [np.linalg.norm(place) for place in places[self.first :]]
-        ways = np.maximum(np.abs(self.low), np.abs(self.high))[self.first :]
-        self.reach = float(sum(after) + ways[~self.turns[self.first :]].sum())
+        desired_path = np.maximum(np.abs(self.low), np.abs(self.high))[self.first :]
+        self.reach = float(sum(after) + desired_path[~self.turns[self.first :]].sum())
 
-    def left(self, q: Floats, target: Poses) -> tuple[Floats, Floats]:
+    def residual(self, q: Floats, target: Poses) -> tuple[Floats, Floats]:
         """What is left to the targets, e (N, 6), and the Jacobian (N, 6, k) of the moving columns, both scaled."""
-        swept = self.chain.sweep(np.ascontiguousarray(q.T), TOOL)
+        swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
         here = swept.pose
         turn = vector_from_rotation(target.rotation @ np.swapaxes(here.rotation, 1, 2))
         error = np.concatenate([(target.position - here.position) / self.size, turn], axis=1)
@@ -65,7 +65,8 @@ class Solver:
         return error, slope
 
     def solve(self, q: Floats, target: Poses, steps: int = 40, done: float = 0.0) -> tuple[Floats, Bools]:
-        """From ``q`` (N, n) to ``target`` (N): the angles, and where what is left is below the tolerance.
+        """From ``q`` (N, n) [rad, m] to ``target`` (N): the joint values (N, n), and where (N,) what is left is below
+        the tolerance.
 
         ``done``: stop at this error instead of the tolerance.  Rows that make no headway are given up.
         """
@@ -75,7 +76,7 @@ class Solver:
         for step in range(steps):
             if not len(active):
                 break
-            error, slope = self.left(q[active], target[active])
+            error, slope = self.residual(q[active], target[active])
             size = np.maximum(
                 np.linalg.norm(error[:, :3], axis=1) * self.size, np.linalg.norm(error[:, 3:], axis=1)
             )
@@ -94,22 +95,23 @@ class Solver:
         return q, good
 
     def distance(self, q: Floats, target: Poses) -> Floats:
-        """(N,) how far the flange at ``q`` is from its target: rad, and parts of the arm's size."""
-        error = self.left(q, target)[0]
+        """(N,) how far the flange at ``q`` (N, n) is from its target: rad, and parts of the arm's size."""
+        error = self.residual(q, target)[0]
         return np.asarray(
             np.maximum(np.linalg.norm(error[:, :3], axis=1), np.linalg.norm(error[:, 3:], axis=1))
         )
 
     def beyond(self, q: Floats, target: Poses) -> Bools:
-        """(N,) farther from the first joint that moves than all links and ways after it together."""
-        swept = self.chain.sweep(np.ascontiguousarray(q.T), TOOL)
+        """(N,) ``target`` (N) is farther from the first joint that moves than all links and ways after it together;
+        ``q`` (N, n) states where that joint is."""
+        swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
         away = np.linalg.norm(target.position - swept.origins[self.first].T, axis=1)
         return np.asarray(away > 1.001 * self.reach)
 
     def follow(self, q: Floats, target: Poses, stride: float = STEP) -> tuple[Floats, Bools, Bools]:
-        """``solve`` along the straight way from where the flange is at ``q``, in steps of ``stride``; third, where no
-        step failed on the way."""
-        swept = self.chain.sweep(np.ascontiguousarray(q.T), TOOL)
+        """Joint values (N, n) and where (N,) they hold, as ``solve``, along the straight path from where the flange is
+        at ``q`` (N, n), in steps of ``stride``; third (N,), where no step failed on the way."""
+        swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
         here = swept.pose
         way = target.position - here.position
         turn = vector_from_rotation(target.rotation @ np.swapaxes(here.rotation, 1, 2))
@@ -128,7 +130,8 @@ class Solver:
         return found, good, smooth & good
 
     def search(self, near: Floats, target: Poses) -> tuple[Floats, Bools]:
-        """Solutions in any branch: within the limits if there is one, and of those the nearest to ``near``."""
+        """Solutions (N, n) in any branch, and where there is one (N,): within the limits if there is one, and of those
+        the nearest to ``near`` (N, n) [rad, m]."""
         best, good = near.copy(), np.zeros(len(near), bool)
         rows = np.flatnonzero(~self.beyond(near, target))
         best[rows], good[rows] = self._search(near[rows], target[rows])
@@ -151,7 +154,8 @@ class Solver:
         return best, good
 
     def inside(self, q: Floats, near: Floats) -> Floats:
-        """Each turning axis at the whole turns nearest to ``near`` within its limits, nearest at all without any."""
+        """(N, n) [rad, m] ``q`` (N, n), each turning axis at the whole turns nearest to ``near`` (N, n) within its
+        limits, nearest at all without any."""
         q = q.copy()
         for i in self.free[self.turns[self.free]]:
             turns = np.round((near[:, i] - q[:, i]) / (2 * np.pi))
@@ -161,6 +165,7 @@ class Solver:
         return q
 
     def within(self, q: Floats) -> Bools:
+        """(N,) all joints of ``q`` (N, n) [rad, m] are within their limits."""
         return np.asarray(((q >= self.low - 1e-9) & (q <= self.high + 1e-9)).all(axis=1))
 
 
@@ -169,8 +174,8 @@ def solver_of(arm: SerialArm) -> Solver:
     return Solver(arm)
 
 
-def inverse_near(arm: SerialArm, flange: Poses, near: Floats) -> tuple[Floats, Bools]:
-    """(N, n) [rad, m] the solution that ``near`` leads to, and where there is one.
+def solve_near(arm: SerialArm, flange: Poses, near: Floats) -> tuple[Floats, Bools]:
+    """(N, n) [rad, m] the solution that ``near`` (N, n) leads to, and where (N,) there is one.
 
     The held joint keeps its value of ``near``.  A target near to where ``near`` stands is solved in its branch or not
     at all; for one that is ``FAR`` any branch will do, within the limits and near to ``near`` if there is a choice.
@@ -196,17 +201,23 @@ def _inverse_near(solver: Solver, flange: Poses, near: Floats) -> tuple[Floats, 
 
 
 def follow_rows(
-    arm: SerialArm, flange: Poses, begins: Bools, starts: Floats, jumps: Bools
+    arm: SerialArm,
+    flange: Poses,
+    begins: Bools,
+    starts: Floats,
+    jumps: Bools,
+    held: Floats | None = None,
 ) -> tuple[Floats, Bools]:
     """Rows in order, each solved from the one before; (M, n) [rad, m] NaN where not reached, and (M,) reached.
 
     ``begins`` (M,): the row before is not the last solution but ``starts`` (M, n); it must be set in row 0.  ``jumps``
     (M,): point to point, so that another branch or turn may be taken where the one so far has no way or leaves the
     limits.  A path, on the contrary, that leads through a singular place or out of reach is not followed into another
-    branch: its end counts as not reached.  A row that is not reached is passed over.
+    branch: its end counts as not reached.  A row that is not reached is passed over.  ``held`` (M,) [rad, m]: where the
+    held joint is at the end of each row; without, it stays.
 
     Solved in about sqrt(M) stretches side by side.  A quick run over the ends of the stretches guesses where each
-    begins; then all march together, one row at a time; a stretch that turns out to have begun elsewhere than the one
+    starts; then all march together, one row at a time; a stretch that turns out to have begun elsewhere than the one
     before it ends is marched again.  So the result is that of one march from the first row to the last.
     """
     solver = solver_of(arm)
@@ -222,7 +233,8 @@ def follow_rows(
         before = heads[k] - 1
         fresh = last_begin[before] >= heads[k - 1]
         base = starts[last_begin[before]] if fresh else state[k - 1]
-        there, fine = _stepped(solver, base[None], flange[before : before + 1], jumps[before : before + 1])
+        one = slice(before, before + 1)
+        there, fine = _stepped(solver, _taken(arm, base[None], held, one), flange[one], jumps[one])
         state[k] = there[0] if fine[0] else base
     ends = state.copy()
     dirty = np.ones(len(heads), bool)
@@ -233,13 +245,22 @@ def follow_rows(
             part = todo[heads[todo] + offset < count]
             rows = heads[part] + offset
             base = np.where(begins[rows, None], starts[rows], ends[part])
-            found, fine = _stepped(solver, base, flange[rows], jumps[rows])
+            found, fine = _stepped(solver, _taken(arm, base, held, rows), flange[rows], jumps[rows])
             ends[part] = np.where(fine[:, None], found, base)
             q[rows], good[rows] = np.where(fine[:, None], found, np.nan), fine
         moved = np.abs(ends[:-1] - state[1:]).max(axis=1, initial=0.0) > 1e-7
         dirty = np.concatenate([[False], moved & ~begins[heads[1:]]])
         state[1:][dirty[1:]] = ends[:-1][dirty[1:]]
     return q, good
+
+
+def _taken(arm: SerialArm, base: Floats, held: Floats | None, rows: Ints | slice) -> Floats:
+    """The angles ``base`` (K, n) with the held joint where it is in ``rows``."""
+    if held is None or arm.held is None:
+        return base
+    base = base.copy()
+    base[:, arm.held] = held[rows]
+    return base
 
 
 def _stepped(solver: Solver, base: Floats, flange: Poses, jumps: Bools) -> tuple[Floats, Bools]:
@@ -259,9 +280,10 @@ def _stepped(solver: Solver, base: Floats, flange: Poses, jumps: Bools) -> tuple
 
 
 def weakest(arm: SerialArm, q: Floats) -> Floats:
-    """(N,) smallest singular value of the Jacobian of the moving joints, lengths as parts of the arm's size."""
+    """(N,) smallest singular value of the Jacobian of the moving joints at ``q`` (N, n) [rad, m], lengths as parts of
+    the arm's size."""
     solver = solver_of(arm)
-    swept = solver.chain.sweep(np.ascontiguousarray(np.nan_to_num(q).T), TOOL)
+    swept = solver.chain.evaluate(np.ascontiguousarray(np.nan_to_num(q).T), TOOL)
     slope = jacobian(swept)[:, :, solver.free]
     slope[:, :3] /= solver.size
     return np.asarray(np.linalg.svd(slope, compute_uv=False)[:, -1])

@@ -9,11 +9,13 @@ from datetime import date
 
 import numpy as np
 
-from postproc.arrays import Floats, frozen
-from postproc.yamlfile import Section
+from postproc.base.arrays import Floats, frozen
+from postproc.base.yaml_section import YamlSection
 
 COMMANDS = ("identify", "diagnose")
-GAP = ("before_rms_mm", "after_rms_mm", "noise_mm", "heldout_before_rms_mm", "heldout_after_rms_mm")
+GAP = ("before_rms_mm", "after_rms_mm", "noise_mm", "held_out_before_rms_mm", "held_out_after_rms_mm")
+FORMER_GAP = {key.replace("held_out", "heldout"): key for key in GAP if "held_out" in key}
+"""Former name of a key, still read -> the key."""
 
 ROUNDING = 1e-6
 """Correlations are written with six decimals: k of them may leave an eigenvalue this far, times k, below zero."""
@@ -23,7 +25,7 @@ ROUNDING = 1e-6
 class Identification:
     """One run that gave a robot file new values: an entry of ``identified:``.
 
-    date: ISO, UTC; data: (name of the file, SHA-256) of each; robot_digest: of the robot file it began with; effects
+    date: ISO, UTC; data: (name of the file, SHA-256) of each; robot_digest: of the robot file it started with; effects
     that it fitted, to how many poses and readings; gap: some of ``GAP`` [mm]; names (k,) of the parameters fitted, as
     effect.parameter or effect#2.parameter, and their correlation (k, k).
     """
@@ -41,7 +43,7 @@ class Identification:
     correlation: Floats
 
 
-def read_identification(section: Section) -> Identification:
+def read_identification(section: YamlSection) -> Identification:
     """One entry of ``identified:``, checked.  Raises Refusal with the line."""
     section.only(
         "command",
@@ -59,7 +61,7 @@ def read_identification(section: Section) -> Identification:
     for one in data:
         one.only("file", "sha256")
     gap = section.section("gap", {})
-    gap.only(*GAP)
+    gap.only(*GAP, *(former for former in FORMER_GAP if former in gap))
     names, correlation = _triangle(section.section("correlation", {}))
     return Identification(
         command=section.text("command", choices=COMMANDS),
@@ -70,14 +72,25 @@ def read_identification(section: Section) -> Identification:
         effects=tuple(section.texts("effects")),
         poses=_count(section, "poses"),
         readings=_count(section, "readings"),
-        gap={key: gap.number(key, low=0.0, unit="mm") for key in GAP if key in gap},
+        gap=_gap(gap),
         names=names,
         correlation=correlation,
     )
 
 
+def _gap(section: YamlSection) -> dict[str, float]:
+    found = {}
+    for former, key in [*((key, key) for key in GAP), *FORMER_GAP.items()]:
+        if former not in section:
+            continue
+        if key in found:
+            raise section.error("YML004", f"is the former name of {key!r}, which is given too", former)
+        found[key] = section.number(former, low=0.0, unit="mm")
+    return {key: found[key] for key in GAP if key in found}
+
+
 def correlations(identified: Sequence[Identification]) -> tuple[tuple[str, ...], Floats]:
-    """Names (k,) and correlation (k, k) of all parameters fitted.  What a later run fitted again counts as it says;
+    """Names (k,) and correlation (k, k) of all parameters fitted.  What a later run refitted counts as it says;
     parameters of different runs are independent."""
     names: list[str] = []
     blocks: list[Floats] = []
@@ -93,18 +106,22 @@ def correlations(identified: Sequence[Identification]) -> tuple[tuple[str, ...],
     return tuple(names), frozen(matrix)
 
 
-def _triangle(section: Section) -> tuple[tuple[str, ...], Floats]:
+def _triangle(section: YamlSection) -> tuple[tuple[str, ...], Floats]:
     """The rows of a lower triangle, each under its parameter's name: correlations with those above, and 1."""
     names = tuple(section)
     matrix = np.eye(len(names))
     for i, name in enumerate(names):
         row = section.numbers(name, i + 1)
         if row[-1] != 1.0 or max(np.abs(row)) > 1.0:
-            raise section.error("YML004", "correlations lie within -1 .. 1, and a row ends with 1", name)
+            raise section.error(
+                "YML004", "correlations must be within -1 .. 1, and a row must end with 1", name
+            )
         matrix[i, : i + 1] = matrix[: i + 1, i] = row
     values, vectors = np.linalg.eigh(matrix)
     if values.min(initial=0.0) < -ROUNDING * len(names):
-        raise section.error("YML004", f"no data correlate like this (an eigenvalue is {values[0]:.2g})")
+        raise section.error(
+            "YML004", f"the matrix is not a correlation matrix (an eigenvalue is {values[0]:.2g})"
+        )
     if values.min(initial=0.0) < 0:
         roots = vectors * np.sqrt(np.maximum(values, 0.0))
         roots /= np.linalg.norm(roots, axis=1, keepdims=True)
@@ -112,7 +129,7 @@ def _triangle(section: Section) -> tuple[tuple[str, ...], Floats]:
     return names, frozen(matrix)
 
 
-def _date(section: Section) -> str:
+def _date(section: YamlSection) -> str:
     text = section.text("date")
     try:
         valid = date.fromisoformat(text).isoformat() == text
@@ -123,14 +140,14 @@ def _date(section: Section) -> str:
     return text
 
 
-def _digest(section: Section, key: str) -> str:
+def _digest(section: YamlSection, key: str) -> str:
     text = section.text(key)
     if not re.fullmatch("[0-9a-f]{64}", text):
         raise section.error("YML004", "is not a SHA-256: 64 digits 0-9, a-f", key)
     return text
 
 
-def _count(section: Section, key: str) -> int:
+def _count(section: YamlSection, key: str) -> int:
     number = section.number(key, low=0.0)
     if number != int(number):
         raise section.error("YML004", f"{number:g} is not a whole number", key)

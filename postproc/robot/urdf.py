@@ -15,10 +15,10 @@ from xml.parsers import expat
 
 import numpy as np
 
-from postproc.arrays import Floats
-from postproc.files import read_file
-from postproc.findings import Finding, Refusal, nearest
-from postproc.geometry import Poses, rotation_from_abc
+from postproc.base.arrays import Floats
+from postproc.base.findings import Finding, Refusal, nearest
+from postproc.base.geometry import Poses, rotation_from_abc
+from postproc.base.read_files import read_file
 from postproc.robot.geometries import Link, frame_with_z
 
 MAX_BYTES = 4_000_000
@@ -56,13 +56,17 @@ def read_urdf(path: Path, base: str | None = None, tip: str | None = None) -> Ar
     for joint in joints:
         for link in (joint.parent, joint.child):
             if link not in links:
-                raise _wrong(path, joint.line, f"joint {joint.name}: no link {link!r}{nearest(link, links)}")
+                raise _wrong(
+                    path,
+                    joint.line,
+                    f"joint {joint.name}: the link {link!r} is not defined{nearest(link, links)}",
+                )
         if joint.child in by_child:
-            raise _wrong(path, joint.line, f"link {joint.child!r} hangs on two joints")
+            raise _wrong(path, joint.line, f"link {joint.child!r} has two parent joints")
         by_child[joint.child] = joint
     for name in (base, tip):
         if name is not None and name not in links:
-            raise _wrong(path, 0, f"no link {name!r}{nearest(name, links)}")
+            raise _wrong(path, 0, f"the link {name!r} is not defined{nearest(name, links)}")
     end = tip or _only(path, [link for link in links if link not in {j.parent for j in joints}], "tip")
     way, at = [], end
     while at in by_child and at != base:
@@ -70,19 +74,21 @@ def read_urdf(path: Path, base: str | None = None, tip: str | None = None) -> Ar
         way.append(joint)
         at = joint.parent
         if len(way) > len(joints):
-            raise _wrong(path, joint.line, "the joints go round in a circle")
+            raise _wrong(path, joint.line, "the joints form a circle")
     if base is None:
         _only(path, [link for link in links if link not in by_child], "base")
     elif at != base:
-        raise _wrong(path, 0, f"the link {end!r} does not hang on {base!r}")
+        raise _wrong(path, 0, f"the link {end!r} is not connected to {base!r}")
     return _merged(path, way[::-1])
 
 
 def _only(path: Path, found: list[str], key: str) -> str:
     if not found:
-        raise _wrong(path, 0, "the joints go round in a circle")
+        raise _wrong(path, 0, "the joints form a circle")
     if len(found) > 1:
-        words = "the joints branch: several ends" if key == "tip" else "several roots"
+        words = (
+            "the joints branch: the URDF has several ends" if key == "tip" else "the URDF has several roots"
+        )
         raise _wrong(path, 0, f"{words}, {', '.join(found)}", f"name one with `{key}:`")
     return found[0]
 
@@ -101,7 +107,7 @@ def _merged(path: Path, way: list[_Joint]) -> Arm:
         links.append(Link(at @ frame, frame.inverse()))
         at = Poses.identity()
     if not links:
-        raise _wrong(path, 0, "no joint moves between base and tip")
+        raise _wrong(path, 0, "no joint between base and tip is movable")
     return Arm(tuple(names), tuple(kinds), tuple(links), at)
 
 
@@ -109,7 +115,7 @@ def _parse(path: Path) -> tuple[list[_Joint], dict[str, int]]:
     """All joints, and the lines of all links."""
     raw = read_file(path, MAX_BYTES)
     if len(raw) > MAX_BYTES:
-        raise _wrong(path, 0, f"larger than {MAX_BYTES} bytes")
+        raise _wrong(path, 0, f"the file is larger than {MAX_BYTES} bytes")
     joints: list[_Joint] = []
     links: dict[str, int] = {}
     stack: list[str] = []
@@ -118,13 +124,13 @@ def _parse(path: Path) -> tuple[list[_Joint], dict[str, int]]:
     def begin(tag: str, words: dict[str, str]) -> None:
         line = parser.CurrentLineNumber
         if not stack and tag != "robot":
-            raise _wrong(path, line, f"<{tag}> where <robot> is expected")
+            raise _wrong(path, line, f"<{tag}> is found where <robot> is expected")
         if tag.startswith("xacro:"):
-            raise _wrong(path, line, "xacro has to be expanded first (ros2 run xacro xacro)")
+            raise _wrong(path, line, "expand xacro first (ros2 run xacro xacro)")
         if stack == ["robot"] and tag == "link":
             name = _word(path, line, tag, words, "name")
             if name in links:
-                raise _wrong(path, line, f"link {name!r} stands twice")
+                raise _wrong(path, line, f"link {name!r} is defined twice")
             links[name] = line
         elif stack == ["robot"] and tag == "joint":
             joints.append(_joint(path, line, words, joints))
@@ -150,7 +156,9 @@ def _parse(path: Path) -> tuple[list[_Joint], dict[str, int]]:
     try:
         parser.Parse(raw, True)
     except expat.ExpatError as error:
-        raise _wrong(path, error.lineno, f"not XML: {expat.errors.messages[error.code]}") from None
+        raise _wrong(
+            path, error.lineno, f"the file is not XML: {expat.errors.messages[error.code]}"
+        ) from None
     return joints, links
 
 
@@ -159,16 +167,19 @@ def _joint(path: Path, line: int, words: dict[str, str], before: list[_Joint]) -
     if kind != "fixed" and kind not in MOVING:
         allowed = ", ".join(("fixed", *MOVING))
         raise _wrong(
-            path, line, f"joint {name}: type {kind!r}{nearest(kind, MOVING)}", f"read here: {allowed}"
+            path,
+            line,
+            f"joint {name}: the type {kind!r} is not supported{nearest(kind, MOVING)}",
+            f"use one of: {allowed}",
         )
     if any(joint.name == name for joint in before):
-        raise _wrong(path, line, f"joint {name!r} stands twice")
+        raise _wrong(path, line, f"joint {name!r} is defined twice")
     return _Joint(name, kind, line)
 
 
 def _detail(path: Path, line: int, joint: _Joint, tag: str, words: dict[str, str]) -> None:
     if tag == "mimic":
-        raise _wrong(path, line, f"joint {joint.name} mimics another one: not a serial arm")
+        raise _wrong(path, line, f"joint {joint.name} mimics another one, so the arm is not serial")
     if tag in ("parent", "child"):
         setattr(joint, tag, _word(path, line, tag, words, "link"))
     elif tag == "origin":
@@ -178,7 +189,7 @@ def _detail(path: Path, line: int, joint: _Joint, tag: str, words: dict[str, str
         axis = _three(path, line, _word(path, line, tag, words, "xyz"))
         length = float(np.linalg.norm(axis))
         if length < 1e-6:
-            raise _wrong(path, line, f"joint {joint.name}: an axis without a direction")
+            raise _wrong(path, line, f"joint {joint.name}: its axis has no direction")
         joint.axis = axis / length
 
 
@@ -188,10 +199,10 @@ def _mesh(path: Path, line: int, name: str) -> None:
         return
     mesh = path.parent / name.removeprefix("file://")
     if not mesh.resolve().is_relative_to(path.parent.resolve()):
-        raise _wrong(path, line, f"mesh {name!r} lies outside of the URDF's folder")
+        raise _wrong(path, line, f"mesh {name!r} is outside the URDF's folder")
     if not mesh.is_file():
         raise _wrong(
-            path, line, f"mesh {name!r} does not exist", "put it there, or take the mesh out: it is not used"
+            path, line, f"mesh {name!r} does not exist", "add the file, or remove the mesh: it is not used"
         )
 
 
@@ -203,7 +214,7 @@ def _snapped(rotation: Floats) -> Floats:
 
 def _word(path: Path, line: int, tag: str, words: dict[str, str], key: str) -> str:
     if not words.get(key):
-        raise _wrong(path, line, f"<{tag}> without {key!r}")
+        raise _wrong(path, line, f"<{tag}> has no {key!r}")
     return words[key]
 
 

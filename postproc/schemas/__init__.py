@@ -1,21 +1,53 @@
-"""JSON Schemas (draft 2020-12) of the files that people write, for their editors.
+"""JSON Schemas (draft 2020-12) of the files that people write, for their editors, and of the results, for scripts.
 
-Names of keys, units, choices, effects and parameters are those of the readers' own tables.  A schema says what one key
-may hold; what goes together (limits that rise, joints as many as the geometry has) only the reader can say.
+Of files: names of keys, units, choices, effects and parameters are those of the readers' own tables.  A schema says
+what one key may hold; what goes together (limits that rise, joints as many as the geometry has) only the reader checks.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from postproc.schemas.cell import cell_schema
-from postproc.schemas.job import job_schema
+from postproc.schemas.cell_schema import cell_schema
+from postproc.schemas.job_schema import job_schema
+from postproc.schemas.model_results import (
+    diagnose_schema,
+    identify_schema,
+    map_schema,
+    plan_schema,
+    robots_schema,
+)
 from postproc.schemas.parts import Schema
-from postproc.schemas.robot import robot_schema
+from postproc.schemas.program_results import (
+    batch_schema,
+    check_schema,
+    corrections_schema,
+    predict_schema,
+    report_schema,
+    verify_schema,
+)
+from postproc.schemas.robot_schema import robot_schema
 
 SCHEMAS: dict[str, Callable[[], Schema]] = {"cell": cell_schema, "robot": robot_schema, "job": job_schema}
+"""Of the files that people write."""
+
+RESULT_SCHEMAS: dict[str, Callable[[], Schema]] = {
+    "report": report_schema,
+    "predict": predict_schema,
+    "check": check_schema,
+    "verify": verify_schema,
+    "map": map_schema,
+    "identify": identify_schema,
+    "plan": plan_schema,
+    "diagnose": diagnose_schema,
+    "batch": batch_schema,
+    "robots": robots_schema,
+    "corrections": corrections_schema,
+}
+"""Of the results: JSON by command (report: of the main job), and the table of corrections."""
 
 
 def schema_of(name: str) -> Schema:
-    """The schema of a kind of file: one of ``SCHEMAS``."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **SCHEMAS[name]()}
+    """The schema of a kind of file or result: one of ``SCHEMAS`` or ``RESULT_SCHEMAS``."""
+    made = {**SCHEMAS, **RESULT_SCHEMAS}[name]()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}

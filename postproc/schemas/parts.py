@@ -1,4 +1,4 @@
-"""The pieces of a schema."""
+"""The parts of a schema."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 Schema = dict[str, Any]
 
 
-def told(schema: Schema, about: str) -> Schema:
-    """The schema with what an editor shows."""
+def describe(schema: Schema, about: str) -> Schema:
+    """The schema with the description that an editor shows."""
     return {"description": about, **schema} if about else schema
 
 
@@ -18,7 +18,7 @@ def number(
 ) -> Schema:
     """A number within ``low`` .. ``high``, or larger than ``above``."""
     bounds = {"minimum": low, "maximum": high, "exclusiveMinimum": above}
-    return told(
+    return describe(
         {"type": "number", **{key: value for key, value in bounds.items() if value is not None}}, about
     )
 
@@ -26,20 +26,20 @@ def number(
 def numbers(least: int, most: int | None, about: str = "") -> Schema:
     """A list of ``least`` .. ``most`` numbers."""
     length = {"minItems": least} if most is None else {"minItems": least, "maxItems": most}
-    return told({"type": "array", "items": {"type": "number"}, **length}, about)
+    return describe({"type": "array", "items": {"type": "number"}, **length}, about)
 
 
 def text(about: str = "", choices: Iterable[str] = ()) -> Schema:
     allowed = list(choices)
-    return told({"type": "string", **({"enum": allowed} if allowed else {"minLength": 1})}, about)
+    return describe({"type": "string", **({"enum": allowed} if allowed else {"minLength": 1})}, about)
 
 
 def flag(about: str = "") -> Schema:
-    return told({"type": "boolean"}, about)
+    return describe({"type": "boolean"}, about)
 
 
 def listed(items: Schema, about: str = "", least: int = 0) -> Schema:
-    return told({"type": "array", "items": items, **({"minItems": least} if least else {})}, about)
+    return describe({"type": "array", "items": items, **({"minItems": least} if least else {})}, about)
 
 
 def mapping(
@@ -55,7 +55,12 @@ def mapping(
         schema["required"] = list(required)
     if patterns:
         schema["patternProperties"] = dict(patterns)
-    return told({**schema, **more}, about)
+    return describe({**schema, **more}, about)
+
+
+def former_name_of(key: str, schema: Schema) -> Schema:
+    """The schema of the former name of ``key``."""
+    return {**schema, "description": f"former name of {key}", "deprecated": True}
 
 
 def known(keys: Iterable[str], described: Mapping[str, Schema]) -> dict[str, Schema]:

@@ -9,27 +9,27 @@ from pathlib import Path
 import numpy as np
 
 from postproc import __version__
-from postproc.arrays import Floats
+from postproc.base.arrays import Floats
+from postproc.base.findings import Finding, Refusal
+from postproc.base.input_files import place
+from postproc.base.units import DEG, MM
 from postproc.diagnosis.candidates import Candidate
-from postproc.diagnosis.diagnose import Diagnosis, diagnose
-from postproc.diagnosis.search import composed, own_unknowns
-from postproc.experiments.discriminating import apart
-from postproc.experiments.offer import Offer, readings_of, spacings, usable_limits
-from postproc.experiments.tour import tour
-from postproc.findings import Finding, Refusal
+from postproc.diagnosis.diagnosis import Diagnosis, diagnose
+from postproc.diagnosis.search import composed, model_unknowns
+from postproc.experiments.candidate_setups import CandidateSetups, readings_of, spacings, usable_limits
+from postproc.experiments.discrimination import apart
+from postproc.experiments.measuring_order import measuring_order
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, lengths, spread_of
 from postproc.identification.outliers import Outlier, outliers
-from postproc.identification.suspicion import check_fit, check_numbers
+from postproc.identification.sanity_checks import check_fit, check_numbers
 from postproc.identification.unknowns import Unknown
 from postproc.identification.validation import held_out
-from postproc.inputs import place
 from postproc.measurements import Readings, measurements_csv
 from postproc.model import STANDARD_GRAVITY, approach
-from postproc.publish import publish
+from postproc.output.atomic_write import write_atomically
 from postproc.report.diagnosed import Diagnosed, NextPoses, diagnosed_csv
 from postproc.report.report import json_bytes
-from postproc.units import DEG, MM
 from postproc.workflows.identify import Measured, measured_of
 from postproc.workflows.preparation import Stage, silent
 from postproc.workflows.robot_files import new_robot_file
@@ -37,7 +37,7 @@ from postproc.workflows.robot_files import new_robot_file
 FOLDS = 5
 
 NEXT = 6
-"""Poses proposed to tell two explanations apart."""
+"""Poses proposed to distinguish two explanations."""
 
 HARDLY = 0.5
 """Standard deviations between two explanations below which poses are not worth measuring."""
@@ -61,7 +61,7 @@ CANDIDATES = 300
 @dataclass(frozen=True)
 class DiagnoseRequest:
     """What the user asked for.  ``robot``: None takes the one that the data name; ``next_poses``: where a plan goes
-    that tells explanations apart, beside ``output`` without it."""
+    that distinguishes explanations, beside ``output`` without it."""
 
     data: tuple[Path, ...]
     robot: str | None = None
@@ -81,19 +81,19 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     stage("reading")
     measured = measured_of(request.data, request.robot, request.tool_mm_deg)
     campaign, model = measured.campaign, measured.model
-    own = own_unknowns(model)
+    own = model_unknowns(model)
     check_numbers(measured.readings, (), model)
     findings = [*measured.findings, *check_fit(campaign, model, own)]
     found = diagnose(campaign, model, stage)
-    wild = _wild(found.final)
+    wild = gross_errors(found.final)
     if wild:
-        stage("once more without wild readings")
+        stage("once more without outliers")
         kept = np.setdiff1d(np.arange(len(campaign)), [one.row for one in wild])
         found = diagnose(Campaign(measured.readings.part(kept), campaign.stated_tool), model)
         findings += [
             Finding(
                 "DIA002",
-                f"{one.distance / MM:.3g} mm off ({one.sigmas:.0f} sigma): {one.what}",
+                f"the reading is {one.distance / MM:.3g} mm off ({one.sigmas:.0f} sigma): {one.what}",
                 one.file,
                 one.line,
             )
@@ -115,8 +115,8 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
             (p.name, d) for p, d in zip(measured.readings.files, measured.readings.digests, strict=True)
         ),
         diagnosis=found,
-        heldout_before=heldout[0],
-        heldout_after=heldout[1],
+        held_out_before=heldout[0],
+        held_out_after=heldout[1],
         next_poses=planned,
         findings=tuple(findings),
         robot_file=None,
@@ -126,7 +126,7 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     return _published(request, measured, result, stage)
 
 
-def _wild(final: Fit) -> tuple[Outlier, ...]:
+def gross_errors(final: Fit) -> tuple[Outlier, ...]:
     """Readings so far off that they would decide; none where there are so many that they are no accidents."""
     length = lengths(final.point.residual, final.plain_weights)
     if length.max(initial=0.0) < 0.5 * WILD * spread_of(length, final.noise.known):
@@ -143,11 +143,18 @@ def _spare_inputs(request: DiagnoseRequest) -> None:
     inputs = {place(path) for path in request.data}
     if request.robot and request.robot.endswith((".yaml", ".yml")):
         inputs.add(place(Path(request.robot)))
-    ways = (request.output, request.next_poses, request.json, request.csv, request.picture, request.page)
-    written = [path for path in ways if path is not None]
+    desired_path = (
+        request.output,
+        request.next_poses,
+        request.json,
+        request.csv,
+        request.picture,
+        request.page,
+    )
+    written = [path for path in desired_path if path is not None]
     for path in written:
         if place(path) in inputs:
-            raise Refusal(Finding("FIL007", "would replace an input", str(path)))
+            raise Refusal(Finding("FIL007", "the output would replace an input", str(path)))
     if len({place(path) for path in written}) < len(written):
         raise Refusal(Finding("FIL007", "two results have the same name", str(written[0])))
 
@@ -156,18 +163,18 @@ def _next_poses(measured: Measured, found: Diagnosis) -> NextPoses | None:
     """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do."""
     offer = _offer(measured, found.search.base)
     pairs = [(first, other) for first, *others in found.verdict.alternatives for other in others[:TRIED]]
-    plans = [_told_apart(measured, found, offer, one, other) for one, other in pairs]
+    plans = [_discriminating_poses(measured, found, offer, one, other) for one, other in pairs]
     return max((plan for plan in plans if plan), key=lambda plan: min(plan.separation), default=None)
 
 
-def _told_apart(
-    measured: Measured, found: Diagnosis, offer: Offer, one: Candidate, other: Candidate
+def _discriminating_poses(
+    measured: Measured, found: Diagnosis, offer: CandidateSetups, one: Candidate, other: Candidate
 ) -> NextPoses | None:
     base = found.search.base
     model, first = composed(base.model, [one])
     model, second = composed(model, [other])
     # the first shows what was found of it; the second what its usual size makes
-    model = model.changed(_values(found.search.final, first, one))
+    model = model.with_values(_values(found.search.final, first, one))
     common = [u for u in base.unknowns if u.prior is None]
     try:
         poses = apart(model, first, second, common, offer, (NEXT,), candidates=CANDIDATES)
@@ -176,7 +183,7 @@ def _told_apart(
     if min(poses.separation[NEXT]) < HARDLY:
         return None
     setups = poses.chosen[NEXT]
-    setups = setups[tour(setups.q, spacings(measured.robot, offer.spacing))]
+    setups = setups[measuring_order(setups.q, spacings(measured.robot, offer.spacing))]
     return NextPoses(_like(measured, readings_of(model, offer, setups)), (one, other), poses.separation[NEXT])
 
 
@@ -207,7 +214,7 @@ def _values(final: Fit, unknowns: Sequence[Unknown], candidate: Candidate) -> di
     return {u.key: found[u.parameter.name] for u in unknowns if u.parameter.name in found}
 
 
-def _offer(measured: Measured, base: Fit) -> Offer:
+def _offer(measured: Measured, base: Fit) -> CandidateSetups:
     """What was measured with: targets, weights, scatter."""
     readings, campaign = measured.readings, measured.campaign
     in_flange = campaign.tool.rotation @ base.point.given.places[:, :, None]
@@ -215,7 +222,7 @@ def _offer(measured: Measured, base: Fit) -> Offer:
     loads = loads[loads > 0] if readings.deflection else loads
     if len(loads) > LOADS:
         loads = loads[np.linspace(0, len(loads) - 1, LOADS).round().astype(int)]
-    return Offer(
+    return CandidateSetups(
         tool=campaign.tool,
         targets=readings.targets,
         places=in_flange[:, :, 0] + campaign.tool.position,
@@ -233,7 +240,7 @@ def _offer(measured: Measured, base: Fit) -> Offer:
 
 
 def _box() -> Floats:
-    """Nothing below the floor that the robot stands on."""
+    """Nothing below the floor that the robot is on."""
     return np.array([[-np.inf, np.inf], [-np.inf, np.inf], [0.0, np.inf]])
 
 
@@ -254,7 +261,9 @@ def _published(request: DiagnoseRequest, measured: Measured, result: Diagnosed, 
     if result.next_poses is not None and plan is not None:
         if place(plan) in {place(path) for path in request.data}:  # an earlier plan, filled in
             raise Refusal(
-                Finding("FIL007", "would replace an input", str(plan), help="say --next-poses FILE.csv")
+                Finding(
+                    "FIL007", "the output would replace an input", str(plan), help="use --next-poses FILE.csv"
+                )
             )
         files[plan] = measurements_csv(result.next_poses.readings, _about(result))
         result = replace(result, next_poses_file=str(plan))
@@ -275,7 +284,7 @@ def _published(request: DiagnoseRequest, measured: Measured, result: Diagnosed, 
 
         files[request.page] = diagnosed_page(result, beside(request.page, _beside(request, result)))
     if files:
-        publish(files, last=request.output)
+        write_atomically(files, last=request.output)
     return result
 
 
@@ -298,7 +307,7 @@ def _about(result: Diagnosed) -> list[str]:
     also = f", {' and '.join(asked)}" if asked else ""
     return [
         f"plan of compensate {__version__}, robot file sha256 {result.robot_digest[:16]}",
-        f"poses that tell {one.label} from {other.label}",
-        f"fill in the readings{also} and give them to `compensate diagnose` together with those before",
-        "what stands around the arm was not looked at, drive slowly to every pose for the first time",
+        f"poses that separate {one.label} from {other.label}",
+        f"fill in the readings{also} and pass them to `compensate diagnose` together with the earlier ones",
+        "collisions with the surroundings are not checked: move slowly to every pose for the first time",
     ]

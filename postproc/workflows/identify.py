@@ -8,24 +8,24 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
-from postproc.findings import Finding, Refusal
-from postproc.geometry import Poses
+from postproc.base.arrays import Bools, Floats
+from postproc.base.findings import Finding, Refusal
+from postproc.base.geometry import Poses
+from postproc.base.input_files import place
+from postproc.base.units import DEG, MM
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
 from postproc.identification.identifiable import strong_correlations
 from postproc.identification.outliers import Outlier, outliers
-from postproc.identification.suspicion import check_fit, check_numbers
-from postproc.identification.unknowns import Asked, asked_for
+from postproc.identification.sanity_checks import check_fit, check_numbers
+from postproc.identification.unknowns import FitRequest, asked_for
 from postproc.identification.validation import WIDER, Bootstrap, Validation, bootstrap, held_out, validated
-from postproc.inputs import place
 from postproc.measurements import Readings, joined, read_measurements, robot_named
 from postproc.model import StiffnessModel
-from postproc.publish import publish
+from postproc.output.atomic_write import write_atomically
 from postproc.report.identified import STRONG, Identified, identified_csv
 from postproc.report.report import json_bytes
 from postproc.robot.description import Robot, find_robot, load_robot, robot_files
-from postproc.units import DEG, MM
 from postproc.workflows.preparation import Stage, silent
 from postproc.workflows.robot_files import new_robot_file
 
@@ -125,7 +125,7 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
     if request.validate:
         stage("validating")
         validation = _validated(request, measured, before, after)
-    findings += _told(measured, asked, after, found, request.drop_outliers, drawn, validation, heldout)
+    findings += _result(measured, asked, after, found, request.drop_outliers, drawn, validation, heldout)
     result = Identified(
         robot=measured.robot.name,
         robot_file=measured.robot.path,
@@ -136,9 +136,9 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
         effects=request.effects,
         before=before,
         after=after,
-        held=asked.held,
-        heldout_before=heldout[0],
-        heldout_after=heldout[1],
+        fixed=asked.fixed,
+        held_out_before=heldout[0],
+        held_out_after=heldout[1],
         folds=folds if folds > 1 else 0,
         validation=validation,
         outliers=found,
@@ -192,7 +192,7 @@ def _known(named: str, path: Path) -> str:
             return name
     if not named:
         raise Refusal(
-            Finding("CEL003", "the readings name no robot", str(path), help="say --robot NAME or FILE")
+            Finding("CEL003", "the readings name no robot", str(path), help="use --robot NAME or FILE")
         )
     return named
 
@@ -206,7 +206,7 @@ def _spare_inputs(request: IdentifyRequest) -> None:
     ]
     for path in written:
         if place(path) in inputs:
-            raise Refusal(Finding("FIL007", "would replace an input", str(path)))
+            raise Refusal(Finding("FIL007", "the output would replace an input", str(path)))
     if len({place(path) for path in written}) < len(written):
         raise Refusal(Finding("FIL007", "two results have the same name", str(written[0])))
 
@@ -214,7 +214,7 @@ def _spare_inputs(request: IdentifyRequest) -> None:
 def _spare(output: Path | None, robot: Path) -> None:
     """Robots that are named and not given as a path are inputs too."""
     if output is not None and place(output) == place(robot):
-        raise Refusal(Finding("FIL007", "would replace the robot file that was read", str(output)))
+        raise Refusal(Finding("FIL007", "the output would replace the robot file of the run", str(output)))
 
 
 def _outliers(after: Fit, leave_out: bool) -> tuple[tuple[Outlier, ...], Bools]:
@@ -238,7 +238,7 @@ def _nothing_found(measured: Measured, after: Fit) -> Finding:
     reasons = "; ".join(f"{dropped.name}: {dropped.why}" for dropped in after.dropped[:SHOWN])
     return Finding(
         "IDN017",
-        f"these readings show none of the parameters asked for ({reasons})",
+        f"these readings show none of the requested parameters ({reasons})",
         str(measured.readings.files[0]),
         help="`compensate plan` proposes poses and loads that do",
     )
@@ -250,14 +250,14 @@ def _validated(request: IdentifyRequest, measured: Measured, before: Fit, after:
     readings = several[0] if len(several) == 1 else joined(several)
     if readings.deflection != measured.readings.deflection:
         raise Refusal(
-            Finding("MEA008", "is of another kind than the data that are fitted", str(request.validate[0]))
+            Finding("MEA008", "the file is of another kind than the fitted data", str(request.validate[0]))
         )
     return validated(before, after, Campaign(readings, measured.campaign.stated_tool))
 
 
-def _told(
+def _result(
     measured: Measured,
-    asked: Asked,
+    asked: FitRequest,
     after: Fit,
     found: Sequence[Outlier],
     left_out: bool,
@@ -265,31 +265,39 @@ def _told(
     validation: Validation | None,
     heldout: Sequence[Floats | None],
 ) -> list[Finding]:
-    """What deserves a look about a fit."""
+    """What needs review about a fit."""
     file = str(measured.readings.files[0])
     told = []
     for outlier in found[:SHOWN]:
-        what = f"{outlier.distance / MM:.3g} mm off ({outlier.sigmas:.0f} sigma): {outlier.what}"
+        what = (
+            f"the reading is {outlier.distance / MM:.3g} mm off ({outlier.sigmas:.0f} sigma): {outlier.what}"
+        )
         code = "IDN019" if left_out else "IDN018"
         told.append(Finding(code, what, outlier.file, outlier.line))
     if len(found) > SHOWN:
         told.append(
-            Finding("IDN019" if left_out else "IDN018", f"and {len(found) - SHOWN} more readings", file)
+            Finding(
+                "IDN019" if left_out else "IDN018", f"{len(found) - SHOWN} more readings are outliers", file
+            )
         )
     for dropped in after.dropped:
-        frame_only = dropped.why.startswith("only seen together") and not dropped.together
+        frame_only = dropped.why.startswith("is observable only together") and not dropped.together
         told.append(Finding("IDN021" if frame_only else "IDN020", f"{dropped.name}: {dropped.why}", file))
     for estimate in after.estimates:
         unknown = estimate.unknown
         if estimate.at_bound:
             told.append(
-                Finding("IDN022", f"{unknown.name} = {estimate.value:g} {unknown.parameter.unit}", file)
+                Finding(
+                    "IDN022",
+                    f"{unknown.name} is at its bound {estimate.value:g} {unknown.parameter.unit}",
+                    file,
+                )
             )
         if unknown.prior is not None and abs(estimate.value - unknown.value) > PULLED * unknown.prior:
             told.append(
                 Finding(
                     "IDN023",
-                    f"{unknown.name}: the readings say {estimate.value:.4g}, the robot file"
+                    f"{unknown.name}: the readings give {estimate.value:.4g}, the robot file states"
                     f" {unknown.value:.4g} +- {1.96 * unknown.prior:.2g} {unknown.parameter.unit}",
                     file,
                 )
@@ -298,20 +306,24 @@ def _told(
         told.append(
             Finding(
                 "IDN024",
-                f"what is left is {np.sqrt(after.factor):.1f} times the scatter that is {after.noise.source};"
-                " the intervals are that much wider",
+                f"the residuals are {np.sqrt(after.factor):.1f} times the scatter, which is {after.noise.source};"
+                " the intervals are wider by this factor",
                 file,
             )
         )
     names = [unknown.name for unknown in after.unknowns]
     for one, other, size in strong_correlations(names, after.covariance, STRONG)[:SHOWN]:
-        told.append(Finding("IDN025", f"{one} and {other}: {size:+.3f}", file))
+        told.append(Finding("IDN025", f"{one} and {other} have the correlation {size:+.3f}", file))
     if drawn is not None:
         ratio = drawn.deviation / np.sqrt(np.diag(after.covariance))
         for name, r in zip(names, ratio.tolist(), strict=True):
             if r > WIDER:
                 told.append(
-                    Finding("IDN026", f"{name}: {r:.2f} times as wide by a bootstrap of {drawn.draws}", file)
+                    Finding(
+                        "IDN026",
+                        f"{name}: the interval is {r:.2f} times as wide by a bootstrap of {drawn.draws}",
+                        file,
+                    )
                 )
     if heldout[0] is not None and heldout[1] is not None:
         without, with_ = (np.sqrt(np.nanmean(h**2)) for h in (heldout[0], heldout[1]))
@@ -319,26 +331,43 @@ def _told(
             told.append(
                 Finding(
                     "IDN027",
-                    f"{np.sqrt(3) * without / MM:.3g} mm without, {np.sqrt(3) * with_ / MM:.3g} mm with them",
+                    f"the held-out poses are {np.sqrt(3) * with_ / MM:.3g} mm off with the fitted values,"
+                    f" {np.sqrt(3) * without / MM:.3g} mm without",
                     file,
                 )
             )
     if validation is not None and validation.registered_anew:
         told.append(
-            Finding("IDN028", "the tracker stood elsewhere", str(validation.campaign.readings.files[0]))
+            Finding("IDN028", "the tracker is at another place", str(validation.campaign.readings.files[0]))
         )
     if after.weights.shared > 0:
-        told.append(Finding("IDN029", f"{after.shared_error / MM:.3g} mm in each coordinate", file))
+        told.append(
+            Finding(
+                "IDN029",
+                f"the readings of a pose share an error of {after.shared_error / MM:.3g} mm in each coordinate",
+                file,
+            )
+        )
     unstated = [u.name for u in asked.unknowns if u.prior is not None and u.stated and u.stated.level is None]
     if unstated:
-        told.append(Finding("IDN030", ", ".join(unstated), file))
+        told.append(
+            Finding(
+                "IDN030", f"the robot file states no level for the intervals of {', '.join(unstated)}", file
+            )
+        )
     again = _counted_before(measured, asked)
     if again:
-        told.append(Finding("IDN031", ", ".join(again), str(measured.robot.path)))
+        told.append(
+            Finding(
+                "IDN031",
+                f"the intervals of {', '.join(again)} come from these readings",
+                str(measured.robot.path),
+            )
+        )
     return told
 
 
-def _counted_before(measured: Measured, asked: Asked) -> list[str]:
+def _counted_before(measured: Measured, asked: FitRequest) -> list[str]:
     """Unknowns of which the prior came from some of these readings."""
     digests = set(measured.readings.digests)
     runs = [run for run in measured.robot.identified if digests & {digest for _, digest in run.data}]
@@ -372,7 +401,7 @@ def _published(request: IdentifyRequest, measured: Measured, result: Identified,
 
         files[request.page] = identified_page(result, beside(request.page, _beside(request)))
     if files:
-        publish(files, last=request.output)
+        write_atomically(files, last=request.output)
     return result
 
 

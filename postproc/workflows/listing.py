@@ -8,12 +8,12 @@ from postproc.cell import load_cell
 from postproc.model import StiffnessModel
 from postproc.report.checked import Checked
 from postproc.robot.description import find_robot, load_robot, robot_files
-from postproc.workflows.preparation import near_cell, read_program
+from postproc.workflows.preparation import find_cell_beside, read_program
 
 
 def check(path: Path, cell: Path | None = None, config_dat: Path | None = None) -> Checked:
     """Read a program only, with what the nearest cell, or ``cell``, says of its language."""
-    known = near_cell(path) if cell is None else load_cell(cell)
+    known = find_cell_beside(path) if cell is None else load_cell(cell)
     _, program, _ = read_program(path, known, config_dat)
     return Checked(program)
 

@@ -10,27 +10,34 @@ from pathlib import Path
 import numpy as np
 
 from postproc import __version__
-from postproc.arrays import Bools, Floats
-from postproc.compensation.doubt import Unsure, sensitivities
+from postproc.base.arrays import Bools, Floats
+from postproc.base.findings import Finding, Refusal, nearest
+from postproc.base.geometry import Poses
+from postproc.base.input_files import place
+from postproc.base.tables import finite_number
+from postproc.base.units import DEG, MM, to_si, words_for
+from postproc.compensation.problem import rotate_wrench
+from postproc.compensation.uncertainty import UncertainInput, goal_sensitivities, sensitivities
 from postproc.effects import ComplianceLaw
-from postproc.experiments.discriminating import apart
-from postproc.experiments.offer import Offer, Setups, readings_of, spacings, usable_limits
+from postproc.experiments.candidate_setups import (
+    CandidateSetups,
+    Setups,
+    readings_of,
+    spacings,
+    usable_limits,
+)
+from postproc.experiments.discrimination import apart
+from postproc.experiments.measuring_order import measuring_order
+from postproc.experiments.observability import measured
 from postproc.experiments.pool import CANDIDATES
-from postproc.experiments.precision import Designs, Task, designs, predicted
-from postproc.experiments.seen import measured
-from postproc.experiments.tour import tour
-from postproc.findings import Finding, Refusal, nearest
-from postproc.geometry import Poses
+from postproc.experiments.precision import DesignProblem, Designs, designs, predicted
 from postproc.identification.unknowns import Unknown, asked_for
-from postproc.inputs import place
 from postproc.measurements import Readings, measurements_csv
 from postproc.model import StiffnessModel
-from postproc.publish import publish
-from postproc.report.plan import Planned, told_apart
+from postproc.output.atomic_write import write_atomically
+from postproc.report.planned import Planned, discrimination_words
 from postproc.report.report import exit_code, json_bytes
 from postproc.robot.description import Robot, find_robot, load_robot
-from postproc.tables import finite_number
-from postproc.units import DEG, MM, to_si, words_for
 from postproc.workflows.identify import measured_of
 from postproc.workflows.preparation import Request, Stage, prepare, silent
 
@@ -38,7 +45,7 @@ SIZES = (10, 15, 20, 30)
 """Numbers of poses that are looked at beside the wanted one."""
 
 FEWEST = 6
-"""Poses at which it is told beside how far apart two effects stay."""
+"""Poses at which it is reported beside how far apart two effects stay."""
 
 SHARE, SIZE_SHARE = 0.05, 0.2
 """Wanted where nothing states an interval: of the value, or of the usual size of a parameter without value."""
@@ -47,7 +54,7 @@ CUTS = 300
 """Motions of a program at which the error counts."""
 
 CLEAR = 3.0
-"""Standard deviations that tell two effects apart."""
+"""Standard deviations that distinguish two effects."""
 
 TOLD = 3
 
@@ -99,10 +106,10 @@ def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
     asked = asked_for(model, request.effects)
     offer = _offer(request, robot, asked.model, asked.unknowns)
     if request.discriminate is not None:
-        planned = _to_tell_apart(request, offer, asked.model, asked.unknowns, stage)
+        planned = _discriminating_poses(request, offer, asked.model, asked.unknowns, stage)
     else:
         planned = _for_precision(request, offer, asked.model, asked.unknowns, stage)
-    order = tour(planned.setups.q, spacings(robot, DEG))
+    order = measuring_order(planned.setups.q, spacings(robot, DEG))
     setups = planned.setups[order]
     readings = _in_sight(offer, planned.model, setups)
     files = {request.output: measurements_csv(readings, _about(request, planned, len(readings)))}
@@ -111,16 +118,20 @@ def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
         planned,
         setups=setups,
         readings=len(readings),
-        held=asked.held,
+        fixed=asked.fixed,
         outputs=tuple(str(path) for path in (*files, *pages)),
         exit=exit_code(planned.findings),
     )
-    publish({**files, **dict.fromkeys(pages, json_bytes(planned))}, last=request.output)
+    write_atomically({**files, **dict.fromkeys(pages, json_bytes(planned))}, last=request.output)
     return planned
 
 
 def _for_precision(
-    request: PlanRequest, offer: Offer, model: StiffnessModel, unknowns: tuple[Unknown, ...], stage: Stage
+    request: PlanRequest,
+    offer: CandidateSetups,
+    model: StiffnessModel,
+    unknowns: tuple[Unknown, ...],
+    stage: Stage,
 ) -> Planned:
     wanted, named, source = _wanted(request, unknowns)
     tests = None
@@ -134,7 +145,7 @@ def _for_precision(
         findings += known.findings
     counts = np.array([unknown.prior is None for unknown in unknowns]) | named
     criterion = request.criterion or ("test" if tests is not None else "minimax")
-    task = Task(model, unknowns, offer, wanted, counts, criterion, before, tests)
+    task = DesignProblem(model, unknowns, offer, wanted, counts, criterion, before, tests)
     found = designs(task, request.poses, SIZES, request.seed, CANDIDATES, stage)
     return Planned(
         robot=model.robot.name,
@@ -142,7 +153,7 @@ def _for_precision(
         effects=request.effects,
         model=found.model,
         unknowns=unknowns,
-        offer=offer,
+        setups_offered=offer,
         seed=request.seed,
         criterion=criterion,
         wanted=wanted,
@@ -153,15 +164,19 @@ def _for_precision(
         chosen=found.chosen,
         at_random=found.at_random,
         before=found.before,
-        unseen=found.unseen,
-        left_out=found.left_out,
-        weak=found.weak,
+        unobservable=found.unobservable,
+        excluded=found.left_out,
+        weakly_observable=found.weak,
         findings=(*findings, *_findings(model.robot, found)),
     )
 
 
-def _to_tell_apart(
-    request: PlanRequest, offer: Offer, model: StiffnessModel, unknowns: tuple[Unknown, ...], stage: Stage
+def _discriminating_poses(
+    request: PlanRequest,
+    offer: CandidateSetups,
+    model: StiffnessModel,
+    unknowns: tuple[Unknown, ...],
+    stage: Stage,
 ) -> Planned:
     assert request.discriminate is not None
     model = asked_for(model, request.discriminate).model
@@ -174,7 +189,7 @@ def _to_tell_apart(
         )
     for word, own in zip(request.discriminate, (first, second), strict=True):
         if all(unknown.prior is not None for unknown in own):
-            message = f"--discriminate: {word} has nothing to fit, its dimensions are known"
+            message = f"--discriminate: {word} has nothing to fit: its dimensions are known"
             raise Refusal(Finding("PLN006", message, str(model.robot.path)))
     common = tuple(unknown for unknown in unknowns if unknown.key not in keys[0] | keys[1])
     sizes = {min(FEWEST, request.poses), request.poses}
@@ -182,10 +197,10 @@ def _to_tell_apart(
     setups = found.chosen[request.poses]
     wanted, named, source = _wanted(request, unknowns)
     counts = np.array([unknown.prior is None for unknown in unknowns]) | named
-    task = Task(model, unknowns, offer, wanted, counts)
+    task = DesignProblem(model, unknowns, offer, wanted, counts)
     findings = []
     if min(found.separation[request.poses]) < CLEAR:
-        words = told_apart(request.discriminate, found.separation[request.poses])
+        words = discrimination_words(request.discriminate, found.separation[request.poses])
         findings.append(Finding("PLN010", words, str(model.robot.path)))
     return Planned(
         robot=model.robot.name,
@@ -193,7 +208,7 @@ def _to_tell_apart(
         effects=request.effects,
         model=model,
         unknowns=unknowns,
-        offer=offer,
+        setups_offered=offer,
         seed=request.seed,
         criterion="discriminate",
         wanted=wanted,
@@ -210,13 +225,13 @@ def _to_tell_apart(
 
 def _findings(robot: Robot, found: Designs) -> list[Finding]:
     file, findings = str(robot.path), []
-    for lost in found.unseen:
+    for lost in found.unobservable:
         findings.append(Finding("PLN011" if lost.imitated else "PLN007", f"{lost.name}: {lost.why}", file))
     for lost in found.left_out:
         findings.append(Finding("PLN011" if lost.imitated else "PLN008", f"{lost.name}: {lost.why}", file))
     if found.weak:
         told = "; ".join(f"{lost.name}: {lost.why}" for lost in found.weak[:TOLD])
-        more = f"; and {len(found.weak) - TOLD} more" if len(found.weak) > TOLD else ""
+        more = f"; {len(found.weak) - TOLD} more parameters are similar" if len(found.weak) > TOLD else ""
         findings.append(Finding("PLN009", told + more, file))
     return findings
 
@@ -227,18 +242,22 @@ def _spare_inputs(request: PlanRequest) -> None:
     written = [path for path in (request.output, request.json) if path is not None]
     for path in written:
         if place(path) in inputs:
-            raise Refusal(Finding("FIL007", "would replace an input", str(path)))
+            raise Refusal(Finding("FIL007", "the output would replace an input", str(path)))
 
 
-def _offer(request: PlanRequest, robot: Robot, model: StiffnessModel, unknowns: Sequence[Unknown]) -> Offer:
+def _offer(
+    request: PlanRequest, robot: Robot, model: StiffnessModel, unknowns: Sequence[Unknown]
+) -> CandidateSetups:
     """What the user can set up, in SI.  Raises Refusal PLN001, PLN005, PLN006."""
     names = [joint.name for joint in robot.joints]
     limits = {}
     for name, ends in request.limits:
         joint = next((joint for joint in robot.joints if joint.name.casefold() == name.casefold()), None)
         if joint is None:
-            message = f"--limits: {name!r} is no joint of {robot.name}{nearest(name, names)}"
-            raise Refusal(Finding("PLN006", message, str(robot.path), help="joints: " + ", ".join(names)))
+            message = f"--limits: {name!r} is not a joint of {robot.name}{nearest(name, names)}"
+            raise Refusal(
+                Finding("PLN006", message, str(robot.path), help="the joints are " + ", ".join(names))
+            )
         unit = DEG if joint.kind == "revolute" else MM
         limits[joint.name] = ends[0] * unit, ends[1] * unit
     tool = Poses.from_abc(np.array(request.tool_mm_deg[:3]) * MM, np.array(request.tool_mm_deg[3:]) * DEG)
@@ -251,11 +270,11 @@ def _offer(request: PlanRequest, robot: Robot, model: StiffnessModel, unknowns: 
         raise Refusal(
             Finding(
                 "PLN005",
-                "deflections are measured, loaded minus unloaded, and there is no load",
-                help="--loads 100,200: weights in kg that can be hung at the TCP; or measure places: --kind absolute",
+                "deflections are the loaded minus the unloaded place, and no load is given",
+                help="use --loads 100,200 (weights in kg at the TCP), or measure places: --kind absolute",
             )
         )
-    return Offer(
+    return CandidateSetups(
         tool=tool,
         targets=tuple(name for name, _ in request.targets),
         places=places,
@@ -294,23 +313,25 @@ def _wanted(request: PlanRequest, unknowns: Sequence[Unknown]) -> tuple[Floats, 
         rows = [i for i, unknown in enumerate(unknowns) if _is_named(unknown, name)]
         if not rows:
             names = [unknown.name for unknown in unknowns]
-            raise _no_wish(text, f"{name!r} is not asked for{nearest(name, names)}", ", ".join(names))
+            raise _no_wish(text, f"{name!r} is not requested{nearest(name, names)}", ", ".join(names))
         if len(rows) > 1 and name and len({unknowns[i].name.partition(".")[0] for i in rows}) > 1:
             raise _no_wish(
-                text, f"{name!r} is several parameters: {', '.join(unknowns[i].name for i in rows)}"
+                text, f"{name!r} consists of several parameters: {', '.join(unknowns[i].name for i in rows)}"
             )
         for i in rows:
             if unit != "%":
                 factor = to_si(unit, unknowns[i].parameter.unit) if unit else None
                 if factor is None:
                     known = ", ".join(["%", *words_for(unknowns[i].parameter.unit)])
-                    raise _no_wish(text, f"{unit!r} is no unit of {unknowns[i].name}", f"units: {known}")
+                    raise _no_wish(
+                        text, f"{unit!r} is not a unit of {unknowns[i].name}", f"use one of the units {known}"
+                    )
                 wanted[i] = number * factor
             elif unknowns[i].value:
                 wanted[i] = number / 100 * abs(unknowns[i].value)
             elif name:
                 raise _no_wish(
-                    text, f"{unknowns[i].name} is zero, {number:g} % of it is nothing; give a unit"
+                    text, f"{unknowns[i].name} is zero, so {number:g} % of it is zero; state a unit"
                 )
             named[i] |= bool(name)
     source = (
@@ -332,16 +353,14 @@ def _no_wish(text: str, message: str, help: str = "") -> Refusal:
 def _tests(
     request: PlanRequest, model: StiffnessModel, unknowns: Sequence[Unknown]
 ) -> tuple[StiffnessModel, Floats]:
-    """The model as it stands in the cell, and R (k, P) [m per SI unit] of R^T R, the mean of S^T S over the cuts of a
+    """The model as it is in the cell, and R (k, P) [m per SI unit] of R^T R, the mean of S^T S over the cuts of a
     program: what the unknowns do there."""
     assert request.program is not None
     ready = prepare(Request(request.program, request.force, request.cell, request.robot))
     task = ready.task
     rows = np.flatnonzero(ready.wrenches.carries & np.isfinite(task.track.q).all(axis=1))
     if not len(rows):
-        message = (
-            "no motion of it carries a force: the error at its cuts does not depend on what is asked for"
-        )
+        message = "no motion has a force: the error at the cuts does not depend on the requested parameters"
         raise Refusal(Finding("PLN006", message, str(request.program)))
     rows = rows[np.linspace(0, len(rows) - 1, min(CUTS, len(rows))).astype(int)]
     model = replace(model, gravity=task.model.gravity)
@@ -349,19 +368,22 @@ def _tests(
     for unknown in unknowns:
         p, value = unknown.parameter, model.terms[unknown.term].values[unknown.parameter.name]
         step = 0.1 * max(p.scale, abs(value))
-        entries.append(Unsure(unknown.name, unknown.term, p.name, value, p.lower, p.upper, step))
+        entries.append(UncertainInput(unknown.name, unknown.term, p.name, value, p.lower, p.upper, step))
     given = task.conditions.part(rows)
     q, wrench, tool = task.track.q[rows], task.wrench[rows], task.tool[rows]
+    if (placed := task.robot_from_path(rows)) is not None:
+        wrench = rotate_wrench(placed, wrench)
     moves = sensitivities(model, entries, q, wrench, tool, given)
-    if task.process:
-        moves -= sensitivities(model, entries, q, np.zeros_like(wrench), tool, given)
+    moves -= goal_sensitivities(replace(task, model=model), entries, rows, task.wanted[rows])
     moves = moves[np.isfinite(moves).all(axis=(1, 2))]
     if not moves.any():
-        raise Refusal(Finding("PLN006", "its cuts do not depend on what is asked for", str(request.program)))
+        raise Refusal(
+            Finding("PLN006", "its cuts do not depend on the requested parameters", str(request.program))
+        )
     return model, np.asarray(np.linalg.qr(moves.reshape(-1, len(entries)) / np.sqrt(len(moves)), mode="r"))
 
 
-def _in_sight(offer: Offer, model: StiffnessModel, setups: Setups) -> Readings:
+def _in_sight(offer: CandidateSetups, model: StiffnessModel, setups: Setups) -> Readings:
     """The readings to be taken."""
     visible = np.repeat(setups.visible[:, None], setups.load.shape[1], axis=1).reshape(-1)
     return readings_of(model, offer, setups).part(np.flatnonzero(visible))
@@ -369,7 +391,7 @@ def _in_sight(offer: Offer, model: StiffnessModel, setups: Setups) -> Readings:
 
 def _about(request: PlanRequest, planned: Planned, readings: int) -> list[str]:
     """Comments at the head of a plan: what it is, and what to do with it."""
-    offer = planned.offer
+    offer = planned.setups_offered
     lines = [
         f"plan of compensate {__version__}, robot file sha256 {planned.digest[:16]}, seed {planned.seed}",
         planned.goal,
@@ -377,7 +399,7 @@ def _about(request: PlanRequest, planned: Planned, readings: int) -> list[str]:
     ]
     if offer.deflection:
         lines.append(
-            "fill in DX, DY, DZ in mm, loaded minus unloaded with the axes held, in axes of the robot base"
+            "fill in DX, DY, DZ in mm, loaded minus unloaded with the axes locked, in axes of the robot base"
         )
     else:
         lines.append("fill in X, Y, Z in mm")
@@ -385,9 +407,11 @@ def _about(request: PlanRequest, planned: Planned, readings: int) -> list[str]:
         for name, place in zip(offer.targets, offer.places / MM, strict=True):
             lines.append(f"reflector {name} about {place[0]:g} {place[1]:g} {place[2]:g} mm on the flange")
     if planned.setups.direction is not None:
-        lines.append("come to each pose with every axis in the sense of its DIR: 1 rises and -1 falls")
+        lines.append(
+            "approach each pose with every axis in the direction of its DIR: 1 increases and -1 decreases"
+        )
     lines += [
-        "go through the rows in this order, and measure the first pose once more at the end, where a drift would show",
-        "what stands around the arm was not looked at, drive slowly to every pose for the first time",
+        "measure the rows in this order, and the first pose once more at the end, where a drift is visible",
+        "collisions with the surroundings are not checked: move slowly to every pose for the first time",
     ]
     return lines

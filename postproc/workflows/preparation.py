@@ -8,33 +8,40 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.arrays import Floats, Ints
-from postproc.cell import Cell, Frames, find_cell, frames_of, load_cell
-from postproc.compensation.task import Task
-from postproc.dialects import DIALECTS, detect
-from postproc.dialects.dialect import Dialect, Program, Settings
-from postproc.document import Document
+from postproc.base.arrays import Floats, Ints
+from postproc.base.document import Document
+from postproc.base.findings import Finding, Refusal, Topic, nearest
+from postproc.base.geometry import PoseRows, Poses
+from postproc.base.input_files import Inputs, noted
+from postproc.base.read_files import read_text_file
+from postproc.base.units import DEG, MM
+from postproc.cell import Cell, MotionFrames, find_cell, frames_of, load_cell
+from postproc.compensation.lost_motion import add_lost_motion
+from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.ramped_forces import ASSUMED, add_force_ramps
 from postproc.effects import Conditions
-from postproc.files import read_plain
-from postproc.findings import Finding, Refusal, nearest
-from postproc.forces import Wrenches, is_no_force, wrenches
-from postproc.geometry import PoseRows, Poses
-from postproc.inputs import Inputs, noted
-from postproc.model import StiffnessModel, approach
+from postproc.languages import DIALECTS, detect
+from postproc.languages.dialect import Dialect, Program, ReadingSettings
+from postproc.model import StiffnessModel
+from postproc.process import Wrenches, is_no_force, wrenches
+from postproc.robot.axis_track import AxisTrack, all_axes, external_joint, follow_axes, nominal_flange
 from postproc.robot.description import Robot, find_robot, load_robot
+from postproc.robot.external_axes import External
 from postproc.robot.geometries import SerialArm
-from postproc.robot.track import Track, all_axes, follow, nominal_flange
+from postproc.robot.orientation_modes import as_run
+from postproc.robot.read_external_axes import fill_external_axes, follow_external_axes
 from postproc.toolpath import Kind, Toolpath
-from postproc.units import DEG, MM
+from postproc.workflows.correction_mode import corrected_model, mode_findings, temperature_rise, touch_off
 
 Stage = Callable[[str], None]
-"""Is told the name of each stage as it begins."""
+"""Is told the name of each stage as it starts."""
 
 
 @dataclass(frozen=True)
 class Request:
     """What the user asked for.  ``force``: None without ``--force``, "" for a bare one, else its value;
-    ``force_offset``: the mean of a force log in air is taken off."""
+    ``tare``: the mean of a force log in air is subtracted; ``allow_compensated``: a program that carries the mark of an
+    earlier compensation is accepted; ``no_insert``: no motion is inserted; ``shared_points``: as of ``Writing``."""
 
     program: Path
     force: str | None = None
@@ -45,12 +52,12 @@ class Request:
     report: Path | None = None
     strict: bool = False
     dry_run: bool = False
-    again: bool = False
+    allow_compensated: bool = False
     json: Path | None = None
-    keep_points: bool = False
-    own_points: str = "inline"
+    no_insert: bool = False
+    shared_points: str = "copy-inline"
     config_dat: Path | None = None
-    force_offset: bool = False
+    tare: bool = False
 
 
 @dataclass(frozen=True)
@@ -59,12 +66,12 @@ class Prepared:
 
     program: Program
     dialect: Dialect
-    settings: Settings
+    settings: ReadingSettings
     cell: Cell
     robot: Robot
     model: StiffnessModel
     wrenches: Wrenches
-    task: Task
+    task: CompensationProblem
     findings: tuple[Finding, ...]
     inputs: Inputs
 
@@ -75,7 +82,7 @@ def silent(_stage: str) -> None:
 
 def read_program(
     path: Path, cell: Cell | None = None, config_dat: Path | None = None
-) -> tuple[Dialect, Program, Settings]:
+) -> tuple[Dialect, Program, ReadingSettings]:
     """Read a program and what belongs to it, with what the cell says of its language.
 
     ``config_dat``: instead of the cell's.  Raises Refusal FIL001, FIL002, FIL003, YML004.
@@ -88,9 +95,9 @@ def read_program(
     if config_dat is None and cell is not None and cell.config_dat is not None:
         config_dat = cell.path.parent / cell.config_dat
     references = () if config_dat is None else (read_document(config_dat),)
-    settings = Settings(references=references)
+    settings = ReadingSettings(references=references)
     if cell is not None:
-        settings = Settings(cell.orientation, cell.integer_words, references)
+        settings = ReadingSettings(cell.orientation, cell.integer_words, references)
     return dialect, dialect.read(documents, settings), settings
 
 
@@ -110,7 +117,7 @@ def _dialect(path: Path, raw: bytes, cell: Cell | None) -> Dialect:
     return DIALECTS[cell.dialect]
 
 
-def near_cell(program: Path) -> Cell | None:
+def find_cell_beside(program: Path) -> Cell | None:
     """The checked cell of a program; None where there is none."""
     try:
         return load_cell(find_cell(program))
@@ -122,7 +129,7 @@ def near_cell(program: Path) -> Cell | None:
 
 def read_document(path: Path) -> Document:
     """A file of a program.  Raises Refusal FIL001 (not readable), FIL003 (no text)."""
-    return Document(path, read_plain(path))
+    return Document(path, read_text_file(path))
 
 
 def prepare(request: Request) -> Prepared:
@@ -139,31 +146,35 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     beside = None if request.robot else cell.path.parent
     robot = load_robot(find_robot(cell.robot, beside))
     full = StiffnessModel.from_robot(robot)
-    process = cell.correct == "process"
-    own: list[str] = []
-    if not process and cell.controller.absolute_accuracy:
-        own.append("geometric")
-    if not process and cell.controller.gravity_compensated:
-        own.append("weight")
     gravity = cell.robot_base.rotation.T @ full.gravity
-    model = replace(full.without(families=own), gravity=gravity)
+    model = replace(corrected_model(full, cell), gravity=gravity)
+    warmer = temperature_rise(model, cell)
 
     path = completed(read.toolpath, cell, robot, request.program)
     program = replace(read, toolpath=path)
     if not len(path) and not is_no_force(request.force):
         raise Refusal(
-            Finding("FIL009", f"no motion was found (read as {dialect.name})", str(request.program)),
+            Finding("FIL009", f"the file contains no motion (read as {dialect.name})", str(request.program)),
             *program.findings,
         )
-    frames = frames_of(cell, path, request.program)
-    force = wrenches(request.program, path, frames, cell, request.force, request.force_offset)
+    external = External.of(path, cell.external_axes, robot, cell.robot_base)
+    frames = frames_of(cell, path, request.program, external)
+    base, tool, start = frames.base_in_robot, frames.tool_in_flange, _start(cell, robot)
+    path, kept = as_run(path, base, tool, robot, start, str(request.program))
+    force = wrenches(request.program, path, frames, cell, request.force, request.tare)
     _missing_points(program, force)
     _missing_orientation(request, path, force, cell)
-    base, tool = frames.base_in_robot, frames.tool_in_flange
+    _other_carrier(request, path, force, external)
     wanted = PoseRows(len(path), lambda rows: base.shared(rows) @ path.target_in_base[rows]).remembered()
-    flange = PoseRows(len(path), lambda rows: wanted[rows] @ tool.shared(rows).inverse())
-    track = follow(robot, path, flange, _start(cell, robot))
-    task = Task(
+
+    def flanges(rows: Ints) -> Poses:
+        there = wanted[rows] @ tool.shared(rows).inverse()
+        placed = None if external is None else external.robot_from_path(rows)
+        return there if placed is None else placed @ there
+
+    flange = PoseRows(len(path), flanges)
+    track = follow_axes(robot, path, flange, start, base, tool)
+    task = CompensationProblem(
         file=str(request.program),
         toolpath=path,
         model=model,
@@ -172,34 +183,53 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
         base=base,
         tool=tool,
         force=force,
-        conditions=_conditions(request, path, cell, frames, model, force, track.q),
-        process=process,
+        conditions=_conditions(request, path, cell, frames, model, force, warmer),
+        process=cell.correct == "process",
         gain=request.gain,
         max_correction=cell.max_correction,
         tolerance=cell.tolerance,
         tolerance_angle=cell.tolerance_angle,
+        external=external,
     )
-    findings = [*program.findings, *force.findings, *model.doubts()]
-    if force.any and not model.gives_way:
+    task = add_force_ramps(task, _ramp(cell, path, force))
+    spacing = np.maximum(cell.min_segment, 1e-3 * cell.cycle_ms * np.nan_to_num(path.feed))
+    task = add_lost_motion(task, start, spacing)
+    findings = [*_read_findings(program, path), *kept, *force.findings, *model.plausibility_findings()]
+    findings += mode_findings(full, cell, str(request.program))
+    if cell.correct == "touched_off":
+        touched, told = touch_off(task, cell)
+        task = replace(task, touched_off=touched)
+        findings += told
+    findings += follow_external_axes(path, cell.external_axes, robot, request.program)
+    if force.any and not model.is_compliant:
         findings.append(
-            Finding(
-                "MOD003", f"{robot.name} has no compliance: under this force nothing bends", str(robot.path)
-            )
+            Finding("MOD003", f"{robot.name} has no compliance: this force deflects nothing", str(robot.path))
         )
     if not isinstance(robot.nominal, SerialArm):
         findings += _disagreeing(request.program, path, track)
     return Prepared(program, dialect, settings, cell, robot, model, force, task, tuple(findings), inputs)
 
 
-def _disagreeing(program: Path, path: Toolpath, track: Track) -> list[Finding]:
+def _read_findings(program: Program, path: Toolpath) -> list[Finding]:
+    """The findings of the reader, but for the external axes: what they carry, the cell has said by now; and the motions
+    at which one of them is not known."""
+    findings = [finding for finding in program.findings if finding.topic is not Topic.EXTERNAL_AXES]
+    lost = [finding for finding in path.refused.values() if finding.code == "EXT004"]
+    if lost:
+        more = f" ({len(lost)} motions)" if len(lost) > 1 else ""
+        findings.append(replace(lost[0], message=lost[0].message + more))
+    return findings
+
+
+def _disagreeing(program: Path, path: Toolpath, track: AxisTrack) -> list[Finding]:
     """What S and T state with a motion, and the axes that bring the robot there, disagree on (KIN007)."""
     # A path motion keeps the branch that the robot is in, whatever its S says.
     elsewhere = (path.status >= 0) & (track.status >= 0) & (path.status & 7 != track.status)
     elsewhere &= path.known & np.isin(path.kind, (Kind.LIN, Kind.CIRC))
     findings = []
     for mask, message in (
-        (~track.turn_holds, "the stated T is not that of this pose"),
-        (elsewhere, "the stated S is not the configuration in which the robot comes here"),
+        (~track.turn_matches, "the stated T (Turn) is not that of this pose"),
+        (elsewhere, "the stated S (Status) is not the configuration in which the robot reaches this pose"),
     ):
         rows = np.flatnonzero(mask)
         if len(rows):
@@ -223,12 +253,13 @@ def _conditions(
     request: Request,
     path: Toolpath,
     cell: Cell,
-    frames: Frames,
+    frames: MotionFrames,
     model: StiffnessModel,
     force: Wrenches,
-    q: Floats,
+    warmer: float | None,
 ) -> Conditions:
-    """What the model's effects need to know of the motions: spindle axes, weights on the flange, senses of approach."""
+    """What the model's effects need to know of the motions: spindle axes, weights on the flange, and by how much the
+    robot is ``warmer`` [K] than at its calibration."""
     spindle = None
     if "spindle.z" in model.chain.names:
         spindle = frames.spindle_in_tool
@@ -251,46 +282,80 @@ def _conditions(
             tool = cell.tools.get(frame.number or 0)
             if tool is not None and tool.mass is not None and tool.com is not None:
                 mass[path.tool == row], com[path.tool == row] = tool.mass, tool.com
-    directed = any(term.effect.by_direction for term in model.terms)
     return Conditions(
         spindle=spindle,
-        direction=np.nan_to_num(approach(q)) if directed else None,
+        temperature=None if warmer is None else np.broadcast_to(warmer, (len(path),)),
         payload_mass=mass,
         payload_com=com,
     )
 
 
+def _ramp(cell: Cell, path: Toolpath, force: Wrenches) -> Floats:
+    """(N,) [m] path over which a force that steps inside a cut goes over: as the cell says, or the cutter's radius
+    where the process or the cell's tool states it."""
+    if cell.force_ramp is not None:
+        return np.broadcast_to(cell.force_ramp, (len(path),))
+    radius = np.full(len(path.frames) + 1, np.nan)  # the last stands for an unknown tool
+    for index, frame in enumerate(path.frames):
+        tool = cell.tools.get(frame.number or 0)
+        if tool is not None and tool.diameter is not None:
+            radius[index] = 0.5 * tool.diameter
+    if force.radius is None and np.isnan(radius).all():
+        return np.broadcast_to(ASSUMED, (len(path),))
+    found = radius[path.tool]
+    if force.radius is not None:
+        found = np.where(np.isnan(force.radius), found, force.radius)
+    return np.where(np.isnan(found), ASSUMED, found)
+
+
 def _missing_points(program: Program, force: Wrenches) -> None:
-    """Refuse a cut whose points are declared nowhere because the module's data list is not there."""
+    """Refuse a cut whose points are declared nowhere because the file that declares them is not there."""
     if len(program.documents) > 1:
         return
     refused = program.toolpath.refused
-    lost = [row for row, why in refused.items() if why.code == "KRL003" and force.carries[row]]
+    lost = [row for row, why in refused.items() if why.topic is Topic.UNDECLARED_POINT and force.carries[row]]
     if lost:
         path, first = program.documents[0].path, refused[min(lost)]
         raise Refusal(
             Finding(
                 "FIL006",
-                f"{first.message}; {path.with_suffix('.dat').name} is not beside {path.name}"
-                f" ({len(lost)} such motions)",
+                f"{len(lost)} motions under force use points that no file of the program declares; {first.message}",
                 str(path),
                 first.line,
                 first.column,
-                help="copy the .dat of the module beside its .src",
+                help=first.advice,
+            )
+        )
+
+
+def _other_carrier(request: Request, path: Toolpath, force: Wrenches, external: External | None) -> None:
+    """Refuse a motion under force that starts where a base on another positioner is: which way it goes on the part is
+    nothing that a program means."""
+    if external is None:
+        return
+    lost = np.flatnonzero(force.carries & external.changes_carrier)
+    if len(lost):
+        raise Refusal(
+            Finding(
+                "EXT005",
+                "a motion under force starts in a base at another place than that of the motion before it",
+                str(request.program),
+                int(path.line[lost[0]]),
+                help="write a motion without force in the new base before it",
             )
         )
 
 
 def _missing_orientation(request: Request, path: Toolpath, force: Wrenches, cell: Cell) -> None:
     """Refuse cuts of a program that says positions only, in a cell that does not say how the tool stands."""
-    lost = force.carries & ~path.oriented & np.isfinite(path.position).all(axis=1)
-    lost &= ~np.isfinite(path.rotation[:, 0, 0])
+    lost = force.carries & ~path.orientation_programmed & np.isfinite(path.position).all(axis=1)
+    lost &= ~np.isfinite(path.rotation[:, 0, 0]) & ~path.keeps_orientation
     if lost.any():
         row = int(np.argmax(lost))
         raise Refusal(
             Finding(
                 "CEL004",
-                f"the program says no orientation, and the cell {cell.path} does not either",
+                f"the program states no orientation, and neither does the cell {cell.path}",
                 str(request.program),
                 int(path.line[row]),
                 help="add the tool's orientation in the base to the cell: orientation: {a: 0, b: 0, c: 180}",
@@ -305,22 +370,31 @@ def _start(cell: Cell, robot: Robot) -> Floats | None:
         return None
     names = [joint.name for joint in robot.joints]
     if len(stated) != len(names):
-        message = f"start: {len(stated)} values; {robot.name} has {len(names)} joints: {', '.join(names)}"
+        message = (
+            f"start: {len(stated)} values are given; {robot.name} has {len(names)} joints: {', '.join(names)}"
+        )
         raise Refusal(Finding("YML004", message, str(cell.path), cell.start_line))
     units = np.array([DEG if joint.kind == "revolute" else MM for joint in robot.joints])
     return np.asarray(stated * units)
 
 
 def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpath:
-    """The toolpath with targets that continue an axis motion filled in from where that one leads."""
-    rows = np.flatnonzero(path.anchor >= 0)
+    """The toolpath with its external axes where they are, and with targets that continue an axis motion filled in from
+    where that one leads."""
+    start = _start(cell, robot)
+    path = fill_external_axes(path, cell.external_axes, robot, start, program, cell.path)
+    rows = np.flatnonzero(path.inherits_from_row >= 0)
     if not len(rows):
         return path
-    frames = frames_of(cell, path, program)
+    external = External.of(path, cell.external_axes, robot, cell.robot_base)
+    frames = frames_of(cell, path, program, external)
 
     def reached(rows: Ints) -> Poses:
-        axes = all_axes(robot, path.axes[path.anchor[rows]], _start(cell, robot))
+        anchor = path.inherits_from_row[rows]
+        axes = all_axes(robot, path.axes[anchor], external_joint(robot, path, anchor, start))
         flange = nominal_flange(robot, axes)
+        if external is not None and external.constant is None:
+            flange = external.placed(path.external[anchor], external.carrier[rows]).inverse() @ flange
         return frames.base_in_robot[rows].inverse() @ flange @ frames.tool_in_flange[rows]
 
     return path.completed(PoseRows(len(path), reached))

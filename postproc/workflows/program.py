@@ -5,38 +5,47 @@ Nothing is written that was not read back from its own bytes and checked.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats, Ints
-from postproc.blocks import give_back
-from postproc.compensation.correct import Result, State, correct
-from postproc.compensation.division import Division, Limits, divide, made
-from postproc.compensation.doubt import doubt_of
-from postproc.compensation.limits import limits
-from postproc.compensation.task import Task
-from postproc.dialects.dialect import Moved, Program
-from postproc.document import Edits
-from postproc.findings import Finding, Refusal
-from postproc.geometry import lengths
-from postproc.inputs import place
-from postproc.publish import Content, publish
+from postproc.base import rotary_words
+from postproc.base.batches import trim_allocator
+from postproc.base.document import Edits
+from postproc.base.findings import Finding, Refusal
+from postproc.base.input_files import place
+from postproc.base.units import DEG, MM
+from postproc.compensation.axis_limits import check_limits
+from postproc.compensation.comparison import cuts_not_improved
+from postproc.compensation.correct import CorrectionResult, MotionOutcome, correct
+from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.splines import unknown_displacements
+from postproc.compensation.subdivision import Limits, Subdivision, subdivide
+from postproc.languages.dialect import EditedTargets, Program
+from postproc.output.atomic_write import Content, write_atomically
+from postproc.output.write import WrittenProgram, edit_program, plan_motions, write, writing_settings
+from postproc.report.corrections_csv import corrections_csv
 from postproc.report.diff import unified_diff
-from postproc.report.files import corrections_csv
 from postproc.report.page import beside, program_page
 from postproc.report.page_data import page_data
-from postproc.report.report import Link, Report, Spread, Worst, exit_code, in_order_of_place, json_bytes
-from postproc.toolpath import Role
-from postproc.units import DEG, MM
+from postproc.report.report import (
+    Report,
+    in_order_of_place,
+    json_bytes,
+)
+from postproc.toolpath import OrientationPath, Role, Toolpath
+from postproc.workflows.figures import report_of
 from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, silent
-from postproc.writing import Written, edited, planned, write, written_as
 
-WORST_PLACES = 5
+NEAREST = 0.3 * MM
+"""[m] Distance of a point that ends a ramp from the next, where the cell does not say how short a motion may be."""
+
+LEAST = 200
+"""Motions that may be inserted into any program where the cell does not limit its growth: a controller holds them."""
 
 
 def predict(request: Request, stage: Stage = silent) -> Report:
@@ -45,7 +54,7 @@ def predict(request: Request, stage: Stage = silent) -> Report:
     stage("predicting")
     result = correct(replace(ready.task, gain=0.0))
     findings = in_order_of_place([*ready.findings, *result.findings])
-    report = _report(request, ready, result, findings)
+    report = report_of(request, ready, result, findings)
     files: dict[Path, Content] = {}
     pages = [] if request.json is None else [request.json]
     shown: Path | None = None
@@ -60,7 +69,7 @@ def predict(request: Request, stage: Stage = silent) -> Report:
         links = beside(shown, {"deflections (CSV)": names[0], "result (JSON)": pages[-1]})
         files[shown] = program_page(page_data(ready.task, result, report, ready.program.documents), links)
     ready.inputs.refuse_changed()
-    publish({**files, **dict.fromkeys(pages, json_bytes(report))}, still=ready.inputs.refuse_changed)
+    write_atomically({**files, **dict.fromkeys(pages, json_bytes(report))}, still=ready.inputs.refuse_changed)
     return report
 
 
@@ -71,39 +80,48 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     """
     ready = prepare(request)
     program = ready.program
-    if program.marker is not None and not request.again:
+    if program.marker is not None and not request.allow_compensated:
         line, column = program.documents[0].place(program.marker.start)
         raise Refusal(
             Finding(
                 "FIL005",
-                "this program carries the mark of an earlier compensation",
+                "this program contains the mark of an earlier compensation",
                 str(request.program),
                 line,
                 column,
-                help="compensate the original instead, or say --again if it is meant",
+                help="compensate the original instead, or use --allow-compensated if this is intended",
             )
         )
     stage("correcting")
     target = _target(request)
-    task, result, division, edits = _corrected(request, ready, target.stem)
-    stage("writing, and reading back")
-    # Only writing needs it, and of a million motions it takes a tenth of a gigabyte.
-    program = replace(program, text=None)
-    ready = replace(ready, program=program)
-    give_back()
-    written = write(
-        program,
-        ready.dialect,
-        task,
-        result,
-        division,
-        edits,
-        written_as(ready.cell, request.own_points),
-        ready.settings,
-        lambda path: completed(path, ready.cell, ready.robot, request.program),
-    )
-    result, division = written.result, written.division  # what was meant goes, before its place is needed
-    give_back()
+    held: dict[int, Finding] = {}
+    while True:
+        task, result, division, edits = _corrected(request, ready, target.stem, held)
+        stage("writing, and reading back")
+        # Only writing needs it, and of a million motions it takes a tenth of a gigabyte.
+        ready = replace(ready, program=replace(ready.program, text=None))
+        trim_allocator()
+        written = write(
+            ready.program,
+            ready.dialect,
+            task,
+            result,
+            division,
+            edits,
+            writing_settings(ready.cell, request.shared_points),
+            ready.settings,
+            partial(completed, cell=ready.cell, robot=ready.robot, program=request.program),
+        )
+        result, division = written.result, written.division  # what was meant goes, before its place is needed
+        trim_allocator()
+        worse = cuts_not_improved(task, result, division, written.path_error, written.across_before)
+        if not worse:
+            break
+        held |= worse
+        stage("correcting without the cuts that would be no better")
+        text = ready.dialect.read(ready.program.documents, ready.settings).text
+        ready = replace(ready, program=replace(ready.program, text=text))
+    program = ready.program
     findings = [*ready.findings, *result.findings, *division.findings, *_closing(request, ready, written)]
     paths = _output_paths(program, target)
     outputs = dict(zip(paths, written.contents, strict=True))
@@ -112,8 +130,8 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff", "report.html")]
     names += [] if request.json is None else [request.json]
     stage("reporting")
-    give_back()
-    report = _report(request, ready, result, in_order_of_place(findings), written)
+    trim_allocator()
+    report = report_of(request, ready, result, in_order_of_place(findings), written)
     if report.exit == 1:
         raise Refusal(*report.findings)
     report = replace(report, outputs=tuple(str(path) for path in (*paths, *names)))
@@ -127,7 +145,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     files: dict[Path, Content] = {
         **outputs,
         names[0]: json_bytes(report),
-        names[1]: corrections_csv(task, result, written.division, written.between),
+        names[1]: corrections_csv(task, result, written.division, written.path_error),
         names[2]: diff,
         names[3]: program_page(
             page_data(task, result, report, program.documents, written),
@@ -144,91 +162,254 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         **dict.fromkeys(names[4:], json_bytes(report)),
     }
     ready.inputs.refuse_changed()
-    give_back()
-    publish(files, target, ready.inputs.refuse_changed)  # writing takes its time as well
+    trim_allocator()
+    write_atomically(files, target, ready.inputs.refuse_changed)  # writing takes its time as well
     return report
 
 
-def _corrected(request: Request, ready: Prepared, stem: str) -> tuple[Task, Result, Division, Edits]:
-    """The correction and its edits; what can not be divided or written as planned stays, and the rest is made anew."""
+def _corrected(
+    request: Request, ready: Prepared, stem: str, worse: Mapping[int, Finding]
+) -> tuple[CompensationProblem, CorrectionResult, Subdivision, Edits]:
+    """The correction and its edits; what cannot be divided or written as planned stays, and the rest is made again.
+    worse: rows whose cuts stay as they are, and why."""
     task, cell = ready.task, ready.cell
-    allowed = Limits(request.keep_points, cell.min_segment, cell.max_growth)
-    writing = written_as(cell, request.own_points)
+    if worse:
+        path = task.toolpath
+        task = replace(task, toolpath=replace(path, refused={**worse, **path.refused}))
+    allowed = Limits(
+        request.no_insert,
+        cell.min_segment,
+        cell.max_growth,
+        1e-3 * cell.cycle_ms,
+        0 if cell.growth_stated else LEAST,
+        cell.min_segment if cell.segment_stated else NEAREST,
+    )
+    writing = writing_settings(cell, request.shared_points)
     while True:
         result = correct(task)
-        give_back()
-        division = divide(task, result, allowed)
-        give_back()
-        told, beyond = limits(task, result, division)
-        give_back()
+        if task.gain == 0.0:  # as asked: nothing moves, nothing is inserted
+            result = replace(
+                result, state=np.where(result.corrected, MotionOutcome.OFF, result.state).astype(np.int8)
+            )
+        trim_allocator()
+        division = subdivide(task, result, allowed)
+        trim_allocator()
+        told, beyond = check_limits(task, division)
+        trim_allocator()
         division = replace(division, findings=(*division.findings, *told))
-        moved = Moved((), {**beyond, **division.held})
-        if not moved.held:
-            moved = ready.dialect.moved(ready.program, planned(task, division), writing)
+        moved = EditedTargets((), {**beyond, **division.not_refined})
+        if not moved.unwritten:
+            moved = ready.dialect.edit_targets(ready.program, plan_motions(task, division), writing)
         known = task.toolpath.refused
-        held = {row: finding for row, finding in moved.held.items() if row not in known}
-        if not moved.held:
-            edits = edited(ready.program, ready.dialect, moved.edits, ready.robot, stem)
+        held = {row: finding for row, finding in moved.unwritten.items() if row not in known}
+        if not moved.unwritten:
+            edits = edit_program(ready.program, ready.dialect, moved.edits, ready.robot, stem)
             return task, result, division, edits
         if not held:
-            raise ValueError("motions that stay as they are were held again")
+            raise ValueError("motions that are not corrected are refused again")
         task = replace(task, toolpath=replace(task.toolpath, refused={**known, **held}))
 
 
-def _closing(request: Request, ready: Prepared, written: Written) -> list[Finding]:
+def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
     """What is to be said of the corrected program as a whole."""
     file, findings = str(request.program), []
     result, division = written.result, written.division
     path, tolerance = ready.task.toolpath, ready.cell.tolerance
     corrected = result.corrected
     if ready.task.process and not ready.wrenches.any:
-        said = "--force was not given" if request.force is None else "no motion carries a force"
+        said = "--force is not given" if request.force is None else "no motion has a force"
         findings.append(Finding("COR010", f"{said}: nothing is corrected", file))
-    if division.inserted:
-        links = int(division.links.sum())
-        points = division.inserted - links
-        first = int(division.source[np.argmax(division.role != Role.OWN)])
+    if division.inserted or len(division.lead_ins):
+        changed = (division.role != Role.ORIGINAL) | (division.moved & ~corrected[division.source])
         findings.append(
             Finding(
                 "COR012",
-                f"{links} link{'' if links == 1 else 's'} where the correction steps, {points} points on the"
-                f" way (the first one here): {len(division) / max(len(path), 1):.3f} times the motions",
+                _inserted(division, len(path)),
                 file,
-                int(path.line[first]),
+                int(path.line[division.source[np.argmax(changed)]]),
             )
         )
+    findings += _corners(ready, written)
     if request.gain < 1.0:
-        said = f"{request.gain:.0%} of the correction was applied, as asked"
+        said = f"{request.gain:.0%} of the correction is applied, as --gain requests"
         findings.append(Finding("COR007", said, file))
-    told = "remain" if request.gain == 1.0 else "are beside what the gain leaves"
-    turns = corrected & path.oriented
+    beyond = "" if request.gain == 1.0 else " beyond the share that --gain keeps"
+    turns = corrected & path.orientation_programmed
     for off, limit, rows, unit, word in (
-        (written.off, tolerance, corrected, MM, "mm"),
+        (written.residual, tolerance, corrected, MM, "mm"),
         (written.off_angle, ready.cell.tolerance_angle, turns, DEG, "deg"),
     ):
         above = rows & ~(off <= limit)
         if above.any():
             row = int(np.argmax(np.where(above, np.nan_to_num(off, nan=np.inf), -1.0)))
-            message = f"{off[row] / unit:.4f} {word} {told}, tolerance {limit / unit:g} {word}"
-            message += f" ({int(above.sum())} motions)"
-            findings.append(Finding("COR005", message, file, int(path.line[row])))
-    between = np.nan_to_num(written.off_between)
-    over = between > tolerance
-    if over.any():
-        worst = int(np.argmax(between))
-        way = "the wanted way" if request.gain == 1.0 else "the way that the gain leaves"
-        findings.append(
-            Finding(
-                "COR006",
-                f"between its points the tool is up to {between[worst] / MM:.4f} mm from {way} (worst"
-                f" here), tolerance {tolerance / MM:g} mm ({int(over.sum())} motions)",
-                file,
-                int(path.line[division.source[worst]]),
-                help="no point may be inserted there (--keep-points, max_growth, min_segment, a spline, a TRIGGER), or"
-                " the begin of the motion is not known",
+            message = (
+                f"the residual is {off[row] / unit:.4f} {word}{beyond}, tolerance {limit / unit:g} {word}"
             )
-        )
+            message += f" ({int(above.sum())} motions)"
+            help = _POLE if unit == DEG and _by_pair(path, row) else ""
+            findings.append(Finding("COR005", message, file, int(path.line[row]), help=help))
+    findings += _between(request, ready, written) + _not_turned(ready, written)
+    return findings + _splines(ready, written) + _assumed(request, ready, written)
+
+
+def _not_turned(ready: Prepared, written: WrittenProgram) -> list[Finding]:
+    """Cutting motions whose text cannot say the orientation that would be needed: those that keep the one before
+    (COR019), and those that have no words for it (COR021)."""
+    path, division, limit = ready.task.toolpath, written.division, ready.cell.tolerance_angle
+    motion = written.result.corrected & ready.task.carries & ~path.orientation_programmed
+    off = np.where(motion, np.nan_to_num(written.result.after_angle), 0.0)
+    np.fmax.at(off, division.source, np.where(motion[division.source], written.between_angle, 0.0))
+    findings = []
+    for code, rows, why, help in (
+        (
+            "COR019",
+            path.keeps_orientation,
+            "#CONSTANT keeps the orientation of the motion before, so only the position is corrected",
+            "program the cut with $ORI_TYPE=#VAR, or state tolerance_deg in the cell",
+        ),
+        (
+            "COR021",
+            ~path.keeps_orientation,
+            "the program does not state the tool's orientation, so only the position is corrected",
+            "",
+        ),
+    ):
+        above = rows & (off > limit)
+        if above.any():
+            row = int(np.argmax(np.where(above, off, -1.0)))
+            message = f"the tool remains rotated by {off[row] / DEG:.4f} deg, tolerance {limit / DEG:g} deg"
+            message += f" ({int(above.sum())} motions): {why}"
+            findings.append(Finding(code, message, ready.task.file, int(path.line[row]), help=help))
     return findings
+
+
+def _splines(ready: Prepared, written: WrittenProgram) -> list[Finding]:
+    """Splines on which the force turns with a feed that only the controller knows."""
+    rows, off = unknown_displacements(ready.task, written.result)
+    above = off > ready.cell.tolerance
+    if not above.any():
+        return []
+    worst = int(np.argmax(off))
+    message = (
+        "only the controller knows the path between the points of a spline: the force rotates with it, and the tool may"
+        f" be off by {off[worst] / MM:.4f} mm (worst here), tolerance {ready.cell.tolerance / MM:g} mm"
+        f" ({int(above.sum())} points)"
+    )
+    line = int(ready.task.toolpath.line[rows[worst]])
+    help = "program the spline with points nearer to each other, or state the force @base"
+    return [Finding("COR018", message, ready.task.file, line, help=help)]
+
+
+def _assumed(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
+    """How rotary axes are taken to run between blocks, where another control would lead the tool elsewhere."""
+    path = ready.task.toolpath
+    if not path.turns_by_words:
+        return []
+    rows = np.flatnonzero(
+        written.result.corrected & (path.orientation_path == OrientationPath.ROTARY_AXES) & path.known
+    )
+    apart = np.nan_to_num(rotary_words.beside_great_circle(path.rotary_from[rows], path.rotary_to[rows]))
+    above = apart > ready.cell.tolerance_angle
+    if not above.any():
+        return []
+    worst = int(np.argmax(apart))
+    message = (
+        "between blocks the words of rotary axes are assumed to run linearly; a control that moves the tool on a great"
+        f" circle rotates it up to {apart[worst] / DEG:.4f} deg otherwise ({int(above.sum())} motions)"
+    )
+    return [Finding("COR020", message, str(request.program), int(path.line[rows[worst]]))]
+
+
+def _between(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
+    """What is to be said of the path between the points."""
+    path, source, cell, findings = ready.task.toolpath, written.division.source, ready.cell, []
+    beyond = "" if request.gain == 1.0 else " beyond the share that --gain keeps"
+    for off, rows, limit, unit, what, word in (
+        (written.off_between, None, cell.tolerance, MM, "path", "mm"),
+        (
+            written.off_between_angle,
+            path.orientation_programmed,
+            cell.tolerance_angle,
+            DEG,
+            "orientation",
+            "deg",
+        ),
+    ):
+        over = off > limit
+        if rows is not None:
+            over &= rows[source]
+        if over.any():
+            worst = int(np.argmax(np.where(over, off, -1.0)))
+            row = int(source[worst])
+            message = (
+                f"the {what} error between points is up to {off[worst] / unit:.4f} {word}{beyond} (worst"
+                f" here), tolerance"
+                f" {limit / unit:g} {word} ({int(over.sum())} motions)"
+            )
+            help = _POLE if unit == DEG and _by_pair(path, row) else _NO_POINT
+            findings.append(Finding("COR006", message, str(request.program), int(path.line[row]), help=help))
+    return findings
+
+
+def _inserted(division: Subdivision, count: int) -> str:
+    """What was inserted, and what leads into cuts."""
+    links, leads = int(division.transitions.sum()), len(division.lead_ins)
+    points = division.inserted - links
+    parts = [
+        (points, "intermediate point{} inserted"),
+        (links, "transition move{} inserted where the correction steps"),
+        (leads, "air move{} moved to the corrected start of the next cut"),
+    ]
+    said = ", ".join(f"{n} " + words.format("" if n == 1 else "s") for n, words in parts if n)
+    return (
+        f"the output has {said} (the first one here): {len(division) / max(count, 1):.3f} times the motions"
+    )
+
+
+def _corners(ready: Prepared, written: WrittenProgram) -> list[Finding]:
+    """Approximated corners of the output that differ from the path of the original by more than the tolerance: where
+    the approximation is stated (COR017), and where it is not (COR015)."""
+    found, tolerance, findings = written.corners, ready.cell.tolerance, []
+    if ready.task.gain < 1.0:  # a share of the correction leaves corners where it leaves the rest
+        return []
+    for code, stated in (("COR017", ~found.unknown), ("COR015", found.unknown)):
+        above = stated & ~(found.difference <= tolerance)
+        if not above.any():
+            continue
+        worst = int(np.argmax(np.where(above, np.nan_to_num(found.difference, posinf=np.inf), -1.0)))
+        off, distance = found.difference[worst] / MM, found.distance[worst] / MM
+        limit = f"tolerance {tolerance / MM:g} mm ({int(above.sum())} corners, the worst here)"
+        message = f"a corner that the controller approximates from {distance:.2f} mm on differs"
+        if code == "COR015":
+            message = (
+                f"no approximation distance is stated; with the largest possible one,"
+                f" {distance:.2f} mm, a corner differs"
+            )
+        message += f" by {off:.4f} mm from that of the original, {limit}"
+        help = (
+            "use a smaller approximation distance there, or state a longer force_ramp in the cell if"
+            " the force changes more slowly"
+        )
+        line = int(ready.task.toolpath.line[found.row[worst]])
+        findings.append(Finding(code, message, ready.task.file, line, help=help))
+    return findings
+
+
+_NO_POINT = (
+    "no point may be inserted there (--no-insert, max_growth, min_segment, a spline, a TRIGGER), or the start of the"
+    " motion is not known"
+)
+
+_POLE = (
+    "near the pole of two rotary axes the outer one hardly rotates the tool: it stays within"
+    f" {rotary_words.SWING / DEG:g} deg of its programmed place, and the rest of the error remains"
+)
+
+
+def _by_pair(path: Toolpath, row: int) -> bool:
+    """Whether two rotary axes turn the tool in a motion."""
+    by_axes = path.orientation_path[row] == OrientationPath.ROTARY_AXES
+    return bool(by_axes and np.isfinite(path.rotary_to[row]).sum() == 2)
 
 
 def _target(request: Request) -> Path:
@@ -239,9 +420,9 @@ def _target(request: Request) -> Path:
             raise Refusal(
                 Finding(
                     "FIL004",
-                    "this folder is a link, which is not followed unasked",
+                    "this folder is a symbolic link, which is not followed by default",
                     str(folder),
-                    help="name the folder with -o if it is meant",
+                    help="name the folder with -o if it is intended",
                 )
             )
         return folder / request.program.name
@@ -264,102 +445,4 @@ def _not_over_inputs(ready: Prepared, outputs: Sequence[str]) -> None:
     named = (cell.path.parent / said for said in (cell.force, cell.process) if said)
     ready.inputs.refuse_outputs(map(Path, outputs), named)
     if len({place(Path(output)) for output in outputs}) < len(outputs):
-        raise Refusal(Finding("FIL007", "two outputs have one name", outputs[0]))
-
-
-def _report(
-    request: Request,
-    ready: Prepared,
-    result: Result,
-    findings: tuple[Finding, ...],
-    written: Written | None = None,
-) -> Report:
-    task, corrected = ready.task, written is not None
-    scope = result.state != State.AIR
-    size = lengths(result.correction)
-    worst = tuple(
-        Worst(
-            int(task.toolpath.line[row]),
-            float(result.before[row] / MM),
-            float(size[row] / MM) if corrected else math.nan,
-            float(result.after[row] / MM) if corrected else math.nan,
-            float(np.linalg.norm(task.wrench[row, :3])),
-        )
-        for row in _largest_rows(result.before, scope, WORST_PLACES)
-    )
-    return Report(
-        program=str(request.program),
-        dialect=ready.dialect.name,
-        robot=ready.robot.name,
-        motions=len(task.toolpath),
-        cuts=int(result.cut.max(initial=-1)) + 1,
-        cutting=int(scope.sum()),
-        corrected=int(result.corrected.sum()) if corrected else 0,
-        inserted=written.division.inserted if written else 0,
-        links=_links(task, written.division) if written else (),
-        left=int((result.state == State.LEFT).sum()),
-        iterations=int(result.iterations.max(initial=0)),
-        gain=request.gain,
-        mode=ready.cell.correct,
-        force_source=ready.wrenches.source,
-        force_max_n=ready.wrenches.max_force,
-        force_peak_n=ready.wrenches.peak_force,
-        before=Spread.of(result.before[scope]),
-        after=Spread.of(result.after[scope]) if corrected else None,
-        between=Spread.of(written.between) if written else None,
-        correction=Spread.of(size[result.corrected]) if corrected else None,
-        angle_before_deg=_largest(result.before_angle[scope]) / DEG,
-        angle_after_deg=_largest(result.after_angle[scope]) / DEG if corrected else None,
-        worst=worst,
-        doubt=doubt_of(task, result, ready.cell.force_ci95),
-        model=_model(ready),
-        digests={
-            "robot": ready.robot.digest,
-            **{document.path.name: document.digest for document in ready.program.documents},
-        },
-        findings=findings,
-        exit=exit_code(findings, request.strict),
-    )
-
-
-def _largest_rows(values: Floats, mask: Bools, count: int) -> Ints:
-    """The rows of the ``count`` largest of ``values`` (N,), the largest first, of those in ``mask`` that are known."""
-    rows = np.flatnonzero(mask & np.isfinite(values))
-    known = values[rows]
-    if len(rows) > count:
-        high = known >= np.partition(known, -count)[-count]
-        rows, known = rows[high], known[high]
-    return rows[np.argsort(-known, kind="stable")[:count]]
-
-
-def _links(task: Task, division: Division) -> tuple[Link, ...]:
-    links = np.flatnonzero(division.links)
-    ways = made(task, division, links)
-    length = np.linalg.norm(ways.end.position - ways.begin.position, axis=1) / MM
-    lines = task.toolpath.line[division.source[links]]
-    return tuple(Link(int(line), float(mm)) for line, mm in zip(lines, length, strict=True))
-
-
-def _model(ready: Prepared) -> dict[str, object]:
-    """Effects, options, values with interval and source, as they were used."""
-    return {
-        ready.model.label(index): {
-            **term.effect.described(),
-            "parameters": {
-                name: {
-                    "value": value.value,
-                    "unit": next(p.unit for p in term.effect.parameters if p.name == name),
-                    "interval": value.interval,
-                    "level": value.level if value.level or value.interval is None else "unstated",
-                    "source": value.source,
-                }
-                for name, value in term.stated.items()
-            },
-        }
-        for index, term in enumerate(ready.model.terms)
-    }
-
-
-def _largest(values: Floats) -> float:
-    seen = values[np.isfinite(values)]
-    return float(seen.max()) if len(seen) else math.nan
+        raise Refusal(Finding("FIL007", "two outputs have the same name", outputs[0]))

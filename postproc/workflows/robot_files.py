@@ -9,11 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from postproc import __version__
+from postproc.effects.thermal_growth import ThermalGrowth
 from postproc.identification.fit import Fit
 from postproc.identification.unknowns import Unknown
+from postproc.measurements.readings import Readings
+from postproc.model import EffectInstance
 from postproc.robot.description import Robot
 from postproc.robot.provenance import GAP, Identification
-from postproc.robot.writing import WrittenEffect, WrittenParameter, robot_file
+from postproc.robot.write_robot_file import WrittenEffect, WrittenParameter, robot_file
 
 SAME_WIDTH, SAME_PLACE = 0.99, 0.01
 """Share of the deviation of a prior that is left, and of it by which its value moves, where readings say nothing."""
@@ -39,9 +42,7 @@ def new_robot_file(
     campaign, today = fitted.campaign, datetime.now(UTC).date().isoformat()
     files = [path.name for path in campaign.readings.files]
     source = f"{command}: {', '.join(files)} ({len(campaign)} readings, {campaign.poses} poses), {today}"
-    told = [
-        _told_by_readings(e.unknown, e.value, d) for e, d in zip(fitted.estimates, deviation, strict=True)
-    ]
+    told = [_observed_value(e.unknown, e.value, d) for e, d in zip(fitted.estimates, deviation, strict=True)]
     estimates = [estimate for estimate, by in zip(fitted.estimates, told, strict=True) if by]
     found = {estimate.unknown.key: estimate for estimate in estimates}
     written = []
@@ -56,10 +57,12 @@ def new_robot_file(
                 parameters.append(WrittenParameter.of(name, unit, stated))
             elif term.values[name] != parameter.null:
                 # the others hold for this value
-                told_by = f"{source}; not told by the readings, what stands beside it holds for this value"
+                told_by = (
+                    f"{source}; the readings do not show it, and the values beside it belong to this value"
+                )
                 parameters.append(WrittenParameter(name, term.values[name], unit, source=told_by))
         if parameters or term.line:
-            options = term.effect.described()
+            options = effect_options(term, campaign.readings)
             written.append(WrittenEffect(term.effect.name, options, tuple(parameters), term.line))
     size = np.where(deviation > 0, deviation, 1.0)
     correlation = fitted.covariance / np.outer(size, size)
@@ -81,7 +84,16 @@ def new_robot_file(
     return robot_file(robot, written, run, destination)
 
 
-def _told_by_readings(unknown: Unknown, value: float, deviation: float) -> bool:
+def effect_options(term: EffectInstance, readings: Readings) -> dict[str, object]:
+    """The options of an effect; a growth by temperature counts from that of the first reading."""
+    options = dict(term.effect.described())
+    by_temperature = isinstance(term.effect, ThermalGrowth) and options["variable"] == "temperature"
+    if by_temperature and readings.temperature is not None:
+        options["reference"] = round(float(readings.temperature[0]), 3)
+    return options
+
+
+def _observed_value(unknown: Unknown, value: float, deviation: float) -> bool:
     """Whether readings say more of an unknown than its prior did."""
     if unknown.prior is None:
         return True

@@ -1,44 +1,57 @@
-"""``compensate verify``: two written programs, simulated along their ways."""
+"""``compensate verify``: two written programs, run along their paths under the original's forces."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from postproc.findings import Finding, Refusal
-from postproc.publish import publish
+from postproc.base.arrays import Floats, Ints
+from postproc.base.findings import Finding, Refusal
+from postproc.base.units import DEG, MM
+from postproc.output.atomic_write import write_atomically
 from postproc.report.report import Spread, exit_code, in_order_of_place, json_bytes
-from postproc.report.verified import Place, Verified, Way
-from postproc.units import MM
-from postproc.verification import STEP, Different, Simulation, matched, simulate, worst_places
+from postproc.report.verified import PathComparison, Verified, WorstError
+from postproc.verification.comparison import STEP, Simulation, Simulator
+from postproc.verification.differences import Difference, PathManner, in_air, missing, on_cuts
+from postproc.verification.pairing import Different, pair_motions
 from postproc.workflows.preparation import Prepared, Request, Stage, prepare, silent
 
-CUT_ENDS = 0.05 * MM
-"""What the first and the last sample of a cut may be off: there the tool enters the material and leaves it."""
+WORST = 10
+"""Places that are listed."""
 
 
 def verify(request: Request, compensated: Path, step: float = STEP, stage: Stage = silent) -> Verified:
     """The path error of ``request.program`` and of ``compensated``, both under the original's forces.
 
-    ``step`` [m]: distance of the samples.  Raises Refusal, VER001 where the second is not made of the first.
+    ``step`` [m]: distance of the first samples.  Raises Refusal, VER001 where the second is not made of the first.
     """
     ready = prepare(request)
     stage("reading the compensated program")
     other = prepare(_without_force(request, compensated, ready))
     try:
-        match = matched(ready.task, other.task)
+        pairing = pair_motions(ready.task, other.task)
     except Different as error:
         raise Refusal(
             Finding("VER001", str(error), str(request.program), error.line,
-                    help="name the original first, and what was made of it second, with the same cell")
+                    help="name the original first and the compensated program second, with the same cell")
         ) from None  # fmt: skip
     stage("simulating the original")
-    before = simulate(ready.task, ready.task, np.arange(len(ready.task.toolpath)), step)
+    simulator = Simulator.of(ready.task, pairing)
+    cuts = pairing.stretches
+    before = simulator.run(ready.task, cuts.start, cuts.stop, step)
     stage("simulating the compensated program")
-    after = simulate(ready.task, other.task, match, step)
-    findings = [*ready.findings, *_findings(ready, other, compensated, after)]
+    after = simulator.run(other.task, pairing.start, pairing.stop, step)
+    manners = [PathManner.of(simulator, ready.task, before), PathManner.of(simulator, other.task, after)]
+    findings = [
+        *ready.findings,
+        *_marks(other, compensated),
+        *_figures(ready, ready, before, request.program, judged=False),
+        *_figures(ready, other, after, compensated, judged=True),
+        *_differences(simulator, ready, other, after, manners, request.program, compensated),
+    ]
     told = in_order_of_place(findings)
     done = Verified(
         str(request.program),
@@ -49,8 +62,9 @@ def verify(request: Request, compensated: Path, step: float = STEP, stage: Stage
         len(other.task.toolpath),
         step,
         ready.cell.tolerance,
-        _way(ready, before),
-        _way(other, after),
+        ready.cell.tolerance_angle,
+        _path_comparison(simulator, ready, before, manners[0]),
+        _path_comparison(simulator, other, after, manners[1]),
         told,
         exit_code(told, request.strict),
     )
@@ -58,7 +72,7 @@ def verify(request: Request, compensated: Path, step: float = STEP, stage: Stage
         inputs.refuse_outputs([] if request.json is None else [request.json])
         inputs.refuse_changed()
     if request.json is not None:
-        publish({request.json: json_bytes(done)})
+        write_atomically({request.json: json_bytes(done)})
     return done
 
 
@@ -71,52 +85,169 @@ def _cell_of(ready: Prepared) -> Path | None:
     return ready.cell.path if ready.cell.path.is_file() else None
 
 
-def _way(ready: Prepared, simulation: Simulation) -> Way:
-    cut, off = ~simulation.link, simulation.distance
-    ends = simulation.first | simulation.last
-    places = worst_places(simulation, ready.task.toolpath)
-    return Way(
-        len(off),
-        Spread.of(off[cut]),
-        Spread.of(off[ends]),
-        simulation.links,
-        simulation.link_length,
-        Spread.of(off[simulation.link]),
-        simulation.skipped,
-        tuple(Place(line, error / MM, axis, force) for line, error, axis, force in places),
+def _path_comparison(
+    simulator: Simulator, ready: Prepared, simulation: Simulation, manner: PathManner
+) -> PathComparison:
+    samples = simulation.samples
+    none = Spread(np.nan, np.nan, np.nan)
+    figures = simulation.converged and len(samples.motion) > 0
+    ends = samples.first | samples.last
+    tangent = simulator.path.tangent(samples.place.row[ends], samples.place.share[ends])
+    along = np.abs(np.sum(samples.place.error[ends] * tangent, axis=1))
+    off = np.append(samples.distance, simulation.point_error)
+    return PathComparison(
+        samples=len(off),
+        error=Spread(float(off.max()), samples.rms, samples.percentile(0.95)) if figures
+        else Spread.of(off) if simulation.converged else none,
+        ends=Spread.of(samples.distance[ends]) if figures else none,
+        along_at_ends=float(along.max(initial=0.0)) if figures else np.nan,
+        missed=simulation.missed,
+        turn=_largest_turn(simulation),
+        change=simulation.change,
+        change_turn=simulation.change_angle,
+        stops=len(manner.stops),
+        backwards=len(manner.backwards),
+        approaches=len(simulation.approaches),
+        approach_length=simulation.approach_length,
+        unknown_corners=simulation.unknown,
+        skipped=simulation.skipped,
+        converged=simulation.converged,
+        worst=_worst(simulator, ready, simulation),
+    )  # fmt: skip
+
+
+def _largest_turn(simulation: Simulation) -> float:
+    """[rad]; NaN where it is not known."""
+    if not simulation.converged or not len(simulation.samples.motion) + len(simulation.points):
+        return float("nan")
+    return float(np.append(simulation.samples.place.turn, simulation.point_turn).max())
+
+
+def _worst(simulator: Simulator, ready: Prepared, simulation: Simulation) -> tuple[WorstError, ...]:
+    """The motions with the largest errors."""
+    samples = simulation.samples
+    off = np.nan_to_num(samples.distance)
+    in_base = np.einsum(
+        "nji,nj->ni", simulator.original.base[samples.place.row].rotation, samples.place.error
     )
+    found: dict[int, WorstError] = {}
+    for sample in np.argsort(-off, kind="stable"):
+        if len(found) == WORST or not simulation.converged:
+            break
+        motion = int(samples.motion[sample])
+        if motion not in found:
+            axis = "XYZ"[int(np.argmax(np.abs(in_base[sample])))]
+            line, force = int(ready.task.toolpath.line[motion]), float(samples.place.force[sample])
+            found[motion] = WorstError(line, float(off[sample]) / MM, axis, force)
+    return tuple(found.values())
 
 
-def _findings(ready: Prepared, other: Prepared, compensated: Path, after: Simulation) -> list[Finding]:
-    findings, file, path = [], str(compensated), other.task.toolpath
-    if other.program.marker is None:
-        findings.append(Finding("VER002", "this program does not say that it is compensated", file))
-    off = np.where(after.link, -1.0, after.distance)
-    if len(off) and off.max() > ready.cell.tolerance:
-        worst = int(np.argmax(off))
-        findings.append(
-            Finding(
-                "VER003",
-                f"{off[worst] / MM:.4f} mm beside the path (worst here), tolerance {ready.cell.tolerance / MM:g} mm",
-                file,
-                int(path.line[after.motion[worst]]),
-            )
+def _marks(other: Prepared, compensated: Path) -> list[Finding]:
+    if other.program.marker is not None:
+        return []
+    return [Finding("VER002", "this program has no mark of a compensation", str(compensated))]
+
+
+def _figures(
+    ready: Prepared, run: Prepared, simulation: Simulation, file: Path, judged: bool
+) -> list[Finding]:
+    """What is to say of the figures of one program; ``judged``: its errors have to be within the tolerances."""
+    samples, line = simulation.samples, run.task.toolpath.line
+    found: list[Finding] = []
+    if not simulation.converged:
+        lost = np.concatenate(
+            [samples.motion[~samples.place.settled], simulation.points[np.isnan(simulation.point_error)]]
         )
-    ends = np.where(after.first | after.last, after.distance, -1.0)
-    if len(ends) and ends.max() > max(CUT_ENDS, ready.cell.tolerance):
-        worst = int(np.argmax(ends))
-        findings.append(
-            Finding("VER003", f"a cut begins or ends {ends[worst] / MM:.4f} mm beside its place", file,
-                    int(path.line[after.motion[worst]]))
-        )  # fmt: skip
-    if after.skipped:
-        findings.append(
-            Finding(
-                "VER004",
-                f"{after.skipped} motions under force can not be simulated (splines, unknown places)",
-                file,
-            )
+        message = "force and place on the path do not converge, or the robot cannot reach the place"
+        found.append(_first("VER007", f"{message}; no error is computed", file, line[np.unique(lost)]))
+    elif judged:
+        found += _above(ready, run, simulation, file)
+    if judged and simulation.skipped:
+        message = f"{simulation.skipped} motions under force cannot be simulated: their places are not known"
+        found.append(Finding("VER004", message, str(file)))
+    if judged and not len(samples.motion) + len(simulation.points):
+        found.append(Finding("VER004", "no motion under force is simulated: is --force missing?", str(file)))
+    return found
+
+
+def _above(ready: Prepared, run: Prepared, simulation: Simulation, file: Path) -> list[Finding]:
+    """Errors above the tolerances."""
+    samples, cell, found = simulation.samples, ready.cell, []
+    line = run.task.toolpath.line
+    motions = np.append(samples.motion, simulation.points)
+    off = np.append(samples.distance, simulation.point_error)
+    turns = np.append(samples.place.turn, simulation.point_turn)
+    if len(off) and off.max() > cell.tolerance:
+        far = f"the tool is {off.max() / MM:.4f} mm off the path", f"tolerance {cell.tolerance / MM:g} mm"
+        found.append(_worst_of(far, off, cell.tolerance, motions, line, file))
+    elif simulation.missed > cell.tolerance:
+        message = f"a place of the path is {simulation.missed / MM:.4f} mm off the path of the tool"
+        found.append(Finding("VER003", f"{message}, tolerance {cell.tolerance / MM:g} mm", str(file)))
+    if len(turns) and turns.max() > cell.tolerance_angle:
+        far = (
+            f"the tool is {turns.max() / DEG:.4f} deg off its orientation",
+            f"tolerance {cell.tolerance_angle / DEG:g} deg",
         )
-    if not len(off):
-        findings.append(Finding("VER004", "no motion under force was simulated: is --force missing?", file))
-    return findings
+        found.append(_worst_of(far, turns, cell.tolerance_angle, motions, line, file))
+    return found
+
+
+def _worst_of(
+    words: tuple[str, str], off: Floats, tolerance: float, motions: Ints, line: Ints, file: Path
+) -> Finding:
+    above = len(np.unique(motions[off > tolerance]))
+    count = f"worst here; {above} motions exceed it" if above > 1 else "here only"
+    message = f"{words[0]} ({count}), {words[1]}"
+    return Finding("VER003", message, str(file), int(line[motions[int(np.argmax(off))]]))
+
+
+def _differences(
+    simulator: Simulator,
+    ready: Prepared,
+    other: Prepared,
+    after: Simulation,
+    manners: Sequence[PathManner],
+    original: Path,
+    compensated: Path,
+) -> list[Finding]:
+    """What differs beside places; one finding for all motions of which the same is to say."""
+    differences = [*on_cuts(simulator, other.task, after), *in_air(simulator, other.task, after)]
+    samples = after.samples
+    # of a program that is beside its path none ends where it should
+    if len(samples.motion) and samples.percentile(0.95) <= ready.cell.tolerance:
+        differences += missing(simulator, after.samples)
+    lines = {True: other.task.toolpath.line, False: ready.task.toolpath.line}
+    files = {True: compensated, False: original}
+    found = _grouped(differences, lambda one: (one.what, one.run), lines, files)
+    for what, name in (
+        ("the motion leads against the feed", "backwards"),
+        ("the motion has no length", "idle"),
+    ):
+        before, now = (getattr(manner, name) for manner in manners)
+        if len(now) > len(before):
+            more = f"; the original has {len(before)} such motions" if len(before) else ""
+            found.append(_first("VER006", what + more, compensated, lines[True][now]))
+    return found
+
+
+def _grouped(
+    differences: Sequence[Difference],
+    key: Callable[[Difference], tuple[str, bool]],
+    lines: dict[bool, Ints],
+    files: dict[bool, Path],
+) -> list[Finding]:
+    groups: dict[tuple[str, bool], list[int]] = {}
+    for one in differences:
+        groups.setdefault(key(one), []).append(int(lines[one.run][one.row]))
+    return [
+        _first(
+            "VER006" if what.startswith("the motion stops") else "VER005", what, files[run], np.unique(rows)
+        )
+        for (what, run), rows in groups.items()
+    ]
+
+
+def _first(code: str, message: str, file: Path, lines: Ints) -> Finding:
+    """A finding at the first of these lines, which tells how many there are."""
+    more = f" ({len(lines)} motions, to line {lines.max()})" if len(lines) > 1 else ""
+    return Finding(code, message + more, str(file), int(lines.min()) if len(lines) else 0)

@@ -28,7 +28,7 @@ SIGMA = 3e-5
 def arm() -> StiffnessModel:
     model = StiffnessModel.from_robot(kr270())
     of = {name: index for index, term in enumerate(model.terms) for name in term.values}
-    return model.changed(
+    return model.with_values(
         {(of[name], name): model.terms[of[name]].values[name] * f for name, f in FACTORS.items()}
     )
 

@@ -16,10 +16,10 @@ sys.path.insert(0, str(HERE.parent.parent / "tests"))
 
 from plant import GRAVITY, Plant, kr270  # noqa: E402
 
-from postproc.geometry import Poses  # noqa: E402
+from postproc.base.geometry import Poses  # noqa: E402
+from postproc.base.units import DEG  # noqa: E402
 from postproc.measurements import measurements_csv, planned  # noqa: E402
 from postproc.model import StiffnessModel  # noqa: E402
-from postproc.units import DEG  # noqa: E402
 
 POSES, WEIGHT, SIGMA = 40, 95.0, 2e-5
 TOOL = Poses(np.eye(3), np.array([0.0, 0.5, 0.3]))

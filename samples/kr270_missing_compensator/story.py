@@ -18,7 +18,9 @@ from plant import Plant, kr270  # noqa: E402
 
 from postproc.cli.main import run  # noqa: E402
 from postproc.model import StiffnessModel  # noqa: E402
-from postproc.verification import matched  # noqa: E402
+from postproc.verification.comparison import Simulator  # noqa: E402
+from postproc.verification.differences import ending  # noqa: E402
+from postproc.verification.pairing import pair_motions  # noqa: E402
 from postproc.workflows.preparation import Request, prepare  # noqa: E402
 
 PANEL = HERE.parent / "kr270_panel"
@@ -37,7 +39,9 @@ def cut(program: Path, plant: Plant) -> np.ndarray:
     """[mm] how far the tool is from the original path at the end of cutting motions, forces against none."""
     wanted = prepare(Request(PANEL / "panel.src", force="", cell=HERE / "cell.yaml")).task
     sent = prepare(Request(program, force="", cell=HERE / "cell.yaml")).task
-    ends = matched(wanted, sent)  # motions may have been inserted
+    pairing = pair_motions(wanted, sent)  # motions may have been inserted
+    simulator = Simulator.of(wanted, pairing)
+    ends = ending(simulator, simulator.run(sent, pairing.start, pairing.stop).samples)
     rows = np.flatnonzero(wanted.carries)[::EVERY]
     away = []
     for row in rows:

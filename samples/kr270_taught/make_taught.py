@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.geometry import Poses, abc_from_rotation
+from postproc.base.geometry import Poses, abc_from_rotation
 from postproc.robot.chain import Chain
 from postproc.robot.description import find_robot, load_robot
 from postproc.robot.inverse import inverse, status_of, turn_of

@@ -13,8 +13,8 @@ import pytest
 from motions import milling_angles
 from plant import kr270, random_wrenches
 
+from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.cli.main import run
-from postproc.geometry import Poses, rotation_from_vector
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit
 from postproc.identification.unknowns import asked_for
@@ -72,7 +72,7 @@ def readings():
     campaign = Campaign(empty)
     place = rotation_from_vector([0.1, -0.2, 2.0]), np.array([3.0, 1.0, 0.5])
     given = replace(campaign.start(), frames=Poses(place[0][None], place[1][None]))
-    value, _ = campaign.expected(campaign.seen(asked().model.changed(more)), given)
+    value, _ = campaign.expected(campaign.predicted(asked().model.with_values(more)), given)
     return replace(empty, value=value + SIGMA * rng.normal(size=value.shape))
 
 

@@ -24,7 +24,7 @@ def heavy():
 @cache
 def springs():
     """Joints that give way, and no compensator."""
-    return heavy().without(["gravity_compensator"])
+    return heavy().without_effects(["gravity_compensator"])
 
 
 @cache

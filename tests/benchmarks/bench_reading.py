@@ -1,6 +1,6 @@
 """What reading a motion costs: the text, its forces, all that predicts it, and the output read again."""
 
-from postproc.document import Document
+from postproc.base.document import Document
 
 
 def read(ready, contents):

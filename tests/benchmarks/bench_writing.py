@@ -1,12 +1,12 @@
 """What writing a motion costs: the plan, its edits, the bytes, and the whole with reading back."""
 
-from postproc.document import Edits, apply, undone
-from postproc.writing import written_as
+from postproc.base.document import Edits, apply, undone
+from postproc.output.write import writing_settings
 
 
 def edits_of(work):
     ready, plan = work["prepare"].result, work["planned"].result
-    return ready.dialect.moved(ready.program, plan, written_as(ready.cell, "inline"))
+    return ready.dialect.moved(ready.program, plan, writing_settings(ready.cell, "inline"))
 
 
 def test_plan(work, measured):

@@ -49,6 +49,12 @@ def measured(benchmark, request):
     return call
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config):
+    """One process, with nothing beside it."""
+    config.option.numprocesses = 0
+
+
 def pytest_collection_modifyitems(items):
     for item in items:
         if Path(__file__).parent in item.path.parents:

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from postproc.base.geometry import Poses
 from postproc.compensation.mirror import ANGLE_TOLERANCE, MAX_ITERATIONS, POSITION_TOLERANCE, REST
-from postproc.geometry import Poses
 from postproc.model import MAX_STEPS, StiffnessModel
 from postproc.robot.chain import Chain
 

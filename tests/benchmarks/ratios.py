@@ -34,9 +34,9 @@ from statistics import median
 import numpy as np
 import pinocchio as pin
 
-from postproc.blocks import large_apart
-from postproc.compensation.mirror import ANGLE_TOLERANCE, POSITION_TOLERANCE, beginning, mirror
-from postproc.geometry import Poses, rotation_from_vector
+from postproc.base.batches import use_mmap_for_large_arrays
+from postproc.base.geometry import Poses, rotation_from_vector
+from postproc.compensation.mirror import ANGLE_TOLERANCE, POSITION_TOLERANCE, initial_guess, mirror
 from postproc.model import NOTHING, StiffnessModel
 from postproc.robot.chain import Chain
 from postproc.robot.description import find_robot, load_robot
@@ -107,8 +107,8 @@ def mirror_loop(states: States) -> None:
 
     def as_run() -> None:
         nonlocal run
-        begin = beginning(model, wanted, wanted, *given, FARTHEST)
-        run = mirror(model, wanted, wanted, *given, begin=begin)
+        begin = initial_guess(model, wanted, wanted, *given, FARTHEST)
+        run = mirror(model, wanted, wanted, *given, guess=begin)
 
     def plain() -> None:
         nonlocal found
@@ -132,7 +132,7 @@ def mirror_loop(states: States) -> None:
 
 
 def linear_deflection(states: States, python: str, folder: Path) -> None:
-    model = states.model.without(["gravity_compensator"])
+    model = states.model.without_effects(["gravity_compensator"])
     chain = Chain(model.robot.joints, model.robot.flange)
     placed = [chain.model.jointPlacements[i + 1] for i in range(chain.model.nq)]
     placed.append(chain.model.frames[chain.flange_id].placement * pin.SE3(TOOL.rotation, TOOL.position))
@@ -212,7 +212,7 @@ def main() -> None:
     parser.add_argument("--toolbox", metavar="PYTHON", help="one that has roboticstoolbox-python")
     parser.add_argument("--sizes", default="100000,1000000", help="motions of whole runs [%(default)s]")
     asked = parser.parse_args()
-    large_apart()  # as the command does
+    use_mmap_for_large_arrays()  # as the command does
     print(f"{heading()}\n{HEADINGS}")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

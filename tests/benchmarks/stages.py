@@ -42,32 +42,32 @@ ORDER = (
     "else",
 )
 
-FUNCTIONS = {("writing.py", "planned"): "write", ("document.py", "apply"): "write"}
+FUNCTIONS = {("output/write.py", "plan_motions"): "write", ("base/document.py", "apply"): "write"}
 """The stage of functions whose file has another one, or none."""
 
 FILES = {
-    "dialects/": "read",
-    "document.py": "read",
-    "files.py": "read",
-    "inputs.py": "read",
-    "cell.py": "frames",
+    "languages/": "read",
+    "base/document.py": "read",
+    "base/read_files.py": "read",
+    "base/input_files.py": "read",
+    "cell/": "frames",
     "workflows/preparation.py": "frames",
-    "forces/": "forces",
+    "process/": "forces",
     "robot/inverse.py": "inverse kinematics",
     "robot/newton.py": "inverse kinematics",
-    "robot/track.py": "inverse kinematics",
+    "robot/axis_track.py": "inverse kinematics",
     "robot/chain.py": "equilibrium",
     "effects/": "equilibrium",
-    "model.py": "equilibrium",
-    "compensation/between.py": "between",
-    "compensation/division.py": "between",
-    "compensation/ways.py": "between",
-    "compensation/limits.py": "between",
+    "model/": "equilibrium",
+    "compensation/path_error.py": "between",
+    "compensation/subdivision.py": "between",
+    "compensation/desired_path.py": "between",
+    "compensation/axis_limits.py": "between",
     "compensation/": "mirror",
-    "writing.py": "read back",
+    "output/write.py": "read back",
     "report/": "reports",
     "workflows/program.py": "reports",
-    "publish.py": "files",
+    "output/atomic_write.py": "files",
 }
 """The stage of a file or folder of the package; the first that fits."""
 
@@ -105,7 +105,7 @@ class Looks:
             frame = frame.f_back
         if stage == "read" and any(name == "moved" for _, name in stack):
             stage = "write"
-        elif stage == "read" and any(file == "writing.py" for file, _ in stack):
+        elif stage == "read" and any(file == "output/write.py" for file, _ in stack):
             stage = "read back"
         return stage or "else", function or "else"
 

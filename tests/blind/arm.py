@@ -8,8 +8,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from plant import _PARTS as PARTS
-from plant import LINKS, Hardware, Plant, Spring
+from plant import LINKS, PARTS, Hardware, Plant, Spring
 
 from postproc.effects import EFFECTS
 from postproc.model import StiffnessModel

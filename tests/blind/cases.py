@@ -157,7 +157,7 @@ def made(case: Case) -> Run:
         return _compensator(case, rng)
     best: Run | None = None
     for _ in range(6):
-        run = _made(case, rng)
+        run = drawn_from(case, rng)
         if best is None or min(run.snr, default=0.0) > min(best.snr, default=0.0):
             best = run
         if run.reached:
@@ -166,7 +166,7 @@ def made(case: Case) -> Run:
     return best
 
 
-def _made(case: Case, rng: np.random.Generator) -> Run:
+def drawn_from(case: Case, rng: np.random.Generator) -> Run:
     row, names = case.row, case.effects
     if row.startswith("null"):
         deflection = case.number % 2 == 0

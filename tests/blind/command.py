@@ -15,7 +15,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from postproc.measurements.writing import measurements_csv
+from postproc.measurements.write_csv import measurements_csv
 from postproc.model import StiffnessModel
 from postproc.robot.description import load_robot
 
@@ -126,7 +126,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     wanted = [case for row in given.rows.split(",") for case in cases(row, given.runs, given.seed)]
     # all rows grow alike, whenever it is stopped
     wanted = sorted((c for c in wanted if given.only in ("", *c.effects)), key=lambda c: c.number)
-    records = _kept(given.out, {case.key for case in wanted})
+    records = kept_records(given.out, {case.key for case in wanted})
     known = {record["key"] for record in records}
     left = [case for case in wanted if case.key not in known]
     begun = time.monotonic()
@@ -161,7 +161,7 @@ def _run(left: Sequence[Case], workers: int):
             yield done.result()
 
 
-def _kept(path: Path | None, keys: set[str]) -> list[dict]:
+def kept_records(path: Path | None, keys: set[str]) -> list[dict]:
     """What an earlier call came to; a last line that was cut off does not count."""
     records: dict[str, dict] = {}
     if path is not None and path.exists():

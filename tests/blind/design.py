@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from plant import GRAVITY
 
+from postproc.base.geometry import Poses, rotation_from_vector
+from postproc.base.units import DEG
 from postproc.effects import Conditions
-from postproc.geometry import Poses, rotation_from_vector
 from postproc.model import StiffnessModel
-from postproc.units import DEG
 
 from .arm import COMPLIANCE, LIMITS
 

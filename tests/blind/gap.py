@@ -32,12 +32,12 @@ def closed(run: Run, found: StiffnessModel) -> float:
     seen = Campaign(measured.readings(design, value, run.sigma))
 
     def left(model: StiffnessModel) -> float:
-        at = seen.seen(model)
+        at = seen.predicted(model)
         given = registered(seen, at, np.ones(len(seen), bool))
         return float(np.sqrt(np.mean(seen.residual(at, given) ** 2)))
 
     filed = model_of(run.robot)
-    before = left(fit(Campaign(run.readings), filed, search.own_unknowns(filed)).model)
+    before = left(fit(Campaign(run.readings), filed, search.model_unknowns(filed)).model)
     return (before - left(found)) / (before - left(knowing(run)))
 
 
@@ -56,7 +56,7 @@ def knowing(run: Run) -> StiffnessModel:
 def at_truth(run: Run, model: StiffnessModel) -> StiffnessModel:
     """The model with the true values of all that it has."""
     names = {f"{t.effect.name}.{p}": (i, p) for i, t in enumerate(model.terms) for p in t.values}
-    return model.changed({names[name]: value for name, value in run.true().items() if name in names})
+    return model.with_values({names[name]: value for name, value in run.true().items() if name in names})
 
 
 def _elsewhere(run: Run, rng: np.random.Generator):

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from plant import _PARTS as PARTS
-from plant import Spring
+from plant import PARTS, Spring
 
 from postproc.effects import EFFECTS, Effect
 

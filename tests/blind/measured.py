@@ -8,11 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.geometry import Poses
+from postproc.base.geometry import Poses
+from postproc.base.units import DEG, MM
 from postproc.measurements import Readings
 from postproc.measurements.readings import alike, planned
 from postproc.model import StiffnessModel
-from postproc.units import DEG, MM
 
 from .arm import Scene
 from .design import Design
@@ -47,9 +47,9 @@ def observed(scene: Scene, design: Design, moved: np.ndarray | None = None) -> n
 
 def _give(plant) -> np.ndarray:
     """(3,) [m] by which the tip's slides have moved it, robot base."""
-    return plant.data.xpos[plant._tip] - (
-        plant.data.xpos[plant._last]
-        + plant.data.xmat[plant._last].reshape(3, 3) @ plant.model.body_pos[plant._tip]
+    return plant.data.xpos[plant.tip_body] - (
+        plant.data.xpos[plant.last_body]
+        + plant.data.xmat[plant.last_body].reshape(3, 3) @ plant.model.body_pos[plant.tip_body]
     )
 
 

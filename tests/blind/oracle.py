@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from postproc.base.geometry import Poses
 from postproc.effects import EFFECTS, Effect
-from postproc.geometry import Poses
 from postproc.identification.campaign import Campaign, Nuisances
-from postproc.identification.columns import columns
+from postproc.identification.sensitivities import columns
 from postproc.identification.unknowns import Unknown, unknowns_of, with_mechanism
 from postproc.measurements import Readings
 from postproc.model import StiffnessModel
@@ -53,7 +53,7 @@ class Oracle:
         places = design.targets @ into.rotation.T + into.position if len(design.targets) else start.places
         frames = Poses(frame.rotation[None], frame.position[None])
         self.given = Nuisances(frames, places, start.turns)
-        seen = self.campaign.seen(model)
+        seen = self.campaign.predicted(model)
         nuisance = self._flat(self.campaign.nuisance_columns(seen, self.given))
         own = self._flat(self._columns(model, own_unknowns(model)))
         limits = np.eye(own.shape[1]) / PLAUSIBLE
@@ -112,14 +112,16 @@ class Oracle:
         return values.reshape(3 * len(values), values.shape[2]) / self.sigma
 
     def _columns(self, model: StiffnessModel, unknowns: list[Unknown]) -> np.ndarray:
-        return np.nan_to_num(columns(self.campaign, model, unknowns, self.campaign.seen(model), self.given))
+        return np.nan_to_num(
+            columns(self.campaign, model, unknowns, self.campaign.predicted(model), self.given)
+        )
 
     def _of(self, hidden: Hidden, size: float) -> np.ndarray:
         """(R, 3, p) columns of what is hidden, where it is."""
         model = joined(self.model, hidden.made)
         term = term_of(model, hidden.made)
         values = hidden.at(size)
-        model = model.changed({(term, name): value for name, value in values.items()})
+        model = model.with_values({(term, name): value for name, value in values.items()})
         return self._columns(model, unknowns_in(hidden, model))
 
     def _library(self):
@@ -135,13 +137,13 @@ class Oracle:
             for effect in kind.variants(self.model.robot.joints):
                 model = joined(self.model, effect)
                 term = term_of(model, effect)
-                unknowns = [u for u in unknowns_of(model, term) if u.stated is None and not u.held]
+                unknowns = [u for u in unknowns_of(model, term) if u.stated is None and not u.fixed]
                 if not unknowns:
                     continue
                 # what moves nothing at its null is looked at in its usual size
                 moves = self._columns(model, unknowns)
                 if not np.abs(moves).max() > 0:
-                    model = model.changed({u.key: u.parameter.scale for u in unknowns})
+                    model = model.with_values({u.key: u.parameter.scale for u in unknowns})
                     moves = self._columns(model, unknowns)
                 for joint in dict.fromkeys(u.parameter.joint for u in unknowns):
                     own = [i for i, u in enumerate(unknowns) if u.parameter.joint == joint]
@@ -171,7 +173,9 @@ def joined(model: StiffnessModel, effect: Effect) -> StiffnessModel:
     if any(term.effect.name == effect.name for term in model.terms):
         return model
     return (
-        with_mechanism(model, type(effect)) if effect.name == "gravity_compensator" else model.added(effect)
+        with_mechanism(model, type(effect))
+        if effect.name == "gravity_compensator"
+        else model.with_effect(effect)
     )
 
 
@@ -189,7 +193,7 @@ def unknowns_in(hidden: Hidden, model: StiffnessModel) -> list[Unknown]:
 def own_unknowns(model: StiffnessModel) -> list[Unknown]:
     """What the robot file states."""
     every = [u for term in range(len(model.terms)) for u in unknowns_of(model, term)]
-    return [u for u in every if u.stated is not None and not u.held]
+    return [u for u in every if u.stated is not None and not u.fixed]
 
 
 def _basis(part: np.ndarray) -> np.ndarray:

@@ -54,13 +54,13 @@ class Beyond(Plant):
         self.laws, self.hose = laws, hose
         self._link4 = self.model.body("link4").id
 
-    def _residual(self, coordinates, free, held, wrench):
-        force = super()._residual(coordinates, free, held, wrench)
+    def residual(self, coordinates, free, held, wrench):
+        force = super().residual(coordinates, free, held, wrench)
         for law in self.laws:
-            row = self._row[law.name]
-            stiffness = 1 / self._gives[row]
+            row = self.row_of[law.name]
+            stiffness = 1 / self.compliances[row]
             torque = force[row] + stiffness * (coordinates - free)[row]
-            force[row] += stiffness * law.shift(torque, coordinates[self._motors], self._came)
+            force[row] += stiffness * law.shift(torque, coordinates[self.motor_rows], self.directions)
         if self.hose is not None:
             force += self._pull()
         return force

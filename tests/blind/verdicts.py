@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.diagnosis.search import own_unknowns
+from postproc.diagnosis.search import model_unknowns
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit
 from postproc.identification.unknowns import unknowns_of
@@ -73,7 +73,7 @@ def outcome_of(run: Run, answer: dict, rivals: list[list[Rival]]) -> str:
     names = names.union(*(one for one in sets if len(one) == 1))
     sets = [one for one in sets if len(one) > 1]
     outside = any(h.outside for h, _ in run.hidden)
-    return _outcome(answer["verdict"], truth_of(run), names, sets, outside, rivals)
+    return outcome_of_words(answer["verdict"], truth_of(run), names, sets, outside, rivals)
 
 
 def named(effect: str, joint: str) -> tuple[str, str]:
@@ -91,7 +91,7 @@ def nearest(run: Run, k: int, rest: np.ndarray) -> list[Rival]:
     return [rival for rival in found if named(rival.effect, rival.joint) != same]
 
 
-def _outcome(
+def outcome_of_words(
     word: str, truth: set, names: set, sets: list[set], outside: bool, rivals: list[list[Rival]]
 ) -> str:
     apart = all(of and of[0].margin >= MARGIN for of in rivals if of)
@@ -138,7 +138,7 @@ def covered(run: Run, found: StiffnessModel) -> dict[str, list[bool | None]]:
         for name, value in of.stated.items()
         if value.source.startswith("diagnose:") and value.interval
     }
-    own = {u.key: u for u in own_unknowns(model_of(run.robot))}
+    own = {u.key: u for u in model_unknowns(model_of(run.robot))}
     new = {u.key: u for term in range(len(found.terms)) for u in unknowns_of(found, term)}
     exact = replace(run.readings, value=measured.observed(run.scene, run.design))
     fitted = fit(Campaign(exact), found, [own.get(key, replace(new[key], prior=None)) for key in told])

@@ -20,7 +20,7 @@ from postproc.cli.main import run as compensate
 ROOMS = "blind-"
 """How the folders of all runs begin, by ``tempfile``."""
 
-_allowed = ""
+allowed_folder = ""
 
 
 def guard(event: str, arguments: tuple) -> None:
@@ -31,15 +31,15 @@ def guard(event: str, arguments: tuple) -> None:
         and isinstance(arguments[0], str | bytes | os.PathLike)
     ):
         path = os.path.abspath(os.fsdecode(arguments[0]))
-        inside = path == _allowed or path.startswith(_allowed + os.sep)
+        inside = path == allowed_folder or path.startswith(allowed_folder + os.sep)
         if f"{os.sep}{ROOMS}" in path and not inside:
             raise PermissionError(f"{path} is none of the diagnosis's business")
 
 
 def ran(folder: str, words: list[str]) -> dict:
     """What one command line came to, in ``folder``."""
-    global _allowed
-    _allowed = os.path.abspath(folder)
+    global allowed_folder
+    allowed_folder = os.path.abspath(folder)
     os.chdir(folder)
     begun, told = time.perf_counter(), StringIO()
     try:

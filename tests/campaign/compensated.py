@@ -9,8 +9,8 @@ import numpy as np
 from motions import milling_angles
 from plant import Plant
 
+from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.compensation.mirror import mirror
-from postproc.geometry import Poses, rotation_from_vector
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit
 from postproc.identification.unknowns import asked_for
@@ -81,7 +81,7 @@ def begun_with(trial: Trial, seed: int, campaign: int) -> StiffnessModel:
 def joints_only(trial: Trial, seed: int, campaign: int) -> StiffnessModel:
     """What a campaign finds with a model that has no compensator."""
     readings, raw = noisy(trial, seed, campaign)
-    bare = rig.model_of(raw).without(["gravity_compensator"])
+    bare = rig.model_of(raw).without_effects(["gravity_compensator"])
     asked = asked_for(bare, ["joint_compliance"])
     return fit(Campaign(readings), asked.model, asked.unknowns).model
 

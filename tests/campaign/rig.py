@@ -10,14 +10,14 @@ from functools import cache
 import numpy as np
 from plant import GRAVITY, Plant, kr270
 
-from postproc.experiments.offer import Offer, Setups, drawn, readings_of, usable_limits
-from postproc.experiments.precision import Task, designs
-from postproc.geometry import Poses
+from postproc.base.geometry import Poses
+from postproc.base.units import DEG
+from postproc.experiments.candidate_setups import CandidateSetups, Setups, drawn, readings_of, usable_limits
+from postproc.experiments.precision import DesignProblem, designs
 from postproc.identification.unknowns import asked_for
 from postproc.measurements import Readings
 from postproc.model import StiffnessModel
 from postproc.robot.description import COVERAGE, robot_of
-from postproc.units import DEG
 
 TABLE_1 = {"c2": 1.3, "c3": 2.0, "c4": 4.0, "c5": 5.0, "c6": 4.0, "K_c": 22.0, "s0": 6.0}
 """Half widths of Table 1's intervals [% of the value], of an unstated level; k_c is 1/K_c, and an interval of one is
@@ -95,10 +95,10 @@ def model_of(raw: bytes) -> StiffnessModel:
     return StiffnessModel.from_robot(robot_of(raw, kr270().path))
 
 
-def offer(loads: Sequence[float] = WEIGHT) -> Offer:
+def offer(loads: Sequence[float] = WEIGHT) -> CandidateSetups:
     """``loads`` [kg] are hung at every configuration, one after the other."""
     anywhere = [-np.inf, np.inf]
-    return Offer(
+    return CandidateSetups(
         tool=LEVER,
         targets=("M1", "M2", "M3"),
         places=REFLECTORS,
@@ -121,7 +121,7 @@ def planned(model: StiffnessModel, count: int, loads: Sequence[float] = WEIGHT, 
     counts = np.array([unknown.parameter.name in TABLE_1 for unknown in asked.unknowns])
     shares = np.array([TABLE_1.get(unknown.parameter.name, 100.0) / 100 for unknown in asked.unknowns])
     wanted = shares * np.array([unknown.value for unknown in asked.unknowns])
-    task = Task(asked.model, asked.unknowns, offer(loads), wanted, counts)
+    task = DesignProblem(asked.model, asked.unknowns, offer(loads), wanted, counts)
     return designs(task, count, seed=seed, candidates=CANDIDATES).chosen[count].setups
 
 

@@ -18,11 +18,11 @@ import numpy as np
 from fuzz.examine import Broken, examined
 from fuzz.hostile import hostile
 from fuzz.mutations import MUTATIONS, mutated
-from postproc.dialects import DIALECTS, detect
-from postproc.dialects.dialect import Dialect, Settings
-from postproc.document import Document
-from postproc.findings import Refusal
-from postproc.units import DEG
+from postproc.base.document import Document
+from postproc.base.findings import Refusal
+from postproc.base.units import DEG
+from postproc.languages import DIALECTS, detect
+from postproc.languages.dialect import Dialect, ReadingSettings
 
 LIMIT_S = 30.0
 """Seconds after which a run hangs."""
@@ -31,7 +31,7 @@ BASE_S, PER_MB_S = 1.0, 2.0
 HURT_S = 2.0
 """Seconds for a megabyte that is made to hurt."""
 SLOWEST = 5
-SETTINGS = Settings(orientation=np.array([0.0, 0.0, 180.0 * DEG]))
+SETTINGS = ReadingSettings(orientation=np.array([0.0, 0.0, 180.0 * DEG]))
 
 
 @dataclass(frozen=True)

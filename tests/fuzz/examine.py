@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.arrays import Bools, Floats
-from postproc.dialects.dialect import PLAIN, Dialect, Program, Settings, Writing
-from postproc.document import Document, apply, undone
-from postproc.geometry import rotation_from_vector, vector_from_rotation
+from postproc.base.arrays import Bools, Floats
+from postproc.base.document import Document, apply, undone
+from postproc.base.geometry import rotation_from_vector, vector_from_rotation
+from postproc.base.units import DEG, MM
+from postproc.languages.dialect import PLAIN, Dialect, Program, ReadingSettings, WritingSettings
 from postproc.toolpath import Kind, Plan, Role, Toolpath
-from postproc.units import DEG, MM
 
-WRITING = Writing(mm=3, deg=3)
+WRITING = WritingSettings(mm=3, deg=3)
 HALF_MM = 0.50001e-3
 """Half of a written step [mm], and what doubles are off by."""
 FARTHEST = 1e4
@@ -41,7 +41,7 @@ def examined(
     dialect: Dialect,
     documents: tuple[Document, ...],
     random: np.random.Generator,
-    settings: Settings = PLAIN,
+    settings: ReadingSettings = PLAIN,
 ) -> Seen:
     """Reads, writes unchanged, moves at random and reads back.  Raises Broken, or what the code raises."""
     begin = time.process_time()
@@ -53,10 +53,10 @@ def examined(
             raise Broken(f"a finding in line {finding.line} of {len(documents[0].line_starts)}")
     for _ in path.dump():
         pass
-    same = dialect.moved(program, Plan.of(path), WRITING)
-    if len(same.edits) or same.held:
+    same = dialect.edit_targets(program, Plan.of(path), WRITING)
+    if len(same.edits) or same.unwritten:
         raise Broken(
-            f"the plan that leaves all as it is gives {len(same.edits)} edits, {len(same.held)} held"
+            f"the plan that leaves all as it is gives {len(same.edits)} edits, {len(same.unwritten)} held"
         )
     moved = 0
     if len(path):
@@ -64,7 +64,7 @@ def examined(
     return Seen(seconds, len(path), moved)
 
 
-def _moved(dialect: Dialect, program: Program, random: np.random.Generator, settings: Settings) -> int:
+def _moved(dialect: Dialect, program: Program, random: np.random.Generator, settings: ReadingSettings) -> int:
     path = program.toolpath
     n = len(path)
     share = random.choice([0.1, 0.6, 1.0])
@@ -72,15 +72,17 @@ def _moved(dialect: Dialect, program: Program, random: np.random.Generator, sett
     shift = random.normal(0, 0.2 * MM, (n, 3))
     turn = random.normal(0, 1e-3, (n, 3)) * (random.random() < 0.7)
     divided = np.flatnonzero(dividable(path) & (random.random(n) < random.choice([0.0, 0.0, 0.2])))
-    writing = replace(WRITING, own_points=str(random.choice(["inline", "inline", "dat", "refuse"])))
+    writing = replace(
+        WRITING, shared_points=str(random.choice(["copy-inline", "copy-inline", "copy-dat", "keep"]))
+    )
     for _ in range(20):
         plan = planned(path, free, shift, turn, divided)
-        found = dialect.moved(program, plan, writing)
-        if not found.held:
+        found = dialect.edit_targets(program, plan, writing)
+        if not found.unwritten:
             break
         if len(found.edits):
             raise Broken("edits besides rows that are held")
-        rows = list(found.held)
+        rows = list(found.unwritten)
         if not free[rows].any() and not np.isin(divided, rows).any() and not _near(rows, free, n):
             raise Broken(f"rows {rows[:5]} are held that do not move")
         free[rows] = False
@@ -106,8 +108,8 @@ def _near(rows: list[int], free: Bools, n: int) -> bool:
 
 def movable(path: Toolpath) -> Bools:
     """(N,) the motions that may be planned elsewhere."""
-    free = path.known & (path.kind != Kind.AXIS) & (path.anchor < 0)
-    free[[*path.refused, *path.pinned]] = False
+    free = path.known & (path.kind != Kind.AXIS) & (path.inherits_from_row < 0)
+    free[[*path.refused, *path.locked]] = False
     # Beyond it doubles do not hold the digits that are written.
     with np.errstate(invalid="ignore"):
         return (
@@ -120,8 +122,8 @@ def movable(path: Toolpath) -> Bools:
 def dividable(path: Toolpath) -> Bools:
     """(N,) the straight motions, and plane arcs of no more than a turn and a half, that another one may be inserted
     before."""
-    free = path.known & ((path.kind == Kind.LIN) | (path.kind == Kind.CIRC)) & (path.anchor < 0)
-    free[[*path.refused, *path.whole]] = False
+    free = path.known & ((path.kind == Kind.LIN) | (path.kind == Kind.CIRC)) & (path.inherits_from_row < 0)
+    free[[*path.refused, *path.no_insert_before]] = False
     arcs = np.flatnonzero(path.kind == Kind.CIRC)
     before = np.maximum(arcs - 1, 0)
     advance = np.sum((path.position[arcs] - path.position[before]) * path.normal[arcs], axis=1)
@@ -135,7 +137,7 @@ def planned(path: Toolpath, free: Bools, shift: Floats, turn: Floats, divided: n
     piece or a link stands before each of ``divided``; of an arc it is its first half."""
     n = len(path)
     shift = _joined(path, np.where(free[:, None], shift, 0.0))
-    turns = free & path.oriented & np.isnan(path.free_axis[:, 0])
+    turns = free & path.orientation_programmed & np.isnan(path.redundant_axis[:, 0])
     turned = rotation_from_vector(np.where(turns[:, None], turn, 0.0))
     rotation = np.where(turns[:, None, None], turned @ path.rotation, path.rotation)
     moves = (shift != 0).any(axis=1)[:, None]
@@ -145,7 +147,7 @@ def planned(path: Toolpath, free: Bools, shift: Floats, turn: Floats, divided: n
     own = np.append(source[1:] != source[:-1], True) if len(source) else np.empty(0, bool)
     arcs = path.kind[source] == Kind.CIRC
     sweep = path.sweep[source] * np.where(np.isin(source, divided), 0.5, 1.0)
-    role = np.where(own, Role.OWN, np.where(arcs | (source % 3 > 0), Role.PIECE, Role.LINK))
+    role = np.where(own, Role.ORIGINAL, np.where(arcs | (source % 3 > 0), Role.INTERMEDIATE, Role.TRANSITION))
     half = rotation_from_vector(np.nan_to_num(-sweep[:, None] * path.normal[source]))
     halves = centre[source] + (half @ (position[source] - centre[source])[..., None])[..., 0]
     aside = position[source] + np.array([1.0, -2.0, 3.0]) * MM
@@ -179,14 +181,14 @@ def _compare(path: Toolpath, plan: Plan, back: Toolpath) -> None:
     if codes != again:
         differ = set(codes.items()) ^ set(again.items())
         raise Broken(f"other refusals: {sorted(differ)[:3]}")
-    for name in ("kind", "base", "tool", "axes", "feed", "status", "turn", "timed"):
+    for name in ("kind", "base", "tool", "axes", "feed", "status", "turn", "inverse_time_feed"):
         before, after = getattr(path, name)[source], getattr(back, name)[:]
         if name in ("base", "tool"):
             before, after = _frames(path, before), _frames(back, after)
         same = (before == after) | ((before != before) & (after != after))
         same = same.all(axis=1) if same.ndim > 1 else same
         if name == "feed":
-            same |= path.timed[source]
+            same |= path.inverse_time_feed[source]
         if not same.all():
             m = int(np.argmin(same))
             raise Broken(f"the {name} of row {source[m]} (line {path.line[source[m]]}) changed")

@@ -21,9 +21,9 @@ HOME = Path(__file__).parent.parent.parent
 ROOMS = {
     "effects": ["postproc/effects"],
     "compensation": ["postproc/compensation"],
-    "dialects": ["postproc/dialects"],
-    "krl": ["postproc/dialects/krl"],
-    "gcode": ["postproc/dialects/gcode"],
+    "languages": ["postproc/languages"],
+    "krl": ["postproc/languages/krl"],
+    "gcode": ["postproc/languages/gcode"],
 }
 SLOW = (  # browsers, hundreds of processes, thousands of programs: a mutant is not judged by these
     "batch",

@@ -110,7 +110,8 @@ def cover(tree: Path, packages: list[str], tests: list[str]) -> Cover:
     contexts = _Contexts(watch)
     watch.start()
     try:
-        pytest.main([*tests, "-q", "-p", "no:cacheprovider", "-p", "no:benchmark"], plugins=[contexts])
+        options = ["-q", "-n", "0", "-m", "slow or not slow", "-p", "no:cacheprovider", "-p", "no:benchmark"]
+        pytest.main([*tests, *options], plugins=[contexts])
     finally:
         watch.stop()
     data = watch.get_data()

@@ -87,6 +87,10 @@ def _child(tree: Path, seconds: dict[str, float], note: Path, words: Path) -> No
         options = [
             "-x",
             "-q",
+            "-n",
+            "0",
+            "-m",
+            "slow or not slow",
             "--tb=line",
             "-p",
             "no:cacheprovider",

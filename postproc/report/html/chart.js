@@ -18,8 +18,8 @@ class Chart {
     const [from, to] = stretch.seen, rows = [];
     let last = -1;
     for (let i = 0; i < count; i++) {
-      if (motions.state[i] === AIR || motions.way[i] < from) continue;
-      if (motions.way[i] > to) { rows.push(i); break; }
+      if (inAir(i) || motions.path_length[i] < from) continue;
+      if (motions.path_length[i] > to) { rows.push(i); break; }
       if (!rows.length && last >= 0) rows.push(last);
       rows.push(i);
       last = i;
@@ -118,7 +118,7 @@ class Chart {
     let free = -Infinity, lines = -Infinity;
     for (let k = 0; k < rows.length; k++) {
       if (k && motions.cut[rows[k]] === motions.cut[rows[k - 1]]) continue;
-      const x = Math.round(this.x(motions.way[rows[k]])) + 0.5;
+      const x = Math.round(this.x(motions.path_length[rows[k]])) + 0.5;
       if (x < MARGIN.left || x - lines < 4) continue;
       lines = x;
       pen.beginPath();
@@ -150,7 +150,7 @@ class Chart {
     };
     for (const i of rows) {
       if (!Number.isFinite(values[i])) { end(); open = false; at = -1; continue; }
-      const x = Math.round(2 * this.x(motions.way[i])) / 2, y = this.y(values[i]);
+      const x = Math.round(2 * this.x(motions.path_length[i])) / 2, y = this.y(values[i]);
       if (open && x === at && motions.cut[i] === cut) {
         low = Math.min(low, y); high = Math.max(high, y); last = y;
         continue;
@@ -173,8 +173,8 @@ class Chart {
     const close = () => {
       if (part.length > 1) {
         pen.beginPath();
-        for (const i of part) pen.lineTo(this.x(motions.way[i]), this.y(values[i] + band[i]));
-        for (const i of part.reverse()) pen.lineTo(this.x(motions.way[i]), this.y(Math.max(floor, values[i] - band[i], this.log ? floor : 0)));
+        for (const i of part) pen.lineTo(this.x(motions.path_length[i]), this.y(values[i] + band[i]));
+        for (const i of part.reverse()) pen.lineTo(this.x(motions.path_length[i]), this.y(Math.max(floor, values[i] - band[i], this.log ? floor : 0)));
         pen.fill();
       }
       part = [];
@@ -189,7 +189,7 @@ class Chart {
   }
 
   cursor(pen, top, h) {
-    const x = this.x(motions.way[chosen]);
+    const x = this.x(motions.path_length[chosen]);
     pen.strokeStyle = theme().ink;
     pen.lineWidth = 1.2;
     pen.beginPath();
@@ -225,7 +225,7 @@ class Chart {
     const way = from + ((to - from) * (x - left)) / (this.canvas.clientWidth - left - right);
     let best = -1, least = Infinity;
     for (const i of this.visible || []) {
-      const off = Math.abs(motions.way[i] - way);
+      const off = Math.abs(motions.path_length[i] - way);
       if (off < least) { least = off; best = i; }
     }
     return best;
@@ -259,7 +259,7 @@ class Chart {
       if (document.activeElement !== canvas && !event.ctrlKey) return;
       event.preventDefault();
       const at = this.rowAt(this.sheet.at(event)[0]);
-      zoomStretch(Math.exp(event.deltaY / 400), at >= 0 ? motions.way[at] : motions.way[chosen]);
+      zoomStretch(Math.exp(event.deltaY / 400), at >= 0 ? motions.path_length[at] : motions.path_length[chosen]);
     }, { passive: false });
     canvas.addEventListener('keydown', (event) => {
       const leap = Math.max(1, Math.round(count / 50));
@@ -267,8 +267,8 @@ class Chart {
         ArrowLeft: () => choose(chosen - 1, true), ArrowRight: () => choose(chosen + 1, true),
         PageDown: () => choose(chosen + leap, true), PageUp: () => choose(chosen - leap, true),
         Home: () => choose(0, true), End: () => choose(count - 1, true),
-        '+': () => zoomStretch(0.6, motions.way[chosen]), '=': () => zoomStretch(0.6, motions.way[chosen]),
-        '-': () => zoomStretch(1 / 0.6, motions.way[chosen]), 0: () => seen(...stretch.all),
+        '+': () => zoomStretch(0.6, motions.path_length[chosen]), '=': () => zoomStretch(0.6, motions.path_length[chosen]),
+        '-': () => zoomStretch(1 / 0.6, motions.path_length[chosen]), 0: () => seen(...stretch.all),
       }[event.key];
       if (!act || event.ctrlKey || event.altKey || event.metaKey) return;
       event.preventDefault();
@@ -282,7 +282,7 @@ class Chart {
     canvas.setAttribute('aria-valuemax', String(given.motions));
     canvas.setAttribute('aria-valuenow', String(motions.row[chosen] + 1));
     canvas.setAttribute('aria-valuetext', words(chosen).join(', '));
-    const way = motions.way[chosen];
+    const way = motions.path_length[chosen];
     if (show && (way < from || way > to)) seen(way - 0.5 * (to - from), way + 0.5 * (to - from));
     this.sheet.later();
   }

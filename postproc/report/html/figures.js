@@ -2,7 +2,8 @@
 
 const given = JSON.parse(document.getElementById('data').textContent);
 const count = given.count;
-const AIR = 0, CORRECTED = 1;
+const AIR = 0, CORRECTED = 1, LEAD_IN = 4;
+const inAir = (i) => motions.state[i] === AIR || motions.state[i] === LEAD_IN;
 
 function column(name) {
   const { form, wide, base64 } = given.columns[name];
@@ -28,7 +29,7 @@ function lengths(vectors) {
 const quantities = {
   before: { title: 'error before', unit: 'mm', decimals: 3, values: motions.before },
   after: { title: 'error after', unit: 'mm', decimals: 4, values: motions.after },
-  between: { title: 'after, on the way', unit: 'mm', decimals: 4, values: motions.between },
+  path_error: { title: 'path error between points', unit: 'mm', decimals: 4, values: motions.path_error },
   correction: { title: 'correction', unit: 'mm', decimals: 3, values: lengths(motions.correction) },
   force: { title: 'force', unit: 'N', decimals: 0, values: lengths(motions.force) },
 };
@@ -93,13 +94,13 @@ function words(i) {
   const cut = motions.cut[i] >= 0 ? `, cut ${motions.cut[i] + 1}` : '';
   const told = [`line ${motions.line[i]}: ${given.kinds[motions.kind[i]]}${cut}, ${given.states[motions.state[i]]}`];
   told.push(`at ${vector(motions.position, i, 2)} mm`);
-  if (motions.state[i] === AIR) return told;
+  if (inAir(i)) return told;
   const wide = (widths) => (Number.isFinite(widths[i]) ? ` ± ${number(widths[i], 3)}` : '');
   told.push(`error before ${number(motions.before[i], 3)}${wide(motions.before_width)} mm`);
   if (given.corrected) {
     told.push(`correction X Y Z ${vector(motions.correction, i, 3)} mm`);
-    const way = Number.isFinite(motions.between[i]) ? `, on the way ${number(motions.between[i], 4)} mm` : '';
-    told.push(`error after ${number(motions.after[i], 4)}${wide(motions.after_width)} mm${way}`);
+    const between = Number.isFinite(motions.path_error[i]) ? `, path error between points ${number(motions.path_error[i], 4)} mm` : '';
+    told.push(`error after ${number(motions.after[i], 4)}${wide(motions.after_width)} mm${between}`);
     if (motions.inserted[i]) told.push(`${motions.inserted[i]} inserted before it`);
   }
   told.push(`force ${number(quantities.force.values[i], 0)} N (${vector(motions.force, i, 0)})`);

@@ -9,7 +9,7 @@ function hands(space) {
     canvas.setPointerCapture(event.pointerId);
     held.set(event.pointerId, [event.clientX, event.clientY]);
     still = 0;
-    canvas.classList.add('held');
+    canvas.classList.add('dragged');
   });
   canvas.addEventListener('pointermove', (event) => {
     const before = held.get(event.pointerId);
@@ -28,7 +28,7 @@ function hands(space) {
   const drop = (event) => {
     held.delete(event.pointerId);
     spread = 0;
-    canvas.classList.remove('held');
+    canvas.classList.remove('dragged');
     if (event.type === 'pointerup' && still < 5) {
       const at = space.find(...space.sheet.at(event));
       if (at >= 0) choose(at, false);

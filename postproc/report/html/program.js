@@ -4,7 +4,7 @@ const byId = (id) => document.getElementById(id);
 
 function start() {
   if (!count) return;
-  const whole = extent(motions.way);
+  const whole = extent(motions.path_length);
   stretch.all = [whole[0], Math.max(whole[1], whole[0] + 1e-3)];
   stretch.seen = [...stretch.all];
   if (given.places.length) chosen = nearest(motions.row, given.places[0]);
@@ -15,8 +15,8 @@ function start() {
   const errors = [{ name: 'before', values: motions.before, band: motions.before_width, colour: (t) => t.before, dash: [7, 4], width: 1.7 }];
   if (given.corrected) {
     errors.push({ name: 'after', values: motions.after, band: motions.after_width, colour: (t) => t.after, dash: [], width: 1.7 });
-    if (motions.between.some(Number.isFinite)) {
-      errors.push({ name: 'after, on the way there', values: motions.between, colour: (t) => t.soft, dash: [2, 2], width: 1.2 });
+    if (motions.path_error.some(Number.isFinite)) {
+      errors.push({ name: 'path error between points', values: motions.path_error, colour: (t) => t.soft, dash: [2, 2], width: 1.2 });
     }
   }
   const error = new Chart(byId('error'), errors, { unit: given.corrected ? 'error, mm (logarithmic)' : 'error, mm', log: given.corrected, zero: true, limit: given.tolerance });
@@ -72,10 +72,10 @@ function legend(place, series) {
 
 function bar(space, error) {
   byId('quantity').addEventListener('change', (event) => { space.quantity = event.target.value; space.sheet.later(); });
-  for (const name of ['arrows', 'bent']) {
+  for (const name of ['arrows', 'deflected']) {
     byId(name).addEventListener('change', (event) => { space[name] = event.target.checked; space.sheet.later(); });
   }
-  // from once to ten thousand times; at first the largest bend is a tenth of the part
+  // from once to ten thousand times; at first the largest deflection is a tenth of the part
   const slider = byId('magnify'), largest = extent(lengths(motions.deflection), space.inside)[1];
   const magnify = () => {
     const raw = 10 ** (slider.value / 25), size = 10 ** Math.floor(Math.log10(raw));
@@ -91,7 +91,7 @@ function bar(space, error) {
   }
   for (const button of document.querySelectorAll('[data-zoom]')) {
     const by = { in: 0.6, out: 1 / 0.6 }[button.dataset.zoom];
-    button.addEventListener('click', () => (by ? zoomStretch(by, motions.way[chosen]) : seen(...stretch.all)));
+    button.addEventListener('click', () => (by ? zoomStretch(by, motions.path_length[chosen]) : seen(...stretch.all)));
   }
   byId('linear').addEventListener('change', (event) => {
     error.log = !event.target.checked;

@@ -1,5 +1,5 @@
 // The 3-D view: the wanted path in the robot base, seen in parallel projection.  Colour and width of a motion say the
-// chosen quantity; a thin line beside it is the path that the robot would bend to, magnified.
+// chosen quantity; a thin line beside it is the deflected path, magnified.
 
 // Turn about Z and tilt: the front is seen from +X, the side from -Y.
 const VIEWS = { oblique: [0.6, 0.6], top: [0, Math.PI / 2], front: [Math.PI / 2, 0], side: [0, 0] };
@@ -15,7 +15,7 @@ class Space {
     this.tip = tip;
     this.quantity = 'before';
     this.arrows = true;
-    this.bent = false;
+    this.deflected = false;
     this.magnify = 0;
     this.hovered = -1;
     this.moving = false;
@@ -23,12 +23,12 @@ class Space {
     this.depth = new Float32Array(count);
     this.known = new Uint8Array(count);
     this.inside = [];
-    this.bends = new Map();
-    motions.arc.forEach((i, k) => this.bends.set(i, k * given.each));
-    this.curve = new Float32Array(2 * (motions.bends.length / 3));
+    this.arcs = new Map();
+    motions.arc.forEach((i, k) => this.arcs.set(i, k * given.each));
+    this.curve = new Float32Array(2 * (motions.arc_points.length / 3));
     for (let i = 0; i < count; i++) {
       this.known[i] = Number.isFinite(motions.position[3 * i]) ? 1 : 0;
-      if (motions.state[i] !== AIR) this.inside.push(i);
+      if (!inAir(i)) this.inside.push(i);
     }
     this.measure();
     this.look('oblique');
@@ -40,7 +40,7 @@ class Space {
     this.high = [-Infinity, -Infinity, -Infinity];
     for (const cuttingOnly of [true, false]) {
       for (let i = 0; i < count; i++) {
-        if (!this.known[i] || (cuttingOnly && motions.state[i] === AIR)) continue;
+        if (!this.known[i] || (cuttingOnly && inAir(i))) continue;
         for (let k = 0; k < 3; k++) {
           const value = motions.position[3 * i + k];
           this.low[k] = Math.min(this.low[k], value);
@@ -49,7 +49,7 @@ class Space {
       }
       if (this.low[0] <= this.high[0]) break;
     }
-    motions.bends.forEach((value, at) => {
+    motions.arc_points.forEach((value, at) => {
       this.low[at % 3] = Math.min(this.low[at % 3], value);
       this.high[at % 3] = Math.max(this.high[at % 3], value);
     });
@@ -93,14 +93,14 @@ class Space {
     this.right = right;
     this.up = up;
     for (let k = 0; k < this.curve.length / 2; k++) {
-      [this.curve[2 * k], this.curve[2 * k + 1]] = this.spot([0, 1, 2].map((axis) => motions.bends[3 * k + axis]));
+      [this.curve[2 * k], this.curve[2 * k + 1]] = this.spot([0, 1, 2].map((axis) => motions.arc_points[3 * k + axis]));
     }
   }
 
   // From the motion before to this one; an arc goes by the points on it.
   segment(pen, i, stride) {
     pen.moveTo(this.screen[2 * (i - stride)], this.screen[2 * (i - stride) + 1]);
-    const first = stride === 1 ? this.bends.get(i) : undefined;
+    const first = stride === 1 ? this.arcs.get(i) : undefined;
     if (first !== undefined) {
       for (let k = first; k < first + given.each; k++) pen.lineTo(this.curve[2 * k], this.curve[2 * k + 1]);
     }
@@ -128,7 +128,7 @@ class Space {
     const stride = this.moving ? Math.ceil(count / WHILE_MOVING) : 1;
     this.air(pen, stride);
     this.path(pen, values, stride);
-    if (this.bent) this.bentPath(pen, stride, wide, high);
+    if (this.deflected) this.deflectedPath(pen, stride, wide, high);
     if (this.arrows) this.forces(pen, wide);
     this.sizes(pen);
     this.triad(pen, high);
@@ -174,7 +174,7 @@ class Space {
     pen.setLineDash([2, 4]);
     pen.beginPath();
     for (let i = stride; i < count; i += stride) {
-      if (motions.state[i] !== AIR || !this.known[i] || !this.known[i - stride]) continue;
+      if (!inAir(i) || !this.known[i] || !this.known[i - stride]) continue;
       this.segment(pen, i, stride);
     }
     pen.stroke();
@@ -186,14 +186,14 @@ class Space {
     const [low, high] = this.range, span = high - low || 1;
     let [near, far] = [-Infinity, Infinity];
     for (let i = 0; i < count; i++) {
-      if (!this.known[i] || motions.state[i] === AIR) continue;
+      if (!this.known[i] || inAir(i)) continue;
       if (this.depth[i] > near) near = this.depth[i];
       if (this.depth[i] < far) far = this.depth[i];
     }
     const thick = near - far || 1;
     const heaps = new Array(SLABS * (BINS + 1));
     for (let i = stride; i < count; i += stride) {
-      if (motions.state[i] === AIR || !this.known[i] || !this.known[i - stride]) continue;
+      if (inAir(i) || !this.known[i] || !this.known[i - stride]) continue;
       const slab = Math.min(SLABS - 1, Math.max(0, Math.floor((SLABS * (this.depth[i] - far)) / thick)));
       const share = (values[i] - low) / span;
       // motions that were not corrected, or are not known, have a heap of their own
@@ -216,25 +216,25 @@ class Space {
     pen.setLineDash([]);
   }
 
-  bentPath(pen, stride, wide, high) {
+  deflectedPath(pen, stride, wide, high) {
     const by = this.magnify * this.scale;
     pen.strokeStyle = theme().before;
     pen.lineWidth = 0.9;
     pen.beginPath();
     let open = false;
     for (let i = 0; i < count; i += stride) {
-      const bent = this.known[i] && motions.state[i] !== AIR && Number.isFinite(motions.deflection[3 * i]);
-      if (bent) {
+      const known = this.known[i] && !inAir(i) && Number.isFinite(motions.deflection[3 * i]);
+      if (known) {
         const [x, y] = this.along(motions.deflection, i, by);
         if (open) pen.lineTo(this.screen[2 * i] + x, this.screen[2 * i + 1] + y);
         else pen.moveTo(this.screen[2 * i] + x, this.screen[2 * i + 1] + y);
       }
-      open = bent;
+      open = known;
     }
     pen.stroke();
     pen.font = FONT;
     pen.textAlign = 'right';
-    halo(pen, `thin line: the path as it would bend, ${this.magnify} ×`, wide - 12, high - 14, theme().before);
+    halo(pen, `thin line: the deflected path, ${this.magnify} ×`, wide - 12, high - 14, theme().before);
   }
 
   // Some motions with their force, as long as it is large; the arrow ends where the force acts.

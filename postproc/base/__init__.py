@@ -1,0 +1,1 @@
+"""What every room uses: documents, arrays, geometry, units, findings, tables."""

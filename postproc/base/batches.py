@@ -1,0 +1,107 @@
+"""Many rows, block by block: arrays of a block stay in the cache, and the blocks go to all cores.
+
+numpy lets other threads run while it computes.  Blocks are cut by number of rows alone, so a result does not depend on
+how many threads there are.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+T = TypeVar("T")
+
+ROWS = 3 << 12
+"""Rows of a block."""
+
+THREADS = "POSTPROC_THREADS"
+"""Environment variable: threads at most; all cores without it."""
+
+LARGE = 1 << 24
+"""Bytes of an array that is no block's."""
+
+MOST = 8
+"""Threads at most: what is not numpy's runs in one of them at a time."""
+
+_inside = threading.local()
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def threads() -> int:
+    """Threads that work on blocks."""
+    word = os.environ.get(THREADS, "")
+    return min(MOST, int(word) if word.isdecimal() and int(word) else cores())
+
+
+def blocks(count: int, rows: int = 0) -> list[slice]:
+    """The blocks of ``count`` rows, of ``ROWS`` each where ``rows`` states nothing else."""
+    rows = rows or ROWS
+    return [slice(start, min(start + rows, count)) for start in range(0, count, rows)]
+
+
+def in_blocks(work: Callable[[slice], T], count: int, rows: int = 0) -> Iterator[T]:
+    """``work`` of every block of ``count`` rows, in their order.
+
+    Few blocks are ahead of the one that is asked for.  Inside of another block all is done where it is asked for.
+    What ``work`` raises is raised here; blocks that have not begun are then given up.
+    """
+    parts, workers = blocks(count, rows), threads()
+    if len(parts) < 2 or workers < 2 or getattr(_inside, "block", False):
+        yield from map(work, parts)
+        return
+
+    def within(part: slice) -> T:
+        _inside.block = True
+        return work(part)
+
+    with ThreadPoolExecutor(workers, "block") as pool:
+        ahead: deque[Future[T]] = deque()
+        try:
+            for part in parts:
+                ahead.append(pool.submit(within, part))
+                if len(ahead) > workers:
+                    yield ahead.popleft().result()
+            while ahead:
+                yield ahead.popleft().result()
+        finally:
+            for future in ahead:
+                future.cancel()
+
+
+def each_block(work: Callable[[slice], None], count: int, rows: int = 0) -> None:
+    """``work`` of every block of ``count`` rows, which puts what it finds in its place."""
+    for _ in in_blocks(work, count, rows):
+        pass
+
+
+def trim_allocator() -> None:
+    """Free memory goes back to the system: the C library (glibc) keeps what lies between blocks that are in use."""
+    _allocator("malloc_trim", 0)
+
+
+def use_mmap_for_large_arrays() -> None:
+    """From now on arrays of more than ``LARGE`` bytes lie apart, and go back to the system as soon as they are free;
+    those of blocks lie together, and what is free of them stays at hand: to fetch a page again takes as long as to
+    compute what it holds."""
+    m_trim_threshold, m_top_pad, m_mmap_threshold, m_arena_max = -1, -2, -3, -8
+    _allocator("mallopt", m_mmap_threshold, LARGE)
+    _allocator("mallopt", m_trim_threshold, 4 * LARGE)
+    _allocator("mallopt", m_top_pad, LARGE // 2)
+    _allocator("mallopt", m_arena_max, 1)
+
+
+def _allocator(name: str, *arguments: int) -> None:
+    """Calls a function of glibc's allocator; nothing where there is none."""
+    function = getattr(ctypes.CDLL(None), name, None) if sys.platform == "linux" else None
+    if function is not None:
+        function(*arguments)

@@ -1,0 +1,91 @@
+"""Reading a whole file that may be anything: what is no file, or too large, is reported and not read."""
+
+from __future__ import annotations
+
+import io
+import stat
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+from postproc.base.findings import Finding, Refusal
+from postproc.base.input_files import note
+
+MAX_BYTES = 1_000_000_000
+"""Sixteen million motions; offsets in a program are held in 32 bits."""
+
+MAX_LINE = 1_000_000
+"""Bytes: no controller and no table has lines of a hundredth of it, and in memory a line is many times its length."""
+
+
+def read_file(path: Path, most: int | None = None) -> bytes:
+    """The bytes of a file, noted as an input of the run.
+
+    ``most``: of a larger file so many and one more, for a reader that has its own words for that.  Raises Refusal
+    FIL001: not readable, a pipe or a device, larger than ``MAX_BYTES``; FIL010: not what it was when last read.
+    """
+    if most is None:
+        return _read(path, MAX_BYTES, lambda stream: stream.read())
+    return _read(path, None, lambda stream: stream.read(most + 1))
+
+
+def read_text_file(path: Path, code: str = "FIL003", ends: tuple[bytes, ...] = (b"\n",)) -> bytes:
+    """The bytes of a text file, noted as an input of the run; what is no text is not read to its end.
+
+    ``ends``: what a line may end with, each of one byte.  Raises Refusal as ``read_file`` does; FIL003: a NUL;
+    ``code``: a line of more than ``MAX_LINE`` bytes.
+    """
+    return _read(path, MAX_BYTES, lambda stream: _text(stream, path, code, ends))
+
+
+def list_folder(folder: Path) -> list[Path]:
+    """What is in a folder, sorted.  Raises FileNotFoundError; Refusal FIL001 for a folder that cannot be listed."""
+    try:
+        return sorted(folder.iterdir())
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        message = f"the folder cannot be listed, so a file of the program may be missed: {error.strerror}"
+        raise Refusal(Finding("FIL001", message, str(folder))) from None
+
+
+def _read(path: Path, largest: int | None, take: Callable[[BinaryIO], bytes]) -> bytes:
+    try:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):
+            raise OSError("it is a pipe or a device, not a file")
+        if largest is not None and status.st_size > largest:
+            raise OSError(f"it is larger than {largest} bytes")
+        with path.open("rb") as stream:
+            raw = take(stream)
+    except (OSError, ValueError) as error:  # ValueError: a name with NUL
+        why = getattr(error, "strerror", None) or error
+        raise Refusal(Finding("FIL001", f"the file cannot be read: {why}", str(path))) from None
+    note(path, raw)
+    return raw
+
+
+def _text(stream: BinaryIO, path: Path, code: str, ends: tuple[bytes, ...]) -> bytes:
+    text = io.BytesIO()  # gives its bytes without a copy
+    begun = 0  # bytes of the line that a block starts in the midst of
+    while block := stream.read(MAX_LINE):
+        nul = block.find(b"\0")
+        if nul >= 0:
+            message = f"byte {text.tell() + nul} is NUL: the file is not plain text"
+            raise Refusal(Finding("FIL003", message, str(path), help="save it as plain text (UTF-8)"))
+        found = [(block.find(end), block.rfind(end)) for end in ends if end in block]
+        begun += min((first for first, _ in found), default=len(block))
+        if begun > MAX_LINE:
+            number = _line(text.getvalue(), ends)
+            message = f"the line has more than {MAX_LINE} bytes: the file is not plain text"
+            raise Refusal(Finding(code, message, str(path), number))
+        if found:
+            begun = len(block) - 1 - max(last for _, last in found)
+        text.write(block)
+    return text.getvalue()
+
+
+def _line(raw: bytes, ends: tuple[bytes, ...]) -> int:
+    """The number of the line that ``raw`` stops in."""
+    count = sum(raw.count(end) for end in ends)
+    return count + 1 - (raw.count(b"\r\n") if b"\r" in ends else 0)

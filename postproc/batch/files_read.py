@@ -1,0 +1,104 @@
+"""Which files a piece of work reads, and what was in them: seen where Python opens them, not foretold.
+
+A list of inputs kept by hand forgets the file that a later version reads, and a result would then pass for unchanged.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import hashlib
+import os
+import stat
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import postproc
+
+ABSENT = "absent"
+"""Digest of a file that is not there."""
+
+
+def digest_of(path: Path | str) -> str:
+    """SHA-256 of a file, or ``ABSENT``, as of what is no file: a pipe and a device have no end."""
+    try:
+        if not stat.S_ISREG(os.stat(path).st_mode):
+            return ABSENT
+        with open(path, "rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError:
+        return ABSENT
+
+
+@contextlib.contextmanager
+def readings() -> Iterator[dict[str, str]]:
+    """Path -> digest of every file that this thread opens to read inside of the ``with``, as it was then.
+
+    The files of Python and of this package are left out; ``code_digest`` stands for them.
+    """
+    _install()
+    seen: dict[str, str] = {}
+    _mine.seen = seen
+    try:
+        yield seen
+    finally:
+        _mine.seen = None
+
+
+@functools.cache
+def code_digest() -> str:
+    """Digest of what computes: version, every file of this package, Python and numpy."""
+    import numpy
+
+    folder = _package()
+    digest = hashlib.sha256(f"{postproc.__version__} {sys.version} {numpy.__version__}".encode())
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts and not path.name.startswith("."):
+            digest.update(f"{path.relative_to(folder).as_posix()} {digest_of(path)}\n".encode())
+    return digest.hexdigest()
+
+
+_mine = threading.local()
+
+
+@functools.cache
+def _install() -> None:
+    """Once a process: a hook cannot be taken out again; without a ``readings`` it does nothing."""
+    sys.addaudithook(_opened)
+
+
+def _opened(event: str, arguments: tuple[object, ...]) -> None:
+    if event != "open":
+        return
+    seen: dict[str, str] | None = getattr(_mine, "seen", None)
+    if seen is None:
+        return
+    _mine.seen = None  # what the digest itself opens does not count
+    try:
+        name, mode, flags = arguments
+        if isinstance(name, str | bytes | os.PathLike) and _reads(mode, flags):
+            path = os.path.abspath(os.fsdecode(name))
+            if path not in seen and not path.startswith(_others()) and not os.path.isdir(path):
+                seen[path] = digest_of(path)
+    finally:
+        _mine.seen = seen
+
+
+def _reads(mode: object, flags: object) -> bool:
+    if isinstance(mode, str):
+        return "r" in mode and "+" not in mode
+    return isinstance(flags, int) and flags & os.O_ACCMODE == os.O_RDONLY
+
+
+@functools.cache
+def _package() -> Path:
+    return Path(postproc.__file__ or "").resolve().parent
+
+
+@functools.cache
+def _others() -> tuple[str, ...]:
+    """Starts of the paths of files that are no input."""
+    folders = {sys.prefix, sys.base_prefix, str(_package()), "/proc", "/sys", "/dev"}
+    return tuple(os.path.join(folder, "") for folder in sorted(folders))

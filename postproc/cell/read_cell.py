@@ -1,0 +1,317 @@
+"""The cell file ``cell.yaml``, read and checked.
+
+The file speaks mm and deg; what is made of it is SI and radians.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+
+from postproc.base.arrays import Floats, frozen
+from postproc.base.findings import Finding, Refusal
+from postproc.base.geometry import Poses
+from postproc.base.units import DEG, MM
+from postproc.base.yaml_section import YamlSection, load
+from postproc.cell.description import MODES, Cell, Controller, ForceVectorInterval, Tool
+from postproc.robot.read_external_axes import read_external
+
+NAME = "cell.yaml"
+
+SAME_PLACE = 1.0 * MM
+"""Touch points that are nearer to each other than this say nothing of a direction."""
+ON_A_LINE = 0.01
+"""Touch points lie on a line where their extent across it is less than this share of that along it."""
+
+KEYS = (
+    "robot",
+    "robot_base",
+    "tools",
+    "bases",
+    "force",
+    "force_ci95",
+    "force_ramp",
+    "process",
+    "correct",
+    "touch_points",
+    "temperature",
+    "start",
+    "external_axes",
+    "orientation",
+    "tolerance",
+    "tolerance_deg",
+    "max_correction",
+    "min_segment",
+    "max_growth",
+    "controller",
+    "dialect",
+)
+_POSE_KEYS = ("x", "y", "z", "a", "b", "c")
+AXES = {
+    sign + name: tuple((1.0 if sign == "+" else -1.0) if i == k else 0.0 for i in range(3))
+    for k, name in enumerate("xyz")
+    for sign in "+-"
+}
+_NUMBER = re.compile(r"[1-9][0-9]{0,5}\Z")
+
+
+def find_cell(program: Path) -> Path:
+    """The ``cell.yaml`` in the program's folder or the nearest parent that has one; Refusal CEL001 if none."""
+    folder = Path(os.path.abspath(program)).parent
+    searched = [folder, *folder.parents]
+    for place in searched:
+        if os.path.isfile(place / NAME):
+            return place / NAME
+    names = ", ".join(str(place) for place in searched)
+    raise Refusal(
+        Finding(
+            "CEL001",
+            f"no {NAME} exists for this program; {names} were searched",
+            str(program),
+            help=f"put a {NAME} beside the program or above it, or name one with --cell FILE",
+        )
+    )
+
+
+def load_cell(path: Path) -> Cell:
+    """Reads and checks a cell file.  Refusal: FIL..., YML... with file, line and key."""
+    top = load(path)
+    top.only(*KEYS)
+    if "force" in top and "process" in top:
+        raise top.error("YML004", "excludes 'force'; state only one of them", "process")
+    controller = top.section("controller", None)
+    controller.only("absolute_accuracy", "gravity_compensated", "cycle_ms")
+    correct = top.text("correct", "process", MODES)
+    if correct != "process" and "absolute_accuracy" not in controller:
+        raise top.error(
+            "CEL010",
+            f"{correct} needs to know whether the controller corrects its geometry itself",
+            "correct",
+            "state it: controller: {absolute_accuracy: false}, or true for a robot with an absolutely accurate model;"
+            " otherwise its geometry errors may be corrected twice",
+        )
+    scale, vector = _force_interval(top)
+    dialect = top.section("dialect", None)
+    dialect.only("integer_words", "name", "config_dat")
+    return Cell(
+        path=path,
+        robot=_word(top, "robot"),
+        robot_base=_robot_base(top),
+        tools={number: _tool(section) for number, section in _numbered(top, "tools")},
+        bases={number: _frame(section) for number, section in _numbered(top, "bases")},
+        force=_force(top),
+        force_line=top.line_of("force") if "force" in top else 0,
+        force_ci95=scale,
+        process=_word(top, "process") if "process" in top else None,
+        correct=correct,
+        start_stated=_start(top),
+        start_line=top.line_of("start") if "start" in top else 0,
+        orientation=_orientation(top),
+        tolerance=_positive(top, "tolerance", 0.02, "mm") * MM,
+        tolerance_angle=_positive(top, "tolerance_deg", 0.01, "deg") * DEG,
+        max_correction=_positive(top, "max_correction", 10.0, "mm") * MM,
+        min_segment=_positive(top, "min_segment", 1.0, "mm") * MM,
+        max_growth=top.number("max_growth", 2.0, low=1.0),
+        growth_stated="max_growth" in top,
+        segment_stated="min_segment" in top,
+        controller=Controller(
+            controller.flag("absolute_accuracy", False),
+            controller.flag("gravity_compensated", False),
+            controller.number("cycle_ms", 12.0, low=0.1, high=100.0, unit="ms"),
+        ),
+        integer_words=dialect.text("integer_words", "mm", ("mm", "um")),
+        dialect=_word(dialect, "name") if "name" in dialect else None,
+        dialect_line=dialect.line_of("name") if "name" in dialect else 0,
+        config_dat=_word(dialect, "config_dat") if "config_dat" in dialect else None,
+        force_vector=vector,
+        force_ramp=top.number("force_ramp", low=0.0, unit="mm") * MM if "force_ramp" in top else None,
+        touch_points=_touch_points(top, correct),
+        touch_line=top.line_of("touch_points") if "touch_points" in top else 0,
+        temperature=(
+            top.number("temperature", low=-10.0, high=60.0, unit="degC") if "temperature" in top else None
+        ),
+        temperature_line=top.line_of("temperature") if "temperature" in top else 0,
+        external_axes=read_external(top),
+    )
+
+
+def _word(section: YamlSection, key: str) -> str:
+    text = section.text(key).strip()
+    if not text:
+        raise section.error("YML004", "is empty", key)
+    return text
+
+
+def _force(top: YamlSection) -> str | None:
+    if "force" not in top:
+        return None
+    if top.is_list("force"):
+        raise top.error(
+            "YML004", "must be a text and not a list", "force", "write for example force: 0,360,560@base"
+        )
+    return _word(top, "force")
+
+
+def _positive(section: YamlSection, key: str, default: float, unit: str) -> float:
+    value = section.number(key, default, unit=unit)
+    if value <= 0:
+        raise section.error("YML004", f"{value:g} is not above 0", key, f"write a number in {unit}, above 0")
+    return value
+
+
+def _numbered(top: YamlSection, key: str) -> list[tuple[int, YamlSection]]:
+    """The sections under ``key`` by number, which counts from 1."""
+    parent = top.section(key, None)
+    found = []
+    for name in parent:
+        if not _NUMBER.match(name):
+            raise parent.error("YML004", "is not a number from 1", name, f"{key} are numbered: 1, 2, ...")
+        found.append((int(name), parent.section(name)))
+    return found
+
+
+def _frame(section: YamlSection, *more: str) -> Poses:
+    """The pose of a section with x y z [mm] and perhaps a b c [deg]."""
+    section.only(*_POSE_KEYS, *more)
+    position = np.array([section.number(key, unit="mm") for key in "xyz"]) * MM
+    abc = np.array([section.number(key, 0.0, unit="deg") for key in "abc"]) * DEG
+    pose = Poses.from_abc(position, abc)
+    return Poses(frozen(pose.rotation, (3, 3)), frozen(pose.position, (3,)))
+
+
+def _robot_base(top: YamlSection) -> Poses:
+    return _frame(top.section("robot_base")) if "robot_base" in top else Poses.identity()
+
+
+def _start(top: YamlSection) -> Floats | None:
+    """Six values, or seven for an arm with an external joint."""
+    if "start" not in top:
+        return None
+    return frozen(top.numbers("start", 7 if top.length("start") == 7 else 6, unit="deg"))
+
+
+def _orientation(top: YamlSection) -> Floats | None:
+    if "orientation" not in top:
+        return None
+    section = top.section("orientation")
+    section.only("a", "b", "c")
+    return frozen([section.number(key, 0.0, unit="deg") * DEG for key in "abc"], (3,))
+
+
+def _force_interval(top: YamlSection) -> tuple[float | None, ForceVectorInterval | None]:
+    """The interval of the forces' scale, as a share of them, and those of their direction and components.
+
+    ``force_ci95`` is one number, the scale, or a mapping ``{scale, direction_deg, fx, fy, fz}``.
+    """
+    if "force_ci95" not in top:
+        return None, None
+    if not top.is_mapping("force_ci95"):
+        return top.number("force_ci95", low=0.0, high=1.0), None
+    section = top.section("force_ci95")
+    names = ("fx", "fy", "fz")
+    section.only("scale", "direction_deg", *names)
+    stated = [name for name in names if name in section]
+    absent = [name for name in names if name not in section]
+    if not stated and "scale" not in section and "direction_deg" not in section:
+        raise section.error(
+            "YML003", "states nothing", help="write for example {scale: 0.2, direction_deg: 10}"
+        )
+    if stated and absent:
+        raise section.error(
+            "YML003",
+            f"is incomplete: {absent[0]!r} is missing",
+            stated[0],
+            "state the intervals of all three components (N); 0 for one that is known exactly",
+        )
+    scale = section.number("scale", low=0.0, high=1.0) if "scale" in section else None
+    direction = section.number("direction_deg", 0.0, low=0.0, high=90.0, unit="deg") * DEG
+    components = None
+    if stated:
+        components = frozen([section.number(name, low=0.0, unit="N") for name in names], (3,))
+    return scale, ForceVectorInterval(direction, components)
+
+
+def _touch_points(top: YamlSection, correct: str) -> dict[int | None, Floats]:
+    """The places at which bases were touched off, by the number of the base; None stands for the only one."""
+    if (correct == "touched_off") != ("touch_points" in top):
+        if correct == "touched_off":
+            raise top.error(
+                "YML003",
+                "touched_off needs 'touch_points'",
+                "correct",
+                "touch_points: [[x, y, z], ...] in mm: the places in the base where it is touched off",
+            )
+        raise top.error("YML004", "needs 'correct: touched_off', and is ignored without it", "touch_points")
+    if correct != "touched_off":
+        return {}
+    if top.is_list("touch_points"):
+        return {None: _places(top, "touch_points")}
+    numbered = top.section("touch_points")
+    found: dict[int | None, Floats] = {}
+    for name in numbered:
+        if not _NUMBER.match(name):
+            raise numbered.error("YML004", "is not a number from 1", name, "bases are numbered: 1, 2, ...")
+        found[int(name)] = _places(numbered, name)
+    if not found:
+        raise top.error("YML003", "contains no touch point", "touch_points")
+    return found
+
+
+def _places(section: YamlSection, key: str) -> Floats:
+    """(K, 3) [m] touch points that lie apart and, three and more of them, not on a line."""
+    points = np.array(section.rows(key, 3, unit="mm")) * MM
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2) + np.diag(np.full(len(points), np.inf))
+    if apart.min() < SAME_PLACE:
+        one, other = np.unravel_index(int(np.argmin(apart)), apart.shape)
+        raise section.error(
+            "YML004",
+            f"points {one + 1} and {other + 1} are the same place",
+            key,
+            "name points that are far apart",
+        )
+    if len(points) > 2:
+        extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+        if extent[1] < ON_A_LINE * extent[0]:
+            raise section.error(
+                "YML004",
+                f"the {len(points)} points are on one line, about which the base can rotate",
+                key,
+                "add a point off the line, or give two points only",
+            )
+    return frozen(points, (-1, 3))
+
+
+def _tool(section: YamlSection) -> Tool:
+    pose = _frame(section, "axis", "mass", "com", "diameter")
+    diameter = None
+    if "diameter" in section:
+        diameter = section.number("diameter", low=0.01, high=1000.0, unit="mm") * MM
+    if ("mass" in section) != ("com" in section):
+        there, absent = ("mass", "com") if "mass" in section else ("com", "mass")
+        raise section.error(
+            "YML003", f"is incomplete: {absent!r} is missing", there, "a payload needs mass (kg) and com (mm)"
+        )
+    if "mass" not in section:
+        return Tool(pose, _axis(section), diameter=diameter)
+    com = frozen(np.array(section.numbers("com", 3, unit="mm")) * MM, (3,))
+    return Tool(pose, _axis(section), section.number("mass", low=0.0, unit="kg"), com, diameter)
+
+
+def _axis(section: YamlSection) -> Floats:
+    """Unit vector (3,) of ``axis``: a signed letter, or three numbers of any length."""
+    if section.is_list("axis"):
+        vector = np.array(section.numbers("axis", 3))
+        largest = np.max(np.abs(vector))
+        if largest == 0:
+            raise section.error("YML004", "has no direction", "axis")
+        vector /= largest  # squares of very large or small numbers leave the range
+        return frozen(vector / np.linalg.norm(vector), (3,))
+    word = section.text("axis", "+z").strip().lower()
+    if word not in AXES:
+        # no nearest name: z is as near to -z as to +z, and the wrong one turns the force round
+        allowed = ", ".join(AXES)
+        raise section.error("YML004", f"{word!r} is not one of {allowed}, nor a list [x, y, z]", "axis")
+    return frozen(AXES[word], (3,))

@@ -1,0 +1,193 @@
+"""The path after the correction against the path before, cut by cut; what the transitions of an output are like.
+
+An error along the feed makes the tool early or late: it marks the part only where the path starts, ends or turns.  What
+a motion leaves on the part is the error across the feed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.batches import in_blocks
+from postproc.base.findings import Finding
+from postproc.base.geometry import lengths
+from postproc.base.units import MM
+from postproc.compensation.correct import CorrectionResult
+from postproc.compensation.path_error import path_errors, programmed
+from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.subdivision import Subdivision, subdivided_motions
+from postproc.toolpath import Role
+
+WORTH = 1e-9
+"""[m] End points that are not better by this are not better."""
+
+ROUNDING = 1e-6
+"""[m] What the digits of a program do to a path."""
+
+
+def across_feed(task: CompensationProblem, rows: Ints, error: Floats) -> tuple[Floats, Floats]:
+    """(K,) [m] the parts of ``error`` (K, 3) along the feed at the end points of motions ``rows`` (K,), with its sign,
+    and (K,) across it; all of it is across where a motion has no direction."""
+    along = np.nan_to_num(np.sum(error * task.desired_path.tangent(rows, np.ones(len(rows))), axis=1))
+    return along, np.sqrt(np.maximum(np.einsum("ni,ni->n", error, error) - along**2, 0.0))
+
+
+def along_and_across(task: CompensationProblem, result: CorrectionResult) -> tuple[Floats, Floats]:
+    """(N,) [m] predicted errors before the correction at the end points, along and across the feed; NaN where nothing
+    is predicted."""
+    rows = np.flatnonzero(np.isfinite(result.deflection[:, 0]))
+    found = np.full((2, len(result.state)), np.nan, np.float32)
+
+    def parted(part: slice) -> None:
+        found[:, rows[part]] = across_feed(task, rows[part], result.deflection[rows[part]])
+
+    for _ in in_blocks(parted, len(rows)):
+        pass
+    return found[0], found[1]
+
+
+def cuts_not_improved(
+    task: CompensationProblem,
+    result: CorrectionResult,
+    division: Subdivision,
+    between: Floats,
+    before: Floats,
+) -> dict[int, Finding]:
+    """Of each cut on which the path after the correction is no better than the path before: its first row, and why it
+    stays as it was.
+
+    between (M,) [m]: largest error across the feed inside of each motion of ``division`` after the correction; before
+    (N,) [m]: that at the end points without one.
+    """
+    rows = np.flatnonzero(result.corrected & task.carries)  # what moves in air leaves nothing on the part
+    if not len(rows):
+        return {}
+    cuts, place = np.unique(result.cut[rows], return_inverse=True)
+
+    def largest(values: Floats, at: Ints) -> Floats:
+        found = np.zeros(len(cuts))
+        np.fmax.at(found, at, values)
+        return found
+
+    def mean_square(values: Floats) -> Floats:
+        return np.bincount(place, np.nan_to_num(values) ** 2, len(cuts)) / np.bincount(place)
+
+    ends = result.across_after[rows]
+    square = [mean_square(values[rows]) for values in (result.after, result.before)]
+    motions = np.flatnonzero((result.corrected & task.carries)[division.source] & ~division.transitions)
+    cut_of = place[np.searchsorted(rows, division.source[motions])]
+    after = np.maximum(largest(ends, place), largest(between[motions], cut_of))
+    first = largest(before[rows], place)
+    angles = (largest(angle[rows], place) for angle in (result.after_angle, result.before_angle))
+    turned = next(angles) > next(angles) + task.tolerance_angle
+    suspect = after > first + ROUNDING
+    if suspect.any():  # the path before may be worse between its points than there
+        some = rows[suspect[place]]
+        first = np.maximum(
+            first, largest(_before_between(task, some), np.searchsorted(cuts, result.cut[some]))
+        )
+    worse = (after > first + ROUNDING) | (square[0] > square[1] - WORTH**2) | turned
+    found = {}
+    for k in np.flatnonzero(worse).tolist():
+        row = int(rows[np.argmax(place == k)])
+        what = (
+            "the corrected orientation is worse than the uncorrected one"
+            if turned[k]
+            else f"the corrected path is not better: across the feed it is {after[k] / MM:.4f} mm off"
+            f" and {first[k] / MM:.4f} without the correction"
+        )
+        line = int(task.toolpath.line[row])
+        found[row] = Finding(
+            "COR016",
+            what,
+            task.file,
+            line,
+            help="allow inserted motions (no --no-insert), raise max_growth, or loosen the tolerance",
+        )
+    return found
+
+
+def _before_between(task: CompensationProblem, rows: Ints) -> Floats:
+    """(K,) [m] largest error across the feed inside of the motions ``rows`` (K,) as they are programmed."""
+
+    def looked(part: slice) -> Floats:
+        some = rows[part]
+        known = task.desired_path.traceable[some]
+        found = np.zeros(len(some))
+        at = some[known]
+        found[known], _ = path_errors(task, programmed(task, at))
+        return found
+
+    return np.concatenate([np.empty(0), *in_blocks(looked, len(rows))])
+
+
+@dataclass(frozen=True)
+class Transitions:
+    """What an output does where its correction changes.
+
+    rate: largest change of the correction, m per m of path, and ``rate_line`` where; speed [m/s]: the same at the
+    programmed feed, NaN where no feed is known; backwards: motions in a cut that lead against the feed; stops: exact
+    stops inside of cuts that the input does not have; lead_ins: motions in air that end where a cut starts corrected.
+    """
+
+    rate: float
+    rate_line: int
+    speed: float
+    backwards: int
+    stops: int
+    lead_ins: int
+
+
+def evaluate_transitions(
+    task: CompensationProblem, result: CorrectionResult, division: Subdivision
+) -> Transitions:
+    """Of the motions of ``division`` in corrected cuts."""
+    source, desired_path = division.source, task.desired_path
+    chosen = np.flatnonzero(result.corrected[source] & desired_path.traceable[source] & ~division.transitions)
+
+    def looked(part: slice) -> tuple[float, int, float, int]:
+        segments = subdivided_motions(task, division, chosen[part])
+        if not len(segments):
+            return 0.0, 0, np.nan, 0
+        first, last = (
+            desired_path.at(segments.rows, share).position for share in (segments.first, segments.last)
+        )
+        change = lengths((segments.end.position - last) - (segments.start.position - first))
+        extent = (segments.last - segments.first) * desired_path.length[segments.rows]
+        moves = extent > 0
+        rate = np.where(moves, change / np.where(moves, extent, 1.0), 0.0)
+        speed = rate * task.toolpath.feed[segments.rows]
+        ahead = np.sum((segments.end.position - segments.start.position) * (last - first), axis=1)
+        worst = int(np.argmax(rate))
+        known = speed[np.isfinite(speed)]
+        return (
+            float(rate[worst]),
+            int(segments.rows[worst]),
+            float(known.max()) if len(known) else np.nan,
+            int((moves & (ahead < 0)).sum()),
+        )
+
+    parts = list(in_blocks(looked, len(chosen)))
+    if not parts:
+        return Transitions(0.0, 0, np.nan, 0, 0, len(division.lead_ins))
+    rate, row, _, _ = max(parts)
+    speeds = [speed for _, _, speed, _ in parts if np.isfinite(speed)]
+    return Transitions(
+        rate,
+        int(task.toolpath.line[row]),
+        max(speeds, default=np.nan),
+        sum(backwards for *_, backwards in parts),
+        int(_stops(result, division).sum()),
+        len(division.lead_ins),
+    )
+
+
+def _stops(result: CorrectionResult, division: Subdivision) -> Bools:
+    """(M,) inserted motions that stop inside of a cut: transition moves after a motion of the same cut."""
+    source = division.source
+    before = np.maximum(source - 1, 0)
+    inside = (source > 0) & (result.cut[before] == result.cut[source]) & (result.cut[source] >= 0)
+    return np.asarray((division.role == Role.TRANSITION) & inside)

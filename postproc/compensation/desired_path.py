@@ -1,0 +1,198 @@
+"""The wanted path of each motion in the robot base, between its start and its end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.batches import each_block
+from postproc.base.geometry import (
+    UNKNOWN,
+    Placed,
+    PoseRows,
+    Poses,
+    lengths,
+    on_arc,
+    turn_beside,
+    turn_between,
+    turned,
+    turning,
+)
+from postproc.compensation.mirror import interpolate_pose
+from postproc.compensation.orientations import interpolate_orientation
+from postproc.robot.axis_track import AxisTrack, nominal_flange
+from postproc.robot.description import Robot
+from postproc.robot.external_axes import External
+from postproc.robot.half_turns import HalfTurns
+from postproc.toolpath import Kind, OrientationPath, Toolpath
+
+_NO_MOVE = 1e-7
+"""[m], [rad]: a motion that is not longer leads nowhere."""
+
+
+@dataclass(frozen=True, eq=False)
+class DesiredPath:
+    """N motions.  start, end: TCP poses, NaN where unknown; sweep (N,) of arcs, NaN elsewhere; traceable (N,): LIN and
+    CIRC whose path is known from start to end; length (N,) [m], 0 where it is not; angle (N,) [rad]: between the
+    orientations at start and end, infinite where the tool turns otherwise than evenly about one axis, NaN where it is
+    not known; half_turns: which way they turn."""
+
+    path: Toolpath
+    start: PoseRows
+    end: Placed
+    base: Poses
+    traceable: Bools
+    length: Floats
+    angle: Floats
+    half_turns: HalfTurns = field(default_factory=HalfTurns)
+
+    @staticmethod
+    def of(
+        path: Toolpath,
+        wanted: Placed,
+        base: Poses,
+        tool: Poses,
+        robot: Robot,
+        track: AxisTrack,
+        external: External | None = None,
+    ) -> DesiredPath:
+        """``wanted`` (N): targets in the robot base; ``base``, ``tool`` (N): frames of each motion."""
+        n = len(path)
+        begin = start_poses(wanted, path, tool, robot, track, external).remembered()
+        known = np.isin(path.kind, (Kind.LIN, Kind.CIRC)) & path.known
+        length, angle = np.zeros(n), np.full(n, np.nan)
+        desired_path = DesiredPath(path, begin, wanted, base, known, length, angle, track.half_turns)
+        unlike = path.turns_along | (path.orientation_path != OrientationPath.SINGLE_AXIS)
+
+        def measured(block: slice) -> None:
+            rows = np.arange(block.start, block.stop)
+            start, target = begin[rows], wanted[rows]
+            end = target.position
+            way = np.linalg.norm(end - start.position, axis=1)
+            known[block] &= np.isfinite(way) & np.isfinite(start.rotation[:, 0, 0])
+            at = np.flatnonzero(known[block])
+            angle[rows[at]] = lengths(turn_between(start.rotation[at], target.rotation[at]))
+            angle[rows[unlike[rows]]] = np.inf
+            bent = np.flatnonzero(desired_path.arc[rows])
+            if len(bent):
+                centre, normal, sweep = desired_path.circles(rows[bent])
+                radius = np.linalg.norm(start.position[bent] - centre, axis=1)
+                rise = np.sum((end[bent] - start.position[bent]) * normal, axis=1)
+                way[bent] = np.hypot(radius * sweep, rise)
+            length[block] = np.where(known[block], way, 0.0)
+
+        each_block(measured, n)
+        return desired_path
+
+    @property
+    def sweep(self) -> Floats:
+        """(N,) [rad] of arcs, NaN elsewhere."""
+        return self.path.sweep
+
+    @cached_property
+    def arc(self) -> Bools:
+        """(N,) the motion is an arc."""
+        return np.asarray(np.isfinite(self.path.sweep))
+
+    def circles(self, rows: Ints) -> tuple[Floats, Floats, Floats]:
+        """Centre (K, 3) [m], normal (K, 3) and sweep (K,) of the arcs ``rows`` (K,), in the robot base."""
+        base = self.base[rows]
+        centre = base.position + turned(base.rotation, self.path.centre[rows])
+        return centre, turned(base.rotation, self.path.normal[rows]), self.path.sweep[rows]
+
+    def at(self, rows: Ints, share: Floats) -> Poses:
+        """Poses (K) at the shares (K,) of the ways of ``rows`` (K,): straight or round, turning as the program says."""
+        start, end = self.start[rows], self.end[rows]
+        found = interpolate_poses(start, end, share)
+        self._turn(rows, start, end, share, found)
+        self.turn(rows, np.zeros(len(rows)), np.ones(len(rows)), start, end, share, found)
+        bent = np.flatnonzero(np.isfinite(self.sweep[rows]))
+        if len(bent):
+            found.position[bent] = on_arc(
+                start.position[bent], end.position[bent], *self.circles(rows[bent]), share[bent]
+            )
+        return found
+
+    def _turn(self, rows: Ints, start: Poses, end: Poses, share: Floats, found: Poses) -> None:
+        """Puts the orientations of the motions that do not turn the short way into ``found`` (K)."""
+        half = self.half_turns.rows
+        if not len(half) and not self._along:
+            return
+        other = np.flatnonzero(self.path.turns_along[rows] | np.isin(rows, half))
+        if len(other):
+            at = rows[other]
+            along = self.path.arc_turn(at, self.base[at].rotation)
+            turn = turn_beside(start.rotation[other], end.rotation[other], along)
+            self.half_turns.put(at, turn)
+            found.rotation[other] = turning(start.rotation[other], turn, along, share[other])
+
+    @cached_property
+    def _along(self) -> bool:
+        return bool(self.path.turns_along.any())
+
+    def turn(
+        self, rows: Ints, first: Floats, last: Floats, start: Poses, end: Poses, share: Floats, found: Poses
+    ) -> None:
+        """Turns ``found`` (K), at the shares (K,) between ``start`` and ``end`` (K), as the controller does on a part,
+        ``first`` to ``last`` (K,), of the ways of ``rows`` (K,) (``OrientationPath``)."""
+        interpolate_orientation(
+            self.path,
+            self.base,
+            self.end,
+            rows,
+            first,
+            last,
+            start.rotation,
+            end.rotation,
+            share,
+            found.rotation,
+        )
+
+    def tangent(self, rows: Ints, share: Floats) -> Floats:
+        """(K, 3) unit vectors along the ways of ``rows`` (K,) at the shares (K,); zero where a motion only turns the
+        tool."""
+        step = self.end[rows].position - self.start[rows].position
+        bent = np.flatnonzero(np.isfinite(self.sweep[rows]))
+        if len(bent):
+            at = rows[bent]
+            here = self.at(at, share[bent]).position
+            centre, normal, sweep = self.circles(at)
+            rise = np.sum(step[bent] * normal, axis=1)[:, None]
+            step[bent] = sweep[:, None] * np.cross(normal, here - centre) + rise * normal
+        length = np.linalg.norm(step, axis=1, keepdims=True)
+        return np.where(length > _NO_MOVE, step / np.maximum(length, _NO_MOVE), 0.0)
+
+
+def start_poses(
+    end: Placed, path: Toolpath, tool: Poses, robot: Robot, track: AxisTrack, external: External | None = None
+) -> PoseRows:
+    """Where each motion starts (N): the end pose of the one before it, with the tool of its own; NaN for the first one
+    and after a motion to an unknown place.  ``external``: in whose path axes ``end`` is, each in those of its own."""
+
+    def made(rows: Ints) -> Poses:
+        before = np.maximum(rows - 1, 0)
+        found = end[before].copy()
+        other = np.flatnonzero((path.tool[rows] != path.tool[before]) & path.known[before])
+        if len(other):
+            found.put(other, found[other] @ tool[before[other]].inverse() @ tool[rows[other]])
+        if external is not None and (moved := np.flatnonzero(external.changes_carrier[rows])).size:
+            found.put(moved, external.begin_from_end(rows[moved]) @ found[moved])
+        behind_axes = np.flatnonzero(~path.known[before])
+        behind_axes = behind_axes[np.isfinite(track.q[before[behind_axes]]).all(axis=1)]
+        if len(behind_axes):
+            flange = nominal_flange(robot, track.q[before[behind_axes]])
+            if external is not None:
+                flange = external.in_path(rows[behind_axes], np.zeros(len(behind_axes)), flange)
+            found.put(behind_axes, flange @ tool[rows[behind_axes]])
+        found.put(rows == 0, UNKNOWN)
+        return found
+
+    return PoseRows(len(path), made)
+
+
+def interpolate_poses(start: Poses, end: Poses, share: Floats) -> Poses:
+    """Straight from ``start`` to ``end`` (K), turning evenly about one axis, at the shares (K,)."""
+    return interpolate_pose(start, end, share[:, None])

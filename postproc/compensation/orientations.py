@@ -1,0 +1,157 @@
+"""How the orientation runs between two commands, and which orientations the words of a program can say."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.base import rotary_words
+from postproc.base.arrays import Floats, Ints
+from postproc.base.geometry import Placed, Poses, product, rotation_from_vector, turned
+from postproc.toolpath import OrientationPath, Toolpath
+
+_OPPOSITE = 1e-6
+"""[rad] Directions that are nearer to opposite have no great circle."""
+
+
+def interpolate_orientation(
+    path: Toolpath,
+    base: Poses,
+    wanted: Placed,
+    rows: Ints,
+    first: Floats,
+    last: Floats,
+    begin: Floats,
+    end: Floats,
+    share: Floats,
+    into: Floats,
+) -> None:
+    """Puts into ``into`` (K, 3, 3) the orientations at the shares (K,) between ``begin`` and ``end`` (K, 3, 3) where
+    they run otherwise than evenly about one axis.
+
+    ``first``, ``last`` (K,): where start and end lie, as shares of the paths of the motions ``rows`` (K,).  ``base``,
+    ``wanted`` (N): bases and targets of the motions.  All orientations are in the robot base.
+    """
+    if not path.turns_by_words:
+        return
+    law = path.orientation_path[rows]
+    at = np.flatnonzero(law == OrientationPath.ROTARY_AXES)
+    if len(at):
+        words = _Words.of(path, base, wanted, rows[at])
+        one, two = words.inside(begin[at]), words.inside(end[at])
+        start = rotary_words.angles_of(one, path.rotary_at(rows[at], first[at]))
+        stop = rotary_words.angles_of(two, path.rotary_at(rows[at], last[at]))
+        # What the words do not say (another base or tool before) turns evenly.
+        said = rotary_words.reproduced(one, start) & rotary_words.reproduced(two, stop)
+        here = words.outside(rotary_words.rotation_of(start + share[at][:, None] * (stop - start)))
+        into[at[said]] = here[said]
+    at = np.flatnonzero(law == OrientationPath.GREAT_CIRCLE)
+    if len(at):
+        here, known = _on_great_circle(begin[at], end[at], path.redundant_axis[rows[at]], share[at])
+        into[at[known]] = here[known]
+
+
+def _on_great_circle(start: Floats, end: Floats, tool: Floats, share: Floats) -> tuple[Floats, Floats]:
+    """R(t) = G(t) R(0) S(t): G turns the direction of ``tool`` (K, 3, in tool axes) the shortest way, S about the tool.
+
+    Gives (K, 3, 3), and (K,) where there is one such way.
+    """
+    one, two = turned(start, tool), turned(end, tool)
+    axis = np.cross(one, two)
+    sine = np.linalg.norm(axis, axis=1)
+    angle = np.arctan2(sine, np.sum(one * two, axis=1))
+    known = np.isfinite(angle) & (angle < np.pi - _OPPOSITE)
+    vector = axis * (angle / np.where(sine > 0, sine, 1.0))[:, None]
+    vector, tool = (np.where(known[:, None], part, 0.0) for part in (vector, tool))
+    # the spin: what is left of R(1) after the great circle turns about the tool
+    left = product(np.swapaxes(product(rotation_from_vector(vector), start), 1, 2), end)
+    odd = np.stack([left[:, k, j] - left[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))], axis=-1)
+    trace = np.trace(left, axis1=1, axis2=2)
+    spin = np.arctan2(0.5 * np.sum(odd * tool, axis=1), 0.5 * (trace - 1.0))
+    path = rotation_from_vector(share[:, None] * vector)
+    turn = rotation_from_vector((share * spin)[:, None] * tool)
+    return product(product(path, start), turn), known
+
+
+class _Words:
+    """K motions: words say R(words) between the base and the tool as it is at A = B = C = 0."""
+
+    def __init__(self, base: Floats, tool: Floats) -> None:
+        self._base, self._tool = base, tool
+
+    @staticmethod
+    def of(path: Toolpath, base: Poses, wanted: Placed, rows: Ints) -> _Words:
+        frame = np.broadcast_to(base.shared(rows).rotation, (len(rows), 3, 3))
+        back = np.swapaxes(product(frame, rotary_words.rotation_of(path.rotary_to[rows])), 1, 2)
+        return _Words(frame, product(back, wanted[rows].rotation))
+
+    def inside(self, rotation: Floats) -> Floats:
+        """What the words have to say (K, 3, 3) of orientations in the robot base."""
+        return product(product(np.swapaxes(self._base, 1, 2), rotation), np.swapaxes(self._tool, 1, 2))
+
+    def outside(self, rotation: Floats) -> Floats:
+        """And back."""
+        return product(product(self._base, rotation), self._tool)
+
+
+def pairs(path: Toolpath, rows: Ints) -> Ints:
+    """Places (P,) among ``rows`` (K,) of the motions that two rotary axes turn and whose words can be written."""
+    if not path.turns_by_words:
+        return rows[:0]
+    by_axes = (path.orientation_path[rows] == OrientationPath.ROTARY_AXES) & path.orientation_programmed[rows]
+    # All motions of a program use the same words.
+    two = np.isfinite(path.rotary_to[rows]).sum(axis=1) == 2
+    return np.flatnonzero(by_axes & two)
+
+
+def nearest_expressible(
+    path: Toolpath, base: Poses, wanted: Placed, rows: Ints, share: Floats, rotation: Floats
+) -> Floats:
+    """(K, 3, 3) orientations that the pair of axes of motions ``rows`` (K,) says near its place at the shares (K,) of
+    their paths, with the tool along that of ``rotation`` (K, 3, 3) as far as they can: ``rotary_words.pointing``."""
+    words = _Words.of(path, base, wanted, rows)
+    tool = words.inside(rotation)[:, :, 2]
+    return words.outside(rotary_words.rotation_of(rotary_words.pointing(tool, path.rotary_at(rows, share))))
+
+
+POLE = np.radians(1.0)
+"""[rad] Lean at which a pair of axes is near its pole: farther away even segments become longer with the lean."""
+
+
+def spread(path: Toolpath, rows: Ints, low: Floats, high: Floats, part: Floats) -> Floats:
+    """(K,) shares of the ways of ``rows`` (K,): the parts ``part`` (K,), 0 to 1, of what lies between the shares
+    ``low`` and ``high`` (K,).
+
+    Evenly; where a pair of axes turns evenly in u = asinh(lean / POLE), because the outer one turns with 1 / lean.
+    """
+    found = low + part * (high - low)
+    at, (start, stop) = _leans(path, rows, low, high)
+    if len(at):
+        one, two = np.arcsinh(start / POLE), np.arcsinh(stop / POLE)
+        lean = POLE * np.sinh(one + part[at] * (two - one))
+        found[at] = low[at] + (high[at] - low[at]) * (lean - start) / (stop - start)
+    return np.where(part == 1.0, high, found)
+
+
+def shortest(path: Toolpath, rows: Ints, low: Floats, high: Floats) -> Floats:
+    """(K,) by which factor the shortest of many segments of ``spread``, from the shares ``low`` to ``high`` (K,) of
+    motions ``rows`` (K,), is shorter than an even one."""
+    found = np.ones(len(rows))
+    at, (start, stop) = _leans(path, rows, low, high)
+    if len(at):
+        one, two = np.arcsinh(start / POLE), np.arcsinh(stop / POLE)
+        nearest = np.where(start * stop < 0, 0.0, np.minimum(np.abs(one), np.abs(two)))
+        found[at] = np.minimum(1.0, np.cosh(nearest) * POLE * (two - one) / (stop - start))
+    return found
+
+
+def _leans(path: Toolpath, rows: Ints, low: Floats, high: Floats) -> tuple[Ints, tuple[Floats, Floats]]:
+    """Places among ``rows`` (K,) of motions whose lean from the outer axis changes, and the leans [rad] at the shares
+    ``low`` and ``high`` (K,) of their paths."""
+    at = pairs(path, rows)
+    if not len(at):
+        return at, (low[at], high[at])
+    ends = [rotary_words.lean(path.rotary_at(rows[at], share[at])) for share in (low, high)]
+    half = np.pi * np.rint(0.5 * (ends[0] + ends[1]) / np.pi)  # the pole that lies nearest
+    start, stop = ends[0] - half, ends[1] - half
+    some = np.abs(stop - start) > 0.1 * POLE
+    return at[some], (start[some], stop[some])

@@ -1,0 +1,65 @@
+"""Where the force steps inside a cut it is given a ramp, on which the correction can follow it without going back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.base.arrays import Floats, Ints
+from postproc.base.batches import each_block
+from postproc.compensation.problem import CompensationProblem
+
+ASSUMED = 5e-3
+"""[m] Length of a ramp where neither the cell nor the process states it or the cutter's radius."""
+
+SHORTEST = 1e-4
+"""[m] A ramp is no shorter."""
+
+SAME = 1e-9
+"""Share of the largest force: what changes by less goes on."""
+
+STEEPEST = 0.9
+"""By how much a correction may go back along the feed on a ramp, m per m of path: no motion on it leads backwards."""
+
+
+def add_force_ramps(task: CompensationProblem, ramp: Floats | float) -> CompensationProblem:
+    """The task, in which no force steps inside a cut: each step that is not measured goes over along ``ramp`` (N,) [m]
+    of the path after it, or along as much more as a correction needs that goes back along the feed (``STEEPEST``)."""
+    if task.force.measured:
+        return task
+    rows = task.force.inner_steps
+    known = task.desired_path.traceable[rows] & task.toolpath.known[rows - 1]
+    known &= (task.track.status[rows] >= 0) & task.track.reachable[rows] & task.track.reachable[rows - 1]
+    known &= task.toolpath.tool[rows] == task.toolpath.tool[rows - 1]
+    away = np.abs(task.force.start[rows] - task.force.values[rows - 1]).max(axis=1, initial=0.0)
+    rows = rows[known & (away > SAME * max(1.0, task.force.max_force))]
+    if not len(rows):
+        return task
+    tangent = task.desired_path.tangent(rows, np.zeros(len(rows)))
+    back = -np.nan_to_num(np.sum(correction_steps(task, rows) * tangent, axis=1))
+    asked = np.broadcast_to(ramp, (len(task.toolpath),))[rows]
+    length = np.maximum(np.maximum(asked, SHORTEST), back / STEEPEST)
+    desired_path = task.desired_path
+    task = replace(task, force=task.force.ramped(rows, length, desired_path.length), ramp=float(asked.min()))
+    vars(task)["desired_path"] = desired_path  # forces change no path
+    return task
+
+
+def correction_steps(task: CompensationProblem, rows: Ints) -> Floats:
+    """(K, 3) [m] by how much the correction would step where the motions ``rows`` (K,) begin: that under the force with
+    which they start, less that under the force with which the motion before them ends."""
+    found = np.empty((len(rows), 3))
+
+    def stepped(part: slice) -> None:
+        at = rows[part]
+        wanted = task.desired_path.at(at, np.zeros(len(at)))
+        goal = task.goal(at, wanted)
+        new, old = (
+            task.command(at, wanted, wrench, goal).command.position
+            for wrench in (task.force.start[at], task.force.values[at - 1])
+        )
+        found[part] = new - old
+
+    each_block(stepped, len(rows))
+    return found

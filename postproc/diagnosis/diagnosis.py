@@ -1,0 +1,75 @@
+"""The whole way from readings to a verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.base.findings import Finding, Refusal
+from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
+from postproc.diagnosis.search import Search, model_unknowns, search, with_effects
+from postproc.diagnosis.verdict import BEYOND_TELLING, OTHER_COURSE, Verdict, judge, refitted
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import Fit, fit
+from postproc.model import StiffnessModel
+
+FEWEST_POSES = 8
+"""Of fewer nothing can be said."""
+
+AGAIN = 3
+"""Times that the search is done again without what did not hold."""
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """stated: the robot file as it is, tracker and targets found; where: patterns in what it leaves; search, verdict;
+    final: the final model, of what is named, or of its own parameters refitted."""
+
+    stated: Fit
+    where: tuple[ResidualPattern, ...]
+    search: Search
+    verdict: Verdict
+    final: Fit
+
+
+def diagnose(
+    campaign: Campaign, model: StiffnessModel, stage: Callable[[str], None] = lambda name: None
+) -> Diagnosis:
+    """Raises Refusal DIA001 with too few poses for any verdict, and as ``fit`` does."""
+    if campaign.poses < FEWEST_POSES:
+        raise Refusal(
+            Finding(
+                "DIA001",
+                f"{campaign.poses} poses are too few for a verdict; at least {FEWEST_POSES} are needed",
+                campaign.readings.where(0)[0],
+                help="`compensate plan` proposes poses to measure",
+            )
+        )
+    every = np.ones(len(campaign), bool)
+    stage("comparing")
+    stated = fit(campaign, model, (), every)
+    stage("fitting the model's own parameters")
+    base = fit(campaign, model, model_unknowns(model), every, given=stated.point.given)
+    stage("looking for what is missing")
+    found = search(campaign, base)
+    verdict = judge(found)
+    rejected = list(verdict.rejected)
+    for _ in range(AGAIN):
+        # of what has no form that is known others would only be imitations
+        if not verdict.rejected or any(why == OTHER_COURSE for _, why in verdict.rejected):
+            break
+        found = search(campaign, base, [candidate.key for candidate, _ in rejected])
+        verdict = judge(found)
+        rejected += verdict.rejected
+    if verdict.word == "nothing_missing" and any(why == BEYOND_TELLING for _, why in rejected):
+        verdict = replace(verdict, word="unknown")
+    names = [named.candidate for named in verdict.named]
+    final = found.base
+    if names and verdict.word != "ambiguous":
+        final = found.final if len(names) == len(found.chosen) else with_effects(campaign, found.base, names)
+    # of a model that lacks something its own parameters stand for that
+    moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
+    verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
+    return Diagnosis(stated, residual_patterns(stated, found.final), found, verdict, final)

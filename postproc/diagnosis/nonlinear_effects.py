@@ -1,0 +1,98 @@
+"""Effects that do not grow in proportion: their columns where they are as large as the readings ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.base.arrays import Floats
+from postproc.identification.campaign import Campaign
+from postproc.identification.least_squares import Point, at, scales, with_columns
+from postproc.identification.unknowns import Unknown
+from postproc.model import StiffnessModel
+
+STEPS = 8
+
+SAME = 1e-3
+"""Share of the squares left by which a step must gain to be followed by another."""
+
+DAMPING = 1e-3
+"""Of a column's length."""
+
+Outside = Callable[[Floats], Floats]
+"""Columns (R, 3 or 6, p), whitened, without what is explained anyway (n, p)."""
+
+
+class NonlinearColumns(NamedTuple):
+    """values (P,) [SI]; columns (R, 3 or 6, P) there, per scale; target (n,), left (n,): what there is to explain,
+    outside of what is explained anyway, without the effect and with it."""
+
+    values: Floats
+    columns: Floats
+    target: Floats
+    left: Floats
+
+
+def evaluate_at_size(
+    campaign: Campaign,
+    point: Point,
+    model: StiffnessModel,
+    unknowns: Sequence[Unknown],
+    outside: Outside,
+) -> NonlinearColumns:
+    """``unknowns`` of ``model`` (that of ``point`` with an effect at its null) as large as explains the most of what
+    ``point`` leaves.
+
+    Gauss-Newton from the usual size within the bounds, on what is outside of what is explained anyway; then
+    ``whole``, so that columns times values are what the effect does.
+    """
+    from scipy.optimize import lsq_linear
+
+    scale, null = scales(unknowns), np.array([u.parameter.null for u in unknowns])
+    low = (np.array([u.parameter.lower for u in unknowns]) - null) / scale
+    high = (np.array([u.parameter.upper for u in unknowns]) - null) / scale
+    target = outside(point.residual[:, :, None])[:, 0]
+
+    def taken(x: Floats, start: Floats | None) -> tuple[Point, Floats]:
+        values = {u.key: v for u, v in zip(unknowns, (null + x * scale).tolist(), strict=True)}
+        there = at(campaign, model.with_values(values), point.given, start)
+        does = np.nan_to_num(point.residual - there.residual)
+        return there, does
+
+    x = np.clip(np.ones(len(unknowns)), low, high)
+    near = point.predicted.displacement
+    there, does = taken(x, near if near.shape[1] == model.chain.size else None)
+    left = target - outside(does[:, :, None])[:, 0]
+    for _ in range(STEPS):
+        there = with_columns(campaign, there, unknowns)
+        matrix = outside(np.nan_to_num(there.taken[0]))
+        damping = DAMPING * np.diag(np.linalg.norm(matrix, axis=0) + 1e-9)
+        tall, aim = np.concatenate([matrix, damping]), np.concatenate([left, np.zeros(len(x))])
+        bounds = np.minimum(low - x, 0.0), np.maximum(high - x, 1e-300)
+        step, before = lsq_linear(tall, aim, bounds, "bvls").x, left @ left
+        for _ in range(6):
+            trial = np.clip(x + step, low, high)
+            moved, did = taken(trial, there.predicted.displacement)
+            rest = target - outside(did[:, :, None])[:, 0]
+            if rest @ rest < before:
+                break
+            step = 0.3 * step
+        else:
+            break
+        x, there, does, left = trial, moved, did, rest
+        if before - left @ left < SAME * before:
+            break
+    if there.columns is None:
+        there = with_columns(campaign, there, unknowns)
+    return NonlinearColumns(null + x * scale, whole(np.nan_to_num(there.taken[0]), does, x), target, left)
+
+
+def whole(columns: Floats, does: Floats, values: Floats) -> Floats:
+    """(R, k, P): the ``columns`` (R, k, P) nearest to those given for which columns times ``values`` (P,) is ``does``
+    (R, k): the rank-one update of Broyden."""
+    square = float(values @ values)
+    if square == 0.0:
+        return columns
+    return np.asarray(columns + (does - columns @ values)[:, :, None] * (values / square))

@@ -1,0 +1,189 @@
+"""Where model and measurement disagree: residuals mapped into the joints, against what could betray a cause."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Floats, Ints
+from postproc.base.units import DEG, MM
+from postproc.diagnosis.selection import basis_of, outside
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import Fit
+from postproc.robot.chain import generalized_force
+
+BINS, POSES = 6, 6
+"""Parts that a variable is divided into at most, and poses in each at least."""
+
+CHANCE = 0.01
+SHOWN = 8
+
+FLIPS = 4000
+"""Times that chance is asked."""
+
+
+@dataclass(frozen=True)
+class ResidualPattern:
+    """A pattern: ``variable``, the ``pattern`` in words, and the ``share`` of the squares left that follow it (adjusted
+    for the freedom of the pattern)."""
+
+    variable: str
+    pattern: str
+    share: float
+
+
+def residual_patterns(
+    fitted: Fit, against: Fit | None = None, chance: float = CHANCE
+) -> tuple[ResidualPattern, ...]:
+    """The clear patterns in what ``fitted`` leaves, largest first.
+
+    Tried are a turn of each joint that depends on its own angle, torque or sense of approach, and a shift of the tool
+    that depends on load, order, time, temperature or session; each as a step function in up to ``BINS`` parts, without
+    what the fit could have made of it.  ``chance``: probability that any is told although there is none.
+
+    What is chance is said by the scatter that ``against`` leaves, as far as that is a better model.  Without it only
+    the residuals themselves say it: readings of one pose may share errors, and a few may be wild, so the residuals of
+    each pose get a random sign (wild bootstrap by clusters; Cameron, Gelbach and Miller, Rev. Econ. Stat. 90 (2008)).
+    """
+    from scipy.stats import f
+
+    campaign, weights = fitted.campaign, (against or fitted).weights
+    left = weights(np.nan_to_num(fitted.point.residual))
+    taken = np.nan_to_num(np.concatenate([weights(part) for part in fitted.point.taken], axis=1))
+    explained_by_fit = basis_of(taken)
+    left = outside(explained_by_fit, left[:, None])[:, 0]
+    squares, rows = float(left @ left), weights.counts
+    if squares <= 0:
+        return ()
+    width = fitted.point.residual.shape[1]
+    # a residual is smaller than the scatter by what the fit took up
+    lever = 1.0 - explained_by_fit.shape[1] / rows
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], (FLIPS, campaign.poses))
+    found = []
+    tried = list(patterns(fitted, campaign))
+    for variable, values, turns, unit in tried:
+        part, parts = _parts(values, max(2, min(BINS, campaign.poses // POSES)))
+        columns = np.zeros((len(campaign), width, len(parts) if turns is not None else 3 * len(parts)))
+        columns[:, :3] = _columns(part, len(parts), turns)
+        basis = _clear(outside(explained_by_fit, weights(columns)))
+        rank = basis.shape[1]
+        if rank == 0 or rows - rank < 3:
+            continue
+        of_reading = (basis * left[:, None]).reshape(len(campaign), width, rank).sum(axis=1)
+        of_pose = np.zeros((campaign.poses, rank))
+        np.add.at(of_pose, campaign.pose, of_reading)
+        explained = float((of_pose.sum(axis=0) ** 2).sum())
+        if against is None:
+            by_chance = _probability(explained, ((signs @ of_pose) ** 2).sum(axis=1) / max(lever, 0.1))
+        else:
+            by_chance = float(f.sf(explained / rank / against.factor, rank, max(1, against.freedom)))
+        share = 1.0 - (1.0 - explained / squares) * rows / (rows - rank)
+        if by_chance * len(tried) < chance and share > 0:
+            words = _words(fitted.point.residual[:, :3], part, parts, unit)
+            if variable in ("order", "time") and _goes_with_poses(values, campaign.readings.q):
+                words += "; but the poses were taken in such an order: measure again in random order"
+            found.append(ResidualPattern(variable, words, float(share)))
+    return tuple(sorted(found, key=lambda one: -one.share)[:SHOWN])
+
+
+def _clear(columns: Floats) -> Floats:
+    """Orthonormal columns (n, r) of those that are more than rounding."""
+    if not columns.shape[1]:
+        return columns
+    u, s, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(u[:, s > max(1e-6 * s[0], 1e-6)])
+
+
+def _probability(seen: float, by_chance: Floats) -> float:
+    """That chance makes as much as ``seen``, of what it made: beyond the largest of that by the gamma distribution of
+    their mean and variance."""
+    from scipy.stats import gamma
+
+    count = int((by_chance >= seen).sum())
+    if count >= 10:
+        return (count + 1) / (len(by_chance) + 1)
+    mean, variance = float(by_chance.mean()), float(by_chance.var())
+    if variance <= 0:
+        return 1.0 if seen <= mean else 0.0
+    return float(gamma.sf(seen, mean * mean / variance, scale=variance / mean))
+
+
+def patterns(
+    fitted: Fit, campaign: Campaign
+) -> Iterator[tuple[str, Floats, Floats | None, tuple[str, float]]]:
+    """Name, value (R,), what a turn of a joint does (R, 3), None for shifts, and unit of each variable."""
+    readings, seen = campaign.readings, fitted.point.predicted
+    chain = fitted.model.chain
+    coordinates = chain.placed(readings.q)
+    swept = chain.evaluate(coordinates, campaign.tool)
+    points = campaign.points(seen, fitted.point.given.places, campaign.at)
+    torque = generalized_force(swept, swept.position, readings.wrench.T)
+    loaded = bool(readings.wrench.any())
+    for i, joint in enumerate(fitted.model.robot.joints):
+        row = chain.motor_rows[i]
+        axis = swept.axes[row].T
+        turn = axis if joint.kind != "revolute" else np.cross(axis, points - swept.origins[row].T)
+        if campaign.tracked:
+            frames = fitted.point.given.frames.rotation[readings.session]
+            turn = (frames @ turn[:, :, None])[:, :, 0]
+        angle = ("deg", DEG) if joint.kind == "revolute" else ("mm", MM)
+        yield f"{joint.name} over its angle", readings.q[:, i], turn, angle
+        if loaded and np.ptp(torque[row]) > 0:
+            yield f"{joint.name} over its torque", torque[row], turn, ("N m", 1.0)
+        sense = campaign.conditions.direction
+        if sense is not None and np.ptp(sense[campaign.at, i]) > 0:
+            yield f"{joint.name} over its approach", sense[campaign.at, i], turn, ("", 1.0)
+    force = np.linalg.norm(readings.wrench[:, :3], axis=1)
+    if np.ptp(force) > 0:
+        yield "load", force, None, ("N", 1.0)
+    yield "order", np.arange(len(readings), dtype=float), None, ("", 1.0)
+    for name, values, unit in (("time", readings.time, "s"), ("temperature", readings.temperature, "degC")):
+        if values is not None and np.ptp(values) > 0:
+            yield name, values, None, (unit, 1.0)
+    if len(readings.sessions) > 1:
+        yield "session", readings.session.astype(float), None, ("", 1.0)
+
+
+def _parts(values: Floats, count: int) -> tuple[Ints, Floats]:
+    """The part (R,) of ``count`` or less each value falls in, and where the parts begin and end (k, 2)."""
+    distinct = np.unique(values)
+    if len(distinct) <= count:
+        return np.searchsorted(distinct, values), np.stack([distinct, distinct], axis=1)
+    edges = np.unique(np.quantile(values, np.linspace(0, 1, count + 1)))
+    part = np.clip(np.searchsorted(edges, values, "right") - 1, 0, len(edges) - 2)
+    return part, np.stack([edges[:-1], edges[1:]], axis=1)
+
+
+def _columns(part: Ints, parts: int, turns: Floats | None) -> Floats:
+    """(R, 3, k): a turn, or shifts along three axes, in each part."""
+    on = (part[:, None] == np.arange(parts)).astype(float)
+    if turns is not None:
+        return np.asarray(turns[:, :, None] * on[:, None, :])
+    return np.asarray(np.eye(3)[None, :, :, None] * on[:, None, None, :]).reshape(len(part), 3, -1)
+
+
+def _words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float]) -> str:
+    count = range(len(parts))
+    size = np.array(
+        [np.sqrt(3 * np.nanmean(residual[part == k] ** 2)) if (part == k).any() else np.nan for k in count]
+    )
+    most, least = int(np.nanargmax(size)), int(np.nanargmin(size))
+
+    def span(k: int) -> str:
+        low, high = parts[k] / unit[1]
+        return f"{low:.4g}{f' .. {high:.4g}' if high > low else ''}{f' {unit[0]}' if unit[0] else ''}"
+
+    return f"{size[most] / MM:.3g} mm at {span(most)}, {size[least] / MM:.3g} mm at {span(least)}"
+
+
+def _goes_with_poses(values: Floats, q: Floats) -> bool:
+    """Whether the joints tell most of ``values`` (R,): what depends on one cannot be distinguished from the other."""
+    spread = np.where(np.ptp(q, axis=0) > 0, np.ptp(q, axis=0), 1.0)
+    scaled = (q - q.mean(axis=0)) / spread
+    matrix = np.column_stack([np.ones(len(q)), scaled, scaled**2])
+    if len(q) < 3 * matrix.shape[1]:
+        return False
+    left = values - matrix @ np.linalg.lstsq(matrix, values, rcond=None)[0]
+    return bool(left @ left < 0.5 * ((values - values.mean()) ** 2).sum())

@@ -1,0 +1,187 @@
+"""Poses that distinguish two effects: where each, fitted to what the other would show, fails most (T-optimal)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Floats
+from postproc.experiments.candidate_setups import CandidateSetups, Setups, drawn, spacings
+from postproc.experiments.criteria import Disagreement
+from postproc.experiments.exchange import CandidateSet, exchanged, grown
+from postproc.experiments.observability import Observability, expected, observability
+from postproc.experiments.pool import (
+    CANDIDATES,
+    Choice,
+    Pool,
+    Stage,
+    enough,
+    pooled,
+    refined,
+    rested,
+    silent,
+)
+from postproc.identification.unknowns import Unknown
+from postproc.model import StiffnessModel
+
+LOOSE = 1e-4
+"""Length of the rows that hold what is fitted, columns of length one: what no setup shows is fitted to nothing."""
+
+
+@dataclass(frozen=True)
+class CompetingModel:
+    """An explanation at C setups, whitened: ``pattern`` (C, r, k) that it would show, or several where nothing is known
+    but sizes; ``columns`` (C, r, P): what a fit of it can imitate."""
+
+    pattern: Floats
+    columns: Floats
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """setups: rows of the choice; separation: standard deviations by which it shows that the first is no case of the
+    second, and the other way round."""
+
+    setups: tuple[int, ...]
+    separation: tuple[float, float]
+
+
+def rivalry(
+    first: CompetingModel, second: CompetingModel, common: Floats, q: Floats, spacing: Floats
+) -> tuple[CandidateSet, Disagreement]:
+    """The choices, and what is to be made large: ``common`` (C, r, U) is fitted by both; q (C, n), spacing (n,) as in
+    ``CandidateSet``."""
+    fitted = np.concatenate([common, first.columns, second.columns], axis=2)
+    length = np.linalg.norm(fitted, axis=(0, 1))
+    fitted = fitted / np.where(length > 0, length, 1.0)
+    k, u = (first.pattern.shape[2], second.pattern.shape[2]), common.shape[2]
+    p, shown = (first.columns.shape[2], second.columns.shape[2]), sum(k)
+    shared = np.arange(shown, shown + u)
+    own = np.arange(shown + u, shown + u + p[0])
+    other = np.arange(shown + u + p[0], shown + u + sum(p))
+    pairs = (
+        (np.arange(k[0]), np.concatenate([shared, other])),
+        (np.arange(k[0], shown), np.concatenate([shared, own])),
+    )
+    base = np.diag(np.repeat([0.0, LOOSE**2], [shown, fitted.shape[2]]))
+    rows = np.concatenate([first.pattern, second.pattern, fitted], axis=2)
+    return CandidateSet(rows, q, spacing, base), Disagreement(pairs)
+
+
+def discriminating(
+    first: CompetingModel,
+    second: CompetingModel,
+    common: Floats,
+    q: Floats,
+    spacing: Floats,
+    count: int,
+    begun: Sequence[int] = (),
+) -> Chosen:
+    """The ``count`` setups that keep the two furthest apart, the smaller of both separations; ``common`` (C, r, U),
+    ``q`` (C, n), ``spacing`` (n,) as of ``rivalry``.
+
+    ``begun``: a choice to start with.
+    """
+    choices, criterion = rivalry(first, second, common, q, spacing)
+    chosen, _ = exchanged(choices, criterion, grown(choices, criterion, begun, count))
+    one, two = np.sqrt(criterion.separations(choices.information(chosen))).tolist()
+    return Chosen(tuple(chosen), (one, two))
+
+
+@dataclass(frozen=True)
+class Discrimination:
+    """Poses that distinguish two effects, by their number, and the separations [standard deviations]: that the first is
+    no case of the second, and the other way round.  candidates: number of poses to choose from."""
+
+    candidates: int
+    chosen: dict[int, Setups]
+    separation: dict[int, tuple[float, float]]
+
+
+def apart(
+    model: StiffnessModel,
+    first: Sequence[Unknown],
+    second: Sequence[Unknown],
+    common: Sequence[Unknown],
+    offer: CandidateSetups,
+    sizes: Iterable[int],
+    seed: int = 1,
+    candidates: int = CANDIDATES,
+    stage: Stage = silent,
+) -> Discrimination:
+    """Poses at which two effects, given by their parameters in ``model``, disagree most when each is fitted, together
+    with ``common`` and the nuisances, to what the other would show.
+
+    An effect shows what its values in the model make of it; one without values shows each of its parameters at its
+    usual size, in the mean.  Dimensions of hardware that are known are not fitted.
+
+    Raises Refusal PLN001 (no pose can be measured), PLN003 (no rest), PLN004 (not enough distinct poses).
+    """
+    rng = np.random.default_rng(seed)
+    stage("looking for poses")
+    setups = drawn(model, offer, candidates, rng)
+    one, two, both = ([u for u in unknowns if u.prior is None] for unknowns in (first, second, common))
+    spacing = spacings(model.robot, offer.spacing)
+    widths = [_patterns(model, one), _patterns(model, two), len(one), len(two)]
+    separation: dict[int, tuple[float, float]] = {}
+
+    def evaluated(some: Setups) -> Pool:
+        alternatives = _alternative(model, one, two, offer, some), _alternative(model, two, one, offer, some)
+        fitted = observability(model, both, offer, some)
+        parts = [alternative.pattern for alternative in alternatives] + [
+            alternative.columns for alternative in alternatives
+        ]
+        columns = np.concatenate([*parts, fitted.columns, fitted.nuisance], axis=2)
+        return pooled(some, Observability(columns, columns[:, :, :0], ()))
+
+    def chosen_from(pool: Pool, begun: Choice) -> Choice:
+        parts = np.split(pool.shown.columns, np.cumsum(widths), axis=2)
+        alternatives = CompetingModel(parts[0], parts[2]), CompetingModel(parts[1], parts[3])
+        found: dict[int, Sequence[int]] = {}
+        last: Sequence[int] = ()
+        for size in sorted(sizes):
+            done = discriminating(
+                *alternatives, parts[4], pool.setups.q, spacing, size, begun.get(size, last)
+            )
+            found[size] = last = done.setups
+            separation[size] = done.separation
+        return found
+
+    stage("computing what poses show")
+    start = rested(model, setups, evaluated)
+    pool, chosen = refined(model, offer, start, evaluated, chosen_from, rng, stage)
+    for size, rows in chosen.items():
+        enough(model, offer, size, len(rows))
+    return Discrimination(
+        len(start), {size: pool.setups[list(rows)] for size, rows in chosen.items()}, separation
+    )
+
+
+def _patterns(model: StiffnessModel, own: Sequence[Unknown]) -> int:
+    """How many patterns an effect may show: one where it has values."""
+    return 1 if _has_values(model, own) else len(own)
+
+
+def _has_values(model: StiffnessModel, own: Sequence[Unknown]) -> bool:
+    return any(model.terms[u.term].values[u.parameter.name] != u.parameter.null for u in own)
+
+
+def _alternative(
+    model: StiffnessModel,
+    own: Sequence[Unknown],
+    other: Sequence[Unknown],
+    offer: CandidateSetups,
+    setups: Setups,
+) -> CompetingModel:
+    """One explanation, in a model without the other."""
+    without = model.with_values({u.key: u.parameter.null for u in other})
+    if not _has_values(model, own):
+        columns = observability(
+            without.with_values({u.key: u.parameter.scale for u in own}), own, offer, setups
+        ).columns
+        return CompetingModel(columns, columns)
+    bare = without.with_values({u.key: u.parameter.null for u in own})
+    pattern = expected(without, offer, setups) - expected(bare, offer, setups)
+    return CompetingModel(pattern[:, :, None], observability(without, own, offer, setups).columns)

@@ -1,0 +1,173 @@
+"""Weighted non-linear least squares on the solved model: Gauss-Newton with bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.base.arrays import Floats
+from postproc.identification.campaign import Campaign, Nuisances, PredictedReadings
+from postproc.identification.noise import Weighting
+from postproc.identification.sensitivities import columns
+from postproc.identification.unknowns import Unknown
+from postproc.model import StiffnessModel
+
+MAX_STEPS = 30
+
+CLOSE = 1e-3
+"""A step that moves the prediction by less than this share of its scatter is the last."""
+
+STRAIGHT = 0.01
+"""Where a step's effect was foreseen to this share, the columns are kept."""
+
+DAMPING, LOOSE = 1e-5, 1e-7
+"""Of a column's length: what no reading sees stays where it is, parameters rather than tracker and targets."""
+
+
+BENT, CAREFUL = 0.3, 1e-4
+"""Share of a step's effect that may come otherwise than foreseen, and the damping that the next step starts with
+then."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A model among the possible ones.  residual (R, 3 or 6) as ``Campaign.residual``; ``columns`` (R, 3 or 6, P) of
+    the unknowns and ``nuisance`` (R, 3 or 6, U), taken here or where the way was straight from."""
+
+    model: StiffnessModel
+    given: Nuisances
+    predicted: PredictedReadings
+    residual: Floats
+    columns: Floats | None = None
+    nuisance: Floats | None = None
+    settled: bool = False
+
+    @property
+    def taken(self) -> tuple[Floats, Floats]:
+        """columns (R, 3 or 6, P) and nuisance (R, 3 or 6, U), which must have been taken.  Raises ValueError where they
+        were not."""
+        if self.columns is None or self.nuisance is None:
+            raise ValueError("the columns of this point are not computed")
+        return self.columns, self.nuisance
+
+    def values(self, unknowns: Sequence[Unknown]) -> Floats:
+        """(P,) [SI]"""
+        return np.array([self.model.terms[u.term].values[u.parameter.name] for u in unknowns])
+
+
+def at(campaign: Campaign, model: StiffnessModel, given: Nuisances, start: Floats | None = None) -> Point:
+    """The point of ``model`` with nuisances ``given``; ``start`` (S, m) [rad, m]: displacements nearby."""
+    seen = campaign.predicted(model, start)
+    return Point(model, given, seen, campaign.residual(seen, given))
+
+
+def with_columns(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Point:
+    """The point with its columns, taken here."""
+    return replace(
+        point,
+        columns=columns(campaign, point.model, unknowns, point.predicted, point.given),
+        nuisance=campaign.nuisance_columns(point.predicted, point.given),
+    )
+
+
+def scales(unknowns: Sequence[Unknown]) -> Floats:
+    """(P,) [SI] the unit in which each unknown counts."""
+    return np.array([unknown.parameter.scale for unknown in unknowns])
+
+
+def prior_rows(unknowns: Sequence[Unknown]) -> Floats:
+    """(P, P) diagonal: scale over standard deviation of the unknowns with a prior, 0 else."""
+    return np.diag([0.0 if u.prior is None else u.parameter.scale / u.prior for u in unknowns])
+
+
+def descended(
+    campaign: Campaign,
+    point: Point,
+    unknowns: Sequence[Unknown],
+    weights: Weighting,
+    keep_columns: bool = False,
+    max_steps: int = MAX_STEPS,
+    factor: float = 1.0,
+) -> Point:
+    """The least squares of ``weights(residual)`` and the priors, from ``point``.
+
+    ``keep_columns``: those of ``point`` serve all through, for fits that end close by.  ``factor``: variance of the
+    readings over the one of ``weights``; priors count the more against it.  Each linear problem is solved
+    within the bounds (scipy's lsq_linear); steps are halved until the squares fall.
+    """
+    from scipy.optimize import lsq_linear
+
+    scale, prior = scales(unknowns), prior_rows(unknowns) * np.sqrt(factor)
+    lower = np.array([u.parameter.lower for u in unknowns]) / scale
+    upper = np.array([u.parameter.upper for u in unknowns]) / scale
+    wanted = np.array([u.value for u in unknowns]) / scale
+    loose = np.full(len(campaign.nuisance_names), np.inf)
+
+    def residuals(candidate: Point) -> tuple[Floats, int]:
+        x = candidate.values(unknowns) / scale
+        left = np.concatenate([weights(candidate.residual), prior @ (wanted - x)])
+        lost = (weights.weight > 0) & ~np.isfinite(candidate.residual)
+        return left, int(lost.sum())
+
+    left, lost = residuals(point)
+    fresh, careful = point.columns is not None, 0.0
+    for _ in range(max_steps):
+        if not fresh:
+            point, fresh = with_columns(campaign, point, unknowns), True
+        x = point.values(unknowns) / scale
+        matrix = np.concatenate([weights(part) for part in point.taken], axis=1)
+        extra = np.concatenate([prior, np.zeros((len(x), len(loose)))], axis=1)
+        matrix = np.nan_to_num(np.concatenate([matrix, extra]))
+        if matrix.shape[1] == 0:
+            return replace(point, settled=True)
+        length = np.linalg.norm(matrix, axis=0)
+        # a column of nothing may grow with the others, however straight their path is
+        awake = length > 0
+        length[~awake] = 1.0
+        # many rows to as many as there are columns, which say the same
+        damping = np.maximum(np.repeat([DAMPING, LOOSE], [len(x), len(loose)]), careful)
+        tall = np.block([[matrix / length, left[:, None]], [np.diag(damping), np.zeros((len(length), 1))]])
+        reduced = np.asarray(np.linalg.qr(tall, mode="r"))
+        system, right = reduced[:-1, :-1], reduced[:-1, -1]
+        low, high = np.concatenate([lower - x, -loose]) * length, np.concatenate([upper - x, loose]) * length
+        whole = np.linalg.lstsq(system, right, rcond=None)[0]
+        if np.any(whole < low) or np.any(whole > high):
+            whole = lsq_linear(system, right, (np.minimum(low, 0.0), np.maximum(high, 0.0)), "bvls").x
+        whole = whole / length
+        share, moved, after, gone = 1.0, point, left, lost
+        for _ in range(12):
+            moved = _stepped(campaign, point, unknowns, share * whole, scale)
+            after, gone = residuals(moved)
+            if gone <= lost and after @ after <= left @ left * (1 + 1e-12):
+                break
+            share *= 0.5
+        else:
+            return replace(point, settled=True)
+        foreseen = matrix @ (share * whole)
+        size = float(np.linalg.norm(foreseen))
+        astray = float(np.linalg.norm(left - foreseen - after))
+        fresh = keep_columns or (share == 1.0 and astray < STRAIGHT * size and bool(awake[: len(x)].all()))
+        # a step that went astray went too far along what is hardly seen (Levenberg)
+        bent = share < 1.0 or astray > BENT * size
+        careful = min(max(30.0 * careful, CAREFUL), 0.1) if bent else careful / 10.0
+        scatter = np.sqrt(after @ after / max(1, len(after) - len(length)))
+        point, left, lost = moved, after, gone
+        if share == 1.0 and (size < CLOSE * scatter or size <= 1e-9):
+            return replace(point, settled=True)
+    return point
+
+
+def _stepped(
+    campaign: Campaign, point: Point, unknowns: Sequence[Unknown], step: Floats, scale: Floats
+) -> Point:
+    count = len(unknowns)
+    values = point.values(unknowns) + step[:count] * scale
+    bounded = {
+        u.key: float(np.clip(value, u.parameter.lower, u.parameter.upper))
+        for u, value in zip(unknowns, values, strict=True)
+    }
+    model = point.model.with_values(bounded) if bounded else point.model
+    moved = at(campaign, model, campaign.moved(point.given, step[count:]), point.predicted.displacement)
+    return replace(moved, columns=point.columns, nuisance=point.nuisance)

@@ -1,0 +1,299 @@
+"""Data that cannot be what they say: degrees that are radians, millimetres that are metres, exchanged columns.
+
+What can be seen of the numbers alone is looked at before anything is fitted.  What shows in how badly a model fits is
+tried out: the one change to the data that makes the fit much better is named.  Nothing is ever changed silently.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from postproc.base.arrays import Floats
+from postproc.base.findings import Finding, Refusal
+from postproc.base.units import DEG, MM
+from postproc.identification.campaign import Campaign
+from postproc.identification.least_squares import at, descended
+from postproc.identification.noise import noise_of, weighting
+from postproc.identification.registration import registered
+from postproc.identification.unknowns import Unknown
+from postproc.measurements import Readings
+from postproc.model import StiffnessModel
+
+TURN = 6.6
+"""[deg] A little more than the radians of a full turn."""
+
+ALIKE = 1.0 * DEG
+"""Joints that all move by less are in one pose."""
+
+STIFF, SOFT = 5e-8, 2e-4
+"""[m/N] No robot has a smaller or a larger compliance."""
+
+UNITS = (
+    (9.80665, "the forces in kg"),
+    (1.0 / 25.4, "the deflections in inches"),
+    (1e-3, "the deflections in metres"),
+    (1e3, "the deflections in micrometres, or the forces in kN"),
+)
+"""Ratio of deflections to those that the robot file foresees, and the unit that would make it so."""
+
+ABOUT, ALONG = 1.4, 0.9
+"""How far a ratio may be from that of a unit, and the cosine of deflections with those foreseen from which on there is
+a ratio."""
+
+FAR = 3.0 * MM
+"""Absolute positions that a registration leaves further away, root mean square, are looked at."""
+
+TRIED, POOR = 0.03, 0.3
+"""Shares of the deflections that a fit leaves, root mean square: from the first on changes to the data are tried out,
+from the second on it is told where none helps."""
+
+SCATTER = 2.0
+"""Times the stated scatter: what is left below that is no cause to look."""
+
+MUCH_BETTER = 1.0 / 3.0
+"""A change to the data is named if it leaves at most this share."""
+
+ENOUGH = 300
+"""Readings that show whether a fit is bad."""
+
+LOOKED_AT = 60
+"""Readings that alternatives are tried on."""
+
+LOADED = ("elastic", "gear", "sensor")
+"""Families of effects that only a load shows."""
+
+
+def check_numbers(readings: Readings, unknowns: Sequence[Unknown], model: StiffnessModel) -> None:
+    """Raises Refusal for readings whose numbers alone cannot be right: IDN010 radians, IDN011 all poses alike, IDN012
+    metres or micrometres, IDN013 no load, or always the same one where that states nothing."""
+    file = str(readings.files[0]) if readings.files else ""
+    turning = np.array([not slides for _, slides in readings.joints])
+    spread = np.ptp(readings.q, axis=0)
+    angles = np.abs(readings.q[:, turning])
+    if (
+        len(readings) > 2
+        and angles.max(initial=0.0) < TURN * DEG
+        and spread[turning].max(initial=0.0) > 0.3 * DEG
+    ):
+        raise Refusal(
+            Finding(
+                "IDN010",
+                f"no joint angle exceeds {angles.max() / DEG:.3g} deg: are they in radians?",
+                file,
+                help="the columns A1..An are in degrees",
+            )
+        )
+    if np.all(np.where(turning, spread / ALIKE, spread / (10 * MM)) < 1.0):
+        raise Refusal(
+            Finding(
+                "IDN011",
+                f"all poses are alike: no joint moves by more than {spread[turning].max(initial=0.0) / DEG:.2g} deg",
+                file,
+                help="one pose cannot separate the parameters; `compensate plan` proposes poses that do",
+            )
+        )
+    _check_loads(readings, unknowns, model, file)
+    if readings.deflection:
+        _check_size(readings, file)
+
+
+def _check_loads(readings: Readings, unknowns: Sequence[Unknown], model: StiffnessModel, file: str) -> None:
+    families = {model.terms[u.term].effect.family for u in unknowns}
+    force = readings.wrench
+    if not force.any() and readings.deflection:
+        raise Refusal(
+            Finding(
+                "IDN013",
+                "the file has deflections, but no row has a load",
+                file,
+                help="add the columns FX, FY, FZ [N], MX, MY, MZ [N m]",
+            )
+        )
+    names = sorted(
+        {model.terms[u.term].effect.name for u in unknowns if model.terms[u.term].effect.family in LOADED}
+    )
+    constant = np.ptp(force, axis=0).max() <= 1e-6 * max(1.0, float(np.abs(force).max()))
+    if not readings.deflection and force.any() and constant and families & set(LOADED):
+        raise Refusal(
+            Finding(
+                "IDN013",
+                f"the wrench is the same in all rows: its effect on {', '.join(names)} cannot be separated from the"
+                " geometry of the robot",
+                file,
+                help="measure poses with and without the load, or with loads of different size",
+            )
+        )
+
+
+def _check_size(readings: Readings, file: str) -> None:
+    """Compares deflections with what robots deflect by under these forces."""
+    size = np.linalg.norm(np.nan_to_num(readings.value), axis=1)
+    force = np.linalg.norm(readings.wrench[:, :3], axis=1)
+    both = (force > 0) & np.isfinite(readings.value).all(axis=1)
+    if not both.any():
+        return
+    gives = float(np.median(size[both] / force[both]))
+    if gives < STIFF:
+        what, like = "stiffer than any robot", "metres"
+    elif gives > SOFT:
+        what, like = "softer than any robot", "micrometres"
+    else:
+        return
+    raise Refusal(
+        Finding(
+            "IDN012",
+            f"deflections of {np.median(size[both]) / MM:.3g} mm under {np.median(force[both]):.0f} N make the robot"
+            f" {what}: are they in {like}, or the forces in another unit than N?",
+            file,
+            help="DX, DY, DZ are in mm, forces in N",
+        )
+    )
+
+
+def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unknown]) -> tuple[Finding, ...]:
+    """Raises Refusal (IDN014) for readings that fit badly, but well after one change to the data, and names it; tells
+    IDN015 where they fit badly and no change helps.
+
+    Tried are exchanged columns of joints, of measured coordinates and of forces, a wrong sign and other units.
+    """
+    if campaign.readings.rotation is not None:
+        campaign = Campaign(replace(campaign.readings, rotation=None, sigma_turn=None), campaign.stated_tool)
+    if len(campaign) > ENOUGH:
+        some = np.linspace(0, len(campaign) - 1, ENOUGH).round().astype(int)
+        campaign = Campaign(campaign.readings.part(some), campaign.stated_tool)
+    left, signal = _remaining_share(campaign, model, unknowns)
+    if campaign.readings.deflection:
+        _check_scale(campaign, model)
+    if not _badly(campaign, left, signal, TRIED):
+        return ()
+    some = np.unique(np.linspace(0, len(campaign) - 1, LOOKED_AT).round().astype(int))
+    if len(campaign) <= LOOKED_AT:
+        some = np.arange(len(campaign))
+    few = campaign.readings.part(some)
+    here, _ = _remaining_share(Campaign(few, campaign.stated_tool), model, unknowns)
+    best, word = np.inf, ""
+    for words, changed in _alternatives(few, campaign):
+        there = _remaining_share(Campaign(changed, campaign.stated_tool), model, unknowns)[0]
+        if there < best:
+            best, word = there, words
+    file = str(campaign.readings.files[0]) if campaign.readings.files else ""
+    if best < MUCH_BETTER * here:
+        raise Refusal(
+            Finding(
+                "IDN014",
+                f"the readings do not fit this robot ({here / MM:.3g} mm remain, root mean square), but they do with"
+                f" {word} ({best / MM:.3g} mm)",
+                file,
+                help="correct the file if the change is right; it is never changed silently",
+            )
+        )
+    left, _ = _remaining_share(campaign, model, unknowns, True)
+    if not _badly(campaign, left, signal, POOR):
+        return ()
+    what = f"{left / MM:.3g} mm remain, root mean square"
+    if campaign.readings.deflection:
+        what = f"{100 * left / signal:.0f} % of the deflections remain"
+    return (
+        Finding(
+            "IDN015",
+            f"the readings do not fit well: {what}",
+            file,
+            help="check robot, tool and effects; `compensate robots NAME` lists what the model contains",
+        ),
+    )
+
+
+def _check_scale(campaign: Campaign, model: StiffnessModel) -> None:
+    """Refuses (IDN012) deflections that are those of the robot file times the ratio of two units.  Stiffnesses that it
+    states without an interval may be anything, and foresee nothing."""
+    sure = [
+        t for t in model.terms if t.effect.family == "elastic" and any(v.interval for v in t.stated.values())
+    ]
+    if not sure:
+        return
+    expected, _ = campaign.expected(campaign.predicted(model), campaign.start())
+    both = np.isfinite(expected) & np.isfinite(campaign.readings.value)
+    foreseen, measured = expected[both], campaign.readings.value[both]
+    size = float(np.linalg.norm(foreseen) * np.linalg.norm(measured))
+    if not foreseen @ measured > ALONG * size:
+        return
+    ratio = float(np.linalg.norm(measured) / np.linalg.norm(foreseen))
+    for factor, unit in UNITS:
+        if 1.0 / ABOUT < ratio / factor < ABOUT:
+            raise Refusal(
+                Finding(
+                    "IDN012",
+                    f"deflections are {ratio:.2g} times those that the robot file predicts: are {unit}?",
+                    str(campaign.readings.files[0]) if campaign.readings.files else "",
+                    help="DX, DY, DZ are in mm, forces in N; if they are, the intervals of the robot file are wrong",
+                )
+            )
+
+
+def _badly(campaign: Campaign, left: float, signal: float, share: float) -> bool:
+    if left < SCATTER * noise_of(campaign.readings).rms:
+        return False
+    return left > (share * signal if campaign.readings.deflection else FAR)
+
+
+def _remaining_share(
+    campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unknown], fitted: bool = False
+) -> tuple[float, float]:
+    """[m] root mean square of what a fit leaves (of absolute readings, unless ``fitted``, a registration alone), and of
+    what was measured."""
+    rows = np.ones(len(campaign), bool)
+    point = at(campaign, model, campaign.start())
+    given = registered(campaign, point.predicted, rows)
+    point = replace(point, given=given, residual=campaign.residual(point.predicted, given))
+    if campaign.readings.deflection or fitted:
+        weights = weighting(campaign, noise_of(campaign.readings), point.residual)
+        point = descended(campaign, point, unknowns, weights, max_steps=3)
+    return _rms(point.residual), _rms(campaign.readings.value)
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(3 * np.nanmean(values**2)))
+
+
+def _alternatives(readings: Readings, campaign: Campaign) -> Iterator[tuple[str, Readings]]:
+    """Each change in words, and the changed readings."""
+    letters = ("DX", "DY", "DZ") if readings.deflection else ("X", "Y", "Z")
+    for a, b in combinations(range(readings.q.shape[1]), 2):
+        if readings.joints[a][1] == readings.joints[b][1]:
+            names = f"the columns of {readings.joints[a][0]} and {readings.joints[b][0]}"
+            yield f"{names} exchanged", replace(readings, q=_exchanged(readings.q, a, b), direction=None)
+    if campaign.tracked:
+        # a tracker may be anyhow: which two it is does not show
+        value = _exchanged(readings.value, 0, 1)
+        yield "two of X, Y, Z exchanged, or one of them with the other sign", replace(readings, value=value)
+    for a, b in combinations(range(3), 2) if not campaign.tracked else ():
+        value = _exchanged(readings.value, a, b)
+        yield f"{letters[a]} and {letters[b]} exchanged", replace(readings, value=value)
+    if readings.deflection:
+        value = -readings.value
+        yield "the opposite sign of all deflections (unloaded minus loaded)", replace(readings, value=value)
+        for a, b in combinations(range(3), 2):
+            names = f"F{'XYZ'[a]} and F{'XYZ'[b]}"
+            yield f"{names} exchanged", replace(readings, wrench=_exchanged(readings.wrench, a, b))
+    else:
+        for word, factor in (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)):
+            yield f"positions in {word}", replace(readings, value=readings.value * factor)
+    if not campaign.tracked:
+        for k in range(3):
+            value = readings.value.copy()
+            value[:, k] *= -1.0
+            yield f"the opposite sign of {letters[k]}", replace(readings, value=value)
+        for shift in (1, 2):
+            value = np.roll(readings.value, shift, axis=1)
+            order = ", ".join(np.roll(letters, -shift))
+            yield f"the columns named {order}", replace(readings, value=value)
+
+
+def _exchanged(values: Floats, a: int, b: int) -> Floats:
+    changed = values.copy()
+    changed[:, [a, b]] = changed[:, [b, a]]
+    return changed

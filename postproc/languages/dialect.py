@@ -1,0 +1,119 @@
+"""What a dialect is: it reads the bytes of a program into a Toolpath, and turns moved targets into edits."""
+
+from __future__ import annotations
+
+from codecs import BOM_UTF8
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Protocol
+
+from postproc.base.arrays import Floats
+from postproc.base.document import Document, Edit, Span
+from postproc.base.findings import Finding
+from postproc.toolpath import Plan as Plan
+from postproc.toolpath import Role as Role
+from postproc.toolpath import Toolpath
+
+MARK = "COMPENSATED by compensate "
+"""With which the comment starts that states that a program is compensated."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program that was read.
+
+    ``documents``: the main file first, then the files that travel with it.  ``marker``: the comment that says
+    the program is compensated, if it has one.  ``marker_at``: where that comment goes (document 0).
+    ``names``: spans of the module's own name, per document, to be renamed with another stem.
+    ``text``: what the dialect knows of the text, for its own writer; nobody else reads it.
+    """
+
+    dialect: str
+    documents: tuple[Document, ...]
+    toolpath: Toolpath
+    text: Any
+    findings: tuple[Finding, ...]
+    marker: Span | None
+    marker_at: Span
+    names: tuple[Span, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ReadingSettings:
+    """What a program does not say of itself.
+
+    orientation (3,): A, B, C [rad] of the tool in the base where the language programs no orientation, and what the
+    spin about the tool axis is measured from; None where nothing states it.  integer_words: what X10 means where a
+    control counts in increments, "mm" or "um".  references: files that are read and never written ($config.dat).
+    places: what only writing needs is wanted too (``Program.text``); a dialect may give None without.
+    """
+
+    orientation: Floats | None = None
+    integer_words: str = "mm"
+    references: tuple[Document, ...] = ()
+    places: bool = True
+
+
+PLAIN = ReadingSettings()
+"""Nothing is said."""
+
+
+@dataclass(frozen=True)
+class WritingSettings:
+    """How numbers are written: the least decimals of lengths (mm) and angles (deg); ``shared_points``: what
+    becomes of a named point that serves several motions: each gets a copy as an aggregate in its line ("copy-inline"),
+    as a new point in the .dat ("copy-dat"), or the point is kept and the motions are refused ("keep")."""
+
+    mm: int
+    deg: int
+    shared_points: str = "copy-inline"
+
+
+@dataclass(frozen=True)
+class EditedTargets:
+    """A plan as edits; or ``unwritten``: rows of it that cannot move as planned, and why (then without edits)."""
+
+    edits: Sequence[Edit]
+    unwritten: Mapping[int, Finding] = field(default_factory=dict)
+
+
+class Dialect(Protocol):
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def letters(self) -> bytes:
+        """Capital letters of the words that its edits may take out of the line of a motion, or put in."""
+
+    def claims(self, path: Path, raw: bytes) -> bool:
+        """Whether a file of this name and content is of this dialect."""
+
+    def companions(self, path: Path) -> list[Path]:
+        """Files beside ``path`` that belong to the program and exist (a KRL module's .dat)."""
+
+    def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
+        """Read a program; never raises on its content: what is not understood becomes a finding."""
+
+    def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
+        """Edits after which the program makes the motions of ``plan``; rows that are where they were stay as written.
+
+        Raises ValueError if a row is asked to move that ``refused`` or ``locked`` forbids, or something is inserted
+        before one of ``no_insert_before``: a defect of the caller.
+        """
+
+    def marked(self, program: Program, text: str) -> Edit:
+        """The edit that puts ``text`` as the marker comment into the main file."""
+
+    def renamed(self, program: Program, stem: str) -> list[Edit]:
+        """Edits that give the module another name.  Raises Refusal FIL011 for one that the language does not allow."""
+
+
+def put_mark(program: Program, comment: bytes) -> Edit:
+    """The edit that puts the marker comment in the place of the one there is, or on a line of its own."""
+    if program.marker is not None:
+        return Edit(program.marker, comment)
+    document, at = program.documents[0], program.marker_at.start
+    if at and not document.raw[:at].endswith((b"\n", BOM_UTF8)):
+        return Edit(program.marker_at, document.newline + comment)
+    return Edit(program.marker_at, comment + document.newline)

@@ -1,0 +1,78 @@
+"""G-code: one reader, and for every control a table of what differs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from postproc.base.document import Document, Edit
+from postproc.languages.dialect import (
+    MARK,
+    PLAIN,
+    EditedTargets,
+    Plan,
+    Program,
+    ReadingSettings,
+    WritingSettings,
+    put_mark,
+)
+from postproc.languages.gcode import codes as codes
+from postproc.languages.gcode import detection, reader, writer
+from postproc.languages.gcode.code_tables import FANUC, LINUXCNC
+from postproc.languages.gcode.control import Control
+from postproc.languages.gcode.kuka_cnc import CONTROL as KUKA_CNC
+from postproc.languages.gcode.sinumerik import CONTROL as SINUMERIK
+from postproc.languages.gcode.sinumerik import with_tools
+
+
+@dataclass(frozen=True)
+class GcodeDialect:
+    """G-code of one control as a ``Dialect``.
+
+    semicolon: comments begin with one, parentheses are none; prepared: the control with what a program names.
+    """
+
+    control: Control
+    semicolon: bool = False
+    prepared: Callable[[bytes], Control] | None = None
+
+    @property
+    def name(self) -> str:
+        return self.control.name
+
+    @property
+    def letters(self) -> bytes:
+        """Those of coordinates, of G and F that hold for inserted blocks too, and of CIP and EX."""
+        return b"ABCEFGIJKPRXYZ"
+
+    def claims(self, path: Path, raw: bytes) -> bool:
+        return detection.CLAIMS[self.name](path, raw)
+
+    def companions(self, path: Path) -> list[Path]:
+        return []
+
+    def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
+        control = self.control if self.prepared is None else self.prepared(documents[0].raw)
+        return reader.read(documents, control, settings)
+
+    def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
+        return writer.edit_targets(program, plan, writing)
+
+    def marked(self, program: Program, text: str) -> Edit:
+        """The mark as a comment line behind ``%`` and the program's number; parentheses in ``text`` become brackets."""
+        plain = MARK + text.replace("(", "[").replace(")", "]")
+        said = (f";{plain}" if self.semicolon else f"({plain})").encode("latin-1", "replace")
+        return put_mark(program, said)
+
+    def renamed(self, program: Program, stem: str) -> list[Edit]:
+        return []
+
+
+DIALECTS = (
+    GcodeDialect(KUKA_CNC, semicolon=True),
+    GcodeDialect(SINUMERIK, semicolon=True, prepared=with_tools),
+    GcodeDialect(FANUC),
+    GcodeDialect(LINUXCNC),
+)
+"""In the order in which they are asked whether a file is theirs."""

@@ -1,0 +1,313 @@
+"""What every block asks for: its words in columns, whether it is a motion, what it does to the coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.units import DEG, MM
+from postproc.languages.gcode.control import Control, Group, Move, Once
+from postproc.languages.gcode.execution_flow import FlowReason
+from postproc.languages.gcode.modal import Modal
+from postproc.languages.gcode.modal_fill import everywhere, lookup
+from postproc.languages.gcode.positions import Course
+from postproc.languages.gcode.source import Source, WordColumn
+from postproc.languages.gcode.words import COLUMNS, How, key
+
+INCH = 25.4 * MM
+SMALL_ANGLE = 1e-3
+"""[deg] what an angle without a decimal point counts where such words count increments."""
+AXES = tuple(key(letter) for letter in "XYZABC")
+THROUGH = tuple(key(letter, 1) for letter in "IJK")
+"""The point between of an arc through three points."""
+
+SECOND = tuple(key(letter) for letter in "UVW")
+FRAMED = {
+    Group.TURNED: "rotated coordinates (G68)",
+    Group.SCALED: "scaled coordinates (G51)",
+    Group.MIRRORED: "mirrored coordinates (G51.1)",
+    Group.POLAR: "polar coordinates (G16)",
+    Group.DIAMETER: "diameters (G7)",
+    Group.LENGTHS: "an offset that the program computes",
+    Group.FOREIGN: "those of an unknown mode",
+}
+"""Modes in which words are no coordinates of the base."""
+
+CHANGES = (Once.SHIFT, Once.LOCAL, Once.UNSHIFT, Once.SUSPEND, Once.RESTORE, Once.FRAME)
+
+
+class What:
+    """What left a coordinate unknown."""
+
+    REFERENCE = "the move to the reference point"
+    MACHINE = "the move in machine coordinates"
+    PROBE = "the probing"
+    CODE = "a code that is not known"
+    WORD = "a word that is no number"
+    TWICE = "a word that occurs twice"
+    PARALLEL = "a word U, V or W"
+    OTHER = "a motion whose end is not read"
+    CYCLE = "the cycle"
+    UNCERTAIN = "a block that runs only sometimes"
+    CALL = "code that is not read"
+    TEXT = "text that is not understood"
+    BASE = "the change of the offset"
+    FRAME = "the change of coordinates"
+    MODE = "absolute or incremental is not known"
+    TIP = "the change of the TCP mode"
+    ORIGIN = "G92 where the position is not known"
+
+
+class Reasons:
+    """What left coordinates unknown: numbers of texts, -1 for none; of every block the one that was told last."""
+
+    def __init__(self, count: int) -> None:
+        self.texts: list[str] = []
+        self.of = np.full(count, -1, np.int8)
+
+    def number(self, why: str) -> int:
+        if why not in self.texts:
+            self.texts.append(why)
+        return self.texts.index(why)
+
+
+@dataclass(frozen=True, eq=False)
+class BlockWords:
+    """The blocks ``start`` .. ``stop`` - 1 of a program; all rows count from ``start``.
+
+    columns: keys of words that say something of motions.  increments: lengths without a decimal point count
+    micrometres, or ten-thousandths of an inch.
+    """
+
+    source: Source
+    modal: Modal
+    control: Control
+    columns: tuple[int, ...]
+    increments: bool
+    start: int
+    stop: int
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+    def part(self, start: int, stop: int) -> BlockWords:
+        """The blocks begin .. stop - 1 of a whole program."""
+        modal = self.modal.part(start, stop)
+        return BlockWords(self.source, modal, self.control, self.columns, self.increments, start, stop)
+
+    @cached_property
+    def _whole(self) -> bool:
+        return len(self) == len(self.source.blocks)
+
+    def words(self, wanted: int) -> WordColumn:
+        """All words with this key."""
+        column = self.source.column(wanted)
+        return column if self._whole else column.part(self.start, self.stop)
+
+    def _dense(self, wanted: int, values: str, absent: float, dtype: Any) -> NDArray[Any]:
+        column = self.words(wanted)
+        if not len(column):
+            return everywhere(absent, len(self), dtype)
+        dense = np.full(len(self), absent, dtype)
+        dense[column.block] = getattr(column, values)
+        return dense
+
+    def noted(self, *kinds: str) -> Bools:
+        """(B,) blocks with a note of one of these kinds."""
+        result = np.zeros(len(self), np.bool_)
+        for kind in kinds:
+            rows = self.source.noted.get(kind)
+            if rows is not None:
+                result[rows[(rows >= self.start) & (rows < self.stop)] - self.start] = True
+        return result
+
+    def has(self, *wanted: int) -> Bools:
+        """(B,) blocks with a word of one of these keys."""
+        mask = np.zeros(len(self), np.bool_)
+        for one in wanted:
+            mask[self.words(one).block] = True
+        return mask
+
+    def number(self, wanted: int) -> Floats:
+        """(B,) the numbers as written, the last of a block; NaN where absent."""
+        return self._dense(wanted, "value", np.nan, np.float64)
+
+    def how(self, wanted: int) -> Ints:
+        """(B,) How, -1 where absent."""
+        return self._dense(wanted, "how", -1, np.int8)
+
+    def _scaled(self, wanted: int, unit: Floats | float, integer: Floats | float) -> Floats:
+        number = self.number(wanted)
+        if number.strides == (0,):
+            return number
+        return number * np.where(self.how(wanted) == How.INTEGER, integer, unit)
+
+    def lengths(self, wanted: int) -> Floats:
+        """(B,) [m], NaN where absent."""
+        return self._scaled(wanted, self.length, self.length_of_integer)
+
+    def angles(self, wanted: int) -> Floats:
+        """(B,) [rad], NaN where absent."""
+        return self._scaled(wanted, DEG, DEG * (SMALL_ANGLE if self.increments else 1.0))
+
+    @cached_property
+    def length(self) -> Floats:
+        """(B,) [m]: a unit of a length word with a decimal point."""
+        return lookup(self.modal.force[Group.UNITS], np.array([MM, INCH, np.nan]))
+
+    @cached_property
+    def length_of_integer(self) -> Floats:
+        """(B,) [m]: a unit of a length word without."""
+        small = (
+            np.array([MM * 1e-3, INCH * 1e-4, np.nan]) if self.increments else np.array([MM, INCH, np.nan])
+        )
+        return lookup(self.modal.force[Group.UNITS], small)
+
+    @cached_property
+    def twice(self) -> Bools:
+        """(B,) blocks in which a word stands twice."""
+        mask = np.zeros(len(self), np.bool_)
+        for one in self.columns:
+            block = self.words(one).block
+            mask[block[1:][block[1:] == block[:-1]]] = True
+        return mask
+
+    @cached_property
+    def move(self) -> Ints:
+        """(B,) Move in force."""
+        return self.modal.force[Group.MOTION]
+
+    @cached_property
+    def axis(self) -> Bools:
+        """(B,) words of axes, or what stands for them."""
+        second = () if self.control.further else SECOND
+        return self.has(*AXES, *second) | self.noted("axis", "polar")
+
+    @cached_property
+    def motion(self) -> Bools:
+        """(B,) the block moves the machine."""
+        modal = self.modal
+        silent = modal.has(Once.SETTING, Once.CALL, Once.OTHER, *CHANGES)
+        # G4 X1.5 is a time; beside P, or with another axis, the words are a motion.
+        moving = self.has(key("P"), *AXES[1:], *SECOND[1:])
+        silent |= modal.has(Once.DWELL) & ~moving
+        arc = np.isin(self.move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH))
+        centre = self.has(
+            *(key(letter) for letter in "IJK"), *(one for one in THROUGH if one in self.columns)
+        )
+        arc &= centre | (modal.states & self.has(key("R")))
+        return modal.flow.tape & ((self.axis | arc) & ~silent | modal.has(Once.HOME))
+
+    @cached_property
+    def machine(self) -> Bools:
+        """(B,) motions that are not to a place in the base."""
+        return self.motion & self.modal.has(Once.HOME, Once.MACHINE, Once.PROBE)
+
+    @cached_property
+    def present(self) -> Bools:
+        """(B, 6) the axes that have words."""
+        return np.stack([self.has(axis) for axis in AXES], axis=1)
+
+    @cached_property
+    def relative(self) -> Bools:
+        """(B, 6) axis words that are differences."""
+        hows = np.stack([self.how(axis) for axis in AXES], axis=1)
+        incremental = (self.modal.force[Group.DISTANCE] == 1)[:, None]
+        return (hows >= 0) & ((incremental & (hows != How.ABSOLUTE)) | (hows == How.INCREMENTAL))
+
+
+def blocks(source: Source, modal: Modal, control: Control, increments: bool) -> BlockWords:
+    """All blocks of a program."""
+    columns = (*COLUMNS, *(key(letter) for letter in "STDHLQ"), *control.columns)
+    return BlockWords(source, modal, control, columns, increments, 0, len(source.blocks))
+
+
+def _targets(given: BlockWords) -> tuple[Bools, Floats, Bools]:
+    """(B, 6) words that are targets, their values [m, rad], and those of them that are differences."""
+    values = [given.lengths(axis) if i < 3 else given.angles(axis) for i, axis in enumerate(AXES)]
+    return (given.motion & ~given.machine)[:, None] & given.present, np.stack(values, axis=1), given.relative
+
+
+def tilted(given: BlockWords) -> Bools:
+    """(B,) of a whole program: blocks after which rotary axes may be away from 0.
+
+    Without a change of the TCP mode that states nothing, and no block is named."""
+    tip = given.modal.force[Group.TCP]
+    if not len(tip) or (tip == tip[0]).all():
+        return everywhere(False, len(given))
+    target, value, relative = _targets(given)
+    home = given.motion & given.modal.has(Once.HOME)
+    return np.logical_or.accumulate(
+        (target[:, 3:] & ((value[:, 3:] != 0) | relative[:, 3:])).any(axis=1) | home
+    )
+
+
+def frame_events(given: BlockWords, spoiled: Bools, away: Bools, reasons: Reasons) -> Course:
+    """What the blocks do to the coordinates; why they leave them unknown is put into ``reasons``.
+
+    spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``.
+    """
+    modal, n = given.modal, len(given)
+    force, flow = modal.force, modal.flow
+    present = given.present
+    target, value, relative = _targets(given)
+    lost, left = np.zeros((n, 6), np.bool_), np.zeros((n, 6), np.bool_)
+    reason = reasons.of[given.start : given.stop]
+    linear = np.arange(6) < 3
+
+    def lose(where: Bools, rows: Bools, why: str) -> None:
+        """Leaves coordinates unknown behind ``rows``: those of ``where`` (B, 6) or (6,)."""
+        if rows.any():
+            lost[rows] |= np.broadcast_to(where, (n, 6))[rows]
+            reason[rows] = reasons.number(why)
+
+    def leave(where: Bools, rows: Bools, why: str) -> None:
+        """Leaves coordinates unknown before ``rows``, unless they set them."""
+        if rows.any():
+            left[rows] |= where
+            reason[rows & (reason < 0)] = reasons.number(why)
+
+    whole = np.ones(6, np.bool_)
+    move, cycle = given.move, given.motion & (given.move == Move.CYCLE)
+    unread = target & np.isnan(value)
+    lose(unread, np.any(unread, axis=1), What.WORD)
+    unclear = target & (force[Group.DISTANCE] < 0)[:, None]
+    lose(unclear, np.any(unclear, axis=1), What.MODE)
+    home, other = given.motion & modal.has(Once.HOME), np.isin(move, (Move.OTHER,)) & given.motion
+    lose(present | ~np.any(present, axis=1)[:, None], home, What.REFERENCE)
+    lose(present, given.motion & modal.has(Once.MACHINE), What.MACHINE)
+    lose(whole, given.motion & modal.has(Once.PROBE), What.PROBE)
+    lose(whole, given.axis & modal.unknown, What.CODE)
+    lose(whole, given.motion & given.twice, What.TWICE)
+    if not given.control.further and given.has(*SECOND).any():
+        parallel = np.stack([given.how(axis) >= 0 for axis in SECOND], axis=1)
+        both = np.concatenate([parallel, np.zeros((n, 3), np.bool_)], axis=1)
+        lose(both, parallel.any(axis=1) & given.motion & ~home, What.PARALLEL)
+    lose(whole, other | (given.motion & (force[Group.MACRO] != 0)), What.OTHER)
+    if cycle.any():
+        # Words of a cycle give where it works; it ends at the depth that it started at, or at R.
+        depth = np.array([2, 1, 0])[np.clip(force[Group.PLANE], 0, 2)]
+        deep = np.zeros((n, 6), np.bool_)
+        deep[np.arange(n), depth] = True
+        target &= ~(cycle[:, None] & deep)
+        repeats = given.has(key("L")) | given.has(key("K"))
+        lose(deep, cycle & (force[Group.RETURN] != 0), What.CYCLE)
+        lose(whole, cycle & repeats & (force[Group.DISTANCE] != 0), What.CYCLE)
+    lose(present, given.motion & (flow.reason != FlowReason.NONE), What.UNCERTAIN)
+    lose(whole, given.noted("unknown"), What.TEXT)
+    lose(whole, given.noted("corner", "axis", "polar"), What.OTHER)
+    leave(whole, flow.forget, What.CALL)
+
+    leave(linear, modal.switched(Group.OFFSET) | spoiled, What.BASE)
+    for group in FRAMED:
+        if force[group].any() or modal.ahead[group]:
+            lose(whole, (force[group] != 0) & given.motion, What.FRAME)
+            leave(whole, modal.switched(group), What.FRAME)
+    # With the rotary axes at 0 the words mean the same with and without a TCP mode.
+    leave(linear, modal.switched(Group.TCP) & away, What.TIP)
+    return Course(np.where(target, value, 0.0), target & ~relative, relative, lost, left)

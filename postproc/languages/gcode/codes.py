@@ -1,0 +1,269 @@
+"""The codes of the findings of G-code."""
+
+from __future__ import annotations
+
+from postproc.base.findings import Code, define
+
+CODES = define(
+    {
+        "GCO001": Code(
+            "warning",
+            "block is not understood",
+            meaning="The block contains a code, a word or a text that this tool does not know.",
+            consequence=(
+                "Its effect is unknown, so it is not corrected, and the position after it may be unknown."
+            ),
+            action="Check what it does; if it moves, write it as G0 to G3 with numbers.",
+            example="`G187 P2`.",
+        ),
+        "GCO002": Code(
+            "warning",
+            "position is not known",
+            meaning="A coordinate is not set before this motion, or an earlier block makes it unknown.",
+            consequence="The target is unknown, so the motion is not corrected.",
+            action="Write X, Y and Z in the first motion after the unknown block.",
+            example="`G1 X10` as the first motion of a program.",
+        ),
+        "GCO003": Code(
+            "info",
+            "rapid that is not fully known",
+            meaning="A coordinate, the work offset or the tool is not known yet.",
+            consequence="It is an air move; it is not corrected and needs no correction.",
+            action="Nothing needs to be done.",
+            example="`G0 Z100` before the first `G54`.",
+        ),
+        "GCO004": Code(
+            "info",
+            "machine or reference position",
+            meaning="G28, G30 and G53 address a place of the machine and not a place in the base.",
+            consequence="Such a move is in air; it is not corrected and needs no correction.",
+            action="Nothing needs to be done.",
+            example="`G28 Z0`.",
+        ),
+        "GCO005": Code(
+            "warning",
+            "variable or expression",
+            meaning="A word contains a variable or an expression.",
+            consequence="Only numbers can be corrected, so the motion is not corrected.",
+            action="Let the post-processor write numbers.",
+            example="`G1 X[#1+5]`.",
+        ),
+        "GCO006": Code(
+            "warning",
+            "motion in a loop, branch or subprogram",
+            meaning="The motion may run many times or never.",
+            consequence="Its correction could differ from run to run, so it is not corrected.",
+            action="Write the cut as a straight run of blocks.",
+            example="`WHILE [#1 LT 5] DO1`.",
+        ),
+        "GCO007": Code(
+            "warning",
+            "call of code that is not read",
+            meaning="The called code may move the machine and change modes.",
+            consequence="Position and modes are unknown after it until they are set again.",
+            action="Write the subprogram's blocks in place of the call; or set modes and X, Y, Z after it.",
+            example="`M98 P1000`.",
+        ),
+        "GCO008": Code(
+            "warning",
+            "canned cycle",
+            meaning="The control generates the motions of a cycle itself.",
+            consequence="The motions are not in the program, so the block is not corrected.",
+            action="Let the post-processor write cycles as single motions.",
+            example="`G81 Z-10 R2`.",
+        ),
+        "GCO009": Code(
+            "warning",
+            "tool radius compensation",
+            meaning="Under G41 and G42 the control computes the path of the tool's centre.",
+            consequence=(
+                "The programmed contour is not the path of the tool, so the motion is not corrected."
+            ),
+            action=(
+                "Let the post-processor write the path of the tool's centre (compensation in the CAM system)."
+            ),
+            example="`G41 D1`.",
+        ),
+        "GCO010": Code(
+            "warning",
+            "coordinates are not those of the base",
+            meaning="The coordinates are rotated, scaled, mirrored, polar, or diameters.",
+            consequence="Their place in the base is not followed, so the motion is not corrected.",
+            action="Let the post-processor write coordinates of the base itself.",
+            example="`G68 X0 Y0 R30`.",
+        ),
+        "GCO011": Code(
+            "info",
+            "probing",
+            meaning="A probing move ends where the probe touches.",
+            consequence="Its end is unknown and needs no correction.",
+            action="Nothing needs to be done.",
+            example="`G38.2 Z-20`.",
+        ),
+        "GCO012": Code(
+            "warning",
+            "arc is not understood",
+            meaning="Start, end, centre and plane do not define an arc.",
+            consequence="Controls treat such a block differently, so it is not corrected.",
+            action="Check start, end and centre of the arc, and G17, G18, G19.",
+            example="`G2 X10 Y0 R3` where the end is 10 mm away.",
+        ),
+        "GCO013": Code(
+            "warning",
+            "rotary axes without a TCP mode",
+            meaning="The rotary axes are not at 0, and no TCP mode such as G43.4 is active.",
+            consequence=(
+                "The place of the tool depends on the machine's geometry, so the motion is not corrected."
+            ),
+            action=(
+                "Let the post-processor write tip coordinates (G43.4), or all motions with the rotary "
+                "axes at 0."
+            ),
+            example="`G1 X10 B30` without G43.4.",
+        ),
+        "GCO014": Code(
+            "warning",
+            "work offset is not known",
+            meaning=(
+                "The program writes the offset itself (G10, a variable), or it is unclear which one is "
+                "active."
+            ),
+            consequence="The place of the target in the cell is unknown, so the motion is not corrected.",
+            action=(
+                "Select the offset with G54 to G59, and define offsets in the cell and not in the program."
+            ),
+            example="`G10 L2 P1 X5`, then `G54`.",
+        ),
+        "GCO015": Code(
+            "warning",
+            "tool is not known",
+            meaning="No tool is loaded, or its number is not known.",
+            consequence="Length and load of the tool are unknown, so the motion is not corrected.",
+            action="Load a tool by number before the cut.",
+            example="`T#5 M6`.",
+        ),
+        "GCO016": Code(
+            "warning",
+            "other motion",
+            meaning="The block is a spline, a thread, a rounded corner or a motion of a further axis.",
+            consequence="This tool does not follow such a path, so the block is not corrected.",
+            action="Let the post-processor write it as G1, G2 and G3.",
+            example="`G33 Z-20 K1.5`.",
+        ),
+        "GCO017": Code(
+            "warning",
+            "words contradict each other",
+            meaning="Two words of the block exclude each other.",
+            consequence="Controls differ in which word they execute, so the block is not corrected.",
+            action="Write every word once.",
+            example="`G1 G2 X10`.",
+        ),
+        "GCO018": Code(
+            "warning",
+            "no motion code is active",
+            meaning="The block has axis words before any G0, G1, G2 or G3.",
+            consequence="Controls start in different modes, so the motion is not corrected.",
+            action="Write G0, G1, G2 or G3 before it.",
+            example="`X10 Y10` as the first block.",
+        ),
+        "GCO019": Code(
+            "warning",
+            "origin is not known",
+            meaning="G92 sets the coordinates of a position that is not known.",
+            consequence="The motions after it have no known place, so they are not corrected.",
+            action="Move to known X, Y and Z before G92, or remove G92 and define the base in the cell.",
+            example="`G92 X0 Y0` as the first block.",
+        ),
+        "GCO020": Code(
+            "info",
+            "unit is not stated",
+            meaning="No code selects mm or inch; mm is assumed.",
+            consequence="In inches every correction would be wrong by a factor of 25.4.",
+            action="Write G21 or G20.",
+            example="A program without G20 and G21.",
+        ),
+        "GCO021": Code(
+            "info",
+            "tool is not stated",
+            meaning="The program names no tool; tool 1 of the cell is assumed.",
+            consequence="Length and load of another tool would lead to another correction.",
+            action="Load a tool with T, or check that the cell's tool 1 is the right one.",
+            example="A program without T.",
+        ),
+        "GCO022": Code(
+            "warning",
+            "words without a decimal point",
+            meaning="The cell counts such words in increments, but the control of this dialect does not.",
+            consequence="A wrong reading differs by a factor of 1000.",
+            action=(
+                "Write `dialect: {name: fanuc, integer_words: um}` in the cell if the control counts "
+                "increments."
+            ),
+            example="`X10` for 10 um.",
+        ),
+        "GCO023": Code(
+            "info",
+            "length of another tool",
+            meaning="G43 names an H number that is not the tool's number; the cell's tool is used.",
+            consequence="With another length the tool tip would be elsewhere.",
+            action="Check that the cell's tool has the intended length.",
+            example="`T3 M6`, then `G43 H5`.",
+        ),
+        "GCO024": Code(
+            "warning",
+            "program writes offsets",
+            meaning="The program writes bases or tools of the control.",
+            consequence="The control's offsets then differ from those of the cell.",
+            action="Define offsets and tools in the cell; check that both agree.",
+            example="`G10 L1 P3 R120`.",
+        ),
+        "GCO025": Code(
+            "info",
+            "motion after the end",
+            meaning="The motion follows M2, M30 or M99.",
+            consequence="It does not run and is not corrected.",
+            action="Nothing needs to be done.",
+            example="`M30`, then `G1 X10`.",
+        ),
+        "GCO026": Code(
+            "warning",
+            "further axes move",
+            meaning="An axis moves that is not one of X, Y, Z, E1 to E6 and the rotary axes.",
+            consequence=(
+                "If it carries the robot or the part, both are elsewhere than the cell states, so the "
+                "motions are not corrected."
+            ),
+            action=(
+                "Let the post-processor name what carries robot or part E1 to E6, and declare it in the cell."
+            ),
+            example="`G1 X10 W50`.",
+        ),
+        "SIN001": Code(
+            "info",
+            "tool is called by a name",
+            meaning="Named tools are numbered 1, 2 ... in the order in which the program names them.",
+            consequence="Another tool of the cell would lead to another correction.",
+            action="Check that the cell's tools of these numbers are the right ones; or write T=1.",
+            example='`T="MILL_20"`.',
+        ),
+        "GCW001": Code(
+            "warning",
+            "arc cannot be written",
+            meaning=(
+                "No numbers of the block express the corrected arc, for example a full circle that does not "
+                "close."
+            ),
+            consequence="The cut is not corrected, because a rounded arc would leave the tolerance.",
+            action="Let the post-processor write the arc as shorter arcs or as lines.",
+            example="A full circle of which start and end get different corrections.",
+        ),
+        "GCW002": Code(
+            "warning",
+            "orientation cannot be written",
+            meaning="The words of the block cannot express the corrected orientation of the tool.",
+            consequence="The motion is not corrected.",
+            action="Correct positions only, or let the post-processor write rotary words in this block.",
+            example="A block with X, Y, Z only, whose correction tilts the tool.",
+        ),
+    }
+)

@@ -1,0 +1,195 @@
+"""What differs between controls, as data: which code means what, which words there are, how a line is taken apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from postproc.base.arrays import Floats
+from postproc.languages.gcode.words import Note, key
+
+
+class Group(IntEnum):
+    """Modal groups, of which one code is in force at a time; ONCE holds in its block only."""
+
+    MOTION = 0  # Move
+    PLANE = 1  # 0 XY, 1 ZX, 2 YZ
+    DISTANCE = 2  # 0 absolute, 1 incremental
+    ARCS = 3  # centre: 0 from the start, 1 absolute
+    UNITS = 4  # 0 mm, 1 inch
+    FEED = 5  # Feed
+    OFFSET = 6  # number of the base
+    PATH = 7  # 0 exact, 1 may be left
+    TCP = 8  # 0 rotary axes are the machine's, 1 they orient the tool
+    RETURN = 9  # of cycles: 0 to where they started, 1 to R
+    LENGTH = 10  # tool length offset: 0 off, 1 on: it lies in the cell's tool, either way
+    RADIUS = 11  # 0 off; else contours: not compensated
+    LENGTHS = 12  # 0; else offsets that the program itself computes (G43.1)
+    TURNED = 13  # 0; else rotated coordinates (G68)
+    SCALED = 14  # 0; else scaled or mirrored coordinates
+    MIRRORED = 15
+    POLAR = 16  # 0; else polar coordinates
+    DIAMETER = 17  # 0; else X is a diameter
+    SPINDLE = 18  # 0 speed, 1 constant surface speed: F per revolution is then unknown
+    MACRO = 19  # 0; else every block calls a macro (G66)
+    FEED_UNITS = 24  # 0 mm, 1 inch: of F, where a control tells it apart from that of coordinates
+    FOREIGN = 20  # 0; else words are no coordinates of the base in this mode (#MCS ON, TRANSMIT)
+    AXIAL = 21  # 0; else targets are axis positions, or reached as the axes go (PTP)
+    ONCE = 22  # Once
+    NONE = 23  # known, states nothing about the path
+    EULER = 40  # what A2= B2= C2= are: 0 Euler angles (Z X' Z''), 1 RPY angles (Z Y' X'')
+
+
+class Move(IntEnum):
+    """What the words of a block do."""
+
+    RAPID = 0
+    LINE = 1
+    CLOCKWISE = 2
+    COUNTER = 3
+    THROUGH = 4  # an arc through a point
+    NOTHING = 5  # G80: no motion is in force
+    CYCLE = 6  # a canned cycle: the motion is hidden in the block
+    SPLINE = 7
+    THREAD = 8
+    OTHER = 9  # a motion of this control that is not read
+
+
+class Feed(IntEnum):
+    PER_MINUTE = 0
+    INVERSE_TIME = 1
+    PER_TURN = 2
+
+
+class Once(IntEnum):
+    """Codes that hold in their block."""
+
+    DWELL = 1  # the words are times
+    HOME = 2  # reference point, perhaps by way of a point
+    MACHINE = 3  # machine coordinates
+    SHIFT = 4  # G92: here is ...
+    LOCAL = 5  # G52: the origin is moved to ...
+    UNSHIFT = 6  # G92.1
+    SUSPEND = 7  # G92.2
+    RESTORE = 8  # G92.3
+    SETTING = 9  # G10
+    CALL = 10  # G65: the words are arguments
+    PROBE = 11
+    OTHER = 12  # its words are no targets of a motion
+    STORE = 14  # G28.1: stores the reference point, or seeks it with the axes that it names
+    FRAME = 13  # a frame of this control (TRANS, ROT): Control.frame gives it
+
+
+class ModalCode(NamedTuple):
+    group: Group
+    value: int
+
+
+UNKNOWN = -1
+"""Value of a group that cannot be determined."""
+
+
+class LexedLine(NamedTuple):
+    """A line that is not plain words: its words (address offset, key, number's start and stop or -1, value, How), the
+    kinds and texts of what else it says, whether it starts with a slash."""
+
+    words: list[tuple[int, int, int, int, float, int]]
+    notes: list[tuple[str, str]]
+    deleted: bool
+
+
+@dataclass(frozen=True, eq=False)
+class ProgrammedFrame:
+    """Programmed coordinates in the base: base = turn @ xyz + shift[:3], and abc + shift[3:] for the rotary axes.
+
+    turn (3, 3); shift (6,) [m, rad], NaN where not known; memory: what the control itself remembers.
+    """
+
+    turn: Floats
+    shift: Floats
+    memory: Any = None
+
+    def to_base(self, programmed: Floats) -> Floats:
+        """(..., 6) [m, rad] of ``programmed`` (..., 6) in the base."""
+        return (
+            np.concatenate([self._turned(programmed[..., :3], self.turn), programmed[..., 3:]], -1)
+            + self.shift
+        )
+
+    def from_base(self, position: Floats) -> Floats:
+        """(..., 6) [m, rad]: a ``position`` (..., 6) in the base as it would be programmed."""
+        moved = position - self.shift
+        return np.concatenate([self._turned(moved[..., :3], self.turn.T), moved[..., 3:]], -1)
+
+    @staticmethod
+    def _turned(vector: Floats, turn: Floats) -> Floats:
+        # Without a rotation an axis that is not known states nothing about the others.
+        return vector if np.array_equal(turn, np.eye(3)) else vector @ turn.T
+
+
+@dataclass(frozen=True, eq=False)
+class Event:
+    """A block that changes the frame: its words (key -> value as written, NaN if UNREAD), its Once bits, its notes.
+
+    plane: 0, 1, 2 for G17, G18, G19; scale [m]: one unit of length; frame: before the block; position (6,) [m, rad]:
+    where the tool is, in the base.
+    """
+
+    words: Mapping[int, float]
+    once: int
+    notes: tuple[Note, ...]
+    codes: tuple[float, ...]
+    plane: int
+    scale: float
+    frame: ProgrammedFrame
+    position: Floats
+
+
+def kept(event: Event) -> ProgrammedFrame:
+    """The frame as it was: of a control without codes that change it."""
+    return event.frame
+
+
+@dataclass(frozen=True)
+class Control:
+    """One dialect of G-code.
+
+    codes: G number times ten -> what it says; also: what else some of them say; named: a word that is alone ->
+    the same; names: addresses of more than a letter -> their key; comment: pattern of comments (and of strings,
+    group 1, which are none); line: takes a line apart that is not plain words; start: what is in force before
+    anything is said. endings: M codes after which nothing is read; cycle_apart: G80 goes back to the move that was
+    in force before the cycle; increments: a length without a decimal point may count increments; turns: key of the
+    word that gives the turns of an arc, and how many of them an arc without the word has. frame: the frame after a
+    block with G52, G92 ... or Once.FRAME; columns: keys of further words of motions. angles: what A, B, C do where
+    a program uses all three, see ``orientation.Angles.sequence``; whole: they then give the orientation of the tool
+    itself, not what turns it from where it is in the cell; vector, euler: keys of the words of a tool vector
+    and of angles that say where it points. calls: keys of words that call a subprogram in a block without G and M;
+    feed_units: the group that says the unit of F;
+    further: U, V, W are axes beside X, Y, Z, and leave these as they are.
+    """
+
+    name: str
+    codes: Mapping[int, ModalCode]
+    also: Mapping[int, tuple[ModalCode, ...]] = field(default_factory=dict, kw_only=True)
+    line: Callable[[bytes], LexedLine]
+    comment: bytes
+    named: Mapping[bytes, ModalCode] = field(default_factory=dict)
+    names: Mapping[bytes, int] = field(default_factory=dict)
+    start: Mapping[Group, int] = field(default_factory=dict)
+    endings: frozenset[int] = frozenset((2, 30))
+    cycle_apart: bool = False
+    increments: bool = False
+    turns: tuple[int, int] = (key("P"), 1)
+    frame: Callable[[Event], ProgrammedFrame] = kept
+    columns: tuple[int, ...] = ()
+    angles: tuple[tuple[int, int], ...] = ((2, 2), (1, 1), (0, 0))
+    whole: bool = False
+    vector: tuple[int, ...] = ()
+    euler: tuple[int, ...] = ()
+    calls: frozenset[int] = frozenset()
+    feed_units: Group = Group.UNITS
+    further: bool = False

@@ -1,0 +1,260 @@
+"""Which motions cannot be corrected, and why; and whose end points those build on."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Ints
+from postproc.base.document import Document
+from postproc.languages.gcode.blocks import AXES, FRAMED, SECOND, BlockWords, Reasons, What
+from postproc.languages.gcode.control import Group, Move, Once
+from postproc.languages.gcode.execution_flow import FlowReason
+from postproc.languages.gcode.motions import GcodeMotions
+from postproc.languages.gcode.positions import Positions
+from postproc.languages.gcode.refusals import RefusalCollector, Refusals
+from postproc.languages.gcode.words import How, key
+from postproc.toolpath import Kind
+
+FLOW_MESSAGES = {
+    FlowReason.DELETED: "the block starts with a slash: it runs only sometimes",
+    FlowReason.FLOW: "the motion is in a loop, branch or subprogram: it may run many times or never",
+    FlowReason.PROGRAM: "the motion is in a subprogram of the file: it runs where that is called",
+    FlowReason.ENDED: "the motion follows the end of the program and does not run",
+}
+ARCS = {
+    2: "the arc has no centre in its plane: I J K of the plane or R",
+    3: "the radii of the arc at its start and at its end differ",
+    4: "R of the arc is too short, or its end is its start",
+    5: "the plane of the arc is not known",
+    6: "the three points of the arc are on one line",
+}
+_POSITION = re.compile(rb"#[ \t]*+(?:(?:50[0-6]\d|542\d)(?!\d)|<_(?:abs_)?[xyzabcuvw]>|#|\[)", re.I)
+
+
+@dataclass(frozen=True, eq=False)
+class Built:
+    """Of N motions, what others build on: block (N,); kind (N,) Kind; sets, lost (N, 3): the block states X, Y, Z, or
+    leaves them unknown; turned (N,): it states the orientation in force, if one is."""
+
+    block: Ints
+    kind: Ints
+    sets: Bools
+    lost: Bools
+    turned: Bools
+
+
+NUMBERS = (*AXES, *(key(letter) for letter in "IJKR"))
+
+
+def check_correctability(
+    given: BlockWords,
+    moves: GcodeMotions,
+    where: Positions,
+    base: Ints,
+    tool: Ints,
+    reasons: Reasons,
+    collector: RefusalCollector,
+) -> None:
+    """Refuses motions of a part of the program.
+
+    base, tool (N,): numbers, -1 where unknown; reasons: of ``frame_events``; doubts (N,): of these motions.
+    """
+    rows = moves.block
+    refuse, modal = collector.refuse, given.modal
+    force = {group: values[rows] for group, values in modal.force.items()}
+    for uncertainty, message in FLOW_MESSAGES.items():
+        code = "GCO025" if uncertainty == FlowReason.ENDED else "GCO006"
+        refuse(modal.flow.reason[rows] == uncertainty, code, message)
+    refuse(force[Group.MACRO] != 0, "GCO007", "every block calls a macro or a cycle here (G66, MCALL)")
+    refuse(modal.has(Once.HOME)[rows], "GCO004", "the block leads to the reference point")
+    refuse(modal.has(Once.MACHINE)[rows], "GCO004", "the block uses machine coordinates")
+    refuse(modal.has(Once.PROBE)[rows], "GCO011", "the block is a probing move: its end is not known")
+    _codes(given, rows, collector)
+    refuse(given.twice[rows], "GCO017", "a word occurs twice in the block")
+    refuse(modal.twice[rows], "GCO017", "two codes of the block select different motions")
+    for kind, code, message in (
+        ("unknown", "GCO001", "the block is not understood"),
+        ("corner", "GCO016", "the control rounds or chamfers this corner"),
+        ("assign", "GCO005", "the block sets a variable"),
+        ("axis", "GCO004", "the block names axes of the machine"),
+        ("polar", "GCO010", "the coordinates are polar"),
+    ):
+        refuse(given.noted(kind)[rows], code, message)
+    refuse(
+        given.has(*SECOND)[rows] & (not given.control.further),
+        "GCO016",
+        "the block has U, V or W: they are further axes, or steps of a lathe",
+    )
+    unread = np.zeros(len(given), np.bool_)
+    for one in NUMBERS:
+        column = given.words(one)
+        unread[column.block[column.how == How.UNREAD]] = True
+    turns = given.words(given.control.turns[0])
+    unread[turns.block[(turns.how == How.UNREAD) & _bent(given.move[turns.block])]] = True
+    refuse(
+        unread[rows],
+        "GCO005",
+        "a word is an expression, a variable or far beyond the size of any machine",
+    )
+    quiet = np.isin(moves.move, (-1, Move.NOTHING))
+    refuse(quiet, "GCO018", "the block has axis words, but no motion code is active")
+    refuse(
+        moves.move == Move.CYCLE, "GCO008", "the block is a canned cycle: its motions are not in the program"
+    )
+    refuse(
+        np.isin(moves.move, (Move.SPLINE, Move.THREAD, Move.OTHER)),
+        "GCO016",
+        "the block is a spline, a thread or another motion of the control",
+    )
+    refuse(
+        force[Group.RADIUS] != 0,
+        "GCO009",
+        "tool radius compensation is active: the contour is not the tool's path",
+    )
+    refuse(force[Group.AXIAL] != 0, "GCO016", "the axes move to the target independently (PTP)")
+    for group, message in FRAMED.items():
+        refuse(force[group] != 0, "GCO010", f"the coordinates are {message}")
+    air = moves.kind == Kind.PTP
+    refuse(
+        air & (base < 0),
+        "GCO003",
+        "the work offset of this rapid is not known, or the program itself writes it",
+    )
+    refuse(air & (tool < 0), "GCO003", "this rapid has no tool, or its number is not known")
+    refuse(base < 0, "GCO014", "the work offset is not known, or the program itself writes it")
+    refuse(tool < 0, "GCO015", "no tool is loaded, or its number is not known")
+    refuse(force[Group.UNITS] < 0, "GCO002", "mm or inch is not known")
+    _positions(given, moves, where, collector, reasons)
+    for wrong, message in ARCS.items():
+        refuse(moves.arcs.wrong == wrong, "GCO012", message)
+    refuse(moves.arcs.wrong == 1, "GCO012", "the start of the arc is not known")
+    centred = _bent(moves.move) & given.has(*(key(letter) for letter in "IJK"))[rows]
+    refuse(
+        centred & (force[Group.ARCS] < 0),
+        "GCO012",
+        "it is not known whether I J K are coordinates or differences",
+    )
+    refuse(
+        moves.tool_orientation.wrong == 1,
+        "GCO013",
+        "a rotary axis is not at 0, or not known, and no TCP mode is active",
+    )
+    refuse(moves.tool_orientation.wrong == 2, "GCO013", "a rotary axis that the program uses is not set yet")
+
+
+def _bent(move: Ints) -> Bools:
+    return np.isin(move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH))
+
+
+def _codes(given: BlockWords, rows: Ints, collector: RefusalCollector) -> None:
+    """Refuses motions in blocks with a code that is not known, by that code."""
+    some = np.flatnonzero(given.modal.unknown[rows])
+    if len(some):
+        codes = given.modal.unknown_codes.last(rows[some], absent=-1.0)
+        values, which = np.unique(np.nan_to_num(codes, nan=-1.0), return_inverse=True)
+        messages = [(named := code_name(value), f"{named} is not known here") for value in values.tolist()]
+        collector.refuse_each(some, [("GCO001", message, name) for name, message in messages], which)
+
+
+def code_name(value: float) -> str:
+    return f"G{value:.6g}" if value >= 0 else "the G code"
+
+
+def _positions(
+    given: BlockWords, moves: GcodeMotions, where: Positions, collector: RefusalCollector, reasons: Reasons
+) -> None:
+    """Refuses motions whose end is not known, by what left it unknown."""
+    rows = moves.block
+    lost = np.isnan(moves.end[:, :3])
+    frame = np.isnan(moves.place) & ~lost
+    some = np.flatnonzero(lost.any(axis=1) & (collector.why < 0))
+    if len(some):
+        # The latest of the causes: before it, the coordinate may have been known.
+        causes = np.where(lost[some], where.source[rows[some], :3], -1).max(axis=1)
+        missing = (lost[some] * np.array([4, 2, 1])).sum(axis=1)
+        air = moves.kind[some] == Kind.PTP
+        keys = np.stack([causes, missing, air], axis=1)
+        kinds, which = np.unique(keys, axis=0, return_inverse=True)
+        messages = []
+        for cause, bits, rapid in kinds.tolist():
+            names = ", ".join(name for name, bit in (("X", 4), ("Y", 2), ("Z", 1)) if bits & bit)
+            why = (
+                "is never set before"
+                if cause < 0
+                else f"not known since line {given.source.blocks.line[cause]}"
+            )
+            what = "" if cause < 0 or reasons.of[cause] < 0 else reasons.texts[reasons.of[cause]]
+            if cause >= 0 and not what:
+                what = What.ORIGIN
+            message = f"{names}: {why}{f' ({what})' if what else ''}"
+            messages.append(("GCO003" if rapid else "GCO002", message, what))
+        collector.refuse_each(some, messages, which.reshape(-1))
+    collector.refuse(
+        np.any(frame, axis=1),
+        "GCO019",
+        "the coordinates are not known: G92 follows an unknown position, or a frame is not read",
+    )
+
+
+def locked_rows(document: Document, given: BlockWords, built: Built, collector: RefusalCollector) -> Refusals:
+    """Motions whose end a refused motion, an origin or other code builds on; ``given``: the whole program."""
+    rows, n = built.block, len(built.block)
+    pins = RefusalCollector(n)
+    modal = given.modal
+    refused = collector.why >= 0
+    if refused.any():
+        partial = ~built.sets.all(axis=1)
+        # Orientation words are inherited as well; an arc starts there, and is bent by where it starts.
+        partial |= ~built.turned | ~np.isin(built.kind, (Kind.LIN, Kind.PTP))
+        reaching = modal.has(Once.HOME, Once.MACHINE)[rows]
+        building = np.flatnonzero(refused & partial & ~reaching)
+        building = building[building > 0]
+        building = building[~refused[building - 1]] - 1
+        pins.refuse(
+            _mask(n, np.concatenate([building, _through(built, refused, refused & ~reaching)])),
+            "GCO002",
+            "the motion after it depends on this end point and is not corrected",
+        )
+    shifting = modal.has(Once.SHIFT) & given.has(*AXES)
+    for at, message in (
+        (np.flatnonzero(shifting), "G92 sets the origin at this end point"),
+        (np.flatnonzero(modal.flow.calls), "code that is not read may depend on this end point"),
+        (_reading(document, given) - 1, "a variable after it reads the end position of this motion"),
+        (
+            np.flatnonzero(given.noted("unknown")),
+            "a block that is not understood may depend on this end point",
+        ),
+    ):
+        before = np.searchsorted(rows, at, side="right") - 1
+        before = before[before >= 0]
+        pins.refuse(_mask(n, before) & (collector.why < 0), "GCO002", message)
+    blocks = given.source.blocks
+    return pins.done(document, blocks.line[rows], blocks.start[rows], blocks.start[rows])
+
+
+def _through(built: Built, refused: Bools, building: Bools) -> Ints:
+    """Motions from which ``building`` (N,) ones inherit a coordinate or the orientation through ``refused`` ones."""
+    n = len(built.block)
+    columns = ((built.sets[:, axis], built.lost[:, axis]) for axis in range(3))
+    found = []
+    for says, ends in (*columns, (built.turned, np.zeros(n, np.bool_))):
+        last = np.maximum.accumulate(np.where(~refused | says | ends, np.arange(n), -1))
+        before = np.append(-1, last)[:n]
+        source = before[building & ~says & (before >= 0)]
+        found.append(source[~refused[source]])
+    return np.concatenate(found)
+
+
+def _reading(document: Document, given: BlockWords) -> Ints:
+    """Blocks with a variable that holds a position (#5001 to #5069, #5420 to #5428, #<_x>), or is itself computed."""
+    places = [found.start() for found in _POSITION.finditer(document.raw)]
+    return np.unique(np.searchsorted(given.source.blocks.start, places, side="right") - 1).astype(np.int64)
+
+
+def _mask(n: int, rows: Ints) -> Bools:
+    mask = np.zeros(n, np.bool_)
+    mask[rows] = True
+    return mask

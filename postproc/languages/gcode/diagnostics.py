@@ -1,0 +1,84 @@
+"""What is reported of a program besides the motions that are refused."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Ints
+from postproc.base.document import Document
+from postproc.base.findings import Finding
+from postproc.languages.dialect import ReadingSettings
+from postproc.languages.gcode.blocks import AXES, BlockWords
+from postproc.languages.gcode.control import Group, Once
+from postproc.languages.gcode.correctability import code_name
+from postproc.languages.gcode.execution_flow import CALLS, FlowReason
+from postproc.languages.gcode.words import How, key
+
+
+def diagnostics(
+    document: Document, given: BlockWords, rows: Ints, loaded: Ints, named: bool, settings: ReadingSettings
+) -> list[Finding]:
+    """Findings that belong to no motion; ``rows``: blocks of the motions; loaded (B,): number of the
+    tool in force; ``named``: the program names one."""
+    blocks, modal = given.source.blocks, given.modal
+    findings: list[Finding] = []
+    live = modal.flow.tape & (modal.flow.reason != FlowReason.ENDED)
+
+    def tell(where: Bools, code: str, message: str) -> None:
+        tell_at(np.flatnonzero(where), code, message)
+
+    def tell_at(at: Ints, code: str, message: str) -> None:
+        at = at[live[at]]
+        if len(at):
+            many = (
+                f"; {len(at)} blocks, lines {blocks.line[at[0]]} to {blocks.line[at[-1]]}"
+                if len(at) > 1
+                else ""
+            )
+            findings.append(Finding(code, message + many, str(document.path), int(blocks.line[at[0]]), 1))
+
+    none = np.zeros(len(given), np.bool_)
+    motion = given.motion
+    text = given.noted("unknown") & ~motion
+    if text.any():
+        said = next(note.text for note in given.source.notes if note.kind == "unknown" and text[note.block])
+        tell(text, "GCO001", f"{said[:60]!r} is not understood")
+    strange = modal.unknown_codes.block[~motion[modal.unknown_codes.block] & live[modal.unknown_codes.block]]
+    codes = np.nan_to_num(modal.unknown_codes.last(strange), nan=-1.0)
+    for value in np.unique(codes)[:100].tolist():
+        tell_at(strange[codes == value], "GCO001", f"{code_name(value)} is not known here")
+    calls, m = none.copy(), given.words(key("M"))
+    calls[m.block[np.isin(m.value, CALLS)]] = True
+    tell(
+        calls | modal.has(Once.CALL) | given.noted("call"), "GCO007", "the block calls code that is not read"
+    )
+    setting = modal.has(Once.SETTING) & given.has(*AXES, key("L"), key("P"), key("R"))
+    tell(setting, "GCO024", "the program writes offsets or tools")
+    tell(
+        given.noted("base"),
+        "GCO024",
+        "the program writes a work offset; the cell's base of its number is used",
+    )
+    named_tools: dict[str, list[int]] = {}
+    for note in given.source.notes:
+        if note.kind == "tool":
+            named_tools.setdefault(note.text, []).append(note.block)
+    for name, at in named_tools.items():
+        tell_at(np.unique(at), "SIN001", name)
+    if not len(rows):
+        return findings
+    first = none.copy()
+    first[rows[0]] = True
+    if not (modal.units & modal.flow.tape).any():
+        tell(first, "GCO020", "no code selects mm or inch; mm is assumed")
+    if not named:
+        tell(first, "GCO021", "the program names no tool; tool 1 of the cell is assumed")
+    if settings.integer_words == "um" and not given.control.increments:
+        whole = none.copy()
+        hows = np.stack([given.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
+        whole[rows] = hows[rows].any(axis=1)
+        tell(whole, "GCO022", f"words without a decimal point are mm or inch in {given.control.name}")
+    height = given.number(key("H"))
+    other = (height > 0) & (modal.force[Group.LENGTH] == 1) & (height != loaded) & (loaded > 0)
+    tell(other, "GCO023", "H has another number than the tool; the length of the cell's tool is used")
+    return findings

@@ -1,0 +1,170 @@
+"""Which blocks surely run once: not those after a slash, in loops, branches and subprograms, or after the end."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Ints
+from postproc.languages.gcode.control import Control, Once
+from postproc.languages.gcode.source import Source
+from postproc.languages.gcode.words import key
+
+_GOTO = re.compile(r"(?:GOTO[BFC]?|REPEATB?)\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
+_ZEROS = re.compile(r"^N?0*(?=\d)")
+CALLS = (72, 97, 98, 198)
+"""M72 of LinuxCNC brings back modes that M70 has saved."""
+LOCAL = 97
+RETURNS = (99,)
+
+
+class FlowReason(IntEnum):
+    """Why a block may run many times, or never."""
+
+    NONE = 0
+    DELETED = 1
+    FLOW = 2
+    PROGRAM = 3
+    ENDED = 4
+
+
+@dataclass(frozen=True, eq=False)
+class ExecutionFlow:
+    """reason (B,) FlowReason; forget (B,): before it other code ran that was not read; calls (B,): runs it; tape (B,):
+    belongs to the program; entered (B,): a jump leads to it, past what is before it."""
+
+    reason: Ints
+    forget: Bools
+    calls: Bools
+    tape: Bools
+    entered: Bools
+
+    def part(self, start: int, stop: int) -> ExecutionFlow:
+        rows = slice(start, stop)
+        forget, calls, tape, entered = self.forget, self.calls, self.tape, self.entered
+        return ExecutionFlow(self.reason[rows], forget[rows], calls[rows], tape[rows], entered[rows])
+
+    @cached_property
+    def last(self) -> Ints:
+        """(B,) the last block of the run of uncertain blocks that each block is in, itself elsewhere."""
+        n = len(self.reason)
+        sure = np.append(self.reason == FlowReason.NONE, True)
+        following = np.where(sure, np.arange(n + 1), n)
+        following = np.minimum.accumulate(following[::-1])[::-1]
+        return np.where(sure[:-1], np.arange(n), following[:-1] - 1)
+
+
+def follow(source: Source, control: Control, once: Ints) -> ExecutionFlow:
+    """The flow of a program; ``once`` (B,): bits of the Once codes of every block."""
+    n = len(source.blocks)
+    uncertainty = np.zeros(n, np.int8)
+    forget = np.zeros(n + 1, np.bool_)
+    tape = _tape(source, n)
+    uncertainty[source.blocks.deleted] = FlowReason.DELETED
+
+    m = source.column(key("M"))
+    forget[m.block[np.isin(m.value, CALLS)] + 1] = True
+    forget[1:] |= (once & (1 << Once.CALL)) != 0
+    if control.calls:
+        forget[1:] |= source.mask(*control.calls) & ~source.mask(key("G"), key("M"))
+    edge = np.zeros(n + 1, np.int32)
+    entered = _returned(source, n)
+    for start, end in _stretches(source, n, forget, entered):
+        edge[start] += 1
+        edge[end] -= 1
+    if edge.any():
+        uncertainty[np.cumsum(edge)[:n] > 0] = FlowReason.FLOW
+    programs = _programs(source)
+    if len(programs) > 1:
+        uncertainty[programs[1] :] = FlowReason.PROGRAM
+    ends = m.block[np.isin(m.value, [*control.endings, *RETURNS])]
+    ends = ends[(uncertainty[ends] == FlowReason.NONE) & tape[ends]]
+    if len(ends):
+        rest = uncertainty[ends[0] + 1 :]
+        # M97 runs what is after the end, as a subprogram.
+        rest[rest != FlowReason.PROGRAM] = (
+            FlowReason.PROGRAM if (m.value == LOCAL).any() else FlowReason.ENDED
+        )
+    return ExecutionFlow(uncertainty, forget[:-1], forget[1:], tape, entered)
+
+
+def _returned(source: Source, n: int) -> Bools:
+    """(B,) blocks to which M99 P leads, by their N."""
+    entered, m, numbers = np.zeros(n, np.bool_), source.column(key("M")), source.column(key("N"))
+    returning = m.block[np.isin(m.value, RETURNS)]
+    if len(returning) and len(numbers):
+        to = source.column(key("P")).last(returning)
+        entered[numbers.block[np.isin(numbers.value, to[np.isfinite(to)])]] = True
+    return entered
+
+
+def _tape(source: Source, n: int) -> Bools:
+    """What is between the first two ``%``, or before the only one where motions are before it."""
+    marks = [note.block for note in source.notes if note.kind == "tape"]
+    inside = np.ones(n, np.bool_)
+    if marks:
+        if any((source.column(key(letter)).block[:1] < marks[0]).any() for letter in "XYZ"):
+            inside[marks[0] :] = False
+        else:
+            inside[: marks[0]] = False
+            if len(marks) > 1:
+                inside[marks[1] :] = False
+    return inside
+
+
+def _programs(source: Source) -> list[int]:
+    """Blocks where a program starts (O1234, :1234)."""
+    plain = source.column(key("O")).block
+    noted = [note.block for note in source.notes if note.kind == "program"]
+    return sorted({*plain.tolist(), *noted})
+
+
+def _stretches(source: Source, n: int, forget: Bools, entered: Bools) -> list[tuple[int, int]]:
+    """Ranges of blocks that are loops, branches, subprograms or lie under a jump; calls are put into ``forget``, where
+    jumps lead to into ``entered``."""
+    found: list[tuple[int, int]] = []
+    stack: list[tuple[int, str]] = []
+    labels: dict[str, int] | None = None
+    for note in source.notes:
+        if note.kind == "call":
+            forget[note.block + 1] = True
+        elif note.kind == "open" or (note.kind == "while" and not any(s == note.text for _, s in stack[-1:])):
+            stack.append((note.block, note.text))
+        elif note.kind in ("close", "while"):
+            if stack:
+                start = stack.pop()[0]
+                if not stack:
+                    found.append((start, note.block + 1))
+        elif note.kind == "jump":
+            goto = _GOTO.search(note.text)
+            if goto is None:
+                continue
+            labels = _labels(source) if labels is None else labels
+            ends = [labels.get(_label(name)) for name in goto.groups() if name]
+            if not ends or None in ends:
+                found.append((0, n))
+            else:
+                at = [note.block, *(end for end in ends if end is not None)]
+                found.append((min(at), max([note.block + 1, *at])))
+                entered[at[1:]] = True
+    if stack:
+        found.append((stack[0][0], n))
+    return found
+
+
+def _labels(source: Source) -> dict[str, int]:
+    """Blocks by the N-number or the label that they start with."""
+    numbers = source.column(key("N"))
+    known = np.isfinite(numbers.value)
+    names = [f"{value:.0f}" for value in numbers.value[known].tolist()]
+    labels = dict(zip(names, numbers.block[known].tolist(), strict=True))
+    return labels | {_label(note.text): note.block for note in source.notes if note.kind == "label"}
+
+
+def _label(name: str) -> str:
+    """A label in upper case, of a block number the digits: N0030 and 30 are 30."""
+    return _ZEROS.sub("", name.upper())

@@ -1,0 +1,59 @@
+"""Axes beside X, Y, Z and the rotary ones: E1..E6, whose kinematics a cell can state, and all others."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.units import MM
+from postproc.languages.gcode.blocks import SECOND, BlockWords
+from postproc.languages.gcode.control import Group
+from postproc.languages.gcode.words import How, key
+from postproc.toolpath import COMPUTED, LOST
+
+EXTERNAL = tuple(key("E", number) for number in range(1, 7))
+
+_LETTERS = frozenset(key(one) for one in "XYZABCUVWEQ")
+
+
+def external_axes(given: BlockWords, rows: Ints) -> Floats:
+    """(N, 6) [mm or deg] where E1..E6 are after the blocks ``rows`` (N,) of the motions, see ``Toolpath``.
+
+    COMPUTED where a word is no number, is a step, or is in inches (whether the axis is linear is not said).
+    """
+    if not any(one in given.source.columns for one in EXTERNAL):
+        return np.broadcast_to(np.nan, (len(rows), 6))
+    steps, metric = given.modal.force[Group.DISTANCE] != 0, given.length == MM
+    found = np.full((len(rows), 6), np.nan)
+    for axis, one in enumerate(EXTERNAL):
+        said = np.full(len(given), np.nan)
+        said[given.modal.flow.forget] = LOST  # what was called may have moved it
+        if one in given.source.columns:
+            words = given.words(one)
+            read = metric[words.block] & np.isin(words.how, (How.NUMBER, How.INTEGER, How.ABSOLUTE))
+            read &= (words.how == How.ABSOLUTE) | ~steps[words.block]
+            said[words.block] = np.where(read & np.isfinite(words.value), words.value, COMPUTED)
+        last = np.maximum.accumulate(np.where(np.isnan(said), -1, np.arange(len(said))))[rows]
+        found[:, axis] = np.where(last >= 0, said[last], np.nan)
+    return found
+
+
+def moves_external(external: Floats) -> dict[int, str]:
+    """Motions in whose block an axis of ``external`` (N, 6) moves: nothing is inserted before them, for lack of words
+    for it."""
+    if not external.strides[0] or not len(external):
+        return {}
+    before = np.concatenate([external[:1], external[:-1]])
+    moves = ((external != before) & ~np.isnan(external) & (external != LOST)).any(axis=1)
+    return dict.fromkeys(np.flatnonzero(moves).tolist(), "an external axis moves in its block")
+
+
+def others_move(given: BlockWords) -> Bools:
+    """(B,) the first block that brings an axis beside those that are read, and E1..E6, to another place than zero."""
+    moving = np.zeros(len(given), np.bool_)
+    for one, column in given.source.columns.items():
+        named = one % 256 in _LETTERS and 256 <= one < 1 << 14 and one not in (*given.columns, *EXTERNAL)
+        if named or one in SECOND:
+            away = column.block[column.value != 0.0]
+            moving[away[:1]] = True
+    return moving

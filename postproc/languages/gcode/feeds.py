@@ -1,0 +1,57 @@
+"""Feeds: F in a minute, in a turn of the spindle, or as the inverse of a block's time."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.base.arrays import Floats, Ints
+from postproc.base.units import MM
+from postproc.languages.gcode.blocks import INCH, BlockWords
+from postproc.languages.gcode.control import Feed, Group, Once
+from postproc.languages.gcode.modal_fill import lookup
+from postproc.languages.gcode.source import WordColumn
+from postproc.languages.gcode.words import key
+
+
+class Feeds:
+    """F and S of a program, as they hold on."""
+
+    def __init__(self, given: BlockWords) -> None:
+        # F and S of a dwell are times (G4 F2).
+        self._dwell = given.modal.has(Once.DWELL)
+        self._force, self._given = given.modal.force, given
+        self._unit = lookup(self._force[given.control.feed_units], np.array([MM, INCH, np.nan]))
+        self._rate, self._spindle = (self._outside(given.words(key(letter))) for letter in "FS")
+
+    def _outside(self, column: WordColumn) -> WordColumn:
+        keep = ~self._dwell[column.block]
+        if keep.all():
+            return column
+        return WordColumn(column.block[keep], column.value[keep], column.how[keep])
+
+    def of(self, blocks: Ints, length: Floats) -> Floats:
+        """(N,) [m/s] of the motions in blocks of the program (N,); NaN where it is not known.
+
+        G94: F units a minute; G95: F units a turn, S turns a minute, in the unit of the coordinates or, on a
+        Sinumerik, of F; G93: the block takes 1/F minutes for its ``length`` (N,) [m].
+        """
+        mode = self._force[Group.FEED]
+        here = mode[blocks]
+        at, number = _latest(self._rate, blocks)
+        rate = np.where(number > 0, number * self._unit[at], np.nan)
+        # F means another thing in another mode, and has to be stated again there.
+        rate[mode[at] != here] = np.nan
+        _, turns = _latest(self._spindle, blocks)
+        turns[self._force[Group.SPINDLE][blocks] != 0] = np.nan
+        own = self._given.words(key("F")).last(blocks)
+        result = np.where(here == Feed.PER_TURN, rate * turns, rate)
+        timed = np.where(length > 0, length, np.nan) * np.where(own > 0, own, np.nan)
+        result = np.where(here == Feed.INVERSE_TIME, timed, result)
+        result[here < 0] = np.nan
+        return np.asarray(result / 60.0)
+
+
+def _latest(column: WordColumn, blocks: Ints) -> tuple[Ints, Floats]:
+    """The blocks (N,) that state what holds in ``blocks`` (N,), and what; 0 and NaN where none does."""
+    at = np.searchsorted(column.block, blocks, side="right") - 1
+    return np.maximum(np.append(column.block, -1)[at], 0), np.append(column.value, np.nan)[at]

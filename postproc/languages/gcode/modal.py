@@ -1,0 +1,300 @@
+"""What is in force at every block: the modal groups, filled forward, and the codes that hold once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.languages.gcode.control import UNKNOWN, Control, Group, ModalCode, Move, Once
+from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason, follow
+from postproc.languages.gcode.modal_fill import fill_modal, switched
+from postproc.languages.gcode.source import Source, WordColumn
+from postproc.languages.gcode.words import key
+
+_ARGUMENTS = np.array(
+    [
+        92,
+        201,
+        203,
+        204,
+        205,
+        208,
+        218,
+        350,
+        425,
+        557,
+        558,
+        566,
+        569,
+        574,
+        665,
+        666,
+        669,
+        851,
+        906,
+        907,
+        908,
+        913,
+        914,
+    ]
+)
+"""M codes of printers whose X, Y, Z are settings."""
+_FORGOTTEN = (Group.MOTION, Group.PLANE, Group.DISTANCE, Group.FEED, Group.OFFSET)
+"""What other code leaves in another state; that it leaves units, a tool radius or what I J K are in another one is not
+assumed."""
+_FARTHEST_OFFSET = 1e6
+"""No control numbers its offsets so far."""
+
+_START = {Group.MOTION: UNKNOWN, Group.OFFSET: 1, Group.PATH: 1}
+
+
+@dataclass(frozen=True, eq=False)
+class Modal:
+    """force: group -> (B,) value in force in each block, UNKNOWN where it cannot be determined; ahead: group -> the
+    value in the block ahead of the first one.
+
+    once (B,): bits 1 << Once; states (B,): a code states the motion; strange: codes that are not known, by block, the
+    last of each; twice (B,): two codes state different motions; more (B,): codes beside those of motion, plane,
+    coordinates and units.  units (B,): codes state mm or inch.
+    """
+
+    force: Mapping[Group, Ints]
+    ahead: Mapping[Group, int]
+    once: Ints
+    states: Bools
+    unknown_codes: WordColumn
+    twice: Bools
+    more: Bools
+    units: Bools
+    flow: ExecutionFlow
+
+    def has(self, *once: Once) -> Bools:
+        """(B,) blocks with one of these codes."""
+        return (self.once & sum(1 << code for code in once)) != 0
+
+    @cached_property
+    def unknown(self) -> Bools:
+        """(B,) blocks with a code that is not known."""
+        mask = np.zeros(len(self.once), np.bool_)
+        mask[self.unknown_codes.block] = True
+        return mask
+
+    def switched(self, group: Group) -> Bools:
+        """(B,) blocks in which another value is in force than in the block ahead."""
+        return switched(self.force[group], self.ahead[group])
+
+    def part(self, start: int, stop: int) -> Modal:
+        """The blocks begin .. stop - 1."""
+        rows = slice(start, stop)
+        ahead = {group: int(force[start - 1]) for group, force in self.force.items()} if start else self.ahead
+        return Modal(
+            {group: force[rows] for group, force in self.force.items()},
+            ahead,
+            self.once[rows],
+            self.states[rows],
+            self.unknown_codes.part(start, stop),
+            self.twice[rows],
+            self.more[rows],
+            self.units[rows],
+            self.flow.part(start, stop),
+        )
+
+
+def modal(source: Source, control: Control) -> Modal:
+    """The state at every block of a program."""
+    n = len(source.blocks)
+    codes = source.column(key("G"))
+    blocks = codes.block
+    number, inside, groups, values = said(codes.value, control)
+
+    once = np.zeros(n, np.int32)
+    for code in np.unique(values[groups == Group.ONCE]).tolist():
+        once[blocks[(groups == Group.ONCE) & (values == code)]] |= 1 << code
+    also = _Also(control, number, inside)
+    for code in Once:
+        once[blocks[also.says(Group.ONCE, code)]] |= 1 << code
+    m = source.column(key("M"))
+    once[m.block[np.isin(m.value, _ARGUMENTS)]] |= 1 << Once.OTHER
+    once[m.block[m.value == 206]] |= 1 << Once.SETTING
+    storing = np.flatnonzero(once & (1 << Once.STORE))
+    if len(storing):
+        named = source.mask(*(key(letter) for letter in "XYZABC"))
+        once[storing[named[storing]]] |= 1 << Once.HOME
+    odd = np.flatnonzero(groups < 0)
+    odd = odd[np.append(blocks[odd][1:] != blocks[odd][:-1], True)[: len(odd)]]
+    strange = WordColumn(blocks[odd], codes.value[odd], codes.how[odd])
+
+    flow = follow(source, control, once)
+    groups, values = _offsets(source, number, groups, values, blocks)
+    groups, values = _polar_or_offset(flow, number, groups, values, blocks)
+    start = {**_START, **control.start}
+    force: dict[Group, Ints] = {}
+    for one in Group:
+        if one in (Group.ONCE, Group.NONE):
+            continue
+        own = groups == one
+        fill = _Fill(flow, start.get(one, 0), one)
+        if one == Group.MOTION:
+            force[one] = _moves(fill, blocks[own], values[own], control.cycle_apart)
+        else:
+            some, meant = also.added(one, own, values)
+            force[one] = fill(blocks[some], meant[some])
+    states, twice = _verbs(blocks, values, groups == Group.MOTION, n)
+    quiet = states.astype(np.int8)
+    for one in (Group.PLANE, Group.DISTANCE, Group.ARCS, Group.UNITS):
+        quiet[_rows(n, blocks[groups == one])] += 1
+    more = np.bincount(blocks, minlength=n) != quiet
+    units = np.zeros(n, np.bool_)
+    units[blocks[groups == Group.UNITS]] = True
+    ahead = {one: int(values[0]) if n else 0 for one, values in force.items()}
+    return Modal(force, ahead, once, states, strange, twice, more, units, flow)
+
+
+def said(codes: Floats, control: Control) -> tuple[Ints, Bools, Ints, Ints]:
+    """Of G codes (K,): ten times their number (K,), whether a control may have it (K,); its Group (K,), -1 if it is not
+    known there, and what it says of that (K,)."""
+    number, known = _numbers(codes)
+    size = max(control.codes) + 1
+    group, value = np.full(size, -1, np.int8), np.zeros(size, np.int32)
+    for code, what in control.codes.items():
+        group[code], value[code] = what
+    inside = known & (number >= 0) & (number < size)
+    at = np.where(inside, number, 0)
+    return number, inside, np.where(inside, group[at], np.int8(-1)), value[at]
+
+
+class _Also:
+    """What else some codes say."""
+
+    def __init__(self, control: Control, number: Ints, inside: Bools) -> None:
+        self._rows = {
+            code: (np.flatnonzero(inside & (number == code)), others)
+            for code, others in control.also.items()
+            if (number == code).any()
+        }
+
+    def says(self, group: Group, value: int) -> Ints:
+        """Codes that say ``value`` of ``group``."""
+        rows = [rows for rows, others in self._rows.values() if ModalCode(group, value) in others]
+        return np.concatenate([np.empty(0, np.intp), *rows])
+
+    def added(self, group: Group, own: Bools, values: Ints) -> tuple[Bools, Ints]:
+        """Codes that say something of ``group``, and what."""
+        some, meant = own, values
+        for rows, others in self._rows.values():
+            for other in others:
+                if other.group == group:
+                    some, meant = (some.copy(), meant.copy()) if some is own else (some, meant)
+                    some[rows], meant[rows] = True, other.value
+        return some, meant
+
+
+def _offsets(source: Source, number: Ints, groups: Ints, values: Ints, blocks: Ints) -> tuple[Ints, Ints]:
+    """Groups and values with the offsets that a word P or H gives."""
+    numbered = (groups == Group.OFFSET) & (values >= 100)
+    if numbered.any():
+        given = source.column(key("P")).last(blocks)
+        fine = (given >= 0) & (given < _FARTHEST_OFFSET)
+        chosen = np.where(fine, 100 + np.where(fine, given, 0), UNKNOWN).astype(np.int32)
+        values = np.where(numbered, chosen, values)
+    selecting = (number == 150) & (groups == Group.POLAR)
+    if selecting.any():
+        # An Okuma: G15 H selects the offset, and G54 to G59 with an H are lengths of tools.
+        selecting &= source.mask(key("H"))[blocks]
+        if selecting.any():
+            groups = np.where(selecting, np.int8(Group.OFFSET), groups)
+            values = np.where(groups == Group.OFFSET, np.int32(UNKNOWN), values)
+    return groups, values
+
+
+def _polar_or_offset(
+    flow: ExecutionFlow, number: Ints, groups: Ints, values: Ints, blocks: Ints
+) -> tuple[Ints, Ints]:
+    """Groups and values where G113 ends a mode only if one is in force; else it is an offset of a Haas, as G110 is."""
+    polar = groups == Group.FOREIGN
+    ending = (number == 1130) & polar
+    if ending.any():
+        force = _Fill(flow, 0, Group.FOREIGN)(blocks[polar], values[polar])
+        before = np.append(np.zeros(1, force.dtype), force)[blocks]  # in the block ahead
+        ending &= before != 1
+        groups = np.where(ending, np.int8(Group.OFFSET), groups)
+        values = np.where(ending, np.int32(UNKNOWN), values)
+    return groups, values
+
+
+def _numbers(value: Floats) -> tuple[Ints, Bools]:
+    tens = value * 10.0
+    fine = np.isfinite(tens) & (np.abs(tens) < 1e6)
+    number = np.rint(np.where(fine, tens, -1.0)).astype(np.int32)
+    return number, fine & (np.abs(np.where(fine, tens, 0.0) - number) < 1e-6)
+
+
+def _rows(n: int, rows: Ints) -> Ints:
+    """``rows`` ascending, each once."""
+    mask = np.zeros(n, np.bool_)
+    mask[rows] = True
+    return np.flatnonzero(mask)
+
+
+class _Fill:
+    """Fills codes forward; what uncertain blocks change, and what follows code that was not read, is unknown."""
+
+    def __init__(self, flow: ExecutionFlow, start: int, group: Group) -> None:
+        self._flow, self._start = flow, start
+        self._type = np.int32 if group == Group.OFFSET else np.int8
+        self._forget = np.flatnonzero(flow.forget) if group in _FORGOTTEN else np.empty(0, np.int64)
+
+    def __call__(self, at: Ints, value: Ints) -> Ints:
+        n = len(self._flow.reason)
+        sure = self._flow.reason[at] == FlowReason.NONE
+        tape = self._flow.tape[at]
+        lost = self._forget
+        filled = self._filled(n, at[sure & tape], value[sure & tape], lost)
+        uncertain = ~sure & tape
+        if uncertain.any():
+            changed = at[uncertain][value[uncertain] != filled[at[uncertain]]]
+            after = self._flow.last[changed] + 1
+            lost = np.union1d(lost, after[after < n])
+            filled = self._filled(n, at[sure & tape], value[sure & tape], lost)
+        return filled
+
+    def _filled(self, n: int, at: Ints, value: Ints, lost: Ints) -> Ints:
+        if len(lost):
+            # What a block itself says holds in it.
+            order = np.argsort(np.concatenate([lost, at]), kind="stable")
+            value = np.concatenate([np.full(len(lost), UNKNOWN), value])[order]
+            at = np.concatenate([lost, at])[order]
+        return fill_modal(n, at, value, self._start, self._type)
+
+
+def _moves(fill: _Fill, at: Ints, value: Ints, apart: bool) -> Ints:
+    """The move in force; G80 yields to another code in its block, and may lead back to the one before a cycle."""
+    quiet = value == Move.NOTHING
+    if quiet.any():
+        # The last of a block wins: NOTHING comes first.
+        order = np.lexsort((~quiet, at))
+        at, value = at[order], value[order]
+    cyclic = np.isin(value, (Move.CYCLE, Move.NOTHING))
+    if not apart or not cyclic.any():
+        return fill(at, value)
+    plain = fill(at[~cyclic], value[~cyclic])
+    inside = fill(at, (value == Move.CYCLE).astype(np.int8))
+    return np.where(inside == 1, np.int8(Move.CYCLE), plain)
+
+
+def _verbs(blocks: Ints, values: Ints, own: Bools, n: int) -> tuple[Bools, Bools]:
+    """Of every block, whether a code states its motion; whether two of them differ."""
+    mine = np.flatnonzero(own & (values != Move.NOTHING))
+    block, value = blocks[mine], values[mine].astype(np.int8)
+    states = np.zeros(n, np.bool_)
+    states[block] = True
+    twice = np.zeros(n, np.bool_)
+    if len(block) > np.count_nonzero(states):
+        first, last = np.zeros(n, np.int8), np.zeros(n, np.int8)
+        first[block[::-1]], last[block] = value[::-1], value
+        twice = first != last
+    return states, twice

@@ -1,0 +1,71 @@
+"""The motions of a program, one row each, as far as reading goes: where they start and end, and how they get there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Floats, Ints
+from postproc.languages.gcode.arcs import ArcGeometry
+from postproc.languages.gcode.positions import Positions
+from postproc.languages.gcode.tool_orientation import ToolOrientation
+
+
+@dataclass(frozen=True, eq=False)
+class GcodeMotions:
+    """block (N,): row in the blocks; move (N,) Move; kind (N,) Kind; plane (N,); start, end (N, 6) [m, rad] in the
+    frame of the program; place (N, 3) [m]: the end in the base; arcs in the frame, centre and normal (N, 3) of them in
+    the base; length (N,) [m] of the way."""
+
+    block: Ints
+    move: Ints
+    kind: Ints
+    plane: Ints
+    start: Floats
+    end: Floats
+    place: Floats
+    arcs: ArcGeometry
+    centre: Floats
+    normal: Floats
+    length: Floats
+    tool_orientation: ToolOrientation
+
+    @staticmethod
+    def of(
+        block: Ints,
+        move: Ints,
+        kind: Ints,
+        plane: Ints,
+        start: Floats,
+        end: Floats,
+        where: Positions,
+        arcs: ArcGeometry,
+        stand: ToolOrientation,
+    ) -> GcodeMotions:
+        """Of ``block``, ``move``, ``kind``, ``plane`` (N,), ``start`` and ``end`` (N, 6) [m, rad] as of the class."""
+        turn = np.array([frame.turn for frame in where.frames])[where.frame[block]]
+        shift = np.array([frame.shift[:3] for frame in where.frames])[where.frame[block]]
+        centre = (turn @ arcs.centre[..., None])[..., 0] + shift
+        # A mirrored frame turns the sense of a rotation about a mirrored axis.
+        sense = np.sign(np.linalg.det(turn))[:, None]
+        normal = (turn @ arcs.normal[..., None])[..., 0] * sense
+        step = end[:, :3] - start[:, :3]
+        bent = np.isfinite(arcs.sweep)
+        along = np.einsum("ij,ij->i", step, np.where(bent[:, None], arcs.normal, 0.0))
+        radius = np.linalg.norm(start[:, :3] - arcs.centre, axis=1)
+        length = np.where(bent, np.hypot(radius * arcs.sweep, along), np.linalg.norm(step, axis=1))
+        return GcodeMotions(
+            block,
+            move,
+            kind,
+            plane,
+            start,
+            end,
+            where.in_base()[block, :3],
+            arcs,
+            centre,
+            normal,
+            length,
+            stand,
+        )

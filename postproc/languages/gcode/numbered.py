@@ -1,0 +1,119 @@
+"""Which base and which tool of the cell a block is in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Ints
+from postproc.base.geometry import Poses
+from postproc.languages.gcode.blocks import BlockWords
+from postproc.languages.gcode.control import Group, Once
+from postproc.languages.gcode.execution_flow import FlowReason
+from postproc.languages.gcode.modal_fill import everywhere, fill_modal
+from postproc.languages.gcode.words import key
+from postproc.toolpath import FrameRef
+
+TOOL_CHANGE = 6
+SYSTEM = ((5201, 5400), (7001, 7999), (14001, 20000))
+"""Variables that are work offsets: of Fanuc and Haas (7001, 14001: G54.1 Pn), 5211 to 5400 of LinuxCNC."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spoiled:
+    """Offsets that the program itself writes: the cell's base of that number holds no longer.
+
+    at (B,): blocks before which the offset in force changed; bad (B,): blocks whose offset is not the cell's.
+    """
+
+    at: Bools
+    bad: Bools
+
+
+def spoiled(given: BlockWords) -> Spoiled:
+    """G10 L2, G10 L20, and variables that are offsets."""
+    n = len(given)
+    base = given.modal.force[Group.OFFSET]
+    events: list[tuple[int, int | None]] = []  # block, number of the base or None for all
+    settings = np.flatnonzero(given.modal.has(Once.SETTING))
+    if len(settings):
+        kind, which = given.number(key("L"))[settings], given.number(key("P"))[settings]
+        has = given.has(key("L"))[settings]
+        for block, level, number, stated in zip(
+            settings.tolist(), kind.tolist(), which.tolist(), has.tolist(), strict=True
+        ):
+            if level in (2, 20):
+                events.append((block, None if np.isnan(number) else int(number) or int(base[block])))
+            elif stated and np.isnan(level):
+                events.append((block, None))
+    for note in given.source.notes:
+        if note.kind == "assign" and _is_offset(note.text):
+            events.append((note.block, None))
+    if not events:
+        no = everywhere(False, n)
+        return Spoiled(no, no)
+    at = np.zeros(n + 1, np.bool_)
+    first: dict[int | None, int] = {}
+    for block, number in sorted(events, key=lambda event: event[0]):
+        first.setdefault(number, block)
+        at[block + 1] |= number is None or number == base[block]
+    written = {number: block for number, block in first.items() if number is not None}
+    numbers, blocks = np.array(sorted(written)), np.array([written[number] for number in sorted(written)])
+    # From where on the base in force is not the cell's: the first change of its own number, or of all.
+    since = np.full(n, first.get(None, n))
+    if len(numbers):
+        own = np.minimum(np.searchsorted(numbers, base), len(numbers) - 1)
+        since = np.where(numbers[own] == base, np.minimum(since, blocks[own]), since)
+    return Spoiled(at[:n], np.arange(n) > since)
+
+
+def _is_offset(text: str) -> bool:
+    if not text.isdigit():
+        return not text.startswith("<")
+    return any(low <= int(text[:9]) <= high for low, high in SYSTEM)
+
+
+def tools(given: BlockWords) -> tuple[Ints, bool]:
+    """(B,) number of the tool in force, -1 where it cannot be determined; whether the program names any.
+
+    T loads a tool at once, or with M6 in programs that have an M6.  T0 without M6 loads nothing.  A program without a
+    tool works with number 1.
+    """
+    n, column, m = len(given), given.words(key("T")), given.words(key("M"))
+    changes = m.block[m.value == TOOL_CHANGE]
+    tape, sure = given.modal.flow.tape, given.modal.flow.reason == FlowReason.NONE
+    changes = changes[tape[changes]]
+    # The last T of a block counts.
+    counts = np.append(column.block[1:] != column.block[:-1], True)[: len(column)] & tape[column.block]
+    named = np.flatnonzero(counts & ((column.value != 0) | (len(changes) > 0)))
+    if not len(named):
+        return everywhere(1, n, np.int32), False
+    block, number = column.block[named], column.value[named]
+    whole = (number > 0) & (number == np.floor(number)) & sure[block] & (number < 1e9)
+    chosen = fill_modal(n, block, np.where(whole, number, -1).astype(np.int32), -1, np.int32)
+    if not len(changes):
+        return chosen, True
+    return fill_modal(n, changes, np.where(sure[changes], chosen[changes], -1), -1, np.int32), True
+
+
+def references(base: Ints, tool: Ints, line: Ints) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
+    """Indices (N,) of bases and (N,) of tools in the frames of a toolpath, of ``base``, ``tool`` and ``line`` (N,), -1
+    where unknown, and these frames."""
+    frames: list[FrameRef] = []
+    columns = []
+    for numbers in (base, tool):
+        starts = np.flatnonzero(np.diff(numbers, prepend=numbers[:1] - 1))
+        names, first = np.unique(numbers[starts], return_index=True)
+        index = np.full(len(names), -1, np.int32)
+        for i, name in enumerate(names.tolist()):
+            if name >= 0:
+                index[i] = len(frames)
+                # Base 0 is no offset (G500): the control's own coordinates.
+                pose = Poses.identity() if numbers is base and name == 0 else None
+                frames.append(FrameRef(name, pose, int(line[starts[first[i]]])))
+        if len(names) == 1:
+            columns.append(everywhere(index[0], len(numbers)))
+        else:
+            columns.append(index[np.searchsorted(names, numbers)])
+    return columns[0], columns[1], tuple(frames)

@@ -1,0 +1,132 @@
+"""Where every block ends: modal coordinates, differences, and frames that the program moves.
+
+A coordinate is a recurrence: a word sets it (or adds to it), no word keeps it, some blocks leave it unknown.  Between
+two changes of the frame it is solved for all blocks at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.languages.gcode.control import ProgrammedFrame
+
+MOST = 2000
+"""Changes of the frame that are followed; after them nothing is known."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """What the blocks do to the coordinates X, Y, Z, A, B, C, each (B, 6).
+
+    value (B, 6) [m, rad]; sets (B, 6): it is a coordinate; adds (B, 6): a difference; unknown (B, 6): lost after the
+    block; left (B, 6): unknown already before it.
+    """
+
+    value: Floats
+    sets: Bools
+    adds: Bools
+    unknown: Bools
+    left: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class Positions:
+    """Of some blocks, start, end (B, 6) [m, rad]: programmed coordinates before and after every block, in its frame.
+
+    source (B, 6): the block of the program that set, or lost, each coordinate; -1 where none did. frame (B,): row in
+    ``frames``.
+    """
+
+    start: Floats
+    end: Floats
+    source: Ints
+    frame: Ints
+    frames: Sequence[ProgrammedFrame]
+
+    def in_base(self) -> Floats:
+        """(B, 6) the ends in the base."""
+        result = np.empty_like(self.end)
+        for i, j in pairwise([*np.flatnonzero(np.diff(self.frame, prepend=-1)).tolist(), len(self.frame)]):
+            result[i:j] = self.frames[self.frame[i]].to_base(self.end[i:j])
+        return result
+
+
+class Trace:
+    """Follows the coordinates of a program through its blocks, in their order."""
+
+    def __init__(
+        self,
+        first: ProgrammedFrame,
+        events: Ints,
+        change: Callable[[int, ProgrammedFrame, Floats], ProgrammedFrame],
+    ) -> None:
+        """events (E,): blocks that change the frame (and move nothing), ascending; ``change`` (block, frame, position
+        in the base) gives the frame after one."""
+        self._events, self._change = events[:MOST], change
+        self.frames = [first]
+        self._here, self._origin = np.full(6, np.nan), np.full(6, -1)
+
+    def frame_of(self, blocks: Ints) -> Ints:
+        """Rows (K,) in ``frames`` of blocks (K,) that were followed."""
+        return np.searchsorted(self._events, blocks, side="right").astype(np.int16)
+
+    def follow(self, course: Course, start: int) -> Positions:
+        """The next blocks, of which ``start`` is the first."""
+        n = len(course.value)
+        found = Positions(
+            np.empty((n, 6)),
+            np.empty((n, 6)),
+            np.empty((n, 6), np.int32),
+            self.frame_of(np.arange(start, start + n)),
+            self.frames,
+        )
+        low, high = np.searchsorted(self._events, [start, start + n]).tolist()
+        at = 0
+        for event in (self._events[low:high] - start).tolist():
+            self._scan(course, slice(at, event), start, found)
+            self._turn(start + event)
+            at = event
+        self._scan(course, slice(at, n), start, found)
+        return found
+
+    def _turn(self, event: int) -> None:
+        """Goes on in the frame behind ``event``; behind too many nothing is known."""
+        there = self.frames[-1].to_base(self._here)
+        frame = self._change(event, self.frames[-1], there)
+        if len(self.frames) == MOST:
+            frame = ProgrammedFrame(np.eye(3), np.full(6, np.nan))
+        self.frames.append(frame)
+        self._here = frame.from_base(there)
+        self._origin = np.where(np.isnan(self._here), event, self._origin)
+
+    def _scan(self, course: Course, piece: slice, first: int, found: Positions) -> None:
+        if piece.stop > piece.start:
+            found.start[piece], found.end[piece], found.source[piece] = _scan(
+                course, piece, self._here, self._origin, first
+            )
+            self._here, self._origin = found.end[piece.stop - 1].copy(), found.source[piece.stop - 1].copy()
+
+
+def _scan(
+    course: Course, piece: slice, here: Floats, origin: Ints, first: int
+) -> tuple[Floats, Floats, Ints]:
+    value, sets, adds = course.value[piece], course.sets[piece], course.adds[piece]
+    lost, left = course.unknown[piece], course.left[piece] & ~course.sets[piece]
+    gone = lost | left | (adds & np.isnan(value))
+    anchor = sets | gone
+    n = len(value)
+    where = np.maximum.accumulate(np.where(anchor, np.arange(n)[:, None], -1), axis=0)
+    known = np.where(sets & ~lost, value, np.nan)
+    total = np.cumsum(np.where(adds & ~anchor, value, 0.0), axis=0)
+    row = np.maximum(where, 0)
+    column = np.arange(6)
+    end = np.where(where >= 0, known[row, column] + (total - total[row, column]), here + total)
+    source = np.where(where >= 0, where + (first + piece.start), origin)
+    start = np.concatenate([here[None], end[:-1]])
+    start[course.left[piece]] = np.nan
+    return start, end, source

@@ -1,0 +1,377 @@
+"""A G-code program as a Toolpath: what the blocks ask for, where they end, and why some are not corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.document import Document
+from postproc.base.geometry import Poses, rotation_from_abc
+from postproc.base.units import MM
+from postproc.languages.dialect import PLAIN, Program, ReadingSettings
+from postproc.languages.gcode import offsets
+from postproc.languages.gcode.arcs import ArcGeometry, arcs, through
+from postproc.languages.gcode.blocks import (
+    AXES,
+    SMALL_ANGLE,
+    THROUGH,
+    BlockWords,
+    Reasons,
+    blocks,
+    frame_events,
+    tilted,
+)
+from postproc.languages.gcode.comments import remarks
+from postproc.languages.gcode.control import Control, Event, Feed, Group, Move, Once, ProgrammedFrame
+from postproc.languages.gcode.correctability import Built, check_correctability, locked_rows
+from postproc.languages.gcode.diagnostics import diagnostics
+from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
+from postproc.languages.gcode.feeds import Feeds
+from postproc.languages.gcode.lexing import FARTHEST
+from postproc.languages.gcode.modal import modal
+from postproc.languages.gcode.modal_fill import FilledRows, everywhere
+from postproc.languages.gcode.motions import GcodeMotions
+from postproc.languages.gcode.numbered import Spoiled, references, spoiled, tools
+from postproc.languages.gcode.orientation_words import OrientationWords
+from postproc.languages.gcode.positions import Positions, Trace
+from postproc.languages.gcode.refusals import RefusalCollector
+from postproc.languages.gcode.source import scan
+from postproc.languages.gcode.source_map import STATE, GcodeSourceMap
+from postproc.languages.gcode.tool_orientation import ToolOrientations
+from postproc.languages.gcode.words import How, Note, key
+from postproc.toolpath import Kind, Toolpath
+
+PART = 1 << 14
+"""Blocks whose motions are worked out at a time."""
+
+
+def read(documents: tuple[Document, ...], control: Control, settings: ReadingSettings = PLAIN) -> Program:
+    """Read a program; never raises on its content."""
+    document = documents[0]
+    source = scan(document.raw, control)
+    given = blocks(
+        source, modal(source, control), control, control.increments and settings.integer_words == "um"
+    )
+    rows = np.flatnonzero(given.motion).astype(np.int32)
+    offset = spoiled(given)
+    base = given.modal.force[Group.OFFSET]
+    base = (np.where(offset.bad, -1, base) if offset.bad.any() else base)[rows]
+    tool, named = tools(given)
+    collector = RefusalCollector(len(rows))
+    found, built, frames, orientations = _followed(given, rows, offset, base, tool[rows], settings, collector)
+    lines = source.blocks
+    line, start = lines.line[rows], lines.start[rows]
+    external = external_axes(given, rows)
+    if control.further and (others := others_move(given)).any():
+        where = int(lines.line[np.argmax(others)])
+        message = f"an axis that is none of X, Y, Z, E1 to E6 and the rotary ones moves (line {where})"
+        collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message)
+    refused = collector.done(document, line, start, lines.first[rows])
+    frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line)
+    said = remarks(document, source, line)
+    number = everywhere(-1, len(rows), np.int32)
+    state = {name: found.taken(name) for name in STATE}
+    timed = state["feed_mode"] == Feed.INVERSE_TIME
+    path = Toolpath(
+        kind=built.kind,
+        position=found.taken("place"),
+        rotation=found.taken("rotation"),
+        axes=everywhere(np.full(6, np.nan), len(rows)),
+        feed=found.taken("feed"),
+        base=frame_of_base,
+        tool=frame_of_tool,
+        status=number,
+        turn=number,
+        line=line,
+        frames=cell_frames,
+        refused=refused,
+        locked=locked_rows(document, given, built, collector),
+        annotations=said.annotations,
+        centre=found.taken("centre"),
+        normal=found.taken("normal"),
+        sweep=found.taken("sweep"),
+        approximation=found.taken("blend"),
+        no_insert_before={**moves_external(external), **_whole(given, rows)},
+        comments=said.comments,
+        orientation_programmed=found.taken("orientation_programmed"),
+        redundant_axis=found.taken("redundant_axis"),
+        arc_plane_free=found.taken("arc_plane_free"),
+        inverse_time_feed=timed if timed.any() else everywhere(False, len(rows)),
+        ptp_may_change_configuration=False,
+        exact_stays=True,
+        orientation_path=found.taken("orientation_path"),
+        rotary_from=found.taken("rotary_from"),
+        rotary_to=found.taken("rotary_to"),
+        external=external,
+    )
+    findings = [*refused.findings(), *diagnostics(document, given, rows, tool, named, settings)]
+    return Program(
+        control.name,
+        documents,
+        path,
+        GcodeSourceMap(
+            **state,
+            raw=document.raw,
+            control=control,
+            start=start,
+            stop=lines.stop[rows],
+            frames=frames,
+            orientations=orientations,
+        ),
+        tuple(sorted(findings, key=lambda finding: finding.line)),
+        said.marker,
+        said.marker_at,
+        (),
+    )
+
+
+def _followed(
+    given: BlockWords,
+    rows: Ints,
+    offset: Spoiled,
+    base: Ints,
+    tool: Ints,
+    settings: ReadingSettings,
+    collector: RefusalCollector,
+) -> tuple[FilledRows, Built, Poses, tuple[OrientationWords, ...]]:
+    """The motions in the blocks ``rows`` (N,), part by part; base, tool (N,): numbers.
+
+    Gives their columns, what others build on, the frames of the program and what its orientation words mean.
+    """
+    turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
+    events = _events(given)
+    trace = Trace(offsets.start(), events, _change(given, events))
+    feeds, stands, away, reasons = (
+        Feeds(given),
+        ToolOrientations(given, turned),
+        tilted(given),
+        Reasons(len(given)),
+    )
+    allowed = _allowed(given)
+    found = FilledRows(len(rows))
+    for start in range(0, max(len(given), 1), PART):
+        stop = min(start + PART, len(given))
+        low, high = np.searchsorted(rows, [start, stop]).tolist()
+        here, own = given.part(start, stop), rows[low:high] - start
+        way = frame_events(here, offset.at[start:stop], away[start:stop], reasons)
+        where = trace.follow(way, start)
+        moves = _motions(here, where, trace, own, stands)
+        check_correctability(
+            here, moves, where, base[low:high], tool[low:high], reasons, collector.part(slice(low, high))
+        )
+        found.put(
+            high - low,
+            **_columns(here, where, moves, feeds),
+            blend=_blend(here, own, allowed),
+            sets=way.sets[own, :3],
+            lost=way.unknown[own, :3],
+        )
+    built = Built(rows, *(found.taken(name) for name in ("kind", "sets", "lost", "turned")))
+    frames = Poses(
+        np.array([frame.turn for frame in trace.frames]),
+        np.array([frame.shift[:3] for frame in trace.frames]),
+    )
+    return found, built, frames, tuple(stands.orientations)
+
+
+def _columns(
+    given: BlockWords, where: Positions, moves: GcodeMotions, feeds: Feeds
+) -> dict[str, NDArray[Any]]:
+    """What is kept of the motions of a part."""
+    rows, force, stand = moves.block, given.modal.force, moves.tool_orientation
+    place = moves.place.copy()
+    place[(given.modal.flow.reason[rows] != 0) | np.isnan(place).any(axis=1)] = np.nan
+    placed = ~np.isnan(place[:, :1])
+    feed = feeds.of(rows + given.start, moves.length)
+    rotary_from, rotary_to = stand.rotary
+    return {
+        "kind": moves.kind,
+        "place": place,
+        "rotation": stand.rotation,
+        "feed": np.where(moves.kind == Kind.PTP, np.nan, feed),
+        "centre": np.where(placed, moves.centre, np.nan),
+        "normal": np.where(placed, moves.normal, np.nan),
+        "sweep": np.where(placed[:, 0], moves.arcs.sweep, np.nan),
+        "orientation_programmed": stand.oriented,
+        "redundant_axis": stand.free_axis,
+        "orientation_path": stand.path,
+        "rotary_from": rotary_from,
+        "rotary_to": rotary_to,
+        "arc_plane_free": _by_point(given, rows),
+        "turned": stand.stated | (stand.orient < 0),
+        "move": moves.move,
+        "plane": force[Group.PLANE][rows],
+        "incremental": force[Group.DISTANCE][rows] == 1,
+        "arc_absolute": force[Group.ARCS][rows] == 1,
+        "scale": given.length[rows],
+        "increment": given.length_of_integer[rows],
+        "frame": where.frame[rows],
+        "start_position": moves.start[:, :3],
+        "orient": stand.orient,
+        "turned_values": stand.values,
+        "turned_before": stand.before,
+        "feed_mode": force[Group.FEED][rows],
+    }
+
+
+def _events(given: BlockWords) -> Ints:
+    """Blocks that change the frame: G92 and G52 only with coordinates."""
+    mentioned = given.has(*(key(letter) for letter in "XYZABC"))
+    always = given.modal.has(Once.UNSHIFT, Once.SUSPEND, Once.RESTORE, Once.FRAME)
+    return np.flatnonzero(
+        (always | (given.modal.has(Once.SHIFT, Once.LOCAL) & mentioned)) & given.modal.flow.tape
+    )
+
+
+def _change(given: BlockWords, events: Ints) -> Callable[[int, ProgrammedFrame, Floats], ProgrammedFrame]:
+    """The frame after a block that changes it; unknown where the block may not run."""
+    change = given.control.frame
+    notes: dict[int, list[Note]] = {block: [] for block in events.tolist()}
+    for note in given.source.notes if notes else ():
+        if note.block in notes:
+            notes[note.block].append(note)
+
+    keys = [one for one in given.columns if one in given.source.columns]
+
+    def changed(block: int, frame: ProgrammedFrame, position: Floats) -> ProgrammedFrame:
+        here = given.part(block, block + 1)
+        lengths = float(here.length_of_integer[0] / here.length[0])
+        angles = SMALL_ANGLE if given.increments else 1.0
+        small = {one: angles if one in AXES[3:] else lengths for one in keys}
+        words = {
+            one: float(column.value[-1] * (small[one] if column.how[-1] == How.INTEGER else 1.0))
+            for one in keys
+            if len(column := here.words(one))
+        }
+        codes = tuple(here.words(key("G")).value.tolist())
+        event = Event(
+            words,
+            int(here.modal.once[0]),
+            tuple(notes[block]),
+            codes,
+            int(here.modal.force[Group.PLANE][0]),
+            float(here.length[0]),
+            frame,
+            position,
+        )
+        after = change(event)
+        after = replace(after, shift=np.where(np.abs(after.shift) > FARTHEST * MM, np.nan, after.shift))
+        if here.modal.flow.reason[0]:
+            same = after.shift == frame.shift
+            return ProgrammedFrame(after.turn, np.where(same, frame.shift, np.nan), after.memory)
+        return after
+
+    return changed
+
+
+def _motions(
+    given: BlockWords, where: Positions, trace: Trace, rows: Ints, stands: ToolOrientations
+) -> GcodeMotions:
+    start, end = where.start[rows], where.end[rows]
+    force, move = given.modal.force, given.move[rows]
+    plane = force[Group.PLANE][rows]
+    bent = np.isin(move, (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH)) & ~given.machine[rows]
+    desired_path = _arcs(given, rows, start, end, plane, bent)
+    kind = KINDS[move]
+    kind[given.modal.has(Once.HOME)[rows]] = Kind.PTP
+    kind[given.modal.has(Once.PROBE)[rows]] = Kind.LIN
+    kind[force[Group.AXIAL][rows] != 0] = Kind.PTP
+    kind[given.modal.unknown[rows]] = Kind.OTHER
+    pose = stands.of(trace, where, rows, given.start, kind == Kind.PTP)
+    return GcodeMotions.of(rows, move, kind, plane, start, end, where, desired_path, pose)
+
+
+def _by_point(given: BlockWords, rows: Ints) -> Bools:
+    """(N,) arcs, if they are some, that a point on their path gives."""
+    words = given.has(*THROUGH)[rows] if THROUGH[0] in given.columns else np.zeros(len(rows), np.bool_)
+    return np.asarray(words | (given.move[rows] == Move.THROUGH))
+
+
+def _arcs(given: BlockWords, rows: Ints, start: Floats, end: Floats, plane: Ints, bent: Bools) -> ArcGeometry:
+    n = len(rows)
+    result = ArcGeometry(
+        np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan), np.zeros(n, np.int64)
+    )
+    between = _by_point(given, rows)
+    word, usual = given.control.turns
+    turns = np.zeros(n)
+    if word in given.columns:
+        turns = np.nan_to_num(given.number(word)[rows] - usual)
+        turns[turns % 1 != 0] = np.nan
+    for some, keys in ((bent & ~between, tuple(key(letter) for letter in "IJK")), (bent & between, THROUGH)):
+        if not some.any():
+            continue
+        at = rows[some]
+        hows = np.stack([given.how(one)[at] for one in keys], axis=1)
+        values = np.stack([given.lengths(one)[at] for one in keys], axis=1)
+        group = Group.DISTANCE if keys is THROUGH else Group.ARCS
+        relative = given.modal.force[group][at] == 1
+        absolute = np.where(hows == How.ABSOLUTE, True, (relative != (group == Group.DISTANCE))[:, None])
+        absolute &= hows != How.INCREMENTAL
+        if keys is THROUGH:
+            via = np.where(absolute & (hows >= 0), values, start[some, :3] + np.where(hows >= 0, values, 0.0))
+            found = through(start[some, :3], via, end[some, :3], turns[some])
+        else:
+            counter, radius = given.move[at] == Move.COUNTER, given.lengths(key("R"))[at]
+            found = arcs(
+                start[some, :3], end[some, :3], plane[some], counter, values, absolute, radius, turns[some]
+            )
+        for name in ("centre", "normal", "sweep", "wrong"):
+            getattr(result, name)[some] = getattr(found, name)
+    return result
+
+
+def _allowed(given: BlockWords) -> tuple[Ints, Floats]:
+    """Blocks with a G64 (K,), and what its P allows [m] (K,), NaN where nothing bounds it."""
+    codes = given.words(key("G"))
+    says = codes.block[codes.value == 64.0]
+    return says, given.lengths(key("P"))[says] if len(says) else np.empty(0)
+
+
+def _blend(given: BlockWords, rows: Ints, allowed: tuple[Ints, Floats]) -> Floats:
+    """(N,) [m]: 0 in exact modes, else as ``allowed``."""
+    path = given.modal.force[Group.PATH][rows]
+    at = np.searchsorted(allowed[0], rows + given.start, side="right") - 1
+    return np.where(path == 0, 0.0, np.where(path == 1, np.append(allowed[1], np.nan)[at], np.nan))
+
+
+def _whole(given: BlockWords, rows: Ints) -> dict[int, str]:
+    """Motions before which nothing may be inserted, because their block says more than the motion."""
+    modal = given.modal
+    more = modal.more | given.noted("assign", "corner", "axis", "polar")
+    others = (one for one in given.control.columns if one not in _WAY)
+    more |= given.has(*(key(letter) for letter in "ESTHDLQUVWM"), *others)
+    word, usual = given.control.turns
+    if word in given.columns:
+        more |= given.number(word) > usual
+    # Machine axes: what is inserted has no words for them.
+    more |= given.has(*(key(letter) for letter in "ABC")) & (modal.force[Group.TCP] != 1)
+    timed = modal.force[Group.FEED] == Feed.INVERSE_TIME
+    found: dict[int, str] = {}
+    for mask, why in (
+        (timed, "F is the time of the whole block (G93)"),
+        (more, "its block contains more than the motion"),
+        (modal.flow.entered, "a jump leads to its block"),
+    ):
+        found.update(dict.fromkeys(np.flatnonzero(mask[rows]).tolist(), why))
+    return found
+
+
+_WAY = tuple(key(letter, index) for letter in "ABCIJK" for index in (1, 2, 3))
+"""Words of the way itself: the point between, orientations."""
+
+
+KINDS = np.full(len(Move) + 1, Kind.OTHER, np.int8)
+KINDS[[Move.RAPID, Move.LINE, Move.CLOCKWISE, Move.COUNTER, Move.THROUGH]] = (
+    Kind.PTP,
+    Kind.LIN,
+    Kind.CIRC,
+    Kind.CIRC,
+    Kind.CIRC,
+)
+"""By Move; the last entry is that of UNKNOWN."""

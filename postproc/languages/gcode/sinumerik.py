@@ -1,0 +1,231 @@
+"""Siemens Sinumerik 840D: its codes and names as data, its frames, and the dialect."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.base.geometry import rotation_from_abc, rotation_from_vector
+from postproc.base.units import DEG
+from postproc.languages.gcode.control import (
+    Control,
+    Event,
+    Feed,
+    Group,
+    ModalCode,
+    Move,
+    Once,
+    ProgrammedFrame,
+)
+from postproc.languages.gcode.sinumerik_lines import RPL, TURN, SinumerikLines
+from postproc.languages.gcode.words import key
+
+COMMENT = rb'("[^"\r\n]*"?)|;[^\r\n]*'
+
+BEGIN = 65536
+"""Bytes from the start of a file that are looked at to tell whose it is."""
+
+FIRST_NAME = 1000
+"""Codes of names are numbers from here on."""
+
+_NUMBERED: tuple[tuple[Group, int, tuple[float, ...]], ...] = (
+    (Group.MOTION, Move.RAPID, (0,)),
+    (Group.MOTION, Move.LINE, (1,)),
+    (Group.MOTION, Move.CLOCKWISE, (2,)),
+    (Group.MOTION, Move.COUNTER, (3,)),
+    (Group.MOTION, Move.THREAD, (33, 34, 35, 63, 331, 332, 335, 336)),
+    (Group.MOTION, Move.OTHER, (147, 148, 247, 248, 347, 348)),
+    (Group.PLANE, 0, (17,)),
+    (Group.PLANE, 1, (18,)),
+    (Group.PLANE, 2, (19,)),
+    (Group.DISTANCE, 0, (90,)),
+    (Group.DISTANCE, 1, (91,)),
+    (Group.UNITS, 1, (70, 700)),
+    (Group.UNITS, 0, (71, 710)),
+    (Group.FEED, Feed.INVERSE_TIME, (93,)),
+    (Group.FEED, Feed.PER_MINUTE, (94, 961, 971)),
+    (Group.FEED, Feed.PER_TURN, (95, 96, 97, 962, 972, 973)),
+    (Group.OFFSET, 0, (500,)),
+    *((Group.OFFSET, n, (53 + n,)) for n in range(1, 5)),
+    *((Group.OFFSET, n, (500 + n,)) for n in range(5, 100)),
+    (Group.PATH, 0, (60,)),
+    (Group.PATH, 1, (64, 641, 642, 643, 644, 645)),
+    (Group.RADIUS, 0, (40,)),
+    (Group.RADIUS, 1, (41, 42)),
+    (Group.ONCE, Once.DWELL, (4,)),
+    (Group.ONCE, Once.OTHER, (25, 26, 110, 111, 112)),
+    (Group.ONCE, Once.HOME, (74, 75, 76)),
+    (Group.ONCE, Once.MACHINE, (53, 153)),
+    (Group.ONCE, Once.FRAME, (58, 59)),
+    (
+        Group.NONE,
+        0,
+        (
+            9,
+            62,
+            140,
+            141,
+            142,
+            143,
+            290,
+            340,
+            341,
+            450,
+            451,
+            460,
+            461,
+            462,
+            601,
+            602,
+            603,
+            621,
+            *range(810, 830),
+        ),
+    ),
+)
+
+_NAMED: tuple[tuple[Group, int, str], ...] = (
+    (Group.MOTION, Move.THROUGH, "CIP"),
+    (Group.MOTION, Move.OTHER, "CT INVCW INVCCW"),
+    (Group.MOTION, Move.SPLINE, "POLY ASPLINE BSPLINE CSPLINE"),
+    (Group.TCP, 1, "TRAORI"),
+    (Group.TCP, 0, "TRAFOOF TRANSMIT TRACYL TRAANG TRACON"),
+    (Group.FOREIGN, 1, "TRANSMIT TRACYL TRAANG TRACON"),
+    (Group.FOREIGN, 0, "TRAFOOF TRAORI"),
+    (Group.AXIAL, 1, "PTP PTPG0 PTPWOC"),
+    (Group.AXIAL, 0, "CP"),
+    (Group.EULER, 0, "ORIEULER"),
+    (Group.EULER, 1, "ORIRPY"),
+    (Group.EULER, -1, "ORIRPY2"),
+    (Group.DIAMETER, 1, "DIAMON DIAM90 DIAMCYCOF"),
+    (Group.DIAMETER, 0, "DIAMOF"),
+    (Group.MACRO, 1, "MCALL()"),
+    (Group.MACRO, 0, "MCALL_OFF"),
+    (Group.ONCE, Once.MACHINE, "SUPA G53"),
+    (Group.ONCE, Once.PROBE, "MEAS MEAW MEASA MEAWA MEAC"),
+    (Group.ONCE, Once.OTHER, "WALIMON WALIMOF"),
+    (
+        Group.ONCE,
+        Once.FRAME,
+        "TRANS ATRANS ROT AROT ROTS AROTS SCALE ASCALE MIRROR AMIRROR TOFRAME TOFRAMEX TOFRAMEY TOFRAMEZ TOROT TOROTX "
+        "TOROTY TOROTZ TOROTOF PAROT PAROTOF",
+    ),
+    (
+        Group.NONE,
+        0,
+        "FNORM FLIN FCUB FPO BRISK SOFT DRIVE FFWON FFWOF COMPON COMPCURV COMPCAD COMPSURF COMPOF FIFOCTRL STARTFIFO "
+        "STOPFIFO DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH DYNPREC CUT2D CUT2DF CUT3DC CUT3DF CUT3DFS CUT3DFF CDON "
+        "CDOF CDOF2 NORM KONT KONTT KONTC SPCON SPCOF CFC CFTCP CFIN SPATH UPATH LFTXT LFWP LFPOS STOPRE RTLION RTLIOF "
+        "SBLON SBLOF ORISON ORISOF ORIWKS ORIMKS ORIAXES ORIVECT ORIPLANE ORIMACHAX ORIVIRTAX ORIVIRT1 FGROUP "
+        "ADISPOSA GEOAX DISPLOF DISPLON TCOABS TCOFR TCOFRX TCOFRY TCOFRZ NOC FEEDOF BNAT BTAN BAUTO ENAT ETAN EAUTO "
+        "TRAFOON ORIROTA ORIROTR ORIROTT ORIROTC OSC OSD OSSE OST OSOF GFRAME0 PTPON LIFTFAST ACCLIMA SPIF1 SPIF2",
+    ),
+)
+
+
+def _names() -> tuple[dict[bytes, tuple[float, ...]], dict[int, ModalCode]]:
+    """Name -> the numbers of its codes, and those codes."""
+    names: dict[bytes, tuple[float, ...]] = {}
+    codes: dict[int, ModalCode] = {}
+    for group, value, said in _NAMED:
+        for name in said.split():
+            number = float(FIRST_NAME + len(codes))
+            codes[round(number * 10)] = ModalCode(group, int(value))
+            names[name.encode()] = (*names.get(name.encode(), ()), number)
+    return names, codes
+
+
+NAMED, _NAMED_CODES = _names()
+CODES: Mapping[int, ModalCode] = {
+    round(number * 10): ModalCode(group, int(value))
+    for group, value, numbers in _NUMBERED
+    for number in numbers
+} | _NAMED_CODES
+
+_FRAMES = {
+    NAMED[name.encode()][0]: name
+    for name in ("TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR", "AMIRROR")
+}
+_AXES = tuple(key(letter) for letter in "XYZABC")
+_NORMAL = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+
+
+def frame(event: Event) -> ProgrammedFrame:
+    """The programmable frame behind TRANS, ROT ...: absolute ones take the place of the whole frame, A... ones go on
+    from it.  ROT X Y Z turns about Z, the new Y, the new X; RPL= about the axis normal to the plane.  Scales, mirrors
+    and frames that come from the machine are not read: where they are in force the place is not known.
+    """
+    unknown = ProgrammedFrame(np.eye(3), np.full(6, np.nan))
+    said = [_FRAMES[code] for code in event.codes if code in _FRAMES]
+    if len(said) != 1:
+        return unknown
+    name = said[0]
+    base = event.frame if name.startswith("A") else ProgrammedFrame(np.eye(3), np.zeros(6))
+    given = np.array([event.words.get(axis, 0.0) for axis in _AXES])
+    if not (set(_AXES) | {RPL}) & set(event.words):
+        return base
+    if name.endswith("TRANS"):
+        shift = given * np.array([event.scale] * 3 + [DEG] * 3)
+        return replace(base, shift=base.shift + np.concatenate([base.turn @ shift[:3], shift[3:]]))
+    if not name.endswith("ROT"):
+        return unknown
+    angle = event.words.get(RPL)
+    turn = rotation_from_abc(given[[2, 1, 0]] * DEG)
+    if angle is not None:
+        turn = rotation_from_vector(_NORMAL[event.plane] * angle * DEG)
+    if not np.isfinite(turn).all():
+        return unknown
+    return replace(base, turn=base.turn @ turn)
+
+
+EULER, VECTOR = (tuple(key(letter, index) for letter in "ABC") for index in (2, 3))
+
+CONTROL = Control(
+    name="sinumerik",
+    codes=CODES,
+    line=SinumerikLines(NAMED, {}),
+    comment=COMMENT,
+    # G70 and G71 say the unit of coordinates; F stays in that of the machine's basic system, mm.
+    also={
+        **dict.fromkeys((700, 710, 7100), (ModalCode(Group.FEED_UNITS, 0),)),
+        7000: (ModalCode(Group.FEED_UNITS, 1),),
+    },
+    feed_units=Group.FEED_UNITS,
+    start={Group.OFFSET: 0},
+    endings=frozenset((2, 17, 30)),
+    turns=(TURN, 0),
+    frame=frame,
+    columns=(RPL, TURN, *(key(letter, 1) for letter in "IJK"), *EULER, *VECTOR),
+    angles=((0, 0), (1, 1), (2, 2)),
+    whole=True,
+    vector=VECTOR,
+    euler=EULER,
+    calls=frozenset((key("L"),)),
+    further=True,
+)
+"""Sinumerik 840D, its own language (G290)."""
+
+_TOOL = re.compile(rb'(?<![A-Za-z_])T[ \t]*=[ \t]*("[^"\r\n]*")', re.I)
+_CLAIM = re.compile(
+    rb"^[ \t]*(?:/\d?[ \t]*)?(?:N\d+[ \t]*)?(?:TRAORI|TRAFOOF|SUPA|MCALL|CYCLE8\d+[ \t]*\(|G7[01]0\b|G64[1-5]\b|"
+    rb"G5[0-9][0-9]\b|CIP\b|A?TRANS\b|A?ROT\b|MSG[ \t]*\(|DEF[ \t]+(?:REAL|INT)\b|\$[PATM][A-Z]*_|T=\"|R\d+=|"
+    rb"%_N_|STOPRE|FNORM|DYN[A-Z]+\b|FFWON|SOFT\b|COMPCAD|G\d{1,3}[^;(\r\n]*(?:\bCR=|[A-C]3=|=AC\(|=IC\(|TURN=))",
+    re.I | re.M,
+)
+
+
+def with_tools(raw: bytes) -> Control:
+    """The control with the named tools of a program: T="MILL10" is the tool whose number is its place among the
+    names, in the order in which they appear."""
+    tools: dict[bytes, int] = {}
+    for found in _TOOL.finditer(raw):
+        tools.setdefault(found[1], len(tools) + 1)
+    return replace(CONTROL, line=SinumerikLines(NAMED, tools)) if tools else CONTROL
+
+
+def claims(suffix: str, raw: bytes) -> bool:
+    """Whether a file is for a Sinumerik: by its name, or by words that no other control has."""
+    return suffix.lower() in (".mpf", ".spf") or _CLAIM.search(raw[:BEGIN]) is not None

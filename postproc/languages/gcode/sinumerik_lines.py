@@ -1,0 +1,247 @@
+"""Lines of Siemens Sinumerik that are not plain words: names, calls, assignments, flow, words with expressions."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+from postproc.languages.gcode.control import LexedLine
+from postproc.languages.gcode.sinumerik_expression import (
+    assigned_end,
+    bracket_end,
+    constant,
+    expression_end,
+    is_open,
+)
+from postproc.languages.gcode.words import NAMES, How, key
+
+TURN, RPL = NAMES, NAMES + 1
+NAMED_WORDS: Mapping[bytes, int] = {b"CR": key("R"), b"TURN": TURN, b"RPL": RPL}
+"""Addresses of several letters whose numbers say where a motion goes."""
+
+ACTIONS = (b"SPOS", b"SPOSA", b"M", b"H")
+CORNERS = frozenset(b"CHR CHF RND RNDM".split())
+POLAR = frozenset(b"AP RP AR ANG".split())
+POSITIONS = frozenset(b"POS POSA POSP MOV".split())
+"""``POS[X]=``: an axis moves by itself."""
+
+SETTINGS = frozenset(
+    b"ADIS ADISPOS CTOL OTOL ATOL FGREF FL FA FB FD FZ FRC FRCM ACC OVR OVRA OVRRAP ACCLIMA JERKLIMA VELOLIMA STAT TU "
+    b"SF SD SR SRA STA SVC FP FMA DISC DISR DISCL LIMS MEAC THETA PHI PSI ID IDS DC FXS FXST FXSW FOC".split()
+)
+"""Addresses that say nothing of where a motion goes."""
+
+QUIET_CALLS = frozenset(
+    b"MSG CYCLE832 FGROUP SETMS SETAL BRISKA SOFTA DRIVEA JERKA WORKPIECE GROUP_BEGIN GROUP_END GROUP_ADDEND WAITM "
+    b"WAITMC WAITE WAITS WAITP INIT START CLEARM SETM CLEAR DISPLOF DISPLON SETINT DISABLE ENABLE CLRINT FPO FENDNORM "
+    b"SPCON SPCOF WRITE DELETE STRINGIS PUTFTOCF PROTD IPTRLOCK IPTRUNLOCK STOPRE TCARR TOFFON TOFFOF CTOL FCTDEF "
+    b"RELEASE GET GETD AXTOCHAN CYCLE_HSC EXTERN MMC COUPDEF TANGDEF LEADON".split()
+)
+"""Calls after which the program goes on where it was."""
+
+OPENS = frozenset(b"FOR WHILE LOOP IF".split())
+CLOSES = frozenset(b"ENDFOR ENDWHILE ENDLOOP ENDIF UNTIL".split())
+JUMPS = frozenset(b"GOTO GOTOF GOTOB GOTOC GOTOS REPEAT REPEATB CASE CALL PCALL EXTCALL CALLPATH".split())
+DECLARES = frozenset(b"DEF EXTERN REDEF PROC ID IDS WHEN WHENEVER FROM EVERY DEFINE STRING".split())
+QUIET_NAMES = frozenset(b"ELSE DEFAULT SAVE DISPLOF DISPLON SBLOF SBLON ACTBLOCNO ENDLABEL PREPRO".split())
+
+_HEAD = re.compile(
+    rb"[ \t\x0b\x0c]*(?P<slash>/[ \t]*\d?[ \t]*)?(?:[Nn:][ \t]*\d+[ \t]*)?(?P<slash2>/[ \t]*\d?)?[ \t]*"
+)
+_LABEL = re.compile(rb"([A-Za-z_][A-Za-z0-9_]+)[ \t]*:(?!=)")
+_NAME = re.compile(rb"[A-Za-z_$][A-Za-z_$][A-Za-z0-9_$]*")
+_ADDRESS = re.compile(rb"([A-Za-z])([0-9]{0,3})[ \t]*=[ \t]*")
+_NUMBER = rb"(?:[-+][ \t]*)?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?"
+_WORD = re.compile(rb"([A-Za-z])[ \t]*(" + _NUMBER + rb")", re.I)
+_ASSIGNED = re.compile(rb"[ \t]*=(?!=)[ \t]*")
+_INDEX = re.compile(rb"[ \t]*\[")
+_PROGRAM = re.compile(rb"[ \t]*%[ \t]*([A-Za-z0-9_]*)")
+_HOWS = {
+    b"AC": How.ABSOLUTE,
+    b"DC": How.ABSOLUTE,
+    b"ACP": How.ABSOLUTE,
+    b"ACN": How.ABSOLUTE,
+    b"IC": How.INCREMENTAL,
+}
+_HOW = re.compile(rb"(ACP|ACN|AC|DC|IC)[ \t]*\(", re.I)
+_AXIS = re.compile(rb"(?:JT|ST|RA|TX|TY|TZ|AX|MA)\d+")
+_STRING = re.compile(rb'"[^"]*"?')
+
+
+class SinumerikLines:
+    """Takes lines apart.  names: what is alone -> the numbers of its codes; tools: a tool's name -> number."""
+
+    def __init__(self, names: Mapping[bytes, tuple[float, ...]], tools: Mapping[bytes, int]) -> None:
+        self._names, self._tools = names, tools
+
+    def __call__(self, text: bytes) -> LexedLine:
+        return _Taken(text, self._names, self._tools).line()
+
+
+class _Taken:
+    def __init__(
+        self, text: bytes, names: Mapping[bytes, tuple[float, ...]], tools: Mapping[bytes, int]
+    ) -> None:
+        self.text, self.names, self.tools = text, names, tools
+        self.words: list[tuple[int, int, int, int, float, int]] = []
+        self.notes: list[tuple[str, str]] = []
+        self.deleted = False
+
+    def line(self) -> LexedLine:
+        program = _PROGRAM.match(self.text)
+        if program is not None:
+            self.note("program" if program[1] else "tape", program[1])
+            return LexedLine([], self.notes, False)
+        head = _HEAD.match(self.text)
+        place = head.end() if head else 0
+        self.deleted = head is not None and bool(head["slash"] or head["slash2"])
+        label = _LABEL.match(self.text, place)
+        if label is not None:
+            self.note("label", label[1].upper())
+            place = label.end()
+        while place < len(self.text):
+            if self.text[place] in b" \t\x0b\x0c":
+                place += 1
+                continue
+            place = self.token(place)
+        if self.words and is_open(self.text):
+            self.note("unknown", self.text[head.end() if head else 0 :].strip())
+        return LexedLine(self.words, self.notes, self.deleted)
+
+    def note(self, kind: str, said: bytes) -> None:
+        self.notes.append((kind, said.decode("latin-1")))
+
+    def word(self, at: int, address: int, start: int, stop: int, value: float, how: int) -> None:
+        self.words.append((at, address, start, stop, value, how))
+
+    def codes(self, at: int, stop: int, name: bytes) -> None:
+        for number in self.names[name]:
+            self.word(at, key("G"), -1, stop, number, How.INTEGER)
+
+    def token(self, place: int) -> int:
+        """Reads what starts at ``place``; where it ends."""
+        text = self.text
+        address = _ADDRESS.match(text, place)
+        if address is not None:
+            letter, index = address[1].upper(), address[2]
+            if letter == b"R" and index:
+                self.note("assign", b"<" + address[0])
+                return assigned_end(text, address.end())
+            if letter == b"G":
+                self.note("axis", address[0])
+                return expression_end(text, address.end())
+            number = key(letter.decode(), int(index) if index else None)
+            return self.value(place, number, address.end())
+        name = _NAME.match(text, place)
+        if name is not None:
+            return self.name(name[0].upper(), place, name.end())
+        plain = _WORD.match(text, place)
+        if plain is not None:
+            start, literal = plain.start(2), plain[2]
+            value = constant(literal)
+            how = How.NUMBER if b"." in literal else How.INTEGER
+            self.word(place, key(plain[1].decode().upper()), start, plain.end(), value, how)
+            return plain.end()
+        self.note("unknown", text[place:].strip())
+        return len(text)
+
+    def value(self, place: int, address: int, at: int) -> int:
+        """The value after an equals sign: a constant expression, AC( ), IC( ) of one, a tool's name, or not read."""
+        text = self.text
+        if address == key("T"):
+            string = _STRING.match(text, at)
+            if string is not None and string[0] in self.tools:
+                tool = self.tools[string[0]]
+                self.note("tool", b"T=%s is tool %d of the cell" % (string[0], tool))
+                self.word(place, address, -1, string.end(), float(tool), How.INTEGER)
+                return string.end()
+        how = _HOW.match(text, at)
+        if how is not None:
+            close = bracket_end(text, how.end() - 1)
+            inside = text[how.end() : close - 1]
+            shift = len(inside) - len(inside.lstrip())
+            number = constant(inside.strip())
+            start, stop = how.end() + shift, how.end() + shift + len(inside.strip())
+            kind = How.UNREAD if math.isnan(number) else _HOWS[how[1].upper()]
+            self.word(place, address, start, stop, number, kind)
+            return close
+        close = expression_end(text, at)
+        literal = text[at:close].rstrip()
+        number = constant(literal)
+        self.word(
+            place, address, at, at + len(literal), number, How.UNREAD if math.isnan(number) else How.NUMBER
+        )
+        return max(close, at + 1)
+
+    def name(self, name: bytes, place: int, end: int) -> int:
+        text = self.text
+        index = _INDEX.match(text, end)
+        stop = bracket_end(text, index.end() - 1) if index is not None else end
+        assigned = _ASSIGNED.match(text, stop)
+        if assigned is not None and not name.startswith(b"$"):
+            return self.assigned(name, place, assigned.end())
+        if name.startswith(b"$"):
+            self.note("base" if name.startswith(b"$P_UIFR") else "assign", b"<" + text[place:].strip())
+            return len(text)
+        if name in self.names:
+            self.codes(place, end, name)
+            return self.arguments(end)
+        if name == b"RET":
+            self.word(place, key("M"), -1, end, 17.0, How.INTEGER)
+            return self.arguments(end)
+        return self.statement(name, place, end)
+
+    def assigned(self, name: bytes, place: int, behind: int) -> int:
+        """``NAME=`` or ``NAME[..]=``."""
+        if name in NAMED_WORDS:
+            return self.value(place, NAMED_WORDS[name], behind)
+        close = expression_end(self.text, behind)
+        end = len(self.text[:close].rstrip())
+        if name in ACTIONS:
+            # It acts before the motion, as S and M do.
+            self.word(place, key("S"), -1, end, math.nan, How.UNREAD)
+        elif name in CORNERS or name in POLAR:
+            self.note("corner" if name in CORNERS else "polar", name)
+        elif name in SETTINGS:
+            pass
+        elif name in self.names:  # MEAS=1
+            self.codes(place, end, name)
+        elif name in POSITIONS or self.words or _AXIS.fullmatch(name):
+            # In a block with other words it can only be an axis of the machine.
+            self.note("axis", name)
+        else:
+            self.note("assign", b"<" + self.text[place:].strip())
+        return max(close, behind + 1)
+
+    def arguments(self, end: int) -> int:
+        """Behind the brackets that follow, if there are any."""
+        at = end
+        while at < len(self.text) and self.text[at] in b" \t":
+            at += 1
+        return bracket_end(self.text, at) if self.text[at : at + 1] == b"(" else end
+
+    def statement(self, name: bytes, place: int, end: int) -> int:
+        text = self.text
+        if name == b"MCALL":
+            # With a cycle after it, every block with a position calls that; alone it ends this.
+            on = bool(text[end:].strip())
+            self.codes(place, len(text.rstrip()), b"MCALL()" if on else b"MCALL_OFF")
+            return len(text)
+        if name in OPENS or name in CLOSES or name in JUMPS or name in DECLARES or name in QUIET_NAMES:
+            said = text[place:].strip().upper()
+            if b"GOTO" in said or name in JUMPS:
+                self.note("jump" if b"GOTO" in said or name in (b"REPEAT", b"REPEATB") else "call", said)
+            elif name in OPENS or name in CLOSES:
+                self.note("open" if name in OPENS else "close", said)
+            else:
+                self.note("assign", b"<" + said)
+            return len(text)
+        closed = self.arguments(end)
+        if name in QUIET_CALLS:
+            return closed
+        if self.words or (closed == end and text[end:].strip()):
+            self.note("unknown", text[place:].strip())
+            return len(text)
+        self.note("call", name)
+        return closed

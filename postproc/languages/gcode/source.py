@@ -1,0 +1,141 @@
+"""A whole program taken apart: all words of an address in one column, which a range of blocks takes its part of.
+
+Where a word stands is not kept: who writes lexes the lines again that are changed.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.languages.gcode.control import Control
+from postproc.languages.gcode.lexing import lex
+from postproc.languages.gcode.words import Note, key
+
+SIZE = 1 << 20
+"""Bytes that are lexed at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class WordColumn:
+    """The words of one key in the order of the text: block (W,), value (W,) as written, NaN if UNREAD, how (W,) How."""
+
+    block: Ints
+    value: Floats
+    how: Ints
+
+    def __len__(self) -> int:
+        return len(self.block)
+
+    def part(self, start: int, stop: int) -> WordColumn:
+        """Those of the blocks start .. stop - 1, counted from ``start``."""
+        low, high = np.searchsorted(self.block, [start, stop]).tolist()
+        return WordColumn(self.block[low:high] - start, self.value[low:high], self.how[low:high])
+
+    def last(self, blocks: Ints, absent: float = np.nan) -> Floats:
+        """(K,) the last values in blocks (K,)."""
+        at = np.searchsorted(self.block, blocks, side="right") - 1
+        there = np.append(self.block, -1)[at] == blocks
+        return np.where(there, np.append(self.value, absent)[at], absent)
+
+
+NONE = WordColumn(np.empty(0, np.int32), np.empty(0), np.empty(0, np.int8))
+
+
+@dataclass(frozen=True, eq=False)
+class SourceLines:
+    """Of B blocks: start, stop, first, line, deleted as in ``words.Blocks``; wordy (B,): has a word beside N."""
+
+    start: Ints
+    stop: Ints
+    first: Ints
+    line: Ints
+    deleted: Bools
+    wordy: Bools
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """columns: key -> its words; comments (C, 3): as in ``words.Text``."""
+
+    columns: Mapping[int, WordColumn]
+    blocks: SourceLines
+    notes: tuple[Note, ...]
+    comments: Ints
+
+    @cached_property
+    def noted(self) -> Mapping[str, Ints]:
+        """kind of note -> its blocks (K,)."""
+        rows: defaultdict[str, list[int]] = defaultdict(list)
+        for note in self.notes:
+            rows[note.kind].append(note.block)
+        return {kind: np.array(blocks) for kind, blocks in rows.items()}
+
+    def column(self, wanted: int) -> WordColumn:
+        return self.columns.get(wanted, NONE)
+
+    def mask(self, *wanted: int) -> Bools:
+        """(B,) blocks with a word of one of these keys."""
+        mask = np.zeros(len(self.blocks), np.bool_)
+        for one in wanted:
+            mask[self.column(one).block] = True
+        return mask
+
+
+class _Growing:
+    """Columns that grow at their ends, in place: the parts of a long one would leave holes in the memory."""
+
+    def __init__(self, *types: Any) -> None:
+        self._types, self._bytes = types, [bytearray() for _ in types]
+
+    def add(self, *columns: NDArray[Any]) -> None:
+        for held, values, kind in zip(self._bytes, columns, self._types, strict=True):
+            held += np.ascontiguousarray(values, kind).data
+
+    def done(self) -> Iterator[NDArray[Any]]:
+        for held, kind in zip(self._bytes, self._types, strict=True):
+            yield np.frombuffer(held, kind)
+
+
+def scan(raw: bytes, control: Control) -> Source:
+    """A program taken apart, part by part."""
+    words: dict[int, _Growing] = {}
+    lines = _Growing(np.int32, np.int32, np.int32, np.int32, np.bool_, np.bool_)
+    comments = _Growing(np.int32)
+    notes: list[Note] = []
+    blocks, line = 0, 1
+    for start, end in _pieces(raw):
+        text = lex(raw, control, start, end, line)
+        for one in np.flatnonzero(np.bincount(text.words.key)).tolist():
+            rows = np.flatnonzero(text.words.key == one)
+            column = words.setdefault(one, _Growing(np.int32, np.float64, np.int8))
+            column.add(text.words.block[rows] + blocks, text.words.value[rows], text.words.how[rows])
+        here = text.blocks
+        wordy = np.zeros(len(here), np.bool_)
+        wordy[text.words.block[text.words.key != key("N")]] = True
+        lines.add(here.start, here.stop, here.first, here.line, here.deleted, wordy)
+        notes += (note._replace(block=note.block + blocks) for note in text.notes)
+        comments.add(text.comments.reshape(-1))
+        blocks += len(here)
+        line += raw.count(b"\n", start, end)
+    columns = {one: WordColumn(*column.done()) for one, column in sorted(words.items())}
+    return Source(columns, SourceLines(*lines.done()), tuple(notes), next(comments.done()).reshape(-1, 3))
+
+
+def _pieces(raw: bytes) -> Iterator[tuple[int, int]]:
+    """Ranges of whole lines."""
+    start = 0
+    while start < len(raw) or not start:
+        end = raw.find(b"\n", start + SIZE) + 1 or len(raw)
+        yield start, end
+        start = end or 1

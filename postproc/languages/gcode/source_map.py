@@ -1,0 +1,131 @@
+"""Where the motions of a G-code program are in its text, and what its words mean there: for the writer.
+
+Words are many: they are not kept, but lexed again of the rows that are asked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.geometry import Poses
+from postproc.languages.gcode.control import Control, Group, Move
+from postproc.languages.gcode.lexing import lex
+from postproc.languages.gcode.modal import said
+from postproc.languages.gcode.orientation_words import OrientationWords
+from postproc.languages.gcode.words import COLUMNS, Text, key
+
+
+@dataclass(frozen=True, eq=False)
+class WriterState:
+    """What is in force at N motions.
+
+    move (N,) Move and plane (N,) (0 XY, 1 ZX, 2 YZ); incremental (N,): axis words are differences (a word's own AC, IC
+    goes before it: text.words.how); arc_absolute (N,): I J K are coordinates, else differences from the start. scale
+    (N,) [m]: what one unit of a length word is; increment (N,) [m]: what one unit of a length word without a decimal
+    point is (the same but for controls that count in increments). frame (N,): row in ``frames``, the programmed
+    coordinates in the base: base = frame @ (number * scale). start_position (N, 3) [m]: where the motion starts, in its
+    ``frame``; NaN where not known. orient (N,): row in ``orientations``, what the orientation words mean there, -1
+    where none are in force; turned_values, turned_before (N, 3): the numbers of these words in force at the end of the
+    motion, and just before its block; NaN where not known. feed_mode (N,) Feed: F of INVERSE_TIME belongs to the whole
+    motion.
+    """
+
+    move: Ints
+    plane: Ints
+    incremental: Bools
+    arc_absolute: Bools
+    scale: Floats
+    increment: Floats
+    frame: Ints
+    start_position: Floats
+    orient: Ints
+    turned_values: Floats
+    turned_before: Floats
+    feed_mode: Ints
+
+    def __len__(self) -> int:
+        return len(self.move)
+
+
+STATE = tuple(field.name for field in fields(WriterState))
+
+
+@dataclass(frozen=True, eq=False)
+class GcodeSourceMap(WriterState):
+    """One row a motion, as in the Toolpath; every motion is a block.
+
+    start, stop (N,): bytes of its line.
+    """
+
+    raw: bytes
+    control: Control
+    start: Ints
+    stop: Ints
+    frames: Poses
+    orientations: tuple[OrientationWords, ...]
+
+    def part(self, start: int, stop: int) -> SourceMapPart:
+        """The rows begin .. stop - 1 with their words."""
+        rows = slice(start, stop)
+        columns = (*COLUMNS, *self.control.columns)
+        state = {name: getattr(self, name)[rows] for name in STATE}
+        span = (int(self.start[start]), int(self.stop[stop - 1])) if stop > start else (0, 0)
+        text = lex(self.raw, self.control, *span)
+        block = np.searchsorted(text.blocks.start, self.start[rows])
+        word = np.full((len(text.blocks), len(columns)), -1, np.int32)
+        for k, one in enumerate(columns):
+            mine = np.flatnonzero(text.words.key == one)
+            word[text.words.block[mine], k] = mine
+        return SourceMapPart(
+            **state,
+            raw=self.raw,
+            span=span,
+            text=text,
+            block=block,
+            columns=columns,
+            word=word[block],
+            verb=_verbs(text, self.control)[block],
+            insert=text.blocks.code[block],
+            frames=self.frames,
+            orientations=self.orientations,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class SourceMapPart(WriterState):
+    """Motions that follow each other, with their words.
+
+    raw: bytes of the file; span: range of their lines.  text: words, blocks of these and of the lines between.
+    block (N,): row in text.blocks.
+    columns (K,): keys; word (N, K): row in text.words of the word with that key in the block, -1 where it has none.
+    verb (N,): row in text.words of the code (G1, G02 ...) that states the motion, -1 where it is inherited.
+    insert (N,): offset at which words that are missing are inserted (after the last word of the block).
+    """
+
+    raw: bytes
+    span: tuple[int, int]
+    text: Text
+    block: Ints
+    columns: tuple[int, ...]
+    word: Ints
+    verb: Ints
+    insert: Ints
+    frames: Poses
+    orientations: tuple[OrientationWords, ...]
+
+    def column(self, letter: str, index: int | None = None) -> Ints:
+        """(N,) row in text.words of the words with this address."""
+        return self.word[:, self.columns.index(key(letter, index))]
+
+
+def _verbs(text: Text, control: Control) -> Ints:
+    """(B,) the word that states the motion of a block, the last of them; -1 where none does."""
+    rows = np.flatnonzero(text.words.key == key("G"))
+    _, _, groups, values = said(text.words.value[rows], control)
+    rows = rows[(groups == Group.MOTION) & (values != Move.NOTHING)]
+    verb = np.full(len(text.blocks), -1, np.int32)
+    verb[text.words.block[rows]] = rows
+    return verb

@@ -1,0 +1,243 @@
+"""The tool's orientation from the words of the blocks.
+
+Rotary axes A, B, C turn the tool against the part: R(A, B, C) = Rz(C) Ry(B) Rx(A) in the base's axes, and the tool
+is at R turned, with ``turned`` its orientation at A = B = C = 0; an axis that no block names stays at 0. That
+holds where X, Y, Z are the tool's tip (TCP modes); else where the tip is, and how the part stands, is the machine's
+own, and only blocks with all rotary axes at 0 say where the tool is. Controls of robots take A, B, C as angles of the
+tool's frame itself (``Control.whole``). A vector, or angles A2= B2= C2=, say where the tool points in the programmed
+coordinates; they hold until another block states an orientation.
+
+Between two blocks rotary axes run linearly, as they do under G43.4, under ORIAXES and in the kinematics of LinuxCNC;
+what says a direction runs on a great circle (ORIVECT, ORIPLANE); angles of the tool's frame turn evenly about one axis.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.units import DEG
+from postproc.languages.gcode.blocks import BlockWords
+from postproc.languages.gcode.control import Group
+from postproc.languages.gcode.modal_fill import everywhere
+from postproc.languages.gcode.orientation_words import Angles, OrientationWords, Vector
+from postproc.languages.gcode.positions import Positions, Trace
+from postproc.languages.gcode.words import key
+from postproc.toolpath import OrientationPath
+
+WHOLE = 1e-9
+"""[rad] a rotary axis this near to 0 is at 0."""
+
+ROTARY, VECTOR, EULER, RPY = range(4)
+_NOWHERE = -1
+_ROTARY_KEYS = (key("A"), key("B"), key("C"))
+_SEQUENCES = {EULER: ((2, 0), (0, 1), (2, 2)), RPY: ((2, 2), (1, 1), (0, 0))}
+
+
+@dataclass(frozen=True, eq=False)
+class ToolOrientation:
+    """rotation (N, 3, 3); oriented (N,): the words can be written; free_axis (N, 3): as in a Toolpath; wrong (N,):
+    0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one.  orient (N,) row in
+    ``Stands.orientations``, -1 where none is in force; values, before (N, 3): as in Places.  stated (N,): the block
+    itself states the whole orientation in force.  path (N,) OrientationPath."""
+
+    rotation: Floats
+    oriented: Bools
+    free_axis: Floats
+    wrong: Ints
+    orient: Ints
+    values: Floats
+    before: Floats
+    stated: Bools
+    path: Ints
+
+    @staticmethod
+    def unsaid(count: int, turned: Floats | None) -> ToolOrientation:
+        """Of ``count`` motions, at the rotation ``turned`` (3, 3) or at none known, whose text states nothing of the
+        orientation."""
+        nothing = everywhere(np.full(3, np.nan), count)
+        no = everywhere(False, count)
+        return ToolOrientation(
+            everywhere(np.full((3, 3), np.nan) if turned is None else turned, count),
+            no,
+            nothing,
+            everywhere(0, count, np.int8),
+            everywhere(-1, count, np.int16),
+            nothing,
+            nothing,
+            no,
+            everywhere(OrientationPath.SINGLE_AXIS, count, np.int8),
+        )
+
+    @property
+    def rotary(self) -> tuple[Floats, Floats]:
+        """(N, 3) [rad] the words of rotary axes just before the block and at its end; NaN where they do not turn the
+        tool."""
+        by_axes = (self.path == OrientationPath.ROTARY_AXES)[:, None]
+        if not by_axes.any():
+            nothing = everywhere(np.full(3, np.nan), len(by_axes))
+            return nothing, nothing
+        before, values = (np.where(by_axes, words * DEG, np.nan) for words in (self.before, self.values))
+        return before, values
+
+
+class ToolOrientations:
+    """The orientation of the motions of a program, which come block by block."""
+
+    def __init__(self, given: BlockWords, turned: Floats | None) -> None:
+        """given: the whole program; turned (3, 3): the tool in the base at A = B = C = 0; None where none is said."""
+        self._given, self._turned = given, turned
+        self._tcp = given.modal.force[Group.TCP] == 1
+        self._used = np.array([len(given.words(one)) > 0 for one in _ROTARY_KEYS])
+        others = (*given.control.vector, *given.control.euler)
+        self._none = not self._used.any() and not any(len(given.words(one)) for one in others)
+        if not self._none:
+            self._kind, self._stating = _kinds(given, self._tcp, bool(self._used.any()))
+        self.orientations: list[OrientationWords] = []
+        self._number: dict[tuple[int, int], int] = {}
+
+    def of(self, trace: Trace, where: Positions, rows: Ints, first: int, rapid: Bools) -> ToolOrientation:
+        """Of motions in blocks ``rows`` (N,) of ``where``, which starts at block ``first``; rapid (N,): air."""
+        used = self._used
+        result = ToolOrientation.unsaid(len(rows), self._turned)
+        if self._none:
+            return result
+        result = ToolOrientation(**{name: np.array(column) for name, column in result.__dict__.items()})
+        blocks = rows + first
+        kind = self._kind[blocks]
+        _machine(where, rows, rapid, used, self._tcp[blocks], kind, result)
+        inside = self._tcp[blocks] & (kind != _NOWHERE)
+        given = self._given.part(first, first + len(where.frame))
+        turning = np.array([frame.shift[3:].any() for frame in where.frames])
+        pairs = np.stack([kind, np.where(kind == ROTARY, 0, where.frame[rows])], axis=1)
+        for one, frame in np.unique(pairs[inside], axis=0).tolist():
+            here = np.flatnonzero(inside & (pairs == (one, frame)).all(axis=1))
+            number = self._orientation(one, frame, where)
+            orientation = self.orientations[number]
+            result.orient[here] = number
+            shifted = turning[where.frame[rows[here]]]
+            ends = where.end[rows[here], 3:]
+            values = self._values(trace, one, blocks[here], ends, orientation)
+            result.values[here] = values
+            ahead = here[(blocks[here] > 0) & ((one == ROTARY) | (self._kind[blocks[here] - 1] == one))]
+            starts = where.start[rows[ahead], 3:]
+            result.before[ahead] = self._values(trace, one, blocks[ahead], starts, orientation, 1)
+            present = np.stack(
+                [given.has(address)[rows[here]] for address in orientation.words if address >= 0], axis=1
+            )
+            result.stated[here] = present.any(axis=1) if orientation.joint else present.all(axis=1)
+            columns = np.array(orientation.words) >= 0
+            known = np.isfinite(values[:, columns]).all(axis=1)
+            if one == VECTOR:
+                known &= values.any(axis=1)
+            result.wrong[here[~known]] = 2
+            good = here[known]
+            result.rotation[here] = np.nan
+            result.rotation[good] = orientation.rotation(values[known])
+            # A pair of axes can be written at its pole as well: the outer one stays near its place (rotary.pointing).
+            pair = one == ROTARY and int(self._used.sum()) == 2 and self._turned is not None
+            result.oriented[good] = (pair | orientation.writable(values[known])) & ~shifted[known]
+            result.path[good] = self._path(one)
+            result.free_axis[good] = orientation.free_axis
+        return result
+
+    def _path(self, kind: int) -> OrientationPath:
+        """How the orientation runs between two blocks that state it by words of a kind."""
+        if kind != ROTARY:
+            return OrientationPath.GREAT_CIRCLE
+        whole = bool(self._used.all()) and self._given.control.whole
+        return OrientationPath.SINGLE_AXIS if whole else OrientationPath.ROTARY_AXES
+
+    def _orientation(self, kind: int, frame: int, where: Positions) -> int:
+        """Row in ``orientations`` of the meaning that the words of a kind have in a frame."""
+        if (kind, frame) not in self._number:
+            self._number[kind, frame] = len(self.orientations)
+            turn = where.frames[frame].turn
+            self.orientations.append(_orientation(self._given, kind, turn, self._turned, self._used))
+        return self._number[kind, frame]
+
+    def _values(
+        self,
+        trace: Trace,
+        kind: int,
+        blocks: Ints,
+        axes: Floats,
+        orientation: OrientationWords,
+        earlier: int = 0,
+    ) -> Floats:
+        """(n, 3) numbers in force at the end of ``blocks`` (n,), or ``earlier`` ones; ``axes`` (n, 3) [rad] there."""
+        if kind == ROTARY:
+            return np.where(self._used, axes / DEG, np.nan)
+        given = self._given
+        keys = given.control.vector if kind == VECTOR else given.control.euler
+        at = self._stating[blocks - earlier]
+        values = np.stack([given.words(one).last(at, absent=0.0) for one in keys], axis=1)
+        # Stated in other coordinates: where it points stays.
+        stated, now = trace.frame_of(at), trace.frame_of(blocks)
+        for number in np.unique(stated).tolist():
+            other = np.flatnonzero((stated == number) & (now != number))
+            if len(other):
+                told = _orientation(given, kind, trace.frames[number].turn, self._turned, self._used)
+                values[other] = orientation.values(told.rotation(values[other]), values[other])
+        return np.asarray(values)
+
+
+def _kinds(given: BlockWords, tcp: Bools, rotary: bool) -> tuple[Ints, Ints]:
+    """(B,) what states the orientation in force, _NOWHERE where nothing known does; the block that states it."""
+    n = len(given)
+    control = given.control
+    stated = np.full(n, _NOWHERE, np.int8)
+    marks = np.zeros(n, np.bool_)
+    euler = given.modal.force[Group.EULER]
+    for keys, kind in (
+        (control.euler, np.where(euler == 1, RPY, EULER)),
+        (control.vector, np.full(n, VECTOR)),
+    ):
+        if keys:
+            has = given.has(*keys)
+            stated[has], marks[has] = kind[has], True
+            stated[has & (euler < 0) & (kind != VECTOR)] = _NOWHERE
+    if rotary:
+        has = given.has(*_ROTARY_KEYS)
+        stated[has], marks[has] = ROTARY, True
+    uncertain = given.modal.flow.reason != 0
+    lost = (marks & uncertain) | given.modal.flow.forget
+    changed = np.concatenate([[False], tcp[1:] != tcp[:-1]]) if n else marks
+    # A vector does not outlast its mode; positions of rotary axes do.
+    stated[lost] = _NOWHERE
+    fresh = marks | lost | changed
+    at = np.maximum.accumulate(np.where(fresh, np.arange(n, dtype=np.int32), np.int32(0)))
+    kind = stated[at]
+    return np.where((kind == _NOWHERE) & rotary, np.int8(ROTARY), kind), at
+
+
+def _machine(
+    where: Positions, rows: Ints, rapid: Bools, used: Bools, tcp: Bools, kind: Ints, result: ToolOrientation
+) -> None:
+    """Motions without a TCP mode: their rotary axes have to be at 0 from begin to end."""
+    end, start = np.where(used, where.end[rows, 3:], 0.0), np.where(used, where.start[rows, 3:], 0.0)
+    unknown = np.isnan(end).any(axis=1)
+    away = (np.abs(end) > WHOLE).any(axis=1) | (~rapid & (np.abs(start) > WHOLE).any(axis=1))
+    wrong = ~tcp & (unknown | away | (kind > ROTARY))
+    result.wrong[wrong] = 1
+    result.wrong[tcp & (kind == _NOWHERE)] = 2
+    result.rotation[wrong | (tcp & (kind == _NOWHERE))] = np.nan
+
+
+def _orientation(
+    given: BlockWords, kind: int, turn: Floats, turned: Floats | None, used: Bools
+) -> OrientationWords:
+    control = given.control
+    if kind == VECTOR:
+        return Vector((control.vector[0], control.vector[1], control.vector[2]), turn, turned)
+    if kind in _SEQUENCES:
+        words = (control.euler[0], control.euler[1], control.euler[2])
+        return Angles(words, _SEQUENCES[kind], turn, turned, free_spin=True, joint=True)
+    a, b, c = (one if use else -1 for one, use in zip(_ROTARY_KEYS, used.tolist(), strict=True))
+    if used.all():
+        tool = np.eye(3) if control.whole else turned
+        return Angles((a, b, c), control.angles, np.eye(3), tool)
+    sequence = tuple((axis, axis) for axis in (2, 1, 0) if used[axis])
+    return Angles((a, b, c), sequence, np.eye(3), turned, free_spin=True)

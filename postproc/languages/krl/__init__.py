@@ -1,0 +1,66 @@
+"""KRL, the language of KUKA robots: a module is a .src and, with it, a .dat."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from postproc.base.document import Document, Edit
+from postproc.base.findings import Finding, Refusal
+from postproc.base.read_files import list_folder
+from postproc.languages.dialect import (
+    MARK,
+    PLAIN,
+    EditedTargets,
+    Plan,
+    Program,
+    ReadingSettings,
+    WritingSettings,
+    put_mark,
+)
+from postproc.languages.krl import codes as codes
+from postproc.languages.krl import interpreter, writer
+
+_CLAIM = re.compile(
+    rb"^(?:\xef\xbb\xbf)?[ \t]*(?:(?:GLOBAL[ \t]+)?DEF[ \t]+[A-Za-z_$][A-Za-z0-9_$]*[ \t]*(?:\(|;|\r?$)"
+    rb"|S?(?:PTP|LIN)[ \t]*\{)",
+    re.I | re.M,
+)
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,23}")
+
+
+class KrlDialect:
+    """KRL as a ``Dialect``."""
+
+    name = "krl"
+    letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ"  # points have names
+
+    def claims(self, path: Path, raw: bytes) -> bool:
+        return path.suffix.lower() == ".src" or _CLAIM.search(raw) is not None
+
+    def companions(self, path: Path) -> list[Path]:
+        wanted = (path.stem.lower(), ".dat")
+        try:
+            beside = list_folder(path.parent)
+        except FileNotFoundError:
+            return []
+        matches = [p for p in beside if (p.stem.lower(), p.suffix.lower()) == wanted and p.is_file()]
+        # Where several differ by case only, the one spelt as the program is.
+        return sorted(matches, key=lambda p: p.stem != path.stem)[:1]
+
+    def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
+        return interpreter.read(documents, settings.references, places=settings.places)
+
+    def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
+        return writer.edit_targets(program, plan, writing)
+
+    def marked(self, program: Program, text: str) -> Edit:
+        return put_mark(program, f";{MARK}{text}".encode("latin-1", "replace"))
+
+    def renamed(self, program: Program, stem: str) -> list[Edit]:
+        """Edits that call the program ``stem``.  Raises Refusal (FIL011) where that cannot name a module."""
+        if not _NAME.fullmatch(stem):
+            message = f"the name {stem!r} cannot name a KRL module"
+            raise Refusal(Finding("FIL011", message, str(program.documents[0].path)))
+        return [Edit(span, stem.encode("latin-1")) for span in program.names]

@@ -1,0 +1,163 @@
+"""What a statement changes, reads and calls.
+
+An effect is a word ("point", "base", "tool", "feed", "apo", "mode", "turning", "record", "all" for every variable that
+the program assigns) or the name (bytes) of a variable that is assigned.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Set
+
+from postproc.languages.krl.lexing import (
+    NAME,
+    SPLINES,
+    Assignment,
+    Call,
+    Declared,
+    Statement,
+    identifiers,
+    kept,
+    without_strings,
+)
+from postproc.languages.krl.target import AXES, COMPONENTS, EXTERNAL
+
+Effect = str | bytes
+Effects = set[Effect]
+
+HERE = frozenset([b"$AXIS_ACT", b"$POS_ACT"])
+"""Motions to where the robot is already."""
+
+READS_POSITION = re.compile(rb"\$(?:POS|AXIS)_(?:ACT|FOR|BACK|INT|RET)", re.I)
+
+HARMLESS = frozenset(
+    b"USERSPOT USER_GRP H50 H70 A10 A20 A10_INI DELMENS IR_STOPM P00 PULSE CWRITE CREAD SREAD SWRITE COPEN CCLOSE "
+    b"CAST_TO CAST_FROM VARSTATE MBX_REC MSGNOTIFY MSGQUIT MSGDIALOG MSGLOOP ON_ERROR_PROCEED ERR_RAISE ERR_CLEAR "
+    b"STRCLEAR STRCOPY STRADD CONFIRM SET_CD_PARAMS USE_CM_PRO_VALUES K_ROOT K_TYPE K_OFFS "
+    b"ABS SIN COS TAN ACOS ATAN ATAN2 SQRT FRAND FORWARD INVERSE INV_POS EK EB EO LK TOOL_ADJ VARTYPE GETVARSIZE "
+    b"STRCOMP STRFIND STRLEN STRDECLLEN STRTOBOOL STRTOINT STRTOREAL STRTOSTRING STRTOFRAME STRTOPOS STRTOE3POS "
+    b"STRTOE6POS STRTOAXIS STRTOE3AXIS STRTOE6AXIS GET_SIG_INF GETSYSSTATE GETCYCDEF GET_DECL_PLACE GET_MSGBUFFER "
+    b"SVEL_CP SVEL_JOINT STOOL2 SBASE SIPO_MODE SLOAD SACC_CP SACC_JOINT SORI_TYP SAPO SAPO_PTP SJERK SGEAR_JERK "
+    b"IS_KEY_PRESSED TIMER_LIMIT ISMESSAGESET SET_KRLMSG EXISTS_KRLMSG CLEAR_KRLMSG SET_KRLDLG EXISTS_KRLDLG".split()
+)
+HARMLESS_BEGIN = (b"SR_", b"EKI_")
+PATH_FROM_FILE = (b"CR_PROCESS",)
+
+HIDDEN = re.compile(rb"(?<![#$\w])(?:PTP|LIN|CIRC)\b", re.I)
+"""A motion word inside of a statement of a technology package."""
+
+_MORE = re.compile(rb"[=(:]|\AGOTO\b", re.I)
+"""An assignment, a call, a label or a GOTO: what no motion holds without a brace."""
+
+MODAL: Effects = {"base", "tool", "feed", "apo", "mode", "turning"}
+"""What BAS may set."""
+
+EVERYTHING: Effects = {"point", "record", "all", *MODAL}
+
+_FUNCTION = re.compile(rb"(?<![A-Za-z0-9_$#.'])(" + NAME + rb")[ \t]*\(")
+_WORDS = frozenset(
+    b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN WHILE UNTIL FOR TO STEP SWITCH CASE WAIT SEC RETURN".split()
+)
+_CALLING = frozenset(["assignment", "call", "foreign", "open", "close", "return"])
+"""Kinds of statement whose expressions may call functions, besides WAIT."""
+
+_COUNTER = re.compile(rb"FOR[ \t]+(" + NAME + rb")[ \t]*=", re.I)
+_KEYS = frozenset([*COMPONENTS, *AXES, *EXTERNAL, b"S", b"T"])
+
+_BAS = re.compile(rb"[ \t]*#[ \t]*([A-Za-z_][A-Za-z0-9_]*)[ \t]*(?:,[ \t]*(.*?)[ \t]*)?\Z", re.S)
+_BAS_EFFECTS: dict[bytes, Effects] = {
+    b"INITMOV": MODAL,
+    b"BASE": {"base"},
+    b"EX_BASE": {"base"},
+    b"TOOL": {"tool"},
+    b"FRAMES": {"base", "tool", "mode"},
+    b"PTP_PARAMS": {"base", "tool", "mode", "apo"},
+    b"CP_PARAMS": MODAL,
+    b"PTP_DAT": {"apo"},
+    b"CP_DAT": {"feed", "apo", "turning"},
+    b"VEL_CP": {"feed"},
+}
+_SYSTEM: dict[bytes, str] = {
+    b"$BASE": "base",
+    b"$TOOL": "tool",
+    b"$VEL": "feed",
+    b"$APO": "apo",
+    b"$IPO_MODE": "mode",
+    b"$ORI_TYPE": "turning",
+    b"$CIRC_TYPE": "turning",
+    b"$CIRC_MODE": "turning",
+    b"FDAT_ACT": "record",
+    b"LDAT_ACT": "record",
+    b"PDAT_ACT": "record",
+}
+
+
+def bas(arguments: bytes) -> tuple[bytes, bytes] | None:
+    """Command (upper case) and argument of a call of BAS."""
+    found = _BAS.match(arguments)
+    return (found[1].upper(), found[2] or b"") if found else None
+
+
+def is_harmless(name: bytes) -> bool:
+    """Whether a routine of KUKA's packages is known not to move the robot."""
+    return name in HARMLESS or name.startswith(HARMLESS_BEGIN)
+
+
+def functions_of(statement: Statement) -> tuple[bytes, ...]:
+    """The functions that the expressions of a statement call, those of KRL itself left out; upper case."""
+    if statement.kind not in _CALLING and statement.word != b"WAIT":
+        return ()
+    if b"(" not in statement.code or statement.word in SPLINES:
+        return ()
+    said = statement.strings
+    code = said.arguments if isinstance(said, Call) else statement.code
+    return _functions(code) if b"(" in code else ()
+
+
+@kept
+def _functions(code: bytes) -> tuple[bytes, ...]:
+    names = dict.fromkeys(name.upper() for name in _FUNCTION.findall(without_strings(code)))
+    return tuple(name for name in names if name not in _WORDS)
+
+
+def read_by(statement: Statement) -> Set[bytes]:
+    """Names that a statement reads."""
+    said = statement.strings
+    if isinstance(said, Assignment):
+        names = identifiers(said.element) if said.element is not None else set()
+        if said.name in (b"$H_POS", b"FDAT_ACT", b"LDAT_ACT", b"PDAT_ACT"):
+            return names  # they belong to the inline form of the motion to that point
+        read = identifiers(said.value)
+        return names | (read - _KEYS if said.value.startswith(b"{") else read)
+    if isinstance(said, Declared):
+        return {name for _, value, _ in said.items for name in identifiers(value)} - _KEYS
+    if isinstance(said, Call):
+        return set() if said.name == b"BAS" and bas(said.arguments) else identifiers(said.arguments)
+    return identifiers(statement.code)
+
+
+def effects_of(statement: Statement) -> tuple[Effects, bytes]:
+    """What a statement (no motion, no block) may change, and the routine it calls."""
+    said = statement.strings
+    if isinstance(said, Assignment):
+        if said.name == b"$VEL" and said.path not in (b"", b"CP"):
+            return set(), b""
+        if said.name in _SYSTEM:
+            return {_SYSTEM[said.name]}, b""
+        if said.name.startswith(b"$") or said.path in EXTERNAL:
+            return set(), b""
+        return {said.name}, b""
+    if isinstance(said, Declared):
+        return {key.split(b"[")[0] for key, value, _ in said.items if key and value}, b""
+    if isinstance(said, Call):
+        if said.name == b"BAS":
+            command = bas(said.arguments)
+            return set(_BAS_EFFECTS.get(command[0], set()) if command else MODAL), b""
+        words: Effects = set() if is_harmless(said.name) else set(identifiers(said.arguments))
+        return words, said.name
+    if statement.kind == "open" and statement.word == b"FOR":
+        counter = _COUNTER.match(statement.code)
+        return ({counter[1].upper()} if counter else set()), b""
+    if statement.kind == "strange":
+        return (set(EVERYTHING) if _MORE.search(statement.code) else {"point"}), b""
+    return ({"point"} if statement.kind == "other" and HIDDEN.search(statement.code) else set()), b""

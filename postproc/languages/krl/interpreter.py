@@ -1,0 +1,173 @@
+"""Reads a KRL program: its lines, what they change where, then what runs."""
+
+from __future__ import annotations
+
+import gc
+import re
+from codecs import BOM_UTF8
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from postproc.base.document import Document, Span
+from postproc.base.findings import Finding
+from postproc.languages.dialect import MARK, Program
+from postproc.languages.krl.block_follower import UncertainBlocks
+from postproc.languages.krl.calls import Restart
+from postproc.languages.krl.data import Declarations, at_the_start, read_data
+from postproc.languages.krl.execution_context import ExecutionContext, Item
+from postproc.languages.krl.goto_analysis import resolve_jumps
+from postproc.languages.krl.lexing import Statement, lines, module_name
+from postproc.languages.krl.motion_rows import MotionRows
+from postproc.languages.krl.program_flow import ProgramFlow
+from postproc.languages.krl.program_structure import ProgramStructure, program_structure
+from postproc.languages.krl.scan import scan
+from postproc.languages.krl.to_toolpath import to_toolpath
+from postproc.languages.krl.variables import Variables
+
+MOST_READINGS = 3
+"""Readings in which jumps are followed that turned out to be uncertain; then none is followed."""
+
+_TCP = re.compile(rb"#[Tt][Cc][Pp]")
+_TURNING = re.compile(
+    rb"_(?:TYPE?+|MODE)(?:(?<=ORI_TYP)|(?<=ORI_TYPE)|(?<=CIRC_TYP)|(?<=CIRC_TYPE)|(?<=CIRC_MODE))"
+    rb"[ \t]*+(?:\.[A-Z_. \t]*+)?+=?+[ \t]*+(?!#[ \t]*(?:VAR|BASE)\b)",
+    re.I,
+)
+"""Where the tool turns otherwise than usual; it starts with what is no letter, so that it is found fast."""
+
+_MARK = f";{MARK}".encode()
+_MARKER = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*" + _MARK + rb"[^\r\n]*)")
+_MOTION = Statement("motion", b"", b"", 0, 0)
+
+
+@contextmanager
+def _no_collection() -> Iterator[None]:
+    """Nothing that a reading makes refers back to itself; the collector would only walk over it again and again."""
+    running = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if running:
+            gc.enable()
+
+
+@_no_collection()
+def read(
+    documents: tuple[Document, ...],
+    references: Sequence[Document] = (),
+    fast: bool = True,
+    places: bool = True,
+) -> Program:
+    """Reads a program; ``fast=False`` takes the general way for the common lines too, with the same result.
+
+    references: files that are read and never written, such as $config.dat; places: whether the program is to be
+    written, else its ``text`` is None.
+    """
+    source = documents[0]
+    code = list(scan(source, fast))
+    surveyed = program_structure(_statements(code))
+    if surveyed.jumps:
+        resolve_jumps(surveyed, _statements(code))
+    declarations = Declarations()
+    for file, document in enumerate(documents[1:], 1):
+        read_data(declarations, document, file)
+    for document in references:
+        read_data(declarations, document, -1)
+    has_tcp = any(_TCP.search(document.raw) for document in documents)
+    has_turning = any(_TURNING.search(document.raw) for document in (*documents, *references))
+    uncertain_blocks = UncertainBlocks()
+    for reading in range(MOST_READINGS + 1):
+        run = ExecutionContext(
+            source,
+            code,
+            surveyed,
+            declarations,
+            _variables(declarations, surveyed),
+            has_tcp,
+            has_turning,
+            MotionRows(source),
+        )
+        flow = ProgramFlow(run, uncertain_blocks)
+        try:
+            flow.all()
+            break
+        except Restart:
+            if reading == MOST_READINGS - 1:
+                uncertain_blocks = _uncertain_blocks(surveyed)
+    _report_structure(run)
+    marker_at = _marker_at(source, code)
+    toolpath, text, refusals = to_toolpath(run, flow.text_called, places)
+    findings = sorted([*run.findings, *refusals], key=lambda finding: (finding.line, finding.column))
+    return Program(
+        dialect="krl",
+        documents=documents,
+        toolpath=toolpath,
+        text=text,
+        findings=tuple(findings),
+        marker=_marker(source.raw),
+        marker_at=marker_at,
+        names=tuple(_names(documents)),
+    )
+
+
+def _statements(code: Sequence[Item]) -> Iterator[tuple[int, Statement]]:
+    """Index and statement; what runs of common lines change, one motion does."""
+    return ((i, item if isinstance(item, Statement) else _MOTION) for i, item in enumerate(code))
+
+
+def _variables(declarations: Declarations, surveyed: ProgramStructure) -> Variables:
+    fixed, changing = at_the_start(declarations, surveyed.assigned)
+    variables = Variables(fixed)
+    for name, entry in changing.items():
+        variables.replace(name, entry)
+    variables.begin()
+    return variables
+
+
+def _uncertain_blocks(surveyed: ProgramStructure) -> UncertainBlocks:
+    labels = {
+        (routine.start, name) for routine in surveyed.routine_at.values() for name in routine.labels
+    } & surveyed.jumps.keys()
+    return UncertainBlocks(set(), labels, plain=True)
+
+
+def _report_structure(run: ExecutionContext) -> None:
+    name = str(run.document.path)
+    for line, what in run.survey.unclosed:
+        run.findings.append(Finding("KRL014", what, name, line, 1))
+    if not run.survey.has_routine:
+        first = next((n for n, a, b in lines(run.document) if run.document.raw[a:b].strip()), 1)
+        run.findings.append(Finding("KRL018", "the file has no DEF", name, first, 1))
+
+
+def _marker(raw: bytes) -> Span | None:
+    """The first line that is the comment of a compensated program."""
+    at = raw.find(_MARK)
+    while at >= 0:
+        found = _MARKER.match(raw, raw.rfind(b"\n", 0, at) + 1)
+        if found:
+            return Span(0, *found.span(1))
+        at = raw.find(_MARK, raw.find(b"\n", at) + 1 or len(raw))
+    return None
+
+
+def _marker_at(document: Document, code: Sequence[Item]) -> Span:
+    """Behind the first DEF line; without one after the header lines."""
+    for item in code:
+        if isinstance(item, Statement) and item.kind == "def":
+            behind = document.raw.find(b"\n", item.at) + 1 or len(document.raw)
+            return Span(0, behind, behind)
+    at = len(BOM_UTF8) if document.raw.startswith(BOM_UTF8) else 0
+    for _, start, stop in lines(document):
+        if not document.raw[start:stop].lstrip().startswith(b"&"):
+            break
+        at = stop
+    return Span(0, at, at)
+
+
+def _names(documents: tuple[Document, ...]) -> Iterator[Span]:
+    for file, (document, word) in enumerate(zip(documents, (b"DEF", b"DEFDAT"), strict=False)):
+        found = module_name(document.raw, word)
+        if found:
+            yield Span(file, *found)

@@ -1,0 +1,167 @@
+"""The motions as they are found, in their order, and why they are refused."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from postproc.base.arrays import Floats
+from postproc.base.document import Document
+from postproc.languages.krl.external_axes import UNSTATED, carried_on, six
+from postproc.languages.krl.modal_state import Anchor, FrameIndex, ModalState, Source
+from postproc.languages.krl.source_map import Auxiliary, InlineForm, PointVariable, Relative
+from postproc.languages.krl.spatial import Arc, Numbers
+from postproc.languages.krl.target import KrlTarget, UnknownValue
+from postproc.languages.krl.vectorised import VectorisedLines
+from postproc.toolpath import Annotation
+
+NAN = float("nan")
+NAN6: Numbers = (NAN,) * 6
+FEW = 8
+"""Places where the robot may come from that are kept apart."""
+
+NO_ARC = (NAN,) * 7
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why a row is refused; equal ``cause`` and code are reported together."""
+
+    code: str
+    message: str
+    cause: str = ""
+
+
+class MotionRow(NamedTuple):
+    """A motion that was read alone; see Toolpath and Places for what its entries mean (mm, deg)."""
+
+    kind: int
+    line: int
+    motion: tuple[int, int, int, int]
+    values: Numbers
+    axes: Numbers
+    feed: float
+    base: int
+    tool: int
+    blend: float
+    target: KrlTarget | None
+    inherits: int
+    path: tuple[float, ...]
+    orientation: int = 0
+    arc_frame: int = 0
+    external: Numbers = UNSTATED
+
+
+class VectorisedLot(NamedTuple):
+    """A run of common lines, and the state in which it is passed; external: E1..E6 of all lines, or of each (K, 6)."""
+
+    bulk: VectorisedLines
+    feed: float
+    base: int
+    tool: int
+    blend: float
+    external: Numbers | Floats
+    orientation: int = 0
+    arc_frame: int = 0
+
+
+@dataclass
+class MotionRows:
+    """``chunks``: single rows and runs of common lines in their order; ``places``: rows by what is rare.
+
+    ``passing``: points of spline blocks; ``entries``: first point of such a block -> line of its header.
+    """
+
+    document: Document
+    chunks: list[list[MotionRow] | VectorisedLot] = field(default_factory=list)
+    count: int = 0
+    anchors: dict[int, Anchor] = field(default_factory=dict)
+    reasons: dict[int, Refusal] = field(default_factory=dict)
+    ranges: list[tuple[int, int, Refusal]] = field(default_factory=list)
+    variables: dict[int, PointVariable] = field(default_factory=dict)
+    locked: dict[int, str] = field(default_factory=dict)
+    arcs: dict[int, Auxiliary] = field(default_factory=dict)
+    relative: dict[int, Relative] = field(default_factory=dict)
+    whole: dict[int, str] = field(default_factory=dict)
+    apart: list[tuple[int, int]] = field(default_factory=list)
+    inline: dict[int, InlineForm] = field(default_factory=dict)
+    approximated: dict[int, float] = field(default_factory=dict)
+    builds_on: dict[int, frozenset[Source]] = field(default_factory=dict)
+    reads: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
+    sources: defaultdict[bytes, set[Source]] = field(default_factory=lambda: defaultdict(set))
+    annotations: list[Annotation] = field(default_factory=list)
+    comments: list[Annotation] = field(default_factory=list)
+    passing: dict[int, bool] = field(default_factory=dict)
+    entries: dict[int, int] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return self.count
+
+    def add(self, row: MotionRow, anchor: Anchor | None) -> int:
+        """Adds a motion; gives its number."""
+        if not self.chunks or not isinstance(self.chunks[-1], list):
+            self.chunks.append([])
+        chunk = self.chunks[-1]
+        assert isinstance(chunk, list)
+        chunk.append(row)
+        if anchor is not None:
+            self.anchors[self.count] = anchor
+        self.count += 1
+        return self.count - 1
+
+    def add_bulk(self, bulk: VectorisedLines, state: ModalState, reason: Refusal | None) -> int:
+        """Adds a run of common lines; gives the number of the last row."""
+        first = self.count
+        external = carried_on(state.external, bulk.external, bool(state.external_apart))
+        frames = index(state.base), index(state.tool)
+        self.chunks.append(
+            VectorisedLot(
+                bulk, state.feed, *frames, state.blend, external, state.orientation, state.arc_frame
+            )
+        )
+        self.count += len(bulk)
+        state.external = external if isinstance(external, tuple) else six(external[-1].tolist())
+        if reason is not None:
+            self.ranges.append((first, self.count, reason))
+        return self.count - 1
+
+    def joined(self, sources: frozenset[Source]) -> frozenset[Source]:
+        """The same rows and marks, as one mark where they are many."""
+        if len(sources) <= FEW:
+            return sources
+        mark = b"join %d" % len(self.sources)
+        self.sources[mark] |= sources
+        return frozenset([mark])
+
+    def truncate(self, count: int) -> None:
+        """Takes the rows from ``count`` on out again."""
+        while self.count > count:
+            chunk = self.chunks.pop()
+            size = len(chunk) if isinstance(chunk, list) else len(chunk.bulk)
+            self.count -= size
+            if self.count < count and isinstance(chunk, list):
+                self.chunks.append(chunk[: count - self.count])
+                self.count = count
+        for sparse in (
+            self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative, self.whole, self.inline,
+            self.approximated, self.builds_on, self.passing, self.entries,
+        ):  # fmt: skip
+            while sparse and next(reversed(sparse)) >= count:
+                sparse.popitem()
+        while self.ranges and self.ranges[-1][0] >= count:
+            self.ranges.pop()
+
+
+def index(frame: FrameIndex | UnknownValue) -> int:
+    """Index in the table of frames, -1 for one that is not known."""
+    return frame.index if isinstance(frame, FrameIndex) else -1
+
+
+def refusal(unclear: UnknownValue, subject: str, cause: str = "") -> Refusal:
+    return Refusal(unclear.code, f"{subject}{unclear.message}", cause)
+
+
+def path_of(arc: Arc | None) -> tuple[float, ...]:
+    """Centre [mm], normal and sweep [deg] in a row."""
+    return NO_ARC if arc is None else (*arc.centre, *arc.normal, arc.sweep)

@@ -1,0 +1,154 @@
+"""The motions that were found as arrays: what they are, and where their numbers stand."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.base.arrays import Floats
+from postproc.base.document import offset_type
+from postproc.base.geometry import rotation_from_abc
+from postproc.base.units import DEG, MM
+from postproc.languages.krl.external_axes import UNSTATED, six
+from postproc.languages.krl.motion_rows import NAN, NAN6, NO_ARC, MotionRow, MotionRows
+from postproc.languages.krl.spatial import Numbers
+from postproc.languages.krl.target import NOWHERE
+from postproc.languages.krl.vectorised import VectorisedLines
+from postproc.toolpath import Kind
+
+
+class Spots:
+    """Where the numbers of all rows are: the columns of ``Places``."""
+
+    def __init__(self, n: int, size: int) -> None:
+        offsets = offset_type(size)
+        self.start, self.stop = np.empty((n, 6), offsets), np.empty((n, 6), offsets)
+        self.motion = np.empty((n, 4), offsets)
+        self.insert = np.empty(n, offsets)
+        self.file, self.home = np.zeros((n, 6), np.int8), np.zeros(n, np.int8)
+        self.inherits = np.zeros(n, np.uint8)
+        self.text = np.arange(n, dtype=np.int32)
+        self._first: dict[int, int] = {}
+
+    def take_bulk(self, part: slice, bulk: VectorisedLines) -> None:
+        """Common lines; where they run again they keep the numbers of their texts."""
+        self.start[part], self.stop[part], self.motion[part] = bulk.start, bulk.stop, bulk.motion
+        self.insert[part] = bulk.stop[:, 5]
+        first = self._first.setdefault(id(bulk), part.start)
+        self.text[part] = np.arange(first, first + len(bulk))
+
+    def take(self, part: slice, rows: list[MotionRow]) -> None:
+        """Rows that were read alone."""
+        targets = [row.target for row in rows]
+        self.motion[part] = [row.motion for row in rows]
+        self.inherits[part] = [row.inherits for row in rows]
+        self.start[part] = [NOWHERE if t is None else t.start for t in targets]
+        self.stop[part] = [NOWHERE if t is None else t.stop for t in targets]
+        self.file[part] = [NOWHERE if t is None else t.file for t in targets]
+        self.insert[part] = [-1 if t is None else t.insert for t in targets]
+        self.home[part] = [-1 if t is None else t.home for t in targets]
+
+
+def _first(rows: MotionRows) -> Numbers:
+    """E1..E6 of the first motion."""
+    if not rows.chunks:
+        return UNSTATED
+    chunk = rows.chunks[0]
+    if isinstance(chunk, list):
+        return chunk[0].external
+    return chunk.external if isinstance(chunk.external, tuple) else six(chunk.external[0].tolist())
+
+
+class MotionTable:
+    """The entries of all rows as arrays, which takes the rows' own away; rare lengths and angles are in mm and deg.
+
+    ``word``: offset of the motion's word; ``loose``: numbers of the rows that were read alone; ``spots``: None where
+    the places are not wanted.
+    """
+
+    def __init__(self, rows: MotionRows, places: bool) -> None:
+        n, size = len(rows), len(rows.document.raw)
+        self.position: Floats = np.empty((n, 3))
+        self.rotation: Floats = np.empty((n, 3, 3))
+        self.kind = np.empty(n, np.int8)
+        self.line = np.empty(n, np.int32)
+        self.status, self.turn = (np.broadcast_to(np.int32(-1), n) for _ in range(2))
+        self.base, self.tool = np.empty(n, np.int32), np.empty(n, np.int32)
+        self.feed, self.blend = np.empty(n), np.empty(n)
+        self.word = np.empty(n, offset_type(size))
+        self.orientation, self.arc_frame = np.zeros(n, np.int8), np.zeros(n, np.int8)
+        self.spots = Spots(n, size) if places else None
+        self.axes: dict[int, Numbers] = {}
+        self.ways: dict[int, tuple[float, ...]] = {}
+        self.loose: list[tuple[int, MotionRow]] = []
+        self.external: Floats = np.broadcast_to(np.array(_first(rows)), (n, 6))
+        at = 0
+        rows.chunks.reverse()
+        while rows.chunks:
+            chunk = rows.chunks.pop()
+            if isinstance(chunk, list):
+                self._fill(at, chunk)
+                at += len(chunk)
+                continue
+            bulk = chunk.bulk
+            part = slice(at, at + len(bulk))
+            self._place(part, bulk.values)
+            self.kind[part] = np.where(bulk.is_line, Kind.LIN, Kind.PTP)
+            self.line[part] = bulk.line + np.arange(len(bulk))
+            self._state(part, bulk.status, bulk.turn)
+            self._external(part, np.array(chunk.external))
+            self.base[part], self.tool[part] = chunk.base, chunk.tool
+            self.feed[part] = np.where(bulk.is_line, chunk.feed, NAN)
+            self.blend[part] = np.array([0.0, chunk.blend, NAN])[bulk.approximation]
+            self.word[part] = bulk.motion[:, 0]
+            self.orientation[part], self.arc_frame[part] = chunk.orientation, chunk.arc_frame
+            if self.spots is not None:
+                self.spots.take_bulk(part, bulk)
+            at += len(bulk)
+        for row, blend in rows.approximated.items():
+            self.blend[row] = blend
+
+    def _state(self, part: slice, status: NDArray[np.int32], turn: NDArray[np.int32]) -> None:
+        """S and T; where no motion has them they take no memory."""
+        if not self.status.flags.writeable:
+            if (status < 0).all() and (turn < 0).all():
+                return
+            self.status, self.turn = self.status.copy(), self.turn.copy()
+        self.status[part], self.turn[part] = status, turn
+
+    def _external(self, part: slice, values: Floats) -> None:
+        """E1..E6 of some rows, (6,) or (K, 6); where all rows have the same they take no memory."""
+        if not self.external.flags.writeable:
+            first = self.external[0]
+            if ((values == first) | (np.isnan(values) & np.isnan(first))).all():
+                return
+            self.external = self.external.copy()
+        self.external[part] = values
+
+    def _place(self, part: slice, values: Floats) -> None:
+        self.position[part] = values[:, :3] * MM
+        self.rotation[part] = rotation_from_abc(values[:, 3:] * DEG)
+
+    def _fill(self, at: int, rows: list[MotionRow]) -> None:
+        part = slice(at, at + len(rows))
+        self.loose += zip(range(at, at + len(rows)), rows, strict=True)
+        self._place(part, np.array([row.values for row in rows]))
+        states = [(-1, -1) if row.target is None else (row.target.status, row.target.turn) for row in rows]
+        self._state(part, *np.array(states, np.int32).T)
+        self._external(part, np.array([row.external for row in rows]))
+        self.kind[part] = [row.kind for row in rows]
+        self.line[part] = [row.line for row in rows]
+        self.base[part] = [row.base for row in rows]
+        self.tool[part] = [row.tool for row in rows]
+        self.feed[part] = [row.feed for row in rows]
+        self.blend[part] = [row.blend for row in rows]
+        self.word[part] = [row.motion[0] for row in rows]
+        self.orientation[part] = [row.orientation for row in rows]
+        self.arc_frame[part] = [row.arc_frame for row in rows]
+        if self.spots is not None:
+            self.spots.take(part, rows)
+        for i, row in enumerate(rows):
+            if row.axes is not NAN6:
+                self.axes[at + i] = row.axes
+            if row.path is not NO_ARC:
+                self.ways[at + i] = row.path

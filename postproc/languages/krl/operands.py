@@ -1,0 +1,195 @@
+"""A motion statement taken apart, and what its operands say."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import chain
+
+from postproc.languages.krl.effects import HERE, READS_POSITION
+from postproc.languages.krl.execution_context import ExecutionContext
+from postproc.languages.krl.expressions import index_text
+from postproc.languages.krl.lexing import NAME, identifiers
+from postproc.languages.krl.source_map import PointVariable
+from postproc.languages.krl.target import KrlTarget, UnknownValue, parse, shown
+
+_NAMED = re.compile(
+    rb"(" + NAME + rb")[ \t]*(?:\[((?:[^\[\]]|\[[^\[\]]*\])*)\])?((?:[ \t]*\.[ \t]*" + NAME + rb")*)[ \t]*"
+)
+_MARK = re.compile(
+    rb'"[^"]*"?|[{}()\[\],]|#[ \t]*[A-Za-z_]+'
+    rb"|(?<![A-Za-z0-9_$.])(?:C_(?:DIS|VEL|ORI|PTP|SPL)|WITH)(?![A-Za-z0-9_$])",
+    re.I,
+)
+_LAST_SLUR = re.compile(rb"[ \t,]C_(DIS|VEL|ORI|PTP|SPL)[ \t]*\Z", re.I)
+_HOME = re.compile(rb"X?HOME[1-5]?\Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """A motion statement taken apart; offsets in its code.  points: begin and end of what is between commas;
+    approximations: approximation words; reference: begin and end of #BASE or #TOOL; clause: WITH and what follows; odd:
+    what has no meaning there."""
+
+    points: tuple[tuple[int, int], ...]
+    approximations: tuple[bytes, ...]
+    reference: tuple[int, int] | None = None
+    clause: bytes = b""
+    not_understood: bytes = b""
+
+
+@dataclass(frozen=True, slots=True)
+class Operand:
+    """One target as it is written: what it says, where it is in document 0, and the variable that holds it.
+
+    builds: it may leave components to the point before, but what it says is not known.
+    """
+
+    target: KrlTarget | UnknownValue
+    start: int
+    stop: int
+    variable: PointVariable | None = None
+    builds: bool = False
+
+
+@lru_cache(maxsize=4096)
+def take_apart(code: bytes, start: int) -> Parts:
+    """The parts of a motion statement, whose word ends at ``start``."""
+    points: list[tuple[int, int]] = []
+    approximations: list[bytes] = []
+    reference: tuple[int, int] | None = None
+    clause = odd = b""
+    is_open, at = True, start  # whether a point is open, and after what
+    depth = 0
+    for mark in chain(_MARK.finditer(code, start), (None,)):
+        token = b"" if mark is None else mark[0]
+        if mark is None:
+            pass
+        elif token in b"{([":
+            depth += 1
+            continue
+        elif token in b"})]":
+            depth -= 1
+            continue
+        elif depth > 0 or token.startswith(b'"'):
+            continue
+        text = code[at : len(code) if mark is None else mark.start()]
+        inner = text.strip(b" \t")
+        if inner and is_open:
+            left = at + text.find(inner)
+            points.append((left, left + len(inner)))
+        elif inner:
+            odd = odd or inner
+        if mark is None:
+            break
+        is_open, at = token == b",", mark.end()
+        if token.startswith(b"#"):
+            reference = mark.span()
+        elif token.upper() == b"WITH":
+            clause = code[at:]
+            found = _LAST_SLUR.search(clause)
+            if found:
+                approximations.append(b"C_" + found[1].upper())
+                clause = clause[: found.start()]
+            break
+        elif token != b",":
+            approximations.append(token.upper())
+    return Parts(tuple(points), tuple(approximations), reference, clause, odd)
+
+
+def operand_at(run: ExecutionContext, code: bytes, at: int, place: tuple[int, int]) -> Operand:
+    """The target that is at ``place`` of the code, which starts at byte ``at``."""
+    start, stop = place
+    text = code[start:stop]
+    begin, end = at + start, at + stop
+    if text.startswith(b"{"):
+        close = text.find(b"}")
+        if close == len(text) - 1 and b"{" not in text[1:]:
+            if b'"' in text:
+                return Operand(UnknownValue("KRL001", "its braces do not match"), begin, end, None, True)
+            target = parse(text, begin, 0, run.value)
+            if isinstance(target, UnknownValue) or -1 in target.start:
+                run.mentioned |= identifiers(text)
+            return Operand(target, begin, end, None, isinstance(target, UnknownValue))
+        if close < 0 or b"{" in text[1:close]:
+            return Operand(UnknownValue("KRL001", "its braces do not match"), begin, end, None, True)
+        if text[close + 1 :].lstrip()[:1] not in (b":", b"+", b"-", b"*", b"/"):
+            why = f"'{shown(text[close + 1 :])}' is not understood"
+            return Operand(UnknownValue("KRL001", why), begin, end, None, True)
+        return _computed(run, text, begin, end)
+    found = _NAMED.match(text)
+    if found is None:
+        if text.startswith(b"("):
+            return _computed(run, text, begin, end)
+        return Operand(UnknownValue("KRL001", "it has no readable target"), begin, end)
+    rest = text[found.end() :]
+    if rest[:1] in (b":", b"+", b"-", b"*", b"/", b"(", b"[", b"."):
+        return _computed(run, text, begin, end)
+    if rest:
+        why = f"'{shown(rest)}' is not understood; it is an inline form without its unfolded lines"
+        return Operand(UnknownValue("KRL001", why), begin, end)
+    return _variable(run, found, begin, end)
+
+
+def _variable(run: ExecutionContext, found: re.Match[bytes], start: int, end: int) -> Operand:
+    name = found[1].upper()
+    words = shown(found[0])
+    path = found[3].replace(b" ", b"").replace(b"\t", b"").upper()
+    if found[2] is not None:
+        run.mentioned |= identifiers(found[2])
+        indices = index_text(found[2], run.lookup)
+        if indices is None:
+            run.mentioned.add(name)
+            return Operand(
+                UnknownValue("KRL002", f"its target {words} has an index that is not a constant"), start, end
+            )
+        path = b"[" + indices + b"]" + path
+    value = run.lookup(name, path)
+    line = run.declarations.lines.get(name + path)
+    has = run.variables.get(name, path)
+    if run.routine is not None and name in run.routine.types:
+        line = None
+    variable = PointVariable(name + path, run.type_of(name) if b"." not in path else b"", line, b"")
+    if isinstance(value, KrlTarget):
+        if value.unknown is not None:
+            return Operand(
+                UnknownValue(value.unknown.code, f"point {words}: {value.unknown.message}"),
+                start,
+                end,
+                variable,
+            )
+        return Operand(value, start, end, replace(variable, words=value.words))
+    if isinstance(value, UnknownValue) and has is not None:
+        return Operand(
+            UnknownValue(value.code, f"point {words}: {value.message}"), start, end, variable, True
+        )
+    if name in HERE or name.startswith(b"$"):
+        reads = READS_POSITION.match(name) is not None
+        why = UnknownValue("KRL002", f"its target {words} is a variable of the controller")
+        return Operand(why, start, end, variable, reads)
+    if isinstance(value, UnknownValue):
+        return Operand(UnknownValue("KRL003", f"point {words} has no value yet"), start, end, variable)
+    if value is not None:
+        return Operand(UnknownValue("KRL001", f"{words} is not a point"), start, end)
+    if _HOME.match(name) and not path:
+        why = UnknownValue("KRL016", f"{words} is a point of the controller; the motion is not corrected")
+        return Operand(why, start, end, variable)
+    return Operand(UnknownValue("KRL003", f"point {words} is not declared"), start, end, variable)
+
+
+def _computed(run: ExecutionContext, text: bytes, start: int, end: int) -> Operand:
+    """An expression as a target."""
+    run.mentioned |= identifiers(text)
+    value = run.value(text)
+    reads = READS_POSITION.search(text) is not None
+    if isinstance(value, KrlTarget):
+        value = value.detached()
+        if value.unknown is None:
+            return Operand(value, start, end, PointVariable(b"", b"", None, value.words))
+        value = value.unknown
+    why = value.message if isinstance(value, UnknownValue) else f"'{shown(text)}' is not a point"
+    code = value.code if isinstance(value, UnknownValue) else "KRL002"
+    return Operand(
+        UnknownValue(code, f"its target is computed: {why}"), start, end, None, reads or text.startswith(b"{")
+    )

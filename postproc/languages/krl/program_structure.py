@@ -1,0 +1,351 @@
+"""What a program may change where: its routines, its blocks and labels, before it is interpreted."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from postproc.languages.krl.effects import (
+    HERE,
+    MODAL,
+    Effect,
+    Effects,
+    effects_of,
+    functions_of,
+    is_harmless,
+    read_by,
+)
+from postproc.languages.krl.lexing import (
+    BRANCHES,
+    CLOSES,
+    LOOPS,
+    NAME,
+    Assignment,
+    Declared,
+    Head,
+    Statement,
+    identifiers,
+)
+
+MOST_EFFECTS = 200
+"""Variables of one block; where it assigns more, all that the program assigns count as changed."""
+
+MOST_NOTED = 1000
+"""Statements of a block that are known again."""
+
+DEEPEST = 100
+"""Nested blocks; what lies deeper is passed over as one."""
+
+INLINE = re.compile(rb";[ \t]*FOLD[ \t]+(?:S?(?:PTP|LIN|CIRC)|SPL)(?![A-Za-z0-9_])", re.I)
+_FOLD = re.compile(rb";[ \t]*(END)?FOLD(?![A-Za-z0-9_])", re.I)
+_DONE_LATER = re.compile(rb"\bDO[ \t]+(" + NAME + rb")", re.I)
+
+
+@dataclass(eq=False)
+class Block:
+    """An IF, SWITCH, loop or spline block: what it may change, and the routines it calls.
+
+    begin, end: index of its first and last statement; branches: those of its ELSE, CASE, DEFAULT; broken: its end is
+    missing; leaves: an EXIT leads out of it.
+    """
+
+    word: bytes
+    line: int
+    start: int
+    end: int = -1
+    branches: list[int] = field(default_factory=list)
+    effects: Effects = field(default_factory=set)
+    calls: set[bytes] = field(default_factory=set)
+    broken: bool = False
+    leaves: bool = False
+
+
+@dataclass(eq=False)
+class Routine(Block):
+    """A DEF or DEFFCT of the file.  types: the variables that it declares and their types, parameters included."""
+
+    name: bytes = b""
+    is_main: bool = False
+    is_function: bool = False
+    parameters: tuple[tuple[bytes, bool], ...] = ()
+    types: dict[bytes, bytes] = field(default_factory=dict)
+    labels: dict[bytes, tuple[int, tuple[Block, ...]]] = field(default_factory=dict)
+
+
+@dataclass
+class ProgramStructure:
+    """``events``: index of a statement -> what it opens, branches or closes, in this order of closing.
+
+    ``routine_at``: index of the DEF -> routine; ``unclosed``: (line, what) of blocks without an end and ends without a
+    begin; ``assigned``: names that the program assigns as a whole, or with ``.X`` after them a component of; ``read``:
+    names that code reads, other than as the target of a motion; ``later``: names that run or change at a time of their
+    own (interrupts, triggers); ``inline``: lines of motions in the fold of an inline form; ``jumps``: begin of the
+    routine and name of every label that a GOTO names -> first and last index of these; ``effects``: all that the
+    program changes anywhere; ``blocks``: all of them; ``passed_through``: the same labels -> what differs between the
+    ways that lead there.
+    """
+
+    events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
+    routines: dict[bytes, Routine] = field(default_factory=dict)
+    routine_at: dict[int, Routine] = field(default_factory=dict)
+    assigned: set[bytes] = field(default_factory=set)
+    read: set[bytes] = field(default_factory=set)
+    later: set[bytes] = field(default_factory=set)
+    jumps: dict[tuple[int, bytes], tuple[int, int]] = field(default_factory=dict)
+    blocks: list[Block] = field(default_factory=list)
+    passed_through: dict[tuple[int, bytes], Effects] = field(default_factory=dict)
+    effects: Effects = field(default_factory=set)
+    inline: set[int] = field(default_factory=set)
+    unclosed: list[tuple[int, str]] = field(default_factory=list)
+
+    @property
+    def has_routine(self) -> bool:
+        return bool(self.routine_at)
+
+
+class _Surveyor:
+    def __init__(self) -> None:
+        self.found = ProgramStructure()
+        self.blocks: list[Block] = []
+        self.stack: list[Block] = []
+        self.buried = 0  # blocks deeper than DEEPEST that are open
+        self.routine: Routine | None = None
+        self.folds: list[bool] = []  # those that are open, and whether it is that of an inline form
+        self.inline = 0
+        self.noted_in: Block | None = None
+        self.noted: set[bytes] = set()  # statements of that block, which say no more a second time
+
+    def take(self, index: int, statement: Statement) -> None:
+        kind, stack = statement.kind, self.stack
+        if kind == "motion":
+            if stack and not _stays(statement.code):
+                stack[-1].effects.add("point")
+            if self.inline:
+                self.found.inline.add(statement.line)
+        elif kind == "comment":
+            self._fold(statement.comment)
+        elif kind == "def":
+            self._routine(index, statement)
+        elif kind == "end":
+            if not stack or not isinstance(stack[0], Routine):
+                self._close_all(index)
+                self.found.unclosed.append((statement.line, f"{_shown(statement.word)} has no DEF"))
+            else:
+                self._close_all(index)
+        elif kind == "open":
+            self._open(index, statement)
+        elif kind == "branch":
+            self.note(statement)
+            if not self.buried and stack and stack[-1].word == BRANCHES[statement.word]:
+                stack[-1].branches.append(index)
+                self.found.events[index] = [("branch", stack[-1])]
+        elif kind == "close":
+            self._close(index, statement)
+        elif kind == "goto":
+            if self.routine is not None and isinstance(statement.strings, bytes):
+                key = (self.routine.start, statement.strings)
+                self.found.jumps[key] = (self.found.jumps.get(key, (index, index))[0], index)
+        elif kind == "exit":
+            loop = next((block for block in reversed(stack) if block.word in LOOPS), None)
+            if loop is not None:
+                loop.leaves = True
+        elif kind == "label" and isinstance(statement.strings, bytes):
+            if self.routine is not None:
+                self.routine.labels.setdefault(statement.strings, (index, tuple(stack[1:])))
+        else:
+            if statement.word == b"ELSEIF" and stack:
+                stack[-1].broken = True  # no KRL, and no end of what is before it
+            self.note(statement)
+
+    def _fold(self, comment: bytes) -> None:
+        found = _FOLD.match(comment)
+        if found is None:
+            return
+        if not found[1]:
+            self.folds.append(INLINE.match(comment) is not None)
+            self.inline += self.folds[-1]
+        elif self.folds:
+            self.inline -= self.folds.pop()
+
+    def _routine(self, index: int, statement: Statement) -> None:
+        if self.stack:
+            self._close_all(index - 1)
+            self.found.unclosed.append((statement.line, "a DEF starts before the END of the previous one"))
+        head = statement.strings if isinstance(statement.strings, Head) else Head(b"", ())
+        routine = Routine(
+            b"DEF", statement.line, index,
+            name=head.name, is_main=not self.found.routine_at, parameters=head.parameters,
+            is_function=b"DEFFCT" in statement.code[:40].upper(),
+            types={name: b"" for name, _ in head.parameters},
+        )  # fmt: skip
+        self.routine = routine
+        self.found.routine_at[index] = routine
+        self.found.routines.setdefault(head.name, routine)
+        self.blocks.append(routine)
+        self.stack.append(routine)
+
+    def _open(self, index: int, statement: Statement) -> None:
+        self.note(statement)
+        if len(self.stack) > DEEPEST:
+            self.buried += 1
+            return
+        if not self.stack:  # a program without DEF
+            self.stack.append(Block(b"", 0, 0))
+            self.blocks.append(self.stack[0])
+        block = Block(statement.word, statement.line, index)
+        self.blocks.append(block)
+        self.stack.append(block)
+        self.note(statement)
+        self.found.events[index] = [("open", block)]
+
+    def _close(self, index: int, statement: Statement) -> None:
+        stack = self.stack
+        if self.buried:
+            self.buried -= 1
+            self.note(statement)
+            return
+        wanted = CLOSES[statement.word]
+        depth = next((i for i in range(len(stack) - 1, 0, -1) if stack[i].word in wanted), 0)
+        if not depth:
+            self.found.unclosed.append((statement.line, f"{_shown(statement.word)} has no start"))
+            return
+        self.note(statement)
+        self._pop(index, depth)
+
+    def _pop(self, index: int, depth: int, proper: bool = True) -> None:
+        """Closes the blocks from ``depth`` on; ``proper``: the outermost of them has its own end here."""
+        stack = self.stack
+        closed = stack[depth:][::-1]
+        del stack[depth:]
+        inner = closed[:-1] if proper else closed
+        for block in inner:
+            block.broken = True
+            self.found.unclosed.append((block.line, f"{_shown(block.word)} has no end"))
+        for i, block in enumerate(closed):
+            block.end = index
+            outer = closed[i + 1] if i + 1 < len(closed) else stack[-1]
+            _join(outer.effects, block.effects)
+            outer.calls |= block.calls
+        self.found.events.setdefault(index, []).extend(("close", block) for block in closed)
+
+    def _close_all(self, index: int) -> None:
+        self.buried = 0
+        if not self.stack:
+            return
+        if len(self.stack) > 1:
+            self._pop(index, 1, proper=False)
+        self.stack[0].end = index
+        self.stack.clear()
+        self.routine = None
+
+    def note(self, statement: Statement) -> None:
+        """Takes up what a statement that moves nothing changes and reads."""
+        found, stack = self.found, self.stack
+        block = stack[-1] if stack else None
+        if block is not self.noted_in:
+            self.noted_in = block
+            self.noted.clear()
+        if statement.code in self.noted:
+            return
+        if len(self.noted) < MOST_NOTED:
+            self.noted.add(statement.code)
+        effects, called = effects_of(statement)
+        functions = functions_of(statement)
+        if not all(map(is_harmless, functions)):
+            # What is handed to a function may come back changed.
+            effects = effects | identifiers(statement.code)
+        _join(found.effects, effects)
+        said = statement.strings
+        if isinstance(said, Assignment) and said.path and said.element is None and len(effects) == 1:
+            found.assigned.add(said.name + b"." + said.path)
+        else:
+            found.assigned.update(effect for effect in effects if isinstance(effect, bytes))
+        if isinstance(said, Declared) and self.routine is not None:
+            for key, _, _ in said.items:
+                if key is not None:
+                    self.routine.types[key.split(b"[")[0]] = said.type
+        found.read |= read_by(statement)
+        if statement.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL"):
+            found.later.update(name.upper() for name in _DONE_LATER.findall(statement.code))
+        if stack:
+            _join(stack[-1].effects, effects)
+            stack[-1].calls.update(functions)
+            if called:
+                stack[-1].calls.add(called)
+
+
+def program_structure(statements: Iterable[tuple[int, Statement]]) -> ProgramStructure:
+    """Goes over the statements (index, statement) once."""
+    surveyor = _Surveyor()
+    index = -1
+    for index, statement in statements:
+        surveyor.take(index, statement)
+    stack, found = surveyor.stack, surveyor.found
+    if stack and isinstance(stack[0], Routine):
+        found.unclosed.append((stack[0].line, "the DEF has no END"))
+    surveyor._close_all(index)
+    found.blocks = surveyor.blocks
+    _settle(found, surveyor.blocks)
+    for name in closure(found, found.later):
+        effects = found.routines[name].effects
+        found.later.update(effect for effect in effects if isinstance(effect, bytes))
+        if "all" in effects:
+            found.later.update(name.partition(b".")[0] for name in found.assigned)
+    return found
+
+
+def closure(found: ProgramStructure, names: Iterable[bytes]) -> set[bytes]:
+    """The routines of the file among ``names``, and all that they call."""
+    seen: set[bytes] = set()
+    todo = list(names)
+    while todo:
+        name = todo.pop()
+        routine = found.routines.get(name)
+        if routine is not None and name not in seen:
+            seen.add(name)
+            todo.extend(routine.calls)
+    return seen
+
+
+def _join(into: Effects, more: Iterable[Effect]) -> None:
+    into.update(more)
+    if len(into) > MOST_EFFECTS:
+        words = {effect for effect in into if isinstance(effect, str)}
+        into.clear()
+        into.update(words, ["all"])
+
+
+def _settle(found: ProgramStructure, blocks: Sequence[Block]) -> None:
+    """Brings what the called routines change into the effects of who calls them."""
+    if len(found.routines) > MOST_EFFECTS:
+        for block in blocks:
+            if block.calls:
+                _join(block.effects, [*found.effects, "all", "point", *MODAL])
+        return
+    reached = {name: closure(found, [name]) for name in found.routines}
+    strange = {
+        name
+        for name, routine in found.routines.items()
+        if any(call not in found.routines and not is_harmless(call) for call in routine.calls)
+    }
+    total: dict[bytes, Effects] = {}
+    for name, routines in reached.items():
+        total[name] = set() if strange.isdisjoint(routines) else {"point"}
+        for other in routines:
+            _join(total[name], found.routines[other].effects)
+    for block in blocks:
+        for name in block.calls:
+            if name in total:
+                _join(block.effects, total[name])
+            elif not is_harmless(name):
+                block.effects.add("point")
+
+
+def _stays(code: bytes) -> bool:
+    words = code.split(None, 2)
+    return len(words) > 1 and words[1].upper() in HERE
+
+
+def _shown(word: bytes) -> str:
+    return word.decode("latin-1")

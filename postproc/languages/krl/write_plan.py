@@ -1,0 +1,189 @@
+"""The components X, Y, Z, A, B, C of motions in bulk: what the text gives, and what is to be written."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from postproc.base.arrays import Bools, Floats, Ints, differs
+from postproc.base.decimals import MOST_DECIMALS, fixed_one, literals
+from postproc.base.document import Document
+from postproc.base.geometry import abc_from_rotation
+from postproc.base.units import DEG, MM
+from postproc.languages.dialect import Plan, Program, WritingSettings
+from postproc.languages.krl.lexing import number
+from postproc.languages.krl.source_map import KrlSourceMap
+from postproc.toolpath import Toolpath
+
+KEYS = "XYZABC"
+LETTER = np.isin(
+    np.arange(256),
+    np.frombuffer(b"0123456789_$abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ", np.uint8),
+)
+"""(256,) the bytes that a name is made of."""
+
+
+@dataclass(frozen=True, eq=False)
+class Components:
+    """K motions.  own (K, 6) [mm, deg]: values as the text gives them; decimals (K, 6) that they are written with, or
+    are to be.  start, stop (K, 6), file (K, 6): their literals, in the row itself or, where it leaves them out, in the
+    row before that gives them; -1 where none says them."""
+
+    own: Floats
+    decimals: Ints
+    start: NDArray[Any]
+    stop: NDArray[Any]
+    file: NDArray[Any]
+
+    @property
+    def half_step(self) -> Floats:
+        """(K, 6) [mm, deg]: what moves by no more stays as it is written."""
+        return np.asarray(0.5 * 10.0**-self.decimals)
+
+    def of(self, chosen: Bools) -> Components:
+        """Those of the motions ``chosen`` (K,)."""
+        return Components(
+            self.own[chosen], self.decimals[chosen], self.start[chosen], self.stop[chosen], self.file[chosen]
+        )
+
+    def kept(self, wanted: Floats) -> Bools:
+        """(K, 6) the components that are what is ``wanted`` (K, 6) [mm, deg] already, within half a step."""
+        change = wanted - self.own
+        change[:, 3:] = (change[:, 3:] + 180.0) % 360.0 - 180.0
+        return np.asarray(np.abs(change) <= self.half_step)
+
+
+class KrlWritePlan:
+    """A program, the plan for it, and what the writer looks up in them again and again.
+
+    own (N,): the motion of the plan that takes the text of each row; inserted (N,): how many are before it.
+    """
+
+    def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
+        """Raises ValueError where the plan has not one motion with the text of every row."""
+        self.program, self.plan, self.writing = program, plan, writing
+        self.path: Toolpath = program.toolpath
+        self.places: KrlSourceMap = program.text
+        self.documents: Sequence[Document] = program.documents
+        self.raws = [np.frombuffer(document.raw, np.uint8) for document in program.documents]
+        self.least = np.array([writing.mm] * 3 + [writing.deg] * 3)
+        self.own: Ints = np.flatnonzero(plan.own)
+        if not np.array_equal(plan.source[self.own], np.arange(len(self.path))):
+            raise ValueError("a plan needs one motion with the text of every row")
+        self.inserted: Ints = np.diff(self.own, prepend=-1) - 1
+        self.has_angle = np.zeros(len(self.path), dtype=bool)
+        self.has_angle[[row for row, arc in self.places.arcs.items() if arc.has_angle]] = True
+        self.is_relative = np.zeros(len(self.path), dtype=bool)
+        self.is_relative[list(self.places.relative)] = True
+
+    @cached_property
+    def _given(self) -> NDArray[Any] | None:
+        """(N, 6) the row whose text gives a component: the row itself, or that which it takes it from; None: always
+        the row itself."""
+        if not self.places.inherits.any():
+            return None
+        # A relative motion, and an arc with CA, do not end where the X, Y, Z say that they take over.
+        ends_elsewhere = self.is_relative | self.has_angle
+        bits = self.places.inherits & np.where(ends_elsewhere, 0b111000, 0b111111).astype(np.uint8)
+        if not bits.any():
+            return None
+        rows = np.arange(len(bits), dtype=np.int32)[:, None]
+        left_out = (bits[:, None] >> np.arange(6, dtype=np.uint8)) & 1
+        return np.maximum.accumulate(np.where(left_out == 1, 0, rows), axis=0)
+
+    @cached_property
+    def is_inline(self) -> Bools:
+        """(N,) straight and point-to-point motions to an aggregate in their line, absolute."""
+        inline = ~self.is_relative
+        inline[[*self.places.variables, *self.places.arcs]] = False
+        return inline
+
+    @cached_property
+    def _aggregates(self) -> tuple[Ints, Ints]:
+        """The aggregates that components can be inserted into, in order, and how many rows use each."""
+        keys = self.places.insert.astype(np.int64) * len(self.raws) + self.places.home
+        return np.unique(keys, return_counts=True)
+
+    def uses_of(self, home: int, insert: int) -> int:
+        """How many rows take components from the aggregate with this place of insertion."""
+        keys, counts = self._aggregates
+        return int(counts[np.searchsorted(keys, insert * len(self.raws) + home)])
+
+    def components(self, rows: Ints) -> Components:
+        """What the text says of rows (K,).
+
+        Where no literal states it, the value is that of the toolpath, in the spelling of A, B, C nearest to the
+        literals that there are.
+        """
+        places, columns = self.places, np.arange(6)
+        if self._given is None:
+            start, stop, file = places.start[rows], places.stop[rows], places.file[rows]
+            start = np.where(self.is_relative[rows, None], -1, start)
+        else:
+            given = self._given[rows]
+            start, stop, file = (part[given, columns] for part in (places.start, places.stop, places.file))
+            # The literals of a CA are not the end that others build on.
+            start = np.where(self.has_angle[given] & (given != rows[:, None]) & (columns < 3), -1, start)
+            start = np.where(self.is_relative[given], -1, start)
+        said = start >= 0
+        own, decimals = np.zeros(start.shape), np.broadcast_to(self.least, start.shape).copy()
+        for index, raw in enumerate(self.raws):
+            here = said & (file == index)
+            if here.any():
+                own[here], written = literals(raw, start[here], stop[here], other_literal)
+                decimals[here] = np.maximum(written, decimals[here])
+        lacking = np.flatnonzero(~said.all(axis=1))
+        if len(lacking):
+            where = rows[lacking]
+            angles = abc_from_rotation(np.nan_to_num(self.path.rotation[where])) / DEG
+            near = np.where(said[lacking, 3:], own[lacking, 3:], angles)
+            angles = abc_from_rotation(np.nan_to_num(self.path.rotation[where]), near * DEG) / DEG
+            values = np.concatenate([self.path.position[where] / MM, angles], axis=1)
+            own[lacking] = np.where(said[lacking], own[lacking], values)
+        return Components(own, decimals, start, stop, file)
+
+    def wanted(self, rows: Ints, own: Floats, position: Floats, rotation: Floats) -> Floats:
+        """(K, 6) [mm, deg] targets of motions (K,) at ``position`` (K, 3) [m] and ``rotation`` (K, 3, 3) that stem from
+        ``rows`` (K,), in the spelling of ``own`` (K, 6)."""
+        result = own.copy()
+        shifted = differs(position, self.path.position[rows]).any(axis=1) | self.has_angle[rows]
+        turned = differs(rotation, self.path.rotation[rows]).any(axis=(1, 2))
+        result[shifted, :3] = position[shifted] / MM
+        result[turned, 3:] = abc_from_rotation(rotation[turned], own[turned, 3:] * DEG) / DEG
+        return result
+
+    def targets(self, rows: Ints) -> tuple[Components, Floats, Bools]:
+        """What the text says of rows (K,), what it is to say (K, 6) [mm, deg], and which of that it says already."""
+        said, there = self.components(rows), self.own[rows]
+        wanted = self.wanted(rows, said.own, self.plan.position[there], self.plan.rotation[there])
+        return said, wanted, said.kept(wanted)
+
+    def texts(self, said: Components, wanted: Floats, kept: Bools, k: int) -> list[bytes]:
+        """The six components of the ``k``-th motion of ``wanted`` (K, 6) [mm, deg] as they are to be written: as they
+        are, where they stay: ``kept`` (K, 6)."""
+        return [
+            self.documents[said.file[k, i]].raw[int(said.start[k, i]) : int(said.stop[k, i])].lstrip(b"+")
+            if kept[k, i] and said.start[k, i] >= 0
+            else fixed_one(float(wanted[k, i]), int(said.decimals[k, i]))
+            for i in range(6)
+        ]
+
+
+def other_literal(literal: bytes) -> tuple[float, int]:
+    """Value and decimals of a literal in any form."""
+    value = number(literal)
+    return (0.0 if value is None else value), written_decimals(literal)
+
+
+def written_decimals(literal: bytes) -> int:
+    """The decimals that a literal is written with, its exponent considered."""
+    if literal.startswith(b"'"):
+        return 0
+    mantissa, _, exponent = literal.upper().partition(b"E")
+    written = len(mantissa.partition(b".")[2].strip())
+    return min(max(written - int(exponent or b"0"), 0), MOST_DECIMALS)

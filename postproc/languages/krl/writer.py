@@ -1,0 +1,138 @@
+"""A plan as edits: only the literals that changed, what a changed neighbour would alter, and inserted motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Ints, differs
+from postproc.base.batches import each_block, in_blocks
+from postproc.base.document import Edit, Edits
+from postproc.base.findings import Finding
+from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
+from postproc.languages.krl.dependent_targets import DependentTargets
+from postproc.languages.krl.in_place import literal_edits, partial_edits
+from postproc.languages.krl.inserting import insertions
+from postproc.languages.krl.target_edits import FULL, single_edits
+from postproc.languages.krl.write_plan import KrlWritePlan
+from postproc.toolpath import Kind
+
+BLOCK = 1 << 14
+"""Rows that are worked on at a time."""
+
+
+def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
+    """The edits after which the program makes the motions of ``plan``.
+
+    Raises ValueError if a row is asked to move, or to be divided, that cannot, and for an inserted arc that sweeps
+    more than ``FULL``: defects of the caller.
+    """
+    task = KrlWritePlan(program, plan, writing)
+    touched, way = _touched(task)
+    _refuse_forbidden(task, touched, way)
+    held: dict[int, Finding] = {}
+    edits = Edits.collected(_parts(task, touched, way, held))
+    return EditedTargets((), held) if held else EditedTargets(edits)
+
+
+def _parts(
+    task: KrlWritePlan, touched: Bools, way: Bools, held: dict[int, Finding]
+) -> Iterator[Iterable[Edit]]:
+    """The edits, nearly all in the order of their places; ``held`` takes up the rows that cannot move as planned."""
+    private = _private(task)
+    plain = touched & _plain(task, private)
+    chain = DependentTargets(task, touched)
+    chain.follow()
+    again = (touched & ~plain) | chain.again(way)
+    partial = again & _partial(task, private)
+    single, not_moved = single_edits(task, np.flatnonzero(again & ~partial), chain.completed)
+    held.update(not_moved)
+    if held:
+        return
+
+    def written(block: slice) -> Edits:
+        rows = np.arange(block.start, block.stop)
+        return Edits.joined(
+            literal_edits(task, rows[plain[rows] & ~chain.depends[rows]]),
+            partial_edits(task, rows[partial[rows]], chain.completed),
+            *insertions(task, rows),
+        )
+
+    yield from in_blocks(written, len(touched))
+    yield single
+
+
+def _touched(task: KrlWritePlan) -> tuple[Bools, Bools]:
+    """(N,) rows whose end is another one, and arcs whose path is."""
+    path, plan, n = task.path, task.plan, len(task.path)
+    touched, way = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+
+    def ends(rows: slice) -> None:
+        there = task.own[rows]
+        touched[rows] = differs(plan.position[there], path.position[rows]).any(axis=1)
+        touched[rows] |= differs(plan.rotation[there], path.rotation[rows]).any(axis=(1, 2))
+
+    each_block(ends, n)
+    for rows in _blocks(np.flatnonzero(path.kind == Kind.CIRC)):
+        there = task.own[rows]
+        for new, old in ((plan.centre, path.centre), (plan.normal, path.normal), (plan.sweep, path.sweep)):
+            other = differs(new[there], old[rows])
+            way[rows] |= other.any(axis=1) if other.ndim > 1 else other
+    return touched, way
+
+
+def _refuse_forbidden(task: KrlWritePlan, touched: Bools, way: Bools) -> None:
+    path = task.path
+    fixed_rows = {row for row in (*path.refused, *path.locked) if touched[row]}
+    fixed_rows |= {row for row in path.refused if way[row]}
+    fixed_rows |= set(np.flatnonzero(touched & (path.kind == Kind.AXIS)).tolist())
+    if fixed_rows:
+        raise ValueError(f"motions that cannot be corrected are moved: rows {sorted(fixed_rows)[:5]}")
+    whole = {row for row in (*path.refused, *path.no_insert_before) if task.inserted[row]}
+    whole -= {row for row in path.entries if _enters(task, row)} - path.refused.keys()
+    inserted = _blocks(np.flatnonzero(task.plan.role != Role.ORIGINAL))
+    if any((task.plan.sweep[motions] > FULL).any() for motions in inserted):
+        raise ValueError("an inserted arc is nearly a full turn: three points do not define it")
+    if whole:
+        raise ValueError(f"motions that cannot be divided are divided: rows {sorted(whole)[:5]}")
+
+
+def _enters(task: KrlWritePlan, row: int) -> bool:
+    """Whether all that is inserted before a row is one transition move."""
+    return bool(task.inserted[row] == 1 and task.plan.role[task.own[row] - 1] == Role.TRANSITION)
+
+
+def _private(task: KrlWritePlan) -> Bools:
+    """(N,) rows whose literals nothing else uses."""
+    places = task.places
+    vias = np.array([arc.text for arc in places.arcs.values()], np.int64)
+    used = np.bincount(np.concatenate([places.text, vias]))
+    private = used[places.text] == 1
+    private[list(places.locked)] = False
+    return np.asarray(private)
+
+
+def _plain(task: KrlWritePlan, private: Bools) -> Bools:
+    """(N,) rows whose target are six literals that nothing else uses."""
+    plain = private & (task.places.start >= 0).all(axis=1) & ~task.is_relative
+    plain[list(task.places.arcs)] = False
+    return np.asarray(plain)
+
+
+def _partial(task: KrlWritePlan, private: Bools) -> Bools:
+    """(N,) rows whose target is an aggregate in a line that runs once; it leaves out components of the row before."""
+    places = task.places
+    left_out = np.unpackbits(places.inherits[:, None], axis=1, count=6, bitorder="little")
+    partial = private & task.is_inline & (places.inherits > 0) & (places.home == 0)
+    partial &= ((places.start >= 0) | left_out).all(axis=1)
+    words = places.motion[:, 0]
+    if (words[1:] <= words[:-1]).any():
+        _, where, counts = np.unique(words, return_inverse=True, return_counts=True)
+        partial &= counts[where] == 1
+    return np.asarray(partial)
+
+
+def _blocks(rows: Ints) -> Iterator[Ints]:
+    for at in range(0, len(rows), BLOCK):
+        yield rows[at : at + BLOCK]

@@ -1,0 +1,173 @@
+"""What the comments above the header state: ``# key: value``."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from postproc.base.arrays import Floats
+from postproc.base.findings import Finding, Refusal, nearest
+from postproc.base.geometry import Poses
+from postproc.base.tables import CsvTable, comments_above, finite_number
+from postproc.base.units import DEG, MM
+
+KEYS = ("robot", "frame", "tool", "sigma_mm", "sigma_deg", "target")
+FRAMES = ("tracker", "robot")
+
+# the name of a target may hold a colon, numbers do not
+_TARGET = re.compile(r"target(\s.*|\s*)[:=]([^:=]*)", re.IGNORECASE)
+_KEYED = re.compile(r"([^:=]*?)\s*[:=]\s*(.*)")
+_CLOSE = 0.75  # of difflib's ratio: sigma is close to sigma_mm, load is not close to tool
+
+
+@dataclass(frozen=True)
+class HeaderComments:
+    """What the comments say, in SI; ``frame`` is "" and ``sigma`` NaN where not stated; ``places``: name of a target ->
+    its place (3,) [m] on the flange; ``lines``: name of a target -> line."""
+
+    robot: str
+    frame: str
+    tool: Poses | None
+    sigma: float
+    sigma_turn: float | None
+    places: dict[str, Floats]
+    lines: dict[str, int]
+    findings: list[Finding]
+
+
+def robot_named(path: Path) -> str:
+    """The ``# robot:`` of a file, "" where it has none; the rest of the file may be wrong.
+
+    Raises Refusal FIL001 (not readable), FIL003 (binary).
+    """
+    stated = (_keyed(text) for _, text in comments_above(path))
+    return next((value for key, _, value in stated if key == "robot"), "")
+
+
+def stated_in(table: CsvTable) -> HeaderComments:
+    """Raises Refusal where a key stands twice, or its value cannot be used."""
+    said, findings = _stated(table)
+
+    def named(key: str) -> str:
+        line, text = said.get((key, ""), (0, ""))
+        if line and not text:
+            raise _wrong(table, line, f"# {key}: the name is missing")
+        return text
+
+    def numbers(key: str, counts: tuple[int, ...], form: str, name: str = "") -> list[float]:
+        if (key, name) not in said:
+            return []
+        line, text = said[key, name]
+        found = _numbers(text.replace(",", ".") if counts == (1,) else text)
+        if found is not None and len(found) in counts:
+            return found
+        what = f"{text[:40]!r} is not understood" if found is None else f"{len(found)} numbers are given"
+        help = "separate the numbers by blanks; a comma in a number is a decimal comma then"
+        raise _wrong(table, line, f"# {_title(key, name)}: {what} where {form} is expected", help)
+
+    def sigma(key: str, unit: float) -> float | None:
+        given = numbers(key, (1,), "one number without a unit")
+        if given and given[0] <= 0:
+            raise _wrong(table, said[key, ""][0], f"# {key}: {given[0]:g} is not above zero")
+        return given[0] * unit if given else None
+
+    tool = numbers("tool", (3, 6), "x y z [a b c] (mm, deg)")
+    robot, frame = named("robot"), named("frame").lower()
+    if frame and frame not in FRAMES:
+        message = f"# frame: {frame[:40]!r} is not a frame{nearest(frame, FRAMES)}"
+        raise _wrong(table, said["frame", ""][0], message, "use one of " + ", ".join(FRAMES))
+    sigma_place, sigma_turn = sigma("sigma_mm", MM), sigma("sigma_deg", DEG)
+    lines = {name: line for (key, name), (line, _) in said.items() if key == "target"}
+    return HeaderComments(
+        robot=robot,
+        frame=frame,
+        tool=Poses.from_abc(np.array(tool[:3]) * MM, np.array(tool[3:] or [0.0] * 3) * DEG) if tool else None,
+        sigma=np.nan if sigma_place is None else sigma_place,
+        sigma_turn=sigma_turn,
+        places={name: np.array(numbers("target", (3,), "x y z (mm)", name)) * MM for name in lines},
+        lines=lines,
+        findings=findings,
+    )
+
+
+def _stated(table: CsvTable) -> tuple[dict[tuple[str, str], tuple[int, str]], list[Finding]]:
+    """(key, name of a target) -> line, value; and the comments that look like keys, but are not used (MEA004)."""
+    said: dict[tuple[str, str], tuple[int, str]] = {}
+    findings: list[Finding] = []
+    for line, text in table.comments:
+        key, name, value = _keyed(text)
+        uncertainty = help = ""
+        if line > table.header_line:
+            if key in KEYS:
+                uncertainty = f"# {key}: is below the header and is ignored"
+                help = "move it above the header; it applies to the whole file"
+        elif key not in KEYS:
+            uncertainty = _almost_a_key(text, key, value)
+            help = "write # key: value with one of " + ", ".join(KEYS)
+        elif (key, name) in said:
+            raise _wrong(table, line, f"# {_title(key, name)} occurs in line {said[key, name][0]} already")
+        elif key == "target" and not name:
+            raise _wrong(
+                table,
+                line,
+                "# target: the name of the target is missing",
+                "write # target NAME: x y z (mm, on the flange)",
+            )
+        else:
+            said[key, name] = line, value
+        if uncertainty:
+            findings.append(Finding("MEA004", uncertainty, str(table.path), line, help=help))
+    return said, findings
+
+
+def _keyed(text: str) -> tuple[str, str, str]:
+    """Key in lower case, name of a target and value of ``key: value`` or ``target NAME: value``, "" without."""
+    text = text.lstrip("# \t")
+    target = _TARGET.fullmatch(text)
+    if target:
+        return "target", target[1].strip(), target[2].strip()
+    keyed = _KEYED.fullmatch(text)
+    return (keyed[1].lower(), "", keyed[2].strip()) if keyed else ("", "", "")
+
+
+def _almost_a_key(text: str, key: str, value: str) -> str:
+    """What is odd about a comment that was probably meant to state something, or ""."""
+    if key:
+        first, whole = key.partition(" ")[0], "_".join(key.split())
+        if _close(whole):
+            return f"{key[:40]!r} is not a key{nearest(whole, KEYS)}"
+        if _close(first) not in ("", "robot", "frame") and _numbers(value):
+            return f"{key[:40]!r} is not a key{nearest(first, KEYS)}"
+        return ""
+    first, *others = text.lower().split() or [""]
+    stated = others and (first == "frame" or finite_number(others[-1]) is not None)
+    return f"{text[:40]!r} has no colon after its key" if first in KEYS and stated else ""
+
+
+def _close(word: str) -> str:
+    """The key that ``word`` is, or is a slip of the hand away from, or ""."""
+    return next(iter(difflib.get_close_matches(word, KEYS, 1, _CLOSE)), "")
+
+
+def _numbers(text: str) -> list[float] | None:
+    """Numbers separated by blanks, commas or semicolons; a comma is a decimal comma where blanks or semicolons
+    separate.  None where one is no number, or commas do both."""
+    beside_blank = ";" not in text and re.search(r",\s|\s,", text)
+    if beside_blank and re.search(r"\S,\S", text):
+        return None
+    by_commas = beside_blank or not re.search(r"[;\s]", text)
+    words = re.split(r"[,\s]+", text) if by_commas else re.split(r"[;\s]+", text.replace(",", "."))
+    numbers = [number for number in map(finite_number, words) if number is not None]
+    return numbers if len(numbers) == len(words) else None
+
+
+def _title(key: str, name: str) -> str:
+    return f"{key} {name}".rstrip()
+
+
+def _wrong(table: CsvTable, line: int, message: str, help: str = "") -> Refusal:
+    return Refusal(Finding(table.code, message, str(table.path), line, help=help))

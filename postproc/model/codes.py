@@ -1,0 +1,20 @@
+"""The codes of the findings of the stiffness model."""
+
+from __future__ import annotations
+
+from postproc.base.findings import Code, define
+
+CODES = define(
+    {
+        "MOD001": Code(
+            "warning",
+            "compensator torque is implausible",
+            meaning="The static torque of the gravity compensator is far above what a balancer carries.",
+            consequence=(
+                "Only the change of its torque may be used: the parameters are valid for the stiffness only."
+            ),
+            action="Check the parameters, or state `preload: balanced`.",
+            example="A torque of 60000 N m on axis 2.",
+        ),
+    }
+)

@@ -1,0 +1,1 @@
+"""Where a part lies in the workspace, and how stiff the robot is there."""

@@ -1,0 +1,277 @@
+"""The codes of the findings of forces."""
+
+from __future__ import annotations
+
+from postproc.base.findings import Code, define
+
+CODES = define(
+    {
+        "EXT005": Code(
+            "error",
+            "force or cut that a moving part leaves undefined",
+            meaning=(
+                "A force in world axes acts on a part that rotates, or a cut starts on another part "
+                "than the motion before it."
+            ),
+            consequence="The load on the robot, or the path on the part, is not defined.",
+            action=(
+                "State the force @base, @tool or @feed; write a motion without force in the new base "
+                "before the cut."
+            ),
+            example="`--force 0,0,-500@world` while a positioner turns the part.",
+        ),
+        "FRC001": Code(
+            "error",
+            "no force",
+            meaning="--force is given without a value, and no force belongs to the program.",
+            consequence="Without a force nothing is corrected.",
+            action=(
+                "Write a FORCE comment, a force CSV or `force:` in the cell, or give the force: --force"
+                " 0,360,560@base."
+            ),
+            example="`compensate panel.src --force` in a cell without `force:`.",
+        ),
+        "FRC002": Code(
+            "error",
+            "force is not understood",
+            meaning="A force consists of 3 or 6 numbers and a frame.",
+            consequence="A misread force would lead to a wrong correction.",
+            action="Write fx,fy,fz[,mx,my,mz][@base|world|tool|feed] in N and N m.",
+            example="`--force 0,360@base` has two numbers.",
+        ),
+        "FRC003": Code(
+            "error",
+            "force file is wrong",
+            meaning="The header or a row of the force CSV cannot be used.",
+            consequence="A misread force would lead to a wrong correction.",
+            action="Correct the row or column that the message names.",
+            example="A column `fx_kN`.",
+        ),
+        "FRC004": Code(
+            "error",
+            "force for no motion",
+            meaning="The force CSV names a line that contains no motion.",
+            consequence="The CSV does not belong to this version of the program.",
+            action="Write the line number of the motion; export the CSV again if the program changed.",
+            example="Row `12,0,360,560` where line 12 is a comment.",
+        ),
+        "FRC005": Code(
+            "error",
+            "feed direction is not known",
+            meaning="A force in the feed frame needs a feed direction and a spindle axis.",
+            consequence="Without them the direction of the force is undefined.",
+            action="Add the spindle axis to the tool in the cell, or give the force @tool or @base.",
+            example="`0,360,560@feed` on a plunge.",
+        ),
+        "FRC006": Code(
+            "warning",
+            "comment looks like a force",
+            meaning="The comment starts with FORCE but is not a valid force; it is ignored.",
+            consequence="The motions after it keep the previous force.",
+            action="Write FORCE fx fy fz [mx my mz] [@base|world|tool|feed], or FORCE OFF.",
+            example="`;FORCE 0 360`.",
+        ),
+        "FRC007": Code(
+            "info",
+            "motions without a force",
+            meaning="The force source has no entry for these motions; they count as air.",
+            consequence="Motions in air are not corrected.",
+            action="Add entries if these motions cut.",
+            example="A CSV with rows for lines 10 to 50 of a program of 80 lines.",
+        ),
+        "FRC008": Code(
+            "info",
+            "plunge before any feed",
+            meaning=(
+                "These motions have a force in the feed frame but no feed direction; they use the "
+                "direction of the next motion."
+            ),
+            consequence="The direction of the force is an assumption there.",
+            action="Give the force @tool or @base for the plunge if the direction matters.",
+            example="A plunge along the spindle before the first cut.",
+        ),
+        "FRC009": Code(
+            "warning",
+            "force on an air move",
+            meaning="PTP and G0 are air moves by definition; the force for them is ignored.",
+            consequence="If the motion cuts, it is not corrected.",
+            action="Remove the row, or program the motion as LIN or G1.",
+            example="A CSV row for the line of a PTP.",
+        ),
+        "FRC010": Code(
+            "info",
+            "feed direction is kept",
+            meaning=(
+                "A plunge or a rotation on the spot has no feed direction across the spindle; the last "
+                "direction is kept."
+            ),
+            consequence="The direction of the force is an assumption there.",
+            action="Give the force @tool or @base if the direction matters.",
+            example="A plunge along the spindle inside a pocket.",
+        ),
+        "FRC011": Code(
+            "error",
+            "process for another program",
+            meaning="No operation of the process file belongs to a motion of the program.",
+            consequence="No force is known, so nothing would be corrected.",
+            action="Check the names, tool numbers and line ranges of the operations.",
+            example="A process with `tool: 3` for a program that uses tool 5.",
+        ),
+        "FRC012": Code(
+            "warning",
+            "operation without motions",
+            meaning="The program has no such name, tool or lines.",
+            consequence="The force of the operation is not used.",
+            action="Check its spelling.",
+            example="`name: roughing` where the comment is `;Rough`.",
+        ),
+        "FRC013": Code(
+            "error",
+            "feed is not known",
+            meaning="Feed per tooth, or the time of a motion, needs the programmed feed.",
+            consequence="The cutting force cannot be computed.",
+            action=(
+                "Set the feed in the program before the motion ($VEL.CP, F), or mark air with FORCE OFF."
+            ),
+            example="A LIN before the first `$VEL.CP`.",
+        ),
+        "FRC014": Code(
+            "info",
+            "motions without a computed force",
+            meaning=(
+                "The process model covers side cutting only; plunges, and approaches from axis "
+                "positions, count as air."
+            ),
+            consequence="These motions are not corrected.",
+            action="State a force for them with a FORCE comment if they cut.",
+            example="A plunge into solid material.",
+        ),
+        "FRC015": Code(
+            "info",
+            "force of an operation",
+            meaning="The process file gives this mean force for this operation.",
+            consequence="The correction is proportional to it.",
+            action="Compare it with a measured force or with experience.",
+            example="A mean of 420 N for a slot in aluminium.",
+        ),
+        "FRC016": Code(
+            "info",
+            "no axial coefficients",
+            meaning="The source of the cutting coefficients states no axial ones; Fz is set to 0.",
+            consequence="An axial force would deflect the tool along its axis, and that is not corrected.",
+            action="Give own coefficients (kac, kae) if they are known.",
+            example="A material with ktc and krc only.",
+        ),
+        "FRC017": Code(
+            "warning",
+            "feed differs from the rest of the operation",
+            meaning="Some motions are much faster than the others and count as cutting.",
+            consequence="If they move through air, they are corrected for a force that is not there.",
+            action="State `rapid:` in the operation, or mark them FORCE OFF.",
+            example="Moves at 200 mm/s between cuts at 20 mm/s.",
+        ),
+        "FRC018": Code(
+            "info",
+            "comment names no operation",
+            meaning=(
+                "A cut starts after comments that name no operation; the last named operation continues."
+            ),
+            consequence="The cut may belong to another operation.",
+            action="Name the operation in the comment, or add the comment's name to the process file.",
+            example="`;Finish wall` without an operation of that name.",
+        ),
+        "FRC019": Code(
+            "error",
+            "log and path do not match",
+            meaning="The log does not cover the path that cuts, or the length of the path is not known.",
+            consequence="Each reading would be assigned to a wrong place.",
+            action="Use the log of this program, from its first motion on.",
+            example="A log over 2 m for a path of 3 m.",
+        ),
+        "FRC020": Code(
+            "error",
+            "no offset to subtract",
+            meaning="--tare needs a log with readings in air moves (PTP, G0, FORCE OFF).",
+            consequence="Without such readings the offset of the gauge is unknown.",
+            action="Record the log from before the cut on; mark LIN moves in air with FORCE OFF.",
+            example="`--tare` with a CSV by line.",
+        ),
+        "FRC021": Code(
+            "warning",
+            "gauge offset",
+            meaning="The log shows a force in air.",
+            consequence="If it is an offset of the gauge, all forces are wrong by it.",
+            action="Use --tare to subtract it; nothing else does.",
+            example="A mean of 35 N in the moves before the cut.",
+        ),
+        "FRC022": Code(
+            "info",
+            "gauge offset subtracted",
+            meaning="The mean of the readings in air is subtracted from all readings.",
+            consequence="The forces of the correction are those after the subtraction.",
+            action="Check that the stated offset is plausible for the gauge.",
+            example="An offset of 35 N in x.",
+        ),
+        "FRC023": Code(
+            "warning",
+            "channel is saturated",
+            meaning="Equal readings follow each other at the end of a channel's range.",
+            consequence="The force there is larger than the log states, so the correction is too small.",
+            action="Measure again with a larger range.",
+            example="2000.0 N in 40 readings in a row.",
+        ),
+        "FRC024": Code(
+            "warning",
+            "gap in the log",
+            meaning="Readings are missing; the force there is interpolated from both sides.",
+            consequence="A force peak inside the gap is not corrected.",
+            action="Check the recorder; measure again if the gap is in a cut.",
+            example="A log with 0.4 s without a reading.",
+        ),
+        "FRC025": Code(
+            "info",
+            "motions between readings",
+            meaning="Motions shorter than the distance of the readings use interpolated readings.",
+            consequence="Force changes on such short motions are not resolved.",
+            action="Record at a higher rate if that matters.",
+            example="Motions of 0.2 mm and readings every 0.5 mm.",
+        ),
+        "FRC026": Code(
+            "warning",
+            "force changes within a motion",
+            meaning="A motion's force is linear from start to end; the log is not.",
+            consequence="The correction does not follow the force inside the motion.",
+            action="Insert a point where the force changes.",
+            example="A cut that starts in the middle of a LIN.",
+        ),
+        "FRC027": Code(
+            "warning",
+            "log longer than the path",
+            meaning="The rest of the log is not used.",
+            consequence="The log may belong to another program.",
+            action="Check that it is the log of this program.",
+            example="A log over 5 m for a path of 3 m.",
+        ),
+        "FRC028": Code(
+            "info",
+            "motions that take no part of the log",
+            meaning=(
+                "Rotations on the spot and moves to axis positions have no path length; moves without a"
+                " feed have no known time."
+            ),
+            consequence="No reading of the log belongs to them.",
+            action="Nothing needs to be done if they are in air.",
+            example="A PTP to an axis position.",
+        ),
+        "FRC029": Code(
+            "info",
+            "summary of the log",
+            meaning=(
+                "The message states the number of readings, and the largest mean and peak force of a motion."
+            ),
+            consequence="The correction uses the mean of each motion.",
+            action="Check that the forces are plausible.",
+            example="A largest mean of 560 N in line 42.",
+        ),
+    }
+)

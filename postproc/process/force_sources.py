@@ -1,0 +1,132 @@
+"""Where a program's forces come from: the option, the program's comments, the CSV beside it, the cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from postproc.base.findings import Finding, Refusal
+from postproc.base.tables import read_table
+from postproc.cell import Cell, MotionFrames
+from postproc.process.force_comments import read_annotations
+from postproc.process.force_logs import read_log
+from postproc.process.force_table import place_column, read_force_table
+from postproc.process.operations import process_forces
+from postproc.process.stated_forces import FORM, NotAForce, StatedForces, parse_force
+from postproc.process.wrenches import Wrenches, turn_to_robot_axes
+from postproc.toolpath import Toolpath
+
+LOG = ".csv"
+PROCESS = (".yaml", ".yml")
+
+Told = tuple[StatedForces, tuple[Finding, ...], str]
+"""Forces, what there is to say of them, and the name of their source."""
+
+
+def wrenches(
+    program: Path,
+    toolpath: Toolpath,
+    frames: MotionFrames,
+    cell: Cell,
+    spec: str | None,
+    offset: bool = False,
+) -> Wrenches:
+    """The wrench of every motion of ``toolpath``.
+
+    spec: None = no --force (zero); '' = --force alone (the program's own: FORCE comments, then
+    ``<stem>.force.csv`` beside it, then the cell's ``force`` or ``process``); else the value of --force, a path
+    in it relative to the working folder.  ``offset``: a log's mean in air is taken off.  Refusal FRC001 to FRC005,
+    FRC020, and those of a force CSV or a process file.
+    """
+    given = _Given(program, toolpath, frames, offset)
+    if spec is None:
+        given.no_offset("there is no --force")
+        return Wrenches.zero(len(toolpath))
+    if spec.strip():
+        stated, findings, source = given.explicit(spec.strip(), Path(), "", 0, f"--force {spec.strip()}")
+    else:
+        stated, findings, source = _belonging(given, cell)
+    return turn_to_robot_axes(stated, toolpath, frames, cell, str(program), source, findings)
+
+
+@dataclass(frozen=True)
+class _Given:
+    """A program whose forces are sought."""
+
+    program: Path
+    toolpath: Toolpath
+    frames: MotionFrames
+    offset: bool
+
+    def explicit(self, spec: str, folder: Path, file: str, line: int, name: str) -> Told:
+        """A force given as text: a CSV or process file (relative to ``folder``), or one wrench for all motions."""
+        if spec.lower().endswith(PROCESS):
+            return self.process(folder / spec)
+        if spec.lower().endswith(LOG):
+            return self.table(folder / spec)
+        self.no_offset(f"the force is {spec}")
+        try:
+            values, frame = parse_force(spec)
+        except NotAForce as error:
+            message = f"{name}: {error}" if spec in name else f"{name}: {spec[:60]!r}: {error}"
+            help = f"write {FORM}; or name a CSV or YAML file"
+            raise Refusal(Finding("FRC002", message, file, line, help=help)) from None
+        all_of_one = np.broadcast_to(np.int32(0), len(self.toolpath))
+        return StatedForces(np.array([values]), np.array([frame]), all_of_one), (), spec
+
+    def table(self, path: Path) -> Told:
+        table = read_table(path, "FRC003")
+        column, program = place_column(table), str(self.program)
+        if column == "line":
+            stated, findings = read_force_table(table, self.toolpath, program, self.offset)
+        else:
+            stated, findings = read_log(table, column, self.toolpath, self.frames, program, self.offset)
+        return stated, findings, path.name
+
+    def process(self, path: Path) -> Told:
+        self.no_offset("the force is computed from a process")
+        stated, findings = process_forces(path, self.toolpath, self.frames, str(self.program))
+        return stated, findings, path.name
+
+    def no_offset(self, why: str) -> None:
+        """Refusal FRC020 where the offset of a log is to be taken off and there is no log."""
+        if self.offset:
+            message = f"--tare subtracts the offset of a log, and {why}"
+            raise Refusal(Finding("FRC020", message, str(self.program), help="use --force LOG.csv --tare"))
+
+
+def _belonging(given: _Given, cell: Cell) -> Told:
+    """The force that belongs to the program, from the first source that exists."""
+    program = given.program
+    stated, findings = read_annotations(given.toolpath, str(program))
+    if stated is not None:
+        given.no_offset("the force comes from FORCE comments")
+        return stated, findings, "FORCE comments"
+    beside = program.with_name(program.stem + ".force.csv")
+    if beside.is_file():
+        stated, more, source = given.table(beside)
+    elif cell.process is not None:
+        stated, more, _ = given.process(cell.path.parent / cell.process)
+        source = f"cell: {cell.process}"
+    elif cell.force is not None:
+        stated, more, _ = given.explicit(
+            cell.force, cell.path.parent, str(cell.path), cell.force_line, "force"
+        )
+        source = f"cell: {cell.force}"
+    else:
+        raise Refusal(
+            Finding(
+                "FRC001",
+                "--force has no value, and no force belongs to this program",
+                str(program),
+                help="use one of: (1) a comment in the program, ;FORCE 0 360 560 @base, in G-code (FORCE"
+                " 0 360 560 @BASE); "
+                f"(2) {beside.name} beside it, with the header line,fx,fy,fz and rows such as 12,0,360,560; "
+                f"(3) force: 0,360,560@base, or process: milling.yaml, in {cell.path}; "
+                "or state it here: --force 0,360,560@base",
+            ),
+            *findings,
+        )
+    return stated, (*findings, *more), source

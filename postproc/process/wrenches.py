@@ -1,0 +1,392 @@
+"""Stated forces turned into the robot's axes, along the path of each motion.  All in arrays over the motions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from postproc.base.arrays import Bools, FewRows, Floats, Ints, frozen, numbers
+from postproc.base.batches import blocks, in_blocks
+from postproc.base.findings import Finding, Refusal
+from postproc.base.geometry import lengths, turn_beside, turning
+from postproc.cell import Cell, MotionFrames
+from postproc.process.feed_frames import FeedFrames
+from postproc.process.force_ramps import Ramps
+from postproc.process.path_length import SMOOTH_TURN, MotionRuns, PathLength
+from postproc.process.stated_forces import BASE, FEED, TOOL, WORLD, StatedForces
+from postproc.toolpath import Kind, Toolpath
+
+JUMP = float(2 * np.sin(SMOOTH_TURN / 2))
+"""A force that changes by more than this share of the larger one is a step: as much as a turn of SMOOTH_TURN makes."""
+
+JUMP_OF_LARGEST = 0.05
+"""Changes below this share of the program's largest force are no steps."""
+
+CLEAR = 4.0
+"""A measured force jumps where it does by more than so many of its standard errors."""
+
+
+@dataclass(frozen=True, eq=False)
+class Wrenches:
+    """What the workpiece does to the tool, at the TCP, in the axes of the robot root [N, N m].
+
+    values (N, 6): at the end point of each motion; start (N, 6): where it leaves the end point before it (the same
+    as there, unless the force steps at that vertex; only where it is another is it kept); both without ``ramps``.
+    ``along`` states what acts there and between.  carries (N,): the motion was given a force (even where both sides of
+    its end point cancel).
+    steps (N,): it carries force, and the wrench does not go over from the motion before: a cut starts, the path turns
+    by SMOOTH_TURN or more, or the force jumps.  ramps: how it goes over where it would step inside a cut.
+    measured: the forces are a log's, whose steps are what was measured.
+    ci95, peak, radius (N,): as of ``Stated``.
+    """
+
+    values: Floats
+    start: Floats | StartWrenches
+    carries: Bools
+    source: str
+    findings: tuple[Finding, ...] = ()
+    steps: Bools = field(default_factory=lambda: np.zeros(0, bool))
+    turning: Turning | None = None
+    ci95: Floats | None = None
+    peak: Floats | None = None
+    ramps: Ramps | None = None
+    measured: bool = False
+    radius: Floats | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.values)
+        object.__setattr__(self, "values", frozen(self.values, (n, 6)))
+        if isinstance(self.start, np.ndarray):
+            object.__setattr__(self, "start", StartWrenches(self.start, self.values))
+        object.__setattr__(self, "carries", frozen(self.carries, (n,), np.bool_))
+        object.__setattr__(self, "steps", frozen(self.steps, (n,), np.bool_))
+
+    @staticmethod
+    def zero(n: int, source: str = "none", findings: tuple[Finding, ...] = ()) -> Wrenches:
+        nothing, never = np.broadcast_to(0.0, (n, 6)), np.broadcast_to(False, n)
+        return Wrenches(nothing, nothing, never, source, findings, never)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @cached_property
+    def any(self) -> bool:
+        """Whether any motion carries force."""
+        return bool(np.any(self.carries))
+
+    @cached_property
+    def max_force(self) -> float:
+        """The largest force [N] at either end of any motion."""
+        if not self.any:
+            return 0.0
+        sides = (self.values, self.start)
+        return float(np.sqrt(max(_largest(side[rows]) for side in sides for rows in blocks(len(self)))))
+
+    @property
+    def peak_force(self) -> float:
+        """The largest force [N] along the path of any motion, of a tooth or of a reading; NaN where none is known."""
+        peak = np.full(1, np.nan) if self.peak is None else self.peak
+        return float(np.nanmax(peak)) if np.any(np.isfinite(peak)) else np.nan
+
+    @cached_property
+    def at_end(self) -> Floats:
+        """(N, 6) the wrench at the end point of each motion, ramps included."""
+        if self.ramps is None:
+            return self.values
+        rows, values = np.unique(self.ramps.row), self.values.copy()
+        values[rows] += self.ramps.at(rows, np.ones(len(rows)))
+        return frozen(values)
+
+    @cached_property
+    def inner_steps(self) -> Ints:
+        """Motions (K,) with which the wrench steps inside a cut."""
+        before = np.append(False, self.carries[:-1])
+        return np.flatnonzero(self.steps & before)
+
+    def ramped(self, rows: Ints, length: Floats, extent: Floats) -> Wrenches:
+        """The same, where the steps at the start of the motions ``rows`` (K,) go over along ``length`` (K,) [m] of the
+        path; extent (N,) [m]: lengths of the motions."""
+        if not len(rows):
+            return self
+        step = self.start[rows] - self.values[rows - 1]
+        steps = self.steps.copy()
+        steps[rows] = False
+        return replace(
+            self, steps=steps, ramps=Ramps.of(rows, step, length, extent, np.asarray(self.carries))
+        )
+
+    def along(self, rows: Ints, fraction: Floats) -> Floats:
+        """(K, 6) the wrench at the shares ``fraction`` (K,), 0 to 1, of the way of the motions ``rows`` (K,).
+
+        Linear between ``start`` and ``values``, with what ``ramps`` add.  On an arc a force stated in the feed frame or
+        the tool frame is linear in that frame, which turns with the tangent or with the tool.
+        """
+        share = fraction[:, None]
+        wrench = (1 - share) * self.start[rows] + share * self.values[rows]
+        if self.turning is not None:
+            bent = np.flatnonzero(self.turning.mask[rows])
+            at = rows[bent]
+            wrench[bent] = self.turning.along(at, fraction[bent], self.start[at], self.values[at])
+        if self.ramps is not None:
+            wrench += self.ramps.at(rows, fraction)
+        return wrench
+
+
+class StartWrenches:
+    """(N, 6) wrenches where motions start: those of ``values`` (N, 6) where the motion before ends, but in few rows."""
+
+    def __init__(self, start: Floats, values: Floats) -> None:
+        other = np.append(True, (start[1:] != values[:-1]).any(axis=1))[: len(start)]
+        rows = np.flatnonzero(other)
+        self._values, self._own = values, FewRows(rows, frozen(start[rows]), len(start))
+
+    def __getitem__(self, rows: Any) -> Floats:
+        """As of an array, by rows: numbers from 0, a mask or a slice."""
+        chosen = numbers(rows, len(self._values))
+        own = self._own[chosen]
+        return np.where(np.isnan(own), self._values[np.maximum(chosen - 1, 0)], own)
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """The frames that turn along the path of arcs.  ``mask`` (N,): motions with such a frame; ``feed`` (N,): where the
+    force is stated in the feed frame; ``base_in_robot``, ``tool_in_base`` (N, 3, 3): frames at the ends; ``arc_turn``:
+    as of ``PathLength``."""
+
+    mask: Bools
+    feed: Bools
+    frames: FeedFrames | None
+    base_in_robot: Floats
+    tool_in_base: Floats
+    arc_turn: Callable[[Ints], Floats]
+
+    def along(self, rows: Ints, fraction: Floats, start: Floats, values: Floats) -> Floats:
+        """(K, 6) C(t) ((1 - t) C(0)^T start + t C(1)^T values) [N, N m] at the shares ``fraction`` (K,) of motions
+        ``rows`` (K,), ``start`` and ``values`` (K, 6), with the frame C in the robot's axes."""
+        # tool in the robot where the motion starts, and how it turns on the way
+        begin, end = (self.base_in_robot[at] @ self.tool_in_base[at] for at in (rows - 1, rows))
+        arc = self.arc_turn(rows)
+        turn = turn_beside(begin, end, arc)
+
+        def axes(share: Floats) -> Floats:
+            """(K, 3, 3): the rows of a matrix are the axes of the frame."""
+            found = np.swapaxes(turning(begin, turn, arc, share), 1, 2)
+            chosen = np.flatnonzero(self.feed[rows])
+            if self.frames is not None and len(chosen):
+                found[chosen] = self.frames.along(rows[chosen], share[chosen])
+            return found
+
+        first, here, last = axes(0 * fraction), axes(fraction), axes(0 * fraction + 1)
+        share = fraction[:, None, None]
+        inside = (1 - share) * (start.reshape(-1, 2, 3) @ np.swapaxes(first, 1, 2))
+        inside += share * (values.reshape(-1, 2, 3) @ np.swapaxes(last, 1, 2))
+        return np.asarray((inside @ here).reshape(-1, 6))
+
+
+def is_air(toolpath: Toolpath) -> Bools:
+    """(N,) motions that are air whatever the force."""
+    return (toolpath.kind == Kind.PTP) | (toolpath.kind == Kind.AXIS)
+
+
+def turn_to_robot_axes(
+    stated: StatedForces,
+    toolpath: Toolpath,
+    frames: MotionFrames,
+    cell: Cell,
+    file: str,
+    source: str,
+    findings: tuple[Finding, ...] = (),
+) -> Wrenches:
+    """The stated forces in the robot's axes, at both ends of each motion.
+
+    At a vertex inside a run that turns by less than SMOOTH_TURN, and where the force does not jump: the mean of both
+    sides, both with the orientation at the vertex.  Motions whose target is not known get their force unturned, so
+    that it stays visible that they carry one.  Refusal FRC005 where a feed frame is needed and is not defined.
+    """
+    carries = stated.acts & ~is_air(toolpath)
+    if not np.any(carries):
+        return Wrenches.zero(len(toolpath), source, findings)
+    _check_world(stated, carries, toolpath, frames, file)
+    way = PathLength(toolpath, frames)
+    runs = MotionRuns(way, carries)
+    feed = None
+    if np.any(carries & (stated.frames == FEED)):
+        feed = FeedFrames(stated, toolpath, frames, way, runs, carries, file)
+        findings = (*findings, *feed.findings)
+    turn = _WrenchTurning(stated, toolpath, frames, cell, way, feed)
+
+    n = len(toolpath)
+    values, start = np.zeros((n, 6)), np.zeros((n, 6))
+    placed, steps = np.zeros(n, bool), carries.copy()
+
+    def ended(part: slice) -> float:
+        """The wrenches of both sides of no vertex shared yet; the square of the largest force."""
+        rows = part.start + np.flatnonzero(carries[part])
+        own = turn.at_end(rows, stated.values)
+        unknown = np.isnan(own[:, 0])
+        own[unknown] = turn.unturned(rows[unknown], stated.values)
+        values[rows], placed[rows] = own, ~unknown
+        return _largest(own)
+
+    largest = float(np.sqrt(max(in_blocks(ended, n))))
+
+    def begun(part: slice) -> None:
+        rows = part.start + np.flatnonzero(carries[part])
+        # where no vertex is known to start at, the end's pose has to serve
+        leaving = np.full((len(rows), 6), np.nan)
+        starts = way.begins[rows]
+        leaving[starts] = turn.at_begin(rows[starts], stated.begin)
+        lost = np.isnan(leaving[:, 0])
+        instead = turn.at_end(rows[lost], stated.begin)
+        unknown = np.isnan(instead[:, 0])
+        instead[unknown] = turn.unturned(rows[lost][unknown], stated.begin)
+        leaving[lost] = instead
+        start[rows] = leaving
+
+        shared = runs.smooth[rows] & ~lost & placed[rows - 1]
+        after, leaving = rows[shared], leaving[shared]
+        own = values[after - 1]
+        scatter = (
+            np.zeros(1) if stated.error is None else np.hypot(stated.error[after - 1], stated.error[after])
+        )
+        even = ~_jumps(own, leaving, largest, scatter)
+        after = after[even]
+        # no other vertex has these two
+        values[after - 1] = start[after] = 0.5 * (own[even] + leaving[even])
+        steps[after] = False
+
+    for _ in in_blocks(begun, n):
+        pass
+    for made in (values, start, steps):
+        made.setflags(write=False)
+    return Wrenches(
+        values,
+        start,
+        carries,
+        source,
+        findings,
+        steps,
+        turn.turning(carries),
+        stated.ci95,
+        stated.peak,
+        measured=stated.error is not None,
+        radius=stated.radius,
+    )
+
+
+def _check_world(
+    stated: StatedForces, carries: Bools, toolpath: Toolpath, frames: MotionFrames, file: str
+) -> None:
+    """Refuse a force in world axes on a part that a positioner turns under it."""
+    if frames.external is None:
+        return
+    wrong = np.flatnonzero(carries & (stated.frames == WORLD) & frames.external.turns_part)
+    if len(wrong):
+        raise Refusal(
+            Finding(
+                "EXT005",
+                "the force is in world axes, and the part rotates in them",
+                file,
+                int(toolpath.line[wrong[0]]),
+                help="state it @base (it rotates with the part), @tool or @feed",
+            )
+        )
+
+
+def _largest(wrenches: Floats) -> float:
+    """The square of the largest force of (M, 6)."""
+    force = wrenches[:, :3]
+    return float(np.max(np.einsum("ni,ni->n", force, force), initial=0.0))
+
+
+def _jumps(one: Floats, two: Floats, largest: float, scatter: Floats) -> Bools:
+    """(M,) whether the force between ``one`` and ``two`` (M, 6) changes by more than JUMP, and clear of its
+    ``scatter`` (M,) [N]; ``largest`` [N]: of the program."""
+    size = np.maximum(lengths(one[:, :3]), lengths(two[:, :3]))
+    change = lengths(two[:, :3] - one[:, :3])
+    return np.asarray(
+        (change > np.maximum(JUMP * size, JUMP_OF_LARGEST * largest)) & (change > CLEAR * scatter)
+    )
+
+
+class _WrenchTurning:
+    """Turns the wrenches stated for motions into the robot's axes, as they act where those start or end."""
+
+    def __init__(
+        self,
+        stated: StatedForces,
+        toolpath: Toolpath,
+        frames: MotionFrames,
+        cell: Cell,
+        way: PathLength,
+        feed: FeedFrames | None,
+    ) -> None:
+        self.stated = stated
+        self.base_in_robot = frames.base_in_robot.rotation
+        self.tool_in_base = toolpath.rotation
+        self.world_in_robot = cell.robot_base.rotation.T
+        self.way = way
+        self.feed = feed
+
+    def at_end(self, rows: Ints, values: Floats) -> Floats:
+        """(M, 6) ``values`` (K, 6) of ``rows`` (M,) at their end poses; NaN where that cannot be known."""
+        return self._turned(rows, values, 1)
+
+    def at_begin(self, rows: Ints, values: Floats) -> Floats:
+        """(M, 6) the same at the poses in which they start, the end poses of the rows before."""
+        return self._turned(rows, values, 0)
+
+    def unturned(self, rows: Ints, values: Floats) -> Floats:
+        """(M, 6) for motions with an unknown pose: taken in the axes of their base, or of the robot."""
+        own = self.stated.of(values, rows)
+        wrench = self._base(own.reshape(-1, 2, 3), rows, 1).reshape(-1, 6)
+        return np.where(np.isnan(wrench), own, wrench)
+
+    def turning(self, carries: Bools) -> Turning | None:
+        """The frames that turn along the path of arcs, where there are any."""
+        frame = self.stated.frames
+        framed = frame == TOOL
+        if self.feed is not None:
+            framed |= (frame == FEED) & (self.feed.matters | self.way.turns_along)
+        mask = carries & framed & self.way.arc & self.way.begins
+        if not mask.any():
+            return None
+        return Turning(
+            mask, frame == FEED, self.feed, self.base_in_robot, self.tool_in_base, self.way.arc_turn
+        )
+
+    def _turned(self, rows: Ints, values: Floats, side: int) -> Floats:
+        own = self.stated.of(values, rows).reshape(-1, 2, 3)
+        wrench = np.empty_like(own)
+        frame = self.stated.frames[rows]
+        for code, turn in ((BASE, self._base), (WORLD, self._world), (TOOL, self._tool), (FEED, self._feed)):
+            chosen = frame == code
+            if len(rows) and np.all(chosen):
+                wrench = turn(own, rows, side)
+            elif np.any(chosen):
+                wrench[chosen] = turn(own[chosen], rows[chosen], side)
+        return wrench.reshape(-1, 6)
+
+    def _base(self, pairs: Floats, rows: Ints, side: int) -> Floats:
+        if not self.base_in_robot.strides[0]:  # one for all
+            return pairs @ self.base_in_robot[0].T
+        return np.einsum("nij,nkj->nki", self.base_in_robot[rows], pairs)
+
+    def _world(self, pairs: Floats, rows: Ints, side: int) -> Floats:
+        return pairs @ self.world_in_robot.T
+
+    def _tool(self, pairs: Floats, rows: Ints, side: int) -> Floats:
+        at = rows - (1 - side)
+        in_base = np.einsum("nij,nkj->nki", self.tool_in_base[at], pairs)
+        turned = np.einsum("nij,nkj->nki", self.base_in_robot[at], in_base)
+        return np.where(self.way.known[at][:, None, None], turned, np.nan)
+
+    def _feed(self, pairs: Floats, rows: Ints, side: int) -> Floats:
+        if self.feed is None:
+            raise ValueError("forces in the feed frame need feed frames")
+        turned = np.einsum("nki,nij->nkj", pairs, self.feed.end(rows, side))
+        return np.where(self.way.known[rows - (1 - side)][:, None, None], turned, np.nan)

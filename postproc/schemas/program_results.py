@@ -1,0 +1,308 @@
+"""The schemas of the results about programs: the main job, predict, check, verify, batch, and the corrections table."""
+
+from __future__ import annotations
+
+from postproc.batch.job_file import FOLDER
+from postproc.cell import MODES
+from postproc.compensation.correct import MotionOutcome
+from postproc.report.batched import STATES, WORDS_OF_SUMMARY
+from postproc.report.corrections_csv import STATE_NAMES
+from postproc.report.report import VERDICTS
+from postproc.schemas.parts import Schema
+from postproc.schemas.result_parts import (
+    ENDING,
+    FINDINGS,
+    OPTIONS,
+    array,
+    boolean,
+    by_name,
+    integer,
+    quantity,
+    record,
+    result,
+    spread,
+    word,
+)
+from postproc.toolpath import Kind
+
+_SIDES = {
+    "before": spread("before the correction"),
+    "after": spread("after the correction"),
+}
+_CI95 = quantity("mm", "half width of the 95 % interval of the maximum", nullable=True)
+_LARGEST = {"max": quantity("deg", "maximum", nullable=True)}
+
+_UNCERTAINTY = record(
+    {
+        "known": boolean("whether the stated intervals determine the uncertainty"),
+        "lower_bound": boolean("whether an input has no interval: the uncertainty is at least this"),
+        "before_mm": quantity("mm", "half width (95 %) of the largest error before", nullable=True),
+        "after_mm": quantity("mm", "half width (95 %) of the largest error after", nullable=True),
+        "bound_after_mm": quantity("mm", "the largest error after is below, with 95 %", nullable=True),
+        "budget": array(
+            record(
+                {
+                    "parameter": word("effect.parameter, or force"),
+                    "share": quantity("1", "share of the variance"),
+                },
+                "one contribution",
+            ),
+            "uncertainty budget: contributions to the variance of the largest error, largest first",
+        ),
+        "effect_of_10_percent_mm": by_name(
+            quantity("mm", "change of the largest error", nullable=True),
+            "inputs without an interval: what 10 % of each changes of the largest error",
+        ),
+        "without_interval": array(word("effect.parameter, or force"), "inputs without an interval"),
+        "level_unstated": array(
+            word("effect.parameter"), "inputs whose interval has no stated level; 95 % is assumed"
+        ),
+        "no_equilibrium": integer("motions without an equilibrium within the intervals"),
+    },
+    "expanded uncertainty (95 %) of the predicted errors",
+)
+
+MODEL = by_name(
+    {
+        "type": "object",
+        "description": f"one effect: its parameters, and {OPTIONS}",
+        "required": ["parameters"],
+        "properties": {
+            "parameters": by_name(
+                record(
+                    {
+                        "value": quantity("as in unit", "value"),
+                        "unit": word("SI unit"),
+                        "interval": quantity("as in unit", "half width of the interval", nullable=True),
+                        "level": {
+                            "description": "level of the interval, or unstated",
+                            "type": ["number", "string", "null"],
+                            "unit": "1",
+                        },
+                        "source": word("where the value comes from"),
+                    },
+                    "one parameter",
+                ),
+                "parameters by name",
+            )
+        },
+        "additionalProperties": {"description": "an option of the effect"},
+    },
+    "effects of the model as it was used, by name",
+)
+
+_PATH_FIGURES: dict[str, Schema] = {
+    "along_feed_mm": record(_SIDES, "error at the points along the feed; absent for predict"),
+    "across_feed_mm": record(_SIDES, "error at the points across the feed; absent for predict"),
+    "force_ramp_mm": quantity("mm", "shortest path over which a force step inside a cut is spread"),
+    "force_ramps": integer("force steps inside cuts that are spread"),
+    "lead_ins": integer("motions in air that end where a corrected cut starts"),
+    "stops_added": integer("exact stops that the correction adds inside cuts"),
+    "backwards": integer("motions of the output against the feed"),
+    "correction_rate": record(
+        {
+            "mm_per_mm": quantity("mm/mm", "per length of the path", nullable=True),
+            "mm_per_s": quantity("mm/s", "per time at the programmed feed", nullable=True),
+            "line": integer("line where it is"),
+        },
+        "largest change of the correction inside a cut",
+    ),
+}
+
+_PROGRAM: dict[str, Schema] = {
+    "program": word("path of the program"),
+    "dialect": word("language of the program"),
+    "robot": word("name of the robot"),
+    "motions": integer("motions of the input"),
+    "cuts": integer("cuts: motions between two air moves"),
+    "cutting": integer("motions that cut"),
+    "corrected": integer("motions that are corrected"),
+    "inserted": integer("motions inserted, transition moves included"),
+    "transition_moves": array(
+        record(
+            {"line": integer("line that it precedes"), "length_mm": quantity("mm", "length")},
+            "one transition move",
+        ),
+        "inserted motions between two corrections",
+    ),
+    "uncorrected": integer("motions that need a correction and are not corrected"),
+    "iterations": integer("iterations of the correction, at most"),
+    "gain": quantity("1", "share of the correction that is applied"),
+    "correct": word("what is corrected, as in the cell file", MODES),
+    "force": record(
+        {
+            "source": word("where the forces come from"),
+            "max_n": quantity("N", "largest force"),
+            "peak_n": quantity("N", "largest peak of a measured force", nullable=True),
+        },
+        "the machining force",
+    ),
+    "error_before_mm": spread("predicted error at the points before the correction", ci95=_CI95),
+    "error_after_mm": spread("predicted error at the points after the correction", nullable=True, ci95=_CI95),
+    "path_error_mm": spread("predicted path error between points after the correction", nullable=True),
+    **_PATH_FIGURES,
+    "correction_mm": spread("length of the corrections", nullable=True),
+    "angle_before_deg": record(_LARGEST, "orientation error at the points before the correction"),
+    "angle_after_deg": record(
+        _LARGEST, "orientation error at the points after the correction", nullable=True
+    ),
+    "path_error_deg": record(
+        _LARGEST, "orientation error between points after the correction", nullable=True
+    ),
+    "uncertainty": _UNCERTAINTY,
+    "tolerance_mm": quantity("mm", "tolerance of the cell", nullable=True),
+    "verdict": word(
+        "error plus uncertainty against the tolerance; null for predict", VERDICTS, nullable=True
+    ),
+    "model": MODEL,
+    "digests": by_name(word("SHA-256, hexadecimal"), "robot, and each file of the program"),
+    **ENDING,
+}
+
+
+def report_schema() -> Schema:
+    return result("program", "the main job: one program, compensated", _PROGRAM)
+
+
+def predict_schema() -> Schema:
+    only_corrected = [key for key in _PROGRAM if key in _PATH_FIGURES]
+    properties = {key: schema for key, schema in _PROGRAM.items() if key not in only_corrected}
+    return result("predict", "the predicted errors of one program", properties)
+
+
+def check_schema() -> Schema:
+    counts = integer("motions")
+    return result(
+        "check",
+        "one program, read only",
+        {
+            "program": word("path of the program"),
+            "dialect": word("language of the program"),
+            "files": array(word("path"), "files of the program"),
+            "motions": integer("motions of the program"),
+            "kinds": by_name(counts, "motions by kind"),
+            "refused": by_name(counts, "motions that can not be corrected, by code of the finding"),
+            "findings": FINDINGS,
+            "exit": integer("exit code of the command"),
+        },
+    )
+
+
+def _simulated(about: str) -> Schema:
+    return spread(
+        about,
+        samples=integer("samples along the path"),
+        converged=boolean("whether force and position converge everywhere; else no errors are known"),
+        orientation_deg=quantity("deg", "largest orientation error", nullable=True),
+        missed=quantity("mm", "largest distance of a point from the path of the tool", nullable=True),
+        cut_ends=spread(
+            "error at the first and last points of cuts",
+            along=quantity("mm", "largest part along the path", nullable=True),
+        ),
+        doubling=record(
+            {
+                "mm": quantity("mm", "of the largest error", nullable=True),
+                "deg": quantity("deg", "of the largest orientation error", nullable=True),
+            },
+            "change by twice as many samples",
+        ),
+        stops=integer("exact stops inside cuts"),
+        backwards=integer("motions against the feed"),
+        approaches=record(
+            {"count": integer("number"), "length_mm": quantity("mm", "length of all")},
+            "lead-ins and lead-outs in air",
+        ),
+        unknown_corners=integer("points with an unknown approximation distance"),
+        skipped=integer("motions that are not simulated"),
+        worst=array(
+            record(
+                {
+                    "line": integer("line of the motion"),
+                    "mm": quantity("mm", "error"),
+                    "axis": word("axis of the base along which the error is largest"),
+                    "force_n": quantity("N", "force there"),
+                },
+                "one place",
+            ),
+            "places with the largest errors",
+        ),
+    )
+
+
+def verify_schema() -> Schema:
+    return result(
+        "verify",
+        "two programs, simulated along their paths",
+        {
+            "programs": array(word("path"), "original, compensated"),
+            "robot": word("name of the robot"),
+            "force": record({"source": word("where the forces come from")}, "the machining force"),
+            "motions": array(integer("motions"), "original, compensated"),
+            "growth": quantity("1", "motions of the compensated program over those of the original"),
+            "step_mm": quantity("mm", "distance of the first samples"),
+            "tolerance_mm": quantity("mm", "tolerance of the cell"),
+            "tolerance_deg": quantity("deg", "tolerance of the orientation"),
+            "converged": boolean("whether both simulations converge"),
+            "samples": integer("samples along the compensated program"),
+            "original": _simulated("distance of the tool from the desired path, original program"),
+            "compensated": _simulated("distance of the tool from the desired path, compensated program"),
+            "findings": FINDINGS,
+            "exit": integer("exit code of the command"),
+        },
+    )
+
+
+def batch_schema() -> Schema:
+    one = {
+        "name": word("path of the program in the folder of the batch"),
+        "state": word("state of the program", STATES),
+        **{key: _PROGRAM[key] for key in WORDS_OF_SUMMARY},
+    }
+    always = ("name", "state", "program", "findings", "outputs", "exit")
+    return result(
+        "batch",
+        f"many programs; also summary.json in the folder of the results ({FOLDER})",
+        {
+            **{state.replace(" ", "_"): integer(f"programs {state}") for state in STATES},
+            "programs": array(
+                record(one, "one program", optional=[key for key in one if key not in always]),
+                "programs, in the order of the batch; of a failed one only some keys",
+            ),
+            "skipped_files": array(word("path"), "files that match and are not programs"),
+            "outputs": array(word("path"), "files of the summary"),
+            "exit": integer("exit code, of the worst program"),
+        },
+    )
+
+
+def corrections_schema() -> Schema:
+    """The columns of <stem>.corrections.csv and <stem>.deflection.csv, as an object per row; an empty cell is null."""
+
+    def axes(name: str, unit: str, about: str, of: str = "xyz") -> dict[str, Schema]:
+        return {name.format(axis): quantity(unit, f"{about}, {axis}", nullable=True) for axis in of}
+
+    columns: dict[str, Schema] = {
+        "line": integer("line of the motion in the input"),
+        "kind": word("kind of the motion", [kind.name for kind in Kind]),
+        "state": word("what is done with it", [STATE_NAMES[state] for state in MotionOutcome]),
+        "cut": integer("number of the cut, from 1; empty in air", nullable=True),
+        **axes("{}_mm", "mm", "programmed position in the programmed base"),
+        **axes("{}_deg", "deg", "programmed orientation in the programmed base", "abc"),
+        **axes("f{}_n", "N", "force on the tool in the programmed base"),
+        **axes("m{}_nm", "N m", "moment on the tool in the programmed base"),
+        **axes("deflection_{}_mm", "mm", "predicted deflection before the correction"),
+        "error_before_mm": quantity("mm", "predicted error before the correction", nullable=True),
+        **axes("correction_{}_mm", "mm", "correction of the position"),
+        "correction_mm": quantity("mm", "length of the correction", nullable=True),
+        **axes("correction_r{}_deg", "deg", "correction of the orientation, rotation vector"),
+        "error_after_mm": quantity("mm", "predicted error after the correction", nullable=True),
+        "transition_moves": integer("transition moves inserted before it"),
+        "intermediate_points": integer("intermediate points inserted before it"),
+        "path_error_mm": quantity("mm", "largest predicted path error between points", nullable=True),
+        "iterations": integer("iterations of its correction"),
+    }
+    inserted = ("transition_moves", "intermediate_points", "path_error_mm")
+    row = record(columns, "one motion of the input; a prediction has no inserted motions", optional=inserted)
+    history = quantity("mm", "predicted error after so many iterations", nullable=True)
+    row["patternProperties"] = {"^error_[0-9]+_mm$": history}
+    return {"title": "corrections.csv, deflection.csv", "type": "array", "items": row}

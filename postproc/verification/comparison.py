@@ -1,0 +1,322 @@
+"""A program that runs in the place of the original: how far its tool is beside the path, and what else is another."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints, sums
+from postproc.base.batches import each_block
+from postproc.base.geometry import Poses, lengths, turn_between
+from postproc.base.units import MM
+from postproc.compensation.problem import CompensationProblem
+from postproc.verification.pairing import SAME, Pairing
+from postproc.verification.run_path import RunPath
+from postproc.verification.tool_placement import PathGrid, PlacedTool, judged, place_tool
+
+STEP = 4.0 * MM
+"""Distance of the first samples along a motion."""
+
+LEAST = 1
+"""Intervals of a motion at first, at least."""
+
+STILL, STILL_SHARE = 2e-7, 0.02
+"""[m] and share by which twice as many samples may change the largest and the mean error."""
+
+DOUBLINGS, MOST = 6, 4_000_000
+"""How often the samples are doubled at most, and how many they may become."""
+
+HALVES = ((1.0,), (0.5, 1.0))
+"""Where on either half of a parabola samples are, besides its middle: at first, and then."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathSamples:
+    """S samples, in the order of the path.
+
+    stretch (S,), motion (S,): row of the program; share (S,) of its path; place: on the original; end (S,): the motion
+    ends here; first, last (S,): of a cut; distance_along (S,) [m]: from the sample before.
+    """
+
+    stretch: Ints
+    motion: Ints
+    share: Floats
+    place: PlacedTool
+    end: Bools
+    first: Bools
+    last: Bools
+    distance_along: Floats
+
+    @property
+    def distance(self) -> Floats:
+        """(S,) [m] of the tool from the wanted path; NaN where place and force do not agree."""
+        return np.where(self.place.settled, lengths(self.place.error), np.nan)
+
+    @cached_property
+    def weight(self) -> Floats:
+        """(S,) [m] of the program's path that each sample stands for."""
+        half = 0.5 * np.append(self.distance_along, 0.0)
+        return half[:-1] + half[1:]
+
+    @property
+    def rms(self) -> float:
+        """[m] along the path"""
+        return float(np.sqrt(np.average(self.distance**2, weights=np.maximum(self.weight, 1e-12))))
+
+    def percentile(self, share: float) -> float:
+        """[m] the distance that this share of the path is below."""
+        order = np.argsort(self.distance)
+        total = np.cumsum(self.weight[order])
+        return float(self.distance[order][np.searchsorted(total, share * total[-1])])
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A program along the original's cuts.
+
+    samples; change [m], change_angle [rad]: what the last doubling of the samples changed of the largest error; missed
+    [m]: the largest distance of an end point of the original from the path of the tool; approaches (K,): rows that lead
+    from where a cut starts in the original to where it starts corrected, or back, in air; approach_length [m]; points
+    (P,): rows of the program whose end point alone is looked at, point_rows (P,) those of the original, point_error
+    (P,) [m] and point_turn (P,) [rad] theirs; added (A,): rows before such points that stand for nothing; unknown:
+    vertices that are passed at a distance that is not known, taken as they are programmed; skipped: motions under force
+    that cannot be simulated.
+    """
+
+    samples: PathSamples
+    change: float
+    change_angle: float
+    missed: float
+    approaches: Ints
+    approach_length: float
+    added: Ints
+    points: Ints
+    point_rows: Ints
+    point_error: Floats
+    point_turn: Floats
+    unknown: int
+    skipped: int
+
+    @property
+    def converged(self) -> bool:
+        return bool(self.samples.place.settled.all() and np.isfinite(self.point_error).all())
+
+    @property
+    def largest(self) -> float:
+        """[m] The largest distance of the tool from the wanted path, or of that from the path of the tool; NaN where it
+        is not known."""
+        if not self.converged or not len(self.samples.motion) + len(self.points):
+            return float("nan")
+        return float(
+            max(self.samples.distance.max(initial=0.0), self.point_error.max(initial=0.0), self.missed)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Simulator:
+    """The original with its grid, which programs are compared with."""
+
+    original: CompensationProblem
+    pairing: Pairing
+    path: RunPath
+    grid: PathGrid
+
+    @staticmethod
+    def of(original: CompensationProblem, pairing: Pairing) -> Simulator:
+        path, cuts = RunPath.of(original), pairing.stretches
+        return Simulator(
+            original,
+            pairing,
+            path,
+            PathGrid.of(original, path, cuts.start[cuts.length], cuts.stop[cuts.length]),
+        )
+
+    def run(self, run: CompensationProblem, start: Ints, stop: Ints, step: float = STEP) -> Simulation:
+        """``run`` with the rows ``start`` to before ``stop`` (K,) in the place of each stretch."""
+        cuts, way = self.pairing.stretches, self.pairing.stretches.length
+        path = self.path if run is self.original else RunPath.of(run)
+        first, last = start.copy(), stop.copy()
+        added = (stop - start) > (cuts.stop - cuts.start)
+        for number in np.flatnonzero(added):
+            first[number] += self._leads(run, int(start[number]), int(cuts.start[number]))
+        for number in np.flatnonzero(added & (stop - first > cuts.stop - cuts.start) & way):
+            last[number] -= self._leads_back(run, int(stop[number]) - 1, int(cuts.stop[number]) - 1)
+        outside = np.concatenate([_rows(start, first), _rows(last, stop)])
+        points, wanted, error, turn = self._points(run, last)
+        samples, change, change_angle = self._dense(run, path, first[way], last[way], step)
+        return Simulation(
+            samples,
+            change,
+            change_angle,
+            self._missed(samples),
+            outside,
+            float(run.desired_path.length[outside].sum()),
+            _rows(first[~way], (last - cuts.stop + cuts.start)[~way]),
+            points,
+            wanted,
+            error,
+            turn,
+            int(path.unknown[samples.motion[samples.end]].sum()),
+            len(cuts.lost),
+        )
+
+    def _leads(self, run: CompensationProblem, row: int, wanted: int) -> int:
+        """1 where ``row`` of the run leads from where ``wanted`` of the original starts to where that starts corrected;
+        such a motion is in air, where nothing but its two ends counts."""
+        rows, at = np.array([row]), np.array([wanted])
+        start = run.desired_path.start[rows].position - self.original.desired_path.start[at].position
+        if not np.linalg.norm(start) <= SAME or run.desired_path.length[row] > self.original.max_correction:
+            return 0
+        return int(self._arrives(run, rows, run.wanted[rows], at, 0.0))
+
+    def _leads_back(self, run: CompensationProblem, row: int, wanted: int) -> int:
+        """The same after the end of a cut."""
+        rows, at = np.array([row]), np.array([wanted])
+        end = run.wanted[rows].position - self.original.wanted[at].position
+        if not np.linalg.norm(end) <= SAME or run.desired_path.length[row] > self.original.max_correction:
+            return 0
+        return int(self._arrives(run, rows, run.desired_path.start[rows], at, 1.0))
+
+    def _arrives(self, run: CompensationProblem, rows: Ints, command: Poses, at: Ints, share: float) -> bool:
+        """Whether the tool is where ``at`` of the original starts (share 0) or ends, under the force there."""
+        there = np.full(len(at), share)
+        real = run.simulated(rows, command, self.original.force.along(at, there))
+        goal = self.original.goal(at, self.path.at(at, there), there)
+        away = lengths(real.pose.position - goal.position)
+        return bool((away <= self.original.tolerance).all())
+
+    def _points(self, run: CompensationProblem, last: Ints) -> tuple[Ints, Ints, Floats, Floats]:
+        """Rows of the run whose end points alone are looked at, those of the original, and how far these are off [m]
+        and turned [rad]."""
+        original, cuts = self.original, self.pairing.stretches
+        lone = np.flatnonzero(~cuts.length)
+        wanted = [_rows(cuts.start[lone], cuts.stop[lone])]
+        rows = [_rows((last - cuts.stop + cuts.start)[lone], last[lone])]
+        if not original.process:  # in air as well, every target is corrected
+            path = original.toolpath
+            known = path.known & ~path.on_axes & (original.track.status >= 0)
+            some = known[self.pairing.air]
+            wanted.append(self.pairing.air[some])
+            rows.append((self.pairing.air if run is original else self.pairing.run_air)[some])
+        row, at = np.concatenate(rows), np.concatenate(wanted)
+        if not len(row):
+            return row, at, np.zeros(0), np.zeros(0)
+        real = run.simulated(row, run.wanted[row], original.wrench[at])
+        goal = original.goal(at, original.wanted[at])
+        good = real.reachable & real.settled
+        away = np.where(good, lengths(real.pose.position - goal.position), np.nan)
+        return (
+            row,
+            at,
+            away,
+            lengths(judged(original, at, goal.rotation, turn_between(goal.rotation, real.pose.rotation))),
+        )
+
+    def _dense(
+        self, run: CompensationProblem, path: RunPath, start: Ints, stop: Ints, step: float
+    ) -> tuple[PathSamples, float, float]:
+        """Samples so dense that twice as many change nothing, and what the last doubling changed."""
+        stretch, rows = np.repeat(np.arange(len(start)), stop - start), _rows(start, stop)
+        parts = np.maximum(LEAST, np.ceil(run.desired_path.length[rows] / step)).astype(np.int64)
+        samples = self._sampled(run, path, stretch, rows, parts, HALVES[0])
+        change = change_angle = float("nan")
+        for _ in range(DOUBLINGS):
+            parts = 2 * parts
+            if not len(rows) or parts.sum() > MOST or not samples.place.settled.all():
+                break
+            finer = self._sampled(run, path, stretch, rows, parts, HALVES[1])
+            old, new = samples.distance, finer.distance
+            change = abs(float(new.max() - old.max()))
+            mean = abs(finer.rms - samples.rms)
+            turns = [float(one.place.turn.max()) for one in (samples, finer)]
+            change_angle = abs(turns[1] - turns[0])
+            samples = finer
+            if max(change, mean) <= max(STILL, STILL_SHARE * float(new.max())):
+                break
+        return samples, change, change_angle
+
+    def _sampled(
+        self,
+        run: CompensationProblem,
+        path: RunPath,
+        stretch: Ints,
+        rows: Ints,
+        parts: Ints,
+        halves: tuple[float, ...],
+    ) -> PathSamples:
+        """Samples at the ends of ``parts`` (R,) even parts of the motions ``rows`` (R,), and where each stretch
+        starts."""
+        opens = np.append(True, stretch[1:] != stretch[:-1])[: len(rows)]
+        closes = np.append(stretch[1:] != stretch[:-1], True)[: len(rows)]
+        number, share, end = _shares(run, path, rows, parts, opens, np.array(halves))
+        motion, where = rows[number], stretch[number]
+        place = place_tool(self.grid, path, where, motion, share)
+        before = np.append(0.0, np.where(number[1:] == number[:-1], share[:-1], 0.0))[: len(share)]
+        way = (share - before) * run.desired_path.length[motion]
+        return PathSamples(
+            where, motion, share, place, end, (share == 0) & opens[number], end & closes[number], way
+        )
+
+    def _missed(self, samples: PathSamples) -> float:
+        """[m] the largest distance of an end point of the original from the path of the tool, near where it passes:
+        what is left out where a place leaps over a corner."""
+        grid, place = self.grid, samples.place
+        if not len(samples.motion) or not place.settled.all():
+            return float("nan") if len(samples.motion) else 0.0
+        there = place.error.copy()
+
+        def reached(part: slice) -> None:
+            row = place.row[part]
+            wanted = self.path.at(row, place.share[part])
+            there[part] += self.original.goal(row, wanted, place.share[part]).position
+
+        each_block(reached, len(there))
+        far = 2 * float(grid.arc.max()) + 1.0
+        passed = np.maximum.accumulate(samples.stretch * far + place.arc)
+        some = grid.gap | np.append(True, grid.gap[:-1])
+        node = (np.repeat(np.arange(len(grid.first) - 1), np.diff(grid.first)) * far + grid.arc)[some]
+        vertex = grid.goal_at[some]
+        last = np.searchsorted(samples.stretch, samples.stretch, side="right") - 1
+        near, best = np.searchsorted(passed, node), np.full(len(node), np.inf)
+        for shift in range(-3, 3):
+            start = np.clip(near + shift, 0, len(there) - 1)
+            end = np.minimum(start + 1, last[start])
+            path, out = there[end] - there[start], vertex - there[start]
+            share = np.clip(np.sum(out * path, axis=1) / np.maximum(np.sum(path**2, axis=1), 1e-24), 0.0, 1.0)
+            best = np.minimum(best, lengths(out - share[:, None] * path))
+        return float(best.max(initial=0.0))
+
+
+def _rows(start: Ints, stop: Ints) -> Ints:
+    """The rows ``start`` to before ``stop`` (K,), one range after another."""
+    count = stop - start
+    return np.repeat(start - sums(count)[:-1], count) + np.arange(count.sum())
+
+
+def _shares(
+    run: CompensationProblem, path: RunPath, rows: Ints, parts: Ints, opens: Bools, halves: Floats
+) -> tuple[Ints, Floats, Bools]:
+    """The samples of the motions ``rows`` (R,): their numbers among these, shares, and whether they are at ends.
+
+    Each motion in ``parts`` (R,) even ones; of the parabolas on it at ``halves`` of their halves; of its
+    begin nothing, as it is the end of another, but where a stretch ``opens`` (R,).
+    """
+    number = np.repeat(np.arange(len(rows)), parts)
+    share = (np.arange(len(number)) - np.repeat(sums(parts)[:-1], parts) + 1) / np.repeat(parts, parts)
+    first = np.flatnonzero(opens)
+    numbers, shares = [number, first], [share, np.zeros(len(first))]
+    length = run.desired_path.length[rows]
+    following = np.where(rows + 1 < len(path.reach), rows + 1, 0)
+    for at_end, reach in ((False, path.reach[rows]), (True, path.reach[following])):
+        near = np.flatnonzero(reach > 0)
+        parts_of_reach = (reach[near] / length[near])[:, None] * halves
+        numbers.append(np.repeat(near, len(halves)))
+        shares.append((1 - parts_of_reach if at_end else parts_of_reach).ravel())
+    number, share = np.concatenate(numbers), np.concatenate(shares)
+    order = np.lexsort((share, number))
+    number, share = number[order], share[order]
+    other = np.append(True, (number[1:] != number[:-1]) | (share[1:] > share[:-1] + 1e-9))[: len(number)]
+    number, share = number[other], share[other]
+    return number, share, share == 1.0

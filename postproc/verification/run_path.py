@@ -1,0 +1,89 @@
+"""The path as a controller runs it: approximated vertices are passed on a parabola.
+
+The path leaves the polygon the distance d before a vertex and joins it d behind.  With u from 0 to 1 in between it is
+
+    (1 - u) A + u B
+
+A the place (1 - u) d before the vertex on the motion that ends there, B the one u d after it: of straight motions the
+quadratic Bezier curve with the vertex in its middle.  Orientations go over in the same way.  d is the approximation
+distance, and at most half of either motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.geometry import Poses, lengths, product, rotation_from_vector, turn_between
+from postproc.compensation.problem import CompensationProblem
+
+_NO_LENGTH = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class RunPath:
+    """N motions.  reach (N,) [m]: d at the vertex where a motion starts, 0 where it is not approximated; unknown (N,):
+    the vertex where it starts is passed at a distance that is not known; taken as it is programmed."""
+
+    task: CompensationProblem
+    reach: Floats
+    unknown: Bools
+
+    @staticmethod
+    def of(task: CompensationProblem) -> RunPath:
+        path, desired_path, n = task.toolpath, task.desired_path, len(task.toolpath)
+        reach, unknown = np.zeros(n), np.zeros(n, bool)
+        both = desired_path.traceable[1:] & desired_path.traceable[:-1] & (path.tool[1:] == path.tool[:-1])
+        both &= (path.executes[1:] == path.executes[:-1]) & ~(path.approximation[:-1] <= 0)
+        rows = np.flatnonzero(both) + 1
+        distance = path.approximation[rows - 1]
+        unknown[rows] = np.isnan(distance)
+        rows, distance = rows[~unknown[rows]], distance[~unknown[rows]]
+        reach[rows] = np.minimum(
+            distance, 0.5 * np.minimum(desired_path.length[rows - 1], desired_path.length[rows])
+        )
+        return RunPath(task, reach, unknown)
+
+    def at(self, rows: Ints, share: Floats) -> Poses:
+        """Poses (K) at the shares (K,) of the motions ``rows`` (K,)."""
+        found = self.task.desired_path.at(rows, share)
+        for some, vertex, u in self._near(rows, share):
+            before, after = self._both(vertex, u)
+            weight = u[:, None]
+            over = turn_between(before.rotation, after.rotation)
+            found.rotation[some] = product(rotation_from_vector(weight * over), before.rotation)
+            found.position[some] = (1 - weight) * before.position + weight * after.position
+        return found
+
+    def tangent(self, rows: Ints, share: Floats) -> Floats:
+        """(K, 3) unit vectors along the path at the shares (K,) of ``rows`` (K,); zero where a motion only turns the
+        tool."""
+        desired_path, length = self.task.desired_path, self.task.desired_path.length
+        found = desired_path.tangent(rows, share)
+        for some, vertex, u in self._near(rows, share):
+            before, after = self._both(vertex, u)
+            reach, weight = self.reach[vertex], u[:, None]
+            one = desired_path.tangent(vertex - 1, 1 - reach * (1 - u) / length[vertex - 1])
+            two = desired_path.tangent(vertex, reach * u / length[vertex])
+            along = (after.position - before.position) / reach[:, None] + (1 - weight) * one + weight * two
+            found[some] = along / np.maximum(lengths(along), _NO_LENGTH)[:, None]
+        return found
+
+    def _near(self, rows: Ints, share: Floats) -> Iterator[tuple[Ints, Ints, Floats]]:
+        """Which of ``rows`` (K,) at the shares (K,) are on the parabola where they start, and then which on the one
+        where they end: their numbers, the motions that start at those vertices, and u."""
+        length = self.task.desired_path.length[rows]
+        following = np.where(rows + 1 < len(self.reach), rows + 1, 0)  # the first one starts nowhere
+        for vertex, distance in ((rows, share * length), (following, (share - 1) * length)):
+            some = np.flatnonzero(np.abs(distance) < self.reach[vertex])
+            if len(some):
+                yield some, vertex[some], 0.5 + 0.5 * distance[some] / self.reach[vertex[some]]
+
+    def _both(self, vertex: Ints, u: Floats) -> tuple[Poses, Poses]:
+        """A and B at the vertices where motions (K,) begin."""
+        desired_path, reach = self.task.desired_path, self.reach[vertex]
+        before = desired_path.at(vertex - 1, 1 - reach * (1 - u) / desired_path.length[vertex - 1])
+        return before, desired_path.at(vertex, reach * u / desired_path.length[vertex])

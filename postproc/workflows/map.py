@@ -1,0 +1,173 @@
+"""The map of a workspace, on paths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from postproc.base.findings import Finding, Refusal
+from postproc.base.geometry import Poses, rotation_from_abc
+from postproc.base.units import DEG, MM
+from postproc.model import StiffnessModel
+from postproc.output.atomic_write import write_atomically
+from postproc.placement.workspace_map import (
+    MapLoad,
+    WorkspaceGrid,
+    WorkspaceMap,
+    evaluate_workspace,
+    has_compensator,
+    with_sign,
+)
+from postproc.report.mapped import Mapped, map_csv, slices_shown
+from postproc.report.report import exit_code, json_bytes
+from postproc.robot.description import find_robot, load_robot
+from postproc.robot.geometries import SerialArm
+from postproc.workflows.preparation import Stage, silent
+
+
+@dataclass(frozen=True)
+class MapRequest:
+    """A map that the user asked for: per axis of the robot base one value or (from, to), each range in ``points``."""
+
+    robot: str
+    ranges_mm: tuple[tuple[float, ...], ...]
+    points: int
+    tool_mm_deg: tuple[float, ...]
+    orientation_deg: tuple[float, ...]
+    wrench: tuple[float, ...]
+    frame: str
+    linear: bool = False
+    sign: str | None = None
+    ignore_limits: bool = False
+    status: int | None = None
+    picture: Path | None = None
+    page: Path | None = None
+    csv: Path | None = None
+    json: Path | None = None
+
+
+def map_workspace(request: MapRequest, stage: Stage = silent) -> Mapped:
+    """The deflection over a part of the workspace.  Raises Refusal, and has then written nothing."""
+    robot = load_robot(find_robot(request.robot))
+    model = StiffnessModel.from_robot(robot)
+    if request.sign is not None:
+        if not has_compensator(model):
+            raise Refusal(
+                Finding(
+                    "MAP001",
+                    f"--sign {request.sign} is given, but the model has no gravity_compensator",
+                    str(robot.path),
+                )
+            )
+        model = with_sign(model, request.sign)
+    free = isinstance(robot.nominal, SerialArm)
+    if free and request.status is not None:
+        raise Refusal(
+            Finding(
+                "MAP006", f"--status {request.status} is given, but this arm has no Status", str(robot.path)
+            )
+        )
+    load = _load(request)
+    stage("computing")
+    found = evaluate_workspace(model, _grid(request), load)
+    signs = {
+        str(term.effect.described()["sign"]) for term in model.terms if "sign" in term.effect.described()
+    }
+    mapped = Mapped(
+        survey=found,
+        load=load,
+        robot=robot.name,
+        digest=robot.digest,
+        axes=tuple((joint.name, "mm" if joint.kind == "prismatic" else "deg") for joint in robot.joints),
+        effects=tuple(term.effect.name for term in model.terms),
+        stated=request.wrench,
+        frame=request.frame,
+        sign=", ".join(sorted(signs)) or None,
+        status=None if free else load.status,
+    )
+    findings = [
+        *_map_findings(found, mapped.status, request.picture is not None),
+        *model.plausibility_findings(),
+    ]
+    files: dict[Path, bytes] = {}
+    if found.mapped.any():
+        stage("drawing")
+        if request.csv is not None:
+            files[request.csv] = map_csv(mapped)
+        if request.picture is not None:
+            from postproc.report.picture import picture
+
+            files[request.picture] = picture(mapped, request.picture.suffix[1:].lower())
+    told = {"result (JSON)": request.json, "page": request.page}
+    names = [*files, *(path for path in told.values() if path is not None)]
+    mapped = replace(
+        mapped,
+        findings=tuple(findings),
+        outputs=tuple(str(path) for path in names),
+        exit=exit_code(findings),
+    )
+    if request.json is not None:
+        files[request.json] = json_bytes(mapped)
+    if request.page is not None:
+        from postproc.report.page import beside
+        from postproc.report.page_results import mapped_page
+
+        also = {"every cell (CSV)": request.csv, "picture": request.picture, "result (JSON)": request.json}
+        files[request.page] = mapped_page(mapped, beside(request.page, also))
+    write_atomically(files)
+    return mapped
+
+
+def _grid(request: MapRequest) -> WorkspaceGrid:
+    axes = []
+    for ends in request.ranges_mm:
+        low, high = ends[0], ends[-1]
+        several = low < high and request.points > 1
+        axes.append(np.linspace(low, high, request.points) if several else np.array([(low + high) / 2]))
+    return WorkspaceGrid(*(values * MM for values in axes))
+
+
+def _load(request: MapRequest) -> MapLoad:
+    place, turn = np.array(request.tool_mm_deg[:3]) * MM, np.array(request.tool_mm_deg[3:]) * DEG
+    orientation = rotation_from_abc(np.array(request.orientation_deg) * DEG)
+    wrench = np.array(request.wrench).reshape(2, 3)
+    if request.frame == "tool":
+        wrench = wrench @ orientation.T
+    return MapLoad(
+        tool=Poses.from_abc(place, turn),
+        orientation=orientation,
+        wrench=wrench.ravel(),
+        status=2 if request.status is None else request.status,
+        linear=request.linear,
+        ignore_limits=request.ignore_limits,
+    )
+
+
+def _map_findings(found: WorkspaceMap, status: int | None, drawn: bool) -> list[Finding]:
+    """What is to be said of a map as a whole."""
+    findings = []
+    cells, unsettled = len(found.q), int(found.unsettled.sum())
+    if status is None:
+        findings.append(
+            Finding(
+                "MAP007",
+                "the configuration is not fixed: the arm has no Status, and neighbouring cells may"
+                " differ in configuration",
+            )
+        )
+    if not found.mapped.any():
+        beyond = int(found.in_reach.sum())
+        help = f"{beyond} cells exceed only the axis limits: use --ignore-limits" if beyond else ""
+        branch = "" if status is None else f" with S {status}"
+        findings.append(Finding("MAP002", f"none of {cells} cells can be reached{branch}", help=help))
+    elif unsettled:
+        findings.append(Finding("MAP003", f"{unsettled} of {cells} cells have no equilibrium"))
+    elif not np.nanmax(found.size) > 0:
+        findings.append(Finding("MAP005", "the deflection is zero everywhere"))
+    slices = found.grid.shape[2]
+    shown = len(slices_shown(slices))
+    if drawn and found.mapped.any() and min(found.grid.shape) > 1 and shown < slices:
+        findings.append(Finding("MAP004", f"the picture shows {shown} of {slices} slices along z"))
+    return findings

@@ -1,0 +1,111 @@
+"""Tests use what the package offers: no test reaches for a name that begins with an underscore, of whatever module."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+FILES = sorted(Path(__file__).parent.rglob("*.py"))
+BY_NAME = {"getattr", "hasattr", "setattr", "delattr"}
+"""Functions and methods (``monkeypatch.setattr``) that take the name of an attribute as a text."""
+
+
+def is_private(name: str) -> bool:
+    return name.startswith("_") and not (name.startswith("__") and name.endswith("__"))
+
+
+def own_names(tree: ast.AST) -> set[str]:
+    """Names that a class, or a module, gives to itself: its functions, and what is assigned to ``self`` and ``cls``."""
+    names = {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store) and is_self(node.value):
+            names.add(node.attr)
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            names.add(node.id)
+    return names
+
+
+def is_self(node: ast.AST) -> bool:
+    return isinstance(node, ast.Name) and node.id in ("self", "cls")
+
+
+def private_uses(text: str) -> Iterator[tuple[int, str]]:
+    """(line, name) of every use of a private name in Python source that another module or class gave."""
+    tree = ast.parse(text)
+    inside: dict[ast.AST, set[str]] = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef):
+            inside.update(dict.fromkeys(ast.walk(node), own_names(node)))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute) and is_private(node.attr):
+            if is_self(node.value) and node.attr in inside.get(node, ()):
+                continue
+            if ast.unparse(node) != "os._exit":
+                yield node.lineno, ast.unparse(node)
+        elif isinstance(node, ast.ImportFrom):
+            words = [*(node.module or "").split("."), *(alias.name for alias in node.names)]
+            yield from ((node.lineno, word) for word in words if is_private(word))
+        elif isinstance(node, ast.Import):
+            words = [word for alias in node.names for word in alias.name.split(".")]
+            yield from ((node.lineno, word) for word in words if is_private(word))
+        elif isinstance(node, ast.Call):
+            called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            texts = [one.value for one in node.args[:2] if isinstance(one, ast.Constant)]
+            for said in texts if called in BY_NAME else ():
+                name = str(said).rpartition(".")[2]
+                own = is_self(node.args[0]) and name in inside.get(node, ())
+                if is_private(name) and not own:
+                    yield node.lineno, str(said)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from postproc.model import _forces",
+        "from postproc._model import forces",
+        "import postproc._model",
+        "model._forces",
+        "model._forces()",
+        "model._forces = 1",
+        "model()._forces[0]._laws",
+        "monkeypatch.setattr(model, '_forces', None)",
+        "monkeypatch.setattr('postproc.model._forces', None)",
+        "getattr(model, '_forces')",
+        "class A(B):\n    def f(self):\n        return super()._forces",
+        "class A(B):\n    def f(self):\n        return self._forces",
+        "class A(B):\n    def f(self):\n        return getattr(self, '_forces')",
+    ],
+)
+def test_a_private_use_is_found(text):
+    assert [*private_uses(text)]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from __future__ import annotations",
+        "from postproc.model import forces as _forces",
+        "_forces = 1\n_forces += 1",
+        "model.__class__.__name__",
+        "os._exit(1)",
+        "class A:\n    def f(self):\n        self._a = 1\n        return self._a, self._g()\n    def _g(self): 0",
+        "class A:\n    _forces: int = 0\n    def f(self):\n        return self._forces",
+        "class A:\n    def f(self):\n        if not hasattr(self, '_forces'):\n            self._forces = 1",
+        "print('_forces', getattr(model, 'forces'))",
+    ],
+)
+def test_other_uses_are_no_private_ones(text):
+    assert not [*private_uses(text)]
+
+
+def test_no_test_uses_a_private_name():
+    found = [
+        f"{path.name}:{line}: {name}"
+        for path in FILES
+        for line, name in private_uses(path.read_text(encoding="utf-8"))
+    ]
+    assert len(FILES) > 100
+    assert not found, "\n".join(found)

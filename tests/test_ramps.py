@@ -1,0 +1,120 @@
+"""Forces that step inside a cut go over along the path: by a scalar walk along it, and by what the correction does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ways_at_work import corner, line
+
+from postproc.compensation.ramped_forces import STEEPEST, add_force_ramps, correction_steps
+from postproc.process import Wrenches
+from postproc.process.force_ramps import Ramps
+
+
+def some_ramps(seed: int):
+    """Motions of random lengths in some cuts, steps at some of them, and ramps of other lengths than those."""
+    rng = np.random.default_rng(seed)
+    n = 40
+    extent = rng.uniform(0.0, 3.0, n) * (rng.random(n) > 0.1)
+    carries = rng.random(n) > 0.15
+    inner = np.flatnonzero(carries[1:] & carries[:-1]) + 1
+    rows = np.sort(rng.choice(inner, min(8, len(inner)), replace=False))
+    return rows, rng.normal(size=(len(rows), 6)), rng.uniform(0.5, 6.0, len(rows)), extent, carries, rng
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_ramp_adds_what_is_left_of_its_step(seed):
+    """Walked by hand: from the step on, through the motions behind it, no further than its cut."""
+    rows, step, length, extent, carries, rng = some_ramps(seed)
+    ramps = Ramps.of(rows, step, length, extent, carries)
+    motions, share = rng.integers(0, len(extent), 200), rng.random(200)
+    share[:40] = rng.integers(0, 2, 40)
+    found = ramps.at(motions, share)
+    for motion, t, added in zip(motions, share, found, strict=True):
+        expected = np.zeros(6)
+        for row, change, long in zip(rows, step, length, strict=True):
+            if row > motion or not carries[row : motion + 1].all():
+                continue
+            walked = extent[row:motion].sum() + t * extent[motion]
+            if walked < long:
+                expected -= (1 - walked / long) * change
+        np.testing.assert_allclose(added, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_ramp_ends_inside_of_the_motion_that_it_is_said_to_end_in(seed):
+    rows, step, length, extent, carries, _ = some_ramps(seed)
+    ramps = Ramps.of(rows, step, length, extent, carries)
+    told = list(zip(*ramps.ends(), strict=True))
+    expected = []
+    for row, long in zip(rows, length, strict=True):
+        motion, walked = row, 0.0
+        while motion < len(extent) and carries[motion]:
+            if walked < long < walked + extent[motion]:
+                expected.append((motion, (long - walked) / extent[motion]))
+                break
+            walked += extent[motion]
+            motion += 1
+    assert len(told) == len(expected)
+    np.testing.assert_allclose(told, sorted(expected))
+
+
+def test_the_motion_before_a_step_keeps_its_force_and_the_one_behind_it_gets_its_own():
+    task = add_force_ramps(stepped(), 5e-3)
+    force, row = task.force, np.array([3])
+    before, behind = task.force.values[2], task.force.values[3]
+    np.testing.assert_array_equal(force.at_end[2], before)
+    np.testing.assert_allclose(force.along(row, np.zeros(1))[0], before)
+    length, extent = force.ramps.length[0], task.desired_path.length[3]
+    for part, share in ((0.25, 0.25), (1.0, 1.0), (1.5, 1.0)):
+        found = force.along(row, np.array([part * length / extent]))[0]
+        np.testing.assert_allclose(found, before + share * (behind - before))
+    assert not task.steps(row, np.ones(5, bool))[0]
+
+
+def stepped():
+    """The corner, as forces are read: its cut goes on, and steps at the corner."""
+    task = corner()
+    steps = np.array([False, False, True, True, False])
+    return replace(task, force=replace(task.force, steps=steps))
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_no_correction_goes_back_faster_than_the_path_goes_on(sense):
+    """What it goes forth, or aside, makes no ramp longer than it is stated."""
+    task = stepped()
+    values = task.force.values.copy()
+    values[2:4, :3] *= sense
+    task = replace(task, force=replace(task.force, values=values, start=values))
+    back = -correction_steps(task, np.array([3]))[0, 1]  # the feed goes along y
+    assert (back > 0) == (sense > 0)
+    for ramp in (1e-3, 20e-3):
+        length = add_force_ramps(task, ramp).force.ramps.length[0]
+        assert length == pytest.approx(max(ramp, back / STEEPEST))
+
+
+def test_what_was_measured_and_what_does_not_change_keep_their_steps():
+    measured = stepped()
+    measured = replace(measured, force=replace(measured.force, measured=True))
+    assert add_force_ramps(measured, 5e-3) is measured
+    same = stepped()
+    values = np.where(same.carries[:, None], same.force.values[2], 0.0)
+    same = replace(same, force=replace(same.force, values=values, start=values))
+    assert add_force_ramps(same, 5e-3).force.ramps is None
+    alone = line()
+    assert add_force_ramps(alone, 5e-3) is alone
+
+
+def test_a_ramp_of_many_motions_reaches_their_end_points():
+    """Motions shorter than the ramp: their ends have a part of the new force."""
+    n = 6
+    values = np.zeros((n, 6))
+    values[1:3, 0], values[3:, 0] = 100.0, 300.0
+    steps = np.array([False, True, False, True, False, False])
+    force = Wrenches(values, values, values.any(axis=1), "test", (), steps)
+    ramped = force.ramped(np.array([3]), np.array([2.5]), np.ones(n))
+    np.testing.assert_allclose(ramped.at_end[:, 0], [0, 100, 100, 180, 260, 300])
+    np.testing.assert_array_equal(ramped.steps, [False, True, False, False, False, False])
+    assert force.ramped(np.empty(0, int), np.empty(0), np.ones(n)) is force
