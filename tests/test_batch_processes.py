@@ -14,12 +14,12 @@ import pytest
 from batches import a_job, four_programs, program
 from conftest import CELL
 
-from postproc.batch import reading
+from postproc.base.findings import Refusal
+from postproc.batch import files_read as reading
+from postproc.batch.files_read import code_digest, digest_of, readings
+from postproc.batch.item import BatchItem, run_item
 from postproc.batch.locking import locked
-from postproc.batch.reading import code_digest, digest_of, readings
-from postproc.batch.running import run_here
-from postproc.batch.work import Task, work
-from postproc.findings import Refusal
+from postproc.batch.processes import run_here
 from postproc.report.batched import Outcome
 
 
@@ -51,16 +51,16 @@ def test_an_input_that_changes_under_way_leaves_no_record(parts, monkeypatch):
     def meddled(stage: str) -> None:
         (parts / "cell.yaml").write_text(CELL + "# another\n")
 
-    outcome = work(Task(job, code_digest()), meddled)
+    outcome = run_item(BatchItem(job, code_digest()), meddled)
     assert (outcome.state, outcome.findings[0].code) == ("failed", "FIL010")
     assert not (parts / "compensated" / "p0.src").exists()
     assert not (parts / "compensated" / ".compensate").exists()
-    assert work(Task(job, code_digest())).state == "done"
-    assert work(Task(job, code_digest())).state == "unchanged"
+    assert run_item(BatchItem(job, code_digest())).state == "done"
+    assert run_item(BatchItem(job, code_digest())).state == "unchanged"
 
 
 def test_code_of_another_version_is_refused(parts):
-    outcome = work(Task(a_job(parts, "p0.src"), "0" * 64))
+    outcome = run_item(BatchItem(a_job(parts, "p0.src"), "0" * 64))
     assert (outcome.state, outcome.findings[0].code) == ("failed", "BAT006")
 
 
@@ -68,7 +68,7 @@ def test_a_defect_is_an_outcome(parts, monkeypatch):
     from postproc.workflows import program as workflow
 
     monkeypatch.setattr(workflow, "compensate", lambda request, stage: 1 // 0)
-    outcome = work(Task(a_job(parts, "p0.src"), code_digest()))
+    outcome = run_item(BatchItem(a_job(parts, "p0.src"), code_digest()))
     assert (outcome.state, outcome.exit, outcome.findings[0].code) == ("failed", 1, "BAT004")
     assert "ZeroDivisionError" in outcome.findings[0].message
     assert not (parts / "compensated").exists()
@@ -138,6 +138,7 @@ def test_nobody_is_beside_the_holder_of_a_lock(tmp_path):
     assert counter.read_text() == "600"
 
 
+@pytest.mark.slow
 def test_two_batches_in_one_folder_share_the_work(parts):
     words = [sys.executable, "-m", "postproc", "batch", str(parts), "--force", "-j", "2", "--json", "-"]
     both = [subprocess.Popen(words, stdout=subprocess.PIPE) for _ in range(2)]
@@ -167,7 +168,7 @@ def worker_ids(parent: int) -> list[int]:
     return found
 
 
-class Deadly(Task):
+class Deadly(BatchItem):
     """A task whose process is killed as it takes it, the first ``times`` times: counted in a file."""
 
     def __reduce__(self):
@@ -183,14 +184,15 @@ def _deadly(job, code):
         if left:
             counter.write_text(str(left - 1))
             os.kill(os.getpid(), signal.SIGKILL)
-    return Task(job, code)
+    return BatchItem(job, code)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
 @pytest.mark.parametrize(("deaths", "state"), [(1, "done"), (2, "failed")])
 def test_a_worker_that_dies_takes_nothing_with_it(parts, deaths, state):
     (parts / "p1.deaths").write_text(str(deaths))
-    tasks = [Task(a_job(parts, f"p{number}.src"), code_digest()) for number in range(4)]
+    tasks = [BatchItem(a_job(parts, f"p{number}.src"), code_digest()) for number in range(4)]
     tasks[1] = Deadly(tasks[1].job, code_digest())
     outcomes: dict[int, Outcome] = dict(run_here(tasks, 2, lambda number, stage: None))
     assert sorted(outcomes) == [0, 1, 2, 3]
@@ -198,6 +200,7 @@ def test_a_worker_that_dies_takes_nothing_with_it(parts, deaths, state):
     assert {outcome.state for outcome in outcomes.values()} == {"done"}
 
 
+@pytest.mark.slow
 def test_what_died_twice_is_told(parts):
     (parts / "p1.deaths").write_text("9")
     ((number, outcome),) = run_here(
@@ -208,6 +211,7 @@ def test_what_died_twice_is_told(parts):
     assert (parts / "p1.deaths").read_text() == "7"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
 def test_workers_die_with_their_batch(parts, tmp_path):
     for number in range(4, 40):
@@ -226,18 +230,37 @@ def test_workers_die_with_their_batch(parts, tmp_path):
     assert not any(Path(f"/proc/{worker}").exists() for worker in workers)
 
 
-def test_an_interrupted_batch_ends_in_words(parts):
-    for number in range(4, 200):
-        program(parts / f"p{number}.src", number)
+def interrupted(parts, begun, delay=0.0):
+    """A batch to whose process group an interrupt is sent ``delay`` s after ``begun(process)``; what it wrote."""
     words = [sys.executable, "-m", "postproc", "batch", str(parts), "--force", "-j", "2"]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
     deadline = time.monotonic() + 60
-    while not list((parts / "compensated").glob("*.src")) and time.monotonic() < deadline:
-        time.sleep(0.02)
+    while not begun(process) and time.monotonic() < deadline:
+        time.sleep(0.005)
+    time.sleep(delay)
     os.killpg(process.pid, signal.SIGINT)
     out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
     assert out == b""
-    assert b"goes on from there" in err
+    return process, err
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
+@pytest.mark.parametrize("delay", [0.0, 0.05, 0.2, 0.5])
+def test_workers_that_only_begin_leave_an_interrupt_to_their_batch(parts, delay):
+    for number in range(4, 20):
+        program(parts / f"p{number}.src", number)
+    process, err = interrupted(parts, lambda process: worker_ids(process.pid), delay)
+    assert process.returncode == 130
+    assert b"Traceback" not in err
+
+
+@pytest.mark.slow
+def test_an_interrupted_batch_ends_in_words(parts):
+    for number in range(4, 200):
+        program(parts / f"p{number}.src", number)
+    process, err = interrupted(parts, lambda _: list((parts / "compensated").glob("*.src")))
+    assert process.returncode == 130
+    assert b"continues from there" in err
     assert b"Traceback" not in err
     assert not list(parts.rglob("*.tmp*"))
