@@ -17,7 +17,8 @@ from postproc.compensation.correct import correct, with_residual
 from postproc.compensation.desired_path import start_poses
 from postproc.compensation.mirror import pose_error, predict
 from postproc.compensation.path_error import LITTLE, SHARES, SHORT, PathSegments, path_errors
-from postproc.compensation.subdivision import Limits, subdivide, subdivided_motions
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits, subdivided_motions
 from postproc.compensation.uncertainty import (
     ForceUncertainty,
     UncertainInput,

@@ -16,7 +16,8 @@ from postproc.compensation.comparison import across_feed, cuts_not_improved, eva
 from postproc.compensation.corners import compare_corners
 from postproc.compensation.correct import correct, with_residual
 from postproc.compensation.ramped_forces import add_force_ramps
-from postproc.compensation.subdivision import Limits, subdivide
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits
 from postproc.languages.krl import KrlDialect
 from postproc.output.write import path_errors_as_written
 from postproc.toolpath import Kind

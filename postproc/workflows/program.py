@@ -24,7 +24,8 @@ from postproc.compensation.comparison import cuts_not_improved
 from postproc.compensation.correct import CorrectionResult, MotionOutcome, correct
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.splines import unknown_displacements
-from postproc.compensation.subdivision import Limits, Subdivision, subdivide
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits, Subdivision
 from postproc.languages.dialect import EditedTargets, Program
 from postproc.output.atomic_write import Content, write_atomically
 from postproc.output.write import WrittenProgram, edit_program, plan_motions, write, writing_settings
