@@ -19,12 +19,9 @@ from postproc.compensation.mirror import pose_error, predict
 from postproc.compensation.path_error import LITTLE, SHARES, SHORT, PathSegments, path_errors
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits, subdivided_motions
-from postproc.compensation.uncertainty import (
-    ForceUncertainty,
-    UncertainInput,
-    expanded_uncertainty,
-    length_quantile,
-)
+from postproc.compensation.uncertain_inputs import UncertainInput
+from postproc.compensation.uncertainty import ForceUncertainty
+from postproc.compensation.uncertainty_propagation import expanded_uncertainty, length_quantile
 from postproc.model import NOTHING
 from postproc.process import Wrenches
 from postproc.robot.axis_track import follow_axes

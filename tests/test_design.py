@@ -48,6 +48,9 @@ ONE_FLOOR = {
 }
 """Neighbours on one floor, from -> to."""
 
+MOST_LINES = 450
+"""Lines of a file of the package."""
+
 TEXT = {"languages", "base.document"}
 PHYSICS = {"robot", "effects", "process"}
 """Neither side knows of the other; they meet in ``toolpath``."""
@@ -129,6 +132,16 @@ def test_the_table_of_rooms_has_these_floors():
     )
     assert {room: int(floor) for floor, room in rows} == {r: f for r, f in ROOMS.items() if r != "__init__"}
     assert [int(floor) for floor, _ in rows] == sorted(ROOMS.values(), reverse=True)[: len(rows)]
+
+
+def test_no_file_is_long():
+    """A file that grows beyond this holds more than one subject."""
+    lines = {
+        path.relative_to(ROOT).as_posix(): len(path.read_text(encoding="utf-8").splitlines())
+        for path in ROOT.rglob("*.py")
+    }
+    assert len(lines) > 300
+    assert {name: count for name, count in lines.items() if count > MOST_LINES} == {}
 
 
 @pytest.mark.slow

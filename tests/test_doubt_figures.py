@@ -15,19 +15,19 @@ from test_doubt import INTERVALS, TOOL, every, job, paper, restated
 from postproc.base.geometry import Poses
 from postproc.compensation import uncertainty as doubt
 from postproc.compensation.correct import correct
+from postproc.compensation.input_sensitivities import sensitivities
 from postproc.compensation.mirror import predict
+from postproc.compensation.uncertain_inputs import FORCE, UncertainInput, input_uncertainties
 from postproc.compensation.uncertainty import (
-    FORCE,
     ForceUncertainty,
-    UncertainInput,
     Uncertainty,
-    covariances,
     evaluate_uncertainty,
-    expanded_uncertainty,
-    input_uncertainties,
-    length_quantile,
     select_motions,
-    sensitivities,
+)
+from postproc.compensation.uncertainty_propagation import (
+    covariances,
+    expanded_uncertainty,
+    length_quantile,
     variance_shares,
 )
 from postproc.model import NOTHING

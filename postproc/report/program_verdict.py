@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from postproc.base.units import MM
-from postproc.compensation.uncertainty import COMPONENTS, DIRECTION, FORCE
+from postproc.compensation.uncertain_inputs import COMPONENTS, DIRECTION, FORCE
 from postproc.report.report import NOT_CORRECTED, REVIEW, UNCERTAIN, Report
 from postproc.report.words import two_digits
 
