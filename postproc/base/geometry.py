@@ -152,14 +152,14 @@ def _rows(components: Floats) -> Floats:
 
 def lengths(vectors: Floats) -> Floats:
     """(N,) lengths of vectors (N, 3)."""
-    return np.sqrt(np.einsum("ni,ni->n", vectors, vectors))
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)))
 
 
 def turned(rotation: Floats, vector: Floats) -> Floats:
     """Vectors (..., 3) turned by rotations (..., 3, 3); leading shapes broadcast."""
     if rotation.ndim == 2:
         return np.asarray(vector @ rotation.T)
-    return np.einsum("...ij,...j->...i", rotation, vector)
+    return np.asarray(np.einsum("...ij,...j->...i", rotation, vector))
 
 
 def rotation_from_abc(abc: ArrayLike) -> Floats:

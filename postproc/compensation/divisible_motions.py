@@ -73,7 +73,7 @@ class DivisibleMotions:
         """(N,) splines with which a corrected cut starts: what is between their points is the controller's, but the
         first of them starts where its correction does."""
         corrected, path = self.full.corrected, self.task.toolpath
-        first = corrected & (path.kind == Kind.SPL) & ~np.append(False, corrected[:-1])
+        first: Bools = corrected & (path.kind == Kind.SPL) & ~np.append(False, corrected[:-1])
         rows = np.flatnonzero(first)
         first[rows] = np.isfinite(self.task.desired_path.start[rows].position[:, 0])
         return first

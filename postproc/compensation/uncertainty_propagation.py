@@ -65,7 +65,7 @@ def length_quantile(spread: Floats) -> Floats:
     found, some = 0.0 * total, squares > 0  # NaN where nothing is known
     total, squares = total[some], squares[some]
     found[some] = np.sqrt(squares / total * np.interp(total**2 / squares, *np.transpose(_CHI_SQUARE)))
-    return found
+    return np.asarray(found)
 
 
 def expanded_uncertainty_of_largest(error: Floats, sensitivity: Floats, covariance: Floats) -> float:

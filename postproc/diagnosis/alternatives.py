@@ -106,7 +106,7 @@ def _instead(
 
     def readings(columns: Floats) -> Floats:
         below = np.zeros((linear.priors, columns.shape[2]))
-        return np.nan_to_num(np.concatenate([linear.weights(columns), below]))
+        return np.asarray(np.nan_to_num(np.concatenate([linear.weights(columns), below])))
 
     large = evaluate_at_size(
         campaign, without, model, unknowns, lambda columns: outside(beyond, readings(columns))

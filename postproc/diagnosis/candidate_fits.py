@@ -19,7 +19,7 @@ from postproc.model import StiffnessModel
 def in_scales(fitted: Fit, unknowns: Sequence[Unknown]) -> Floats:
     """(P,) what was found of unknowns, from their nulls, in their scales."""
     nulls = np.array([u.parameter.null for u in unknowns])
-    return (fitted.point.values(unknowns) - nulls) / scales(unknowns)
+    return np.asarray((fitted.point.values(unknowns) - nulls) / scales(unknowns))
 
 
 def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> Fit:

@@ -173,7 +173,7 @@ def _linear(
     away = np.array([u.value for u in base.unknowns]) - _values(fitted.model, base.unknowns)
 
     def tall(columns: Floats, below: Floats) -> Floats:
-        return np.nan_to_num(np.concatenate([weights(columns), below]))
+        return np.asarray(np.nan_to_num(np.concatenate([weights(columns), below])))
 
     def readings(columns: Floats) -> Floats:
         return tall(columns, np.zeros((len(prior), columns.shape[2])))

@@ -218,7 +218,7 @@ class BlockWords:
         """(B, 6) axis words that are differences."""
         hows = np.stack([self.how(axis) for axis in AXES], axis=1)
         incremental = (self.modal.force[Group.DISTANCE] == 1)[:, None]
-        return (hows >= 0) & ((incremental & (hows != How.ABSOLUTE)) | (hows == How.INCREMENTAL))
+        return np.asarray((hows >= 0) & ((incremental & (hows != How.ABSOLUTE)) | (hows == How.INCREMENTAL)))
 
 
 def blocks(source: Source, modal: Modal, control: Control, increments: bool) -> BlockWords:

@@ -36,7 +36,7 @@ def switched(state: Ints, before: int) -> Bools:
     """(B,) blocks in which ``state`` (B,) is another one than in the block ahead; ``before`` ahead of the first."""
     if state.strides == (0,):
         return _single(len(state), len(state) > 0 and int(state[0]) != before)
-    return np.diff(state, prepend=state.dtype.type(before)) != 0
+    return np.asarray(np.diff(state, prepend=state.dtype.type(before)) != 0)
 
 
 def _single(count: int, first: bool) -> Bools:
