@@ -34,8 +34,8 @@ from statistics import median
 import numpy as np
 import pinocchio as pin
 
-from postproc.base.batches import use_mmap_for_large_arrays
 from postproc.base.geometry import Poses, rotation_from_vector
+from postproc.base.memory import use_mmap_for_large_arrays
 from postproc.compensation.mirror import ANGLE_TOLERANCE, POSITION_TOLERANCE, initial_guess, mirror
 from postproc.model import NOTHING, StiffnessModel
 from postproc.robot.chain import Chain

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.base.arrays import Bools, FewRows, Floats, Ints
+from postproc.base.arrays import Bools, FewRows, Floats, Ints, is_shared
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.languages.krl.execution_context import ExecutionContext
@@ -288,7 +288,7 @@ def _reported(rows: MotionRows, table: MotionTable, refused: dict[int, Finding])
 def _told_external(rows: MotionRows, table: MotionTable) -> list[Finding]:
     """What ``check`` says of external axes that do not stay where they are first."""
     first: dict[str, int] = {}
-    if table.external.strides[0]:
+    if not is_shared(table.external):
         for axis, values in enumerate(table.external.T):
             there = np.isfinite(values) | (values == COMPUTED)
             away = there & (values != values[np.argmax(there)])
