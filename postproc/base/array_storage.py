@@ -40,9 +40,11 @@ class GrowingColumns:
         self._types, self._bytes = types, [bytearray() for _ in types]
 
     def add(self, *columns: NDArray[Any]) -> None:
+        """Append ``columns`` (K,) to those that are here, one to each."""
         for held, values, kind in zip(self._bytes, columns, self._types, strict=True):
             held += np.ascontiguousarray(values, kind).data
 
     def done(self) -> Iterator[NDArray[Any]]:
+        """The columns (N,) as they are now."""
         for held, kind in zip(self._bytes, self._types, strict=True):
             yield np.frombuffer(held, kind)

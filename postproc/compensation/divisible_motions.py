@@ -107,6 +107,7 @@ class DivisibleMotions:
         return np.where(half, np.maximum(least, 2), least)
 
     def leave_undivided(self, rows: Ints, code: str, message: str) -> None:
+        """Note of ``rows`` (K,) that they are not divided as they should be, and why; what is noted first counts."""
         for row in rows.tolist():
             line = int(self.task.toolpath.line[row])
             self.not_refined.setdefault(row, Finding(code, message, self.task.file, line))
@@ -117,8 +118,8 @@ class DivisibleMotions:
         return np.maximum(least, feed * self.limits.cycle)
 
     def largest_errors(self, chosen: Ints, count: Ints) -> Floats:
-        """(A,) what is left between the points of the intervals ``chosen`` (A,) in ``count`` (A,) even segments, in
-        parts of what may be left."""
+        """(A,) the largest error between the points of the intervals ``chosen`` (A,) in ``count`` (A,) even segments,
+        in parts of the one that is allowed."""
 
         def largest(part: slice) -> Floats:
             segments, owner = self.segments(chosen[part], count[part])
@@ -140,11 +141,12 @@ class DivisibleMotions:
         return np.concatenate([np.empty(0), *in_blocks(there, len(chosen))])
 
     def _allowed(self, off: Floats, angle: Floats) -> Floats:
-        """(K,) errors [m], [rad] in parts of what may be left."""
+        """(K,) errors [m], [rad] in parts of those that are allowed."""
         return np.maximum(off / self.task.tolerance, angle / self.task.tolerance_angle) / ROOM
 
     def segments(self, chosen: Ints, count: Ints) -> tuple[PathSegments, Ints]:
-        """The segments of the intervals ``chosen``, and the place in ``chosen`` of each."""
+        """The segments (S) of the intervals ``chosen`` (A,) in ``count`` (A,) even ones each, and (S,) the place in
+        ``chosen`` of each."""
         path = self.owner[chosen]
         owner = np.repeat(np.arange(len(path)), count)
         number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
@@ -179,7 +181,7 @@ class DivisibleMotions:
         return np.where(part == 1.0, high, low + part * (high - low))
 
     def commands(self, rows: Ints, share: Floats, where: str = "between its points") -> Poses:
-        """The commands (K) by which the tool is at the shares (K,) of the ways of ``rows`` (K,), under the force
+        """The commands (K) by which the tool is at the shares (K,) of the paths of ``rows`` (K,), under the force
         there."""
         wanted = self.task.desired_path.at(rows, share)
         if not len(rows):

@@ -19,9 +19,9 @@ from postproc.base.geometry import PoseRows, Poses
 from postproc.base.memory import release_free_memory
 from postproc.base.units import DEG, MM
 from postproc.cell import Cell
-from postproc.compensation.comparison import Transitions, along_and_across, evaluate_transitions
 from postproc.compensation.corners import Corners, compare_corners
 from postproc.compensation.correct import CorrectionResult, MotionOutcome, with_residual
+from postproc.compensation.path_comparison import Transitions, along_and_across, evaluate_transitions
 from postproc.compensation.path_error import path_errors
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import Subdivision, subdivided_motions

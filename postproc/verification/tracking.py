@@ -20,7 +20,8 @@ _BLOCK = 128
 
 
 def track_commands(grid: PathGrid, stretch: Ints, command: Floats) -> tuple[Ints, Floats]:
-    """Interval and part of it (S,) of the grid in which each command (S, 3) is found, going on from the one before."""
+    """Interval and part of it (S,) of the grid in which each command (S, 3) is found, going on from the one before;
+    ``stretch`` (S,): that of the grid on which it is, ascending."""
     interval, part = np.empty(len(command), np.int64), np.empty(len(command))
     start = np.flatnonzero(np.append(True, stretch[1:] != stretch[:-1])[: len(stretch)])
     for first, stop in zip(start, np.append(start[1:], len(command))[: len(start)], strict=True):

@@ -20,8 +20,8 @@ from postproc.base.input_files import place
 from postproc.base.memory import release_free_memory
 from postproc.base.units import DEG, MM
 from postproc.compensation.axis_limits import check_limits
-from postproc.compensation.comparison import cuts_not_improved
 from postproc.compensation.correct import CorrectionResult, MotionOutcome, correct
+from postproc.compensation.path_comparison import cuts_not_improved
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.splines import unknown_displacements
 from postproc.compensation.subdivide import subdivide

@@ -10,7 +10,7 @@ from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.lexing import Statement, identifiers, is_number
 from postproc.languages.krl.modal_state import ModalState
 from postproc.languages.krl.motion_entry import enter_motion
-from postproc.languages.krl.motion_rows import Refusal
+from postproc.languages.krl.motion_rows import RowRefusal
 from postproc.languages.krl.operands import Operand, Parts, operand_at
 from postproc.languages.krl.relative_motions import absolute_target, relative_reference, shift
 from postproc.languages.krl.source_map import Auxiliary
@@ -22,7 +22,7 @@ _CIRCLE_ANGLE = re.compile(rb"CA(?![A-Za-z0-9_$])[ \t]*=?[ \t]*", re.I)
 
 
 def move_on_arc(
-    run: ExecutionContext, statement: Statement, parts: Parts, first: Operand, reason: Refusal | None, blend: float
+    run: ExecutionContext, statement: Statement, parts: Parts, first: Operand, reason: RowRefusal | None, blend: float
 ) -> None:  # fmt: skip
     code, state = statement.code, run.state
     points, angle, span = list(parts.points[1:]), None, None
@@ -39,7 +39,7 @@ def move_on_arc(
             run.mentioned |= identifiers(text)
         else:
             why = value.message if isinstance(value, UnknownValue) else "it is not a number"
-            reason = reason or Refusal("KRL002", f"its angle CA is computed: {why}")
+            reason = reason or RowRefusal("KRL002", f"its angle CA is computed: {why}")
     if len(points) != 1:
         what = (
             "it has no end point" if not points else f"'{shown(code[slice(*points[1])])}' is not understood"
@@ -88,28 +88,28 @@ def _arc_path(
     auxiliary: KrlTarget | UnknownValue,
     end: KrlTarget | UnknownValue,
     angle: float | None,
-) -> tuple[Arc | None, Refusal]:
+) -> tuple[Arc | None, RowRefusal]:
     """The path of an arc, or why it is not known."""
     if isinstance(auxiliary, UnknownValue):
         code = auxiliary.code if auxiliary.code in ("KRL001", "KRL002", "KRL003") else "KRL009"
-        return None, Refusal(
+        return None, RowRefusal(
             code, f"its auxiliary point is not known: {auxiliary.message}", auxiliary.message
         )
     if auxiliary.axes is not None:
-        return None, Refusal("KRL009", "its auxiliary point is given in axis angles")
+        return None, RowRefusal("KRL009", "its auxiliary point is given in axis angles")
     if start is None:
         lost = state.point_unknown
         if state.point_frames is not None and state.point_frames != (state.base, state.tool):
             lost = "base or tool changed since the point before"
         elif state.anchor is not None:
             lost = "it is the end of an axis motion"
-        return None, Refusal(
+        return None, RowRefusal(
             "KRL009", f"it is an arc, and its start is not known in numbers: {lost}", f"start {lost}"
         )
     if isinstance(end, UnknownValue) or end.axes is not None:
-        return None, Refusal("KRL009", "its end is not known")
+        return None, RowRefusal("KRL009", "its end is not known")
     through = [old if new is None else new for new, old in zip(auxiliary.values[:3], start, strict=False)]
     there = [old if new is None else new for new, old in zip(end.values[:3], start, strict=False)]
     found = arc(start[:3], (through[0], through[1], through[2]), (there[0], there[1], there[2]), angle)
     same = "its start, auxiliary point and end do not define a circle"
-    return found, Refusal("KRL009", same, "flat")
+    return found, RowRefusal("KRL009", same, "flat")

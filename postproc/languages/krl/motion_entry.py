@@ -14,7 +14,7 @@ from postproc.languages.krl.motion_refusals import (
     orientation_refusal,
     structure_refusal,
 )
-from postproc.languages.krl.motion_rows import NAN6, NO_ARC, MotionRow, Refusal, index, path_of, refusal
+from postproc.languages.krl.motion_rows import NAN6, NO_ARC, MotionRow, RowRefusal, index, path_of, refusal
 from postproc.languages.krl.operands import Operand
 from postproc.languages.krl.partial import anchored, filled, incomplete
 from postproc.languages.krl.source_map import InlineForm
@@ -46,7 +46,7 @@ def extent(statement: Statement, operand: Operand | None) -> tuple[int, int, int
 
 
 def enter_motion(
-    run: ExecutionContext, statement: Statement, kind: Kind, operand: Operand, reason: Refusal | None, blend: float,
+    run: ExecutionContext, statement: Statement, kind: Kind, operand: Operand, reason: RowRefusal | None, blend: float,
     way: Arc | None = None, relative: bool = False,
 ) -> int:  # fmt: skip
     """Adds the row of a motion and brings the state after it.  ``reason``: why it is refused in any case."""
@@ -63,7 +63,7 @@ def enter_motion(
             kind = Kind.AXIS
             axes = filled(target.axes, state.axes)
         else:
-            reason = reason or Refusal("KRL001", "a straight line cannot lead to axis angles")
+            reason = reason or RowRefusal("KRL001", "a straight line cannot lead to axis angles")
         stated = replace(target.detached(), locked="")
     else:
         values = filled(target.values, state.point)
@@ -78,7 +78,7 @@ def enter_motion(
     if values is not None and way is not None:
         values = (*way.end, *values[3:])
     elif kind == Kind.CIRC and reason is None:
-        reason = Refusal("KRL009", "its path is not known")
+        reason = RowRefusal("KRL009", "its path is not known")
     if reason is None and kind is not Kind.AXIS:
         reason = frames_missing(run) or orientation_refusal(state, kind)
     structure = structure_refusal(run)
@@ -161,7 +161,7 @@ def _inherits(stated: KrlTarget | None, relative: bool) -> int:
 
 
 def _advance(
-    state: ModalState, line: int, values: Numbers | None, axes: Numbers | None, reason: Refusal | None
+    state: ModalState, line: int, values: Numbers | None, axes: Numbers | None, reason: RowRefusal | None
 ) -> None:
     if values is not None:
         state.point, state.point_frames = values, (state.base, state.tool)

@@ -5,35 +5,35 @@ from __future__ import annotations
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.lexing import LOOPS, SPLINES
 from postproc.languages.krl.modal_state import ModalState
-from postproc.languages.krl.motion_rows import Refusal, refusal
+from postproc.languages.krl.motion_rows import RowRefusal, refusal
 from postproc.languages.krl.target import UnknownValue
 from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 
-def frames_missing(run: ExecutionContext) -> Refusal | None:
+def frames_missing(run: ExecutionContext) -> RowRefusal | None:
     state = run.state
     if run.root_set is not None:
-        return Refusal("KRL005", f"the robot's place in the world is set in line {run.root_set}", "root")
+        return RowRefusal("KRL005", f"the robot's place in the world is set in line {run.root_set}", "root")
     if state.tool_known:
-        return Refusal("KRL013", "the tool is fixed in the world ($IPO_MODE=#TCP)", "tcp")
+        return RowRefusal("KRL013", "the tool is fixed in the world ($IPO_MODE=#TCP)", "tcp")
     for frame in (state.base, state.tool):
         if isinstance(frame, UnknownValue):
             return refusal(frame, "", frame.message)
     return None
 
 
-def orientation_refusal(state: ModalState, kind: Kind) -> Refusal | None:
+def orientation_refusal(state: ModalState, kind: Kind) -> RowRefusal | None:
     """Why it is not known how the tool turns on a motion, or not in a way that is corrected."""
     if kind not in (Kind.LIN, Kind.CIRC, Kind.SPL):
         return None
     if state.orientation == OrientationMode.UNKNOWN:
-        return Refusal(
+        return RowRefusal(
             "KRL031",
             "the orientation between the points is not known: $ORI_TYPE is none of #VAR, #CONSTANT, #JOINT",
             "ori",
         )
     if state.orientation == OrientationMode.JOINT and kind is not Kind.SPL:
-        return Refusal(
+        return RowRefusal(
             "KRL031", "the wrist axes move linearly, and the tool does not ($ORI_TYPE=#JOINT)", "joint"
         )
     if (
@@ -42,9 +42,9 @@ def orientation_refusal(state: ModalState, kind: Kind) -> Refusal | None:
         and state.arc_frame == ArcFrame.PATH
     ):
         message = "the tool rotates with the executed arc ($ORI_TYPE=#CONSTANT, $CIRC_TYPE=#PATH)"
-        return Refusal("KRL031", message, "path")
+        return RowRefusal("KRL031", message, "path")
     if kind is Kind.CIRC and state.arc_frame == ArcFrame.UNKNOWN:
-        return Refusal(
+        return RowRefusal(
             "KRL031",
             "the orientation on the arc is not known: $CIRC_TYPE or $CIRC_MODE is not understood",
             "circ",
@@ -57,22 +57,24 @@ def is_detached(run: ExecutionContext) -> bool:
     return run.idle or run.walked
 
 
-def structure_refusal(run: ExecutionContext) -> Refusal | None:
+def structure_refusal(run: ExecutionContext) -> RowRefusal | None:
     """The reason that lies in where the motion is."""
     routine = run.routine
     if run.idle:
-        return Refusal("KRL023", "the flow that the program's constants define does not lead here", "never")
+        return RowRefusal(
+            "KRL023", "the flow that the program's constants define does not lead here", "never"
+        )
     if routine is None:
         if run.survey.has_routine:
-            return Refusal("KRL014", "the motion is outside every DEF", "outside")
+            return RowRefusal("KRL014", "the motion is outside every DEF", "outside")
     elif run.walked:
-        return Refusal("KRL015", run.why_walked(routine), f"def {routine.line}")
+        return RowRefusal("KRL015", run.why_walked(routine), f"def {routine.line}")
     for item in run.stack:
         word = item.block.word
         if not item.followed and word not in SPLINES:
             what = "loop" if word in LOOPS else "branch"
             told = word.decode("latin-1")
-            return Refusal(
+            return RowRefusal(
                 "KRL006",
                 f"it is inside the {what} ({told}) of line {item.block.line}",
                 f"in {item.block.line}",

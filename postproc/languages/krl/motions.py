@@ -6,7 +6,6 @@ import numpy as np
 
 from postproc.languages.krl.arc_motions import move_on_arc
 from postproc.languages.krl.assignments import with_clause
-from postproc.languages.krl.effects import HERE
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.lexing import LONGEST, Statement, identifiers
 from postproc.languages.krl.modal_state import NAN, ModalState
@@ -17,10 +16,11 @@ from postproc.languages.krl.motion_refusals import (
     orientation_refusal,
     structure_refusal,
 )
-from postproc.languages.krl.motion_rows import NAN6, Refusal
+from postproc.languages.krl.motion_rows import NAN6, RowRefusal
 from postproc.languages.krl.operands import Operand, Parts, operand_at, take_apart
 from postproc.languages.krl.relative_motions import absolute_target, relative_reference
 from postproc.languages.krl.spatial import Numbers
+from postproc.languages.krl.statement_effects import HERE
 from postproc.languages.krl.target import UnknownValue, shown
 from postproc.languages.krl.vectorised import VectorisedLines
 from postproc.toolpath import Kind, OrientationMode
@@ -88,11 +88,11 @@ def unknown_motion(run: ExecutionContext, statement: Statement) -> None:
     run.mentioned |= identifiers(statement.code[:LONGEST])
     motion = extent(statement, None)
     operand = Operand(UnknownValue("KRL001", ""), motion[1], motion[2])
-    reason = Refusal("KRL001", f"'{shown(statement.code)}' is not understood", "package")
+    reason = RowRefusal("KRL001", f"'{shown(statement.code)}' is not understood", "package")
     enter_motion(run, statement, Kind.OTHER, operand, reason, NAN)
 
 
-def _move(run: ExecutionContext, statement: Statement, parts: Parts, reason: Refusal | None) -> None:
+def _move(run: ExecutionContext, statement: Statement, parts: Parts, reason: RowRefusal | None) -> None:
     word, code = statement.word, statement.code
     relative = word.endswith(b"_REL")
     kind = _kind(run, word)
@@ -105,17 +105,17 @@ def _move(run: ExecutionContext, statement: Statement, parts: Parts, reason: Ref
     if not relative and first.variable is not None and first.variable.name in HERE and len(parts.points) == 1:
         return
     if parts.not_understood:
-        reason = reason or Refusal("KRL001", f"'{shown(parts.not_understood)}' is not understood")
+        reason = reason or RowRefusal("KRL001", f"'{shown(parts.not_understood)}' is not understood")
     if kind == Kind.CIRC:
         move_on_arc(run, statement, parts, first, reason, blend)
         return
     if len(parts.points) > 1:
         odd = code[slice(*parts.points[1])]
-        reason = reason or Refusal("KRL001", f"'{shown(odd)}' is not understood")
+        reason = reason or RowRefusal("KRL001", f"'{shown(odd)}' is not understood")
     if relative:
         first, reason = absolute_target(run, statement, parts, first, reason)
     if isinstance(first.target, UnknownValue) and first.target.code == "KRL016":
-        reason = Refusal("KRL016", first.target.message, "home")
+        reason = RowRefusal("KRL016", first.target.message, "home")
     row = enter_motion(run, statement, kind, first, reason, blend, relative=relative)
     if relative:
         run.rows.relative[row] = relative_reference(statement, parts)

@@ -8,7 +8,7 @@ from postproc.base.document import Span
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.lexing import Statement
 from postproc.languages.krl.modal_state import ModalState
-from postproc.languages.krl.motion_rows import Refusal
+from postproc.languages.krl.motion_rows import RowRefusal
 from postproc.languages.krl.operands import Operand, Parts
 from postproc.languages.krl.source_map import Relative
 from postproc.languages.krl.spatial import Numbers, Vector, rotation, turned
@@ -25,20 +25,20 @@ def relative_reference(statement: Statement, parts: Parts) -> Relative:
 
 
 def absolute_target(
-    run: ExecutionContext, statement: Statement, parts: Parts, operand: Operand, reason: Refusal | None
-) -> tuple[Operand, Refusal | None]:
+    run: ExecutionContext, statement: Statement, parts: Parts, operand: Operand, reason: RowRefusal | None
+) -> tuple[Operand, RowRefusal | None]:
     """A relative target as the absolute one."""
     state, moved = run.state, operand.target
     if parts.reference is not None:
         named = statement.code[slice(*parts.reference)].upper().replace(b" ", b"")
         if named not in (b"#BASE", b"#TOOL"):
-            why = Refusal("KRL008", f"it is a relative motion in {shown(named)}")
+            why = RowRefusal("KRL008", f"it is a relative motion in {shown(named)}")
             return replace(operand, target=UnknownValue("KRL008", "")), reason or why
     if isinstance(moved, UnknownValue):
         return operand, reason
     if moved.axes is not None:
         if state.axes is None:
-            why = Refusal(
+            why = RowRefusal(
                 "KRL008", f"it is relative to axis angles that are not known: {_axes_lost(state)}", "axes"
             )
             return replace(operand, target=UnknownValue("KRL008", "")), reason or why
@@ -46,7 +46,7 @@ def absolute_target(
         absolute = KrlTarget((None,) * 6, axes=six(there), external=moved.external)
         return replace(operand, target=absolute), reason
     if any(moved.values[3:]):
-        why = Refusal(
+        why = RowRefusal(
             "KRL008", "it is a relative rotation, which is not documented well enough to be followed", "turn"
         )
         return replace(operand, target=UnknownValue("KRL008", "")), reason or why
@@ -56,7 +56,7 @@ def absolute_target(
             lost = "base or tool changed since the point before"
         elif state.anchor is not None:
             lost = "it is the end of an axis motion"
-        why = Refusal(
+        why = RowRefusal(
             "KRL008",
             f"it is a relative motion, and the position before is not known in numbers: {lost}",
             lost,
