@@ -18,6 +18,7 @@ from postproc.compensation import uncertain_inputs
 from postproc.compensation import uncertainty as doubt
 from postproc.compensation.correct import correct
 from postproc.compensation.input_sensitivities import error_sensitivities, sensitivities
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import predict
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.uncertain_inputs import FORCE, input_uncertainties
@@ -117,7 +118,7 @@ def drawn(task, command, names, root, force=0.0):
     still, tool = np.zeros_like(task.wrench), tiled(task.tool, 3)
 
     def motors(pose):
-        return predict(task.model, pose, task.tool, still, NOTHING, track.status, track.q).q
+        return predict(task.model, pose, LoadCase(task.tool, still, NOTHING, track.status, track.q)).q
 
     q = np.concatenate([motors(task.wanted), motors(command), motors(task.wanted)])
     near = task.model.equilibrium(q, np.tile(task.wrench, (3, 1)), tool).displacement
@@ -146,7 +147,7 @@ def covariance_of(errors):
 
 
 def _real(task, model, command, wrench):
-    there = predict(model, command, task.tool, wrench, NOTHING, task.track.status, task.track.q)
+    there = predict(model, command, LoadCase(task.tool, wrench, NOTHING, task.track.status, task.track.q))
     assert there.settled.all()
     return there.pose.position
 

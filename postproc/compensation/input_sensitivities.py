@@ -8,6 +8,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.geometry import Poses, rotation_from_vector
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import predict
 from postproc.compensation.problem import CompensationProblem, rotate_wrench
 from postproc.compensation.uncertain_inputs import COMPONENTS, FORCE, TURNS, UncertainInput
@@ -99,8 +100,7 @@ def error_sensitivities(
         command, wrench = placed @ command, rotate_wrench(placed, wrench)
         axes = placed.rotation @ axes
     given = task.given(rows, corrected=corrected)
-    branch = (task.track.status[rows], task.track.q[rows])
-    here = predict(model, command, tool, wrench, given, *branch)
+    here = predict(model, command, LoadCase(tool, wrench, given, task.track.status[rows], task.track.q[rows]))
     moves = sensitivities(model, entries, here.q, wrench, tool, given, here.displacement, axes)
     moves -= goal_sensitivities(task, entries, rows, wanted)
     goal = task.goal(rows, wanted)

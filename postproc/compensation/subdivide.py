@@ -147,7 +147,7 @@ def _scaled(task: CompensationProblem, division: Subdivision) -> Subdivision:
         on_way = np.flatnonzero(desired_path.traceable[at])
         wanted.put(on_way, desired_path.at(at[on_way], share[on_way]))
         part = interpolate_pose(wanted, found[moved], task.gain)
-        found.put(moved, Poses(task.reported_findings(at, share, part.rotation), part.position))
+        found.put(moved, Poses(task.expressible_orientations(at, share, part.rotation), part.position))
         return found
 
     scaled = replace(division, command=PoseRows(len(division), command))
