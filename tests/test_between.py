@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation, Slerp
 from postproc.base.geometry import Poses
 from postproc.compensation.correct import correct
 from postproc.compensation.path_error import SHARES, path_errors
-from postproc.compensation.subdivision import Limits, subdivide, subdivided_motions
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits, subdivided_motions
 from postproc.robot.inverse import inverse
 from postproc.workflows.preparation import Request, prepare
 

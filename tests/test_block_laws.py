@@ -9,10 +9,11 @@ import pytest
 from ways_at_work import circle, corner, line
 
 import postproc.base.batches
-import postproc.compensation.subdivision
+import postproc.compensation.divisible_motions
 from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.correct import correct
-from postproc.compensation.subdivision import Limits, subdivide
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits
 from postproc.output.write import path_errors_as_written
 
 SIZES = [1, 2, 3, 7]
@@ -20,7 +21,7 @@ SIZES = [1, 2, 3, 7]
 
 def in_blocks_of(monkeypatch, rows):
     monkeypatch.setattr(postproc.base.batches, "ROWS", rows)
-    monkeypatch.setattr(postproc.compensation.subdivision, "ROWS", rows)
+    monkeypatch.setattr(postproc.compensation.divisible_motions, "ROWS", rows)
 
 
 def found(task, allowed):

@@ -15,15 +15,14 @@ from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.correct import correct, with_residual
 from postproc.compensation.desired_path import start_poses
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import pose_error, predict
 from postproc.compensation.path_error import LITTLE, SHARES, SHORT, PathSegments, path_errors
-from postproc.compensation.subdivision import Limits, subdivide, subdivided_motions
-from postproc.compensation.uncertainty import (
-    ForceUncertainty,
-    UncertainInput,
-    expanded_uncertainty,
-    length_quantile,
-)
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits, subdivided_motions
+from postproc.compensation.uncertain_inputs import UncertainInput
+from postproc.compensation.uncertainty import ForceUncertainty
+from postproc.compensation.uncertainty_propagation import expanded_uncertainty, length_quantile
 from postproc.model import NOTHING
 from postproc.process import Wrenches
 from postproc.robot.axis_track import follow_axes
@@ -76,11 +75,7 @@ def test_what_is_left_is_what_the_robot_does_with_the_commands(said, gain):
     there = predict(
         job.model,
         result.command[rows],
-        TOOL,
-        job.wrench[rows],
-        NOTHING,
-        job.track.status[rows],
-        job.track.q[rows],
+        LoadCase(TOOL, job.wrench[rows], NOTHING, job.track.status[rows], job.track.q[rows]),
     ).pose
     wanted = job.wanted[rows]
     shift, turn = pose_error(there, wanted)

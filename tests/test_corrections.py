@@ -13,7 +13,8 @@ from conftest import CELL, JUMPED_LINES
 
 from postproc.base.geometry import abc_from_rotation, rotation_from_vector
 from postproc.compensation.correct import MotionOutcome, correct
-from postproc.compensation.subdivision import Limits, subdivide
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits
 from postproc.report import corrections_csv as files
 from postproc.report.corrections_csv import corrections_csv
 from postproc.report.csv_columns import csv_parts

@@ -48,9 +48,38 @@ ONE_FLOOR = {
 }
 """Neighbours on one floor, from -> to."""
 
+MOST_LINES = 450
+"""Lines of a file of the package."""
+
 TEXT = {"languages", "base.document"}
 PHYSICS = {"robot", "effects", "process"}
 """Neither side knows of the other; they meet in ``toolpath``."""
+
+
+SAME_MODULE_NAMES = {
+    "one part of each family of languages": {
+        "arcs": {"languages/gcode", "languages/krl"},
+        "lexing": {"languages/gcode", "languages/krl"},
+        "motions": {"languages/gcode", "languages/krl"},
+        "source_map": {"languages/gcode", "languages/krl"},
+        "writer": {"languages/gcode", "languages/krl"},
+    },
+    "what the text says of these axes, and their kinematics": {
+        "external_axes": {"languages/gcode", "languages/krl", "robot"},
+    },
+    "a command: its options, and the function that does it": {
+        "batch": {"cli", "batch"},
+        "diagnose": {"cli", "workflows"},
+        "identify": {"cli", "workflows"},
+        "map": {"cli", "workflows"},
+        "plan": {"cli", "workflows"},
+        "program": {"cli", "workflows"},
+        "verify": {"cli", "workflows"},
+    },
+    "what a file of this kind says, in SI": {"description": {"cell", "robot"}},
+    "each room has its own": {"codes": {"*"}},
+}
+"""Reason -> names that several modules may have, and the folders of these."""
 
 
 def room_of(module):
@@ -129,6 +158,38 @@ def test_the_table_of_rooms_has_these_floors():
     )
     assert {room: int(floor) for floor, room in rows} == {r: f for r, f in ROOMS.items() if r != "__init__"}
     assert [int(floor) for floor, _ in rows] == sorted(ROOMS.values(), reverse=True)[: len(rows)]
+
+
+def test_no_file_is_long():
+    """A file that grows beyond this holds more than one subject."""
+    lines = {
+        path.relative_to(ROOT).as_posix(): len(path.read_text(encoding="utf-8").splitlines())
+        for path in ROOT.rglob("*.py")
+    }
+    assert len(lines) > 300
+    assert {name: count for name, count in lines.items() if count > MOST_LINES} == {}
+
+
+def test_modules_of_one_name_are_of_one_kind():
+    folders: dict[str, set[str]] = {}
+    for path in ROOT.rglob("*.py"):
+        if path.stem != "__init__":
+            folders.setdefault(path.stem, set()).add(path.parent.relative_to(ROOT).as_posix())
+    several = {name: places for name, places in folders.items() if len(places) > 1}
+    defended = {name: places for group in SAME_MODULE_NAMES.values() for name, places in group.items()}
+    defended["codes"] = folders["codes"]
+    assert several == defended
+
+
+def test_no_two_classes_have_one_name():
+    """Neither with an underscore before one of them: a reader who searches for a class finds one."""
+    places: dict[str, list[str]] = {}
+    for module, tree in modules(ROOT).items():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.ClassDef):
+                places.setdefault(node.name.lstrip("_"), []).append(module)
+    assert len(places) > 300
+    assert {name: found for name, found in places.items() if len(found) > 1} == {}
 
 
 @pytest.mark.slow

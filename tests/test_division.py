@@ -9,11 +9,13 @@ import pytest
 from ways_at_work import FORCE, circle, corner, in_even_pieces, line
 from ways_at_work import task as task_to
 
-import postproc.compensation.subdivision as division_module
+import postproc.compensation.divisible_motions as divisible_motions
 from postproc.base.units import MM
 from postproc.compensation.correct import correct
+from postproc.compensation.divisible_motions import ROOM, STEP
 from postproc.compensation.path_error import PathSegments, path_errors
-from postproc.compensation.subdivision import ROOM, STEP, Limits, subdivide, subdivided_motions
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits, subdivided_motions
 from postproc.toolpath import Role
 
 FREE = Limits(max_growth=100.0)
@@ -209,10 +211,10 @@ def test_pieces_of_a_straight_way_are_where_they_are_asked_for():
 def looked_at(task, result, monkeypatch):
     """The rows of all pieces at whose errors a division looks, and the division."""
     seen = []
-    errors = division_module.path_errors
+    errors = divisible_motions.path_errors
     with monkeypatch.context() as watched:
         watched.setattr(
-            division_module,
+            divisible_motions,
             "path_errors",
             lambda task, pieces, *more: seen.extend(pieces.rows.tolist()) or errors(task, pieces, *more),
         )

@@ -14,10 +14,13 @@ from ways_at_work import task as at_points
 
 from postproc.base.geometry import Poses, arc_through, rotation_from_vector
 from postproc.compensation.correct import correct
+from postproc.compensation.divisible_motions import ROOM
 from postproc.compensation.mirror import pose_error
 from postproc.compensation.path_error import path_errors
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.subdivision import ROOM, Limits, allocate, subdivide, subdivided_motions
+from postproc.compensation.refinement import allocate
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits, subdivided_motions
 from postproc.toolpath import Kind, Role
 
 FREE = Limits(max_growth=100.0)

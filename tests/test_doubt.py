@@ -14,27 +14,26 @@ from plant import SOFTER, kr270, random_tools, random_wrenches, with_compensator
 from postproc.base.findings import Refusal
 from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.cell import load_cell
+from postproc.compensation import uncertain_inputs
 from postproc.compensation import uncertainty as doubt
 from postproc.compensation.correct import correct
+from postproc.compensation.input_sensitivities import error_sensitivities, sensitivities
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import predict
 from postproc.compensation.problem import CompensationProblem
-from postproc.compensation.uncertainty import (
-    EVEN,
-    FORCE,
-    WORST,
+from postproc.compensation.uncertain_inputs import FORCE, input_uncertainties
+from postproc.compensation.uncertainty import EVEN, WORST, evaluate_uncertainty
+from postproc.compensation.uncertainty_propagation import (
     covariances,
-    evaluate_uncertainty,
     expanded_uncertainty,
-    input_uncertainties,
     length_quantile,
-    sensitivities,
     variance_shares,
 )
 from postproc.model import NOTHING, StiffnessModel
 from postproc.process import Wrenches
 from postproc.report.terminal import describe_budget
 from postproc.robot.axis_track import follow_axes
-from postproc.robot.description import Value, find_robot
+from postproc.robot.description import COVERAGE, Value, find_robot
 
 DRAWS = 2000
 WITHIN = 4 / np.sqrt(2 * DRAWS)
@@ -119,7 +118,7 @@ def drawn(task, command, names, root, force=0.0):
     still, tool = np.zeros_like(task.wrench), tiled(task.tool, 3)
 
     def motors(pose):
-        return predict(task.model, pose, task.tool, still, NOTHING, track.status, track.q).q
+        return predict(task.model, pose, LoadCase(task.tool, still, NOTHING, track.status, track.q)).q
 
     q = np.concatenate([motors(task.wanted), motors(command), motors(task.wanted)])
     near = task.model.equilibrium(q, np.tile(task.wrench, (3, 1)), tool).displacement
@@ -148,7 +147,7 @@ def covariance_of(errors):
 
 
 def _real(task, model, command, wrench):
-    there = predict(model, command, task.tool, wrench, NOTHING, task.track.status, task.track.q)
+    there = predict(model, command, LoadCase(task.tool, wrench, NOTHING, task.track.status, task.track.q))
     assert there.settled.all()
     return there.pose.position
 
@@ -165,7 +164,7 @@ def largest_deviation(spread):
 def spread_of(task, command, known):
     """The covariance that linear propagation gives, and the error of the model itself."""
     rows = np.arange(len(task.wanted))
-    error, moves = doubt.error_sensitivities(task, known.entries, rows, command)
+    error, moves = error_sensitivities(task, known.entries, rows, command)
     return error, covariances(moves, known.covariance)
 
 
@@ -187,11 +186,11 @@ def test_deflection_and_residual_spread_as_drawn_robots(model, process, force):
     task = job(model, process=process)
     result = correct(task)
     assert result.corrected.all()
-    known = input_uncertainties(model, doubt.COVERAGE * force if force else None, True)
+    known = input_uncertainties(model, COVERAGE * force if force else None, True)
     names = [entry.name for entry in known.entries if entry.name != FORCE]
 
     before, after = drawn(task, result.command[:], names, deviations(known), force)
-    told = evaluate_uncertainty(task, result, doubt.COVERAGE * force if force else None)
+    told = evaluate_uncertainty(task, result, COVERAGE * force if force else None)
 
     error, spread = spread_of(task, task.wanted, known)
     unit = error / np.linalg.norm(error, axis=1, keepdims=True)
@@ -237,7 +236,7 @@ def test_correlated_parameters_spread_as_drawn_robots():
     seen = covariance_of(drawn(task, task.wanted, names, np.linalg.cholesky(matrix))[0])
     np.testing.assert_allclose(largest_deviation(seen), largest_deviation(spread), rtol=WITHIN)
     part = variance_shares(
-        doubt.error_sensitivities(task, known.entries, np.array([4]), task.wanted[[4]])[1][0],
+        error_sensitivities(task, known.entries, np.array([4]), task.wanted[[4]])[1][0],
         known.covariance,
     )
     assert part.sum() == pytest.approx(1.0, abs=1e-12)
@@ -390,7 +389,7 @@ def test_blame_is_the_variance_that_goes_with_the_interval():
         known = input_uncertainties(restated(task.model, **{short: 0.0}))
         rest = np.trace(
             covariances(
-                doubt.error_sensitivities(task, known.entries, rows, task.wanted[rows])[1], known.covariance
+                error_sensitivities(task, known.entries, rows, task.wanted[rows])[1], known.covariance
             )[0]
         )
         assert share == pytest.approx(1 - rest / whole, abs=1e-9)
@@ -442,7 +441,7 @@ def test_the_step_does_not_matter(monkeypatch, step):
         return found * [entry.deviation for entry in entries]
 
     usual = moves()
-    monkeypatch.setattr(doubt, "STEP", step)
+    monkeypatch.setattr(uncertain_inputs, "STEP", step)
     size = np.abs(usual).max(axis=(0, 1))
     assert (size > 0).all()
     assert (np.abs(moves() - usual).max(axis=(0, 1)) < 2e-3 * size + 1e-12).all()
@@ -475,7 +474,7 @@ def test_one_motion_as_in_the_batch():
     for row in range(7):
         rows = np.array([row])
         alone = covariances(
-            doubt.error_sensitivities(task, known.entries, rows, task.wanted[rows])[1], known.covariance
+            error_sensitivities(task, known.entries, rows, task.wanted[rows])[1], known.covariance
         )
         np.testing.assert_allclose(alone[0], together[row], rtol=1e-6, atol=1e-20)
 

@@ -15,19 +15,20 @@ from test_doubt import INTERVALS, TOOL, every, job, paper, restated
 from postproc.base.geometry import Poses
 from postproc.compensation import uncertainty as doubt
 from postproc.compensation.correct import correct
+from postproc.compensation.input_sensitivities import sensitivities
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import predict
+from postproc.compensation.uncertain_inputs import FORCE, UncertainInput, input_uncertainties
 from postproc.compensation.uncertainty import (
-    FORCE,
     ForceUncertainty,
-    UncertainInput,
     Uncertainty,
-    covariances,
     evaluate_uncertainty,
-    expanded_uncertainty,
-    input_uncertainties,
-    length_quantile,
     select_motions,
-    sensitivities,
+)
+from postproc.compensation.uncertainty_propagation import (
+    covariances,
+    expanded_uncertainty,
+    length_quantile,
     variance_shares,
 )
 from postproc.model import NOTHING
@@ -372,14 +373,16 @@ def test_a_doubt_is_made_of_differences_of_predictions(process, each):
 
     def placed(model, command, wrench):
         return predict(
-            model, command, task.tool, wrench, NOTHING, task.track.status, task.track.q
+            model, command, LoadCase(task.tool, wrench, NOTHING, task.track.status, task.track.q)
         ).pose.position
 
     def held(model, q, wrench):
         return model.equilibrium(q, wrench, task.tool).pose.position
 
     def motors(command, wrench):
-        return predict(task.model, command, task.tool, wrench, NOTHING, task.track.status, task.track.q).q
+        return predict(
+            task.model, command, LoadCase(task.tool, wrench, NOTHING, task.track.status, task.track.q)
+        ).q
 
     none = np.zeros_like(task.wrench)
     goal = placed(model, task.wanted, none) if process else task.wanted.position

@@ -18,7 +18,8 @@ from postproc.base.geometry import Poses, abc_from_rotation, lengths, rotation_f
 from postproc.base.units import DEG, MM
 from postproc.compensation.correct import correct
 from postproc.compensation.desired_path import DesiredPath
-from postproc.compensation.subdivision import Limits, subdivide
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits
 from postproc.robot.axis_track import follow_axes, nominal_flange
 from postproc.robot.half_turns import HALF, HalfTurns, TurnChoices, choose_senses
 from postproc.robot.inverse import inverse

@@ -32,11 +32,11 @@ from postproc.identification.validation import Bootstrap, held_out, validated
 from postproc.measurements import planned
 from postproc.model import StiffnessModel
 from postproc.report import identified_picture as identified_picture_module
+from postproc.report.formatting import SHOWN, fixed, shown_unit
 from postproc.report.identified import Identified, identified_csv
 from postproc.report.identified_picture import MAX_POINTS, identified_picture, rows_to_draw
 from postproc.report.identified_terminal import show_identified, verdict
 from postproc.report.residuals import PARTS, ResidualVariable, Sizes, lengths_of, poses_in_order
-from postproc.report.words import SHOWN, fixed, shown_unit
 from postproc.robot.description import find_robot, load_robot
 
 PLACES = {

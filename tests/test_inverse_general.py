@@ -9,6 +9,7 @@ from motions import motions
 
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, rotation_from_vector, vector_from_rotation
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import mirror, pose_error, predict
 from postproc.effects.effect import Conditions
 from postproc.model import StiffnessModel
@@ -599,10 +600,10 @@ def test_mirror_on_a_general_arm(tmp_path):
     track = follow_axes(robot, motions(wanted), wanted, START)
     tool = Poses.identity()
     wrench = np.tile([30.0, -20, 60, 0.5, 0.2, 0.1], (200, 1))
-    done = mirror(model, wanted, wanted, tool, wrench, Conditions(), track.status, track.q)
+    done = mirror(model, wanted, wanted, LoadCase(tool, wrench, Conditions(), track.status, track.q))
     assert done.converged.all()
     assert np.nanmin(done.history[0]) > 2e-4
-    real = predict(model, done.command, tool, wrench, Conditions(), track.status, track.q)
+    real = predict(model, done.command, LoadCase(tool, wrench, Conditions(), track.status, track.q))
     shift, turn = pose_error(real.pose, wanted)
     assert np.linalg.norm(shift, axis=1).max() < 1e-8
     assert np.linalg.norm(turn, axis=1).max() < 1e-8

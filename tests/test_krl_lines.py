@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from postproc.base.document import Document
-from postproc.languages.krl import KrlDialect, effects, lexing
-from postproc.languages.krl.effects import bas, effects_of, functions_of, read_by
+from postproc.languages.krl import KrlDialect, lexing
 from postproc.languages.krl.expressions import DEEPEST, component, evaluate, index_text
 from postproc.languages.krl.lexing import (
     LONGEST,
@@ -33,6 +32,7 @@ from postproc.languages.krl.lexing import (
 )
 from postproc.languages.krl.operands import take_apart
 from postproc.languages.krl.spatial import angles, arc, product, rotation
+from postproc.languages.krl.statement_effects import EVERYTHING, bas, effects_of, functions_of, read_by
 from postproc.languages.krl.target import KrlTarget, UnknownValue, fields, parse, shown
 from postproc.languages.krl.variables import Variables
 
@@ -628,8 +628,8 @@ SIX = {"base", "tool", "feed", "apo", "mode", "turning"}
         ("go(x,y[i])", {b"X", b"Y", b"I"}, "GO"), ("H50(x)", set(), "H50"), ("SR_x(y)", set(), "SR_X"),
         ("FOR i = 1 TO n", {b"I"}, ""), ("FOR 5", set(), ""), ("IF LIN THEN", set(), ""), ("5 LIN P", {"point"}, ""),
         ("5 LINE P", set(), ""), ("WAIT FOR LIN", set(), ""), ("5 $LIN", set(), ""), ("5 #PTP", set(), ""),
-        ("l\xe5 x", {"point"}, ""), ("l\xe5 x=1", effects.EVERYTHING, ""), ("l\xe5 (1)", effects.EVERYTHING, ""),
-        ("GOTO l\xe5", effects.EVERYTHING, ""), ("l\xe5:", effects.EVERYTHING, ""), ("Z\xe4=1", {b"Z_"}, ""),
+        ("l\xe5 x", {"point"}, ""), ("l\xe5 x=1", EVERYTHING, ""), ("l\xe5 (1)", EVERYTHING, ""),
+        ("GOTO l\xe5", EVERYTHING, ""), ("l\xe5:", EVERYTHING, ""), ("Z\xe4=1", {b"Z_"}, ""),
     ],
 )  # fmt: skip
 def test_what_a_statement_changes(line: str, changes: set[object], calls: str) -> None:

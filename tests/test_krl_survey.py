@@ -14,12 +14,11 @@ from postproc.base.units import MM
 from postproc.languages.dialect import Program
 from postproc.languages.krl import KrlDialect, block_follower, motions, program_flow
 from postproc.languages.krl.calls import MOST_CALLS
-from postproc.languages.krl.effects import MODAL, Effects
 from postproc.languages.krl.external_axes import carried_on, reached, stated
 from postproc.languages.krl.goto_analysis import MOST_PAIRS, resolve_jumps
 from postproc.languages.krl.lexing import LONGEST, Statement
 from postproc.languages.krl.modal_state import Source
-from postproc.languages.krl.motion_rows import FEW, NAN6, NO_ARC, MotionRow, MotionRows, Refusal
+from postproc.languages.krl.motion_rows import FEW, NAN6, NO_ARC, MotionRow, MotionRows, RowRefusal
 from postproc.languages.krl.program_structure import (
     DEEPEST,
     MOST_EFFECTS,
@@ -29,6 +28,7 @@ from postproc.languages.krl.program_structure import (
     program_structure,
 )
 from postproc.languages.krl.scan import FEWEST, MOST, scan
+from postproc.languages.krl.statement_effects import MODAL, Effects
 
 POINT = FULL.decode()
 LINE = f"LIN {POINT}\n"
@@ -323,11 +323,11 @@ def test_rows_are_taken_out_from_any_on() -> None:
     rows = MotionRows(Document(Path("a.src"), raw))
     state = motions.ModalState()
     rows.add(row(0), None)
-    assert rows.add_bulk(bulk, state, Refusal("KRL006", "why")) == 9
+    assert rows.add_bulk(bulk, state, RowRefusal("KRL006", "why")) == 9
     rows.add(row(10), None)
     rows.add(row(11), None)
     assert rows.add_bulk(bulk, state, None) == 20
-    assert rows.ranges == [(1, 10, Refusal("KRL006", "why"))]
+    assert rows.ranges == [(1, 10, RowRefusal("KRL006", "why"))]
     for stop, chunks in (12, 3), (11, 3), (10, 2):
         rows.truncate(stop)
         assert (len(rows), len(rows.chunks), len(rows.ranges)) == (stop, chunks, 1)

@@ -10,7 +10,8 @@ from ways_at_work import START, TOOL, corner, line
 
 from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.correct import correct
-from postproc.compensation.subdivision import Limits, subdivide
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits
 from postproc.robot.axis_track import follow_axes, is_near_singular
 from postproc.robot.description import find_robot, load_robot
 

@@ -12,6 +12,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.compensation.correct import MotionOutcome, correct
 from postproc.compensation.cuts import number_cuts, spread_over_cuts
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import MAX_ITERATIONS, interpolate_pose, mirror, pose_error, predict
 from postproc.compensation.problem import CompensationProblem
 from postproc.model import NOTHING, StiffnessModel
@@ -53,11 +54,14 @@ class Problem:
 
     def mirror(self):
         return mirror(
-            self.model, self.wanted, self.wanted, self.tool, self.wrench, NOTHING, self.status, self.near
+            self.model,
+            self.wanted,
+            self.wanted,
+            LoadCase(self.tool, self.wrench, NOTHING, self.status, self.near),
         )
 
     def predict(self, command):
-        return predict(self.model, command, self.tool, self.wrench, NOTHING, self.status, self.near)
+        return predict(self.model, command, LoadCase(self.tool, self.wrench, NOTHING, self.status, self.near))
 
 
 def stepped(command, shift, turn):
@@ -105,11 +109,9 @@ def test_one_motion_is_corrected_as_in_the_batch():
             problem.model,
             problem.wanted[rows],
             problem.wanted[rows],
-            problem.tool[rows],
-            problem.wrench[rows],
-            NOTHING,
-            problem.status[rows],
-            problem.near[rows],
+            LoadCase(
+                problem.tool[rows], problem.wrench[rows], NOTHING, problem.status[rows], problem.near[rows]
+            ),
         )
         assert np.abs(alone.command.position - done.command.position[rows]).max() < 1e-12
         assert alone.iterations[0] == done.iterations[row]
@@ -245,7 +247,7 @@ def test_unstable_spring_is_reported_as_no_rest():
         [1.0, 1.0, 0.0, 0.0], [100.0, 0, 300, 0, 0, 0]
     )  # a pencil on its tip does not rest either
     wanted = model.chain.flange(q) @ TOOL
-    done = mirror(model, wanted, wanted, TOOL, wrench, NOTHING, np.full(4, 2), q)
+    done = mirror(model, wanted, wanted, LoadCase(TOOL, wrench, NOTHING, np.full(4, 2), q))
     assert done.settled.tolist() == [False, True] * 2
     assert done.converged.tolist() == [False, True] * 2
     assert done.reachable.all()
@@ -254,7 +256,9 @@ def test_unstable_spring_is_reported_as_no_rest():
 def test_out_of_reach_is_reported():
     model = full()
     wanted = Poses(np.eye(3)[None], np.array([[5.0, 0.0, 1.0]]))
-    done = mirror(model, wanted, wanted, TOOL, np.ones((1, 6)), NOTHING, np.array([2]), np.zeros((1, 6)))
+    done = mirror(
+        model, wanted, wanted, LoadCase(TOOL, np.ones((1, 6)), NOTHING, np.array([2]), np.zeros((1, 6)))
+    )
     assert not done.reachable[0]
     assert not done.converged[0]
 
@@ -351,11 +355,7 @@ def test_cuts_are_corrected_and_air_is_not_touched():
     rest = predict(
         job.model,
         result.command[job_rows],
-        TOOL,
-        job.wrench[job_rows],
-        NOTHING,
-        job.track.status[job_rows],
-        job.track.q[job_rows],
+        LoadCase(TOOL, job.wrench[job_rows], NOTHING, job.track.status[job_rows], job.track.q[job_rows]),
     )
     assert np.linalg.norm(rest.pose.position - job.wanted.position[job_rows], axis=1).max() <= NANOMETRES_10
 
@@ -580,7 +580,9 @@ def test_process_keeps_the_sag_and_absolute_removes_it():
     still = np.zeros((9, 6))
 
     def real(job, command, wrench):
-        return predict(model, command, job.tool, wrench, NOTHING, job.track.status, job.track.q).pose
+        return predict(
+            model, command, LoadCase(job.tool, wrench, NOTHING, job.track.status, job.track.q)
+        ).pose
 
     sagged = real(process, process.wanted, still)
     sag = np.linalg.norm(sagged.position - process.wanted.position, axis=1)

@@ -10,6 +10,7 @@ from motions import milling_angles
 from plant import kr270, random_tools
 
 from postproc.base.geometry import Poses, rotation_from_vector
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import MAX_ITERATIONS, interpolate_pose, mirror
 from postproc.model import NOTHING
 from postproc.robot.inverse import status_of
@@ -52,7 +53,7 @@ class Off:
         wrench[:, 0] = np.arange(count)
         wanted = wanted or self.wanted
         return mirror(
-            self, wanted, goal or wanted, self.tool, wrench, NOTHING, self.status, self.near, **more
+            self, wanted, goal or wanted, LoadCase(self.tool, wrench, NOTHING, self.status, self.near), **more
         )
 
 

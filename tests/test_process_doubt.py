@@ -7,7 +7,8 @@ import pytest
 from test_doubt import job, paper, restated
 
 from postproc.compensation.correct import correct
-from postproc.compensation.uncertainty import FORCE, evaluate_uncertainty
+from postproc.compensation.uncertain_inputs import FORCE
+from postproc.compensation.uncertainty import evaluate_uncertainty
 from postproc.report.terminal import describe_budget
 
 

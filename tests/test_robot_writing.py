@@ -15,7 +15,7 @@ from tiers import examples
 
 from postproc.base.findings import Refusal
 from postproc.base.yaml_section import parsed
-from postproc.compensation.uncertainty import input_uncertainties
+from postproc.compensation.uncertain_inputs import input_uncertainties
 from postproc.effects import EFFECTS
 from postproc.model import StiffnessModel
 from postproc.robot import write_robot_file as writing

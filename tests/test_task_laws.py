@@ -11,6 +11,7 @@ from test_mirror import CARRIES, TOOL, full, joints_only, task
 
 from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.compensation.correct import correct
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import pose_error, predict
 from postproc.model import NOTHING
 from postproc.process import Wrenches
@@ -22,7 +23,9 @@ NONE, Z, ACROSS = np.full(3, np.nan), np.array([0.0, 0.0, 1.0]), np.array([0.6, 
 
 def predicted(job, rows, command, wrench):
     tool = Poses(np.tile(TOOL.rotation, (len(rows), 1, 1)), np.tile(TOOL.position, (len(rows), 1)))
-    return predict(job.model, command, tool, wrench, NOTHING, job.track.status[rows], job.track.q[rows])
+    return predict(
+        job.model, command, LoadCase(tool, wrench, NOTHING, job.track.status[rows], job.track.q[rows])
+    )
 
 
 def test_the_goal_is_the_wanted_pose_or_where_the_robot_takes_it_without_force():

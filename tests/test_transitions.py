@@ -12,11 +12,12 @@ from ways_at_work import FORCE, circle, corner, line, task
 
 from postproc.base.document import Document
 from postproc.base.geometry import Poses
-from postproc.compensation.comparison import across_feed, cuts_not_improved, evaluate_transitions
 from postproc.compensation.corners import compare_corners
 from postproc.compensation.correct import correct, with_residual
+from postproc.compensation.path_comparison import across_feed, cuts_not_improved, evaluate_transitions
 from postproc.compensation.ramped_forces import add_force_ramps
-from postproc.compensation.subdivision import Limits, subdivide
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits
 from postproc.languages.krl import KrlDialect
 from postproc.output.write import path_errors_as_written
 from postproc.toolpath import Kind

@@ -25,27 +25,29 @@ from test_doubt import (
 from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.base.units import DEG
 from postproc.cell import ForceVectorInterval
-from postproc.compensation import uncertainty as doubt
 from postproc.compensation.correct import correct
+from postproc.compensation.input_sensitivities import error_sensitivities, sensitivities
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import predict
 from postproc.compensation.touched_off import TouchedOff, rigid_motion
-from postproc.compensation.uncertainty import (
+from postproc.compensation.uncertain_inputs import (
     COMPONENTS,
     DIRECTION,
     FORCE,
     TURNS,
     UncertainInput,
-    Uncertainty,
+    input_uncertainties,
+)
+from postproc.compensation.uncertainty import Uncertainty, evaluate_uncertainty
+from postproc.compensation.uncertainty_propagation import (
     covariances,
-    evaluate_uncertainty,
     expanded_uncertainty,
     expanded_uncertainty_of_largest,
-    input_uncertainties,
-    sensitivities,
 )
 from postproc.model import NOTHING
 from postproc.report.program_verdict import verdict_sentence
 from postproc.report.report import Report, Spread
+from postproc.robot.description import COVERAGE
 
 DIRECTED = ForceVectorInterval(direction=10 * DEG)
 ADDED = ForceVectorInterval(components=np.array([20.0, 5.0, 40.0]))
@@ -62,7 +64,7 @@ def turned_base(task):
 
 def loaded(task, command, wrench):
     q = predict(
-        task.model, command, task.tool, wrench, NOTHING, task.track.status, task.track.q
+        task.model, command, LoadCase(task.tool, wrench, NOTHING, task.track.status, task.track.q)
     ).q  # the motors do not depend on the force
     return task.model.equilibrium(q, wrench, task.tool).pose.position
 
@@ -101,7 +103,7 @@ def test_components_are_forces_along_the_axes_of_the_programmed_base():
     known = input_uncertainties(task.model, None, True, ADDED)
     assert [e.name for e in known.entries if e.deviation] == list(COMPONENTS)
     assert FORCE not in [entry.name for entry in known.without_interval]
-    _, moves = doubt.error_sensitivities(task, known.entries, np.arange(10), result.command[:])
+    _, moves = error_sensitivities(task, known.entries, np.arange(10), result.command[:])
     for k in range(3):
         more = task.wrench.copy()
         more[:, :3] += task.base.rotation[:, :, k]
@@ -176,7 +178,7 @@ def test_the_bound_holds_for_95_of_100_robots(monkeypatch, model, process, force
     monkeypatch.setattr(test_doubt, "DRAWS", 500)
     task = job(model, 12, process=process, seed=6)
     result = correct(task)
-    ci95 = doubt.COVERAGE * force if force else None
+    ci95 = COVERAGE * force if force else None
     known = input_uncertainties(model, ci95, True)
     names = [entry.name for entry in known.entries if entry.name != FORCE]
     _, after = drawn(task, result.command[:], names, deviations(known), force)
@@ -247,12 +249,14 @@ def test_a_touched_off_base_moves_with_the_robot_that_touched_it(count):
     task = touched(task, middle + np.random.default_rng(count).uniform(-0.4, 0.4, (count, 3)))
     result = correct(task)
     known = input_uncertainties(model, 0.1, True)
-    error, moves = doubt.error_sensitivities(task, known.entries, np.arange(6), result.command[:])
+    error, moves = error_sensitivities(task, known.entries, np.arange(6), result.command[:])
     assert np.linalg.norm(error, axis=1).max() < 2e-8
 
     def seen(model, scale=1.0):
         q = predict(
-            task.model, result.command[:], task.tool, task.wrench, NOTHING, task.track.status, task.track.q
+            task.model,
+            result.command[:],
+            LoadCase(task.tool, task.wrench, NOTHING, task.track.status, task.track.q),
         ).q
         tool = model.equilibrium(q, scale * task.wrench, task.tool).pose.position
         points = task.touched_off
@@ -292,7 +296,7 @@ def test_air_in_a_base_that_was_not_touched_stays():
     task = replace(task, toolpath=other)
     rows = np.arange(4)
     still = predict(
-        model, task.wanted, task.tool, np.zeros((4, 6)), NOTHING, task.track.status, task.track.q
+        model, task.wanted, LoadCase(task.tool, np.zeros((4, 6)), NOTHING, task.track.status, task.track.q)
     ).pose
     goal = task.goal(rows, task.wanted)
     np.testing.assert_allclose(goal.position[1::2], still.position[1::2], atol=1e-9)

@@ -12,11 +12,12 @@ from ways_at_work import task as hand_made
 
 from postproc.base.units import MM
 from postproc.compensation.correct import correct
-from postproc.compensation.subdivision import Limits, subdivide
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits
 from postproc.output.write import plan_motions
 from postproc.toolpath import Kind, Toolpath
-from postproc.verification.comparison import Simulator
 from postproc.verification.pairing import Different, pair_motions
+from postproc.verification.simulator import Simulator
 from postproc.workflows.preparation import Request, prepare
 
 

@@ -9,10 +9,10 @@ from ways_at_work import circle, corner, line, task
 
 from postproc.base.units import MM
 from postproc.process import Wrenches
-from postproc.verification.comparison import Simulator
 from postproc.verification.differences import in_air, on_cuts
 from postproc.verification.pairing import Different, pair_motions
 from postproc.verification.run_path import RunPath
+from postproc.verification.simulator import Simulator
 
 STEEP = np.array([-2000.0, 900.0, 1500.0, 0.0, 0.0, 0.0])
 

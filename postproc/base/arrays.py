@@ -43,10 +43,16 @@ def _is_frozen(values: ArrayLike, dtype: Any) -> TypeGuard[NDArray[Any]]:
     return one_for_all or bool(values.flags.owndata and values.flags.c_contiguous)
 
 
+def is_shared(array: NDArray[Any]) -> bool:
+    """Whether one row in memory stands for all rows of ``array`` (N, ...), as ``shared`` and ``np.broadcast_to`` make
+    it."""
+    return not array.strides[0]
+
+
 def shared(array: NDArray[Any]) -> NDArray[Any]:
     """``array`` (N, ...), or where its rows are all the same one of them that stands for all, of the same shape;
     read-only."""
-    if len(array) < 2 or not array.strides[0]:
+    if len(array) < 2 or is_shared(array):
         return array
     for rows in (slice(0, 64), slice(None)):  # a look at the first tells most
         part = array[rows]

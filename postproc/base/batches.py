@@ -6,9 +6,7 @@ how many threads there are.
 
 from __future__ import annotations
 
-import ctypes
 import os
-import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -22,9 +20,6 @@ ROWS = 3 << 12
 
 THREADS = "POSTPROC_THREADS"
 """Environment variable: threads at most; all cores without it."""
-
-LARGE = 1 << 24
-"""Bytes of an array that is no block's."""
 
 MOST = 8
 """Threads at most: what is not numpy's runs in one of them at a time."""
@@ -82,26 +77,3 @@ def each_block(work: Callable[[slice], None], count: int, rows: int = 0) -> None
     """``work`` of every block of ``count`` rows, which puts what it finds in its place."""
     for _ in in_blocks(work, count, rows):
         pass
-
-
-def trim_allocator() -> None:
-    """Free memory goes back to the system: the C library (glibc) keeps what lies between blocks that are in use."""
-    _allocator("malloc_trim", 0)
-
-
-def use_mmap_for_large_arrays() -> None:
-    """From now on arrays of more than ``LARGE`` bytes lie apart, and go back to the system as soon as they are free;
-    those of blocks lie together, and what is free of them stays at hand: to fetch a page again takes as long as to
-    compute what it holds."""
-    m_trim_threshold, m_top_pad, m_mmap_threshold, m_arena_max = -1, -2, -3, -8
-    _allocator("mallopt", m_mmap_threshold, LARGE)
-    _allocator("mallopt", m_trim_threshold, 4 * LARGE)
-    _allocator("mallopt", m_top_pad, LARGE // 2)
-    _allocator("mallopt", m_arena_max, 1)
-
-
-def _allocator(name: str, *arguments: int) -> None:
-    """Calls a function of glibc's allocator; nothing where there is none."""
-    function = getattr(ctypes.CDLL(None), name, None) if sys.platform == "linux" else None
-    if function is not None:
-        function(*arguments)

@@ -204,7 +204,7 @@ def _whole(last: bool) -> Fours:
 
 def fours(text: bytes) -> np.uint32:
     """Up to four letters as one of ``Fours``."""
-    return np.frombuffer(text.ljust(4, b"\0"), np.uint32)[0]
+    return np.uint32(np.frombuffer(text.ljust(4, b"\0"), np.uint32)[0])
 
 
 def text_of(columns: Sequence[Fours]) -> bytes:

@@ -20,6 +20,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from postproc.base.array_storage import ArrayStore
 from postproc.base.arrays import Ints, sums
 
 Offsets = NDArray[np.signedinteger]
@@ -86,30 +87,6 @@ class Document:
         start = self.line_starts[number - 1]
         stop = self.line_starts[number] if number < len(self.line_starts) else len(self.raw)
         return self.raw[start:stop].rstrip(b"\r\n")
-
-
-class Store:
-    """Keeps arrays in blocks so large that the system takes them back when nothing in them is used any more."""
-
-    SIZE = 33 << 20
-    """Bytes; the C library gives allocations above 32 MB back at once, and what is not used takes no memory."""
-
-    def __init__(self) -> None:
-        self._block, self._used = np.empty(0, np.uint8), 0
-
-    def keep(self, array: NDArray[Any], dtype: type[np.generic] | None = None) -> NDArray[Any]:
-        """A copy of ``array`` (...) of the same shape, with values of another type if one is given; an array that is
-        large is kept as it is."""
-        kind = np.dtype(dtype or array.dtype)
-        size = array.size * kind.itemsize
-        if size > self.SIZE // 8 and kind == array.dtype:
-            return array
-        if self._used + size > len(self._block):
-            self._block, self._used = np.empty(max(self.SIZE, size), np.uint8), 0
-        kept = self._block[self._used : self._used + size].view(kind).reshape(array.shape)
-        kept[...] = array
-        self._used += -(-size // 8) * 8
-        return kept
 
 
 class Edits(Sequence[Edit]):
@@ -216,7 +193,7 @@ class Edits(Sequence[Edit]):
 def _in_columns(parts: Iterable[Iterable[Edit]]) -> list[list[NDArray[Any]]]:
     """Documents, starts, ends, lengths of texts, and texts of the parts; in order of place where one part as a whole
     is before the other."""
-    store = Store(), Store(), Store(), Store(), Store()
+    store = ArrayStore(), ArrayStore(), ArrayStore(), ArrayStore(), ArrayStore()
     kinds = np.int8, np.int32, np.int32, np.int32, np.uint8
     columns: list[list[NDArray[Any]]] = [[np.empty(0, kind)] for kind in kinds]
     spans = [(Span(-1, 0, 0), Span(-1, 0, 0))]

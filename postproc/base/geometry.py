@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from postproc.base.arrays import Floats, Ints, numbers
+from postproc.base.arrays import Floats, Ints, is_shared, numbers
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Poses:
 
     def shared(self, rows: Any) -> Poses:
         """``self[rows]``; one pose where all N are held as one that is broadcast."""
-        same = len(self.position) and not self.position.strides[0] and not self.rotation.strides[0]
+        same = len(self.position) and is_shared(self.position) and is_shared(self.rotation)
         return self[0] if same else self[rows]
 
     def copy(self) -> Poses:
@@ -152,14 +152,14 @@ def _rows(components: Floats) -> Floats:
 
 def lengths(vectors: Floats) -> Floats:
     """(N,) lengths of vectors (N, 3)."""
-    return np.sqrt(np.einsum("ni,ni->n", vectors, vectors))
+    return np.asarray(np.sqrt(np.einsum("ni,ni->n", vectors, vectors)))
 
 
 def turned(rotation: Floats, vector: Floats) -> Floats:
     """Vectors (..., 3) turned by rotations (..., 3, 3); leading shapes broadcast."""
     if rotation.ndim == 2:
         return np.asarray(vector @ rotation.T)
-    return np.einsum("...ij,...j->...i", rotation, vector)
+    return np.asarray(np.einsum("...ij,...j->...i", rotation, vector))
 
 
 def rotation_from_abc(abc: ArrayLike) -> Floats:

@@ -61,7 +61,7 @@ def _inner(tool: Floats, angle: Floats, outer: int, inner: int) -> Floats:
     turn = np.full((len(tool), 3), np.nan)
     turn[:, outer] = angle
     inside = np.einsum("nji,nj->ni", rotation_of(turn), tool)
-    return np.arctan2(inside @ np.cross(np.eye(3)[inner], [0.0, 0.0, 1.0]), inside[:, 2])
+    return np.asarray(np.arctan2(inside @ np.cross(np.eye(3)[inner], [0.0, 0.0, 1.0]), inside[:, 2]))
 
 
 def pointing(tool: Floats, near: Floats) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import unicodedata
 
 
-class _Shown(dict[int, int | str]):
+class _ShownCharacters(dict[int, int | str]):
     """Character -> what is shown of it; filled as characters come."""
 
     def __missing__(self, code: int) -> int | str:
@@ -13,7 +13,7 @@ class _Shown(dict[int, int | str]):
         return self[code]
 
 
-_SHOWN = _Shown()
+_SHOWN = _ShownCharacters()
 
 
 def sanitize(text: str) -> str:

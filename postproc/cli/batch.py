@@ -195,7 +195,7 @@ def _watched(out: Out) -> Iterator[Watch | None]:
     )
     progress = Progress(*columns, console=out.console(error=True), transient=True)
 
-    class Shown(Watch):
+    class ProgressBar(Watch):
         """A bar with the names of what is in work."""
 
         def __init__(self) -> None:
@@ -224,4 +224,4 @@ def _watched(out: Out) -> Iterator[Watch | None]:
             )
 
     with progress:
-        yield Shown()
+        yield ProgressBar()

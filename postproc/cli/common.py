@@ -15,6 +15,7 @@ from typing import Any, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
+from click.types import StringParamType
 
 from postproc.base.findings import Finding, Refusal
 from postproc.workflows.option_names import SHARED_POINTS, former_names_of, present_value
@@ -29,7 +30,7 @@ FAR = 100_000.0
 Numbers = tuple[float, ...]
 
 
-class _RobotName(click.ParamType):
+class _RobotName(StringParamType):
     """The name of a robot, or a robot file; a shell completes both."""
 
     name = "robot"

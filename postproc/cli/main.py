@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import click
 
 from postproc import __version__
-from postproc.base.batches import use_mmap_for_large_arrays
 from postproc.base.findings import nearest
+from postproc.base.memory import use_mmap_for_large_arrays
 from postproc.cli.batch import batch
 from postproc.cli.check import check
 from postproc.cli.completion import Commands, completion

@@ -184,7 +184,7 @@ def _differences(
     carried = task.goal(before.rows, there, before.last).position - there.position
     tool = real.pose.position - np.repeat(carried, many, axis=0)
     tool = np.where((real.reachable & real.settled)[:, None], tool, np.inf)
-    return _distance(tool.reshape(len(vertex), many, 3), drawn).max(axis=1)
+    return np.asarray(_distance(tool.reshape(len(vertex), many, 3), drawn).max(axis=1))
 
 
 def _original(task: CompensationProblem, row: Ints, distance: Floats) -> Floats:
@@ -216,4 +216,4 @@ def _distance(points: Floats, drawn: Floats) -> Floats:
     away = points[:, :, None] - start
     share = np.clip(np.sum(away * step, axis=-1) / square, 0.0, 1.0)
     away = away - share[..., None] * step
-    return np.sqrt(np.sum(away**2, axis=-1)).min(axis=2)
+    return np.asarray(np.sqrt(np.sum(away**2, axis=-1)).min(axis=2))

@@ -66,7 +66,7 @@ class CorrectionResult:
     @property
     def corrected(self) -> Bools:
         """(N,) the motion is corrected."""
-        return self.state == MotionOutcome.CORRECTED
+        return np.asarray(self.state == MotionOutcome.CORRECTED)
 
 
 def correct(task: CompensationProblem) -> CorrectionResult:

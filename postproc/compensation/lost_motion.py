@@ -253,7 +253,9 @@ class _Samples:
 
         def changes(sides: GapSides, least: float) -> Bools:
             side = sides.shares[:, lossy]
-            return np.abs(np.diff(side, axis=0, prepend=side[:1])).max(axis=1, initial=0.0) > least
+            return np.asarray(
+                np.abs(np.diff(side, axis=0, prepend=side[:1])).max(axis=1, initial=0.0) > least
+            )
 
         turns = changes(self.within, CHANGE)
         turns[:-1] |= turns[1:].copy()  # the place itself may lie before that

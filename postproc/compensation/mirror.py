@@ -15,7 +15,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses, lengths, product, rotation_from_vector, turn_between
-from postproc.effects import Conditions
+from postproc.compensation.load_case import LoadCase
 from postproc.model import StiffnessModel
 from postproc.robot.inverse import Inverse, inverse
 
@@ -47,16 +47,12 @@ class Prediction:
 def predict(
     model: StiffnessModel,
     command: Poses,
-    tool: Poses,
-    wrench: Floats,
-    conditions: Conditions,
-    status: Ints,
-    q_reference: Floats,
+    case: LoadCase,
     start: Floats | None = None,
     q: Floats | None = None,
 ) -> Prediction:
-    """The tool's pose when the controller is sent to ``command`` (N TCP poses in the robot base) under ``wrench``
-    (N, 6), in the branch ``status`` (N,), with turns nearest to ``near`` (N, 6) [rad].
+    """The tool's pose when the controller is sent to ``command`` (N TCP poses in the robot base) in the load case
+    ``case`` (N).
 
     ``start`` (N, m): the displacement of a state nearby, to start the equilibrium with; ``q`` (N, 6): motor angles at
     ``command``, where they are known.
@@ -64,8 +60,8 @@ def predict(
     if q is not None:
         found = Inverse(q, np.asarray(np.isfinite(q).all(axis=1)))
     else:
-        found = inverse(model.robot.nominal, command @ tool.inverse(), status, q_reference)
-    rest = model.equilibrium(found.q, wrench, tool, conditions, start, REST)
+        found = inverse(model.robot.nominal, command @ case.tool.inverse(), case.status, case.q_reference)
+    rest = model.equilibrium(found.q, case.wrench, case.tool, case.conditions, start, REST)
     return Prediction(rest.pose, found.q, rest.displacement, found.reachable, rest.converged)
 
 
@@ -93,16 +89,12 @@ def mirror(
     model: StiffnessModel,
     wanted: Poses,
     goal: Poses,
-    tool: Poses,
-    wrench: Floats,
-    conditions: Conditions,
-    status: Ints,
-    q_reference: Floats,
+    case: LoadCase,
     orientation_projection: Floats | None = None,
     guess: tuple[Poses, Floats] | None = None,
 ) -> Correction:
-    """Correct N commands that start at ``wanted`` so that the predicted tool comes to ``goal``, under ``wrench`` (N, 6)
-    [N, N m] in the branch ``status`` (N,) near ``q_reference`` (N, n) [rad, m].
+    """Correct N commands that start at ``wanted`` so that the predicted tool comes to ``goal`` in the load case
+    ``case`` (N).
 
     ``orientation_projection`` (N, 3, 3): projection onto the rotation vectors that can be corrected (all of them
     without it); nothing else of the orientation is corrected, nor judged.  ``guess``: commands to start with instead of
@@ -114,7 +106,7 @@ def mirror(
     n = len(wanted)
     first, bent = (wanted, None) if guess is None else guess
     rotation, position = first.rotation.copy(), first.position.copy()
-    q, iterations = q_reference.copy(), np.zeros(n, np.int64)
+    q, iterations = case.q_reference.copy(), np.zeros(n, np.int64)
     reachable, settled, converged = np.ones(n, bool), np.ones(n, bool), np.zeros(n, bool)
     history: list[Floats] = []
     last = np.full(n, np.inf)
@@ -122,16 +114,7 @@ def mirror(
     active = np.arange(n)
     for iteration in range(MAX_ITERATIONS + 1):
         some: Any = active if len(active) < n else slice(None)  # mostly all of them: nothing is copied
-        here = predict(
-            model,
-            Poses(rotation[some], position[some]),
-            tool if tool.position.ndim == 1 else tool[some],
-            wrench[some],
-            conditions.part(some),
-            status[some],
-            q_reference[some],
-            bent,
-        )
+        here = predict(model, Poses(rotation[some], position[some]), case.part(some), bent)
         shift, turn = pose_error(here.pose, goal[some])
         if orientation_projection is not None:
             turn = (orientation_projection[some] @ turn[..., None])[..., 0]
@@ -178,24 +161,19 @@ def initial_guess(
     model: StiffnessModel,
     wanted: Poses,
     goal: Poses,
-    tool: Poses,
-    wrench: Floats,
-    conditions: Conditions,
-    status: Ints,
-    near: Floats,
+    case: LoadCase,
     farthest: float,
     q: Floats | None = None,
 ) -> tuple[Poses, Floats]:
     """What ``mirror`` can start with: commands whose loaded joints are where the goal is, and how far they are
-    deflected there (N, m) [rad, m] under ``wrench`` (N, 6) [N, N m], in the branch ``status`` (N,) near ``near`` (N, n)
-    [rad, m]; the wanted pose where that is out of reach, or more than ``farthest`` [m] away.  ``q`` (N, n) [rad, m]:
-    motors at the goal, where they are known."""
+    deflected there (N, m) [rad, m], in the load case ``case`` (N); the wanted pose where that is out of reach, or more
+    than ``farthest`` [m] away.  ``q`` (N, n) [rad, m]: motors at the goal, where they are known."""
     if q is None:
-        q = inverse(model.robot.nominal, goal @ tool.inverse(), status, near).q
+        q = inverse(model.robot.nominal, goal @ case.tool.inverse(), case.status, case.q_reference).q
     known = np.asarray(np.isfinite(q).all(axis=1))
-    joints = q if known.all() else np.where(known[:, None], q, near)
-    motors, bent = model.inverse_equilibrium(joints, wrench, tool, conditions)
-    start = model.robot.nominal_chain.flange(motors) @ tool
+    joints = q if known.all() else np.where(known[:, None], q, case.q_reference)
+    motors, bent = model.inverse_equilibrium(joints, case.wrench, case.tool, case.conditions)
+    start = model.robot.nominal_chain.flange(motors) @ case.tool
     good = known & (lengths(start.position - wanted.position) <= farthest) & np.isfinite(bent).all(axis=1)
     if good.all():
         return start, bent

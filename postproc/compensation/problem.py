@@ -12,6 +12,7 @@ from postproc.base.geometry import Placed, Poses, product, rotation_from_vector,
 from postproc.compensation import orientations
 from postproc.compensation.desired_path import DesiredPath
 from postproc.compensation.gap_sides import GapSides, LostMotion, Reversals
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import Correction, Prediction, initial_guess, mirror, pose_error, predict
 from postproc.compensation.touched_off import TouchedOff
 from postproc.effects import Conditions
@@ -86,6 +87,12 @@ class CompensationProblem:
         q = self.track.q[rows]
         return q if self.external is None else self.external.joint_values(q, rows, share)
 
+    def _load_case(self, rows: Ints, wrench: Floats, given: Conditions, share: Floats | None) -> LoadCase:
+        """Motions ``rows`` (K,) at the shares (K,) of their paths; ``wrench`` (K, 6) in the robot's own axes."""
+        return LoadCase(
+            self.tool.shared(rows), wrench, given, self.track.status[rows], self.q_reference(rows, share)
+        )
+
     @cached_property
     def _sides(self) -> GapSides | None:
         """On which side of its gap each axis lies as the program runs corrected."""
@@ -149,11 +156,7 @@ class CompensationProblem:
         found = predict(
             self.model,
             command if placed is None else placed @ command,
-            self.tool.shared(rows),
-            rotate_wrench(placed, wrench),
-            given,
-            self.track.status[rows],
-            self.q_reference(rows, share),
+            self._load_case(rows, rotate_wrench(placed, wrench), given, share),
             start,
             q,
         )
@@ -204,11 +207,7 @@ class CompensationProblem:
             self.model,
             wanted,
             goal,
-            self.tool.shared(rows),
-            wrench,
-            self._to_be(rows, share),
-            self.track.status[rows],
-            self.q_reference(rows, share),
+            self._load_case(rows, wrench, self._to_be(rows, share), share),
             turns,
             start if turns is None else None,
         )
@@ -226,20 +225,17 @@ class CompensationProblem:
         place = np.ones(len(at)) if share is None else share[pairs]
         here, placed = done.command.rotation[pairs], self.robot_from_path(at, place)
         if placed is None:
-            said = self.reported_findings(at, place, here)
+            said = self.expressible_orientations(at, place, here)
         else:
             said = product(
-                placed.rotation, self.reported_findings(at, place, product(placed.inverse().rotation, here))
+                placed.rotation,
+                self.expressible_orientations(at, place, product(placed.inverse().rotation, here)),
             )
         again = mirror(
             self.model,
             Poses(said, done.command.position[pairs]),
             goal[pairs],
-            self.tool.shared(at),
-            wrench[pairs],
-            self._to_be(at, place),
-            self.track.status[at],
-            self.q_reference(at, place),
+            self._load_case(at, wrench[pairs], self._to_be(at, place), place),
             np.zeros((len(at), 3, 3)),
         )
         command, parts = done.command.copy(), {}
@@ -252,7 +248,7 @@ class CompensationProblem:
         iterations[pairs] += again.iterations
         return replace(done, command=command, iterations=iterations, **parts)
 
-    def reported_findings(self, rows: Ints, share: Floats, rotation: Floats) -> Floats:
+    def expressible_orientations(self, rows: Ints, share: Floats, rotation: Floats) -> Floats:
         """(K, 3, 3) orientations nearest to ``rotation`` (K, 3, 3) that the words of motions ``rows`` (K,) say at the
         shares (K,) of their paths, without a swing of an axis that hardly turns the tool."""
         pairs = orientations.pairs(self.toolpath, rows)
@@ -272,7 +268,9 @@ class CompensationProblem:
             return turn
         found, at = turn.copy(), rows[pairs]
         here, tool = command.rotation[pairs], self.toolpath.redundant_axis[at]
-        better = self.reported_findings(at, share[pairs], product(rotation_from_vector(-turn[pairs]), here))
+        better = self.expressible_orientations(
+            at, share[pairs], product(rotation_from_vector(-turn[pairs]), here)
+        )
         found[pairs] = np.cross(turned(better, tool), turned(here, tool))
         return found
 
@@ -295,11 +293,7 @@ class CompensationProblem:
             self.model,
             wanted,
             goal,
-            self.tool.shared(rows),
-            rotate_wrench(placed, wrench),
-            self._to_be(rows, share),
-            self.track.status[rows],
-            self.q_reference(rows, share),
+            self._load_case(rows, rotate_wrench(placed, wrench), self._to_be(rows, share), share),
             self.max_correction,
             q,
         )

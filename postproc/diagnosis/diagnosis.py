@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.findings import Finding, Refusal
+from postproc.diagnosis.candidate_fits import with_effects
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
-from postproc.diagnosis.search import Search, model_unknowns, search, with_effects
+from postproc.diagnosis.search import model_unknowns, search
+from postproc.diagnosis.search_result import Search
 from postproc.diagnosis.verdict import BEYOND_TELLING, OTHER_COURSE, Verdict, judge, refitted
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit

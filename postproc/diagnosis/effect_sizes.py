@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.diagnosis.candidates import Candidate
-from postproc.diagnosis.search import Search
+from postproc.diagnosis.search_result import Search
 from postproc.diagnosis.selection import CHANCE, EXCEEDED, WORTH, explained, scatter
 from postproc.diagnosis.verdict import Named
 from postproc.identification.least_squares import at

@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.diagnosis.alternatives import find_alternatives
+from postproc.diagnosis.candidate_fits import composed, in_scales, point_without, term_of, with_effects
 from postproc.diagnosis.candidates import Candidate, candidates, is_visible
-from postproc.diagnosis.decoys import AlternativeForm, decoys
 from postproc.diagnosis.nonlinear_effects import Outside, evaluate_at_size, whole
+from postproc.diagnosis.search_result import Key, Linear, Search
 from postproc.diagnosis.selection import (
-    Explained,
-    Problem,
     basis_of,
-    beside,
-    complexity_penalty,
     counts,
     explained,
     outside,
     problem,
-    residual_of,
-    scatter,
     selected,
 )
 from postproc.identification.campaign import Campaign
-from postproc.identification.fit import Fit, fit
-from postproc.identification.least_squares import Point, at, prior_rows, scales
+from postproc.identification.fit import Fit
+from postproc.identification.least_squares import prior_rows, scales
 from postproc.identification.noise import Weighting
-from postproc.identification.unknowns import Unknown, unknowns_of, with_mechanism
+from postproc.identification.unknowns import Unknown, unknowns_of
 from postproc.model import StiffnessModel
 
 PASSES = 4
@@ -41,10 +37,6 @@ LOOSE, BESIDE = 0.5, 0.05
 IMITATED = 1e-3
 """Share of a column that must lie outside of what the robot file's own parameters do."""
 
-CLOSE, CLOSE_SHARE, RIVALS = 30.0, 0.05, 3
-"""Alternatives are fitted where -2 ln(likelihood) is linearly worse by less than this, or than this share of the gain;
-so many at most."""
-
 FORM = 0.01
 """Share of what another effect explains that one must explain itself: no form in the library is exact, and what a large
 effect does beside its form looks like small ones."""
@@ -52,67 +44,6 @@ effect does beside its form looks like small ones."""
 SHARED = 1.0
 """Stated standard deviations that readings of a pose may share: of a robot that does not quite come back, of one
 unloaded reading.  What they share beyond that is no scatter."""
-
-WILD = 5.0
-"""Standard deviations that a reading counts with at most."""
-
-Key = tuple[str, str]
-"""Label of an effect's form, and its joint."""
-
-
-@dataclass(frozen=True, eq=False)
-class Linear:
-    """A search's last step.  candidates: what was looked at, group by group of ``problem``; whitened and as they are:
-    residual (n,) without what was chosen, common (n, k) columns that are explained anyway, columns (n, p) of each
-    candidate; the last ``priors`` rows are no readings; ``weights`` that it was whitened with."""
-
-    candidates: tuple[Candidate, ...]
-    problem: Problem
-    residual: Floats
-    common: Floats
-    columns: tuple[Floats, ...]
-    priors: int
-    weights: Weighting
-
-
-@dataclass(frozen=True, eq=False)
-class Alternative:
-    """A ``candidate`` in the place of the choice ``of``: by how much -2 ln(likelihood) is ``worse``, and what it pays
-    ``more`` for its parameters (negative: less); ``fitted``, or only linearly so."""
-
-    of: Key
-    candidate: Candidate
-    worse: float
-    more: float
-    fitted: bool
-
-    @property
-    def margin(self) -> float:
-        """By how much it is the lesser explanation; negative: the better one."""
-        return self.worse + self.more
-
-    @property
-    def foil(self) -> bool:
-        """Whether it is never named itself."""
-        return isinstance(self.candidate.effect, AlternativeForm)
-
-
-@dataclass(frozen=True, eq=False)
-class Search:
-    """What a search came to.
-
-    base: the model as it is, its own parameters refitted; final: with what was ``chosen``; untestable: candidates
-    that these readings cannot show; linear, explained: the last choice; rivals: those of
-    what was chosen, nearest first.
-    """
-
-    base: Fit
-    final: Fit
-    chosen: tuple[Candidate, ...]
-    untestable: tuple[Candidate, ...]
-    linear: Linear
-    explained: Explained
-    rivals: tuple[Alternative, ...]
 
 
 def model_unknowns(model: StiffnessModel) -> tuple[Unknown, ...]:
@@ -157,7 +88,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
         keys = frozenset(c.key for c in now)
         if keys == before or keys in tried or len(tried) >= PASSES:
             last = explained(linear.problem, start)
-            against = _alternatives(campaign, base, fitted, linear, last)
+            against = find_alternatives(campaign, base, fitted, linear, last)
             better = next((r for r in against if r.fitted and not r.foil and r.margin < -1.0), None)
             done = Search(base, fitted, chosen, hidden, linear, last, against)
             if better is None or len(tried) >= PASSES:
@@ -242,7 +173,7 @@ def _linear(
     away = np.array([u.value for u in base.unknowns]) - _values(fitted.model, base.unknowns)
 
     def tall(columns: Floats, below: Floats) -> Floats:
-        return np.nan_to_num(np.concatenate([weights(columns), below]))
+        return np.asarray(np.nan_to_num(np.concatenate([weights(columns), below])))
 
     def readings(columns: Floats) -> Floats:
         return tall(columns, np.zeros((len(prior), columns.shape[2])))
@@ -274,157 +205,8 @@ def _as_grown(campaign: Campaign, fitted: Fit, candidate: Candidate, beyond: Out
     return replace(candidate, columns=large.columns, start=tuple(large.values.tolist()))
 
 
-def in_scales(fitted: Fit, unknowns: Sequence[Unknown]) -> Floats:
-    """(P,) what was found of unknowns, from their nulls, in their scales."""
-    nulls = np.array([u.parameter.null for u in unknowns])
-    return (fitted.point.values(unknowns) - nulls) / scales(unknowns)
-
-
 def _values(model: StiffnessModel, unknowns: Sequence[Unknown]) -> Floats:
     return np.array([model.terms[u.term].values[u.parameter.name] for u in unknowns])
-
-
-def squares_of(fitted: Fit, weights: Weighting, variance: float) -> float:
-    """Squares that a fit leaves, of readings [their variance by ``weights``, wild ones cut] and of priors; ``variance``
-    of the readings as they are seen to scatter."""
-    level = np.sqrt(variance)
-    left = np.minimum(np.abs(weights(fitted.point.residual)), WILD * level)
-    values = fitted.point.values(fitted.unknowns)
-    priors = sum(
-        (level * (u.value - value) / u.prior) ** 2
-        for u, value in zip(fitted.unknowns, values.tolist(), strict=True)
-        if u.prior is not None
-    )
-    return float(left @ left) + float(priors)
-
-
-def _alternatives(
-    campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Explained
-) -> tuple[Alternative, ...]:
-    """Other candidates in the place of each choice that explain at least half of what it does, nearest first; the
-    nearest are fitted: what is linear is only nearly so."""
-    given, chosen = linear.problem, [linear.candidates[g] for g in last.groups]
-    variance = scatter(given, last)
-    here = squares_of(fitted, fitted.weights, variance)
-    found: list[Alternative] = []
-    for group in last.groups:
-        mine = linear.candidates[group]
-        rest = explained(given, tuple(g for g in last.groups if g != group))
-        gain, left = rest.squares - last.squares, residual_of(given, rest)
-
-        def paid(columns: Floats, rest: Explained = rest, left: Floats = left) -> float:
-            return complexity_penalty(beside(given, rest, columns), left, variance)
-
-        def scaled(g: int) -> Floats:
-            return given.matrix[:, given.places[g]] * given.size[given.places[g]]
-
-        own, of_mine = paid(scaled(group)), []
-        against = [
-            *enumerate(linear.candidates),
-            *((-1, decoy) for decoy in decoys(base.model, campaign.readings.q, mine)),
-        ]
-        for other, candidate in against:
-            if other in last.groups or candidate.contains(mine) or mine.contains(candidate):
-                continue
-            if candidate.nonlinear:
-                instead, squares, columns = _instead(campaign, fitted, linear, rest, mine, candidate)
-            else:
-                instead, squares = candidate, explained(given, (*rest.groups, other)).squares
-                columns = scaled(other)
-            if rest.squares - squares > 0.5 * gain:
-                worse = float(squares - last.squares) / variance
-                of_mine.append(Alternative(mine.key, instead, worse, paid(columns) - own, False))
-        of_mine.sort(key=lambda rival: rival.margin)
-        for k, rival in enumerate(of_mine[:RIVALS]):
-            if rival.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
-                there = with_effects(campaign, base, [rival.candidate if c is mine else c for c in chosen])
-                worse = float(squares_of(there, fitted.weights, variance) - here) / variance
-                of_mine[k] = replace(rival, worse=worse, fitted=True)
-        found += of_mine
-    return tuple(sorted(found, key=lambda rival: rival.margin))
-
-
-def _instead(
-    campaign: Campaign, fitted: Fit, linear: Linear, rest: Explained, mine: Candidate, other: Candidate
-) -> tuple[Candidate, float, Floats]:
-    """``other``, that is not linear in its size, as large as explains the most in the place of ``mine`` beside
-    ``rest``; the squares that are left then, and its columns outside of what is explained anyway."""
-    without = _without(campaign, fitted, [mine])
-    model, unknowns = composed(without.model, [other])
-    basis = basis_of(linear.common)
-    beyond = basis_of(np.concatenate([linear.common, *(linear.columns[g] for g in rest.groups)], axis=1))
-
-    def readings(columns: Floats) -> Floats:
-        below = np.zeros((linear.priors, columns.shape[2]))
-        return np.nan_to_num(np.concatenate([linear.weights(columns), below]))
-
-    large = evaluate_at_size(
-        campaign, without, model, unknowns, lambda columns: outside(beyond, readings(columns))
-    )
-    gain = float(large.target @ large.target - large.left @ large.left)
-    alternative = replace(other, columns=large.columns, start=tuple(large.values.tolist()))
-    return alternative, rest.squares - gain, outside(basis, readings(large.columns))
-
-
-def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> Fit:
-    """The non-linear fit with the effects ``chosen`` added to ``base``, its own unknowns fitted along."""
-    model, unknowns = composed(base.model, chosen)
-    start: dict[tuple[int, str], float] = {}
-    for candidate in chosen:
-        start |= _begun(campaign, base, model, candidate)
-    own = [u for u in base.asked if u.key in {b.key for b in base.unknowns}]
-    # what turns out not to be seen stays where it is begun with: without a length a spring is none
-    looked = [replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in unknowns]
-    return fit(campaign, model.with_values(start), [*own, *looked], given=base.point.given)
-
-
-def _begun(
-    campaign: Campaign, base: Fit, model: StiffnessModel, candidate: Candidate
-) -> dict[tuple[int, str], float]:
-    """Values to start a fit of ``candidate`` in ``model`` with; those that no reading sees stay at their null."""
-    term = _term_of(model, candidate)
-    if term is None or not candidate.start:
-        return {}
-    nulls = {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
-    start = dict(zip(nulls, candidate.start, strict=True))
-    there = at(campaign, model.with_values(start), base.point.given)
-    if not there.predicted.converged.all():
-        return {}
-    for key, null in nulls.items():
-        without = at(
-            campaign, model.with_values({**start, key: null}), base.point.given, there.predicted.displacement
-        )
-        moved = np.linalg.norm(base.weights(np.nan_to_num(without.residual - there.residual)))
-        if without.predicted.converged.all() and moved < 1.0:
-            start[key] = null
-    return start
-
-
-def composed(
-    model: StiffnessModel, chosen: Sequence[Candidate]
-) -> tuple[StiffnessModel, tuple[Unknown, ...]]:
-    """``model`` with the effects of ``chosen``, and their unknowns in it."""
-    unknowns: list[Unknown] = []
-    for candidate in chosen:
-        term = _term_of(model, candidate)
-        if term is None:
-            if any(mechanism.kind == candidate.name for mechanism in model.robot.mechanisms):
-                model = with_mechanism(model, type(candidate.effect))
-            else:
-                model = model.with_effect(candidate.effect)
-            term = len(model.terms) - 1
-        names = {u.parameter.name for u in candidate.unknowns}
-        known = {u.key for u in unknowns}
-        unknowns += [u for u in unknowns_of(model, term) if u.parameter.name in names and u.key not in known]
-    return model, tuple(unknowns)
-
-
-def _term_of(model: StiffnessModel, candidate: Candidate) -> int | None:
-    wanted = (candidate.name, candidate.effect.described())
-    for index, term in enumerate(model.terms):
-        if (term.effect.name, term.effect.described()) == wanted:
-            return index
-    return None
 
 
 def _as_fitted(
@@ -435,29 +217,17 @@ def _as_fitted(
     values = in_scales(fitted, fitted.unknowns)
     there: dict[Key, Candidate] = {}
     for candidate in chosen:
-        term = _term_of(fitted.model, candidate)
+        term = term_of(fitted.model, candidate)
         names = {u.parameter.name for u in candidate.unknowns}
         at = [i for i, u in enumerate(fitted.unknowns) if u.term == term and u.parameter.name in names]
         if not at:
             continue
         columns = np.nan_to_num(own[:, :, at])
         if candidate.nonlinear:
-            does = _without(campaign, fitted, [candidate]).residual - fitted.point.residual
+            does = point_without(campaign, fitted, [candidate]).residual - fitted.point.residual
             columns = whole(columns, np.nan_to_num(does), values[at])
         there[candidate.key] = candidate.fitted(columns, [fitted.unknowns[i] for i in at])
     return tuple(there.get(c.key, c) for c in looked)
-
-
-def _without(campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate]) -> Point:
-    """The fitted model with what was chosen put back to its null: what there is to explain."""
-    nulls: dict[tuple[int, str], float] = {}
-    for candidate in chosen:
-        term = _term_of(fitted.model, candidate)
-        if term is not None:
-            nulls |= {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
-    if not nulls:
-        return fitted.point
-    return at(campaign, fitted.model.with_values(nulls), fitted.point.given)
 
 
 def _reach(candidate: Candidate) -> Floats:

@@ -11,7 +11,7 @@ from postproc.base.arrays import Floats, Ints
 from postproc.diagnosis.candidates import EVERY, Candidate, names_of
 from postproc.diagnosis.decoys import FOILED
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
-from postproc.diagnosis.search import Alternative, Search
+from postproc.diagnosis.search_result import Alternative, Search
 from postproc.diagnosis.selection import (
     Explained,
     Problem,

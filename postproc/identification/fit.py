@@ -233,7 +233,7 @@ def lengths(residual: Floats, weights: Weighting) -> Floats:
     fewer count."""
     on = weights.weight > 0
     square = np.where(on, np.nan_to_num(residual) * weights.weight, 0.0) ** 2
-    return np.sqrt(3.0 * square.sum(axis=1) / np.maximum(on.sum(axis=1), 1))
+    return np.asarray(np.sqrt(3.0 * square.sum(axis=1) / np.maximum(on.sum(axis=1), 1)))
 
 
 def spread_of(length: Floats, known: bool) -> float:

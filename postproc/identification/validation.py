@@ -150,4 +150,4 @@ def _free_share(fitted: Fit) -> Floats:
     length = np.linalg.norm(matrix, axis=0)
     u, s, _ = np.linalg.svd(matrix[:, length > 0] / length[length > 0], full_matrices=False)
     leverage = (u[:, s > 1e-8 * s[0]] ** 2).sum(axis=1).reshape(point.residual.shape)
-    return np.sqrt(np.clip(1.0 - leverage.mean(axis=1), 0.05, 1.0))
+    return np.asarray(np.sqrt(np.clip(1.0 - leverage.mean(axis=1), 0.05, 1.0)))

@@ -21,7 +21,7 @@ def compute_linear_deflection(
     state = model.state(q, np.zeros((len(q), 6)), tool, conditions)
     j = jacobian(state.swept)
     torque = np.einsum("nij,ni->nj", j, wrench)
-    return np.einsum("nij,nj->ni", j, model.compliance(state) * torque)
+    return np.asarray(np.einsum("nij,nj->ni", j, model.compliance(state) * torque))
 
 
 def compute_cartesian_compliance(
@@ -32,7 +32,7 @@ def compute_cartesian_compliance(
     if wrench is None:
         state = model.state(q, np.zeros((len(q), 6)), tool, conditions)
         j = jacobian(state.swept)
-        return np.einsum("nij,nj,nkj->nik", j, model.compliance(state), j)
+        return np.asarray(np.einsum("nij,nj,nkj->nik", j, model.compliance(state), j))
     rest = solve_equilibrium(model, q, wrench, tool, conditions)
     state = model.state(q, wrench, tool, conditions, rest.displacement)
     j = jacobian(state.swept)

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints, is_shared
 from postproc.base.batches import blocks, each_block, in_blocks
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses, lengths, on_arc, turn_between
@@ -218,7 +218,7 @@ def _check_external(
     path: Toolpath, back: Toolpath, division: Subdivision, rows: slice, writing: WritingSettings, file: str
 ) -> None:
     """External axes are where the program has them, and along the path of a motion that was divided at its share."""
-    moves = path.external.strides[0] or back.external.strides[0]
+    moves = not (is_shared(path.external) and is_shared(back.external))
     if not moves and np.array_equal(path.external[:1], back.external[:1], equal_nan=True):
         return
     source, own = division.source[rows], division.original[rows]

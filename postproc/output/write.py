@@ -11,16 +11,17 @@ from functools import cached_property
 import numpy as np
 
 from postproc import __version__
-from postproc.base.arrays import Floats, Ints, LazyRows
-from postproc.base.batches import each_block, trim_allocator
+from postproc.base.arrays import Floats, Ints, LazyRows, is_shared
+from postproc.base.batches import each_block
 from postproc.base.document import Document, Edit, Edits, apply, undone
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import PoseRows, Poses
+from postproc.base.memory import release_free_memory
 from postproc.base.units import DEG, MM
 from postproc.cell import Cell
-from postproc.compensation.comparison import Transitions, along_and_across, evaluate_transitions
 from postproc.compensation.corners import Corners, compare_corners
 from postproc.compensation.correct import CorrectionResult, MotionOutcome, with_residual
+from postproc.compensation.path_comparison import Transitions, along_and_across, evaluate_transitions
 from postproc.compensation.path_error import path_errors
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
@@ -140,7 +141,7 @@ def plan_motions(task: CompensationProblem, division: Subdivision) -> Plan:
         approximated_motions(task, division, slice(None)),
         division.share,
         LazyRows(m, lambda rows: external_at(task.toolpath, division.source[rows], division.share[rows]))
-        if task.toolpath.external.strides[0]
+        if not is_shared(task.toolpath.external)
         else None,
     )
 
@@ -188,17 +189,17 @@ def write(
     contents = _contents(documents, edits)
     again = _read_back(documents, contents, dialect, settings)
     back = completed(again.toolpath)
-    trim_allocator()
+    release_free_memory()
     check_readback(task, result, division, program, again, back, writing)
-    trim_allocator()
+    release_free_memory()
     there = _as_written(task, division, back)
     written = _with_lead_ins(task, with_residual(task, result, there.original_command), there)
     written = replace(
         written, turn=np.broadcast_to(np.nan, written.turn.shape)
     )  # it was meant for what is written
-    trim_allocator()
+    release_free_memory()
     check_residual(task, result, written, there, writing, documents[0].path.name)
-    trim_allocator()
+    release_free_memory()
     left = (written.after, written.after_angle) if task.gain == 1.0 else _beside_uncorrected(task, written)
     return WrittenProgram(task, edits, contents, written, there, *left)
 

@@ -100,7 +100,7 @@ class FeedFrames:
         """(M, 3) z of ``rows`` (M,) at their start (``side``, scalar or (M,): 0) or end (1); of a begin that is not
         known that at the end."""
         at = rows - ((np.asarray(side) == 0) & self.way.begins[rows])
-        return self._back.take(at, axis=0)
+        return np.asarray(self._back.take(at, axis=0))
 
     def _tangent(self, rows: Ints, side: Ints | int) -> Floats:
         """(M, 3) of each motion at its start or end; that of an arc from inside where it lies along z there."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from postproc.base.arrays import Bools, FewRows, Floats, Ints, frozen, numbers
+from postproc.base.arrays import Bools, FewRows, Floats, Ints, frozen, is_shared, numbers
 from postproc.base.batches import blocks, in_blocks
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import lengths, turn_beside, turning
@@ -189,7 +189,7 @@ class Turning:
 
 def is_air(toolpath: Toolpath) -> Bools:
     """(N,) motions that are air whatever the force."""
-    return (toolpath.kind == Kind.PTP) | (toolpath.kind == Kind.AXIS)
+    return np.asarray((toolpath.kind == Kind.PTP) | (toolpath.kind == Kind.AXIS))
 
 
 def turn_to_robot_axes(
@@ -372,9 +372,9 @@ class _WrenchTurning:
         return wrench.reshape(-1, 6)
 
     def _base(self, pairs: Floats, rows: Ints, side: int) -> Floats:
-        if not self.base_in_robot.strides[0]:  # one for all
-            return pairs @ self.base_in_robot[0].T
-        return np.einsum("nij,nkj->nki", self.base_in_robot[rows], pairs)
+        if is_shared(self.base_in_robot):
+            return np.asarray(pairs @ self.base_in_robot[0].T)
+        return np.asarray(np.einsum("nij,nkj->nki", self.base_in_robot[rows], pairs))
 
     def _world(self, pairs: Floats, rows: Ints, side: int) -> Floats:
         return pairs @ self.world_in_robot.T

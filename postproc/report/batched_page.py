@@ -7,9 +7,9 @@ from pathlib import Path
 from urllib.parse import quote
 
 from postproc.report.batched import DONE, FAILED, NOT_RUN, UNCHANGED, Batched, Outcome
+from postproc.report.formatting import count, in_decimals
 from postproc.report.page import FINDINGS, finding_rows, rendered
 from postproc.report.page_words import printed
-from postproc.report.words import count, in_decimals
 
 _SIGNS = {
     DONE: ("", "✓", "done"),

@@ -9,8 +9,8 @@ from rich.text import Text
 
 from postproc.base.sanitize import sanitize
 from postproc.report.batched import DONE, FAILED, NOT_RUN, UNCHANGED, Batched, Outcome
+from postproc.report.formatting import count, in_decimals
 from postproc.report.terminal import show_findings
-from postproc.report.words import count, in_decimals
 
 _STYLES = {DONE: "", UNCHANGED: "dim", FAILED: "bold red", NOT_RUN: "yellow"}
 

@@ -14,7 +14,7 @@ from postproc.diagnosis.candidates import Candidate, names_of
 from postproc.diagnosis.diagnosis import Diagnosis
 from postproc.diagnosis.effect_sizes import Gains, Smallest, gains, moved, smallest
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
-from postproc.diagnosis.search import Key
+from postproc.diagnosis.search_result import Key
 from postproc.diagnosis.verdict import Evidence, Named, Verdict, reduced_chi2_of
 from postproc.identification.fit import Estimate, Fit
 from postproc.measurements import Readings

@@ -18,7 +18,7 @@ from postproc.base.arrays import Floats
 from postproc.base.sanitize import sanitize, sanitize_lines
 from postproc.base.units import MM
 from postproc.diagnosis.residual_patterns import patterns
-from postproc.diagnosis.search import Key
+from postproc.diagnosis.search_result import Key
 from postproc.identification.fit import Fit
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_words import headline

@@ -13,9 +13,9 @@ from postproc.base.sanitize import sanitize
 from postproc.base.units import MM
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_words import headline, paragraph
+from postproc.report.formatting import campaign_in_words, count, fixed, shown_unit, some
 from postproc.report.identified_terminal import add_sizes
 from postproc.report.terminal import show_findings, show_rows
-from postproc.report.words import campaign_in_words, count, fixed, shown_unit, some
 from postproc.robot.description import robot_words
 
 WIDE = 110

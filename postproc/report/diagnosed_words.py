@@ -14,8 +14,8 @@ from postproc.effects import EFFECTS, ComplianceLaw
 from postproc.identification.fit import Estimate, Fit
 from postproc.identification.sanity_checks import LOADED
 from postproc.report.diagnosed import USUAL, Diagnosed
+from postproc.report.formatting import count, fixed, shown_unit
 from postproc.report.terminal import _once
-from postproc.report.words import count, fixed, shown_unit
 
 NOUNS = {
     "joint_compliance": "compliance of {joints}: the gear deflects in proportion to the torque",

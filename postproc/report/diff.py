@@ -82,7 +82,7 @@ class _DiffLines:
         """The lines (K,), from 0, that hold these bytes (K,), which ascend."""
         low, high = np.searchsorted(self.starts, [offsets[0], offsets[-1]], side="right")
         start = np.searchsorted(offsets, self.starts[low:high])
-        return low - 1 + np.cumsum(np.bincount(start, minlength=len(offsets)))
+        return np.asarray(low - 1 + np.cumsum(np.bincount(start, minlength=len(offsets))))
 
     def part(self, first: int, stop: int) -> tuple[bytes, Ints]:
         """The lines first .. stop - 1, and where in them each starts and the last one ends."""

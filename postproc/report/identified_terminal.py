@@ -14,10 +14,10 @@ from postproc.base.sanitize import sanitize
 from postproc.base.units import MM
 from postproc.identification.fit import Estimate
 from postproc.identification.validation import WIDER
+from postproc.report.formatting import campaign_in_words, count, fixed, shown_unit, some
 from postproc.report.identified import STRONG, Identified, Sum
 from postproc.report.residuals import Sizes
 from postproc.report.terminal import _once, show_findings, show_rows
-from postproc.report.words import campaign_in_words, count, fixed, shown_unit, some
 from postproc.robot.description import robot_words
 
 IN_TABLES = frozenset({"IDN018", "IDN019", "IDN020", "IDN021", "IDN022", "IDN025", "IDN026"})

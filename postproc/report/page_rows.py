@@ -85,4 +85,4 @@ def _last_largest(values: Floats, starts: Ints) -> Ints:
     largest = np.repeat(np.maximum.reduceat(values, starts), np.diff(starts, append=len(values)))
     rows = np.flatnonzero(values == largest)
     stretch = np.searchsorted(starts, rows, side="right")
-    return rows[np.append(stretch[1:] != stretch[:-1], True)]
+    return np.asarray(rows[np.append(stretch[1:] != stretch[:-1], True)])

@@ -12,11 +12,11 @@ from rich.text import Text
 from postproc.base.sanitize import sanitize_lines
 from postproc.base.units import MM
 from postproc.compensation.uncertainty import Uncertainty
+from postproc.report.formatting import count, two_digits
 from postproc.report.page_data import PageData
 from postproc.report.program_verdict import verdict_sentence
 from postproc.report.report import Report
 from postproc.report.terminal import _rows, missing_intervals
-from postproc.report.words import count, two_digits
 
 LISTED = 8
 """Cuts that are not corrected are listed up to so many."""

@@ -18,9 +18,9 @@ from postproc.experiments.candidate_setups import CandidateSetups, Setups
 from postproc.experiments.precision import Design, UnobservableParameter
 from postproc.identification.unknowns import Unknown
 from postproc.model import StiffnessModel
+from postproc.report.formatting import fixed, shown_unit
 from postproc.report.result_keys import complete_result
 from postproc.report.terminal import _once, show_findings
-from postproc.report.words import fixed, shown_unit
 
 GOALS = {
     "minimax": "smallest worst ratio of an interval to the wanted one",

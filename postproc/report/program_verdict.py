@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 from postproc.base.units import MM
-from postproc.compensation.uncertainty import COMPONENTS, DIRECTION, FORCE
+from postproc.compensation.uncertain_inputs import COMPONENTS, DIRECTION, FORCE
+from postproc.report.formatting import two_digits
 from postproc.report.report import NOT_CORRECTED, REVIEW, UNCERTAIN, Report
-from postproc.report.words import two_digits
 
 _NAMED = 2
 """Quantities that are worth measuring, at most."""

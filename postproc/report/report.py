@@ -12,7 +12,7 @@ import numpy as np
 from postproc.base.arrays import Floats
 from postproc.base.findings import SEVERITIES, Finding
 from postproc.base.units import MM
-from postproc.compensation.comparison import Transitions
+from postproc.compensation.path_comparison import Transitions
 from postproc.compensation.uncertainty import Uncertainty
 from postproc.report.result_keys import complete_result
 

@@ -13,10 +13,11 @@ from rich.text import Text
 from postproc.base.findings import Finding
 from postproc.base.sanitize import sanitize
 from postproc.base.units import MM
-from postproc.compensation.uncertainty import DIRECTION, FORCE, Uncertainty
+from postproc.compensation.uncertain_inputs import DIRECTION, FORCE
+from postproc.compensation.uncertainty import Uncertainty
+from postproc.report.formatting import two_digits
 from postproc.report.program_verdict import verdict_sentence
 from postproc.report.report import PathFigures, Report, Spread
-from postproc.report.words import two_digits
 
 _STYLES = {"info": "cyan", "warning": "yellow", "error": "bold red"}
 NAMED = 3

@@ -11,10 +11,10 @@ from rich.table import Table
 
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
+from postproc.report.formatting import in_decimals
 from postproc.report.report import Spread
 from postproc.report.result_keys import complete_result
 from postproc.report.terminal import show_findings
-from postproc.report.words import in_decimals
 
 
 @dataclass(frozen=True)

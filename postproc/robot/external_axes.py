@@ -19,7 +19,7 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints, is_shared
 from postproc.base.geometry import Poses, rotation_from_vector, turned
 from postproc.base.units import DEG, MM
 from postproc.robot.description import Robot
@@ -227,7 +227,7 @@ def needed_rows(path: Toolpath) -> Bools:
 
 def _changes(values: Floats, needed: Bools) -> Bools:
     """(6,) axes that are not at one place in all ``needed`` (N,) of ``values`` (N, 6)."""
-    if not values.strides[0]:
+    if is_shared(values):
         return np.zeros(6, np.bool_)
     seen = needed[:, None] & np.isfinite(values)
     low = np.where(seen, values, np.inf).min(axis=0, initial=np.inf)

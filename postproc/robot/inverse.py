@@ -133,4 +133,4 @@ def status_of(arm: Geometry, q: Floats) -> Ints:
 
 def turn_of(q: Floats) -> Ints:
     """T (N,) of axis angles (N, 6) [rad]: bit i is set where axis i + 1 is negative."""
-    return ((q < 0).astype(np.int64) << np.arange(q.shape[1])).sum(axis=1)
+    return np.asarray(((q < 0).astype(np.int64) << np.arange(q.shape[1])).sum(axis=1))

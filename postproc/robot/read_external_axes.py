@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats, frozen
+from postproc.base.arrays import Bools, Floats, frozen, is_shared
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import MM
 from postproc.base.yaml_section import YamlSection
@@ -284,7 +284,7 @@ class _Place:
 
 def _with(external: Floats, columns: Mapping[int, Floats]) -> Floats:
     """(N, 6) with other columns; one row for all where they do not change."""
-    if len(external) and not external.strides[0] and all(map(_even, columns.values())):
+    if len(external) and is_shared(external) and all(map(_even, columns.values())):
         row = external[0].copy()
         row[list(columns)] = [values[0] for values in columns.values()]
         return np.broadcast_to(row, external.shape)

@@ -26,7 +26,7 @@ MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prisma
 
 
 @dataclass
-class _Joint:
+class _UrdfJoint:
     name: str
     kind: str
     line: int
@@ -52,7 +52,7 @@ def read_urdf(path: Path, base: str | None = None, tip: str | None = None) -> Ar
     Raises Refusal: FIL001 (not readable), URD001 (with the line).
     """
     joints, links = _parse(path)
-    by_child: dict[str, _Joint] = {}
+    by_child: dict[str, _UrdfJoint] = {}
     for joint in joints:
         for link in (joint.parent, joint.child):
             if link not in links:
@@ -93,7 +93,7 @@ def _only(path: Path, found: list[str], key: str) -> str:
     return found[0]
 
 
-def _merged(path: Path, way: list[_Joint]) -> Arm:
+def _merged(path: Path, way: list[_UrdfJoint]) -> Arm:
     names, kinds, links = [], [], []
     at = Poses.identity()
     for joint in way:
@@ -111,12 +111,12 @@ def _merged(path: Path, way: list[_Joint]) -> Arm:
     return Arm(tuple(names), tuple(kinds), tuple(links), at)
 
 
-def _parse(path: Path) -> tuple[list[_Joint], dict[str, int]]:
+def _parse(path: Path) -> tuple[list[_UrdfJoint], dict[str, int]]:
     """All joints, and the lines of all links."""
     raw = read_file(path, MAX_BYTES)
     if len(raw) > MAX_BYTES:
         raise _wrong(path, 0, f"the file is larger than {MAX_BYTES} bytes")
-    joints: list[_Joint] = []
+    joints: list[_UrdfJoint] = []
     links: dict[str, int] = {}
     stack: list[str] = []
     parser = expat.ParserCreate()
@@ -162,7 +162,7 @@ def _parse(path: Path) -> tuple[list[_Joint], dict[str, int]]:
     return joints, links
 
 
-def _joint(path: Path, line: int, words: dict[str, str], before: list[_Joint]) -> _Joint:
+def _joint(path: Path, line: int, words: dict[str, str], before: list[_UrdfJoint]) -> _UrdfJoint:
     name, kind = _word(path, line, "joint", words, "name"), _word(path, line, "joint", words, "type")
     if kind != "fixed" and kind not in MOVING:
         allowed = ", ".join(("fixed", *MOVING))
@@ -174,10 +174,10 @@ def _joint(path: Path, line: int, words: dict[str, str], before: list[_Joint]) -
         )
     if any(joint.name == name for joint in before):
         raise _wrong(path, line, f"joint {name!r} is defined twice")
-    return _Joint(name, kind, line)
+    return _UrdfJoint(name, kind, line)
 
 
-def _detail(path: Path, line: int, joint: _Joint, tag: str, words: dict[str, str]) -> None:
+def _detail(path: Path, line: int, joint: _UrdfJoint, tag: str, words: dict[str, str]) -> None:
     if tag == "mimic":
         raise _wrong(path, line, f"joint {joint.name} mimics another one, so the arm is not serial")
     if tag in ("parent", "child"):

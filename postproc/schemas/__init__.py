@@ -9,15 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from postproc.schemas.cell_schema import cell_schema
+from postproc.schemas.diagnose_schema import diagnose_schema
+from postproc.schemas.identify_schema import identify_schema
 from postproc.schemas.job_schema import job_schema
-from postproc.schemas.model_results import (
-    diagnose_schema,
-    identify_schema,
-    map_schema,
-    plan_schema,
-    robots_schema,
-)
+from postproc.schemas.map_schema import map_schema
 from postproc.schemas.parts import Schema
+from postproc.schemas.plan_schema import plan_schema
 from postproc.schemas.program_results import (
     batch_schema,
     check_schema,
@@ -27,6 +24,7 @@ from postproc.schemas.program_results import (
     verify_schema,
 )
 from postproc.schemas.robot_schema import robot_schema
+from postproc.schemas.robots_schema import robots_schema
 
 SCHEMAS: dict[str, Callable[[], Schema]] = {"cell": cell_schema, "robot": robot_schema, "job": job_schema}
 """Of the files that people write."""

@@ -21,129 +21,26 @@ So a corner holds the tool that is nearest to it, and a force that jumps has eve
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats, Ints, sums
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import each_block
 from postproc.base.geometry import Poses, lengths, turn_between
-from postproc.base.units import MM
 from postproc.compensation.mirror import Prediction
 from postproc.compensation.problem import CompensationProblem
+from postproc.verification.path_grid import LEAST_NODES, SPOT, PathGrid
 from postproc.verification.run_path import RunPath
-
-NODES = 2.0 * MM
-"""Distance of the nodes on the wanted path, at most."""
-
-LEAST_NODES = 2
-"""Intervals of a motion at least."""
+from postproc.verification.tracking import track_commands
 
 RESIDUAL = 1e-7
 """[m] How far along the path a tool may be from the place whose force it has."""
-
-SPOT = 1e-6
-"""[m] A motion that is not longer only turns the tool."""
 
 STEPS, HALVINGS = 10, 60
 """Newton's steps at most, and steps of bracketing of what they do not settle."""
 
 FLAT = 0.02
 """Least slope of h that a step is taken with, in parts of a path that the force does not move."""
-
-REACH, MARGIN = 1.5, 2.0 * MM
-"""How far from the last place the next one may be, besides the path of the command: so many times the largest
-displacement of the tool, and this."""
-
-_BLOCK = 128
-"""Commands that are looked at together."""
-
-
-@dataclass(frozen=True, eq=False)
-class PathGrid:
-    """J nodes on the wanted path, one stretch after another: ``first`` (K + 1,) where each stretch starts.
-
-    row (J,) and share (J,) of its path; arc (J,) [m] along the stretch; v (J, 3) [m], tangent (J, 3); gap (J,): the
-    interval to the next node is within one vertex; of the last node of a stretch there is none.  goal_at (J, 3) [m];
-    farthest [m]: the largest displacement.
-    """
-
-    original: CompensationProblem
-    path: RunPath
-    first: Ints
-    row: Ints
-    share: Floats
-    arc: Floats
-    v: Floats
-    tangent: Floats
-    gap: Bools
-    goal_at: Floats
-    farthest: float
-
-    @staticmethod
-    def of(original: CompensationProblem, path: RunPath, start: Ints, stop: Ints) -> PathGrid:
-        """Of the stretches of rows ``start`` to before ``stop`` (K,)."""
-        count = stop - start
-        rows = np.repeat(start - sums(count)[:-1], count) + np.arange(count.sum())
-        length = original.desired_path.length[rows]
-        parts = np.maximum(LEAST_NODES, np.ceil(length / NODES)).astype(np.int64)
-        at = sums(parts + 1)
-        row = np.repeat(rows, parts + 1)
-        number = np.arange(len(row)) - np.repeat(at[:-1], parts + 1)
-        share = number / np.repeat(parts, parts + 1)
-        first = at[sums(count)]
-        before = np.append(0.0, np.cumsum(length))
-        own = before[:-1] - np.repeat(before[sums(count)[:-1]], count)
-        arc = np.repeat(own, parts + 1) + share * np.repeat(length, parts + 1)
-        v, tangent, goals = (np.empty((len(row), 3)) for _ in range(3))
-
-        def made(part: slice) -> None:
-            there = path.at(row[part], share[part])
-            wrench = original.force.along(row[part], share[part])
-            real = original.simulated(row[part], there, wrench, share=share[part])
-            goal = original.goal(row[part], there, share[part]).position
-            goals[part], v[part] = goal, goal - np.nan_to_num(real.pose.position - there.position)
-            tangent[part] = path.tangent(row[part], share[part])
-
-        each_block(made, len(row))
-        gap = np.append(row[1:] != row[:-1], True)[: len(row)]
-        farthest = float(lengths(goals - v).max(initial=0.0))
-        return PathGrid(original, path, first, row, share, arc, v, tangent, gap, goals, farthest)
-
-    @cached_property
-    def on_the_spot(self) -> Bools:
-        """(N,) motions on the cuts that only turn the tool."""
-        found = np.zeros(len(self.original.toolpath), bool)
-        found[self.row] = self.original.desired_path.length[self.row] < SPOT
-        return found
-
-    def place(self, interval: Ints, part: Floats) -> tuple[Ints, Floats]:
-        """Row (S,) and share (S,) at the parts (S,) of intervals (S,); of a vertex the end of the motion before it."""
-        row, share = self.row[interval], self.share[interval]
-        step = np.where(
-            self.gap[interval], 0.0, self.share[np.minimum(interval + 1, len(self.row) - 1)] - share
-        )
-        return row, share + part * step
-
-    def along(self, interval: Ints, part: Floats) -> Floats:
-        """(S,) [m] along the stretch, at ``part`` (S,) of ``interval`` (S,)."""
-        step = self.arc[interval + 1] - self.arc[interval]
-        return self.arc[interval] + part * step
-
-    def goal(self, interval: Ints, part: Floats) -> tuple[Poses, Floats, Floats]:
-        """Goal poses (S), tangents (S, 3) and wrenches (S, 6) at the parts (S,) of intervals."""
-        row, share = self.place(interval, part)
-        wanted = self.path.at(row, share)
-        goal = self.original.goal(row, wanted, share)
-        tangent, wrench = self.path.tangent(row, share), self.original.force.along(row, share)
-        over = np.flatnonzero(self.gap[interval])
-        if len(over):
-            other, start = self.row[interval[over] + 1], np.zeros(len(over))
-            weight = part[over, None]
-            turned = (1 - weight) * tangent[over] + weight * self.path.tangent(other, start)
-            tangent[over] = turned / np.maximum(lengths(turned), 1e-12)[:, None]
-            wrench[over] = (1 - weight) * wrench[over] + weight * self.original.force.along(other, start)
-        return goal, tangent, wrench
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +67,7 @@ def place_tool(grid: PathGrid, path: RunPath, stretch: Ints, motion: Ints, share
         command[block] = path.at(motion[block], share[block]).position
 
     each_block(sent, len(motion))
-    interval, part = _tracked(grid, stretch, command)
+    interval, part = track_commands(grid, stretch, command)
     low, high = grid.first[stretch], grid.first[stretch + 1] - 2
     count = len(motion)
     row, at, arc = np.empty(count, np.int64), np.empty(count), np.empty(count)
@@ -359,101 +256,3 @@ class _Solution:
         self.interval[active] = np.minimum(np.floor(place).astype(np.int64), self.high[active])
         self.part[active] = place - self.interval[active]
         return self._ahead(active)
-
-
-def _tracked(grid: PathGrid, stretch: Ints, command: Floats) -> tuple[Ints, Floats]:
-    """Interval and part of it (S,) of the grid in which each command (S, 3) is found, going on from the one before."""
-    interval, part = np.empty(len(command), np.int64), np.empty(len(command))
-    start = np.flatnonzero(np.append(True, stretch[1:] != stretch[:-1])[: len(stretch)])
-    for first, stop in zip(start, np.append(start[1:], len(command))[: len(start)], strict=True):
-        low, high = int(grid.first[stretch[first]]), int(grid.first[stretch[first] + 1])
-        _Tracking(grid, slice(low, high)).run(command[first:stop], interval[first:stop], part[first:stop])
-        interval[first:stop] += low
-    return interval, part
-
-
-class _Tracking:
-    """Goes along the J nodes of one stretch."""
-
-    def __init__(self, grid: PathGrid, nodes: slice) -> None:
-        self.v, self.tangent, self.arc = grid.v[nodes], grid.tangent[nodes], grid.arc[nodes]
-        self.level = np.sum(self.v * self.tangent, axis=1)
-        self.reach = REACH * grid.farthest + MARGIN
-        self.last = len(self.v) - 2
-
-    def run(self, command: Floats, interval: Ints, part: Floats) -> None:
-        """Fills in ``interval`` and ``part`` (S,) of the commands (S, 3)."""
-        step = np.append(0.0, REACH * lengths(np.diff(command, axis=0)))
-        done, here = 0, float(self.arc[0])
-        while done < len(command):
-            block = slice(done, min(done + _BLOCK, len(command)))
-            found, share, here = self._found(command[block], step[block], here)
-            interval[done : done + len(found)], part[done : done + len(found)] = found, share
-            done += len(found)
-
-    def _found(self, command: Floats, step: Floats, here: float) -> tuple[Ints, Floats, float]:
-        """Of the commands (B, 3), or of the first of them whose path stays in view: of the intervals near the last
-        place, ``here`` [m], where h changes from positive to negative, the one that the tool is nearest to."""
-        start = np.searchsorted(self.arc, [here - 2 * self.reach, here + 2 * self.reach + step.sum()])
-        low, high = max(int(start[0]) - 1, 0), min(int(start[1]), self.last)
-        some = self._candidates(command, low, high)
-        least = -np.inf if low == 0 else float(self.arc[low])
-        most = np.inf if high == self.last else float(self.arc[high + 1])
-        first = np.searchsorted(some.row, np.arange(len(command) + 1)).tolist()
-        arc, away, steps = some.arc.tolist(), some.away.tolist(), step.tolist()
-        chosen: list[int] = []
-        for row in range(len(command)):
-            back, ahead = here - self.reach, here + self.reach + steps[row]
-            if row and (back < least or ahead > most):
-                break
-            best, nearest = -1, np.inf
-            for number in range(first[row], first[row + 1]):
-                if away[number] < nearest and back <= arc[number] <= ahead:
-                    best, nearest = number, away[number]
-            if best < 0:  # nowhere square to it: the solution will tell
-                if row:
-                    break
-                return self._node(command[:1], back, ahead)
-            chosen.append(best)
-            here = arc[best]
-        return some.interval[chosen], some.share[chosen], here
-
-    def _candidates(self, command: Floats, low: int, high: int) -> _Candidates:
-        """Where, in the intervals ``low`` to ``high``, the tools of the commands may be found."""
-        value = command @ self.tangent[low : high + 2].T - self.level[low : high + 2]
-        behind = value < 0
-        row, interval = np.nonzero(~behind[:, :-1] & behind[:, 1:])
-        one, two = value[row, interval], value[row, interval + 1]
-        share, interval = one / (one - two), interval + low
-        # before the start and after the end of the stretch these are the places
-        before = np.flatnonzero(behind[:, 0]) if low == 0 else np.zeros(0, np.int64)
-        beyond = np.flatnonzero(~behind[:, -1]) if high == self.last else np.zeros(0, np.int64)
-        row = np.concatenate([row, before, beyond])
-        interval = np.concatenate(
-            [interval, np.zeros(len(before), np.int64), np.full(len(beyond), self.last)]
-        )
-        share = np.concatenate([share, np.zeros(len(before)), np.ones(len(beyond))])
-        order = np.argsort(row, kind="stable")
-        row, interval, share = row[order], interval[order], share[order]
-        v = self.v[interval] + share[:, None] * (self.v[interval + 1] - self.v[interval])
-        arc = self.arc[interval] + share * (self.arc[interval + 1] - self.arc[interval])
-        return _Candidates(row, interval, share, arc, lengths(command[row] - v))
-
-    def _node(self, command: Floats, back: float, ahead: float) -> tuple[Ints, Floats, float]:
-        """The nearest node."""
-        low, high = np.searchsorted(self.arc, [back, ahead])
-        low = min(int(low), self.last)
-        at = low + int(np.argmin(lengths(command - self.v[low : max(int(high), low + 1)])))
-        interval = min(at, self.last)
-        return np.array([interval]), np.array([float(at - interval)]), float(self.arc[at])
-
-
-@dataclass(frozen=True, eq=False)
-class _Candidates:
-    """row (C,) ascending; interval, share of it, arc [m], and how far the tool is away [m]."""
-
-    row: Ints
-    interval: Ints
-    share: Floats
-    arc: Floats
-    away: Floats

@@ -13,9 +13,10 @@ from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
 from postproc.base.units import DEG, MM
+from postproc.diagnosis.candidate_fits import composed
 from postproc.diagnosis.candidates import Candidate
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
-from postproc.diagnosis.search import composed, model_unknowns
+from postproc.diagnosis.search import model_unknowns
 from postproc.experiments.candidate_setups import CandidateSetups, readings_of, spacings, usable_limits
 from postproc.experiments.discrimination import apart
 from postproc.experiments.measuring_order import measuring_order

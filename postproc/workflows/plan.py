@@ -16,8 +16,9 @@ from postproc.base.geometry import Poses
 from postproc.base.input_files import place
 from postproc.base.tables import finite_number
 from postproc.base.units import DEG, MM, to_si, words_for
+from postproc.compensation.input_sensitivities import goal_sensitivities, sensitivities
 from postproc.compensation.problem import rotate_wrench
-from postproc.compensation.uncertainty import UncertainInput, goal_sensitivities, sensitivities
+from postproc.compensation.uncertain_inputs import UncertainInput
 from postproc.effects import ComplianceLaw
 from postproc.experiments.candidate_setups import (
     CandidateSetups,

@@ -75,6 +75,16 @@ class Prepared:
     findings: tuple[Finding, ...]
     inputs: Inputs
 
+    def without_text(self) -> Prepared:
+        """The same for what comes after the edits: only they need what the dialect knows of the text, and of a million
+        motions that takes a tenth of a gigabyte."""
+        return replace(self, program=replace(self.program, text=None))
+
+    def with_text(self) -> Prepared:
+        """The same with the text read again, for new edits."""
+        text = self.dialect.read(self.program.documents, self.settings).text
+        return replace(self, program=replace(self.program, text=text))
+
 
 def silent(_stage: str) -> None:
     """Progress that nobody watches."""

@@ -14,17 +14,18 @@ from pathlib import Path
 import numpy as np
 
 from postproc.base import rotary_words
-from postproc.base.batches import trim_allocator
 from postproc.base.document import Edits
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
+from postproc.base.memory import release_free_memory
 from postproc.base.units import DEG, MM
 from postproc.compensation.axis_limits import check_limits
-from postproc.compensation.comparison import cuts_not_improved
 from postproc.compensation.correct import CorrectionResult, MotionOutcome, correct
+from postproc.compensation.path_comparison import cuts_not_improved
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.splines import unknown_displacements
-from postproc.compensation.subdivision import Limits, Subdivision, subdivide
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits, Subdivision
 from postproc.languages.dialect import EditedTargets, Program
 from postproc.output.atomic_write import Content, write_atomically
 from postproc.output.write import WrittenProgram, edit_program, plan_motions, write, writing_settings
@@ -98,9 +99,8 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     while True:
         task, result, division, edits = _corrected(request, ready, target.stem, held)
         stage("writing, and reading back")
-        # Only writing needs it, and of a million motions it takes a tenth of a gigabyte.
-        ready = replace(ready, program=replace(ready.program, text=None))
-        trim_allocator()
+        ready = ready.without_text()
+        release_free_memory()
         written = write(
             ready.program,
             ready.dialect,
@@ -113,14 +113,13 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
             partial(completed, cell=ready.cell, robot=ready.robot, program=request.program),
         )
         result, division = written.result, written.division  # what was meant goes, before its place is needed
-        trim_allocator()
+        release_free_memory()
         worse = cuts_not_improved(task, result, division, written.path_error, written.across_before)
         if not worse:
             break
         held |= worse
         stage("correcting without the cuts that would be no better")
-        text = ready.dialect.read(ready.program.documents, ready.settings).text
-        ready = replace(ready, program=replace(ready.program, text=text))
+        ready = ready.with_text()
     program = ready.program
     findings = [*ready.findings, *result.findings, *division.findings, *_closing(request, ready, written)]
     paths = _output_paths(program, target)
@@ -130,7 +129,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff", "report.html")]
     names += [] if request.json is None else [request.json]
     stage("reporting")
-    trim_allocator()
+    release_free_memory()
     report = report_of(request, ready, result, in_order_of_place(findings), written)
     if report.exit == 1:
         raise Refusal(*report.findings)
@@ -162,7 +161,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         **dict.fromkeys(names[4:], json_bytes(report)),
     }
     ready.inputs.refuse_changed()
-    trim_allocator()
+    release_free_memory()
     write_atomically(files, target, ready.inputs.refuse_changed)  # writing takes its time as well
     return report
 
@@ -191,11 +190,11 @@ def _corrected(
             result = replace(
                 result, state=np.where(result.corrected, MotionOutcome.OFF, result.state).astype(np.int8)
             )
-        trim_allocator()
+        release_free_memory()
         division = subdivide(task, result, allowed)
-        trim_allocator()
+        release_free_memory()
         told, beyond = check_limits(task, division)
-        trim_allocator()
+        release_free_memory()
         division = replace(division, findings=(*division.findings, *told))
         moved = EditedTargets((), {**beyond, **division.not_refined})
         if not moved.unwritten:

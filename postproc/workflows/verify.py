@@ -14,9 +14,9 @@ from postproc.base.units import DEG, MM
 from postproc.output.atomic_write import write_atomically
 from postproc.report.report import Spread, exit_code, in_order_of_place, json_bytes
 from postproc.report.verified import PathComparison, Verified, WorstError
-from postproc.verification.comparison import STEP, Simulation, Simulator
 from postproc.verification.differences import Difference, PathManner, in_air, missing, on_cuts
 from postproc.verification.pairing import Different, pair_motions
+from postproc.verification.simulator import STEP, Simulation, Simulator
 from postproc.workflows.preparation import Prepared, Request, Stage, prepare, silent
 
 WORST = 10

@@ -18,9 +18,9 @@ from plant import Plant, kr270  # noqa: E402
 
 from postproc.cli.main import run  # noqa: E402
 from postproc.model import StiffnessModel  # noqa: E402
-from postproc.verification.comparison import Simulator  # noqa: E402
 from postproc.verification.differences import ending  # noqa: E402
 from postproc.verification.pairing import pair_motions  # noqa: E402
+from postproc.verification.simulator import Simulator  # noqa: E402
 from postproc.workflows.preparation import Request, prepare  # noqa: E402
 
 PANEL = HERE.parent / "kr270_panel"

@@ -8,6 +8,7 @@ from effects_at_work import TOOL, conditions, made, sampled, with_terms
 from motions import milling_angles
 from plant import SOFTER, kr270, random_tools, random_wrenches, with_compensator
 
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import mirror
 from postproc.effects import EFFECTS
 from postproc.model import NOTHING, StiffnessModel
@@ -81,5 +82,5 @@ def test_mirror(measured):
     q, wrench, *_ = states(COUNT)
     model = heavy()
     wanted, status = model.chain.flange(q) @ TOOL, status_of(model.robot.nominal, q)
-    done = measured(lambda: mirror(model, wanted, wanted, TOOL, wrench, NOTHING, status, q), COUNT)
+    done = measured(lambda: mirror(model, wanted, wanted, LoadCase(TOOL, wrench, NOTHING, status, q)), COUNT)
     assert done.converged.all()

@@ -34,8 +34,9 @@ from statistics import median
 import numpy as np
 import pinocchio as pin
 
-from postproc.base.batches import use_mmap_for_large_arrays
 from postproc.base.geometry import Poses, rotation_from_vector
+from postproc.base.memory import use_mmap_for_large_arrays
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import ANGLE_TOLERANCE, POSITION_TOLERANCE, initial_guess, mirror
 from postproc.model import NOTHING, StiffnessModel
 from postproc.robot.chain import Chain
@@ -99,16 +100,16 @@ def mirror_loop(states: States) -> None:
     loop = Loop(model, TOOL)
     places = [pin.SE3(wanted.rotation[i], wanted.position[i]) for i in range(PLAIN)]
 
-    given = (TOOL, wrench, NOTHING, status, q)
+    case = LoadCase(TOOL, wrench, NOTHING, status, q)
 
     def batch() -> None:
         nonlocal done
-        done = mirror(model, wanted, wanted, *given)
+        done = mirror(model, wanted, wanted, case)
 
     def as_run() -> None:
         nonlocal run
-        begin = initial_guess(model, wanted, wanted, *given, FARTHEST)
-        run = mirror(model, wanted, wanted, *given, guess=begin)
+        begin = initial_guess(model, wanted, wanted, case, FARTHEST)
+        run = mirror(model, wanted, wanted, case, guess=begin)
 
     def plain() -> None:
         nonlocal found

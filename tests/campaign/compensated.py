@@ -10,6 +10,7 @@ from motions import milling_angles
 from plant import Plant
 
 from postproc.base.geometry import Poses, rotation_from_vector
+from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import mirror
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import fit
@@ -63,7 +64,7 @@ def share(plant: Plant, model: StiffnessModel, cuts: Cuts, before: np.ndarray) -
     """Of the deflection ``before`` (N,) [m], the share that a compensation with ``model`` takes away: the median over
     the cuts."""
     status = status_of(model.robot.nominal, cuts.q)
-    done = mirror(model, cuts.wanted, cuts.wanted, CUTTER, cuts.wrench, NOTHING, status, cuts.q)
+    done = mirror(model, cuts.wanted, cuts.wanted, LoadCase(CUTTER, cuts.wrench, NOTHING, status, cuts.q))
     assert done.converged.all()
     return float(np.median(1 - errors(plant, done.q, cuts) / before))
 

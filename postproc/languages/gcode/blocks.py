@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints, is_shared
 from postproc.base.units import DEG, MM
 from postproc.languages.gcode.control import Control, Group, Move, Once
 from postproc.languages.gcode.execution_flow import FlowReason
@@ -143,7 +143,7 @@ class BlockWords:
 
     def _scaled(self, wanted: int, unit: Floats | float, integer: Floats | float) -> Floats:
         number = self.number(wanted)
-        if number.strides == (0,):
+        if is_shared(number):
             return number
         return number * np.where(self.how(wanted) == How.INTEGER, integer, unit)
 
@@ -218,7 +218,7 @@ class BlockWords:
         """(B, 6) axis words that are differences."""
         hows = np.stack([self.how(axis) for axis in AXES], axis=1)
         incremental = (self.modal.force[Group.DISTANCE] == 1)[:, None]
-        return (hows >= 0) & ((incremental & (hows != How.ABSOLUTE)) | (hows == How.INCREMENTAL))
+        return np.asarray((hows >= 0) & ((incremental & (hows != How.ABSOLUTE)) | (hows == How.INCREMENTAL)))
 
 
 def blocks(source: Source, modal: Modal, control: Control, increments: bool) -> BlockWords:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints, is_shared
 from postproc.base.units import MM
 from postproc.languages.gcode.blocks import SECOND, BlockWords
 from postproc.languages.gcode.control import Group
@@ -41,7 +41,7 @@ def external_axes(given: BlockWords, rows: Ints) -> Floats:
 def moves_external(external: Floats) -> dict[int, str]:
     """Motions in whose block an axis of ``external`` (N, 6) moves: nothing is inserted before them, for lack of words
     for it."""
-    if not external.strides[0] or not len(external):
+    if is_shared(external) or not len(external):
         return {}
     before = np.concatenate([external[:1], external[:-1]])
     moves = ((external != before) & ~np.isnan(external) & (external != LOST)).any(axis=1)

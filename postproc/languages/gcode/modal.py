@@ -74,7 +74,7 @@ class Modal:
 
     def has(self, *once: Once) -> Bools:
         """(B,) blocks with one of these codes."""
-        return (self.once & sum(1 << code for code in once)) != 0
+        return np.asarray((self.once & sum(1 << code for code in once)) != 0)
 
     @cached_property
     def unknown(self) -> Bools:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from postproc.base.arrays import Bools, Ints
+from postproc.base.arrays import Bools, Ints, is_shared
 
 
 def everywhere(value: ArrayLike, count: int, dtype: Any = None) -> NDArray[Any]:
@@ -34,9 +34,9 @@ def fill_modal(count: int, at: Ints, value: NDArray[Any], first: int, dtype: Any
 
 def switched(state: Ints, before: int) -> Bools:
     """(B,) blocks in which ``state`` (B,) is another one than in the block ahead; ``before`` ahead of the first."""
-    if state.strides == (0,):
+    if is_shared(state):
         return _single(len(state), len(state) > 0 and int(state[0]) != before)
-    return np.diff(state, prepend=state.dtype.type(before)) != 0
+    return np.asarray(np.diff(state, prepend=state.dtype.type(before)) != 0)
 
 
 def _single(count: int, first: bool) -> Bools:
@@ -47,7 +47,7 @@ def _single(count: int, first: bool) -> Bools:
 
 def lookup(state: Ints, table: NDArray[Any]) -> NDArray[Any]:
     """(B, ...) ``table[state]`` of ``state`` (B,) and ``table`` (K, ...); one value where the state is one."""
-    if state.strides == (0,) and len(state):
+    if is_shared(state) and len(state):
         return everywhere(table[state[0]], len(state))
     return np.asarray(table[state])
 
@@ -80,7 +80,7 @@ class FilledRows:
         one = self._one[name]
         if not np.array_equal(values[0], one, equal_nan=True):
             return False
-        if values.strides[0] == 0:
+        if is_shared(values):
             return True
         same = values == one
         if values.dtype.kind == "f":

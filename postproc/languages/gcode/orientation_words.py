@@ -188,7 +188,7 @@ class Angles:
             most = np.abs(change).max(axis=1, keepdims=True)
             found[np.ix_(rows, columns)] += change * np.minimum(1.0, _STEP / np.maximum(most, 1e-300)) / DEG
         found[missed] = np.nan
-        return found
+        return np.asarray(found)
 
     def _left(self, values: Floats, target: Floats, pointing: bool) -> tuple[Floats, Floats]:
         """The rotation vector (n, 3) from the values to the target, and the axes (n, 3, k) that count for it."""

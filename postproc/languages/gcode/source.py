@@ -9,11 +9,10 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from postproc.base.array_storage import GrowingColumns
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.languages.gcode.control import Control
 from postproc.languages.gcode.lexing import lex
@@ -92,33 +91,18 @@ class Source:
         return mask
 
 
-class _Growing:
-    """Columns that grow at their ends, in place: the parts of a long one would leave holes in the memory."""
-
-    def __init__(self, *types: Any) -> None:
-        self._types, self._bytes = types, [bytearray() for _ in types]
-
-    def add(self, *columns: NDArray[Any]) -> None:
-        for held, values, kind in zip(self._bytes, columns, self._types, strict=True):
-            held += np.ascontiguousarray(values, kind).data
-
-    def done(self) -> Iterator[NDArray[Any]]:
-        for held, kind in zip(self._bytes, self._types, strict=True):
-            yield np.frombuffer(held, kind)
-
-
 def scan(raw: bytes, control: Control) -> Source:
     """A program taken apart, part by part."""
-    words: dict[int, _Growing] = {}
-    lines = _Growing(np.int32, np.int32, np.int32, np.int32, np.bool_, np.bool_)
-    comments = _Growing(np.int32)
+    words: dict[int, GrowingColumns] = {}
+    lines = GrowingColumns(np.int32, np.int32, np.int32, np.int32, np.bool_, np.bool_)
+    comments = GrowingColumns(np.int32)
     notes: list[Note] = []
     blocks, line = 0, 1
     for start, end in _pieces(raw):
         text = lex(raw, control, start, end, line)
         for one in np.flatnonzero(np.bincount(text.words.key)).tolist():
             rows = np.flatnonzero(text.words.key == one)
-            column = words.setdefault(one, _Growing(np.int32, np.float64, np.int8))
+            column = words.setdefault(one, GrowingColumns(np.int32, np.float64, np.int8))
             column.add(text.words.block[rows] + blocks, text.words.value[rows], text.words.how[rows])
         here = text.blocks
         wordy = np.zeros(len(here), np.bool_)

@@ -135,7 +135,7 @@ class _Path:
 
 
 @dataclass(frozen=True, eq=False)
-class _Plan:
+class _PlannedMotions:
     """Motions of a plan; before (3,): where the one ahead of them ends."""
 
     position: Floats
@@ -158,7 +158,7 @@ class WrittenMotions:
     places: SourceMapPart
     text: ProgrammedWords
     path: _Path
-    plan: _Plan
+    plan: _PlannedMotions
     first: int
     row: Ints
     last: int
@@ -181,7 +181,7 @@ class WrittenMotions:
         low, high = np.searchsorted(plan.source, [start, stop]).tolist()
         rows, motions = slice(first, behind), slice(low, high)
         before = plan.position[low - 1 : low][0] if low else np.full(3, np.nan)
-        here = _Plan(
+        here = _PlannedMotions(
             plan.position[motions],
             plan.rotation[motions],
             plan.centre[motions],

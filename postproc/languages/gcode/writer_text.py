@@ -137,7 +137,7 @@ def _least(places: SourceMapPart, orient: Ints, writing: WritingSettings) -> Int
         [writing.deg if o.angles else writing.deg + VECTOR_DECIMALS for o in places.orientations] + [0]
     )
     least[:, TURNED] = angles[orient][:, None]
-    return np.maximum(least, 1)
+    return np.asarray(np.maximum(least, 1))
 
 
 def _modal(places: SourceMapPart, orient: Ints, through: Bools) -> Bools:

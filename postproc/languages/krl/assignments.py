@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
-from postproc.languages.krl.effects import MODAL, READS_POSITION, bas
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.expressions import Value, index_text
 from postproc.languages.krl.external_axes import apart
@@ -20,7 +19,8 @@ from postproc.languages.krl.lexing import (
     value_end,
 )
 from postproc.languages.krl.modal_state import NAN, ZERO, FrameIndex, Record
-from postproc.languages.krl.motion_rows import Refusal
+from postproc.languages.krl.motion_rows import RowRefusal
+from postproc.languages.krl.statement_effects import MODAL, READS_POSITION, bas
 from postproc.languages.krl.target import (
     AXES,
     COMPONENTS,
@@ -95,14 +95,14 @@ def assign(run: ExecutionContext, statement: Statement, said: Assignment, here: 
         _set_variable(run, said)
 
 
-def with_clause(run: ExecutionContext, statement: Statement, clause: bytes) -> Refusal | None:
+def with_clause(run: ExecutionContext, statement: Statement, clause: bytes) -> RowRefusal | None:
     """Takes up what a WITH sets; the caller takes it back after the motion."""
     place = 0
     while place < len(clause):
         end = value_end(clause, place)
         said = assignment(clause[place:end].strip(), 0)
         if said is None:
-            return Refusal("KRL001", f"'{shown(clause[place:end])}' is not understood")
+            return RowRefusal("KRL001", f"'{shown(clause[place:end])}' is not understood")
         assign(run, statement, said, here=True)
         place = end + 1
     return None

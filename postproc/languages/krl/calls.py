@@ -6,10 +6,10 @@ import re
 
 from postproc.languages.krl.assignments import command, keep
 from postproc.languages.krl.block_follower import BlockFollower
-from postproc.languages.krl.effects import PATH_FROM_FILE, is_harmless
 from postproc.languages.krl.execution_context import BlockFrame
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, value_end
 from postproc.languages.krl.program_structure import Routine
+from postproc.languages.krl.statement_effects import PATH_FROM_FILE, is_harmless
 from postproc.languages.krl.target import shown
 from postproc.languages.krl.variables import Entry
 

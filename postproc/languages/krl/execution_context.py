@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.languages.krl.data import Declarations
-from postproc.languages.krl.effects import Effects
 from postproc.languages.krl.expressions import Value, evaluate
 from postproc.languages.krl.lexing import LOOPS, Statement
 from postproc.languages.krl.modal_state import ZERO, FrameRegister, ModalState, Source
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.program_structure import Block, ProgramStructure, Routine
+from postproc.languages.krl.statement_effects import Effects
 from postproc.languages.krl.target import UnknownValue, known, shown
 from postproc.languages.krl.variables import Entry, Variables
 from postproc.languages.krl.vectorised import VectorisedLines

@@ -54,7 +54,7 @@ _FUNCTIONS: dict[bytes, Callable[..., float]] = {
 _SYSTEM = {b"TRUE": True, b"FALSE": False}
 
 
-class _Unknown(Exception):
+class _NotConstant(Exception):
     def __init__(self, why: UnknownValue) -> None:
         self.why = why
 
@@ -71,8 +71,8 @@ def evaluate(text: bytes, lookup: Lookup) -> Value:
         parser = _Parser(text, lookup)
         value = parser.comparison(0)
         if parser.place < len(text.rstrip()):
-            raise _Unknown(UnknownValue("KRL002", f"'{shown(text)}' is not understood"))
-    except _Unknown as unknown:
+            raise _NotConstant(UnknownValue("KRL002", f"'{shown(text)}' is not understood"))
+    except _NotConstant as unknown:
         return unknown.why
     except (ArithmeticError, ValueError, TypeError):
         return UnknownValue("KRL002", f"'{shown(text)}' has no value")
@@ -123,8 +123,8 @@ class _Parser:
         self.token = found[self.kind].upper() if self.kind != "text" else found["text"]
         self.after = found.end()
 
-    def _unknown(self, why: str) -> _Unknown:
-        return _Unknown(UnknownValue("KRL002", why))
+    def _unknown(self, why: str) -> _NotConstant:
+        return _NotConstant(UnknownValue("KRL002", why))
 
     def comparison(self, depth: int) -> Value:
         left = self._logic(depth, 0)
@@ -264,7 +264,7 @@ class _Parser:
             raise self._unknown("its braces do not match")
         found = parse(self.text[start : stop + 1], 0, -1, lambda inner: evaluate(inner, self.lookup))
         if isinstance(found, UnknownValue):
-            raise _Unknown(found)
+            raise _NotConstant(found)
         self.after = stop + 1
         self._next()
         return found.detached()
@@ -300,9 +300,9 @@ class _Parser:
             path += b"[" + b",".join(indices) + b"]"
         value = self.lookup(name, path)
         if value is None:
-            raise _Unknown(_no_constant(name + path))
+            raise _NotConstant(_no_constant(name + path))
         if isinstance(value, UnknownValue):
-            raise _Unknown(value)
+            raise _NotConstant(value)
         return value
 
     def _call(self, name: bytes, depth: int) -> Value:

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Floats, is_shared
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import External
 from postproc.toolpath import COMPUTED, LOST
@@ -68,7 +68,7 @@ def carried_on(before: Numbers, own: Floats | None, left_out_of_motions: bool = 
     if left_out_of_motions:
         own = np.where(np.isnan(own), own, COMPUTED)
     left_out = np.isnan(own)
-    if not own.strides[0]:
+    if is_shared(own):
         return six(np.where(left_out[0], before, own[0]).tolist())
     if not left_out.any():
         return own

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
-from postproc.languages.krl.effects import MODAL, Effects, effects_of, functions_of, is_harmless
 from postproc.languages.krl.lexing import Statement, identifiers
 from postproc.languages.krl.program_structure import ProgramStructure, Routine
+from postproc.languages.krl.statement_effects import MODAL, Effects, effects_of, functions_of, is_harmless
 
 MOST_PAIRS = 50_000
 """Stretches times branches of a routine that are compared; with more, a label forgets all that the program changes."""

@@ -181,7 +181,7 @@ def _copied(task: KrlWritePlan, block: Ints, rows: Ints, start: Ints) -> Bools:
         & (places.start[rows] >= first[:, None])
         & (places.stop[rows] <= last[:, None])
     )
-    many = here.all(axis=1) & task.is_inline[rows] & (task.plan.role[block] == Role.INTERMEDIATE)
+    many: Bools = here.all(axis=1) & task.is_inline[rows] & (task.plan.role[block] == Role.INTERMEDIATE)
     # what ends exactly gets a word of its own: that of a LIN, behind nothing else
     many &= (task.path.approximation[rows] != 0) | ((last == end) & (raw[word] & 0xDF == ord("L")))
     many &= word - start <= _DEEPEST

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import gc
 import re
 from codecs import BOM_UTF8
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
+from postproc.base.memory import without_garbage_collection
 from postproc.languages.dialect import MARK, Program
 from postproc.languages.krl.block_follower import UncertainBlocks
 from postproc.languages.krl.calls import Restart
@@ -40,19 +39,7 @@ _MARKER = re.compile(rb"(?:\xef\xbb\xbf)?([ \t]*" + _MARK + rb"[^\r\n]*)")
 _MOTION = Statement("motion", b"", b"", 0, 0)
 
 
-@contextmanager
-def _no_collection() -> Iterator[None]:
-    """Nothing that a reading makes refers back to itself; the collector would only walk over it again and again."""
-    running = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if running:
-            gc.enable()
-
-
-@_no_collection()
+@without_garbage_collection()
 def read(
     documents: tuple[Document, ...],
     references: Sequence[Document] = (),

@@ -25,7 +25,7 @@ NO_ARC = (NAN,) * 7
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class RowRefusal:
     """Why a row is refused; equal ``cause`` and code are reported together."""
 
     code: str
@@ -77,8 +77,8 @@ class MotionRows:
     chunks: list[list[MotionRow] | VectorisedLot] = field(default_factory=list)
     count: int = 0
     anchors: dict[int, Anchor] = field(default_factory=dict)
-    reasons: dict[int, Refusal] = field(default_factory=dict)
-    ranges: list[tuple[int, int, Refusal]] = field(default_factory=list)
+    reasons: dict[int, RowRefusal] = field(default_factory=dict)
+    ranges: list[tuple[int, int, RowRefusal]] = field(default_factory=list)
     variables: dict[int, PointVariable] = field(default_factory=dict)
     locked: dict[int, str] = field(default_factory=dict)
     arcs: dict[int, Auxiliary] = field(default_factory=dict)
@@ -110,7 +110,7 @@ class MotionRows:
         self.count += 1
         return self.count - 1
 
-    def add_bulk(self, bulk: VectorisedLines, state: ModalState, reason: Refusal | None) -> int:
+    def add_bulk(self, bulk: VectorisedLines, state: ModalState, reason: RowRefusal | None) -> int:
         """Adds a run of common lines; gives the number of the last row."""
         first = self.count
         external = carried_on(state.external, bulk.external, bool(state.external_apart))
@@ -158,8 +158,8 @@ def index(frame: FrameIndex | UnknownValue) -> int:
     return frame.index if isinstance(frame, FrameIndex) else -1
 
 
-def refusal(unclear: UnknownValue, subject: str, cause: str = "") -> Refusal:
-    return Refusal(unclear.code, f"{subject}{unclear.message}", cause)
+def refusal(unclear: UnknownValue, subject: str, cause: str = "") -> RowRefusal:
+    return RowRefusal(unclear.code, f"{subject}{unclear.message}", cause)
 
 
 def path_of(arc: Arc | None) -> tuple[float, ...]:

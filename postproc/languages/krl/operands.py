@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
 
-from postproc.languages.krl.effects import HERE, READS_POSITION
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.expressions import index_text
 from postproc.languages.krl.lexing import NAME, identifiers
 from postproc.languages.krl.source_map import PointVariable
+from postproc.languages.krl.statement_effects import HERE, READS_POSITION
 from postproc.languages.krl.target import KrlTarget, UnknownValue, parse, shown
 
 _NAMED = re.compile(

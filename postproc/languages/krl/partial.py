@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from postproc.languages.krl.modal_state import Anchor, ModalState
-from postproc.languages.krl.motion_rows import Refusal
+from postproc.languages.krl.motion_rows import RowRefusal
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import KrlTarget, Six, six
 
@@ -35,13 +35,15 @@ def anchored(own: Six, anchor: Anchor) -> tuple[Numbers | None, Anchor | None]:
     return None, Anchor(anchor.row, given) if all(open_angles) or not any(open_angles) else None
 
 
-def incomplete(state: ModalState, target: KrlTarget, values: Numbers | None) -> Refusal | None:
+def incomplete(state: ModalState, target: KrlTarget, values: Numbers | None) -> RowRefusal | None:
     names = ", ".join(target.missing)
     if target.axes is None and state.point_frames not in (None, (state.base, state.tool)):
-        return Refusal("KRL017", f"the point omits {names}, and base or tool changed since the point before")
+        return RowRefusal(
+            "KRL017", f"the point omits {names}, and base or tool changed since the point before"
+        )
     if values is None:
         why = state.point_unknown
         if target.axes is not None and not why.startswith("no motion"):
             why = "the motion before it does not define the axes"
-        return Refusal("KRL004", f"the point omits {names}, and the position is not known: {why}", why)
+        return RowRefusal("KRL004", f"the point omits {names}, and the position is not known: {why}", why)
     return None

@@ -8,11 +8,11 @@ from postproc.languages.krl import motions
 from postproc.languages.krl.assignments import assign, declare
 from postproc.languages.krl.block_follower import BUDGET
 from postproc.languages.krl.calls import Calls, Restart
-from postproc.languages.krl.effects import HIDDEN, effects_of, functions_of
 from postproc.languages.krl.external_axes import ALL_LOST, by_themselves
 from postproc.languages.krl.lexing import Assignment, Call, Declared, Statement, has_foreign_letters
 from postproc.languages.krl.modal_state import InlineFormState, ModalState
 from postproc.languages.krl.program_structure import INLINE, Routine
+from postproc.languages.krl.statement_effects import HIDDEN, effects_of, functions_of
 from postproc.languages.krl.vectorised import VectorisedLines
 from postproc.toolpath import Annotation
 

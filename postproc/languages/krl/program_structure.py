@@ -6,16 +6,6 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from postproc.languages.krl.effects import (
-    HERE,
-    MODAL,
-    Effect,
-    Effects,
-    effects_of,
-    functions_of,
-    is_harmless,
-    read_by,
-)
 from postproc.languages.krl.lexing import (
     BRANCHES,
     CLOSES,
@@ -26,6 +16,16 @@ from postproc.languages.krl.lexing import (
     Head,
     Statement,
     identifiers,
+)
+from postproc.languages.krl.statement_effects import (
+    HERE,
+    MODAL,
+    Effect,
+    Effects,
+    effects_of,
+    functions_of,
+    is_harmless,
+    read_by,
 )
 
 MOST_EFFECTS = 200

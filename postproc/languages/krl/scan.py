@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.base.arrays import Floats
+from postproc.base.array_storage import ArrayStore
+from postproc.base.arrays import Floats, is_shared
 from postproc.base.batches import in_blocks
 from postproc.base.decimals import literals
-from postproc.base.document import BLOCK, Document, Store, offset_type
+from postproc.base.document import BLOCK, Document, offset_type
 from postproc.languages.krl.execution_context import Item
 from postproc.languages.krl.external_axes import UNSTATED, six
 from postproc.languages.krl.lexing import statement
@@ -51,7 +52,7 @@ _IN_NUMBER[list(b"0123456789.+-")] = True
 def scan(document: Document, fast: bool) -> Iterator[Item]:
     """The statements of a program in the order of the text; ``fast``: runs of common lines as one."""
     raw = document.raw
-    store = Store()
+    store = ArrayStore()
     line, place = 1, len(BOM_UTF8) if document.raw.startswith(BOM_UTF8) else 0
     runs = [found.span() for found in _RUN.finditer(raw, place)] if fast else []
     groups = _groups(runs)
@@ -76,7 +77,7 @@ def _groups(runs: Sequence[tuple[int, int]]) -> list[Sequence[tuple[int, int]]]:
     return [runs[a:b] for a, b in pairwise(bounds) if a < b]
 
 
-def _kept(bulk: VectorisedLines, line: int, store: Store) -> VectorisedLines:
+def _kept(bulk: VectorisedLines, line: int, store: ArrayStore) -> VectorisedLines:
     """The same where it takes no more memory than it needs, with the number of its first line."""
     external = bulk.external
     return replace(
@@ -88,7 +89,7 @@ def _kept(bulk: VectorisedLines, line: int, store: Store) -> VectorisedLines:
         stop=store.keep(bulk.stop),
         motion=store.keep(bulk.motion),
         approximation=store.keep(bulk.approximation),
-        external=store.keep(external) if external is not None and external.strides[0] else external,
+        external=store.keep(external) if external is not None and not is_shared(external) else external,
     )
 
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from postproc.base.arrays import Bools, FewRows, Floats, Ints
+from postproc.base.arrays import Bools, FewRows, Floats, Ints, is_shared
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.modal_state import Source
-from postproc.languages.krl.motion_rows import MotionRows, Refusal
+from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
 from postproc.languages.krl.motion_table import MotionTable, Spots
 from postproc.languages.krl.program_structure import closure
 from postproc.languages.krl.source_map import KrlSourceMap
@@ -135,7 +135,7 @@ def _used(base: Ints, tool: Ints, frames: tuple[FrameRef, ...]) -> tuple[Ints, I
     return renamed[base], renamed[tool], tuple(frames[i] for i in kept)
 
 
-def _other_calls(run: ExecutionContext, text_called: Iterable[bytes]) -> list[tuple[int, int, Refusal]]:
+def _other_calls(run: ExecutionContext, text_called: Iterable[bytes]) -> list[tuple[int, int, RowRefusal]]:
     """First and last line of routines that also run where their values are not known: they cannot be corrected for the
     calls that are followed."""
     survey = run.survey
@@ -144,7 +144,7 @@ def _other_calls(run: ExecutionContext, text_called: Iterable[bytes]) -> list[tu
         if name in run.followed:
             routine = survey.routines[name]
             last = run.code[min(routine.end, len(run.code) - 1)]
-            reason = Refusal("KRL015", run.why_walked(routine), f"def {routine.line}")
+            reason = RowRefusal("KRL015", run.why_walked(routine), f"def {routine.line}")
             found.append((routine.line, last.line, reason))
     return found
 
@@ -288,7 +288,7 @@ def _reported(rows: MotionRows, table: MotionTable, refused: dict[int, Finding])
 def _told_external(rows: MotionRows, table: MotionTable) -> list[Finding]:
     """What ``check`` says of external axes that do not stay where they are first."""
     first: dict[str, int] = {}
-    if table.external.strides[0]:
+    if not is_shared(table.external):
         for axis, values in enumerate(table.external.T):
             there = np.isfinite(values) | (values == COMPUTED)
             away = there & (values != values[np.argmax(there)])

@@ -13,8 +13,9 @@ from postproc.base.geometry import Poses, lengths, turn_between
 from postproc.base.units import MM
 from postproc.compensation.problem import CompensationProblem
 from postproc.verification.pairing import SAME, Pairing
+from postproc.verification.path_grid import PathGrid
 from postproc.verification.run_path import RunPath
-from postproc.verification.tool_placement import PathGrid, PlacedTool, judged, place_tool
+from postproc.verification.tool_placement import PlacedTool, judged, place_tool
 
 STEP = 4.0 * MM
 """Distance of the first samples along a motion."""

@@ -1,0 +1,116 @@
+"""Other candidates in the place of what a search chose."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.base.arrays import Floats
+from postproc.diagnosis.candidate_fits import composed, point_without, with_effects
+from postproc.diagnosis.candidates import Candidate
+from postproc.diagnosis.decoys import decoys
+from postproc.diagnosis.nonlinear_effects import evaluate_at_size
+from postproc.diagnosis.search_result import Alternative, Linear
+from postproc.diagnosis.selection import (
+    Explained,
+    basis_of,
+    beside,
+    complexity_penalty,
+    explained,
+    outside,
+    residual_of,
+    scatter,
+)
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import Fit
+from postproc.identification.noise import Weighting
+
+CLOSE, CLOSE_SHARE, RIVALS = 30.0, 0.05, 3
+"""Alternatives are fitted where -2 ln(likelihood) is linearly worse by less than this, or than this share of the gain;
+so many at most."""
+
+WILD = 5.0
+"""Standard deviations that a reading counts with at most."""
+
+
+def squares_of(fitted: Fit, weights: Weighting, variance: float) -> float:
+    """Squares that a fit leaves, of readings [their variance by ``weights``, wild ones cut] and of priors; ``variance``
+    of the readings as they are seen to scatter."""
+    level = np.sqrt(variance)
+    left = np.minimum(np.abs(weights(fitted.point.residual)), WILD * level)
+    values = fitted.point.values(fitted.unknowns)
+    priors = sum(
+        (level * (u.value - value) / u.prior) ** 2
+        for u, value in zip(fitted.unknowns, values.tolist(), strict=True)
+        if u.prior is not None
+    )
+    return float(left @ left) + float(priors)
+
+
+def find_alternatives(
+    campaign: Campaign, base: Fit, fitted: Fit, linear: Linear, last: Explained
+) -> tuple[Alternative, ...]:
+    """Other candidates in the place of each choice that explain at least half of what it does, nearest first; the
+    nearest are fitted: what is linear is only nearly so."""
+    given, chosen = linear.problem, [linear.candidates[g] for g in last.groups]
+    variance = scatter(given, last)
+    here = squares_of(fitted, fitted.weights, variance)
+    found: list[Alternative] = []
+    for group in last.groups:
+        mine = linear.candidates[group]
+        rest = explained(given, tuple(g for g in last.groups if g != group))
+        gain, left = rest.squares - last.squares, residual_of(given, rest)
+
+        def paid(columns: Floats, rest: Explained = rest, left: Floats = left) -> float:
+            return complexity_penalty(beside(given, rest, columns), left, variance)
+
+        def scaled(g: int) -> Floats:
+            return given.matrix[:, given.places[g]] * given.size[given.places[g]]
+
+        own, of_mine = paid(scaled(group)), []
+        against = [
+            *enumerate(linear.candidates),
+            *((-1, decoy) for decoy in decoys(base.model, campaign.readings.q, mine)),
+        ]
+        for other, candidate in against:
+            if other in last.groups or candidate.contains(mine) or mine.contains(candidate):
+                continue
+            if candidate.nonlinear:
+                instead, squares, columns = _instead(campaign, fitted, linear, rest, mine, candidate)
+            else:
+                instead, squares = candidate, explained(given, (*rest.groups, other)).squares
+                columns = scaled(other)
+            if rest.squares - squares > 0.5 * gain:
+                worse = float(squares - last.squares) / variance
+                of_mine.append(Alternative(mine.key, instead, worse, paid(columns) - own, False))
+        of_mine.sort(key=lambda rival: rival.margin)
+        for k, rival in enumerate(of_mine[:RIVALS]):
+            if rival.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
+                there = with_effects(campaign, base, [rival.candidate if c is mine else c for c in chosen])
+                worse = float(squares_of(there, fitted.weights, variance) - here) / variance
+                of_mine[k] = replace(rival, worse=worse, fitted=True)
+        found += of_mine
+    return tuple(sorted(found, key=lambda rival: rival.margin))
+
+
+def _instead(
+    campaign: Campaign, fitted: Fit, linear: Linear, rest: Explained, mine: Candidate, other: Candidate
+) -> tuple[Candidate, float, Floats]:
+    """``other``, that is not linear in its size, as large as explains the most in the place of ``mine`` beside
+    ``rest``; the squares that are left then, and its columns outside of what is explained anyway."""
+    without = point_without(campaign, fitted, [mine])
+    model, unknowns = composed(without.model, [other])
+    basis = basis_of(linear.common)
+    beyond = basis_of(np.concatenate([linear.common, *(linear.columns[g] for g in rest.groups)], axis=1))
+
+    def readings(columns: Floats) -> Floats:
+        below = np.zeros((linear.priors, columns.shape[2]))
+        return np.asarray(np.nan_to_num(np.concatenate([linear.weights(columns), below])))
+
+    large = evaluate_at_size(
+        campaign, without, model, unknowns, lambda columns: outside(beyond, readings(columns))
+    )
+    gain = float(large.target @ large.target - large.left @ large.left)
+    alternative = replace(other, columns=large.columns, start=tuple(large.values.tolist()))
+    return alternative, rest.squares - gain, outside(basis, readings(large.columns))

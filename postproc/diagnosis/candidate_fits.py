@@ -1,0 +1,95 @@
+"""Candidates in a model: the model with them, and its fit to the readings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.base.arrays import Floats
+from postproc.diagnosis.candidates import Candidate
+from postproc.identification.campaign import Campaign
+from postproc.identification.fit import Fit, fit
+from postproc.identification.least_squares import Point, at, scales
+from postproc.identification.unknowns import Unknown, unknowns_of, with_mechanism
+from postproc.model import StiffnessModel
+
+
+def in_scales(fitted: Fit, unknowns: Sequence[Unknown]) -> Floats:
+    """(P,) what was found of unknowns, from their nulls, in their scales."""
+    nulls = np.array([u.parameter.null for u in unknowns])
+    return np.asarray((fitted.point.values(unknowns) - nulls) / scales(unknowns))
+
+
+def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> Fit:
+    """The non-linear fit with the effects ``chosen`` added to ``base``, its own unknowns fitted along."""
+    model, unknowns = composed(base.model, chosen)
+    start: dict[tuple[int, str], float] = {}
+    for candidate in chosen:
+        start |= _begun(campaign, base, model, candidate)
+    own = [u for u in base.asked if u.key in {b.key for b in base.unknowns}]
+    # what turns out not to be seen stays where it is begun with: without a length a spring is none
+    looked = [replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in unknowns]
+    return fit(campaign, model.with_values(start), [*own, *looked], given=base.point.given)
+
+
+def _begun(
+    campaign: Campaign, base: Fit, model: StiffnessModel, candidate: Candidate
+) -> dict[tuple[int, str], float]:
+    """Values to start a fit of ``candidate`` in ``model`` with; those that no reading sees stay at their null."""
+    term = term_of(model, candidate)
+    if term is None or not candidate.start:
+        return {}
+    nulls = {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
+    start = dict(zip(nulls, candidate.start, strict=True))
+    there = at(campaign, model.with_values(start), base.point.given)
+    if not there.predicted.converged.all():
+        return {}
+    for key, null in nulls.items():
+        without = at(
+            campaign, model.with_values({**start, key: null}), base.point.given, there.predicted.displacement
+        )
+        moved = np.linalg.norm(base.weights(np.nan_to_num(without.residual - there.residual)))
+        if without.predicted.converged.all() and moved < 1.0:
+            start[key] = null
+    return start
+
+
+def composed(
+    model: StiffnessModel, chosen: Sequence[Candidate]
+) -> tuple[StiffnessModel, tuple[Unknown, ...]]:
+    """``model`` with the effects of ``chosen``, and their unknowns in it."""
+    unknowns: list[Unknown] = []
+    for candidate in chosen:
+        term = term_of(model, candidate)
+        if term is None:
+            if any(mechanism.kind == candidate.name for mechanism in model.robot.mechanisms):
+                model = with_mechanism(model, type(candidate.effect))
+            else:
+                model = model.with_effect(candidate.effect)
+            term = len(model.terms) - 1
+        names = {u.parameter.name for u in candidate.unknowns}
+        known = {u.key for u in unknowns}
+        unknowns += [u for u in unknowns_of(model, term) if u.parameter.name in names and u.key not in known]
+    return model, tuple(unknowns)
+
+
+def term_of(model: StiffnessModel, candidate: Candidate) -> int | None:
+    wanted = (candidate.name, candidate.effect.described())
+    for index, term in enumerate(model.terms):
+        if (term.effect.name, term.effect.described()) == wanted:
+            return index
+    return None
+
+
+def point_without(campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate]) -> Point:
+    """The fitted model with what was chosen put back to its null: what there is to explain."""
+    nulls: dict[tuple[int, str], float] = {}
+    for candidate in chosen:
+        term = term_of(fitted.model, candidate)
+        if term is not None:
+            nulls |= {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
+    if not nulls:
+        return fitted.point
+    return at(campaign, fitted.model.with_values(nulls), fitted.point.given)

@@ -1,0 +1,73 @@
+"""What a search came to: its choice, its last linear step, and the alternatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from postproc.base.arrays import Floats
+from postproc.diagnosis.candidates import Candidate
+from postproc.diagnosis.decoys import AlternativeForm
+from postproc.diagnosis.selection import (
+    Explained,
+    Problem,
+)
+from postproc.identification.fit import Fit
+from postproc.identification.noise import Weighting
+
+Key = tuple[str, str]
+"""Label of an effect's form, and its joint."""
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A search's last step.  candidates: what was looked at, group by group of ``problem``; whitened and as they are:
+    residual (n,) without what was chosen, common (n, k) columns that are explained anyway, columns (n, p) of each
+    candidate; the last ``priors`` rows are no readings; ``weights`` that it was whitened with."""
+
+    candidates: tuple[Candidate, ...]
+    problem: Problem
+    residual: Floats
+    common: Floats
+    columns: tuple[Floats, ...]
+    priors: int
+    weights: Weighting
+
+
+@dataclass(frozen=True, eq=False)
+class Alternative:
+    """A ``candidate`` in the place of the choice ``of``: by how much -2 ln(likelihood) is ``worse``, and what it pays
+    ``more`` for its parameters (negative: less); ``fitted``, or only linearly so."""
+
+    of: Key
+    candidate: Candidate
+    worse: float
+    more: float
+    fitted: bool
+
+    @property
+    def margin(self) -> float:
+        """By how much it is the lesser explanation; negative: the better one."""
+        return self.worse + self.more
+
+    @property
+    def foil(self) -> bool:
+        """Whether it is never named itself."""
+        return isinstance(self.candidate.effect, AlternativeForm)
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What a search came to.
+
+    base: the model as it is, its own parameters refitted; final: with what was ``chosen``; untestable: candidates
+    that these readings cannot show; linear, explained: the last choice; rivals: those of
+    what was chosen, nearest first.
+    """
+
+    base: Fit
+    final: Fit
+    chosen: tuple[Candidate, ...]
+    untestable: tuple[Candidate, ...]
+    linear: Linear
+    explained: Explained
+    rivals: tuple[Alternative, ...]

@@ -1,0 +1,82 @@
+"""Why a motion cannot be corrected, from where it is and the state before it."""
+
+from __future__ import annotations
+
+from postproc.languages.krl.execution_context import ExecutionContext
+from postproc.languages.krl.lexing import LOOPS, SPLINES
+from postproc.languages.krl.modal_state import ModalState
+from postproc.languages.krl.motion_rows import RowRefusal, refusal
+from postproc.languages.krl.target import UnknownValue
+from postproc.toolpath import ArcFrame, Kind, OrientationMode
+
+
+def frames_missing(run: ExecutionContext) -> RowRefusal | None:
+    state = run.state
+    if run.root_set is not None:
+        return RowRefusal("KRL005", f"the robot's place in the world is set in line {run.root_set}", "root")
+    if state.tool_known:
+        return RowRefusal("KRL013", "the tool is fixed in the world ($IPO_MODE=#TCP)", "tcp")
+    for frame in (state.base, state.tool):
+        if isinstance(frame, UnknownValue):
+            return refusal(frame, "", frame.message)
+    return None
+
+
+def orientation_refusal(state: ModalState, kind: Kind) -> RowRefusal | None:
+    """Why it is not known how the tool turns on a motion, or not in a way that is corrected."""
+    if kind not in (Kind.LIN, Kind.CIRC, Kind.SPL):
+        return None
+    if state.orientation == OrientationMode.UNKNOWN:
+        return RowRefusal(
+            "KRL031",
+            "the orientation between the points is not known: $ORI_TYPE is none of #VAR, #CONSTANT, #JOINT",
+            "ori",
+        )
+    if state.orientation == OrientationMode.JOINT and kind is not Kind.SPL:
+        return RowRefusal(
+            "KRL031", "the wrist axes move linearly, and the tool does not ($ORI_TYPE=#JOINT)", "joint"
+        )
+    if (
+        kind is Kind.CIRC
+        and state.orientation == OrientationMode.CONSTANT
+        and state.arc_frame == ArcFrame.PATH
+    ):
+        message = "the tool rotates with the executed arc ($ORI_TYPE=#CONSTANT, $CIRC_TYPE=#PATH)"
+        return RowRefusal("KRL031", message, "path")
+    if kind is Kind.CIRC and state.arc_frame == ArcFrame.UNKNOWN:
+        return RowRefusal(
+            "KRL031",
+            "the orientation on the arc is not known: $CIRC_TYPE or $CIRC_MODE is not understood",
+            "circ",
+        )
+    return None
+
+
+def is_detached(run: ExecutionContext) -> bool:
+    """Whether the motion does not follow the one before it: it never runs, or nobody knows when."""
+    return run.idle or run.walked
+
+
+def structure_refusal(run: ExecutionContext) -> RowRefusal | None:
+    """The reason that lies in where the motion is."""
+    routine = run.routine
+    if run.idle:
+        return RowRefusal(
+            "KRL023", "the flow that the program's constants define does not lead here", "never"
+        )
+    if routine is None:
+        if run.survey.has_routine:
+            return RowRefusal("KRL014", "the motion is outside every DEF", "outside")
+    elif run.walked:
+        return RowRefusal("KRL015", run.why_walked(routine), f"def {routine.line}")
+    for item in run.stack:
+        word = item.block.word
+        if not item.followed and word not in SPLINES:
+            what = "loop" if word in LOOPS else "branch"
+            told = word.decode("latin-1")
+            return RowRefusal(
+                "KRL006",
+                f"it is inside the {what} ({told}) of line {item.block.line}",
+                f"in {item.block.line}",
+            )
+    return None

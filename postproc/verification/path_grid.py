@@ -1,0 +1,111 @@
+"""The wanted path as a grid of nodes, with the displacement of a tool that is sent there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints, sums
+from postproc.base.batches import each_block
+from postproc.base.geometry import Poses, lengths
+from postproc.base.units import MM
+from postproc.compensation.problem import CompensationProblem
+from postproc.verification.run_path import RunPath
+
+NODES = 2.0 * MM
+"""Distance of the nodes on the wanted path, at most."""
+
+LEAST_NODES = 2
+"""Intervals of a motion at least."""
+
+SPOT = 1e-6
+"""[m] A motion that is not longer only turns the tool."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathGrid:
+    """J nodes on the wanted path, one stretch after another: ``first`` (K + 1,) where each stretch starts.
+
+    row (J,) and share (J,) of its path; arc (J,) [m] along the stretch; v (J, 3) [m], tangent (J, 3); gap (J,): the
+    interval to the next node is within one vertex; of the last node of a stretch there is none.  goal_at (J, 3) [m];
+    farthest [m]: the largest displacement.
+    """
+
+    original: CompensationProblem
+    path: RunPath
+    first: Ints
+    row: Ints
+    share: Floats
+    arc: Floats
+    v: Floats
+    tangent: Floats
+    gap: Bools
+    goal_at: Floats
+    farthest: float
+
+    @staticmethod
+    def of(original: CompensationProblem, path: RunPath, start: Ints, stop: Ints) -> PathGrid:
+        """Of the stretches of rows ``start`` to before ``stop`` (K,)."""
+        count = stop - start
+        rows = np.repeat(start - sums(count)[:-1], count) + np.arange(count.sum())
+        length = original.desired_path.length[rows]
+        parts = np.maximum(LEAST_NODES, np.ceil(length / NODES)).astype(np.int64)
+        at = sums(parts + 1)
+        row = np.repeat(rows, parts + 1)
+        number = np.arange(len(row)) - np.repeat(at[:-1], parts + 1)
+        share = number / np.repeat(parts, parts + 1)
+        first = at[sums(count)]
+        before = np.append(0.0, np.cumsum(length))
+        own = before[:-1] - np.repeat(before[sums(count)[:-1]], count)
+        arc = np.repeat(own, parts + 1) + share * np.repeat(length, parts + 1)
+        v, tangent, goals = (np.empty((len(row), 3)) for _ in range(3))
+
+        def made(part: slice) -> None:
+            there = path.at(row[part], share[part])
+            wrench = original.force.along(row[part], share[part])
+            real = original.simulated(row[part], there, wrench, share=share[part])
+            goal = original.goal(row[part], there, share[part]).position
+            goals[part], v[part] = goal, goal - np.nan_to_num(real.pose.position - there.position)
+            tangent[part] = path.tangent(row[part], share[part])
+
+        each_block(made, len(row))
+        gap = np.append(row[1:] != row[:-1], True)[: len(row)]
+        farthest = float(lengths(goals - v).max(initial=0.0))
+        return PathGrid(original, path, first, row, share, arc, v, tangent, gap, goals, farthest)
+
+    @cached_property
+    def on_the_spot(self) -> Bools:
+        """(N,) motions on the cuts that only turn the tool."""
+        found = np.zeros(len(self.original.toolpath), bool)
+        found[self.row] = self.original.desired_path.length[self.row] < SPOT
+        return found
+
+    def place(self, interval: Ints, part: Floats) -> tuple[Ints, Floats]:
+        """Row (S,) and share (S,) at the parts (S,) of intervals (S,); of a vertex the end of the motion before it."""
+        row, share = self.row[interval], self.share[interval]
+        step = np.where(
+            self.gap[interval], 0.0, self.share[np.minimum(interval + 1, len(self.row) - 1)] - share
+        )
+        return row, share + part * step
+
+    def along(self, interval: Ints, part: Floats) -> Floats:
+        """(S,) [m] along the stretch, at ``part`` (S,) of ``interval`` (S,)."""
+        step = self.arc[interval + 1] - self.arc[interval]
+        return self.arc[interval] + part * step
+
+    def goal(self, interval: Ints, part: Floats) -> tuple[Poses, Floats, Floats]:
+        """Goal poses (S), tangents (S, 3) and wrenches (S, 6) at the parts (S,) of intervals."""
+        row, share = self.place(interval, part)
+        wanted = self.path.at(row, share)
+        goal = self.original.goal(row, wanted, share)
+        tangent, wrench = self.path.tangent(row, share), self.original.force.along(row, share)
+        over = np.flatnonzero(self.gap[interval])
+        if len(over):
+            other, start = self.row[interval[over] + 1], np.zeros(len(over))
+            weight = part[over, None]
+            turned = (1 - weight) * tangent[over] + weight * self.path.tangent(other, start)
+            tangent[over] = turned / np.maximum(lengths(turned), 1e-12)[:, None]
+            wrench[over] = (1 - weight) * wrench[over] + weight * self.original.force.along(other, start)
+        return goal, tangent, wrench
