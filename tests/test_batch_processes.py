@@ -75,17 +75,19 @@ def test_a_defect_is_an_outcome(parts, monkeypatch):
 
 
 HOLD = """
-import sys, time
+import sys
 from pathlib import Path
 from postproc.batch.locking import locked
 with locked(Path(sys.argv[1])):
     print("held", flush=True)
-    time.sleep(float(sys.argv[2]))
+    sys.stdin.read()
 """
 
 
-def holder(path: Path, seconds: float) -> subprocess.Popen:
-    process = subprocess.Popen([sys.executable, "-c", HOLD, str(path), str(seconds)], stdout=subprocess.PIPE)
+def holder(path: Path) -> subprocess.Popen:
+    """A process that holds the lock until its input ends."""
+    words, pipe = [sys.executable, "-c", HOLD, str(path)], subprocess.PIPE
+    process = subprocess.Popen(words, stdin=pipe, stdout=pipe)
     assert process.stdout.readline() == b"held\n"
     return process
 
@@ -93,12 +95,17 @@ def holder(path: Path, seconds: float) -> subprocess.Popen:
 def test_a_lock_waits_for_its_holder_and_survives_its_death(tmp_path):
     path = tmp_path / "state" / "x.lock"
     waited: list[int] = []
-    process = holder(path, 0.5)
-    with locked(path, lambda: waited.append(1)):
+    process = holder(path)
+
+    def wait() -> None:
+        waited.append(1)
+        process.stdin.close()
+
+    with locked(path, wait):
         assert process.wait() == 0
     assert waited == [1]
     assert not path.parent.exists()
-    process = holder(path, 60.0)
+    process = holder(path)
     process.kill()
     process.wait()
     assert path.exists()
@@ -218,7 +225,7 @@ def test_workers_die_with_their_batch(parts, tmp_path):
         program(parts / f"p{number}.src", number)
     words = [sys.executable, "-m", "postproc", "batch", str(parts), "--force", "-j", "2", "-q"]
     process = subprocess.Popen(words)
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while not (parts / "compensated" / "p1.src").exists() and time.monotonic() < deadline:
         time.sleep(0.02)
     workers = worker_ids(process.pid)
@@ -234,12 +241,12 @@ def interrupted(parts, begun, delay=0.0):
     """A batch to whose process group an interrupt is sent ``delay`` s after ``begun(process)``; what it wrote."""
     words = [sys.executable, "-m", "postproc", "batch", str(parts), "--force", "-j", "2"]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True)
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while not begun(process) and time.monotonic() < deadline:
         time.sleep(0.005)
     time.sleep(delay)
     os.killpg(process.pid, signal.SIGINT)
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=300)
     assert out == b""
     return process, err
 

@@ -198,7 +198,7 @@ def source() -> Source:
     return Source(package())
 
 
-ROOMS = sorted({path.split("/")[0] for path in package()})
+ROOMS = sorted({path.relative_to(ROOT).parts[0] for path in ROOT.rglob("*.py")})
 
 NOT_YET = {"toolpath/toolpath.py"}
 """Modules that are not read yet: the fields of ``Toolpath`` are being named anew."""

@@ -216,6 +216,7 @@ def test_every_module_that_is_named_exists():
     assert not missing
 
 
+@pytest.mark.slow
 def test_the_picture_of_the_front_page_can_be_drawn_again(tmp_path):
     folder = ROOT / "samples" / "kr270_panel"
     drawn = tmp_path / "drawn.svg"

@@ -104,11 +104,11 @@ def test_a_batch_is_ended_by_the_end_of_the_session(job):
     job.program.unlink()
     words = [sys.executable, "-m", "postproc", "batch", str(job.folder), "--force", "-j", "2"]
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    deadline = time.monotonic() + 60
+    deadline = time.monotonic() + 300
     while not list(job.output.parent.glob("*.src")) and time.monotonic() < deadline:
         time.sleep(0.02)
     process.terminate()
-    out, err = process.communicate(timeout=60)
+    out, err = process.communicate(timeout=300)
     assert (process.returncode, out) == (143, b"")
     assert b"continues from there" in err
     assert b"Traceback" not in err

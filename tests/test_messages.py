@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import itertools
 import re
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -93,6 +94,10 @@ COMPOSED = {
 """Templates whose verb is in one of their values."""
 
 
+parse = cache(ast.parse)
+"""Of a source; most tests read all of them."""
+
+
 def flat(node):
     """The text of a string or f-string, each value of it as ``{}``; None for anything else."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
@@ -156,7 +161,7 @@ def arguments(call):
 
 def collect(source):
     """(line, text) of the messages and helps of all findings, and of all exceptions, in a source text."""
-    tree = ast.parse(source)
+    tree = parse(source)
     names: dict[ast.AST, dict] = {}
     for function in ast.walk(tree):
         if isinstance(function, ast.FunctionDef):
@@ -174,7 +179,7 @@ def collect(source):
 
 def literals(source):
     """(line, text) of every text of a source but its docstrings and the help of command-line options."""
-    tree = ast.parse(source)
+    tree = parse(source)
     skipped = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.Expr):
@@ -210,6 +215,7 @@ def is_composed(text):
     return text in COMPOSED or not re.search(r"[a-z]{2}", text)
 
 
+@cache
 def sources():
     """Path -> source of every module that reports something about an input; reports and schemas have other words."""
     return {
@@ -268,7 +274,7 @@ def test_the_rooms_tables_are_apart_and_complete():
     named = {
         node.value
         for source in sources().values()
-        for node in ast.walk(ast.parse(source))
+        for node in ast.walk(parse(source))
         if isinstance(node, ast.Constant) and isinstance(node.value, str) and CODE.match(node.value)
     }
     assert named == set(ALL)
@@ -291,7 +297,7 @@ def test_a_module_knows_the_codes_that_it_uses():
     names = {}
     for path, source in sources().items():
         parts = ["postproc", *Path(path).with_suffix("").parts]
-        names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = ast.parse(source)
+        names[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = parse(source)
     for name, tree in names.items():
         wanted = graph.setdefault(name, set())
         wanted.update(".".join(name.split(".")[:k]) for k in range(1, name.count(".") + 1))

@@ -34,39 +34,35 @@ MAP = MapRequest(
 )
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """name -> (result, its page, how it is shown on a terminal, how its page is made)."""
+def mapped(folder):
+    return map_workspace(replace(MAP, page=folder / "map.html", csv=folder / "sub" / "map.csv"))
+
+
+def identified(folder):
+    data, effects = SAMPLES / "kr270_campaign" / "loads.csv", ("joint_compliance", "gravity_compensator")
+    written = {"output": folder / "new.yaml", "page": folder / "identify.html"}
+    return identify(IdentifyRequest((data,), None, effects, bootstrap=20, **written))
+
+
+def diagnosed(folder):
+    data, robot = (SAMPLES / "kr270_missing_compensator" / name for name in ("loads.csv", "kr270_plain.yaml"))
+    written = {"output": folder / "found.yaml", "page": folder / "diagnose.html"}
+    return diagnose_robot(DiagnoseRequest((data,), str(robot), **written))
+
+
+WAYS = {
+    "map": (mapped, show_map, mapped_page),
+    "identify": (identified, show_identified, identified_page),
+    "diagnose": (diagnosed, show_diagnosed, diagnosed_page),
+}
+
+
+@pytest.fixture(scope="module", params=WAYS)
+def one(request, tmp_path_factory):
+    """A result, its page, how it is shown on a terminal, how its page is made."""
     folder = tmp_path_factory.mktemp("results")
-    mapped = map_workspace(replace(MAP, page=folder / "map.html", csv=folder / "sub" / "map.csv"))
-    identified = identify(
-        IdentifyRequest(
-            (SAMPLES / "kr270_campaign" / "loads.csv",),
-            None,
-            ("joint_compliance", "gravity_compensator"),
-            output=folder / "new.yaml",
-            page=folder / "identify.html",
-        )
-    )
-    story = SAMPLES / "kr270_missing_compensator"
-    diagnosed = diagnose_robot(
-        DiagnoseRequest(
-            (story / "loads.csv",),
-            str(story / "kr270_plain.yaml"),
-            output=folder / "found.yaml",
-            page=folder / "diagnose.html",
-        )
-    )
-    return {
-        "map": (mapped, folder / "map.html", show_map, mapped_page),
-        "identify": (identified, folder / "identify.html", show_identified, identified_page),
-        "diagnose": (diagnosed, folder / "diagnose.html", show_diagnosed, diagnosed_page),
-    }
-
-
-@pytest.fixture(params=["map", "identify", "diagnose"])
-def one(request, made):
-    return made[request.param]
+    make, show, page = WAYS[request.param]
+    return make(folder), folder / f"{request.param}.html", show, page
 
 
 @pytest.mark.slow

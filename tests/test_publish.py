@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 import sys
 import threading
@@ -122,30 +121,33 @@ def test_a_file_that_is_being_written_is_not_swept(tmp_path):
 LOOP = """
 import sys
 from pathlib import Path
-from postproc.output.atomic_write import publish
+from postproc.output.atomic_write import write_atomically
 folder = Path(sys.argv[1])
 n = 0
 while True:
     n += 1
     text = (b"%d" % n) * 20000
-    publish({folder / "a.src": text, folder / "a.dat": text}, last=folder / "a.src")
+    write_atomically({folder / "a.src": text, folder / "a.dat": text}, last=folder / "a.src")
 """
 
 
-def test_a_killed_writer_never_leaves_half_a_file(tmp_path):
-    for round in range(12):
-        folder = tmp_path / str(round)
-        folder.mkdir()
-        writer = subprocess.Popen([sys.executable, "-c", LOOP, str(folder)])
-        deadline = time.monotonic() + 20
-        while not (folder / "a.src").exists() and time.monotonic() < deadline:
+@pytest.mark.sample(3)
+@pytest.mark.parametrize("step", range(12))
+def test_a_killed_writer_never_leaves_half_a_file(tmp_path, step):
+    program, data = tmp_path / "a.src", tmp_path / "a.dat"
+    writer = subprocess.Popen([sys.executable, "-c", LOOP, str(tmp_path)])
+    try:
+        deadline = time.monotonic() + 60
+        while not program.exists():
+            assert writer.poll() is None, "the writer ended by itself"
+            assert time.monotonic() < deadline, "the writer has written nothing"
             time.sleep(0.002)
-        time.sleep(0.0013 * round)
-        writer.send_signal(signal.SIGKILL)
+        time.sleep(0.0013 * step)
+        assert writer.poll() is None, "the writer ended by itself"
+    finally:
+        writer.kill()
         writer.wait()
-        program, data = folder / "a.src", folder / "a.dat"
-        if program.exists():
-            text = program.read_bytes()
-            assert data.read_bytes() == text
-            number = text[: len(text) // 20000]
-            assert text == number * 20000
+    text = program.read_bytes()
+    assert data.read_bytes() == text
+    number = text[: len(text) // 20000]
+    assert text == number * 20000

@@ -33,9 +33,12 @@ RUNS = {
     "map": ["map", *MAP, "--z", "500:900", "--force", "0,360,560"],
     "map, out of reach": ["map", *MAP, "--z", "9000", "--force", "0,360,560"],
     "identify": [
-        "identify", "loads.csv", "--effects", "joint_compliance,gravity_compensator", "--validate", "check.csv"
+        "identify", "loads.csv", "--effects", "joint_compliance,gravity_compensator", "--validate", "check.csv",
+        "--bootstrap", "20",
     ],
-    "identify, no folds": ["identify", "loads.csv", "--effects", "joint_compliance.c2", "--folds", "0"],
+    "identify, no folds": [
+        "identify", "loads.csv", "--effects", "joint_compliance.c2", "--folds", "0", "--bootstrap", "0"
+    ],
     "plan": ["plan", "--effects", "joint_compliance,gravity_compensator", *PLAN],
     "plan, two effects": [
         "plan", "--effects", "joint_compliance", "--discriminate", "gravity_compensator,link_compliance", *PLAN
@@ -45,6 +48,7 @@ RUNS = {
     "robots": ["robots"],
     "robots, one": ["robots", "kr270_shop.yaml"],
 }  # fmt: skip
+LONG = {"plan, two effects"}
 SAMPLE = {"identify": CAMPAIGN, "diagnose": MISSING}
 FAILING = {
     "report": ["none.src", "--force"],
@@ -97,7 +101,10 @@ def run(words: list[str], folder: Path):
     return json.loads(done.stdout)
 
 
-@pytest.fixture(scope="module", params=RUNS)
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(run, marks=pytest.mark.slow) if run in LONG else run for run in RUNS],
+)
 def ran(request, tmp_path_factory):
     """Name of a schema, and a result of its command."""
     folder = tmp_path_factory.mktemp("run") / "here"

@@ -1,11 +1,15 @@
 """Which tests the fast tier has."""
 
 import os
+import re
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
 from tiers import FAST, examples, in_sample
+
+import postproc
 
 
 @pytest.mark.parametrize("of", [1, 2, 5, 12, 984])
@@ -30,3 +34,14 @@ def test_laws_try_all_their_examples_where_everything_runs(request):
 @pytest.mark.slow
 def test_a_slow_test_runs_where_it_is_asked_for(request):
     assert request.config.getoption("markexpr") != FAST
+
+
+def test_every_room_has_tests_in_the_fast_tier(request):
+    """A test file is of those rooms that it imports from."""
+    files = {item.path for item in request.session.items if not item.get_closest_marker("slow")}
+    if len(files) < 0.9 * len(list(Path(__file__).parent.glob("test_*.py"))):
+        pytest.skip("not all files are collected")
+    tested = {room for path in files for room in re.findall(r"\bpostproc\.(\w+)", path.read_text())}
+    rooms = {path.parent.name for path in Path(postproc.__file__).parent.glob("*/__init__.py")}
+    assert len(rooms) > 10
+    assert rooms <= tested
