@@ -13,7 +13,7 @@ _TOKEN = re.compile(
     rb"[ \t\x0b\x0c]+"
     rb"|(?P<slash>/[ \t]*[1-9]?(?!\d))"
     rb"|(?P<name>[A-Za-z_][A-Za-z_]+)"
-    rb"|(?P<letter>[A-Za-z])[ \t]*(?:(?P<number>"
+    rb"|(?P<letter>[A-Za-z])[ \t]*+(?:(?P<number>"
     + _NUMBER
     + rb")(?![\d.#\[])|(?P<sign>[-+]?[ \t]*)(?P<open>[#\[]"
     rb"|[A-Za-z]{2,5}[ \t]*\[))"
