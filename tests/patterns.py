@@ -32,11 +32,15 @@ def find_patterns() -> list[Pattern]:
             last = name.split(".")[-1].split("[")[0]
             uses = here if last.startswith("_") else everywhere
             for use in sorted(uses.get(last, {"match", "search"})):
-                found.setdefault((pattern.pattern, pattern.flags, use), (f"{module.__name__}.{name}", pattern, use))
+                found.setdefault(
+                    (pattern.pattern, pattern.flags, use), (f"{module.__name__}.{name}", pattern, use)
+                )
         if isinstance(comment := getattr(module, "COMMENT", None), bytes):  # compiled by the lexer
             found.setdefault(comment, (f"{module.__name__}.COMMENT", re.compile(comment, re.M), "search"))
         for line, pattern, use in _written_in_functions(trees[module.__name__]):
-            found.setdefault((pattern.pattern, pattern.flags, use), (f"{module.__name__}:{line}", pattern, use))
+            found.setdefault(
+                (pattern.pattern, pattern.flags, use), (f"{module.__name__}:{line}", pattern, use)
+            )
     return list(found.values())
 
 
@@ -55,7 +59,9 @@ def _patterns_in(names: dict, before: str, deep: int = 0) -> Iterator[tuple[str,
         elif isinstance(value, dict) and deep < 3 and not str(name).startswith("__"):
             yield from _patterns_in({f"[{key!r}]": each for key, each in value.items()}, place, deep + 1)
         elif isinstance(value, tuple | list | frozenset | set) and deep < 3:
-            yield from _patterns_in({f"[{number}]": each for number, each in enumerate(value)}, place, deep + 1)
+            yield from _patterns_in(
+                {f"[{number}]": each for number, each in enumerate(value)}, place, deep + 1
+            )
         elif isinstance(value, type) and value.__module__.startswith("postproc") and deep < 2:
             yield from _patterns_in(dict(vars(value)), f"{place}.", deep + 1)
         elif hasattr(value, "__dataclass_fields__") and not isinstance(value, type) and deep < 3:
@@ -78,7 +84,7 @@ def _uses_of_names(trees: Iterable[ast.Module]) -> dict[str, set[str]]:
 
 
 def _written_in_functions(tree: ast.Module) -> Iterator[tuple[int, re.Pattern, str]]:
-    """Patterns as literals of `re.match(...)` and the like; what is put together there has its parts replaced by a letter."""
+    """Patterns as literals of `re.match(...)` and the like; a part that is put in is a letter here."""
     functions = [each for each in ast.walk(tree) if isinstance(each, ast.FunctionDef)]
     for node in (inner for function in functions for inner in ast.walk(function)):
         called = isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)

@@ -15,7 +15,7 @@ LARGE = "postproc.languages.krl.scan._RUN"
 
 PATTERNS = [each for each in find_patterns() if each[0] != LARGE]
 CASES = {f"{case.kind}: {case.name}": case for case in all_cases()}
-RUNS = (" ", "\t", "0", "a", "A", '"', "'", "{", "}", "(", "[", "]", ",", ".", "-", "=", ":", ";", "#", "/", "a ", "1,", "[0", "S ")
+RUNS = (*" \t0aA\"'{}([],.-=:;#/", "a ", "1,", "[0", "S ")
 
 
 @pytest.mark.parametrize(
@@ -58,7 +58,10 @@ def test_no_pattern_costs_more_than_linear_time(where):
 def test_all_modules_are_looked_at():
     places = {name for name, _, _ in PATTERNS}
     assert len(PATTERNS) > 120
-    assert {"postproc.languages.krl.lexing._ASSIGNMENT", "postproc.languages.gcode.kuka_cnc._SYSTEM"} <= places
+    assert {
+        "postproc.languages.krl.lexing._ASSIGNMENT",
+        "postproc.languages.gcode.kuka_cnc._SYSTEM",
+    } <= places
 
 
 def _time(pattern: re.Pattern, use: str, text: str | bytes) -> float:
@@ -77,7 +80,8 @@ def _time(pattern: re.Pattern, use: str, text: str | bytes) -> float:
 def _texts(pattern: re.Pattern, size: int) -> list[str | bytes]:
     """Runs, alone and after what the pattern starts with."""
     starts = sorted({"", *re.findall(r"[A-Z]{2,}|[A-Z#$;(\[%O]", str(pattern.pattern))})[:12]
-    texts: list = [before + run * (size // len(run)) + after for before in starts for run in RUNS for after in ("", "!\n")]
+    runs = [run * (size // len(run)) for run in RUNS]
+    texts: list = [before + run + after for before in starts for run in runs for after in ("", "!\n")]
     return [text.encode() for text in texts] if isinstance(pattern.pattern, bytes) else texts
 
 
@@ -107,13 +111,12 @@ def test_a_hostile_file_is_read_or_refused_in_time(name):
 def test_hostile_files_are_read_in_linear_time(kind):
     """Twice as much takes twice as long: judged where it takes so long that it can be judged."""
     import_readers()
-    for name, case in list(CASES.items())[:: 1 if kind == "urdf" else 3]:
-        if case.kind != kind:
-            continue
+    of_kind = [(name, case) for name, case in CASES.items() if case.kind == kind]
+    for name, case in of_kind[:: 1 if kind == "urdf" else 4]:
         small = measure(case, MB // 10)
         assert not small.error, name
+        assert small.seconds < 2 * SECONDS, name
         assert small.megabytes < MEGABYTES, name
         if small.seconds > 0.3:
-            large = measure(case, MB // 5)
-            ratio = min(large.seconds, measure(case, MB // 5).seconds) / min(small.seconds, measure(case, MB // 10).seconds)
-            assert ratio < 3, (name, small, large)
+            once, twice = (min(measure(case, size).seconds for _ in range(3)) for size in (MB // 10, MB // 5))
+            assert twice < 3 * once, name
