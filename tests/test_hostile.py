@@ -357,7 +357,7 @@ def test_links_stay_where_nothing_is_written(job):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     failed = 0
-    for at in range(24, 40, 3):
+    for at in range(12, 36, 3):
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir()
         for name in NAMES:

@@ -110,7 +110,13 @@ class Refusal(Exception):
         self.findings = findings
 
 
+LONGEST_WORD = 100
+"""Longer words are not compared: that takes the product of their lengths."""
+
+
 def nearest(word: str, words: Iterable[str]) -> str:
     """``; did you mean 'x'?`` for a misspelt word, or nothing."""
-    match = difflib.get_close_matches(word, list(words), 1, 0.5)
+    if len(word) > LONGEST_WORD:
+        return ""
+    match = difflib.get_close_matches(word, [each for each in words if len(each) <= LONGEST_WORD], 1, 0.5)
     return f"; did you mean {match[0]!r}?" if match else ""

@@ -27,7 +27,7 @@ _UNITS = {
     "degC": (("degc", "°c", "c"), "degrees Celsius are expected"),
     "": ((), "this column has no unit"),
 }
-_WITH_UNIT = re.compile(r"(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))")
+_BRACKETS = {"]": "[", ")": "("}
 _JOINT_LIKE = re.compile(r"[aej][0-9]+")
 
 
@@ -87,12 +87,21 @@ def _heads(table: CsvTable, joints: Sequence[tuple[str, bool]]) -> Mapping[str, 
     own = [name.lower() for name, _ in joints]
     heads: dict[str, tuple[str, str]] = {}
     for head in table.columns:
-        match = None if head in own else _WITH_UNIT.fullmatch(head)
-        name, unit = (match[1], match[2] or match[3] or "") if match else (head, "")
+        name, unit = (head, "") if head in own else _split_unit(head)
         if name in heads:
             raise table.header_error(f"columns {heads[name][0]!r} and {head!r} are the same")
         heads[name] = head, " ".join(unit.split())
     return heads
+
+
+def _split_unit(head: str) -> tuple[str, str]:
+    """Name and unit of ``name [unit]`` or ``name (unit)``."""
+    closing = head[-1:]
+    if closing not in _BRACKETS:
+        return head, ""
+    opening = head.find(_BRACKETS[closing], head.rfind(closing, 0, -1) + 1)
+    name = head[: max(opening, 0)].rstrip()
+    return (head, "") if opening < 0 or "\n" in name else (name, head[opening + 1 : -1])
 
 
 def _joint_columns(table: CsvTable, heads: Collection[str], joints: Sequence[tuple[str, bool]]) -> list[str]:

@@ -20,7 +20,7 @@ FRAMES = ("tracker", "robot")
 
 # the name of a target may hold a colon, numbers do not
 _TARGET = re.compile(r"target(\s.*|\s*)[:=]([^:=]*)", re.IGNORECASE)
-_KEYED = re.compile(r"([^:=]*?)\s*[:=]\s*(.*)")
+_KEYED = re.compile(r"([^:=]*+)[:=]\s*+(.*)")
 _CLOSE = 0.75  # of difflib's ratio: sigma is close to sigma_mm, load is not close to tool
 
 
@@ -131,7 +131,7 @@ def _keyed(text: str) -> tuple[str, str, str]:
     if target:
         return "target", target[1].strip(), target[2].strip()
     keyed = _KEYED.fullmatch(text)
-    return (keyed[1].lower(), "", keyed[2].strip()) if keyed else ("", "", "")
+    return (keyed[1].rstrip().lower(), "", keyed[2].strip()) if keyed else ("", "", "")
 
 
 def _almost_a_key(text: str, key: str, value: str) -> str:

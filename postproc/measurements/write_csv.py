@@ -37,7 +37,7 @@ def measurements_csv(readings: Readings, about: Sequence[str] = ()) -> bytes:
         columns["REPEAT"] = [str(number + 1) for number in ids]
     stream = io.StringIO()
     for comment in comments:  # in quotes where a spreadsheet would cut a cell with a formula out of it
-        quote = '"' if re.search(r"[,;\t]\s*[=+@-]", comment) else ""
+        quote = '"' if re.search(r"[,;\t][^\S\t]*+[=+@-]", comment) else ""
         stream.write(f"{quote}# {comment}{quote}\n")
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(columns)

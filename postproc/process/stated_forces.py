@@ -18,7 +18,7 @@ BASE, WORLD, TOOL, FEED = range(4)
 CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
 
 FORM = "fx,fy,fz[,mx,my,mz][@base|world|tool|feed] in N and N m, for example 0,360,560@base"
-_SEPARATOR = re.compile(r"\s*,\s*|\s+")
+_SEPARATOR = re.compile(r"\s++(?:,\s*+)?|,\s*+")
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
 _NUMBER_LIKE = re.compile(r"[-+]?([.,]?[0-9]|nan\b|inf(inity)?\b)", re.IGNORECASE)
 

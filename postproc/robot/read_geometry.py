@@ -201,14 +201,14 @@ def _check_order(section: YamlSection, names: list[str]) -> None:
     """Names that end in a number count up from 1 in the order of the chain: a gap or a swap is a slip."""
     last: dict[str, int] = {}
     for name in names:
-        match = re.fullmatch(r"(.*?)([0-9]+)", name)
-        if match is None:
+        word = name.rstrip("0123456789")
+        number = name[len(word) :]
+        if not number:
             continue
-        word, number = match[1], int(match[2])
         wanted = last.get(word, 0) + 1
-        if number != wanted:
+        if number.lstrip("0") != str(wanted):
             raise section.error("YML002", f"the joint is unknown; did you mean '{word}{wanted}'?", name)
-        last[word] = number
+        last[word] = wanted
 
 
 def _check_count(section: YamlSection, axes: tuple[Axis, ...], count: int) -> None:

@@ -22,6 +22,9 @@ from postproc.base.read_files import read_file
 from postproc.robot.geometries import Link, frame_with_z
 
 MAX_BYTES = 4_000_000
+MOST_JOINTS = 1000
+LONGEST_NAME = 1000
+"""Characters of the name of a mesh: the system walks over all folders in it."""
 MOVING = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
 
 
@@ -67,7 +70,8 @@ def read_urdf(path: Path, base: str | None = None, tip: str | None = None) -> Ar
     for name in (base, tip):
         if name is not None and name not in links:
             raise _wrong(path, 0, f"the link {name!r} is not defined{nearest(name, links)}")
-    end = tip or _only(path, [link for link in links if link not in {j.parent for j in joints}], "tip")
+    parents = {joint.parent for joint in joints}
+    end = tip or _only(path, [link for link in links if link not in parents], "tip")
     way, at = [], end
     while at in by_child and at != base:
         joint = by_child[at]
@@ -75,6 +79,8 @@ def read_urdf(path: Path, base: str | None = None, tip: str | None = None) -> Ar
         at = joint.parent
         if len(way) > len(joints):
             raise _wrong(path, joint.line, "the joints form a circle")
+    if len(way) > MOST_JOINTS:
+        raise _wrong(path, 0, f"there are more than {MOST_JOINTS} joints between base and tip")
     if base is None:
         _only(path, [link for link in links if link not in by_child], "base")
     elif at != base:
@@ -118,6 +124,7 @@ def _parse(path: Path) -> tuple[list[_UrdfJoint], dict[str, int]]:
         raise _wrong(path, 0, f"the file is larger than {MAX_BYTES} bytes")
     joints: list[_UrdfJoint] = []
     links: dict[str, int] = {}
+    names: set[str] = set()
     stack: list[str] = []
     parser = expat.ParserCreate()
 
@@ -133,7 +140,7 @@ def _parse(path: Path) -> tuple[list[_UrdfJoint], dict[str, int]]:
                 raise _wrong(path, line, f"link {name!r} is defined twice")
             links[name] = line
         elif stack == ["robot"] and tag == "joint":
-            joints.append(_joint(path, line, words, joints))
+            joints.append(_joint(path, line, words, names))
         elif stack == ["robot", "joint"]:
             _detail(path, line, joints[-1], tag, words)
         elif tag == "mesh":
@@ -162,7 +169,7 @@ def _parse(path: Path) -> tuple[list[_UrdfJoint], dict[str, int]]:
     return joints, links
 
 
-def _joint(path: Path, line: int, words: dict[str, str], before: list[_UrdfJoint]) -> _UrdfJoint:
+def _joint(path: Path, line: int, words: dict[str, str], names: set[str]) -> _UrdfJoint:
     name, kind = _word(path, line, "joint", words, "name"), _word(path, line, "joint", words, "type")
     if kind != "fixed" and kind not in MOVING:
         allowed = ", ".join(("fixed", *MOVING))
@@ -172,8 +179,9 @@ def _joint(path: Path, line: int, words: dict[str, str], before: list[_UrdfJoint
             f"joint {name}: the type {kind!r} is not supported{nearest(kind, MOVING)}",
             f"use one of: {allowed}",
         )
-    if any(joint.name == name for joint in before):
+    if name in names:
         raise _wrong(path, line, f"joint {name!r} is defined twice")
+    names.add(name)
     return _UrdfJoint(name, kind, line)
 
 
@@ -198,12 +206,19 @@ def _mesh(path: Path, line: int, name: str) -> None:
     if "://" in name and not name.startswith("file://"):
         return
     mesh = path.parent / name.removeprefix("file://")
+    missing = _wrong(
+        path, line, f"mesh {name!r} does not exist", "add the file, or remove the mesh: it is not used"
+    )
+    if len(name) > LONGEST_NAME:
+        raise missing
     if not mesh.resolve().is_relative_to(path.parent.resolve()):
         raise _wrong(path, line, f"mesh {name!r} is outside the URDF's folder")
-    if not mesh.is_file():
-        raise _wrong(
-            path, line, f"mesh {name!r} does not exist", "add the file, or remove the mesh: it is not used"
-        )
+    try:
+        found = mesh.is_file()
+    except OSError:
+        found = False
+    if not found:
+        raise missing
 
 
 def _snapped(rotation: Floats) -> Floats:

@@ -16,8 +16,8 @@ from postproc.toolpath import Annotation
 
 _SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 _HEAD = re.compile(
-    rb"[ \t]*+(?:%[^\r\n]*|;[ \t]*+\$PATH[ \t]*+=[^\r\n]*"
-    rb"|(?:O|:)[ \t]*+(?:\d++|<[^>\r\n]*>)[ \t]*+(?:\([^)\r\n]*\)|;[^\r\n]*)?[ \t]*+)"
+    rb"[ \t]*+(?:%[^\r\n]*+|;[ \t]*+\$PATH[ \t]*+=[^\r\n]*+"
+    rb"|(?:O|:)[ \t]*+(?:\d++|<[^>\r\n]*+>)[ \t]*+(?:\([^)\r\n]*+\)|;[^\r\n]*+)?[ \t]*+)"
     rb"\r?(?:\n|\Z)",
     re.I,
 )

@@ -13,7 +13,7 @@ _TOKEN = re.compile(
     rb"[ \t\x0b\x0c]+"
     rb"|(?P<slash>/[ \t]*[1-9]?(?!\d))"
     rb"|(?P<name>[A-Za-z_][A-Za-z_]+)"
-    rb"|(?P<letter>[A-Za-z])[ \t]*(?:(?P<number>"
+    rb"|(?P<letter>[A-Za-z])[ \t]*+(?:(?P<number>"
     + _NUMBER
     + rb")(?![\d.#\[])|(?P<sign>[-+]?[ \t]*)(?P<open>[#\[]"
     rb"|[A-Za-z]{2,5}[ \t]*\[))"
@@ -52,6 +52,8 @@ def line(text: bytes) -> LexedLine:
         notes.append((kind, said.decode("latin-1")))
 
     place, deleted = 0, False
+    codes: set[int] = set()
+    looked_at = 0  # words whose codes are known
     head = _HEAD.match(text)
     if head is not None:
         place = head.end()
@@ -97,7 +99,9 @@ def line(text: bytes) -> LexedLine:
             deleted = True
         elif kind == "bare":
             # G28 X Y of printers; after an M code (M84 X Y) it is no axis.
-            at, codes = found.start("bare"), [word[1] for word in words]
+            at = found.start("bare")
+            codes.update(word[1] for word in words[looked_at:])
+            looked_at = len(words)
             if ord("G") in codes:
                 words.append((at, ord(found["bare"].upper()), -1, at + 1, math.nan, How.UNREAD))
             elif ord("M") not in codes:

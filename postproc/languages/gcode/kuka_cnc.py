@@ -91,8 +91,8 @@ CODES: Mapping[int, ModalCode] = {
     for number in numbers
 } | _NAMED_CODES
 
-_SYSTEM = re.compile(r"#\s*CS\s*(DEF|ON|OFF|ADD)?\s*(ALL)?\s*((?:\[[^\]]*\]\s*)*)$")
-_BRACKETS = re.compile(r"\[([^\]]*)\]")
+_SYSTEM = re.compile(r"#\s*+CS\s*+(DEF|ON|OFF|ADD)?\s*+(ALL)?\s*+((?:\[[^\]]*+\]\s*+)*+)$")
+_IN_BRACKETS = re.compile(r"\[([^\]]*)")
 
 
 def frame(event: Event) -> ProgrammedFrame:
@@ -105,7 +105,7 @@ def frame(event: Event) -> ProgrammedFrame:
         said = _SYSTEM.match(note.text) if note.kind == "frame" else None
         if said is None:
             continue
-        groups = _BRACKETS.findall(said[3])
+        groups = _IN_BRACKETS.findall(said[3])
         number = groups[0].strip() if groups else ""
         if said[1] == "DEF" and len(groups) == 2:
             memory[number] = _system(groups[1])

@@ -16,7 +16,7 @@ from postproc.languages.krl.variables import Entry
 MOST_CALLS = 30
 """Calls inside of one another that are followed."""
 
-_PLAIN_NAME = re.compile(rb"[ \t]*(" + NAME + rb")[ \t]*(\[[ \t]*\d+[ \t]*\])?[ \t]*\Z")
+_PLAIN_NAME = re.compile(rb"[ \t]*+(" + NAME + rb")[ \t]*+(\[[ \t]*+\d++[ \t]*+\])?[ \t]*+\Z")
 
 
 class Restart(Exception):

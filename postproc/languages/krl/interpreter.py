@@ -29,7 +29,7 @@ MOST_READINGS = 3
 _TCP = re.compile(rb"#[Tt][Cc][Pp]")
 _TURNING = re.compile(
     rb"_(?:TYPE?+|MODE)(?:(?<=ORI_TYP)|(?<=ORI_TYPE)|(?<=CIRC_TYP)|(?<=CIRC_TYPE)|(?<=CIRC_MODE))"
-    rb"[ \t]*+(?:\.[A-Z_. \t]*+)?+=?+[ \t]*+(?!#[ \t]*(?:VAR|BASE)\b)",
+    rb"[ \t]*+(?:\.[A-Z_. \t]{0,200}+)?+=?+[ \t]*+(?!#[ \t]*(?:VAR|BASE)\b)",
     re.I,
 )
 """Where the tool turns otherwise than usual; it starts with what is no letter, so that it is found fast."""

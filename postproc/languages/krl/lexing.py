@@ -60,8 +60,8 @@ _DEF = re.compile(
 )
 _GOTO = re.compile(rb"GOTO[ \t]+(" + NAME + rb")", re.I)
 _ASSIGNMENT = re.compile(
-    rb"(" + NAME + rb")[ \t]*(?:\[((?:[^\[\]]|\[[^\[\]]*\])*)\])?[ \t]*"
-    rb"((?:\.[ \t]*" + NAME + rb"(?:\[[^\]]*\])?[ \t]*)*)=(?!=)[ \t]*"
+    rb"(" + NAME + rb")[ \t]*+(?:\[((?:[^\[\]]|\[[^\[\]]*+\])*+)\][ \t]*+)?"
+    rb"((?:\.[ \t]*+" + NAME + rb"(?:\[[^\]]*+\])?[ \t]*+)*+)=(?!=)[ \t]*+"
 )
 _CALL = re.compile(rb"(" + NAME + rb")[ \t]*\((.*)\)\Z", re.S)
 _DECLARED = re.compile(
@@ -73,7 +73,7 @@ _STRING = re.compile(rb'"[^"\r\n]*"?')
 _BRACKET = re.compile(rb'"[^"\r\n]*"?|[{}()\[\],]')
 _BLANKS = re.compile(rb"[ \t]*")
 _IDENTIFIER = re.compile(rb"(?<![A-Za-z0-9_$#'])" + NAME)
-_NUMBER = re.compile(rb"[-+]?[ \t]*(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,4})?\Z")
+_NUMBER = re.compile(rb"[-+]?[ \t]*+(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d{1,4})?\Z")
 _RADIX = re.compile(rb"'[ \t]*(?:[Bb][ \t]*([01]+)|[Hh][ \t]*([0-9A-Fa-f]+))[ \t]*'\Z")
 
 

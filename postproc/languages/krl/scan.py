@@ -44,7 +44,7 @@ _LINE = (
     + rb"(?:;(?![ \t]*(?:FORCE|COMPENSATE))[^\r\n{}]*+)?+\r?\n"
 )  # fmt: skip
 _RUN = re.compile(rb"^(?:%s){%d,%d}+" % (_LINE, FEWEST, MOST), re.I | re.M)
-_EXTERNAL = re.compile(_B + rb"," + _B + rb"[Ee]([1-6])[ \t]++(" + _REAL + rb")")
+_EXTERNAL = re.compile(rb"(?<![ \t])" + _B + rb"," + _B + rb"[Ee]([1-6])[ \t]++(" + _REAL + rb")")
 _IN_NUMBER = np.zeros(256, bool)
 _IN_NUMBER[list(b"0123456789.+-")] = True
 

@@ -64,7 +64,7 @@ _CALLING = frozenset(["assignment", "call", "foreign", "open", "close", "return"
 _COUNTER = re.compile(rb"FOR[ \t]+(" + NAME + rb")[ \t]*=", re.I)
 _KEYS = frozenset([*COMPONENTS, *AXES, *EXTERNAL, b"S", b"T"])
 
-_BAS = re.compile(rb"[ \t]*#[ \t]*([A-Za-z_][A-Za-z0-9_]*)[ \t]*(?:,[ \t]*(.*?)[ \t]*)?\Z", re.S)
+_BAS = re.compile(rb"[ \t]*+#[ \t]*+([A-Za-z_][A-Za-z0-9_]*+)[ \t]*+(?:,(.*))?\Z", re.S)
 _BAS_EFFECTS: dict[bytes, Effects] = {
     b"INITMOV": MODAL,
     b"BASE": {"base"},
@@ -95,7 +95,7 @@ _SYSTEM: dict[bytes, str] = {
 def bas(arguments: bytes) -> tuple[bytes, bytes] | None:
     """Command (upper case) and argument of a call of BAS."""
     found = _BAS.match(arguments)
-    return (found[1].upper(), found[2] or b"") if found else None
+    return (found[1].upper(), (found[2] or b"").strip(b" \t")) if found else None
 
 
 def is_harmless(name: bytes) -> bool:
