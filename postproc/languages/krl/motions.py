@@ -435,7 +435,7 @@ def _advance(
     elif axes is not None:
         state.lose_point(f"after the axis motion in line {line}")
         state.axes = axes
-    elif reason is None or reason.code != "KRL004" or state.anchor is not None:
+    elif reason is None or reason.code != "KRL004" or state.point is not None or state.anchor is not None:
         state.lose_point(f"after the motion in line {line}")
 
 
@@ -443,6 +443,9 @@ def _frames_missing(run: ExecutionContext) -> Refusal | None:
     state = run.state
     if run.root_set is not None:
         return Refusal("KRL005", f"the robot's place in the world is set in line {run.root_set}", "root")
+    if run.later_since is not None:
+        what = f"the interrupt or trigger of line {run.later_since} may change base or tool at any time"
+        return Refusal("KRL005", what, "later")
     if state.tool_known:
         return Refusal("KRL013", "the tool is fixed in the world ($IPO_MODE=#TCP)", "tcp")
     for frame in (state.base, state.tool):
