@@ -13,6 +13,7 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.units import DEG, MM
 from postproc.languages.gcode.control import Control, Group, Move, Once
 from postproc.languages.gcode.execution_flow import FlowReason
+from postproc.languages.gcode.integer_words import IntegerWords
 from postproc.languages.gcode.modal import Modal
 from postproc.languages.gcode.modal_fill import everywhere, lookup
 from postproc.languages.gcode.positions import Course
@@ -50,6 +51,7 @@ class What:
     CODE = "a code that is not known"
     WORD = "a word that is no number"
     TWICE = "a word that occurs twice"
+    INTEGER = "a word without a decimal point"
     PARALLEL = "a word U, V or W"
     OTHER = "a motion whose end is not read"
     CYCLE = "the cycle"
@@ -80,15 +82,14 @@ class Reasons:
 class BlockWords:
     """The blocks ``start`` .. ``stop`` - 1 of a program; all rows count from ``start``.
 
-    columns: keys of words that say something of motions.  increments: lengths without a decimal point count
-    micrometres, or ten-thousandths of an inch.
+    columns: keys of words that say something of motions.  integers: what lengths without a decimal point mean.
     """
 
     source: Source
     modal: Modal
     control: Control
     columns: tuple[int, ...]
-    increments: bool
+    integers: IntegerWords
     start: int
     stop: int
 
@@ -98,7 +99,7 @@ class BlockWords:
     def part(self, start: int, stop: int) -> BlockWords:
         """The blocks begin .. stop - 1 of a whole program."""
         modal = self.modal.part(start, stop)
-        return BlockWords(self.source, modal, self.control, self.columns, self.increments, start, stop)
+        return BlockWords(self.source, modal, self.control, self.columns, self.integers, start, stop)
 
     @cached_property
     def _whole(self) -> bool:
@@ -153,7 +154,7 @@ class BlockWords:
 
     def angles(self, wanted: int) -> Floats:
         """(B,) [rad], NaN where absent."""
-        return self._scaled(wanted, DEG, DEG * (SMALL_ANGLE if self.increments else 1.0))
+        return self._scaled(wanted, DEG, DEG * (SMALL_ANGLE if self.integers.increments else 1.0))
 
     @cached_property
     def length(self) -> Floats:
@@ -164,9 +165,20 @@ class BlockWords:
     def length_of_integer(self) -> Floats:
         """(B,) [m]: a unit of a length word without."""
         small = (
-            np.array([MM * 1e-3, INCH * 1e-4, np.nan]) if self.increments else np.array([MM, INCH, np.nan])
+            np.array([MM * 1e-3, INCH * 1e-4, np.nan])
+            if self.integers.increments
+            else np.array([MM, INCH, np.nan])
         )
         return lookup(self.modal.force[Group.UNITS], small)
+
+    @cached_property
+    def unclear(self) -> Bools:
+        """(B,) blocks with a length of which it is not known what it means without a decimal point."""
+        mask = np.zeros(len(self), np.bool_)
+        for one in (*AXES[:3], *(key(letter) for letter in "IJKR")) if self.integers.unclear else ():
+            column = self.words(one)
+            mask[column.block[(column.how == How.INTEGER) & (column.value != 0)]] = True
+        return mask
 
     @cached_property
     def twice(self) -> Bools:
@@ -221,10 +233,10 @@ class BlockWords:
         return (hows >= 0) & ((incremental & (hows != How.ABSOLUTE)) | (hows == How.INCREMENTAL))
 
 
-def blocks(source: Source, modal: Modal, control: Control, increments: bool) -> BlockWords:
+def blocks(source: Source, modal: Modal, control: Control, integers: IntegerWords) -> BlockWords:
     """All blocks of a program."""
     columns = (*COLUMNS, *(key(letter) for letter in "STDHLQ"), *control.columns)
-    return BlockWords(source, modal, control, columns, increments, 0, len(source.blocks))
+    return BlockWords(source, modal, control, columns, integers, 0, len(source.blocks))
 
 
 def _targets(given: BlockWords) -> tuple[Bools, Floats, Bools]:
@@ -276,6 +288,7 @@ def frame_events(given: BlockWords, spoiled: Bools, away: Bools, reasons: Reason
     move, cycle = given.move, given.motion & (given.move == Move.CYCLE)
     unread = target & np.isnan(value)
     lose(unread, np.any(unread, axis=1), What.WORD)
+    lose(whole, given.axis & given.unclear, What.INTEGER)
     unclear = target & (force[Group.DISTANCE] < 0)[:, None]
     lose(unclear, np.any(unclear, axis=1), What.MODE)
     home, other = given.motion & modal.has(Once.HOME), np.isin(move, (Move.OTHER,)) & given.motion

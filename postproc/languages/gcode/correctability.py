@@ -88,6 +88,11 @@ def check_correctability(
         "GCO016",
         "the block has U, V or W: they are further axes, or steps of a lathe",
     )
+    refuse(
+        given.unclear[rows],
+        "GCO022",
+        "a length without a decimal point is mm or an increment: the program has both kinds of words",
+    )
     unread = np.zeros(len(given), np.bool_)
     for one in NUMBERS:
         column = given.words(one)

@@ -73,6 +73,12 @@ def diagnostics(
         tell(first, "GCO020", "no code selects mm or inch; mm is assumed")
     if not named:
         tell(first, "GCO021", "the program names no tool; tool 1 of the cell is assumed")
+    if given.integers.message:
+        whole = none.copy()
+        hows = np.stack([given.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
+        values = np.stack([given.number(axis) for axis in AXES[:3]], axis=1)
+        whole[rows] = (hows & (values != 0))[rows].any(axis=1)
+        tell(whole, "GCO027", given.integers.message)
     if settings.integer_words == "um" and not given.control.increments:
         whole = none.copy()
         hows = np.stack([given.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER

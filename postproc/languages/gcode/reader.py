@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -32,6 +33,7 @@ from postproc.languages.gcode.correctability import Built, check_correctability,
 from postproc.languages.gcode.diagnostics import diagnostics
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds
+from postproc.languages.gcode.integer_words import integer_words
 from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.modal import modal
 from postproc.languages.gcode.modal_fill import FilledRows, everywhere
@@ -54,9 +56,8 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     """Read a program; never raises on its content."""
     document = documents[0]
     source = scan(document.raw, control)
-    given = blocks(
-        source, modal(source, control), control, control.increments and settings.integer_words == "um"
-    )
+    integers = integer_words(source, control, settings.integer_words)
+    given = blocks(source, modal(source, control), control, integers)
     rows = np.flatnonzero(given.motion).astype(np.int32)
     offset = spoiled(given)
     base = given.modal.force[Group.OFFSET]
@@ -241,13 +242,15 @@ def _change(given: BlockWords, events: Ints) -> Callable[[int, ProgrammedFrame, 
     def changed(block: int, frame: ProgrammedFrame, position: Floats) -> ProgrammedFrame:
         here = given.part(block, block + 1)
         lengths = float(here.length_of_integer[0] / here.length[0])
-        angles = SMALL_ANGLE if given.increments else 1.0
+        angles = SMALL_ANGLE if given.integers.increments else 1.0
         small = {one: angles if one in AXES[3:] else lengths for one in keys}
         words = {
             one: float(column.value[-1] * (small[one] if column.how[-1] == How.INTEGER else 1.0))
             for one in keys
             if len(column := here.words(one))
         }
+        if here.unclear.any():
+            words = {one: math.nan if one in AXES[:3] else value for one, value in words.items()}
         codes = tuple(here.words(key("G")).value.tolist())
         event = Event(
             words,
