@@ -45,7 +45,8 @@ class ReadingSettings:
 
     orientation (3,): A, B, C [rad] of the tool in the base where the language programs no orientation, and what the
     spin about the tool axis is measured from; None where nothing states it.  integer_words: what X10 means where a
-    control may count in increments, "mm" or "um", "" where nothing states it.  references: files that are read and never written ($config.dat).
+    control may count in increments, "mm" or "um", "" where nothing states it.  references: files that are read and
+    never written ($config.dat).
     places: what only writing needs is wanted too (``Program.text``); a dialect may give None without.
     """
 

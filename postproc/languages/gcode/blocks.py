@@ -16,7 +16,7 @@ from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.integer_words import IntegerWords
 from postproc.languages.gcode.modal import Modal
 from postproc.languages.gcode.modal_fill import everywhere, lookup
-from postproc.languages.gcode.positions import Course
+from postproc.languages.gcode.positions import Course, CycleEnds
 from postproc.languages.gcode.source import Source, WordColumn
 from postproc.languages.gcode.words import COLUMNS, How, key
 
@@ -51,6 +51,7 @@ class What:
     CODE = "a code that is not known"
     WORD = "a word that is no number"
     TWICE = "a word that occurs twice"
+    UNUSED = "a word that belongs to no code"
     INTEGER = "a word without a decimal point"
     PARALLEL = "a word U, V or W"
     OTHER = "a motion whose end is not read"
@@ -62,6 +63,7 @@ class What:
     FRAME = "the change of coordinates"
     MODE = "absolute or incremental is not known"
     TIP = "the change of the TCP mode"
+    LENGTH = "the change of the tool's length"
     ORIGIN = "G92 where the position is not known"
 
 
@@ -259,10 +261,13 @@ def tilted(given: BlockWords) -> Bools:
     )
 
 
-def frame_events(given: BlockWords, spoiled: Bools, away: Bools, reasons: Reasons) -> Course:
+def frame_events(
+    given: BlockWords, spoiled: Bools, away: Bools, ends: CycleEnds, lengths: Bools, reasons: Reasons
+) -> Course:
     """What the blocks do to the coordinates; why they leave them unknown is put into ``reasons``.
 
-    spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``.
+    spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``; ends: those of the cycles;
+    lengths (B,): blocks in which another tool length holds than before.
     """
     modal, n = given.modal, len(given)
     force, flow = modal.force, modal.flow
@@ -296,6 +301,7 @@ def frame_events(given: BlockWords, spoiled: Bools, away: Bools, reasons: Reason
     lose(present, given.motion & modal.has(Once.MACHINE), What.MACHINE)
     lose(whole, given.motion & modal.has(Once.PROBE), What.PROBE)
     lose(whole, given.axis & modal.unknown, What.CODE)
+    lose(whole, given.axis & modal.unused, What.UNUSED)
     lose(whole, given.motion & given.twice, What.TWICE)
     if not given.control.further and given.has(*SECOND).any():
         parallel = np.stack([given.how(axis) >= 0 for axis in SECOND], axis=1)
@@ -303,13 +309,17 @@ def frame_events(given: BlockWords, spoiled: Bools, away: Bools, reasons: Reason
         lose(both, parallel.any(axis=1) & given.motion & ~home, What.PARALLEL)
     lose(whole, other | (given.motion & (force[Group.MACRO] != 0)), What.OTHER)
     if cycle.any():
-        # Words of a cycle give where it works; it ends at the depth that it started at, or at R.
+        # Words of a cycle give where it works.
         depth = np.array([2, 1, 0])[np.clip(force[Group.PLANE], 0, 2)]
         deep = np.zeros((n, 6), np.bool_)
         deep[np.arange(n), depth] = True
         target &= ~(cycle[:, None] & deep)
+        relative = relative & ~(cycle[:, None] & deep)
+        at_level = cycle & np.isfinite(ends.level)
+        target |= at_level[:, None] & deep
+        value = np.where(at_level[:, None] & deep, ends.level[:, None], value)
         repeats = given.has(key("L")) | given.has(key("K"))
-        lose(deep, cycle & (force[Group.RETURN] != 0), What.CYCLE)
+        lose(deep, cycle & ~at_level & ~ends.stays, What.CYCLE)
         lose(whole, cycle & repeats & (force[Group.DISTANCE] != 0), What.CYCLE)
     lose(present, given.motion & (flow.reason != FlowReason.NONE), What.UNCERTAIN)
     lose(whole, given.noted("unknown"), What.TEXT)
@@ -323,4 +333,8 @@ def frame_events(given: BlockWords, spoiled: Bools, away: Bools, reasons: Reason
             leave(whole, modal.switched(group), What.FRAME)
     # With the rotary axes at 0 the words mean the same with and without a TCP mode.
     leave(linear, modal.switched(Group.TCP) & away, What.TIP)
+    if lengths.any():
+        # Along the tool, which only rotary axes away from 0 can lay elsewhere than along Z.
+        leave(np.arange(6) == 2, lengths, What.LENGTH)
+        leave(linear, lengths & away, What.LENGTH)
     return Course(np.where(target, value, 0.0), target & ~relative, relative, lost, left)

@@ -110,12 +110,12 @@ def line(text: bytes) -> LexedLine:
                 note("unknown", text[found.start() :].strip())
                 break
         elif kind == "assign":
-            target, stop = _TARGET.match(text, found.start()), _assignment_end(text, found.start())
-            if stop is None:
+            target, end = _TARGET.match(text, found.start()), _assignment_end(text, found.start())
+            if end is None:
                 note("unknown", text[found.start() :].strip())
                 break
             note("assign", (target and target[1]) or b"")
-            place = stop
+            place = end
         elif kind == "corner":
             note("corner", text[found.start() :].strip())
         elif kind == "name":
@@ -123,7 +123,11 @@ def line(text: bytes) -> LexedLine:
             if word.startswith(HARMLESS) or _speaks(words):
                 break
             then = _THEN.match(text, found.end()) if word == b"IF" else None
-            if then is not None and then.end() < len(text) and not text[then.end() :].upper().startswith(b"GOTO"):
+            if (
+                then is not None
+                and then.end() < len(text)
+                and not text[then.end() :].upper().startswith(b"GOTO")
+            ):
                 deleted, place = True, then.end()  # what follows runs where the condition holds
                 continue
             if then is not None and then.end() == len(text):
@@ -168,7 +172,10 @@ def _assignment_end(text: bytes, at: int) -> int | None:
             stop = _expression(text, place)
             if text[stop - 1 : stop] not in (b"]", b">") and not text[place:stop].lstrip(b"#+- \t").isdigit():
                 return None
-            if re.fullmatch(rb"[ \t]*+ATAN[ \t]*+\[.*", text[place:stop], re.I | re.S) and text[stop : stop + 1] == b"/":
+            if (
+                re.fullmatch(rb"[ \t]*+ATAN[ \t]*+\[.*", text[place:stop], re.I | re.S)
+                and text[stop : stop + 1] == b"/"
+            ):
                 place = stop + 1
                 continue
         operator = _OPERATOR.match(text, stop)

@@ -43,7 +43,9 @@ def integer_words(source: Source, control: Control, stated: str) -> IntegerWords
         return IntegerWords(False, message="no length has a decimal point: X10 is read as 10 mm (or inch)")
     largest, farthest = integers.max(), max(decimals.max(), 1.0)
     if largest >= FARTHER * farthest:
-        return IntegerWords(True, message="lengths without a decimal point are read as increments of 0.001 mm")
+        return IntegerWords(
+            True, message="lengths without a decimal point are read as increments of 0.001 mm"
+        )
     if not (decimals % 1 == 0).any() or largest <= max(ALIKE * farthest, SMALL):
         return IntegerWords(False, message="lengths without a decimal point are read as mm (or inch)")
     return IntegerWords(False, unclear=True)

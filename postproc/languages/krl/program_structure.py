@@ -81,10 +81,10 @@ class ProgramStructure:
     ``routine_at``: index of the DEF -> routine; ``unclosed``: (line, what) of blocks without an end and ends without a
     begin; ``assigned``: names that the program assigns as a whole, or with ``.X`` after them a component of; ``read``:
     names that code reads, other than as the target of a motion; ``later``: names that run or change at a time of their
-    own (interrupts, triggers); ``later_effects``: what these change of base, tool and modes; ``inline``: lines of motions in the fold of an inline form; ``jumps``: begin of the
-    routine and name of every label that a GOTO names -> first and last index of these; ``effects``: all that the
-    program changes anywhere; ``blocks``: all of them; ``passed_through``: the same labels -> what differs between the
-    ways that lead there.
+    own (interrupts, triggers); ``later_effects``: what these change of base, tool and modes; ``inline``: lines of
+    motions in the fold of an inline form; ``jumps``: start of the routine and name of every label that a GOTO names ->
+    first and last index of these; ``effects``: all that the program changes anywhere; ``blocks``: all of them;
+    ``passed_through``: the same labels -> what differs between the paths that lead there.
     """
 
     events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
