@@ -32,7 +32,8 @@ RULE = "--------\n"
 def read(head: str, text: str) -> Program:
     name, *words = head.split()
     orientation = None if "unoriented" in words else DOWN
-    settings = ReadingSettings(orientation=orientation, integer_words="um" if "um" in words else "mm")
+    integers = next((word for word in ("um", "undecided") if word in words), "mm").replace("undecided", "")
+    settings = ReadingSettings(orientation=orientation, integer_words=integers)
     return NAMES[name].read((Document(Path("part.nc"), text.encode("latin-1")),), settings)
 
 

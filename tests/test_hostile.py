@@ -367,9 +367,7 @@ def test_links_stay_where_nothing_is_written(job):
         failed += code == 1
         # where the request that failed was to take an old one away, that stays until the next run
         links = {
-            path.name
-            for path in folder.iterdir()
-            if path.is_symlink() and not TEMPORARY.fullmatch(path.name)
+            path.name for path in folder.iterdir() if path.is_symlink() and not TEMPORARY.fullmatch(path.name)
         }
         assert links == (set(NAMES) if code == 1 else set()), at
         assert not outside.exists()

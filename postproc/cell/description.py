@@ -88,7 +88,7 @@ class Cell:
     growth_stated: bool = False
     segment_stated: bool = False
     controller: Controller = Controller()
-    integer_words: str = "mm"
+    integer_words: str = ""
     dialect: str | None = None
     dialect_line: int = 0
     config_dat: str | None = None

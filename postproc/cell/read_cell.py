@@ -122,7 +122,7 @@ def load_cell(path: Path) -> Cell:
             controller.flag("gravity_compensated", False),
             controller.number("cycle_ms", 12.0, low=0.1, high=100.0, unit="ms"),
         ),
-        integer_words=dialect.text("integer_words", "mm", ("mm", "um")),
+        integer_words=dialect.text("integer_words", "", ("mm", "um")),
         dialect=_word(dialect, "name") if "name" in dialect else None,
         dialect_line=dialect.line_of("name") if "name" in dialect else 0,
         config_dat=_word(dialect, "config_dat") if "config_dat" in dialect else None,

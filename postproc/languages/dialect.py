@@ -45,12 +45,13 @@ class ReadingSettings:
 
     orientation (3,): A, B, C [rad] of the tool in the base where the language programs no orientation, and what the
     spin about the tool axis is measured from; None where nothing states it.  integer_words: what X10 means where a
-    control counts in increments, "mm" or "um".  references: files that are read and never written ($config.dat).
+    control may count in increments, "mm" or "um", "" where nothing states it.  references: files that are read and
+    never written ($config.dat).
     places: what only writing needs is wanted too (``Program.text``); a dialect may give None without.
     """
 
     orientation: Floats | None = None
-    integer_words: str = "mm"
+    integer_words: str = ""
     references: tuple[Document, ...] = ()
     places: bool = True
 

@@ -124,7 +124,7 @@ CELL: dict[str, Schema] = {
     "dialect": mapping(
         {
             "name": text("the language of the programs [detected]"),
-            "integer_words": text("what X10 means", ["mm", "um"]),
+            "integer_words": text("what X10 means [decided by the program]", ["mm", "um"]),
             "config_dat": text("the controller's $config.dat, relative to this file"),
         },
         about="how programs are read",

@@ -13,9 +13,10 @@ from postproc.base.arrays import Bools, Floats, Ints, is_shared
 from postproc.base.units import DEG, MM
 from postproc.languages.gcode.control import Control, Group, Move, Once
 from postproc.languages.gcode.execution_flow import FlowReason
+from postproc.languages.gcode.integer_words import IntegerWords
 from postproc.languages.gcode.modal import Modal
 from postproc.languages.gcode.modal_fill import everywhere, lookup
-from postproc.languages.gcode.positions import Course
+from postproc.languages.gcode.positions import Course, CycleEnds
 from postproc.languages.gcode.source import Source, WordColumn
 from postproc.languages.gcode.words import COLUMNS, How, key
 
@@ -50,6 +51,8 @@ class What:
     CODE = "a code that is not known"
     WORD = "a word that is no number"
     TWICE = "a word that occurs twice"
+    UNUSED = "a word that belongs to no code"
+    INTEGER = "a word without a decimal point"
     PARALLEL = "a word U, V or W"
     OTHER = "a motion whose end is not read"
     CYCLE = "the cycle"
@@ -60,6 +63,7 @@ class What:
     FRAME = "the change of coordinates"
     MODE = "absolute or incremental is not known"
     TIP = "the change of the TCP mode"
+    LENGTH = "the change of the tool's length"
     ORIGIN = "G92 where the position is not known"
 
 
@@ -80,15 +84,14 @@ class Reasons:
 class BlockWords:
     """The blocks ``start`` .. ``stop`` - 1 of a program; all rows count from ``start``.
 
-    columns: keys of words that say something of motions.  increments: lengths without a decimal point count
-    micrometres, or ten-thousandths of an inch.
+    columns: keys of words that say something of motions.  integers: what lengths without a decimal point mean.
     """
 
     source: Source
     modal: Modal
     control: Control
     columns: tuple[int, ...]
-    increments: bool
+    integers: IntegerWords
     start: int
     stop: int
 
@@ -98,7 +101,7 @@ class BlockWords:
     def part(self, start: int, stop: int) -> BlockWords:
         """The blocks begin .. stop - 1 of a whole program."""
         modal = self.modal.part(start, stop)
-        return BlockWords(self.source, modal, self.control, self.columns, self.increments, start, stop)
+        return BlockWords(self.source, modal, self.control, self.columns, self.integers, start, stop)
 
     @cached_property
     def _whole(self) -> bool:
@@ -153,7 +156,7 @@ class BlockWords:
 
     def angles(self, wanted: int) -> Floats:
         """(B,) [rad], NaN where absent."""
-        return self._scaled(wanted, DEG, DEG * (SMALL_ANGLE if self.increments else 1.0))
+        return self._scaled(wanted, DEG, DEG * (SMALL_ANGLE if self.integers.increments else 1.0))
 
     @cached_property
     def length(self) -> Floats:
@@ -164,9 +167,20 @@ class BlockWords:
     def length_of_integer(self) -> Floats:
         """(B,) [m]: a unit of a length word without."""
         small = (
-            np.array([MM * 1e-3, INCH * 1e-4, np.nan]) if self.increments else np.array([MM, INCH, np.nan])
+            np.array([MM * 1e-3, INCH * 1e-4, np.nan])
+            if self.integers.increments
+            else np.array([MM, INCH, np.nan])
         )
         return lookup(self.modal.force[Group.UNITS], small)
+
+    @cached_property
+    def unclear(self) -> Bools:
+        """(B,) blocks with a length of which it is not known what it means without a decimal point."""
+        mask = np.zeros(len(self), np.bool_)
+        for one in (*AXES[:3], *(key(letter) for letter in "IJKR")) if self.integers.unclear else ():
+            column = self.words(one)
+            mask[column.block[(column.how == How.INTEGER) & (column.value != 0)]] = True
+        return mask
 
     @cached_property
     def twice(self) -> Bools:
@@ -221,10 +235,10 @@ class BlockWords:
         return np.asarray((hows >= 0) & ((incremental & (hows != How.ABSOLUTE)) | (hows == How.INCREMENTAL)))
 
 
-def blocks(source: Source, modal: Modal, control: Control, increments: bool) -> BlockWords:
+def blocks(source: Source, modal: Modal, control: Control, integers: IntegerWords) -> BlockWords:
     """All blocks of a program."""
     columns = (*COLUMNS, *(key(letter) for letter in "STDHLQ"), *control.columns)
-    return BlockWords(source, modal, control, columns, increments, 0, len(source.blocks))
+    return BlockWords(source, modal, control, columns, integers, 0, len(source.blocks))
 
 
 def _targets(given: BlockWords) -> tuple[Bools, Floats, Bools]:
@@ -247,10 +261,13 @@ def tilted(given: BlockWords) -> Bools:
     )
 
 
-def frame_events(given: BlockWords, spoiled: Bools, away: Bools, reasons: Reasons) -> Course:
+def frame_events(
+    given: BlockWords, spoiled: Bools, away: Bools, ends: CycleEnds, lengths: Bools, reasons: Reasons
+) -> Course:
     """What the blocks do to the coordinates; why they leave them unknown is put into ``reasons``.
 
-    spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``.
+    spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``; ends: those of the cycles;
+    lengths (B,): blocks in which another tool length holds than before.
     """
     modal, n = given.modal, len(given)
     force, flow = modal.force, modal.flow
@@ -276,6 +293,7 @@ def frame_events(given: BlockWords, spoiled: Bools, away: Bools, reasons: Reason
     move, cycle = given.move, given.motion & (given.move == Move.CYCLE)
     unread = target & np.isnan(value)
     lose(unread, np.any(unread, axis=1), What.WORD)
+    lose(whole, given.axis & given.unclear, What.INTEGER)
     unclear = target & (force[Group.DISTANCE] < 0)[:, None]
     lose(unclear, np.any(unclear, axis=1), What.MODE)
     home, other = given.motion & modal.has(Once.HOME), np.isin(move, (Move.OTHER,)) & given.motion
@@ -283,6 +301,7 @@ def frame_events(given: BlockWords, spoiled: Bools, away: Bools, reasons: Reason
     lose(present, given.motion & modal.has(Once.MACHINE), What.MACHINE)
     lose(whole, given.motion & modal.has(Once.PROBE), What.PROBE)
     lose(whole, given.axis & modal.unknown, What.CODE)
+    lose(whole, given.axis & modal.unused, What.UNUSED)
     lose(whole, given.motion & given.twice, What.TWICE)
     if not given.control.further and given.has(*SECOND).any():
         parallel = np.stack([given.how(axis) >= 0 for axis in SECOND], axis=1)
@@ -290,13 +309,17 @@ def frame_events(given: BlockWords, spoiled: Bools, away: Bools, reasons: Reason
         lose(both, parallel.any(axis=1) & given.motion & ~home, What.PARALLEL)
     lose(whole, other | (given.motion & (force[Group.MACRO] != 0)), What.OTHER)
     if cycle.any():
-        # Words of a cycle give where it works; it ends at the depth that it started at, or at R.
+        # Words of a cycle give where it works.
         depth = np.array([2, 1, 0])[np.clip(force[Group.PLANE], 0, 2)]
         deep = np.zeros((n, 6), np.bool_)
         deep[np.arange(n), depth] = True
         target &= ~(cycle[:, None] & deep)
+        relative = relative & ~(cycle[:, None] & deep)
+        at_level = cycle & np.isfinite(ends.level)
+        target |= at_level[:, None] & deep
+        value = np.where(at_level[:, None] & deep, ends.level[:, None], value)
         repeats = given.has(key("L")) | given.has(key("K"))
-        lose(deep, cycle & (force[Group.RETURN] != 0), What.CYCLE)
+        lose(deep, cycle & ~at_level & ~ends.stays, What.CYCLE)
         lose(whole, cycle & repeats & (force[Group.DISTANCE] != 0), What.CYCLE)
     lose(present, given.motion & (flow.reason != FlowReason.NONE), What.UNCERTAIN)
     lose(whole, given.noted("unknown"), What.TEXT)
@@ -310,4 +333,8 @@ def frame_events(given: BlockWords, spoiled: Bools, away: Bools, reasons: Reason
             leave(whole, modal.switched(group), What.FRAME)
     # With the rotary axes at 0 the words mean the same with and without a TCP mode.
     leave(linear, modal.switched(Group.TCP) & away, What.TIP)
+    if lengths.any():
+        # Along the tool, which only rotary axes away from 0 can lay elsewhere than along Z.
+        leave(np.arange(6) == 2, lengths, What.LENGTH)
+        leave(linear, lengths & away, What.LENGTH)
     return Course(np.where(target, value, 0.0), target & ~relative, relative, lost, left)

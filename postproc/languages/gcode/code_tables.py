@@ -3,10 +3,18 @@
 from __future__ import annotations
 
 from postproc.languages.gcode import general_lines, offsets
-from postproc.languages.gcode.control import Control, Feed, Group, ModalCode, Move, Once
+from postproc.languages.gcode.control import UNKNOWN, Control, Feed, Group, ModalCode, Move, Once
 
 COMMENT = rb"\((?:[^()\r\n]++|\([^()\r\n]*+\))*+\)?|;[^\r\n]*"
 """Parentheses, one pair of which may hold others; or from a semicolon on."""
+
+_WORD = rb"[A-Za-z][ \t]*+[-+]?+[ \t]*+(?:\d[\d \t]*+(?:\.[\d \t]*+)?+|\.[ \t]*+\d[\d \t]*+|[#\[][^;(\r\n]*+)"
+END_OF_BLOCK = (
+    rb"\((?:[^()\r\n]++|\([^()\r\n]*+\))*+\)?|;(?![ \t]*+/?+[ \t]*+(?:"
+    + _WORD
+    + rb")++(?:[;(\r\n]|\Z))[^\r\n]*"
+)
+"""The same of controls to which a semicolon is the end of a block: with words after it, it starts no comment."""
 
 
 def _codes(*entries: tuple[Group, int, tuple[float, ...]]) -> dict[int, ModalCode]:
@@ -98,6 +106,7 @@ LINUXCNC = Control(
     name="linuxcnc",
     line=general_lines.line,
     comment=COMMENT,
+    iso=True,
     also={**_TIP, **_ARGUMENTS},
     codes={
         **_COMMON,
@@ -113,6 +122,8 @@ LINUXCNC = Control(
             (Group.TCP, 1, (43.4, 43.5)),
         ),
     },
+    start={Group.RETURN: UNKNOWN},
+    feed_before_units=True,
     frame=offsets.one_shift,
 )
 """LinuxCNC, and ISO code that is of no other control."""
@@ -120,7 +131,8 @@ LINUXCNC = Control(
 FANUC = Control(
     name="fanuc",
     line=general_lines.line,
-    comment=COMMENT,
+    comment=END_OF_BLOCK,
+    iso=True,
     also={**_TIP, **_ARGUMENTS},
     codes={
         **_COMMON,

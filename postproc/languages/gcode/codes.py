@@ -193,7 +193,10 @@ CODES = define(
         "GCO022": Code(
             "warning",
             "words without a decimal point",
-            meaning="The cell counts such words in increments, but the control of this dialect does not.",
+            meaning=(
+                "The cell counts such words in increments, but the control of this dialect does not; or it does, and "
+                "the program has words that are too large for mm and too small for increments."
+            ),
             consequence="A wrong reading differs by a factor of 1000.",
             action=(
                 "Write `dialect: {name: fanuc, integer_words: um}` in the cell if the control counts "
@@ -237,6 +240,34 @@ CODES = define(
                 "Let the post-processor name what carries robot or part E1 to E6, and declare it in the cell."
             ),
             example="`G1 X10 W50`.",
+        ),
+        "GCO027": Code(
+            "info",
+            "words without a decimal point are decided",
+            meaning=(
+                "A control of this kind counts X10 as 10 mm or as 10 increments, and the cell does not state which."
+            ),
+            consequence="A wrong reading differs by a factor of 1000.",
+            action="State `dialect: {integer_words: mm}` or `um` in the cell.",
+            example="`X30500` beside `X30.5`.",
+        ),
+        "GCO028": Code(
+            "info",
+            "M code is not known",
+            meaning="The machine's builder gives such a code its meaning.",
+            consequence="It is assumed that it moves no axis; if it does, the positions after it are wrong.",
+            action="Check that it moves no axis; if it does, state X, Y and Z in the motion after it.",
+            example="`M405`.",
+        ),
+        "GCO029": Code(
+            "warning",
+            "tool offset is not active",
+            meaning="The program switches the tool's length off (G49, D0), and then moves at feed.",
+            consequence=(
+                "Its coordinates are not those of the tool tip that is stated in the cell, so it is not corrected."
+            ),
+            action="Switch the tool's length on before the cut.",
+            example="`G49`, then `G1 Z-5`.",
         ),
         "SIN001": Code(
             "info",

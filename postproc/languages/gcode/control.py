@@ -169,7 +169,9 @@ class Control:
     itself, not what turns it from where it is in the cell; vector, euler: keys of the words of a tool vector
     and of angles that say where it points. calls: keys of words that call a subprogram in a block without G and M;
     feed_units: the group that says the unit of F;
-    further: U, V, W are axes beside X, Y, Z, and leave these as they are.
+    further: U, V, W are axes beside X, Y, Z, and leave these as they are; offsets: key of the word that selects the
+    tool's offsets, of which 0 switches them off (D); feed_before_units: F in a block with G20 or G21 is in the unit
+    from before it; iso: every word belongs to a code of its block or to its motion.
     """
 
     name: str
@@ -193,3 +195,6 @@ class Control:
     calls: frozenset[int] = frozenset()
     feed_units: Group = Group.UNITS
     further: bool = False
+    offsets: int | None = None
+    feed_before_units: bool = False
+    iso: bool = False

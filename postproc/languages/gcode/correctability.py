@@ -19,7 +19,7 @@ from postproc.languages.gcode.words import How, key
 from postproc.toolpath import Kind
 
 FLOW_MESSAGES = {
-    FlowReason.DELETED: "the block starts with a slash: it runs only sometimes",
+    FlowReason.DELETED: "the block runs only sometimes: it starts with a slash, or with a condition",
     FlowReason.FLOW: "the motion is in a loop, branch or subprogram: it may run many times or never",
     FlowReason.PROGRAM: "the motion is in a subprogram of the file: it runs where that is called",
     FlowReason.ENDED: "the motion follows the end of the program and does not run",
@@ -31,6 +31,7 @@ ARCS = {
     5: "the plane of the arc is not known",
     6: "the three points of the arc are on one line",
 }
+UNUSED = "a word I, J, K, L, P, Q or R belongs to no code of the block"
 _POSITION = re.compile(rb"#[ \t]*+(?:(?:50[0-6]\d|542\d)(?!\d)|<_(?:abs_)?[xyzabcuvw]>|#|\[)", re.I)
 
 
@@ -73,6 +74,7 @@ def check_correctability(
     refuse(modal.has(Once.MACHINE)[rows], "GCO004", "the block uses machine coordinates")
     refuse(modal.has(Once.PROBE)[rows], "GCO011", "the block is a probing move: its end is not known")
     _codes(given, rows, collector)
+    refuse(modal.unused[rows], "GCO001", UNUSED)
     refuse(given.twice[rows], "GCO017", "a word occurs twice in the block")
     refuse(modal.twice[rows], "GCO017", "two codes of the block select different motions")
     for kind, code, message in (
@@ -87,6 +89,11 @@ def check_correctability(
         given.has(*SECOND)[rows] & (not given.control.further),
         "GCO016",
         "the block has U, V or W: they are further axes, or steps of a lathe",
+    )
+    refuse(
+        given.unclear[rows],
+        "GCO022",
+        "a length without a decimal point is mm or an increment: the program has both kinds of words",
     )
     unread = np.zeros(len(given), np.bool_)
     for one in NUMBERS:

@@ -10,9 +10,31 @@ from postproc.base.findings import Finding
 from postproc.languages.dialect import ReadingSettings
 from postproc.languages.gcode.blocks import AXES, BlockWords
 from postproc.languages.gcode.control import Group, Once
-from postproc.languages.gcode.correctability import code_name
+from postproc.languages.gcode.correctability import UNUSED, code_name
 from postproc.languages.gcode.execution_flow import CALLS, FlowReason
 from postproc.languages.gcode.words import How, key
+
+KNOWN_M = (
+    *range(12),
+    13,
+    14,
+    17,
+    19,
+    29,
+    30,
+    40,
+    41,
+    42,
+    43,
+    44,
+    45,
+    *range(48, 54),
+    *range(60, 74),
+    97,
+    98,
+    99,
+)
+"""Codes of programs, spindles, tools, coolants, overrides, inputs and calls, which no machine's builder defines."""
 
 
 def diagnostics(
@@ -47,11 +69,24 @@ def diagnostics(
     codes = np.nan_to_num(modal.unknown_codes.last(strange), nan=-1.0)
     for value in np.unique(codes)[:100].tolist():
         tell_at(strange[codes == value], "GCO001", f"{code_name(value)} is not known here")
+    tell(modal.unused & ~motion, "GCO001", UNUSED)
+    probing = modal.has(Once.PROBE) & ~motion
+    tell(probing, "GCO001", "the block is a probing move without axes")
     calls, m = none.copy(), given.words(key("M"))
     calls[m.block[np.isin(m.value, CALLS)]] = True
     tell(
         calls | modal.has(Once.CALL) | given.noted("call"), "GCO007", "the block calls code that is not read"
     )
+    strange_m = ~np.isin(m.value, KNOWN_M) & live[m.block]
+    if strange_m.any():
+        names = [f"M{value:g}" for value in np.unique(m.value[strange_m & np.isfinite(m.value)]).tolist()]
+        shown = ", ".join([*names[:8], *(["..."] if len(names) > 8 else [])]) or "an M code that is computed"
+        verb = "is" if len(names) < 2 else "are"
+        tell_at(
+            np.unique(m.block[strange_m])[:1],
+            "GCO028",
+            f"{shown} {verb} not known here; it is assumed that no axis moves",
+        )
     setting = modal.has(Once.SETTING) & given.has(*AXES, key("L"), key("P"), key("R"))
     tell(setting, "GCO024", "the program writes offsets or tools")
     tell(
@@ -73,6 +108,12 @@ def diagnostics(
         tell(first, "GCO020", "no code selects mm or inch; mm is assumed")
     if not named:
         tell(first, "GCO021", "the program names no tool; tool 1 of the cell is assumed")
+    if given.integers.message:
+        whole = none.copy()
+        hows = np.stack([given.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER
+        values = np.stack([given.number(axis) for axis in AXES[:3]], axis=1)
+        whole[rows] = (hows & (values != 0))[rows].any(axis=1)
+        tell(whole, "GCO027", given.integers.message)
     if settings.integer_words == "um" and not given.control.increments:
         whole = none.copy()
         hows = np.stack([given.how(axis) for axis in AXES[:3]], axis=1) == How.INTEGER

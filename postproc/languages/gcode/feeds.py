@@ -21,6 +21,13 @@ class Feeds:
         self._dwell = given.modal.has(Once.DWELL)
         self._force, self._given = given.modal.force, given
         self._unit = lookup(self._force[given.control.feed_units], np.array([MM, INCH, np.nan]))
+        if given.control.feed_before_units:
+            units = given.modal.units
+            late = np.flatnonzero(given.modal.switched(Group.UNITS) & (np.cumsum(units) > units))
+            if len(late):
+                unit = np.array(self._unit)
+                unit[late] = self._unit[late - 1]
+                self._unit = unit
         self._rate, self._spindle = (self._outside(given.words(key(letter))) for letter in "FS")
 
     def _outside(self, column: WordColumn) -> WordColumn:

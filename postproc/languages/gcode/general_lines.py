@@ -27,7 +27,13 @@ _FLOW = re.compile(
     rb"[ \t]*(?:N[ \t]*\d+[ \t]*)?(O[ \t]*(?:\d+|<[^>]*>|#[^ \t]*|\[[^\]]*\]))[ \t]*([A-Za-z]+)", re.I
 )
 _TEXT = re.compile(rb"[ \t]*(?:N[ \t]*\d+[ \t]*)?(M[ \t]*11[78])(?!\d)", re.I)
-_TARGET = re.compile(rb"#[ \t]*(\d+|<[^>]*>)?")
+_TARGET = re.compile(rb"#[ \t]*+(\d++|<[^>]*+>|(?=[#\[]))")
+_ASSIGNED = re.compile(rb"[ \t]*+=[ \t]*+")
+_OPERATOR = re.compile(
+    rb"[ \t]*+(?:\*\*|[-+*/]|(?:AND|OR|XOR|MOD|EQ|NE|GT|GE|LT|LE)(?![A-Za-z_]))[ \t]*+", re.I
+)
+_CONSTANT = re.compile(rb"[-+]?[ \t]*+(?:\d[\d \t]*+(?:\.[\d \t]*+)?|\.[ \t]*+\d[\d \t]*+)")
+_THEN = re.compile(rb"[^\]]*+(?:\][^\]]*?)*?\][ \t]*+THEN(?![A-Za-z_])[ \t]*+", re.I)
 
 _FLOW_WORDS = {
     **dict.fromkeys(b"SUB DO IF REPEAT".split(), "open"),
@@ -38,7 +44,7 @@ _FLOW_WORDS = {
 }
 """Words after an O-word; ``while`` opens a loop, or closes the one that ``do`` with its number has opened."""
 
-_JUMPS = frozenset(b"IF GOTO THEN ELSE ENDIF".split())
+_JUMPS = frozenset(b"IF GOTO THEN".split())
 HARMLESS = (b"EXCLUDE_OBJECT", b"SET_", b"TIMELAPSE", b"POPEN", b"PCLOS", b"DPRNT", b"BPRNT", b"MSG")
 """Names of commands that move nothing."""
 
@@ -108,16 +114,31 @@ def line(text: bytes) -> LexedLine:
                 note("unknown", text[found.start() :].strip())
                 break
         elif kind == "assign":
-            target = _TARGET.match(text, found.start())
+            target, end = _TARGET.match(text, found.start()), _assignment_end(text, found.start())
+            if end is None:
+                note("unknown", text[found.start() :].strip())
+                break
             note("assign", (target and target[1]) or b"")
-            break
+            place = end
         elif kind == "corner":
             note("corner", text[found.start() :].strip())
         elif kind == "name":
             word = found["name"].upper()
             if word.startswith(HARMLESS) or _speaks(words):
                 break
-            if word in _JUMPS:
+            then = _THEN.match(text, found.end()) if word == b"IF" else None
+            if (
+                then is not None
+                and then.end() < len(text)
+                and not text[then.end() :].upper().startswith(b"GOTO")
+            ):
+                deleted, place = True, then.end()  # what follows runs where the condition holds
+                continue
+            if then is not None and then.end() == len(text):
+                note("open", b"IF")
+            elif word in (b"ELSE", b"ENDIF"):
+                note("between" if word == b"ELSE" else "close", word)
+            elif word in _JUMPS:
                 note("jump", text[found.start() :].strip())
             elif word in (b"WHILE", b"DO", b"END"):
                 note("close" if word == b"END" else "open", b"")
@@ -135,6 +156,36 @@ def _speaks(words: list[tuple[int, int, int, int, float, int]]) -> bool:
     """Whether a line starts with an M code of a printer: what follows may be any text."""
     codes = [(letter, value) for _, letter, _, _, value, _ in words[:2] if letter != ord("N")]
     return bool(codes) and codes[0][0] == ord("M") and codes[0][1] >= 100
+
+
+def _assignment_end(text: bytes, at: int) -> int | None:
+    """Where ``#target = value`` that starts at ``at`` ends: before the next word of the block.  None: it is none."""
+    target = _TARGET.match(text, at)
+    if target is None:
+        return None
+    stop = target.end() if target[1] else _expression(text, at + 1)
+    assigned = _ASSIGNED.match(text, stop)
+    if assigned is None:
+        return None
+    place = assigned.end()
+    while True:
+        number = _CONSTANT.match(text, place)
+        if number is not None:
+            stop = number.end()
+        else:
+            stop = _expression(text, place)
+            if text[stop - 1 : stop] not in (b"]", b">") and not text[place:stop].lstrip(b"#+- \t").isdigit():
+                return None
+            if (
+                re.fullmatch(rb"[ \t]*+ATAN[ \t]*+\[.*", text[place:stop], re.I | re.S)
+                and text[stop : stop + 1] == b"/"
+            ):
+                place = stop + 1
+                continue
+        operator = _OPERATOR.match(text, stop)
+        if operator is None:
+            return stop
+        place = operator.end()
 
 
 def _expression(text: bytes, at: int) -> int:

@@ -25,6 +25,9 @@ _FLOW = re.compile(
 _ADDRESS = re.compile(rb"([A-Za-z])([0-9]{0,3})[ \t]*=[ \t]*")
 _WORD = re.compile(rb"([A-Za-z])[ \t]*((?:[-+][ \t]*)?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)", re.I)
 _NAME = re.compile(rb"[A-Za-z_][A-Za-z_.][A-Za-z0-9_.]*")
+_ASSIGNED = re.compile(rb"[ \t]*+=(?!=)[ \t]*+")
+_BRACKETS = re.compile(rb"\[[^\]]*+\]")
+_MOVES = re.compile(rb"(?<![A-Za-z])[GXYZABCIJKF][ \t]*+[-+]?+[ \t]*+[.\d=]", re.I)
 _NUMBER = re.compile(rb"(?:[-+][ \t]*)?(?:\d+\.?\d*|\.\d+)")
 
 WEIGHTS = frozenset(
@@ -105,6 +108,8 @@ class KukaCncLines:
         if said in self._names or name in self._names or name in QUIET:
             if name == b"CS":
                 note("frame", text[place:].strip().upper())
+            elif _MOVES.search(_BRACKETS.sub(b" ", text[command.end() :])):
+                note("unknown", text[place:].strip())
             return
         note("call", text[place:].strip())
 
@@ -119,8 +124,11 @@ class KukaCncLines:
             at = name.end()
             while text[at : at + 1] == b"[":
                 at = bracket_end(text, at)
-            assigned = text[at:].lstrip(b" \t").startswith(b"=")
-            quiet = assigned or name[0].upper() == b"WAIT"
+            assigned = _ASSIGNED.match(text, at)
+            if assigned is not None:
+                note("assign", b"<" + rest)
+                return max(assigned_end(text, assigned.end()), at + 1)
+            quiet = name[0].upper() == b"WAIT"
             note("assign" if quiet else "call", b"<" + rest if quiet else rest)
         else:
             note("unknown", rest)

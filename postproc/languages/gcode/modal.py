@@ -60,6 +60,7 @@ class Modal:
     once (B,): bits 1 << Once; states (B,): a code states the motion; strange: codes that are not known, by block, the
     last of each; twice (B,): two codes state different motions; more (B,): codes beside those of motion, plane,
     coordinates and units.  units (B,): codes state mm or inch.
+    unused (B,): a word I, J, K, P, Q, L or R belongs to none of the block's codes, nor to its motion.
     """
 
     force: Mapping[Group, Ints]
@@ -70,6 +71,7 @@ class Modal:
     twice: Bools
     more: Bools
     units: Bools
+    unused: Bools
     flow: ExecutionFlow
 
     def has(self, *once: Once) -> Bools:
@@ -100,6 +102,7 @@ class Modal:
             self.twice[rows],
             self.more[rows],
             self.units[rows],
+            self.unused[rows],
             self.flow.part(start, stop),
         )
 
@@ -151,7 +154,49 @@ def modal(source: Source, control: Control) -> Modal:
     units = np.zeros(n, np.bool_)
     units[blocks[groups == Group.UNITS]] = True
     ahead = {one: int(values[0]) if n else 0 for one, values in force.items()}
-    return Modal(force, ahead, once, states, strange, twice, more, units, flow)
+    unused = _unused(source, control, blocks, groups, values, number, force)
+    return Modal(force, ahead, once, states, strange, twice, more, units, unused, flow)
+
+
+_PLAIN = (
+    Group.MOTION, Group.PLANE, Group.DISTANCE, Group.ARCS, Group.UNITS, Group.FEED, Group.OFFSET, Group.PATH,
+    Group.LENGTH, Group.RADIUS, Group.RETURN,
+)  # fmt: skip
+"""Groups whose codes have no words of their own, but those in ``_OWN``."""
+_OWN = {"P": (540, 541, 1540, 640), "Q": (640,)}
+"""Tenfold numbers of the codes of these groups that have such words: G54.1 P, G54 P, G154 P, G64 P Q."""
+_WORDLESS = (Move.RAPID, Move.LINE, Move.NOTHING, UNKNOWN)
+_CURVED = (Move.CLOCKWISE, Move.COUNTER, Move.THROUGH)
+
+
+def _unused(
+    source: Source,
+    control: Control,
+    blocks: Ints,
+    groups: Ints,
+    values: Ints,
+    number: Ints,
+    force: Mapping[Group, Ints],
+) -> Bools:
+    """(B,) blocks with a word that nothing in them uses; of controls of ISO code only."""
+    n = len(source.blocks)
+    unused = np.zeros(n, np.bool_)
+    if not control.iso:
+        return unused
+    using = np.zeros(n, np.bool_)  # a code that is free to have any word
+    using[blocks[~np.isin(groups, _PLAIN)]] = True
+    using |= source.mask(key("M")) | force[Group.MACRO].astype(bool) | force[Group.FOREIGN].astype(bool)
+    move = force[Group.MOTION]
+    using |= ~np.isin(move, (*_WORDLESS, *_CURVED))
+    curved = np.isin(move, _CURVED)
+    for letter in "IJKPQLR":
+        has = source.mask(key(letter))
+        if not has.any():
+            continue
+        own = np.zeros(n, np.bool_)
+        own[blocks[np.isin(number, _OWN.get(letter, ()))]] = True
+        unused |= has & ~using & ~own & ~(curved & (letter not in "LQ"))
+    return unused
 
 
 def said(codes: Floats, control: Control) -> tuple[Ints, Bools, Ints, Ints]:

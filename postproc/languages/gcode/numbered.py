@@ -11,11 +11,12 @@ from postproc.base.geometry import Poses
 from postproc.languages.gcode.blocks import BlockWords
 from postproc.languages.gcode.control import Group, Once
 from postproc.languages.gcode.execution_flow import FlowReason
-from postproc.languages.gcode.modal_fill import everywhere, fill_modal
+from postproc.languages.gcode.modal_fill import everywhere, fill_modal, switched
 from postproc.languages.gcode.words import key
 from postproc.toolpath import FrameRef
 
 TOOL_CHANGE = 6
+LENGTH_CODES = (43.0, 43.4, 43.5, 234.0)
 SYSTEM = ((5201, 5400), (7001, 7999), (14001, 20000))
 """Variables that are work offsets: of Fanuc and Haas (7001, 14001: G54.1 Pn), 5211 to 5400 of LinuxCNC."""
 
@@ -95,6 +96,42 @@ def tools(given: BlockWords) -> tuple[Ints, bool]:
     if not len(changes):
         return chosen, True
     return fill_modal(n, changes, np.where(sure[changes], chosen[changes], -1), -1, np.int32), True
+
+
+@dataclass(frozen=True, eq=False)
+class ToolLengths:
+    """changes (B,): another tool length holds from the block on; off (B,): the program has switched it off."""
+
+    changes: Bools
+    off: Bools
+
+
+def tool_lengths(given: BlockWords, tool: Ints) -> ToolLengths:
+    """Where a program changes the length of its tool: G43 with another number H or another ``tool`` (B,), G49, a word D
+    of a control with such offsets, M6."""
+    n, force = len(given), given.modal.force[Group.LENGTH]
+    changes, off = switched(force, given.modal.ahead[Group.LENGTH]).copy(), force == 0
+    if (force == 1).any():
+        codes = given.words(key("G"))
+        stated = np.zeros(n, np.bool_)
+        stated[codes.block[np.isin(codes.value, LENGTH_CODES)]] = True
+        stated |= given.has(key("H"))
+        at = np.flatnonzero(stated & (force == 1))
+        number = given.number(key("H"))[at]
+        number = np.where(np.isnan(number), tool[at], number)
+        changes[at[1:][number[1:] != number[:-1]]] = True
+        off &= np.maximum.accumulate(force == 1)
+    else:
+        off = everywhere(False, n)
+    m = given.words(key("M"))
+    changes[m.block[m.value == TOOL_CHANGE]] = True
+    changes |= switched(tool, int(tool[0]) if n else -1)
+    if given.control.offsets is not None:
+        edge = given.words(given.control.offsets)
+        chosen = fill_modal(n, edge.block, np.nan_to_num(edge.value, nan=-1.0).astype(np.int32), 1, np.int32)
+        changes |= switched(chosen, 1)
+        off = off | (chosen == 0)
+    return ToolLengths(changes, off)
 
 
 def references(base: Ints, tool: Ints, line: Ints) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:

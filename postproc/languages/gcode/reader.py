@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -29,14 +30,16 @@ from postproc.languages.gcode.blocks import (
 from postproc.languages.gcode.comments import remarks
 from postproc.languages.gcode.control import Control, Event, Feed, Group, Move, Once, ProgrammedFrame
 from postproc.languages.gcode.correctability import Built, check_correctability, locked_rows
+from postproc.languages.gcode.cycle_ends import cycle_ends
 from postproc.languages.gcode.diagnostics import diagnostics
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds
+from postproc.languages.gcode.integer_words import integer_words
 from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.modal import modal
 from postproc.languages.gcode.modal_fill import FilledRows, everywhere
 from postproc.languages.gcode.motions import GcodeMotions
-from postproc.languages.gcode.numbered import Spoiled, references, spoiled, tools
+from postproc.languages.gcode.numbered import Spoiled, references, spoiled, tool_lengths, tools
 from postproc.languages.gcode.orientation_words import OrientationWords
 from postproc.languages.gcode.positions import Positions, Trace
 from postproc.languages.gcode.refusals import RefusalCollector
@@ -54,16 +57,15 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     """Read a program; never raises on its content."""
     document = documents[0]
     source = scan(document.raw, control)
-    given = blocks(
-        source, modal(source, control), control, control.increments and settings.integer_words == "um"
-    )
+    integers = integer_words(source, control, settings.integer_words)
+    given = blocks(source, modal(source, control), control, integers)
     rows = np.flatnonzero(given.motion).astype(np.int32)
     offset = spoiled(given)
     base = given.modal.force[Group.OFFSET]
     base = (np.where(offset.bad, -1, base) if offset.bad.any() else base)[rows]
     tool, named = tools(given)
     collector = RefusalCollector(len(rows))
-    found, built, frames, orientations = _followed(given, rows, offset, base, tool[rows], settings, collector)
+    found, built, frames, orientations = _followed(given, rows, offset, base, tool, settings, collector)
     lines = source.blocks
     line, start = lines.line[rows], lines.start[rows]
     external = external_axes(given, rows)
@@ -139,7 +141,7 @@ def _followed(
     settings: ReadingSettings,
     collector: RefusalCollector,
 ) -> tuple[FilledRows, Built, Poses, tuple[OrientationWords, ...]]:
-    """The motions in the blocks ``rows`` (N,), part by part; base, tool (N,): numbers.
+    """The motions in the blocks ``rows`` (N,), part by part; base (N,), tool (B,): numbers.
 
     Gives their columns, what others build on, the frames of the program and what its orientation words mean.
     """
@@ -153,17 +155,26 @@ def _followed(
         Reasons(len(given)),
     )
     allowed = _allowed(given)
+    ends, lengths = cycle_ends(given, events), tool_lengths(given, tool)
     found = FilledRows(len(rows))
     for start in range(0, max(len(given), 1), PART):
         stop = min(start + PART, len(given))
         low, high = np.searchsorted(rows, [start, stop]).tolist()
         here, own = given.part(start, stop), rows[low:high] - start
-        way = frame_events(here, offset.at[start:stop], away[start:stop], reasons)
+        way = frame_events(
+            here,
+            offset.at[start:stop],
+            away[start:stop],
+            ends.part(start, stop),
+            lengths.changes[start:stop],
+            reasons,
+        )
         where = trace.follow(way, start)
         moves = _motions(here, where, trace, own, stands)
-        check_correctability(
-            here, moves, where, base[low:high], tool[low:high], reasons, collector.part(slice(low, high))
-        )
+        part = collector.part(slice(low, high))
+        cutting = np.isin(moves.kind, (Kind.LIN, Kind.CIRC)) & lengths.off[rows[low:high]]
+        part.refuse(cutting, "GCO029", "the program has switched the tool's length off")
+        check_correctability(here, moves, where, base[low:high], tool[rows[low:high]], reasons, part)
         found.put(
             high - low,
             **_columns(here, where, moves, feeds),
@@ -241,13 +252,15 @@ def _change(given: BlockWords, events: Ints) -> Callable[[int, ProgrammedFrame, 
     def changed(block: int, frame: ProgrammedFrame, position: Floats) -> ProgrammedFrame:
         here = given.part(block, block + 1)
         lengths = float(here.length_of_integer[0] / here.length[0])
-        angles = SMALL_ANGLE if given.increments else 1.0
+        angles = SMALL_ANGLE if given.integers.increments else 1.0
         small = {one: angles if one in AXES[3:] else lengths for one in keys}
         words = {
             one: float(column.value[-1] * (small[one] if column.how[-1] == How.INTEGER else 1.0))
             for one in keys
             if len(column := here.words(one))
         }
+        if here.unclear.any():
+            words = {one: math.nan if one in AXES[:3] else value for one, value in words.items()}
         codes = tuple(here.words(key("G")).value.tolist())
         event = Event(
             words,

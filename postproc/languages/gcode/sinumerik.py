@@ -205,6 +205,7 @@ CONTROL = Control(
     euler=EULER,
     calls=frozenset((key("L"),)),
     further=True,
+    offsets=key("D"),
 )
 """Sinumerik 840D, its own language (G290)."""
 

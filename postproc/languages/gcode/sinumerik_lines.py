@@ -182,8 +182,12 @@ class _Taken:
         if assigned is not None and not name.startswith(b"$"):
             return self.assigned(name, place, assigned.end())
         if name.startswith(b"$"):
-            self.note("base" if name.startswith(b"$P_UIFR") else "assign", b"<" + text[place:].strip())
-            return len(text)
+            if assigned is None:
+                self.note("unknown", text[place:].strip())
+                return len(text)
+            close = assigned_end(text, assigned.end())
+            self.note("base" if name.startswith(b"$P_UIFR") else "assign", b"<" + text[place:close].strip())
+            return close
         if name in self.names:
             self.codes(place, end, name)
             return self.arguments(end)
@@ -211,7 +215,8 @@ class _Taken:
             # In a block with other words it can only be an axis of the machine.
             self.note("axis", name)
         else:
-            self.note("assign", b"<" + self.text[place:].strip())
+            close = assigned_end(self.text, behind)
+            self.note("assign", b"<" + self.text[place:close].strip())
         return max(close, behind + 1)
 
     def arguments(self, end: int) -> int:

@@ -180,3 +180,9 @@ class Calls(BlockFollower):
         else:
             message = f"{called} is not read: after it the position is not known; base and tool are assumed unchanged"
             run.add_finding("KRL010", message, item)
+
+    def _unread(self, item: Statement, name: bytes) -> None:
+        """Reports a routine that an interrupt or a trigger runs, and that is not in this file."""
+        if not is_harmless(name):
+            message = f"{shown(name)} is not read: it runs at a time of its own; base and tool are assumed unchanged"
+            self.run.add_finding("KRL010", message, item)

@@ -55,7 +55,8 @@ class BlockFrame:
 @dataclass(eq=False)
 class ExecutionContext:
     """``mentioned``: names that code reads, other than as the target of a motion.  ``root_set``: the line, if any, from
-    which on the program itself states where the robot is in the world.  ``routine``: the one that runs.
+    which on the program itself states where the robot is in the world.  ``later_since``: the line, if any, from which
+    on an interrupt or a trigger may change base or tool.  ``routine``: the one that runs.
     ``walked``: it is passed over without a call that is known.  ``idle``: what no flow leads to is listed.
     ``has_tcp_mode``, ``has_turning``: some line names another interpolation mode, or another way of turning the tool,
     than the usual one.
@@ -77,6 +78,7 @@ class ExecutionContext:
     mentioned: set[bytes] = field(default_factory=set)
     reported: set[tuple[str, str]] = field(default_factory=set)
     root_set: int | None = None
+    later_since: int | None = None
     routine: Routine | None = None
     walked: bool = False
     idle: bool = False

@@ -169,5 +169,5 @@ def _advance(
     elif axes is not None:
         state.lose_point(f"after the axis motion in line {line}")
         state.axes = axes
-    elif reason is None or reason.code != "KRL004" or state.anchor is not None:
+    elif reason is None or reason.code != "KRL004" or state.point is not None or state.anchor is not None:
         state.lose_point(f"after the motion in line {line}")

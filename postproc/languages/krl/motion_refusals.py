@@ -14,6 +14,9 @@ def frames_missing(run: ExecutionContext) -> RowRefusal | None:
     state = run.state
     if run.root_set is not None:
         return RowRefusal("KRL005", f"the robot's place in the world is set in line {run.root_set}", "root")
+    if run.later_since is not None:
+        what = f"the interrupt or trigger of line {run.later_since} may change base or tool at any time"
+        return RowRefusal("KRL005", what, "later")
     if state.tool_known:
         return RowRefusal("KRL013", "the tool is fixed in the world ($IPO_MODE=#TCP)", "tcp")
     for frame in (state.base, state.tool):

@@ -11,7 +11,7 @@ from postproc.languages.krl.calls import Calls, Restart
 from postproc.languages.krl.external_axes import ALL_LOST, by_themselves
 from postproc.languages.krl.lexing import Assignment, Call, Declared, Statement, has_foreign_letters
 from postproc.languages.krl.modal_state import InlineFormState, ModalState
-from postproc.languages.krl.program_structure import INLINE, Routine
+from postproc.languages.krl.program_structure import INLINE, LATER, Routine
 from postproc.languages.krl.statement_effects import HIDDEN, effects_of, functions_of
 from postproc.languages.krl.vectorised import VectorisedLines
 from postproc.toolpath import Annotation
@@ -142,8 +142,9 @@ class ProgramFlow(Calls):
             run.state.external = by_themselves(run.state.external, item.code)
         elif kind == "other" and run.survey.has_routine and HIDDEN.search(item.code):
             motions.unknown_motion(run, item)
-        elif item.word == b"TRIGGER":
-            run.triggered = True
+        elif item.word in (b"TRIGGER", b"INTERRUPT", b"GLOBAL"):
+            run.triggered = run.triggered or item.word == b"TRIGGER"
+            self._later(item)
         return pc + 1
 
     def _comment(self, item: Statement) -> None:
@@ -158,6 +159,16 @@ class ProgramFlow(Calls):
             run.rows.annotations.append(note)
         elif item.kind == "comment":
             self.comments.setdefault(item.line, note)
+
+    def _later(self, item: Statement) -> None:
+        """Takes up what an interrupt or a trigger may do from here on."""
+        run = self.run
+        if not run.survey.later_effects.isdisjoint(("base", "tool", "mode", "turning")):
+            run.later_since = run.later_since or item.line
+        for name in LATER.findall(item.code):
+            name = name.upper()
+            if name + b"(" in item.code.upper().replace(b" ", b"") and name not in run.survey.routines:
+                self._unread(item, name)
 
     def _report_letters(self, item: Statement) -> None:
         """Once; the motions that it leaves uncertain are reported one by one."""

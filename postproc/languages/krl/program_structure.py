@@ -20,6 +20,7 @@ from postproc.languages.krl.lexing import (
 from postproc.languages.krl.statement_effects import (
     HERE,
     MODAL,
+    SYSTEM,
     Effect,
     Effects,
     effects_of,
@@ -39,7 +40,7 @@ DEEPEST = 100
 
 INLINE = re.compile(rb";[ \t]*FOLD[ \t]+(?:S?(?:PTP|LIN|CIRC)|SPL)(?![A-Za-z0-9_])", re.I)
 _FOLD = re.compile(rb";[ \t]*(END)?FOLD(?![A-Za-z0-9_])", re.I)
-_DONE_LATER = re.compile(rb"\bDO[ \t]+(" + NAME + rb")", re.I)
+LATER = re.compile(rb"\bDO[ \t]+(" + NAME + rb")", re.I)
 
 
 @dataclass(eq=False)
@@ -80,10 +81,10 @@ class ProgramStructure:
     ``routine_at``: index of the DEF -> routine; ``unclosed``: (line, what) of blocks without an end and ends without a
     begin; ``assigned``: names that the program assigns as a whole, or with ``.X`` after them a component of; ``read``:
     names that code reads, other than as the target of a motion; ``later``: names that run or change at a time of their
-    own (interrupts, triggers); ``inline``: lines of motions in the fold of an inline form; ``jumps``: begin of the
-    routine and name of every label that a GOTO names -> first and last index of these; ``effects``: all that the
-    program changes anywhere; ``blocks``: all of them; ``passed_through``: the same labels -> what differs between the
-    ways that lead there.
+    own (interrupts, triggers); ``later_effects``: what these change of base, tool and modes; ``inline``: lines of
+    motions in the fold of an inline form; ``jumps``: start of the routine and name of every label that a GOTO names ->
+    first and last index of these; ``effects``: all that the program changes anywhere; ``blocks``: all of them;
+    ``passed_through``: the same labels -> what differs between the paths that lead there.
     """
 
     events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
@@ -92,6 +93,7 @@ class ProgramStructure:
     assigned: set[bytes] = field(default_factory=set)
     read: set[bytes] = field(default_factory=set)
     later: set[bytes] = field(default_factory=set)
+    later_effects: Effects = field(default_factory=set)
     jumps: dict[tuple[int, bytes], tuple[int, int]] = field(default_factory=dict)
     blocks: list[Block] = field(default_factory=list)
     passed_through: dict[tuple[int, bytes], Effects] = field(default_factory=dict)
@@ -267,7 +269,7 @@ class _Surveyor:
                     self.routine.types[key.split(b"[")[0]] = said.type
         found.read |= read_by(statement)
         if statement.word in (b"INTERRUPT", b"TRIGGER", b"GLOBAL"):
-            found.later.update(name.upper() for name in _DONE_LATER.findall(statement.code))
+            found.later.update(name.upper() for name in LATER.findall(statement.code))
         if stack:
             _join(stack[-1].effects, effects)
             stack[-1].calls.update(functions)
@@ -287,8 +289,10 @@ def program_structure(statements: Iterable[tuple[int, Statement]]) -> ProgramStr
     surveyor._close_all(index)
     found.blocks = surveyor.blocks
     _settle(found, surveyor.blocks)
+    found.later_effects = {SYSTEM[name] for name in found.later if name in SYSTEM}
     for name in closure(found, found.later):
         effects = found.routines[name].effects
+        found.later_effects |= {effect for effect in effects if isinstance(effect, str)}
         found.later.update(effect for effect in effects if isinstance(effect, bytes))
         if "all" in effects:
             found.later.update(name.partition(b".")[0] for name in found.assigned)

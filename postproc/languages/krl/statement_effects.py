@@ -77,7 +77,7 @@ _BAS_EFFECTS: dict[bytes, Effects] = {
     b"CP_DAT": {"feed", "apo", "turning"},
     b"VEL_CP": {"feed"},
 }
-_SYSTEM: dict[bytes, str] = {
+SYSTEM: dict[bytes, str] = {
     b"$BASE": "base",
     b"$TOOL": "tool",
     b"$VEL": "feed",
@@ -142,8 +142,8 @@ def effects_of(statement: Statement) -> tuple[Effects, bytes]:
     if isinstance(said, Assignment):
         if said.name == b"$VEL" and said.path not in (b"", b"CP"):
             return set(), b""
-        if said.name in _SYSTEM:
-            return {_SYSTEM[said.name]}, b""
+        if said.name in SYSTEM:
+            return {SYSTEM[said.name]}, b""
         if said.name.startswith(b"$") or said.path in EXTERNAL:
             return set(), b""
         return {said.name}, b""

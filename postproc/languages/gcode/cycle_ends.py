@@ -1,0 +1,55 @@
+"""Where the tool is after a canned cycle, along the axis in which it works."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.base.arrays import Ints
+from postproc.languages.gcode.blocks import AXES, BlockWords
+from postproc.languages.gcode.control import Group, Move
+from postproc.languages.gcode.modal_fill import everywhere
+from postproc.languages.gcode.positions import CycleEnds
+from postproc.languages.gcode.words import How, key
+
+
+def cycle_ends(given: BlockWords, events: Ints) -> CycleEnds:
+    """The ends of all cycles of a whole program; ``events`` (E,): blocks that change the frame.
+
+    G99: at R.  G98: where the first of the cycles without another motion between began, if that is not below R: from
+    there controls differ.  R is known where it is a coordinate (G90); it holds to the end of these cycles.
+    """
+    n = len(given)
+    cycle = given.motion & (given.move == Move.CYCLE)
+    rows = np.flatnonzero(cycle)
+    if not len(rows):
+        return CycleEnds(everywhere(np.nan, n), everywhere(False, n))
+    level, stays = np.full(n, np.nan), np.zeros(n, np.bool_)
+    axis = np.array([2, 1, 0])[np.clip(given.modal.force[Group.PLANE], 0, 2)]
+    absolute = given.modal.force[Group.DISTANCE] == 0
+    back = given.modal.force[Group.RETURN]
+    plane, height = given.lengths(key("R")), np.stack([given.lengths(one) for one in AXES[:3]], axis=1)
+    hows = np.stack([given.how(one) for one in AXES[:3]], axis=1)
+    # Where the last coordinate of each axis is that a motion other than a cycle states.
+    placed = (given.motion & ~given.machine & ~cycle & absolute)[:, None] & np.isin(
+        hows, (How.NUMBER, How.INTEGER)
+    )
+    latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
+    frame = np.searchsorted(events, np.arange(n))
+    at_r, before, last = np.nan, np.nan, -1
+    for row in rows.tolist():
+        if last < 0 or given.move[row - 1] != Move.CYCLE or axis[row] != axis[row - 1]:
+            source = latest[row, axis[row]]
+            same = source >= 0 and frame[source] == frame[row]
+            at_r, before = np.nan, height[source, axis[row]] if same else np.nan
+        elif frame[row] != frame[last]:
+            at_r, before = np.nan, np.nan
+        last = row
+        if not np.isnan(plane[row]):
+            at_r = plane[row] if absolute[row] else np.nan
+        elif not absolute[row]:
+            at_r = np.nan
+        if back[row] == 1:
+            level[row] = at_r
+        elif back[row] == 0:
+            stays[row] = before >= at_r
+    return CycleEnds(level, stays)
