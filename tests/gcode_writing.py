@@ -70,7 +70,7 @@ def random_plan(
     last = np.full(3, np.nan)
     for row in range(n):
         begin = last if row and path.base[row] == path.base[row - 1] else np.full(3, np.nan)
-        arc = path.kind[row] == Kind.CIRC and np.isfinite(path.sweep[row])
+        arc = path.kind[row] == Kind.CIRC and np.isfinite(path.arcs.sweep[row])
         whole = (
             row in path.no_insert_before
             or row in path.refused
@@ -88,7 +88,7 @@ def random_plan(
         else:
             if through[row] and movable[row]:
                 # Three points: no advance along the normal.
-                end[row] -= path.normal[row] * ((end[row] - begin) @ path.normal[row])
+                end[row] -= path.arcs.normal[row] * ((end[row] - begin) @ path.arcs.normal[row])
             groups += _arc(
                 path,
                 row,
@@ -117,7 +117,7 @@ def random_plan(
 
 def _arc(path, row, start, begin, end, rotation, whole, moves, random, divided, flat):
     """An arc, or two, from ``begin``; as it is where nothing moves."""
-    own = np.concatenate([path.centre[row], path.normal[row], [path.sweep[row]]])
+    own = np.concatenate([path.arcs.centre[row], path.arcs.normal[row], [path.arcs.sweep[row]]])
     if row in path.refused or (not moves and np.array_equal(begin, start)):
         return [(row, Role.ORIGINAL, path.position[row], rotation, own)]
     source = [
@@ -225,8 +225,8 @@ def assert_reads_as(
         reach = np.where(plan.sweep > 6, np.maximum(reach, np.roll(half, 1)), reach)
     assert (off <= reach[known, None]).all(), f"{off.max() / MM} mm\n" + raw.decode("latin-1")
     _assert_turned(path, plan, before, writing)
-    arc = np.flatnonzero(np.isfinite(plan.sweep) & np.isfinite(path.sweep) & (kind == Kind.CIRC))
-    np.testing.assert_array_equal(np.isfinite(path.sweep), np.isfinite(plan.sweep) & (kind == Kind.CIRC))
+    arc = np.flatnonzero(np.isfinite(plan.sweep) & np.isfinite(path.arcs.sweep) & (kind == Kind.CIRC))
+    np.testing.assert_array_equal(np.isfinite(path.arcs.sweep), np.isfinite(plan.sweep) & (kind == Kind.CIRC))
     if len(arc):
         _assert_arcs(path, plan, arc, step, raw)
     return again
@@ -239,7 +239,14 @@ def _assert_arcs(path: Toolpath, plan: Plan, arc, step, raw) -> None:
     for share in (0.3, 0.5, 0.8):
         at = np.full(len(arc), share)
         one = on_arc(meant, plan.position[arc], plan.centre[arc], plan.normal[arc], plan.sweep[arc], at)
-        two = on_arc(read_begin, path.position[arc], path.centre[arc], path.normal[arc], path.sweep[arc], at)
+        two = on_arc(
+            read_begin,
+            path.position[arc],
+            path.arcs.centre[arc],
+            path.arcs.normal[arc],
+            path.arcs.sweep[arc],
+            at,
+        )
         off = np.linalg.norm(one - two, axis=1)
         worst = int(np.argmax(off / step[arc]))
         assert (off <= 2.5 * step[arc]).all(), f"arc {arc[worst]}: {off[worst] / MM} mm\n" + raw.decode(

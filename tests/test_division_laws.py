@@ -18,7 +18,7 @@ from postproc.compensation.mirror import pose_error
 from postproc.compensation.path_error import path_errors
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import ROOM, Limits, allocate, subdivide, subdivided_motions
-from postproc.toolpath import Kind, Role
+from postproc.toolpath import Arcs, Kind, Role
 
 FREE = Limits(max_growth=100.0)
 OWN, PIECE, LINK = Role.ORIGINAL, Role.INTERMEDIATE, Role.TRANSITION
@@ -30,7 +30,8 @@ def divided(job, limits=FREE):
 
 
 def planar(job):
-    return replace(job, toolpath=replace(job.toolpath, arc_plane_free=np.zeros(len(job.toolpath), bool)))
+    arcs = replace(job.toolpath.arcs, plane_free=np.zeros(len(job.toolpath), bool))
+    return replace(job, toolpath=replace(job.toolpath, arcs=arcs))
 
 
 def mixed(**words):
@@ -47,7 +48,7 @@ def mixed(**words):
     centre[3], normal[3], sweep[3] = [1.7, 0.1, 0.5], [0, 0, -1.0], 0.5 * np.pi
     centre[5], normal[5], sweep[5] = [1.65, 0.25, 0.6], [0, 0, 1.0], np.pi
     carries = np.isin(np.arange(n), [2, 3, 6])
-    return at_points(points, carries, kinds, centre=centre, normal=normal, sweep=sweep, **words)
+    return at_points(points, carries, kinds, arcs=Arcs(centre, normal, sweep), **words)
 
 
 JOBS = {
@@ -123,7 +124,7 @@ def test_a_division_has_links_pieces_and_own_motions_where_they_belong(job, limi
             middle = 0.5 * (pieces.first + pieces.last)
             via = commands(task, np.full(count, row), middle).position
             points = pieces.start.position, via, pieces.end.position
-            if task.toolpath.arc_plane_free[row]:
+            if task.toolpath.arcs.plane_free[row]:
                 for name, values in zip(("centre", "normal", "sweep"), arc_through(*points), strict=True):
                     np.testing.assert_allclose(getattr(division, name)[curved], values, atol=1e-7)
             else:

@@ -194,12 +194,12 @@ def test_angles_of_the_two_modes_that_are_read_turn_as_they_say() -> None:
 def test_turns_of_an_arc_are_those_said(turns: int) -> None:
     """TURN= counts those beyond the first, P of LinuxCNC all of them."""
     found = body(f"G1 X10 Y0 Z0\nG2 X10 Y0 I-10 J0 TURN={turns}\n").toolpath
-    assert abs(found.sweep[-1]) == pytest.approx(2 * np.pi * (turns + 1))
+    assert abs(found.arcs.sweep[-1]) == pytest.approx(2 * np.pi * (turns + 1))
     if turns:
         other = read(
             NAMES["linuxcnc"], f"G21 G90 G17 T1\nG0 X10 Y0 Z0\nF600\nG2 X10 Y0 I-10 J0 P{turns}\n"
         ).toolpath
-        assert abs(other.sweep[-1]) == pytest.approx(2 * np.pi * turns)
+        assert abs(other.arcs.sweep[-1]) == pytest.approx(2 * np.pi * turns)
 
 
 # Digits

@@ -2,6 +2,7 @@
 
 import random
 import re
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -181,8 +182,9 @@ def test_inches_are_inches() -> None:
         "T1 G21\nG0 X25.4 Y50.8 Z0\nG1 X50.8 F254\nG2 X76.2 Y25.4 I0 J-25.4\nG3 X0 Y0 R127\n"
     ).toolpath
     inch = read("T1 G20\nG0 X1 Y2 Z0\nG1 X2 F10\nG2 X3 Y1 I0 J-1\nG3 X0 Y0 R5\n").toolpath
-    for name in ("position", "centre", "sweep", "feed"):
-        np.testing.assert_allclose(getattr(inch, name), getattr(metric, name), atol=1e-12, err_msg=name)
+    for name in ("position", "arcs.centre", "arcs.sweep", "feed"):
+        column = attrgetter(name)
+        np.testing.assert_allclose(column(inch), column(metric), atol=1e-12, err_msg=name)
 
 
 def test_the_planes_are_alike() -> None:
@@ -196,18 +198,18 @@ def test_the_planes_are_alike() -> None:
     for turned, steps in ((two, 1), (three, 2)):
         assert not turned.refused
         np.testing.assert_allclose(np.roll(one.position, steps, axis=1), turned.position, atol=1e-12)
-        np.testing.assert_allclose(np.roll(one.centre, steps, axis=1), turned.centre, atol=1e-12)
-        np.testing.assert_allclose(np.roll(one.normal, steps, axis=1), turned.normal, atol=1e-12)
-        np.testing.assert_allclose(one.sweep, turned.sweep, atol=1e-12)
+        np.testing.assert_allclose(np.roll(one.arcs.centre, steps, axis=1), turned.arcs.centre, atol=1e-12)
+        np.testing.assert_allclose(np.roll(one.arcs.normal, steps, axis=1), turned.arcs.normal, atol=1e-12)
+        np.testing.assert_allclose(one.arcs.sweep, turned.arcs.sweep, atol=1e-12)
 
 
 def test_an_arc_by_its_radius_is_that_by_its_centre() -> None:
     for code, size, i, j in (("G2", 5, 3, -4), ("G3", 5, 3, 4), ("G2", -5, 3, 4), ("G3", -5, 3, -4)):
         one = body(f"{code} X6 Y0 R{size}\n").toolpath
         two = body(f"{code} X6 Y0 I{i} J{j}\n").toolpath
-        np.testing.assert_allclose(one.centre[1], two.centre[1], atol=1e-12)
-        assert one.sweep[1] == pytest.approx(two.sweep[1])
-        assert (one.sweep[1] > np.pi) == (size < 0)
+        np.testing.assert_allclose(one.arcs.centre[1], two.arcs.centre[1], atol=1e-12)
+        assert one.arcs.sweep[1] == pytest.approx(two.arcs.sweep[1])
+        assert (one.arcs.sweep[1] > np.pi) == (size < 0)
 
 
 def test_words_without_a_point_count_increments_where_the_cell_says_so() -> None:

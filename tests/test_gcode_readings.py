@@ -52,10 +52,10 @@ def reading(program: Program) -> Iterator[str]:
             said.append("ABC?")
         elif text.orient[row] >= 0:
             said.append(letters("ABC", abc_from_rotation(path.rotation[row]) / DEG))
-        if np.isfinite(path.sweep[row]):
-            centre, normal = path.centre[row] / MM, path.normal[row]
+        if np.isfinite(path.arcs.sweep[row]):
+            centre, normal = path.arcs.centre[row] / MM, path.arcs.normal[row]
             said.append(
-                f"arc {letters('XYZ', centre)} {letters('UVW', normal)} {number(path.sweep[row] / DEG)}deg"
+                f"arc {letters('XYZ', centre)} {letters('UVW', normal)} {number(path.arcs.sweep[row] / DEG)}deg"
             )
         if text.orient[row] >= 0:
             ways = "written" if path.orientation_programmed[row] else "kept"
@@ -73,7 +73,7 @@ def reading(program: Program) -> Iterator[str]:
         said.append({0: "", 1: "G18", 2: "G19"}.get(int(text.plane[row]), "plane?"))
         said.append("G91" if text.incremental[row] else "")
         said.append("centres absolute" if text.arc_absolute[row] else "")
-        said.append("any plane" if path.arc_plane_free[row] and path.kind[row] == Kind.CIRC else "")
+        said.append("any plane" if path.arcs.plane_free[row] and path.kind[row] == Kind.CIRC else "")
         if text.scale[row] != MM or text.increment[row] != MM:
             said.append(f"unit {number(text.scale[row] / MM)} {number(text.increment[row] / MM)}")
         if text.frame[row]:

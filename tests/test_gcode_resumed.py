@@ -76,8 +76,8 @@ def test_a_coordinate_is_inherited_through_what_is_not_corrected() -> None:
 def test_an_arc_without_an_end_has_no_way() -> None:
     path = read(LINUXCNC, HEAD + "G2 X2 I1 F9\nM2\nG2 I3\n").toolpath
     assert np.isnan(path.position[-1]).all()
-    assert np.isnan(path.sweep[-1])
-    assert np.isnan(path.centre[-1]).all()
+    assert np.isnan(path.arcs.sweep[-1])
+    assert np.isnan(path.arcs.centre[-1]).all()
 
 
 def test_far_frames_are_not_known() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -35,10 +36,12 @@ class Seen:
         check_readback(*self.held[:5], replace(self.held[5], **of_back), self.held[6])
 
     def column(self, name: str, at: object, value: object) -> None:
-        """Holds with one value of a column changed."""
-        values = np.array(getattr(self.held[5], name))
+        """Holds with one value of a column changed, of the toolpath or of a part of it (``arcs.sweep``)."""
+        values = np.array(attrgetter(name)(self.path))
         values[at] = value
-        self.hold(**{name: values})
+        part, _, column = name.rpartition(".")
+        changed = {column: values}
+        self.hold(**({part: replace(getattr(self.path, part), **changed)} if part else changed))
 
     def residual_with(self, division=None, **of_result: object) -> None:
         task, planned, result, made, *rest = self.residual
@@ -225,8 +228,8 @@ def test_frames_stay(seen):
 def test_arcs_go_through_the_middle_that_was_meant(blocks):
     division = blocks.held[2]
     arc = int(np.flatnonzero(np.isfinite(division.sweep))[0])
-    refuses("off the planned arc", blocks.column, "sweep", arc, blocks.path.sweep[arc] + np.pi)
-    refuses("the arcs differ", blocks.column, "sweep", arc, np.nan)
+    refuses("off the planned arc", blocks.column, "arcs.sweep", arc, blocks.path.arcs.sweep[arc] + np.pi)
+    refuses("the arcs differ", blocks.column, "arcs.sweep", arc, np.nan)
 
 
 def test_corrections_are_those_that_were_planned(krl):

@@ -120,10 +120,10 @@ def test_an_arc_passes_its_points_and_turns_by_its_angle(
 
 def test_an_arc_of_the_program_is_in_metres_and_radians() -> None:
     path = body("LIN {X 100,Y 0,Z 50,A 0,B 0,C 0}\nCIRC {X 0,Y 100},{X -100,Y 0}\n").toolpath
-    np.testing.assert_allclose(path.centre[1], [0, 0, 0.05], atol=1e-12)
-    np.testing.assert_allclose(path.normal[1], [0, 0, 1], atol=1e-12)
-    np.testing.assert_allclose(path.sweep[1], math.pi)
-    assert np.isnan(path.sweep[0])
+    np.testing.assert_allclose(path.arcs.centre[1], [0, 0, 0.05], atol=1e-12)
+    np.testing.assert_allclose(path.arcs.normal[1], [0, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(path.arcs.sweep[1], math.pi)
+    assert np.isnan(path.arcs.sweep[0])
     assert path.known.tolist() == [True, True]
 
 
@@ -132,7 +132,7 @@ def test_an_arc_behind_one_with_an_angle_begins_where_that_ends() -> None:
         "LIN {X 10,Y 0,Z 0,A 0,B 0,C 0}\nCIRC {X 0,Y 10},{X -10,Y 0},CA 90\nCIRC {X -10,Y 0},{X 0,Y -10}\n"
     ).toolpath
     np.testing.assert_allclose(path.position[1] / MM, [0, 10, 0], atol=1e-9)
-    np.testing.assert_allclose(path.sweep[2], math.pi, atol=1e-9)
+    np.testing.assert_allclose(path.arcs.sweep[2], math.pi, atol=1e-9)
 
 
 def test_places_of_an_arc() -> None:

@@ -216,19 +216,19 @@ def with_arc(program: Program, row: int, shift: tuple[float, float, float], grow
     """Begin, end and centre of the arc at ``row`` shifted [mm], and its end moved on along it [rad]."""
     path = program.toolpath
     wanted = plan(program, **{f"r{row - 1}": shift, f"r{row}": shift})
-    centre, sweep, position = path.centre.copy(), path.sweep.copy(), wanted.position.copy()
+    centre, sweep, position = path.arcs.centre.copy(), path.arcs.sweep.copy(), wanted.position.copy()
     centre[row] += np.array(shift) * MM
     sweep[row] += grow
-    turn = rotation_from_vector(grow * path.normal[row])
+    turn = rotation_from_vector(grow * path.arcs.normal[row])
     position[row] = centre[row] + turn @ (position[row] - centre[row])
     return dataclasses.replace(wanted, centre=centre, sweep=sweep, position=position)
 
 
 def arcs_agree(program: Program, wanted: Plan, row: int, text: list[str]) -> None:
     back = read("".join(line + "\n" for line in text)).toolpath
-    assert abs(back.sweep[row] - wanted.sweep[row]) < 1e-3
-    np.testing.assert_allclose(back.centre[row], wanted.centre[row], atol=5e-6)
-    np.testing.assert_allclose(back.normal[row], wanted.normal[row], atol=1e-3)
+    assert abs(back.arcs.sweep[row] - wanted.sweep[row]) < 1e-3
+    np.testing.assert_allclose(back.arcs.centre[row], wanted.centre[row], atol=5e-6)
+    np.testing.assert_allclose(back.arcs.normal[row], wanted.normal[row], atol=1e-3)
 
 
 def test_the_auxiliary_point_of_a_moved_arc_stands_half_way() -> None:

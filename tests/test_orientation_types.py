@@ -29,7 +29,7 @@ from postproc.process.wrenches import Turning
 from postproc.robot.axis_track import follow_axes, nominal_flange
 from postproc.robot.inverse import inverse
 from postproc.robot.orientation_modes import as_run
-from postproc.toolpath import ArcFrame, Kind, OrientationMode
+from postproc.toolpath import ArcFrame, Arcs, Kind, OrientationMode
 
 KRL = KrlDialect()
 LIN = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
@@ -80,7 +80,7 @@ FDAT = "DECL FDAT F1={TOOL_NO 1,BASE_NO 1,IPO_FRAME #BASE}\n"
 def test_what_the_program_sets_is_read(text: str, orientation: list[int], frame: list[int]) -> None:
     path = read(text, LDAT + FDAT).toolpath
     assert path.orientation.tolist() == orientation
-    assert path.arc_frame.tolist() == frame
+    assert path.arcs.frame.tolist() == frame
 
 
 def test_a_program_that_sets_nothing_unusual_forgets_nothing() -> None:
@@ -204,8 +204,8 @@ def test_an_arc_turns_what_is_kept_along() -> None:
     run, _ = framed(path, TURNED, TILTED)
     kept = Rotation.from_euler("ZYX", [10, 20, 30], degrees=True)
     for row in range(1, len(path)):
-        if np.isfinite(path.sweep[row]):
-            kept = Rotation.from_rotvec(path.sweep[row] * path.normal[row]) * kept
+        if np.isfinite(path.arcs.sweep[row]):
+            kept = Rotation.from_rotvec(path.arcs.sweep[row] * path.arcs.normal[row]) * kept
         np.testing.assert_allclose(run.rotation[row], kept.as_matrix(), atol=1e-12)
 
 
@@ -240,10 +240,12 @@ def part_circle(frame: ArcFrame, turn: float = 40.0):
     path = motions(
         target,
         kind=[Kind.LIN, Kind.LIN, Kind.CIRC],
-        centre=np.array([none, none, [0.1, 0, 0]]),
-        normal=np.array([none, none, [0, 0, -1.0]]),
-        sweep=np.array([np.nan, np.nan, angle]),
-        arc_frame=np.full(3, frame),
+        arcs=Arcs(
+            centre=np.array([none, none, [0.1, 0, 0]]),
+            normal=np.array([none, none, [0, 0, -1.0]]),
+            sweep=np.array([np.nan, np.nan, angle]),
+            frame=np.full(3, frame),
+        ),
     )
     n = len(path)
     base = Poses(np.tile(TURNED.rotation, (n, 1, 1)), np.tile(TURNED.position, (n, 1)))
@@ -324,7 +326,7 @@ def test_a_force_in_the_tool_turns_with_it() -> None:
     base = np.tile(TURNED.rotation, (3, 1, 1))
     frames = Turning(
         np.array([False, False, True]), np.zeros(3, bool), None, base, path.rotation,
-        lambda rows: path.arc_turn(rows, base[rows]),
+        lambda rows: path.arcs.turn(rows, base[rows]),
     )  # fmt: skip
     force = np.array([100.0, 20, -50, 1, 2, 3])
     row = np.array([2])
@@ -444,7 +446,7 @@ def test_what_is_corrected_under_each(compensate, job, switch, corrected) -> Non
 def test_ways_without_an_unusual_turn_are_as_they_were() -> None:
     task = circle()
     rows, share = np.array([1, 2, 3]), np.array([0.3, 0.6, 0.9])
-    assert not task.toolpath.turns_along.any()
-    assert np.array_equal(task.toolpath.arc_turn(rows, np.eye(3)), np.zeros((3, 3)))
+    assert not task.toolpath.arcs.turns_along.any()
+    assert np.array_equal(task.toolpath.arcs.turn(rows, np.eye(3)), np.zeros((3, 3)))
     assert np.isfinite(task.desired_path.at(rows, share).rotation).all()
     assert DEG > 0

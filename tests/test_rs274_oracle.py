@@ -132,18 +132,22 @@ def agree(program: Path, folder: Path) -> int:
             # The begin has four decimals of the unit that was in force there.
             for share, point in zip((1 / 3, 2 / 3), motion.between, strict=True):
                 at = on_arc(
-                    begin[None], path.position[row][None], path.centre[row][None], path.normal[row][None],
-                    path.sweep[row][None], np.array([share]),
+                    begin[None], path.position[row][None], path.arcs.centre[row][None], path.arcs.normal[row][None],
+                    path.arcs.sweep[row][None], np.array([share]),
                 )  # fmt: skip
                 np.testing.assert_allclose(
                     np.ravel(at), point, rtol=0, atol=3 * NEAR * max(motion.unit, before), err_msg=where
                 )
-            plane = np.abs(path.normal[row]) < 0.5
+            plane = np.abs(path.arcs.normal[row]) < 0.5
             np.testing.assert_allclose(
-                path.centre[row][plane], motion.centre[plane], rtol=0, atol=NEAR * motion.unit, err_msg=where
+                path.arcs.centre[row][plane],
+                motion.centre[plane],
+                rtol=0,
+                atol=NEAR * motion.unit,
+                err_msg=where,
             )
-            assert np.sign(path.normal[row].sum()) == np.sign(motion.turn), where
-            assert abs(path.sweep[row] - abs(motion.turn)) < 1e-2, where
+            assert np.sign(path.arcs.normal[row].sum()) == np.sign(motion.turn), where
+            assert abs(path.arcs.sweep[row] - abs(motion.turn)) < 1e-2, where
         before = motion.unit
     return compared
 

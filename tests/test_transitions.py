@@ -19,7 +19,7 @@ from postproc.compensation.ramped_forces import add_force_ramps
 from postproc.compensation.subdivision import Limits, subdivide
 from postproc.languages.krl import KrlDialect
 from postproc.output.write import path_errors_as_written
-from postproc.toolpath import Kind
+from postproc.toolpath import Arcs, Kind
 
 FREE = Limits(max_growth=100.0)
 
@@ -364,9 +364,11 @@ def test_a_smooth_corner_of_line_and_arc_is_held_against_the_one_that_is_run():
         [[1.55, -0.2, 0.5], begin, [1.55, 0.0, 0.5], end],
         [False, True, True, True],
         kind=[Kind.PTP, Kind.LIN, Kind.LIN, Kind.CIRC],
-        centre=np.array([none, none, none, centre]),
-        normal=np.array([none, none, none, [0.0, 0.0, 1.0]]),
-        sweep=np.array([np.nan, np.nan, np.nan, np.pi / 2]),
+        arcs=Arcs(
+            centre=np.array([none, none, none, centre]),
+            normal=np.array([none, none, none, [0.0, 0.0, 1.0]]),
+            sweep=np.array([np.nan, np.nan, np.nan, np.pi / 2]),
+        ),
         approximation=np.full(4, 8e-3),
     )
     found = compare_corners(job, *divided(job, Limits(no_insert=True)))

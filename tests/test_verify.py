@@ -14,7 +14,7 @@ from postproc.base.units import MM
 from postproc.compensation.correct import correct
 from postproc.compensation.subdivision import Limits, subdivide
 from postproc.output.write import plan_motions
-from postproc.toolpath import Kind, Toolpath
+from postproc.toolpath import Arcs, Kind, Toolpath
 from postproc.verification.comparison import Simulator
 from postproc.verification.pairing import Different, pair_motions
 from postproc.workflows.preparation import Request, prepare
@@ -42,9 +42,7 @@ def as_run(task, limits=None, gain=1.0):
         turn=old.turn[plan.source],
         line=np.arange(len(plan)) + 100,
         frames=old.frames,
-        centre=plan.centre,
-        normal=plan.normal,
-        sweep=plan.sweep,
+        arcs=Arcs(plan.centre, plan.normal, plan.sweep),
         approximation=old.approximation[plan.source],
         stops=old.stops[plan.source],
     )

@@ -700,7 +700,7 @@ def _rows(count: Ints) -> int:
 
 def _normals(task: CompensationProblem, rows: Ints) -> Floats:
     """(K, 3) about which the arcs ``rows`` (K,) have to turn; NaN where any plane will do."""
-    return np.where(task.toolpath.arc_plane_free[rows, None], np.nan, task.desired_path.circles(rows)[1])
+    return np.where(task.toolpath.arcs.plane_free[rows, None], np.nan, task.desired_path.circles(rows)[1])
 
 
 def _scaled(task: CompensationProblem, division: Subdivision) -> Subdivision:

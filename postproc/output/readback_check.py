@@ -51,9 +51,9 @@ def intended_motions(
         division.role[rows],
         np.where(moved[:, None], command.position, path.position[source]),
         np.where(turned[:, None, None], command.rotation, path.programmed_rotation[source]),
-        way(centre, path.centre),
-        way(normal, path.normal),
-        way(division.sweep[rows], path.sweep),
+        way(centre, path.arcs.centre),
+        way(normal, path.arcs.normal),
+        way(division.sweep[rows], path.arcs.sweep),
         approximated_motions(task, division, rows),
         division.share[rows],
     )
@@ -256,8 +256,8 @@ def _check_arcs(
 ) -> None:
     path, source = task.toolpath, division.source
     kept = ~moved & ~division.transitions
-    arc = np.isfinite(division.sweep) | (kept & np.isfinite(path.sweep[source]))
-    if not np.array_equal(np.isfinite(back.sweep), arc):
+    arc = np.isfinite(division.sweep) | (kept & np.isfinite(path.arcs.sweep[source]))
+    if not np.array_equal(np.isfinite(back.arcs.sweep), arc):
         raise Refusal(Finding("FIL008", "the arcs differ from the plan", file))
     for rows in blocks(len(division)) if arc.any() else ():
         start = max(rows.start - 1, 0)
@@ -269,8 +269,8 @@ def _check_arcs(
             continue
         there, half = at + start, np.full(len(at), 0.5)
         one, other = (
-            on_arc(p.position[k - 1], p.position[k], p.centre[k], p.normal[k], p.sweep[k], half)
-            for p, k in ((plan, at), (back, there))
+            on_arc(p.position[k - 1], p.position[k], arcs.centre[k], arcs.normal[k], arcs.sweep[k], half)
+            for p, arcs, k in ((plan, plan, at), (back, back.arcs, there))
         )
         off = np.abs(other - one).max(axis=1) / MM
         _close(off > FAR * step_mm, off, path, plan.source[at], file, "mm off the planned arc")

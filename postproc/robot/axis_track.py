@@ -338,7 +338,7 @@ def _large(
 
 def _winds(toolpath: Toolpath, rows: Ints) -> Bools:
     """(K,) arcs on which an axis may turn far and end near its start: long ones, and those that turn the tool."""
-    return np.asarray((toolpath.sweep[rows] > np.pi) | toolpath.turns_along[rows])
+    return np.asarray((toolpath.arcs.sweep[rows] > np.pi) | toolpath.arcs.turns_along[rows])
 
 
 def _motions(
@@ -358,10 +358,10 @@ def _motions(
         nominal_flange(robot, values[place - 1]),
         nominal_flange(robot, values[place]),
         nowhere if tool is None else tool[at],
-        (frame @ Poses(same, toolpath.centre[at])).position,
-        (frame.rotation @ toolpath.normal[at][..., None])[..., 0],
-        toolpath.sweep[at],
-        toolpath.arc_turn(at, frame.rotation),
+        (frame @ Poses(same, toolpath.arcs.centre[at])).position,
+        (frame.rotation @ toolpath.arcs.normal[at][..., None])[..., 0],
+        toolpath.arcs.sweep[at],
+        toolpath.arcs.turn(at, frame.rotation),
     )
 
 

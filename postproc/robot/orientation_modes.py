@@ -38,8 +38,8 @@ def as_run(
     anchor = np.maximum.accumulate(np.where(keeps, -1, np.arange(len(path))))[rows]
     flange = _flange(path, base, tool, robot, start, anchor)
     flange[~path.executes[rows]] = np.nan
-    turn = path.arc_turn(rows, base.rotation[rows])
-    unclear = (path.kind == Kind.CIRC) & (path.arc_frame != ArcFrame.BASE) & ~path.turns_along
+    turn = path.arcs.turn(rows, base.rotation[rows])
+    unclear = (path.kind == Kind.CIRC) & (path.arcs.frame != ArcFrame.BASE) & ~path.arcs.turns_along
     turn[unclear[rows]] = np.nan
     turns = _along(turn, anchor)
     own = product(

@@ -1,16 +1,15 @@
 """The wanted motions of a program: where the text side and the physics side meet."""
 
+from postproc.toolpath.arcs import ArcFrame, Arcs
+from postproc.toolpath.plan import Plan, Role
 from postproc.toolpath.toolpath import (
     COMPUTED,
     LOST,
     Annotation,
-    ArcFrame,
     FrameRef,
     Kind,
     OrientationMode,
     OrientationPath,
-    Plan,
-    Role,
     Toolpath,
     external_at,
 )
@@ -20,6 +19,7 @@ __all__ = [
     "LOST",
     "Annotation",
     "ArcFrame",
+    "Arcs",
     "FrameRef",
     "Kind",
     "OrientationMode",

@@ -13,10 +13,11 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.base.arrays import Bools, FewRows, Floats, Ints, LazyRows, frozen, shared
+from postproc.base.arrays import Bools, FewRows, Floats, Ints, frozen, shared
 from postproc.base.findings import Finding
-from postproc.base.geometry import Placed, Poses, abc_from_rotation, rotation_from_abc, turned
+from postproc.base.geometry import Placed, Poses, abc_from_rotation, rotation_from_abc
 from postproc.base.units import DEG, MM
+from postproc.toolpath.arcs import ArcFrame, Arcs
 
 COMPUTED, LOST = np.inf, -np.inf
 """An external axis whose value is an expression that is not constant; one that something else may have moved."""
@@ -50,14 +51,6 @@ class OrientationMode(IntEnum):
         2  # as the wrist axes, each of which turns evenly from its angle at the begin to that at the target
     )
     UNKNOWN = 3
-
-
-class ArcFrame(IntEnum):
-    """To what the orientation on an arc refers (KRL's $CIRC_TYPE)."""
-
-    BASE = 0  # to the base, as on a straight line
-    PATH = 1  # to the frame of the path, which turns with the tangent
-    UNKNOWN = 2
 
 
 @dataclass(frozen=True)
@@ -101,12 +94,7 @@ class Toolpath:
     its text serves another motion too, ...). ``locked``: rows whose end point a later, refused motion
     builds on: moving them would move that one, so they can not be corrected either.
 
-    Arcs (CIRC; NaN elsewhere), in the programmed base: ``centre`` (N, 3) [m], ``normal`` (N, 3) unit
-    vector, ``sweep`` (N,) > 0 [rad] counter-clockwise seen from the tip of the normal. The way at the share
-    t is the begin, turned about the centre by t * sweep, and moved along the normal by its share of what
-    begin and end lie apart there. ``arc_plane_free`` (N,): the text gives an arc by three points, which may
-    lie in any plane but leave no advance; False: it lies in a plane that the program selects (its normal
-    stays, an advance along it is possible). ``no_insert_before``: row -> why no motion can be inserted
+    ``arcs``: Arcs. ``no_insert_before``: row -> why no motion can be inserted
     before it (a spline, a TRIGGER, a line that runs many times). ``approximation`` (N,) [m]: the controller
     may leave the path that far before the end point (approximation); 0 where it stops or passes exactly,
     NaN where the distance is not known. ``exact_stays``: what is inserted before such an end point is
@@ -120,8 +108,8 @@ class Toolpath:
     lead into another configuration of the robot (KRL's S); without, no motion does. ``annotations``:
     comments that speak to this tool; ``comments``: all others that stand on a line of their own. ``stops``
     (N,): the controller comes to rest at the end point: it is not approximated (``approximation`` is 0),
-    and is no inner point of a spline block. ``orientation`` (N,) Orientation and ``arc_frame`` (N,)
-    ArcFrame of path motions. ``programmed`` (N, 3, 3): the rotations of the text, where ``rotation`` is
+    and is no inner point of a spline block. ``orientation`` (N,) OrientationMode of path
+    motions. ``programmed`` (N, 3, 3): the rotations of the text, where ``rotation`` is
     what the controller runs instead (see ``programmed_rotation``). ``entries``: row -> line of the header
     of the spline block that begins with it. Such a row is ``no_insert_before``, but one straight link may
     stand before that line. ``orientation_path`` (N,) OrientationPath; ``rotary_from``, ``rotary_to`` (N, 3)
@@ -142,19 +130,16 @@ class Toolpath:
     turn: Ints
     line: Ints
     frames: tuple[FrameRef, ...]
+    arcs: Arcs = field(default_factory=Arcs)
     refused: Mapping[int, Finding] = field(default_factory=dict)
     locked: Mapping[int, Finding] = field(default_factory=dict)
     annotations: tuple[Annotation, ...] = ()
     inherits_from_row: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     partial_target: Floats = field(default_factory=lambda: np.empty((0, 6)))
-    centre: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    normal: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    sweep: Floats = field(default_factory=lambda: np.empty(0))
     approximation: Floats = field(default_factory=lambda: np.empty(0))
     orientation_programmed: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     redundant_axis: Floats = field(default_factory=lambda: np.empty((0, 3)))
     executes: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    arc_plane_free: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     inverse_time_feed: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     ptp_may_change_configuration: bool = True
     exact_stays: bool = False
@@ -166,7 +151,6 @@ class Toolpath:
     rotary_from: Floats = field(default_factory=lambda: np.empty((0, 3)))
     rotary_to: Floats = field(default_factory=lambda: np.empty((0, 3)))
     orientation: Ints = field(default_factory=lambda: np.empty(0, np.int8))
-    arc_frame: Ints = field(default_factory=lambda: np.empty(0, np.int8))
     programmed: Floats = field(default_factory=lambda: np.empty((0, 3, 3)))
     external: Floats = field(default_factory=lambda: np.empty((0, 6)))
 
@@ -181,14 +165,12 @@ class Toolpath:
             "rotation": ((n, 3, 3), np.float64, None),
             "feed": ((n,), np.float64, None),
             **dict.fromkeys(("partial_target", "external"), ((n, 6), np.float64, np.nan)),
-            **dict.fromkeys(("centre", "normal", "redundant_axis"), ((n, 3), np.float64, np.nan)),
-            **dict.fromkeys(("rotary_from", "rotary_to"), ((n, 3), np.float64, np.nan)),
+            **dict.fromkeys(("redundant_axis", "rotary_from", "rotary_to"), ((n, 3), np.float64, np.nan)),
             "orientation_path": ((n,), np.int8, OrientationPath.SINGLE_AXIS),
-            "sweep": ((n,), np.float64, np.nan),
             "approximation": ((n,), np.float64, 0.0),
-            **dict.fromkeys(("orientation_programmed", "executes", "arc_plane_free"), ((n,), np.bool_, True)),
+            **dict.fromkeys(("orientation_programmed", "executes"), ((n,), np.bool_, True)),
             "inverse_time_feed": ((n,), np.bool_, False),
-            **dict.fromkeys(("orientation", "arc_frame"), ((n,), np.int8, 0)),
+            "orientation": ((n,), np.int8, 0),
         }
         for name, (shape, dtype, default) in columns.items():
             values = getattr(self, name)
@@ -197,6 +179,7 @@ class Toolpath:
             object.__setattr__(self, name, shared(frozen(values, shape, dtype)))
         stops = self.stops if len(self.stops) else self.approximation == 0.0
         object.__setattr__(self, "stops", shared(frozen(stops, (n,), np.bool_)))
+        object.__setattr__(self, "arcs", self.arcs.for_motions(n))
         object.__setattr__(self, "axes", FewRows.of(self.axes))
         if self.axes.shape != (n, 6):
             raise ValueError(f"axes have the shape {self.axes.shape} for {n} motions")
@@ -208,7 +191,7 @@ class Toolpath:
     def known(self) -> Bools:
         """(N,) the Cartesian target, its base and its tool are known; of an arc its way as well."""
         pose = np.isfinite(self.position).all(axis=1) & np.isfinite(self.rotation[:, 0, 0])
-        way = (self.kind != Kind.CIRC) | np.isfinite(self.sweep)
+        way = (self.kind != Kind.CIRC) | np.isfinite(self.arcs.sweep)
         return np.asarray(pose & way & (self.base >= 0) & (self.tool >= 0))
 
     @cached_property
@@ -224,23 +207,6 @@ class Toolpath:
         """(N,) path motions that end with the orientation with which they begin, on arcs maybe turned with the arc."""
         on_path = np.isin(self.kind, (Kind.LIN, Kind.CIRC, Kind.SPL))
         return np.asarray(on_path & (self.orientation == OrientationMode.CONSTANT))
-
-    @cached_property
-    def turns_along(self) -> Bools:
-        """(N,) arcs with which the tool turns."""
-        return np.asarray((self.arc_frame == ArcFrame.PATH) & np.isfinite(self.sweep))
-
-    def arc_turn(self, rows: Ints, base: Floats) -> Floats:
-        """(K, 3) [rad] the rotation vectors by which the tool turns along with the arcs ``rows`` (K,), 0 where it does
-        not; base (K, 3, 3) or (3, 3): rotation of their programmed base in the axes that are asked for."""
-        turn = np.zeros((len(rows), 3))
-        along = np.flatnonzero(self.turns_along[rows])
-        if len(along):
-            at = rows[along]
-            turn[along] = turned(
-                base if base.ndim == 2 else base[along], self.sweep[at, None] * self.normal[at]
-            )
-        return turn
 
     @property
     def programmed_rotation(self) -> Floats:
@@ -316,10 +282,13 @@ class Toolpath:
                     words += [f"{k} {_number(v)}" for k, v in zip("ABC", abc[row], strict=True)]
                 else:
                     words += ["A ?", "B ?", "C ?"]
-            if np.isfinite(self.sweep[row]):
-                for word, vector in (("centre", self.centre[row] / MM), ("normal", self.normal[row])):
+            if np.isfinite(self.arcs.sweep[row]):
+                for word, vector in (
+                    ("centre", self.arcs.centre[row] / MM),
+                    ("normal", self.arcs.normal[row]),
+                ):
                     words.append(word + " " + " ".join(_number(value) for value in vector))
-                words.append(f"sweep {_number(self.sweep[row] / DEG)}")
+                words.append(f"sweep {_number(self.arcs.sweep[row] / DEG)}")
             for axis in shown:
                 value = self.external[row, axis]
                 if value == value:
@@ -334,8 +303,8 @@ class Toolpath:
                 words.append(f"feed {_number(self.feed[row])} m/s")
             if self.orientation[row] and kind in (Kind.LIN, Kind.CIRC, Kind.SPL):
                 words.append(f"orientation {OrientationMode(self.orientation[row]).name}")
-            if self.arc_frame[row] and kind == Kind.CIRC:
-                words.append(f"arc {ArcFrame(self.arc_frame[row]).name}")
+            if self.arcs.frame[row] and kind == Kind.CIRC:
+                words.append(f"arc {ArcFrame(self.arcs.frame[row]).name}")
             if row in self.refused:
                 words.append(f"refused {self.refused[row].code}")
             yield " ".join(words)
@@ -349,82 +318,6 @@ class Toolpath:
         angles = abc_from_rotation(frame.pose.rotation) / DEG
         numbers = [*(frame.pose.position / MM), *angles]
         return "{" + " ".join(_number(value) for value in numbers) + "}"
-
-
-class Role(IntEnum):
-    """What a motion of the output is to the motion of the input that it stems from."""
-
-    ORIGINAL = 0  # the last of them: it ends where that motion ends, and takes its text
-    INTERMEDIATE = 1  # an earlier part of its way, inserted before it
-    TRANSITION = 2  # a straight line to where its way begins, inserted before it
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """The motions that an output has to make, M >= N, all in the programmed base of their source.
-
-    source (M,): row of the input, ascending; each has one OWN, last of its group.  role (M,) Role.
-    position (M, 3) [m], rotation (M, 3, 3): targets, NaN where the input's is not known; a dialect asks for those of
-    some rows at a time.
-    centre, normal (M, 3), sweep (M,): way of arcs, as in a Toolpath; NaN for all others.
-    flows (M,): inserted motions at whose end the controller must not come to rest; without it the PIECEs.
-    share (M,): of the source's way, where the motion ends; 1 for all where none is given.
-    external (M, 6) [mm or deg]: where E1..E6 stand, as in a Toolpath; None where they do not move.
-    """
-
-    source: Ints
-    role: Ints
-    position: Floats | LazyRows
-    rotation: Floats | LazyRows
-    centre: Floats
-    normal: Floats
-    sweep: Floats
-    flows: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    share: Floats = field(default_factory=lambda: np.empty(0))
-    external: Floats | LazyRows | None = None
-
-    def __post_init__(self) -> None:
-        m = len(self.source)
-        shapes = {
-            "position": (m, 3),
-            "rotation": (m, 3, 3),
-            "centre": (m, 3),
-            "normal": (m, 3),
-            "sweep": (m,),
-        }
-        for name, shape in shapes.items():
-            values = getattr(self, name)
-            if not isinstance(values, LazyRows):
-                object.__setattr__(self, name, frozen(values, shape))
-        share = self.share if len(self.share) else np.broadcast_to(1.0, m)
-        object.__setattr__(self, "share", frozen(share, (m,)))
-        for name, dtype in (("source", np.int32), ("role", np.int8)):
-            object.__setattr__(self, name, frozen(getattr(self, name), (m,), dtype))
-        flows = self.flows if len(self.flows) else self.role == Role.INTERMEDIATE
-        object.__setattr__(self, "flows", frozen(flows, (m,), np.bool_))
-
-    def __len__(self) -> int:
-        return len(self.source)
-
-    @property
-    def own(self) -> Bools:
-        """(M,) the motions that take the text of their source."""
-        return np.asarray(self.role == Role.ORIGINAL)
-
-    @staticmethod
-    def of(path: Toolpath) -> Plan:
-        """The plan that leaves everything as it is."""
-        n = len(path)
-        return Plan(
-            np.arange(n),
-            np.zeros(n, np.int64),
-            path.position,
-            path.rotation,
-            path.centre,
-            path.normal,
-            path.sweep,
-            external=path.external if path.external.strides[0] else None,
-        )
 
 
 def external_at(path: Toolpath, rows: Ints, share: Floats | None = None) -> Floats:

@@ -44,7 +44,7 @@ from postproc.languages.gcode.source import scan
 from postproc.languages.gcode.source_map import STATE, GcodeSourceMap
 from postproc.languages.gcode.tool_orientation import ToolOrientations
 from postproc.languages.gcode.words import How, Note, key
-from postproc.toolpath import Kind, Toolpath
+from postproc.toolpath import Arcs, Kind, Toolpath
 
 PART = 1 << 14
 """Blocks whose motions are worked out at a time."""
@@ -92,15 +92,12 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         refused=refused,
         locked=locked_rows(document, given, built, collector),
         annotations=said.annotations,
-        centre=found.taken("centre"),
-        normal=found.taken("normal"),
-        sweep=found.taken("sweep"),
+        arcs=Arcs(*(found.taken(name) for name in ("centre", "normal", "sweep", "plane_free"))),
         approximation=found.taken("blend"),
         no_insert_before={**moves_external(external), **_whole(given, rows)},
         comments=said.comments,
         orientation_programmed=found.taken("orientation_programmed"),
         redundant_axis=found.taken("redundant_axis"),
-        arc_plane_free=found.taken("arc_plane_free"),
         inverse_time_feed=timed if timed.any() else everywhere(False, len(rows)),
         ptp_may_change_configuration=False,
         exact_stays=True,
@@ -202,7 +199,7 @@ def _columns(
         "orientation_path": stand.path,
         "rotary_from": rotary_from,
         "rotary_to": rotary_to,
-        "arc_plane_free": _by_point(given, rows),
+        "plane_free": _by_point(given, rows),
         "turned": stand.stated | (stand.orient < 0),
         "move": moves.move,
         "plane": force[Group.PLANE][rows],

@@ -98,7 +98,7 @@ class DependentTargets:
     def again(self, way: Bools) -> Bools:
         """(N,) rows to be written for the sake of the row before; ``way`` (N,): arcs that are planned otherwise."""
         arcs = np.zeros(len(way), dtype=bool)
-        known = [row for row in self.task.places.arcs if np.isfinite(self.task.path.sweep[row])]
+        known = [row for row in self.task.places.arcs if np.isfinite(self.task.path.arcs.sweep[row])]
         arcs[known] = True
         # Where an arc with CA ends follows from where it starts.
         before = np.zeros(len(way), dtype=bool)

@@ -18,7 +18,7 @@ from postproc.languages.krl.motion_rows import MotionRows, Refusal
 from postproc.languages.krl.motion_table import MotionTable, Spots
 from postproc.languages.krl.program_structure import closure
 from postproc.languages.krl.source_map import KrlSourceMap
-from postproc.toolpath import COMPUTED, FrameRef, Kind, OrientationMode, Toolpath
+from postproc.toolpath import COMPUTED, Arcs, FrameRef, Kind, OrientationMode, Toolpath
 
 READ_TOO = "other code reads it too"
 SEVERAL = "its line runs several times"
@@ -62,9 +62,12 @@ def to_toolpath(
         annotations=tuple(rows.annotations),
         inherits_from_row=anchor,
         partial_target=given,
-        centre=_sparse((n, 3), np.nan, {row: way[:3] for row, way in table.ways.items()}, MM),
-        normal=_sparse((n, 3), np.nan, {row: way[3:6] for row, way in table.ways.items()}),
-        sweep=_sparse((n,), np.nan, {row: way[6] for row, way in table.ways.items()}, DEG),
+        arcs=Arcs(
+            centre=_sparse((n, 3), np.nan, {row: arc[:3] for row, arc in table.ways.items()}, MM),
+            normal=_sparse((n, 3), np.nan, {row: arc[3:6] for row, arc in table.ways.items()}),
+            sweep=_sparse((n,), np.nan, {row: arc[6] for row, arc in table.ways.items()}, DEG),
+            frame=_kept(table.arc_frame),
+        ),
         approximation=_kept(table.blend),
         redundant_axis=np.broadcast_to(np.nan, (n, 3)),
         no_insert_before=_whole(rows, several),
@@ -74,7 +77,6 @@ def to_toolpath(
         entries=_entries(rows, several),
         orientation_programmed=_oriented(table),
         orientation=_kept(table.orientation),
-        arc_frame=_kept(table.arc_frame),
         external=_kept(table.external),
     )
     found = None if table.spots is None else _places(rows, table, table.spots)

@@ -76,7 +76,11 @@ def _touched(task: KrlWritePlan) -> tuple[Bools, Bools]:
     each_block(ends, n)
     for rows in _blocks(np.flatnonzero(path.kind == Kind.CIRC)):
         there = task.own[rows]
-        for new, old in ((plan.centre, path.centre), (plan.normal, path.normal), (plan.sweep, path.sweep)):
+        for new, old in (
+            (plan.centre, path.arcs.centre),
+            (plan.normal, path.arcs.normal),
+            (plan.sweep, path.arcs.sweep),
+        ):
             other = differs(new[there], old[rows])
             way[rows] |= other.any(axis=1) if other.ndim > 1 else other
     return touched, way
