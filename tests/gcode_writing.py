@@ -258,7 +258,7 @@ def _assert_turned(path: Toolpath, plan: Plan, before: Toolpath, writing: Writin
     oriented = (before.orientation_programmed & before.known)[plan.source]
     if not oriented.any():
         return
-    free_axis = before.redundant_axis[plan.source]
+    free_axis = before.orientation_control.redundant_axis[plan.source]
     spins = oriented & np.isfinite(free_axis[:, 0])
     # Half a step in each of three angles, or a little less of a vector's components.
     most = 3 * 0.5 * 10.0**-writing.deg * DEG * 1.01 + 1e-8

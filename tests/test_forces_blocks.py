@@ -20,7 +20,7 @@ from postproc.process.milling_forces import mean_force
 from postproc.process.operations import process_forces
 from postproc.process.path_length import PathLength
 from postproc.process.process_file import read_process
-from postproc.toolpath import Annotation, Arcs, FrameRef, Kind, Toolpath
+from postproc.toolpath import Annotation, Arcs, FrameRef, Kind, OrientationControl, PartialTargets, Toolpath
 
 TIMES = 2 * ROWS // 10
 """Repetitions: a path of 11 to 14 motions then ends in all places of a block."""
@@ -83,20 +83,27 @@ def repeated(path: Toolpath, times: int) -> Toolpath:
     notes = [
         Annotation(note.row + n * k, note.text, note.line) for k in range(times) for note in path.annotations
     ]
-    left_out = (
-        "partial_target",
-        "redundant_axis",
-        "approximation",
-        "orientation_path",
-        "rotary_from",
-        "rotary_to",
-        "external",
+    left_out = {
+        name: np.empty(0)
+        for name in (
+            "approximation",
+            "executes",
+            "external",
+            "inverse_time_feed",
+            "orientation_programmed",
+            "stops",
+        )
+    }
+    return replace(
+        path,
+        **tiled,
+        **left_out,
+        line=np.arange(n * times) + 10,
+        annotations=tuple(notes),
+        arcs=arcs,
+        partial_targets=PartialTargets(),
+        orientation_control=OrientationControl(),
     )
-    rest = {name: np.empty((0, *getattr(path, name).shape[1:])) for name in left_out}
-    return replace(path, **tiled, **rest, line=np.arange(n * times) + 10, annotations=tuple(notes),
-                   inherits_from_row=np.empty(0, int), **{name: np.empty(0, bool) for name in
-                   ("orientation_programmed", "executes", "inverse_time_feed", "stops")},
-                   arcs=arcs, orientation=np.empty(0, np.int8))  # fmt: skip
 
 
 def same(long, short, times: int, seed: int) -> None:

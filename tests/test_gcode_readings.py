@@ -61,8 +61,8 @@ def reading(program: Program) -> Iterator[str]:
             ways = "written" if path.orientation_programmed[row] else "kept"
             said.append(f"{letters('abc', text.turned_values[row])} {ways}")
             said.append(f"from {letters('abc', text.turned_before[row])}")
-            if np.isfinite(path.redundant_axis[row, 0]):
-                said.append(f"about {letters('xyz', path.redundant_axis[row])}")
+            if np.isfinite(path.orientation_control.redundant_axis[row, 0]):
+                said.append(f"about {letters('xyz', path.orientation_control.redundant_axis[row])}")
         said.append(f"F{number(path.feed[row] / MM * 60)}")
         for letter, index in (("G", path.base[row]), ("T", path.tool[row])):
             frame = path.frames[index] if index >= 0 else None

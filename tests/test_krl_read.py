@@ -544,9 +544,11 @@ def test_components_left_out_after_an_axis_motion_are_left_to_it() -> None:
     program = body("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\nLIN {Z 450}\nLIN {X 1,Y 2}\nLIN {A 1,B 2,C 3}\n")
     path = program.toolpath
     assert not path.refused
-    assert path.inherits_from_row.tolist() == [-1, 0, 0, -1]
-    np.testing.assert_allclose(path.partial_target[1] * 1e3, [np.nan, np.nan, 450, *[np.nan] * 3])
-    np.testing.assert_allclose(path.partial_target[2] * 1e3, [1, 2, 450, *[np.nan] * 3])
+    assert path.partial_targets.inherits_from_row.tolist() == [-1, 0, 0, -1]
+    np.testing.assert_allclose(
+        path.partial_targets.coordinates[1] * 1e3, [np.nan, np.nan, 450, *[np.nan] * 3]
+    )
+    np.testing.assert_allclose(path.partial_targets.coordinates[2] * 1e3, [1, 2, 450, *[np.nan] * 3])
     assert path.known.tolist() == [False, False, False, True]
     there = Poses.from_abc(np.tile([7.0, 8.0, 9.0], (4, 1)), np.tile([0.1, 0.2, 0.3], (4, 1)))
     full = path.completed(there)

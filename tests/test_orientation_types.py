@@ -79,7 +79,7 @@ FDAT = "DECL FDAT F1={TOOL_NO 1,BASE_NO 1,IPO_FRAME #BASE}\n"
 )  # fmt: skip
 def test_what_the_program_sets_is_read(text: str, orientation: list[int], frame: list[int]) -> None:
     path = read(text, LDAT + FDAT).toolpath
-    assert path.orientation.tolist() == orientation
+    assert path.orientation_control.mode.tolist() == orientation
     assert path.arcs.frame.tolist() == frame
 
 
@@ -87,7 +87,7 @@ def test_a_program_that_sets_nothing_unusual_forgets_nothing() -> None:
     """What is not known to leave it can only leave it as it is everywhere."""
     text = "IF $IN[1] THEN\nBAS(#INITMOV,0)\n$ORI_TYPE=#VAR\n$CIRC_TYPE = #BASE\nENDIF\n$BASE=BASE_DATA[1]\n"
     path = read(text + "$TOOL=TOOL_DATA[1]\n" + LIN).toolpath
-    assert path.orientation.tolist() == [VAR]
+    assert path.orientation_control.mode.tolist() == [VAR]
     assert not path.refused
 
 

@@ -219,7 +219,7 @@ def test_frames_turn_as_the_control_says(first: np.ndarray, second: np.ndarray) 
 def test_a_vector_keeps_its_direction_where_the_frame_turns() -> None:
     text = "G54 G71 G90\nT1\nTRAORI\nG0 X0 Y0 Z0 A3=1 B3=0 C3=0\nROT Z90\nG1 X1 F100\nG1 X2 A3=1 B3=0 C3=0\n"
     path = read(SINUMERIK, text).toolpath
-    tool = np.einsum("nij,nj->ni", path.rotation, path.redundant_axis)
+    tool = np.einsum("nij,nj->ni", path.rotation, path.orientation_control.redundant_axis)
     np.testing.assert_allclose(tool, [[1, 0, 0], [1, 0, 0], [0, 1, 0]], atol=1e-12)
 
 

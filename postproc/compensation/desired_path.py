@@ -65,7 +65,7 @@ class DesiredPath:
         known = np.isin(path.kind, (Kind.LIN, Kind.CIRC)) & path.known
         length, angle = np.zeros(n), np.full(n, np.nan)
         desired_path = DesiredPath(path, begin, wanted, base, known, length, angle, track.half_turns)
-        unlike = path.arcs.turns_along | (path.orientation_path != OrientationPath.SINGLE_AXIS)
+        unlike = path.arcs.turns_along | (path.orientation_control.path != OrientationPath.SINGLE_AXIS)
 
         def measured(block: slice) -> None:
             rows = np.arange(block.start, block.stop)

@@ -231,7 +231,7 @@ class _SubdivisionSearch:
         can &= (path.tool[before] == path.tool[rows]) & (
             path.orientation_programmed[before] == path.orientation_programmed[rows]
         )
-        free = path.redundant_axis
+        free = path.orientation_control.redundant_axis
         can &= np.isclose(free[before], free[rows], atol=1e-9, equal_nan=True).all(axis=1)
         fixed = np.zeros(self.n, bool)
         fixed[[*path.refused, *path.locked]] = True
@@ -572,7 +572,7 @@ class _SubdivisionSearch:
 
     def _shares(self, rows: Ints, low: Floats, high: Floats, part: Floats) -> Floats:
         """(K,) the parts ``part`` (K,), 0 to 1, of what lies between the shares ``low`` and ``high`` (K,)."""
-        if self.task.toolpath.turns_by_words:
+        if self.task.toolpath.orientation_control.any_by_words:
             return spread(self.task.toolpath, rows, low, high, part)
         return np.where(part == 1.0, high, low + part * (high - low))
 

@@ -36,7 +36,9 @@ def intended_motions(
     command = to_base @ division.command[rows]
     # What is inserted has the orientation of its own place, if words say it.
     inserted = division.role[rows] != Role.ORIGINAL
-    turned = moved & (path.orientation_programmed[source] | (inserted & (path.orientation_path[source] != 0)))
+    turned = moved & (
+        path.orientation_programmed[source] | (inserted & (path.orientation_control.path[source] != 0))
+    )
     arc, kept = np.isfinite(division.sweep[rows]), ~moved & ~division.transitions[rows]
     centre = (to_base @ Poses(np.eye(3), division.centre[rows])).position
     normal = (to_base.rotation @ division.normal[rows][..., None])[..., 0]
@@ -195,7 +197,10 @@ def _check_texts(path: Toolpath, back: Toolpath, plan: Plan, rows: slice, file: 
         ("inverse_time_feed", own),
         ("approximation", own),
         ("stops", own),
-        ("orientation_programmed", own & (path.orientation_path[source] == OrientationPath.SINGLE_AXIS)),
+        (
+            "orientation_programmed",
+            own & (path.orientation_control.path[source] == OrientationPath.SINGLE_AXIS),
+        ),
         ("executes", own),
         ("feed", (path.kind[source] != Kind.PTP) & ~path.inverse_time_feed[source]),
     ):
@@ -243,8 +248,8 @@ def _check_targets(
     step_mm, step_deg = 10.0**-writing.mm, 10.0**-writing.deg
     off = np.abs(back.position[rows] - plan.position[:]).max(axis=1) / MM
     # Rotary axes say the whole orientation that is meant, though the turn about the tool is free: no axis swings.
-    by_axes = path.orientation_path[plan.source] == OrientationPath.ROTARY_AXES
-    free_axis = np.where(by_axes[:, None], np.nan, path.redundant_axis[plan.source])
+    by_axes = path.orientation_control.path[plan.source] == OrientationPath.ROTARY_AXES
+    free_axis = np.where(by_axes[:, None], np.nan, path.orientation_control.redundant_axis[plan.source])
     angle = _angle(plan.rotation[:], back.rotation[rows], free_axis) / DEG
     most = np.where(path.kind[plan.source] == Kind.CIRC, 2 * HALF, HALF) * step_mm
     _close(off > most, off, path, plan.source, file, "mm off the plan")

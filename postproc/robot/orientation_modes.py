@@ -56,7 +56,8 @@ def as_run(
             "it keeps the orientation of the motion before, which is not known (constant orientation control)"
         )
         refused.setdefault(row, Finding("KIN010", message, file, int(path.line[row])))
-    run = replace(path, rotation=rotation, programmed=path.rotation, refused=dict(sorted(refused.items())))
+    control = replace(path.orientation_control, programmed=path.rotation)
+    run = replace(path, rotation=rotation, orientation_control=control, refused=dict(sorted(refused.items())))
     return run, _without_effect(path, rows, said, own, file)
 
 
@@ -75,7 +76,7 @@ def _flange(
         axes = all_axes(robot, path.axes[at], external_joint(robot, path, at, start))
         found[on_axes] = nominal_flange(robot, axes).rotation
     jumps = np.isin(path.kind, (Kind.PTP, Kind.AXIS))
-    ends: Bools = path.known & (jumps | (path.orientation != OrientationMode.UNKNOWN))
+    ends: Bools = path.known & (jumps | (path.orientation_control.mode != OrientationMode.UNKNOWN))
     known: Bools = ~starts & ~on_axes & ends[anchor]
     at = anchor[known]
     tool_in_robot = product(base.rotation[at], path.rotation[at])

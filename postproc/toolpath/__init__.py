@@ -1,6 +1,8 @@
 """The wanted motions of a program: where the text side and the physics side meet."""
 
 from postproc.toolpath.arcs import ArcFrame, Arcs
+from postproc.toolpath.orientation_control import OrientationControl, OrientationMode, OrientationPath
+from postproc.toolpath.partial_targets import PartialTargets
 from postproc.toolpath.plan import Plan, Role
 from postproc.toolpath.toolpath import (
     COMPUTED,
@@ -8,8 +10,6 @@ from postproc.toolpath.toolpath import (
     Annotation,
     FrameRef,
     Kind,
-    OrientationMode,
-    OrientationPath,
     Toolpath,
     external_at,
 )
@@ -22,8 +22,10 @@ __all__ = [
     "Arcs",
     "FrameRef",
     "Kind",
+    "OrientationControl",
     "OrientationMode",
     "OrientationPath",
+    "PartialTargets",
     "Plan",
     "Role",
     "Toolpath",

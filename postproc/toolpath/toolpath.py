@@ -18,6 +18,8 @@ from postproc.base.findings import Finding
 from postproc.base.geometry import Placed, Poses, abc_from_rotation, rotation_from_abc
 from postproc.base.units import DEG, MM
 from postproc.toolpath.arcs import ArcFrame, Arcs
+from postproc.toolpath.orientation_control import OrientationControl, OrientationMode
+from postproc.toolpath.partial_targets import PartialTargets
 
 COMPUTED, LOST = np.inf, -np.inf
 """An external axis whose value is an expression that is not constant; one that something else may have moved."""
@@ -32,25 +34,6 @@ class Kind(IntEnum):
     CIRC = 3  # circular arc, or a helix
     OTHER = 4  # a motion that is none of these
     SPL = 5  # a point of a spline: the way between is the controller's
-
-
-class OrientationPath(IntEnum):
-    """How the orientation runs from the begin of a motion to its end."""
-
-    SINGLE_AXIS = 0  # evenly about the one axis that leads there
-    ROTARY_AXES = 1  # the words of rotary axes run linearly
-    GREAT_CIRCLE = 2  # the tool's direction runs on a great circle, the turn about it evenly
-
-
-class OrientationMode(IntEnum):
-    """How the tool turns on a path motion (KRL's $ORI_TYPE)."""
-
-    VAR = 0  # evenly from its orientation at the begin to that of the target
-    CONSTANT = 1  # not at all: what the target says of it has no effect
-    JOINT = (
-        2  # as the wrist axes, each of which turns evenly from its angle at the begin to that at the target
-    )
-    UNKNOWN = 3
 
 
 @dataclass(frozen=True)
@@ -131,14 +114,13 @@ class Toolpath:
     line: Ints
     frames: tuple[FrameRef, ...]
     arcs: Arcs = field(default_factory=Arcs)
+    partial_targets: PartialTargets = field(default_factory=PartialTargets)
+    orientation_control: OrientationControl = field(default_factory=OrientationControl)
     refused: Mapping[int, Finding] = field(default_factory=dict)
     locked: Mapping[int, Finding] = field(default_factory=dict)
     annotations: tuple[Annotation, ...] = ()
-    inherits_from_row: Ints = field(default_factory=lambda: np.empty(0, np.int64))
-    partial_target: Floats = field(default_factory=lambda: np.empty((0, 6)))
     approximation: Floats = field(default_factory=lambda: np.empty(0))
     orientation_programmed: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    redundant_axis: Floats = field(default_factory=lambda: np.empty((0, 3)))
     executes: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     inverse_time_feed: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     ptp_may_change_configuration: bool = True
@@ -147,11 +129,6 @@ class Toolpath:
     comments: tuple[Annotation, ...] = ()
     stops: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
     entries: Mapping[int, int] = field(default_factory=dict)
-    orientation_path: Ints = field(default_factory=lambda: np.empty(0, np.int8))
-    rotary_from: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    rotary_to: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    orientation: Ints = field(default_factory=lambda: np.empty(0, np.int8))
-    programmed: Floats = field(default_factory=lambda: np.empty((0, 3, 3)))
     external: Floats = field(default_factory=lambda: np.empty((0, 6)))
 
     def __post_init__(self) -> None:
@@ -160,17 +137,13 @@ class Toolpath:
         columns: dict[str, tuple[tuple[int, ...], type[np.generic], float | None]] = {
             "kind": ((n,), np.int8, None),
             **dict.fromkeys(("base", "tool", "status", "turn", "line"), ((n,), np.int32, None)),
-            "inherits_from_row": ((n,), np.int32, -1),
             "position": ((n, 3), np.float64, None),
             "rotation": ((n, 3, 3), np.float64, None),
             "feed": ((n,), np.float64, None),
-            **dict.fromkeys(("partial_target", "external"), ((n, 6), np.float64, np.nan)),
-            **dict.fromkeys(("redundant_axis", "rotary_from", "rotary_to"), ((n, 3), np.float64, np.nan)),
-            "orientation_path": ((n,), np.int8, OrientationPath.SINGLE_AXIS),
+            "external": ((n, 6), np.float64, np.nan),
             "approximation": ((n,), np.float64, 0.0),
             **dict.fromkeys(("orientation_programmed", "executes"), ((n,), np.bool_, True)),
             "inverse_time_feed": ((n,), np.bool_, False),
-            "orientation": ((n,), np.int8, 0),
         }
         for name, (shape, dtype, default) in columns.items():
             values = getattr(self, name)
@@ -179,7 +152,8 @@ class Toolpath:
             object.__setattr__(self, name, shared(frozen(values, shape, dtype)))
         stops = self.stops if len(self.stops) else self.approximation == 0.0
         object.__setattr__(self, "stops", shared(frozen(stops, (n,), np.bool_)))
-        object.__setattr__(self, "arcs", self.arcs.for_motions(n))
+        for part in ("arcs", "partial_targets", "orientation_control"):
+            object.__setattr__(self, part, getattr(self, part).for_motions(n))
         object.__setattr__(self, "axes", FewRows.of(self.axes))
         if self.axes.shape != (n, 6):
             raise ValueError(f"axes have the shape {self.axes.shape} for {n} motions")
@@ -206,12 +180,13 @@ class Toolpath:
     def keeps_orientation(self) -> Bools:
         """(N,) path motions that end with the orientation with which they begin, on arcs maybe turned with the arc."""
         on_path = np.isin(self.kind, (Kind.LIN, Kind.CIRC, Kind.SPL))
-        return np.asarray(on_path & (self.orientation == OrientationMode.CONSTANT))
+        return np.asarray(on_path & (self.orientation_control.mode == OrientationMode.CONSTANT))
 
     @property
     def programmed_rotation(self) -> Floats:
         """(N, 3, 3) the orientations of the text."""
-        return self.programmed if len(self.programmed) else self.rotation
+        programmed = self.orientation_control.programmed
+        return self.rotation if programmed is None else programmed
 
     @cached_property
     def inserted_before(self) -> Ints:
@@ -221,19 +196,6 @@ class Toolpath:
         line = self.line.copy()
         line[list(self.entries)] = list(self.entries.values())
         return line
-
-    @cached_property
-    def turns_by_words(self) -> bool:
-        """Whether any motion's orientation runs otherwise than about a single axis."""
-        return bool(self.orientation_path.any())
-
-    def rotary_at(self, rows: Ints, share: Floats) -> Floats:
-        """A, B, C (K, 3) [rad] at the shares (K,) of motions ``rows`` (K,) of ROTARY_AXES; at their end where their
-        begin is not known."""
-        end = self.rotary_to[rows]
-        start = self.rotary_from[rows]
-        known = np.isfinite(start)
-        return np.where(known, end + (1.0 - share)[:, None] * (np.where(known, start, end) - end), end)
 
     @cached_property
     def moves_external(self) -> Bools:
@@ -248,13 +210,15 @@ class Toolpath:
 
     def completed(self, reached: Placed) -> Toolpath:
         """The toolpath with its partial targets known; ``reached`` (N): where the AXIS motion of
-        ``inherits_from_row`` brings the TCP, in the base and with the tool of the row itself."""
-        rows = np.flatnonzero(self.inherits_from_row >= 0)
+        ``partial_targets`` brings the TCP, in the base and with the tool of the row itself."""
+        rows = np.flatnonzero(self.partial_targets.inherits_from_row >= 0)
         if not len(rows):
             return self
         end = reached[rows]
         there = np.concatenate([end.position, abc_from_rotation(end.rotation)], axis=1)
-        values = np.where(np.isnan(self.partial_target[rows]), there, self.partial_target[rows])
+        values = np.where(
+            np.isnan(self.partial_targets.coordinates[rows]), there, self.partial_targets.coordinates[rows]
+        )
         position, rotation = self.position.copy(), self.rotation.copy()
         position[rows], rotation[rows] = values[:, :3], rotation_from_abc(values[:, 3:])
         return replace(self, position=position, rotation=rotation)
@@ -268,14 +232,14 @@ class Toolpath:
             words = [f"{self.line[row]}", kind.name]
             if self.on_axes[row]:
                 words += [f"A{i + 1} {_number(a / DEG)}" for i, a in enumerate(self.axes[row])]
-            elif self.inherits_from_row[row] >= 0:
+            elif self.partial_targets.inherits_from_row[row] >= 0:
                 words += [
                     f"{k} {'?' if np.isnan(v) else _number(v / unit)}"
                     for k, v, unit in zip(
-                        "XYZABC", self.partial_target[row], [MM] * 3 + [DEG] * 3, strict=True
+                        "XYZABC", self.partial_targets.coordinates[row], [MM] * 3 + [DEG] * 3, strict=True
                     )
                 ]
-                words.append(f"from line {self.line[self.inherits_from_row[row]]}")
+                words.append(f"from line {self.line[self.partial_targets.inherits_from_row[row]]}")
             elif np.isfinite(self.position[row, 0]):
                 words += [f"{k} {_number(v / MM)}" for k, v in zip("XYZ", self.position[row], strict=True)]
                 if np.isfinite(self.rotation[row, 0, 0]):
@@ -301,8 +265,8 @@ class Toolpath:
                 words.append(f"{word} {self._frame_name(int(index))}")
             if np.isfinite(self.feed[row]):
                 words.append(f"feed {_number(self.feed[row])} m/s")
-            if self.orientation[row] and kind in (Kind.LIN, Kind.CIRC, Kind.SPL):
-                words.append(f"orientation {OrientationMode(self.orientation[row]).name}")
+            if self.orientation_control.mode[row] and kind in (Kind.LIN, Kind.CIRC, Kind.SPL):
+                words.append(f"orientation {OrientationMode(self.orientation_control.mode[row]).name}")
             if self.arcs.frame[row] and kind == Kind.CIRC:
                 words.append(f"arc {ArcFrame(self.arcs.frame[row]).name}")
             if row in self.refused:

@@ -383,14 +383,14 @@ def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpa
     where that one leads."""
     start = _start(cell, robot)
     path = fill_external_axes(path, cell.external_axes, robot, start, program, cell.path)
-    rows = np.flatnonzero(path.inherits_from_row >= 0)
+    rows = np.flatnonzero(path.partial_targets.inherits_from_row >= 0)
     if not len(rows):
         return path
     external = External.of(path, cell.external_axes, robot, cell.robot_base)
     frames = frames_of(cell, path, program, external)
 
     def reached(rows: Ints) -> Poses:
-        anchor = path.inherits_from_row[rows]
+        anchor = path.partial_targets.inherits_from_row[rows]
         axes = all_axes(robot, path.axes[anchor], external_joint(robot, path, anchor, start))
         flange = nominal_flange(robot, axes)
         if external is not None and external.constant is None:

@@ -303,12 +303,16 @@ def _splines(ready: Prepared, written: WrittenProgram) -> list[Finding]:
 def _assumed(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
     """How rotary axes are taken to run between blocks, where another control would lead the tool elsewhere."""
     path = ready.task.toolpath
-    if not path.turns_by_words:
+    if not path.orientation_control.any_by_words:
         return []
     rows = np.flatnonzero(
-        written.result.corrected & (path.orientation_path == OrientationPath.ROTARY_AXES) & path.known
+        written.result.corrected & (path.orientation_control.path == OrientationPath.ROTARY_AXES) & path.known
     )
-    apart = np.nan_to_num(rotary_words.beside_great_circle(path.rotary_from[rows], path.rotary_to[rows]))
+    apart = np.nan_to_num(
+        rotary_words.beside_great_circle(
+            path.orientation_control.rotary_from[rows], path.orientation_control.rotary_to[rows]
+        )
+    )
     above = apart > ready.cell.tolerance_angle
     if not above.any():
         return []
@@ -408,8 +412,8 @@ _POLE = (
 
 def _by_pair(path: Toolpath, row: int) -> bool:
     """Whether two rotary axes turn the tool in a motion."""
-    by_axes = path.orientation_path[row] == OrientationPath.ROTARY_AXES
-    return bool(by_axes and np.isfinite(path.rotary_to[row]).sum() == 2)
+    by_axes = path.orientation_control.path[row] == OrientationPath.ROTARY_AXES
+    return bool(by_axes and np.isfinite(path.orientation_control.rotary_to[row]).sum() == 2)
 
 
 def _target(request: Request) -> Path:

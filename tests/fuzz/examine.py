@@ -108,7 +108,7 @@ def _near(rows: list[int], free: Bools, n: int) -> bool:
 
 def movable(path: Toolpath) -> Bools:
     """(N,) the motions that may be planned elsewhere."""
-    free = path.known & (path.kind != Kind.AXIS) & (path.inherits_from_row < 0)
+    free = path.known & (path.kind != Kind.AXIS) & (path.partial_targets.inherits_from_row < 0)
     free[[*path.refused, *path.locked]] = False
     # Beyond it doubles do not hold the digits that are written.
     with np.errstate(invalid="ignore"):
@@ -122,7 +122,11 @@ def movable(path: Toolpath) -> Bools:
 def dividable(path: Toolpath) -> Bools:
     """(N,) the straight motions, and plane arcs of no more than a turn and a half, that another one may be inserted
     before."""
-    free = path.known & ((path.kind == Kind.LIN) | (path.kind == Kind.CIRC)) & (path.inherits_from_row < 0)
+    free = (
+        path.known
+        & ((path.kind == Kind.LIN) | (path.kind == Kind.CIRC))
+        & (path.partial_targets.inherits_from_row < 0)
+    )
     free[[*path.refused, *path.no_insert_before]] = False
     arcs = np.flatnonzero(path.kind == Kind.CIRC)
     before = np.maximum(arcs - 1, 0)
@@ -137,7 +141,7 @@ def planned(path: Toolpath, free: Bools, shift: Floats, turn: Floats, divided: n
     piece or a link stands before each of ``divided``; of an arc it is its first half."""
     n = len(path)
     shift = _joined(path, np.where(free[:, None], shift, 0.0))
-    turns = free & path.orientation_programmed & np.isnan(path.redundant_axis[:, 0])
+    turns = free & path.orientation_programmed & np.isnan(path.orientation_control.redundant_axis[:, 0])
     turned = rotation_from_vector(np.where(turns[:, None], turn, 0.0))
     rotation = np.where(turns[:, None, None], turned @ path.rotation, path.rotation)
     moves = (shift != 0).any(axis=1)[:, None]

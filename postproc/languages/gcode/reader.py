@@ -44,7 +44,7 @@ from postproc.languages.gcode.source import scan
 from postproc.languages.gcode.source_map import STATE, GcodeSourceMap
 from postproc.languages.gcode.tool_orientation import ToolOrientations
 from postproc.languages.gcode.words import How, Note, key
-from postproc.toolpath import Arcs, Kind, Toolpath
+from postproc.toolpath import Arcs, Kind, OrientationControl, Toolpath
 
 PART = 1 << 14
 """Blocks whose motions are worked out at a time."""
@@ -97,13 +97,13 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         no_insert_before={**moves_external(external), **_whole(given, rows)},
         comments=said.comments,
         orientation_programmed=found.taken("orientation_programmed"),
-        redundant_axis=found.taken("redundant_axis"),
         inverse_time_feed=timed if timed.any() else everywhere(False, len(rows)),
         ptp_may_change_configuration=False,
         exact_stays=True,
-        orientation_path=found.taken("orientation_path"),
-        rotary_from=found.taken("rotary_from"),
-        rotary_to=found.taken("rotary_to"),
+        orientation_control=OrientationControl(
+            path=found.taken("orientation_path"),
+            **{name: found.taken(name) for name in ("rotary_from", "rotary_to", "redundant_axis")},
+        ),
         external=external,
     )
     findings = [*refused.findings(), *diagnostics(document, given, rows, tool, named, settings)]

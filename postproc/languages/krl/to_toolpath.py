@@ -18,7 +18,16 @@ from postproc.languages.krl.motion_rows import MotionRows, Refusal
 from postproc.languages.krl.motion_table import MotionTable, Spots
 from postproc.languages.krl.program_structure import closure
 from postproc.languages.krl.source_map import KrlSourceMap
-from postproc.toolpath import COMPUTED, Arcs, FrameRef, Kind, OrientationMode, Toolpath
+from postproc.toolpath import (
+    COMPUTED,
+    Arcs,
+    FrameRef,
+    Kind,
+    OrientationControl,
+    OrientationMode,
+    PartialTargets,
+    Toolpath,
+)
 
 READ_TOO = "other code reads it too"
 SEVERAL = "its line runs several times"
@@ -60,8 +69,7 @@ def to_toolpath(
         refused=refused,
         locked=_pinned(rows, table, refused),
         annotations=tuple(rows.annotations),
-        inherits_from_row=anchor,
-        partial_target=given,
+        partial_targets=PartialTargets(anchor, given),
         arcs=Arcs(
             centre=_sparse((n, 3), np.nan, {row: arc[:3] for row, arc in table.ways.items()}, MM),
             normal=_sparse((n, 3), np.nan, {row: arc[3:6] for row, arc in table.ways.items()}),
@@ -69,14 +77,13 @@ def to_toolpath(
             frame=_kept(table.arc_frame),
         ),
         approximation=_kept(table.blend),
-        redundant_axis=np.broadcast_to(np.nan, (n, 3)),
         no_insert_before=_whole(rows, several),
         comments=tuple(rows.comments),
         executes=_runs(rows, n),
         stops=_stops(rows, table),
         entries=_entries(rows, several),
         orientation_programmed=_oriented(table),
-        orientation=_kept(table.orientation),
+        orientation_control=OrientationControl(mode=_kept(table.orientation)),
         external=_kept(table.external),
     )
     found = None if table.spots is None else _places(rows, table, table.spots)
