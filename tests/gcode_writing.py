@@ -37,7 +37,7 @@ def begins(path: Toolpath) -> Floats:
 def free(path: Toolpath) -> np.ndarray:
     """(N,) rows that may be moved."""
     rows = path.known.copy()
-    rows[[*path.refused, *path.locked]] = False
+    rows[[*path.constraints.refused, *path.constraints.locked]] = False
     return rows
 
 
@@ -58,10 +58,10 @@ def random_plan(
     moves = movable & (random.random(n) < share)
     end = path.position + np.where(moves[:, None], random.normal(0, size, (n, 3)), 0.0)
     turns = rotation_from_vector(
-        random.normal(0, turn, (n, 3)) * (moves & path.orientation_programmed)[:, None]
+        random.normal(0, turn, (n, 3)) * (moves & path.constraints.orientation_programmed)[:, None]
     )
     rotation = np.where(
-        moves[:, None, None] & path.orientation_programmed[:, None, None],
+        moves[:, None, None] & path.constraints.orientation_programmed[:, None, None],
         turns @ path.rotation,
         path.rotation,
     )
@@ -72,8 +72,8 @@ def random_plan(
         begin = last if row and path.base[row] == path.base[row - 1] else np.full(3, np.nan)
         arc = path.kind[row] == Kind.CIRC and np.isfinite(path.arcs.sweep[row])
         whole = (
-            row in path.no_insert_before
-            or row in path.refused
+            row in path.constraints.no_insert_before
+            or row in path.constraints.refused
             or not moves[row]
             or not np.isfinite(begin).all()
         )
@@ -118,7 +118,7 @@ def random_plan(
 def _arc(path, row, start, begin, end, rotation, whole, moves, random, divided, flat):
     """An arc, or two, from ``begin``; as it is where nothing moves."""
     own = np.concatenate([path.arcs.centre[row], path.arcs.normal[row], [path.arcs.sweep[row]]])
-    if row in path.refused or (not moves and np.array_equal(begin, start)):
+    if row in path.constraints.refused or (not moves and np.array_equal(begin, start)):
         return [(row, Role.ORIGINAL, path.position[row], rotation, own)]
     source = [
         on_arc(start[None], path.position[[row]], own[None, :3], own[None, 3:6], own[6:], np.array([t]))[0]
@@ -210,11 +210,15 @@ def assert_reads_as(
     timed = program.text.feed_mode[source] == Feed.INVERSE_TIME
     same = np.isclose(path.feed, before.feed[source], rtol=np.where(timed, 0.2, 1e-9), equal_nan=True)
     assert same[~air].all()
-    np.testing.assert_array_equal(path.orientation_programmed, before.orientation_programmed[source])
+    np.testing.assert_array_equal(
+        path.constraints.orientation_programmed, before.constraints.orientation_programmed[source]
+    )
     own_rows = np.flatnonzero(own)
-    codes = {int(source[m]): path.refused[m].code for m in own_rows if m in path.refused}
-    assert codes == {row: finding.code for row, finding in before.refused.items()}
-    assert all(m not in path.refused for m in np.flatnonzero(~own))
+    codes = {
+        int(source[m]): path.constraints.refused[m].code for m in own_rows if m in path.constraints.refused
+    }
+    assert codes == {row: finding.code for row, finding in before.constraints.refused.items()}
+    assert all(m not in path.constraints.refused for m in np.flatnonzero(~own))
 
     known = np.isfinite(plan.position).all(axis=1)
     np.testing.assert_array_equal(np.isfinite(path.position).all(axis=1), known)
@@ -255,7 +259,7 @@ def _assert_arcs(path: Toolpath, plan: Plan, arc, step, raw) -> None:
 
 
 def _assert_turned(path: Toolpath, plan: Plan, before: Toolpath, writing: WritingSettings) -> None:
-    oriented = (before.orientation_programmed & before.known)[plan.source]
+    oriented = (before.constraints.orientation_programmed & before.known)[plan.source]
     if not oriented.any():
         return
     free_axis = before.orientation_control.redundant_axis[plan.source]

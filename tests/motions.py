@@ -7,9 +7,9 @@ import numpy as np
 from postproc.base.geometry import Poses
 from postproc.effects import ChainState, Conditions
 from postproc.robot.chain import Chain
-from postproc.toolpath import FrameRef, Kind, OrientationControl, Toolpath
+from postproc.toolpath import Configuration, EditConstraints, FrameRef, Kind, OrientationControl, Toolpath
 
-PARTS = {"orientation_control": OrientationControl}
+PARTS = {"constraints": EditConstraints, "orientation_control": OrientationControl}
 
 
 def milling_angles(count, rng):
@@ -43,8 +43,7 @@ def motions(target: Poses, kind=Kind.LIN, axes=None, status=-1, turn=-1, **more)
         feed=np.full(n, 0.05),
         base=np.zeros(n),
         tool=np.ones(n),
-        status=np.broadcast_to(status, n),
-        turn=np.broadcast_to(turn, n),
+        configuration=Configuration({"status": np.broadcast_to(status, n), "turn": np.broadcast_to(turn, n)}),
         line=np.arange(10, 10 + n),
         frames=(FrameRef(1, world), FrameRef(1, world)),
         **more,

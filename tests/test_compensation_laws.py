@@ -102,7 +102,7 @@ def test_commands_turn_only_as_the_text_can_say(said):
     rows = np.flatnonzero(result.corrected)
     _, turn = pose_error(result.command[rows], job.wanted[rows])
     oriented, free = (
-        job.toolpath.orientation_programmed[rows],
+        job.toolpath.constraints.orientation_programmed[rows],
         np.nan_to_num(job.toolpath.orientation_control.redundant_axis[rows]),
     )
     assert np.linalg.norm(turn[~oriented], axis=1).max(initial=0.0) == 0.0

@@ -18,7 +18,7 @@ from postproc.compensation.mirror import pose_error
 from postproc.compensation.path_error import path_errors
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import ROOM, Limits, allocate, subdivide, subdivided_motions
-from postproc.toolpath import Arcs, Kind, Role
+from postproc.toolpath import Arcs, EditConstraints, Kind, Role
 
 FREE = Limits(max_growth=100.0)
 OWN, PIECE, LINK = Role.ORIGINAL, Role.INTERMEDIATE, Role.TRANSITION
@@ -230,7 +230,7 @@ def test_an_arc_that_stays_begins_where_it_was_programmed():
     said = "an uncorrected arc starts where this motion ends"
     for job, limits in (
         (task, Limits(no_insert=True)),
-        (again(task, no_insert_before={2: "a TRIGGER"}), FREE),
+        (not_before(task, {2: "a TRIGGER"}), FREE),
     ):
         division = divided(job, limits)[1]
         assert [
@@ -248,6 +248,11 @@ def again(task, **words):
     return replace(task, toolpath=replace(task.toolpath, **words))
 
 
+def not_before(task, why):
+    """``task`` where no motion can be inserted before some; ``why``: row -> reason."""
+    return again(task, constraints=EditConstraints(no_insert_before=why))
+
+
 # what may be inserted
 
 
@@ -258,7 +263,7 @@ def test_a_long_way_that_goes_on_without_a_step_is_divided_only_where_it_may_be(
     assert np.sum(division.source == 3) > 1
     assert 3 not in division.source[division.transitions]
     assert subdivide(task, result, Limits(no_insert=True)).inserted == 0
-    assert np.sum(subdivide(again(task, no_insert_before={3: "a loop"}), result, FREE).source == 3) == 1
+    assert np.sum(subdivide(not_before(task, {3: "a loop"}), result, FREE).source == 3) == 1
 
 
 @pytest.mark.parametrize(
@@ -344,7 +349,7 @@ def test_an_arc_of_nearly_a_full_turn_has_two_pieces_at_least(degrees, pieces):
     loose = replace(loose, tolerance_angle=1.0)
     result, division = divided(loose)
     assert int(np.sum((division.source == 2) & ~division.transitions)) == pieces
-    held = subdivide(again(loose, no_insert_before={2: "a loop"}), result, FREE).not_refined
+    held = subdivide(not_before(loose, {2: "a loop"}), result, FREE).not_refined
     said = "an arc of nearly a full turn cannot be divided here"
     expected = [(2, "COR013", said, "part.src", 12)] if pieces > 1 else []
     assert [(row, one.code, one.message, one.file, one.line) for row, one in held.items()] == expected

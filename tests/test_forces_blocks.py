@@ -20,7 +20,17 @@ from postproc.process.milling_forces import mean_force
 from postproc.process.operations import process_forces
 from postproc.process.path_length import PathLength
 from postproc.process.process_file import read_process
-from postproc.toolpath import Annotation, Arcs, FrameRef, Kind, OrientationControl, PartialTargets, Toolpath
+from postproc.toolpath import (
+    Annotation,
+    Arcs,
+    Configuration,
+    EditConstraints,
+    FrameRef,
+    Kind,
+    OrientationControl,
+    PartialTargets,
+    Toolpath,
+)
 
 TIMES = 2 * ROWS // 10
 """Repetitions: a path of 11 to 14 motions then ends in all places of a block."""
@@ -72,7 +82,7 @@ def some_path(draw: np.random.Generator, count: int) -> Toolpath:
 
 def repeated(path: Toolpath, times: int) -> Toolpath:
     n = len(path)
-    columns = ("kind", "position", "rotation", "axes", "feed", "base", "tool", "status", "turn")
+    columns = ("kind", "position", "rotation", "axes", "feed", "base", "tool")
     tiled = {name: np.concatenate([getattr(path, name)] * times) for name in columns}
     arcs = Arcs(
         *(
@@ -90,7 +100,6 @@ def repeated(path: Toolpath, times: int) -> Toolpath:
             "executes",
             "external",
             "inverse_time_feed",
-            "orientation_programmed",
             "stops",
         )
     }
@@ -101,7 +110,9 @@ def repeated(path: Toolpath, times: int) -> Toolpath:
         line=np.arange(n * times) + 10,
         annotations=tuple(notes),
         arcs=arcs,
+        constraints=EditConstraints(),
         partial_targets=PartialTargets(),
+        configuration=Configuration(),
         orientation_control=OrientationControl(),
     )
 

@@ -21,8 +21,8 @@ from postproc.toolpath.columns import MotionColumns
 
 PROGRAMS = Path(__file__).parent / "programs"
 COLUMNS = (
-    "kind position rotation axes feed base tool status turn line arcs.centre arcs.normal arcs.sweep arcs.plane_free"
-    " approximation orientation_programmed orientation_control.redundant_axis inverse_time_feed"
+    "kind position rotation axes feed base tool line arcs.centre arcs.normal arcs.sweep arcs.plane_free"
+    " approximation constraints.orientation_programmed orientation_control.redundant_axis inverse_time_feed"
 )
 
 
@@ -60,7 +60,7 @@ def test_parts_are_read_as_the_whole(whole: dict[Path, Program], small: None) ->
                 column(one), column(other), rtol=1e-12, atol=1e-13, err_msg=f"{path} {name}"
             )
         for name in ("refused", "locked", "no_insert_before"):
-            assert dict(getattr(one, name)) == dict(getattr(other, name)), path
+            assert dict(getattr(one.constraints, name)) == dict(getattr(other.constraints, name)), path
         for name in ("annotations", "comments", "frames"):
             assert str(getattr(one, name)) == str(getattr(other, name)), path
         assert program.findings == whole[path].findings
@@ -179,12 +179,10 @@ def test_a_motion_takes_few_bytes(arcs: bool) -> None:
     assert bytes_of(path) - rotation <= (24 + 8 + 4 + 1 + 56 * arcs + 2) * n
     assert bytes_of(program.text) <= (24 + 8 + 2) * n
     for name in (
-        "status",
-        "turn",
         "partial_targets.inherits_from_row",
         "orientation_control.redundant_axis",
         "inverse_time_feed",
-        "orientation_programmed",
+        "constraints.orientation_programmed",
         "approximation",
     ):
         column = attrgetter(name)(path)

@@ -58,7 +58,7 @@ def reading(program: Program) -> Iterator[str]:
                 f"arc {letters('XYZ', centre)} {letters('UVW', normal)} {number(path.arcs.sweep[row] / DEG)}deg"
             )
         if text.orient[row] >= 0:
-            ways = "written" if path.orientation_programmed[row] else "kept"
+            ways = "written" if path.constraints.orientation_programmed[row] else "kept"
             said.append(f"{letters('abc', text.turned_values[row])} {ways}")
             said.append(f"from {letters('abc', text.turned_before[row])}")
             if np.isfinite(path.orientation_control.redundant_axis[row, 0]):
@@ -83,11 +83,11 @@ def reading(program: Program) -> Iterator[str]:
         said.append("timed" if path.inverse_time_feed[row] else "")
         yield " ".join(word for word in said if word)
         for name in ("refused", "locked"):
-            finding = getattr(path, name).get(row)
+            finding = getattr(path.constraints, name).get(row)
             if finding:
                 yield f"  {name} {finding.code} {finding.line}:{finding.column} {finding.message}"
-        if row in path.no_insert_before:
-            yield f"  whole: {path.no_insert_before[row]}"
+        if row in path.constraints.no_insert_before:
+            yield f"  whole: {path.constraints.no_insert_before[row]}"
     for note in path.annotations:
         yield f"speaks before {note.row} line {note.line}: {note.text}"
     for note in path.comments:

@@ -16,7 +16,7 @@ from postproc.base.findings import Refusal
 from postproc.base.geometry import PoseRows, Poses
 from postproc.base.units import DEG, MM
 from postproc.output.readback_check import check_readback, check_residual
-from postproc.toolpath import FrameRef
+from postproc.toolpath import Configuration, FrameRef
 
 BLOCKS = [
     "%", "(PART)", "G21 G90 G17 G94", "G54", "T1 M6", "G0 X0 Y0 Z50", "G0 Z0", "F3000",
@@ -37,11 +37,15 @@ class Seen:
 
     def column(self, name: str, at: object, value: object) -> None:
         """Holds with one value of a column changed, of the toolpath or of a part of it (``arcs.sweep``)."""
-        values = np.array(attrgetter(name)(self.path))
-        values[at] = value
         part, _, column = name.rpartition(".")
+        stated = self.path.configuration
+        values = np.array(stated[column] if part == "configuration" else attrgetter(name)(self.path))
+        values[at] = value
         changed = {column: values}
-        self.hold(**({part: replace(getattr(self.path, part), **changed)} if part else changed))
+        if part == "configuration":
+            self.hold(configuration=Configuration({**stated.numbers, **changed}))
+        else:
+            self.hold(**({part: replace(getattr(self.path, part), **changed)} if part else changed))
 
     def residual_with(self, division=None, **of_result: object) -> None:
         task, planned, result, made, *rest = self.residual
@@ -107,13 +111,17 @@ def test_as_it_was_read_back_it_holds(krl, blocks):
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("approximation", 0.5), ("executes", False), ("feed", 9.0), ("status", 5), ("turn", 5), ("base", 7),
-     ("tool", 7), ("inverse_time_feed", True), ("kind", 5)],
+    [("approximation", 0.5), ("executes", False), ("feed", 9.0), ("configuration.status", 5), ("configuration.turn", 5),
+     ("base", 7), ("tool", 7), ("inverse_time_feed", True), ("kind", 5)],
 )  # fmt: skip
 def test_what_a_motion_says_beside_its_target(krl, blocks, name, value):
     for one, last in ((krl, 5), (blocks, 6)):
         refuses(
-            f"the {name.replace('_', ' ')} of a motion differs from the plan", one.column, name, last, value
+            f"the {name.rpartition('.')[2].replace('_', ' ')} of a motion differs from the plan",
+            one.column,
+            name,
+            last,
+            value,
         )
 
 
@@ -135,9 +143,19 @@ def test_an_inserted_motion_stops_only_where_its_source_does(krl):
 
 
 def test_whether_the_text_gives_the_orientation(krl, blocks):
-    refuses("the orientation programmed of a motion differs", krl.column, "orientation_programmed", 5, False)
     refuses(
-        "the orientation programmed of a motion differs", blocks.column, "orientation_programmed", 6, True
+        "the orientation programmed of a motion differs",
+        krl.column,
+        "constraints.orientation_programmed",
+        5,
+        False,
+    )
+    refuses(
+        "the orientation programmed of a motion differs",
+        blocks.column,
+        "constraints.orientation_programmed",
+        6,
+        True,
     )
 
 

@@ -88,7 +88,7 @@ def test_a_program_that_sets_nothing_unusual_forgets_nothing() -> None:
     text = "IF $IN[1] THEN\nBAS(#INITMOV,0)\n$ORI_TYPE=#VAR\n$CIRC_TYPE = #BASE\nENDIF\n$BASE=BASE_DATA[1]\n"
     path = read(text + "$TOOL=TOOL_DATA[1]\n" + LIN).toolpath
     assert path.orientation_control.mode.tolist() == [VAR]
-    assert not path.refused
+    assert not path.constraints.refused
 
 
 @pytest.mark.parametrize(
@@ -110,12 +110,12 @@ def test_a_program_that_sets_nothing_unusual_forgets_nothing() -> None:
 )
 def test_what_is_not_corrected_is_told(text: str, refused: list[str]) -> None:
     path = read(text).toolpath
-    assert [one.code for one in path.refused.values()] == refused
+    assert [one.code for one in path.constraints.refused.values()] == refused
 
 
 def test_neither_what_keeps_an_orientation_nor_what_gives_it_is_turned() -> None:
     path = read(LIN + LIN + "$ORI_TYPE=#CONSTANT\n" + LIN + LIN + "$ORI_TYPE=#VAR\n" + LIN).toolpath
-    assert path.orientation_programmed.tolist() == [True, False, False, False, True]
+    assert path.constraints.orientation_programmed.tolist() == [True, False, False, False, True]
 
 
 def test_what_leaves_out_angles_behind_an_orientation_that_is_kept() -> None:
@@ -190,7 +190,7 @@ def test_an_axis_motion_or_the_start_gives_the_orientation_or_nothing_does() -> 
     for text in (constant, "PTP XP7\n" + constant):
         run, _ = framed(read(text).toolpath, TURNED, TILTED)
         assert np.isnan(run.rotation[-2:]).all()
-        assert [run.refused[len(run) - k].code for k in (1, 2)] == ["KIN010"] * 2
+        assert [run.constraints.refused[len(run) - k].code for k in (1, 2)] == ["KIN010"] * 2
     plain = read(LIN).toolpath
     assert framed(plain, TURNED, TILTED)[0] is plain
 
@@ -220,7 +220,7 @@ def test_an_arc_turns_what_is_kept_along() -> None:
 def test_behind_an_orientation_that_is_not_known_none_is(text: str) -> None:
     run, _ = framed(read(text + LIN + "$ORI_TYPE=#VAR\n" + LIN).toolpath, TURNED, TILTED)
     assert np.isnan(run.rotation[-2]).all()
-    assert run.refused[len(run) - 2].code == "KIN010"
+    assert run.constraints.refused[len(run) - 2].code == "KIN010"
     assert np.isfinite(run.rotation[-1]).all()
 
 

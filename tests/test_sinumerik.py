@@ -276,7 +276,7 @@ def test_at_their_pole_two_rotary_axes_are_written_all_the_same() -> None:
     rotary = ORIENTATIONS[3]
     assert rotary.writable(np.array([[np.nan, 1.0, 20.0], [np.nan, 30.0, 20.0]])).tolist() == [False, True]
     text = "G54 G71 G90\nT1\nTRAORI\nG0 X0 Y0 Z0 B1 C20\nG1 X1 B30 F100\n"
-    assert read(SINUMERIK, text).toolpath.orientation_programmed.tolist() == [True, True]
+    assert read(SINUMERIK, text).toolpath.constraints.orientation_programmed.tolist() == [True, True]
 
 
 HOSTILE = [

@@ -14,7 +14,7 @@ from postproc.base.units import MM
 from postproc.compensation.correct import correct
 from postproc.compensation.subdivision import Limits, subdivide
 from postproc.output.write import plan_motions
-from postproc.toolpath import Arcs, Kind, Toolpath
+from postproc.toolpath import Arcs, Configuration, Kind, Toolpath
 from postproc.verification.comparison import Simulator
 from postproc.verification.pairing import Different, pair_motions
 from postproc.workflows.preparation import Request, prepare
@@ -38,8 +38,7 @@ def as_run(task, limits=None, gain=1.0):
         feed=old.feed[plan.source],
         base=old.base[plan.source],
         tool=old.tool[plan.source],
-        status=old.status[plan.source],
-        turn=old.turn[plan.source],
+        configuration=Configuration({k: one[plan.source] for k, one in old.configuration.numbers.items()}),
         line=np.arange(len(plan)) + 100,
         frames=old.frames,
         arcs=Arcs(plan.centre, plan.normal, plan.sweep),

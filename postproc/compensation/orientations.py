@@ -103,7 +103,7 @@ def pairs(path: Toolpath, rows: Ints) -> Ints:
         return rows[:0]
     by_axes = (
         path.orientation_control.path[rows] == OrientationPath.ROTARY_AXES
-    ) & path.orientation_programmed[rows]
+    ) & path.constraints.orientation_programmed[rows]
     # All motions of a program use the same words.
     two = np.isfinite(path.orientation_control.rotary_to[rows]).sum(axis=1) == 2
     return np.flatnonzero(by_axes & two)

@@ -309,7 +309,7 @@ class CompensationProblem:
         """Whether the texts of all motions ``rows`` (K,) can express any orientation."""
         path = self.toolpath
         return (
-            bool(path.orientation_programmed[rows].all())
+            bool(path.constraints.orientation_programmed[rows].all())
             and not np.isfinite(path.orientation_control.redundant_axis[rows, 0]).any()
         )
 
@@ -321,7 +321,7 @@ class CompensationProblem:
             return None
         axis = (rotation @ np.nan_to_num(path.orientation_control.redundant_axis[rows])[..., None])[..., 0]
         across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
-        return np.where(path.orientation_programmed[rows][:, None, None], across, 0.0)
+        return np.where(path.constraints.orientation_programmed[rows][:, None, None], across, 0.0)
 
     def pose_errors(self, rows: Ints, real: Poses, goal: Poses) -> tuple[Floats, Floats]:
         """real (-) goal (K, 3) [m], [rad] of motions ``rows`` (K,), without rotations that cannot be corrected."""

@@ -151,7 +151,7 @@ class _SubdivisionSearch:
         self.spline = entered[self.rows]
         self.entry = start_poses(full.command, path, task.tool, task.model.robot, task.track, task.external)
         self.free = np.full(self.n, not limits.no_insert)
-        self.free[list(path.no_insert_before)] = False
+        self.free[list(path.constraints.no_insert_before)] = False
         self.start_at = np.full(len(self.rows), -1, np.int32)
         self.starts = self.entry[:0]
         self.needs_transition, self.has_lead_in = (
@@ -217,7 +217,7 @@ class _SubdivisionSearch:
         entered = np.flatnonzero(self.needs_transition)
         self.has_lead_in[entered] = self._can_lead(rows[entered]) & self._turns_alike(entered)
         # before a spline block a transition move may be, though nothing else may be inserted before its points
-        enters = np.isin(rows, list(task.toolpath.entries)) & (not self.limits.no_insert)
+        enters = np.isin(rows, list(task.toolpath.constraints.spline_headers)) & (not self.limits.no_insert)
         self.needs_transition &= ~self.has_lead_in & (self.free[rows] | enters)
         self._return_by_transition()
 
@@ -229,12 +229,12 @@ class _SubdivisionSearch:
         can &= (self.full.state[before] == MotionOutcome.AIR) & ~self.task.carries[before]
         can &= feed_motions(path)[before] & (self.task.track.status[before] >= 0)
         can &= (path.tool[before] == path.tool[rows]) & (
-            path.orientation_programmed[before] == path.orientation_programmed[rows]
+            path.constraints.orientation_programmed[before] == path.constraints.orientation_programmed[rows]
         )
         free = path.orientation_control.redundant_axis
         can &= np.isclose(free[before], free[rows], atol=1e-9, equal_nan=True).all(axis=1)
         fixed = np.zeros(self.n, bool)
-        fixed[[*path.refused, *path.locked]] = True
+        fixed[[*path.constraints.refused, *path.constraints.locked]] = True
         return np.asarray(can & ~fixed[before])
 
     def _turns_alike(self, entered: Ints) -> Bools:
@@ -313,7 +313,7 @@ class _SubdivisionSearch:
         length, spacing = self.task.desired_path.length[rows], self._spacing(rows, self.limits.ramp_end)
         blend = path.approximation[rows]
         # of an exact motion it is not known; where nothing is stated of an approximation, nothing is known of the path
-        reach = np.where(blend == 0, 0.0 if path.exact_stays else np.inf, np.nan_to_num(blend))
+        reach = np.where(blend == 0, 0.0 if path.constraints.exact_stays else np.inf, np.nan_to_num(blend))
         last = np.append(at[1:] != at[:-1], True)
         first = np.append(True, last[:-1])
         behind = (np.where(last, 1.0, np.append(share[1:], 1.0)) - share) * length

@@ -223,9 +223,9 @@ def needed_rows(path: Toolpath) -> Bools:
         | path.on_axes
         | ((path.partial_targets.inherits_from_row >= 0) & (path.base >= 0) & (path.tool >= 0))
     )
-    if path.refused:
+    if path.constraints.refused:
         needed = needed.copy()
-        needed[list(path.refused)] = False
+        needed[list(path.constraints.refused)] = False
     return np.asarray(needed)
 
 

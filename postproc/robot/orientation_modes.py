@@ -50,14 +50,16 @@ def as_run(
     rotation = path.rotation.copy()
     rotation[rows] = own
     lost = rows[np.isnan(own[:, 0, 0]) & np.isfinite(said[:, 0, 0])]
-    refused = dict(path.refused)
+    refused = dict(path.constraints.refused)
     for row in lost.tolist():
         message = (
             "it keeps the orientation of the motion before, which is not known (constant orientation control)"
         )
         refused.setdefault(row, Finding("KIN010", message, file, int(path.line[row])))
     control = replace(path.orientation_control, programmed=path.rotation)
-    run = replace(path, rotation=rotation, orientation_control=control, refused=dict(sorted(refused.items())))
+    run = replace(path, rotation=rotation, orientation_control=control).with_refused(
+        dict(sorted(refused.items()))
+    )
     return run, _without_effect(path, rows, said, own, file)
 
 

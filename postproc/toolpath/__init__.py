@@ -1,6 +1,8 @@
 """The wanted motions of a program: where the text side and the physics side meet."""
 
 from postproc.toolpath.arcs import ArcFrame, Arcs
+from postproc.toolpath.configuration import Configuration
+from postproc.toolpath.edit_constraints import EditConstraints
 from postproc.toolpath.orientation_control import OrientationControl, OrientationMode, OrientationPath
 from postproc.toolpath.partial_targets import PartialTargets
 from postproc.toolpath.plan import Plan, Role
@@ -20,6 +22,8 @@ __all__ = [
     "Annotation",
     "ArcFrame",
     "Arcs",
+    "Configuration",
+    "EditConstraints",
     "FrameRef",
     "Kind",
     "OrientationControl",

@@ -18,6 +18,9 @@ from postproc.base.findings import Finding
 from postproc.base.geometry import Placed, Poses, abc_from_rotation, rotation_from_abc
 from postproc.base.units import DEG, MM
 from postproc.toolpath.arcs import ArcFrame, Arcs
+from postproc.toolpath.columns import MotionColumns, column, not_given
+from postproc.toolpath.configuration import Configuration
+from postproc.toolpath.edit_constraints import EditConstraints
 from postproc.toolpath.orientation_control import OrientationControl, OrientationMode
 from postproc.toolpath.partial_targets import PartialTargets
 
@@ -33,7 +36,7 @@ class Kind(IntEnum):
     LIN = 2  # straight line
     CIRC = 3  # circular arc, or a helix
     OTHER = 4  # a motion that is none of these
-    SPL = 5  # a point of a spline: the way between is the controller's
+    SPL = 5  # a point of a spline: the path between is the controller's
 
 
 @dataclass(frozen=True)
@@ -52,8 +55,7 @@ class FrameRef:
 
 @dataclass(frozen=True)
 class Annotation:
-    """A comment, which stands before the motion ``row``; one that speaks to this tool (FORCE, COMPENSATE) holds from
-    there on."""
+    """A comment before the motion ``row``; one that speaks to this tool (FORCE, COMPENSATE) holds from there on."""
 
     row: int
     text: str
@@ -61,98 +63,63 @@ class Annotation:
 
 
 @dataclass(frozen=True)
-class Toolpath:
+class Toolpath(MotionColumns):
     """N motions in the order of the text.
 
-    kind (N,) Kind; position (N, 3) [m] and rotation (N, 3, 3): target of the TCP in the programmed base,
-    NaN where the target is not known; axes (N, 6) [rad] for AXIS motions, NaN elsewhere; feed (N,) [m/s],
-    NaN if unknown; base, tool (N,) index into ``frames``, -1 where unknown; status, turn (N,) KUKA's S and
-    T as stated with the motion, -1 where not; line (N,) from 1.
+    What every motion states:
 
-    ``inherits_from_row`` (N,): the AXIS row whose end point gives the components that a partial target
-    leaves out, -1 where none; ``partial_target`` (N, 6) [m, rad] X, Y, Z, A, B, C of such a target, NaN
-    where left out. ``completed`` fills them in.
+    ``kind`` (N,): Kind.
+    ``position`` (N, 3) [m], ``rotation`` (N, 3, 3): target of the TCP in the programmed base, NaN where it is not
+    known; the rotation is the one that the controller runs (see ``programmed_rotation``).
+    ``axes`` (N, 6) [rad]: target of AXIS motions, NaN for others.
+    ``external`` (N, 6) [mm or deg, as in the text]: external axes E1..E6 at the end of each motion; NaN where nothing
+    has stated them yet, ``COMPUTED`` or ``LOST`` where they are not known.
+    ``feed`` (N,) [m/s]: NaN where it is not known.
+    ``inverse_time_feed`` (N,): the text gives the time that the motion takes, its feed follows from its length (G93).
+    ``base``, ``tool`` (N,): index into ``frames``, -1 where it is not known.
+    ``line`` (N,): from 1.
+    ``approximation`` (N,) [m]: the controller may leave the path that far before the end point; 0 where it stops or
+    passes exactly, NaN where the distance is not known.
+    ``stops`` (N,): the controller comes to rest at the end point: it is not approximated (``approximation`` is 0), and
+    is no inner point of a spline block; without it wherever ``approximation`` is 0.
+    ``executes`` (N,): the motion follows the one before it; False for motions of which it is not known whether, or
+    where, they run: these come last.
 
-    ``refused``: row -> why that motion can not be corrected by an edit of its own (its target is not known,
-    its text serves another motion too, ...). ``locked``: rows whose end point a later, refused motion
-    builds on: moving them would move that one, so they can not be corrected either.
+    What few motions state, and what holds of a dialect, is in types of its own.
 
-    ``arcs``: Arcs. ``no_insert_before``: row -> why no motion can be inserted
-    before it (a spline, a TRIGGER, a line that runs many times). ``approximation`` (N,) [m]: the controller
-    may leave the path that far before the end point (approximation); 0 where it stops or passes exactly,
-    NaN where the distance is not known. ``exact_stays``: what is inserted before such an end point is
-    passed exactly as well (G61); without, it is approximated. ``orientation_programmed`` (N,): the text
-    programs the orientation and it can be written; else it is given from outside and only the position can
-    be corrected. ``redundant_axis`` (N, 3): unit vector in tool axes about which the text does not say how
-    the tool is turned (tool vectors, two rotary axes); NaN where it gives the whole orientation.
-    ``executes`` (N,): the motion follows the one before it; False for motions of which it is not known
-    whether, or where, they run: these come last. ``inverse_time_feed`` (N,): the text gives the time that
-    the motion takes: its feed follows from its length (G93). ``ptp_may_change_configuration``: a jump may
-    lead into another configuration of the robot (KRL's S); without, no motion does. ``annotations``:
-    comments that speak to this tool; ``comments``: all others that stand on a line of their own. ``stops``
-    (N,): the controller comes to rest at the end point: it is not approximated (``approximation`` is 0),
-    and is no inner point of a spline block. ``orientation`` (N,) OrientationMode of path
-    motions. ``programmed`` (N, 3, 3): the rotations of the text, where ``rotation`` is
-    what the controller runs instead (see ``programmed_rotation``). ``entries``: row -> line of the header
-    of the spline block that begins with it. Such a row is ``no_insert_before``, but one straight link may
-    stand before that line. ``orientation_path`` (N,) OrientationPath; ``rotary_from``, ``rotary_to`` (N, 3)
-    [rad]: of ROTARY_AXES, A, B, C where the motion begins and where it ends, R = Rz(C) Ry(B) Rx(A); NaN
-    where a word is not used or not known. ``external`` (N, 6): where the external axes E1..E6 stand at the
-    end of each motion, in mm or deg as the text has them; NaN where nothing has stated it yet, ``COMPUTED``
-    or ``LOST`` where it is not known.
+    ``annotations``: comments that speak to this tool; ``comments``: all others that are alone on their line.
     """
 
-    kind: Ints
-    position: Floats
-    rotation: Floats
+    kind: Ints = field(metadata=column(dtype=np.int8))
+    position: Floats = field(metadata=column(3))
+    rotation: Floats = field(metadata=column(3, 3))
     axes: FewRows | Floats
-    feed: Floats
-    base: Ints
-    tool: Ints
-    status: Ints
-    turn: Ints
-    line: Ints
+    feed: Floats = field(metadata=column())
+    base: Ints = field(metadata=column(dtype=np.int32))
+    tool: Ints = field(metadata=column(dtype=np.int32))
+    line: Ints = field(metadata=column(dtype=np.int32))
     frames: tuple[FrameRef, ...]
     arcs: Arcs = field(default_factory=Arcs)
+    constraints: EditConstraints = field(default_factory=EditConstraints)
     partial_targets: PartialTargets = field(default_factory=PartialTargets)
     orientation_control: OrientationControl = field(default_factory=OrientationControl)
-    refused: Mapping[int, Finding] = field(default_factory=dict)
-    locked: Mapping[int, Finding] = field(default_factory=dict)
+    configuration: Configuration = field(default_factory=Configuration)
+    external: Floats = field(default_factory=not_given, metadata=column(6, default=np.nan))
+    approximation: Floats = field(default_factory=not_given, metadata=column(default=0.0))
+    stops: Bools = field(default_factory=not_given)
+    executes: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=True))
+    inverse_time_feed: Bools = field(
+        default_factory=not_given, metadata=column(dtype=np.bool_, default=False)
+    )
     annotations: tuple[Annotation, ...] = ()
-    approximation: Floats = field(default_factory=lambda: np.empty(0))
-    orientation_programmed: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    executes: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    inverse_time_feed: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    ptp_may_change_configuration: bool = True
-    exact_stays: bool = False
-    no_insert_before: Mapping[int, str] = field(default_factory=dict)
     comments: tuple[Annotation, ...] = ()
-    stops: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    entries: Mapping[int, int] = field(default_factory=dict)
-    external: Floats = field(default_factory=lambda: np.empty((0, 6)))
 
     def __post_init__(self) -> None:
         n = len(self.kind)
-        # (shape, type, what stands for all rows where nothing is given)
-        columns: dict[str, tuple[tuple[int, ...], type[np.generic], float | None]] = {
-            "kind": ((n,), np.int8, None),
-            **dict.fromkeys(("base", "tool", "status", "turn", "line"), ((n,), np.int32, None)),
-            "position": ((n, 3), np.float64, None),
-            "rotation": ((n, 3, 3), np.float64, None),
-            "feed": ((n,), np.float64, None),
-            "external": ((n, 6), np.float64, np.nan),
-            "approximation": ((n,), np.float64, 0.0),
-            **dict.fromkeys(("orientation_programmed", "executes"), ((n,), np.bool_, True)),
-            "inverse_time_feed": ((n,), np.bool_, False),
-        }
-        for name, (shape, dtype, default) in columns.items():
-            values = getattr(self, name)
-            if not len(values) and default is not None:
-                values = np.broadcast_to(np.asarray(default, dtype), shape)
-            object.__setattr__(self, name, shared(frozen(values, shape, dtype)))
+        self._fill(n)
         stops = self.stops if len(self.stops) else self.approximation == 0.0
         object.__setattr__(self, "stops", shared(frozen(stops, (n,), np.bool_)))
-        for part in ("arcs", "partial_targets", "orientation_control"):
+        for part in ("arcs", "constraints", "partial_targets", "orientation_control", "configuration"):
             object.__setattr__(self, part, getattr(self, part).for_motions(n))
         object.__setattr__(self, "axes", FewRows.of(self.axes))
         if self.axes.shape != (n, 6):
@@ -163,10 +130,10 @@ class Toolpath:
 
     @cached_property
     def known(self) -> Bools:
-        """(N,) the Cartesian target, its base and its tool are known; of an arc its way as well."""
+        """(N,) the Cartesian target, its base and its tool are known; of an arc its path as well."""
         pose = np.isfinite(self.position).all(axis=1) & np.isfinite(self.rotation[:, 0, 0])
-        way = (self.kind != Kind.CIRC) | np.isfinite(self.arcs.sweep)
-        return np.asarray(pose & way & (self.base >= 0) & (self.tool >= 0))
+        path = (self.kind != Kind.CIRC) | np.isfinite(self.arcs.sweep)
+        return np.asarray(pose & path & (self.base >= 0) & (self.tool >= 0))
 
     @cached_property
     def on_axes(self) -> Bools:
@@ -178,7 +145,7 @@ class Toolpath:
 
     @cached_property
     def keeps_orientation(self) -> Bools:
-        """(N,) path motions that end with the orientation with which they begin, on arcs maybe turned with the arc."""
+        """(N,) path motions that end with the orientation with which they start, on arcs maybe turned with the arc."""
         on_path = np.isin(self.kind, (Kind.LIN, Kind.CIRC, Kind.SPL))
         return np.asarray(on_path & (self.orientation_control.mode == OrientationMode.CONSTANT))
 
@@ -190,11 +157,12 @@ class Toolpath:
 
     @cached_property
     def inserted_before(self) -> Ints:
-        """(N,) line before which stands what is inserted before each motion."""
-        if not self.entries:
+        """(N,) line before which is written what is inserted before each motion."""
+        headers = self.constraints.spline_headers
+        if not headers:
             return self.line
         line = self.line.copy()
-        line[list(self.entries)] = list(self.entries.values())
+        line[list(headers)] = list(headers.values())
         return line
 
     @cached_property
@@ -207,6 +175,10 @@ class Toolpath:
     @property
     def target_in_base(self) -> Poses:
         return Poses(self.rotation, self.position)
+
+    def with_refused(self, refused: Mapping[int, Finding]) -> Toolpath:
+        """The toolpath with these rows refused instead: row -> why."""
+        return replace(self, constraints=replace(self.constraints, refused=refused))
 
     def completed(self, reached: Placed) -> Toolpath:
         """The toolpath with its partial targets known; ``reached`` (N): where the AXIS motion of
@@ -257,10 +229,9 @@ class Toolpath:
                 value = self.external[row, axis]
                 if value == value:
                     words.append(f"E{axis + 1} {_number(value) if np.isfinite(value) else '?'}")
-            if self.status[row] >= 0:
-                words.append(f"S {self.status[row]}")
-            if self.turn[row] >= 0:
-                words.append(f"T {self.turn[row]}")
+            for name, numbers in self.configuration.numbers.items():
+                if numbers[row] >= 0:
+                    words.append(f"{name[0].upper()} {numbers[row]}")
             for word, index in (("base", self.base[row]), ("tool", self.tool[row])):
                 words.append(f"{word} {self._frame_name(int(index))}")
             if np.isfinite(self.feed[row]):
@@ -269,8 +240,8 @@ class Toolpath:
                 words.append(f"orientation {OrientationMode(self.orientation_control.mode[row]).name}")
             if self.arcs.frame[row] and kind == Kind.CIRC:
                 words.append(f"arc {ArcFrame(self.arcs.frame[row]).name}")
-            if row in self.refused:
-                words.append(f"refused {self.refused[row].code}")
+            if row in self.constraints.refused:
+                words.append(f"refused {self.constraints.refused[row].code}")
             yield " ".join(words)
 
     def _frame_name(self, index: int) -> str:

@@ -201,7 +201,7 @@ def judged(original: CompensationProblem, rows: Ints, rotation: Floats, turn: Fl
     if free.any():
         axis = (rotation @ free[..., None])[..., 0]
         turn = turn - np.sum(turn * axis, axis=1, keepdims=True) * axis
-    return np.where(path.orientation_programmed[rows][:, None], turn, 0.0)
+    return np.where(path.constraints.orientation_programmed[rows][:, None], turn, 0.0)
 
 
 class _Solution:

@@ -109,7 +109,7 @@ def _near(rows: list[int], free: Bools, n: int) -> bool:
 def movable(path: Toolpath) -> Bools:
     """(N,) the motions that may be planned elsewhere."""
     free = path.known & (path.kind != Kind.AXIS) & (path.partial_targets.inherits_from_row < 0)
-    free[[*path.refused, *path.locked]] = False
+    free[[*path.constraints.refused, *path.constraints.locked]] = False
     # Beyond it doubles do not hold the digits that are written.
     with np.errstate(invalid="ignore"):
         return (
@@ -127,7 +127,7 @@ def dividable(path: Toolpath) -> Bools:
         & ((path.kind == Kind.LIN) | (path.kind == Kind.CIRC))
         & (path.partial_targets.inherits_from_row < 0)
     )
-    free[[*path.refused, *path.no_insert_before]] = False
+    free[[*path.constraints.refused, *path.constraints.no_insert_before]] = False
     arcs = np.flatnonzero(path.kind == Kind.CIRC)
     before = np.maximum(arcs - 1, 0)
     advance = np.sum((path.position[arcs] - path.position[before]) * path.arcs.normal[arcs], axis=1)
@@ -141,7 +141,11 @@ def planned(path: Toolpath, free: Bools, shift: Floats, turn: Floats, divided: n
     piece or a link stands before each of ``divided``; of an arc it is its first half."""
     n = len(path)
     shift = _joined(path, np.where(free[:, None], shift, 0.0))
-    turns = free & path.orientation_programmed & np.isnan(path.orientation_control.redundant_axis[:, 0])
+    turns = (
+        free
+        & path.constraints.orientation_programmed
+        & np.isnan(path.orientation_control.redundant_axis[:, 0])
+    )
     turned = rotation_from_vector(np.where(turns[:, None], turn, 0.0))
     rotation = np.where(turns[:, None, None], turned @ path.rotation, path.rotation)
     moves = (shift != 0).any(axis=1)[:, None]
@@ -180,13 +184,16 @@ def _compare(path: Toolpath, plan: Plan, back: Toolpath) -> None:
     if len(back) != len(plan):
         raise Broken(f"{len(plan)} motions became {len(back)}")
     own = plan.own
-    codes = {row: finding.code for row, finding in path.refused.items()}
-    again = {int(source[m]): finding.code for m, finding in back.refused.items()}
+    codes = {row: finding.code for row, finding in path.constraints.refused.items()}
+    again = {int(source[m]): finding.code for m, finding in back.constraints.refused.items()}
     if codes != again:
         differ = set(codes.items()) ^ set(again.items())
         raise Broken(f"other refusals: {sorted(differ)[:3]}")
-    for name in ("kind", "base", "tool", "axes", "feed", "status", "turn", "inverse_time_feed"):
-        before, after = getattr(path, name)[source], getattr(back, name)[:]
+    for name in ("kind", "base", "tool", "axes", "feed", *path.configuration.numbers, "inverse_time_feed"):
+        if name in path.configuration.numbers:
+            before, after = path.configuration[name][source], back.configuration[name]
+        else:
+            before, after = getattr(path, name)[source], getattr(back, name)[:]
         if name in ("base", "tool"):
             before, after = _frames(path, before), _frames(back, after)
         same = (before == after) | ((before != before) & (after != after))

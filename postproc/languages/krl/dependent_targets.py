@@ -27,7 +27,7 @@ class DependentTargets:
     def __init__(self, task: KrlWritePlan, touched: Bools) -> None:
         self.task, self.touched = task, touched
         refused = np.zeros(len(touched), dtype=bool)
-        refused[list(task.path.refused)] = True
+        refused[list(task.path.constraints.refused)] = True
         self._refused = refused
         self.depends: Bools = ((task.places.inherits > 0) | task.is_relative) & ~refused
         self.completed = np.zeros((len(touched), 6), dtype=bool)
