@@ -37,7 +37,7 @@ def begins(path: Toolpath) -> Floats:
 def free(path: Toolpath) -> np.ndarray:
     """(N,) rows that may be moved."""
     rows = path.known.copy()
-    rows[[*path.refused, *path.locked]] = False
+    rows[[*path.constraints.refused, *path.constraints.locked]] = False
     return rows
 
 
@@ -58,10 +58,10 @@ def random_plan(
     moves = movable & (random.random(n) < share)
     end = path.position + np.where(moves[:, None], random.normal(0, size, (n, 3)), 0.0)
     turns = rotation_from_vector(
-        random.normal(0, turn, (n, 3)) * (moves & path.orientation_programmed)[:, None]
+        random.normal(0, turn, (n, 3)) * (moves & path.constraints.orientation_programmed)[:, None]
     )
     rotation = np.where(
-        moves[:, None, None] & path.orientation_programmed[:, None, None],
+        moves[:, None, None] & path.constraints.orientation_programmed[:, None, None],
         turns @ path.rotation,
         path.rotation,
     )
@@ -70,10 +70,10 @@ def random_plan(
     last = np.full(3, np.nan)
     for row in range(n):
         begin = last if row and path.base[row] == path.base[row - 1] else np.full(3, np.nan)
-        arc = path.kind[row] == Kind.CIRC and np.isfinite(path.sweep[row])
+        arc = path.kind[row] == Kind.CIRC and np.isfinite(path.arcs.sweep[row])
         whole = (
-            row in path.no_insert_before
-            or row in path.refused
+            row in path.constraints.no_insert_before
+            or row in path.constraints.refused
             or not moves[row]
             or not np.isfinite(begin).all()
         )
@@ -88,7 +88,7 @@ def random_plan(
         else:
             if through[row] and movable[row]:
                 # Three points: no advance along the normal.
-                end[row] -= path.normal[row] * ((end[row] - begin) @ path.normal[row])
+                end[row] -= path.arcs.normal[row] * ((end[row] - begin) @ path.arcs.normal[row])
             groups += _arc(
                 path,
                 row,
@@ -117,8 +117,8 @@ def random_plan(
 
 def _arc(path, row, start, begin, end, rotation, whole, moves, random, divided, flat):
     """An arc, or two, from ``begin``; as it is where nothing moves."""
-    own = np.concatenate([path.centre[row], path.normal[row], [path.sweep[row]]])
-    if row in path.refused or (not moves and np.array_equal(begin, start)):
+    own = np.concatenate([path.arcs.centre[row], path.arcs.normal[row], [path.arcs.sweep[row]]])
+    if row in path.constraints.refused or (not moves and np.array_equal(begin, start)):
         return [(row, Role.ORIGINAL, path.position[row], rotation, own)]
     source = [
         on_arc(start[None], path.position[[row]], own[None, :3], own[None, 3:6], own[6:], np.array([t]))[0]
@@ -210,11 +210,15 @@ def assert_reads_as(
     timed = program.text.feed_mode[source] == Feed.INVERSE_TIME
     same = np.isclose(path.feed, before.feed[source], rtol=np.where(timed, 0.2, 1e-9), equal_nan=True)
     assert same[~air].all()
-    np.testing.assert_array_equal(path.orientation_programmed, before.orientation_programmed[source])
+    np.testing.assert_array_equal(
+        path.constraints.orientation_programmed, before.constraints.orientation_programmed[source]
+    )
     own_rows = np.flatnonzero(own)
-    codes = {int(source[m]): path.refused[m].code for m in own_rows if m in path.refused}
-    assert codes == {row: finding.code for row, finding in before.refused.items()}
-    assert all(m not in path.refused for m in np.flatnonzero(~own))
+    codes = {
+        int(source[m]): path.constraints.refused[m].code for m in own_rows if m in path.constraints.refused
+    }
+    assert codes == {row: finding.code for row, finding in before.constraints.refused.items()}
+    assert all(m not in path.constraints.refused for m in np.flatnonzero(~own))
 
     known = np.isfinite(plan.position).all(axis=1)
     np.testing.assert_array_equal(np.isfinite(path.position).all(axis=1), known)
@@ -225,8 +229,8 @@ def assert_reads_as(
         reach = np.where(plan.sweep > 6, np.maximum(reach, np.roll(half, 1)), reach)
     assert (off <= reach[known, None]).all(), f"{off.max() / MM} mm\n" + raw.decode("latin-1")
     _assert_turned(path, plan, before, writing)
-    arc = np.flatnonzero(np.isfinite(plan.sweep) & np.isfinite(path.sweep) & (kind == Kind.CIRC))
-    np.testing.assert_array_equal(np.isfinite(path.sweep), np.isfinite(plan.sweep) & (kind == Kind.CIRC))
+    arc = np.flatnonzero(np.isfinite(plan.sweep) & np.isfinite(path.arcs.sweep) & (kind == Kind.CIRC))
+    np.testing.assert_array_equal(np.isfinite(path.arcs.sweep), np.isfinite(plan.sweep) & (kind == Kind.CIRC))
     if len(arc):
         _assert_arcs(path, plan, arc, step, raw)
     return again
@@ -239,7 +243,14 @@ def _assert_arcs(path: Toolpath, plan: Plan, arc, step, raw) -> None:
     for share in (0.3, 0.5, 0.8):
         at = np.full(len(arc), share)
         one = on_arc(meant, plan.position[arc], plan.centre[arc], plan.normal[arc], plan.sweep[arc], at)
-        two = on_arc(read_begin, path.position[arc], path.centre[arc], path.normal[arc], path.sweep[arc], at)
+        two = on_arc(
+            read_begin,
+            path.position[arc],
+            path.arcs.centre[arc],
+            path.arcs.normal[arc],
+            path.arcs.sweep[arc],
+            at,
+        )
         off = np.linalg.norm(one - two, axis=1)
         worst = int(np.argmax(off / step[arc]))
         assert (off <= 2.5 * step[arc]).all(), f"arc {arc[worst]}: {off[worst] / MM} mm\n" + raw.decode(
@@ -248,10 +259,10 @@ def _assert_arcs(path: Toolpath, plan: Plan, arc, step, raw) -> None:
 
 
 def _assert_turned(path: Toolpath, plan: Plan, before: Toolpath, writing: WritingSettings) -> None:
-    oriented = (before.orientation_programmed & before.known)[plan.source]
+    oriented = (before.constraints.orientation_programmed & before.known)[plan.source]
     if not oriented.any():
         return
-    free_axis = before.redundant_axis[plan.source]
+    free_axis = before.orientation_control.redundant_axis[plan.source]
     spins = oriented & np.isfinite(free_axis[:, 0])
     # Half a step in each of three angles, or a little less of a vector's components.
     most = 3 * 0.5 * 10.0**-writing.deg * DEG * 1.01 + 1e-8

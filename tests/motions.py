@@ -1,11 +1,15 @@
 """Hand-made motions for tests: a Toolpath from TCP poses, without a program's text."""
 
+from dataclasses import fields
+
 import numpy as np
 
 from postproc.base.geometry import Poses
 from postproc.effects import ChainState, Conditions
 from postproc.robot.chain import Chain
-from postproc.toolpath import FrameRef, Kind, Toolpath
+from postproc.toolpath import Configuration, EditConstraints, FrameRef, Kind, OrientationControl, Toolpath
+
+PARTS = {"constraints": EditConstraints, "orientation_control": OrientationControl}
 
 
 def milling_angles(count, rng):
@@ -16,7 +20,8 @@ def milling_angles(count, rng):
 
 
 def motions(target: Poses, kind=Kind.LIN, axes=None, status=-1, turn=-1, **more) -> Toolpath:
-    """One motion per pose of ``target`` (N), base and tool known; line 10 is the first.
+    """One motion per pose of ``target`` (N), base and tool known; line 10 is the first.  ``more``: fields of a Toolpath
+    and of its ``PARTS``.
 
     ``axes``: row -> (6,) [rad]; those rows become AXIS motions.  ``status``, ``turn``, ``kind``: for all, or (N,).
     """
@@ -25,6 +30,10 @@ def motions(target: Poses, kind=Kind.LIN, axes=None, status=-1, turn=-1, **more)
     position, rotation = target.position.copy(), target.rotation.copy()
     for row, angles in (axes or {}).items():
         kinds[row], joint[row], position[row], rotation[row] = Kind.AXIS, angles, np.nan, np.nan
+    for part, type_ in PARTS.items():
+        own = {one.name: more.pop(one.name) for one in fields(type_) if one.name in more}
+        if own:
+            more[part] = type_(**own)
     world = Poses.identity()
     return Toolpath(
         kind=kinds,
@@ -34,8 +43,7 @@ def motions(target: Poses, kind=Kind.LIN, axes=None, status=-1, turn=-1, **more)
         feed=np.full(n, 0.05),
         base=np.zeros(n),
         tool=np.ones(n),
-        status=np.broadcast_to(status, n),
-        turn=np.broadcast_to(turn, n),
+        configuration=Configuration({"status": np.broadcast_to(status, n), "turn": np.broadcast_to(turn, n)}),
         line=np.arange(10, 10 + n),
         frames=(FrameRef(1, world), FrameRef(1, world)),
         **more,

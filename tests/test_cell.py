@@ -50,7 +50,6 @@ def refused(action) -> list[Finding]:
 def toolpath(base, tool, frames, position=None, kind=Kind.LIN) -> Toolpath:
     n = len(base)
     where = np.zeros((n, 3)) if position is None else np.asarray(position, float)
-    unset = np.full(n, -1)
     return Toolpath(
         kind=np.full(n, kind),
         position=where,
@@ -59,8 +58,6 @@ def toolpath(base, tool, frames, position=None, kind=Kind.LIN) -> Toolpath:
         feed=np.full(n, 0.01),
         base=np.asarray(base),
         tool=np.asarray(tool),
-        status=unset,
-        turn=unset,
         line=np.arange(n) + 1,
         frames=tuple(frames),
     )

@@ -90,7 +90,7 @@ def test_a_gap_known_to_a_third_leaves_a_third(compensate, job, effect, share):
 def with_points(lines, task, arcs):
     """The circle in arcs that end where ``reversals`` asks for it; behind one a little later, for the digits."""
     rows, along = find_reversals(task, np.full(len(task.toolpath), 1e-3))
-    first = int(np.flatnonzero(np.isfinite(task.toolpath.sweep))[0])
+    first = int(np.flatnonzero(np.isfinite(task.toolpath.arcs.sweep))[0])
     inside = (rows >= first) & (rows < first + arcs)
     place = task.lost_motion.wanted.line.position(rows[inside], along[inside])
     behind = np.abs(place[:, None] - task.lost_motion.wanted.until).min(axis=1) < 1e-9

@@ -79,7 +79,7 @@ def test_what_is_left_is_what_the_robot_does_with_the_commands(said, gain):
     ).pose
     wanted = job.wanted[rows]
     shift, turn = pose_error(there, wanted)
-    free = np.nan_to_num(job.toolpath.redundant_axis[rows])
+    free = np.nan_to_num(job.toolpath.orientation_control.redundant_axis[rows])
     axis = (wanted.rotation @ free[..., None])[..., 0]
     shows = turn - np.sum(turn * axis, axis=1)[:, None] * axis
     np.testing.assert_allclose(result.after[rows], np.linalg.norm(shift, axis=1), atol=1e-9)
@@ -97,8 +97,8 @@ def test_commands_turn_only_as_the_text_can_say(said):
     rows = np.flatnonzero(result.corrected)
     _, turn = pose_error(result.command[rows], job.wanted[rows])
     oriented, free = (
-        job.toolpath.orientation_programmed[rows],
-        np.nan_to_num(job.toolpath.redundant_axis[rows]),
+        job.toolpath.constraints.orientation_programmed[rows],
+        np.nan_to_num(job.toolpath.orientation_control.redundant_axis[rows]),
     )
     assert np.linalg.norm(turn[~oriented], axis=1).max(initial=0.0) == 0.0
     whole = oriented & ~free.any(axis=1)

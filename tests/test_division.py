@@ -47,7 +47,9 @@ def dense(task, division, samples=41):
 def planar_only(task):
     """The same task where arcs lie in a plane that the program selects."""
     n = len(task.toolpath)
-    return replace(task, toolpath=replace(task.toolpath, arc_plane_free=np.zeros(n, bool)))
+    return replace(
+        task, toolpath=replace(task.toolpath, arcs=replace(task.toolpath.arcs, plane_free=np.zeros(n, bool)))
+    )
 
 
 def error_in_even_pieces(task, division, count):

@@ -21,7 +21,7 @@ from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.refinement import allocate
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits, subdivided_motions
-from postproc.toolpath import Kind, Role
+from postproc.toolpath import Arcs, EditConstraints, Kind, Role
 
 FREE = Limits(max_growth=100.0)
 OWN, PIECE, LINK = Role.ORIGINAL, Role.INTERMEDIATE, Role.TRANSITION
@@ -33,7 +33,8 @@ def divided(job, limits=FREE):
 
 
 def planar(job):
-    return replace(job, toolpath=replace(job.toolpath, arc_plane_free=np.zeros(len(job.toolpath), bool)))
+    arcs = replace(job.toolpath.arcs, plane_free=np.zeros(len(job.toolpath), bool))
+    return replace(job, toolpath=replace(job.toolpath, arcs=arcs))
 
 
 def mixed(**words):
@@ -50,7 +51,7 @@ def mixed(**words):
     centre[3], normal[3], sweep[3] = [1.7, 0.1, 0.5], [0, 0, -1.0], 0.5 * np.pi
     centre[5], normal[5], sweep[5] = [1.65, 0.25, 0.6], [0, 0, 1.0], np.pi
     carries = np.isin(np.arange(n), [2, 3, 6])
-    return at_points(points, carries, kinds, centre=centre, normal=normal, sweep=sweep, **words)
+    return at_points(points, carries, kinds, arcs=Arcs(centre, normal, sweep), **words)
 
 
 JOBS = {
@@ -126,7 +127,7 @@ def test_a_division_has_links_pieces_and_own_motions_where_they_belong(job, limi
             middle = 0.5 * (pieces.first + pieces.last)
             via = commands(task, np.full(count, row), middle).position
             points = pieces.start.position, via, pieces.end.position
-            if task.toolpath.arc_plane_free[row]:
+            if task.toolpath.arcs.plane_free[row]:
                 for name, values in zip(("centre", "normal", "sweep"), arc_through(*points), strict=True):
                     np.testing.assert_allclose(getattr(division, name)[curved], values, atol=1e-7)
             else:
@@ -232,7 +233,7 @@ def test_an_arc_that_stays_begins_where_it_was_programmed():
     said = "an uncorrected arc starts where this motion ends"
     for job, limits in (
         (task, Limits(no_insert=True)),
-        (again(task, no_insert_before={2: "a TRIGGER"}), FREE),
+        (not_before(task, {2: "a TRIGGER"}), FREE),
     ):
         division = divided(job, limits)[1]
         assert [
@@ -250,6 +251,11 @@ def again(task, **words):
     return replace(task, toolpath=replace(task.toolpath, **words))
 
 
+def not_before(task, why):
+    """``task`` where no motion can be inserted before some; ``why``: row -> reason."""
+    return again(task, constraints=EditConstraints(no_insert_before=why))
+
+
 # what may be inserted
 
 
@@ -260,7 +266,7 @@ def test_a_long_way_that_goes_on_without_a_step_is_divided_only_where_it_may_be(
     assert np.sum(division.source == 3) > 1
     assert 3 not in division.source[division.transitions]
     assert subdivide(task, result, Limits(no_insert=True)).inserted == 0
-    assert np.sum(subdivide(again(task, no_insert_before={3: "a loop"}), result, FREE).source == 3) == 1
+    assert np.sum(subdivide(not_before(task, {3: "a loop"}), result, FREE).source == 3) == 1
 
 
 @pytest.mark.parametrize(
@@ -346,7 +352,7 @@ def test_an_arc_of_nearly_a_full_turn_has_two_pieces_at_least(degrees, pieces):
     loose = replace(loose, tolerance_angle=1.0)
     result, division = divided(loose)
     assert int(np.sum((division.source == 2) & ~division.transitions)) == pieces
-    held = subdivide(again(loose, no_insert_before={2: "a loop"}), result, FREE).not_refined
+    held = subdivide(not_before(loose, {2: "a loop"}), result, FREE).not_refined
     said = "an arc of nearly a full turn cannot be divided here"
     expected = [(2, "COR013", said, "part.src", 12)] if pieces > 1 else []
     assert [(row, one.code, one.message, one.file, one.line) for row, one in held.items()] == expected

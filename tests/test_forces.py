@@ -22,7 +22,6 @@ HORIZONTAL = [[0, 0, 0], [0.1, 0, 0], [0.2, 0, 0]]
 def path_of(points, kinds=None, rotations=None, notes=(), frames=FRAMES, base=None, tool=None) -> Toolpath:
     """Motions to ``points`` [m] with the tool down; lines count 10, 11, ...; NaN makes a target unknown."""
     n = len(points)
-    unset = np.full(n, -1)
     return Toolpath(
         kind=np.full(n, Kind.LIN) if kinds is None else np.array(kinds),
         position=np.array(points, float).reshape(n, 3),
@@ -31,8 +30,6 @@ def path_of(points, kinds=None, rotations=None, notes=(), frames=FRAMES, base=No
         feed=np.full(n, 0.01),
         base=np.zeros(n, int) if base is None else np.array(base),
         tool=np.ones(n, int) if tool is None else np.array(tool),
-        status=unset,
-        turn=unset,
         line=np.arange(n) + 10,
         frames=tuple(frames),
         annotations=tuple(Annotation(row, text, line) for row, text, line in notes),
@@ -681,8 +678,6 @@ def test_a_cut_without_any_known_place_keeps_its_force(tmp_path):
         feed=np.full(n, np.nan),
         base=np.full(n, -1),
         tool=np.full(n, -1),
-        status=np.full(n, -1),
-        turn=np.full(n, -1),
         line=np.arange(1, n + 1),
         frames=(),
     )

@@ -11,7 +11,7 @@ from tiers import examples
 
 from postproc.base.geometry import Poses, rotation_from_abc, rotation_from_vector
 from postproc.base.units import DEG
-from postproc.toolpath import Kind
+from postproc.toolpath import Arcs, Kind
 
 
 def arc_path(
@@ -27,7 +27,7 @@ def arc_path(
     n = len(points)
     centre, axis, sweeps = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan)
     centre[-1], axis[-1], sweeps[-1] = 0, normal, sweep
-    return replace(path, centre=centre, normal=axis, sweep=sweeps)
+    return replace(path, arcs=Arcs(centre, axis, sweeps))
 
 
 def at(result, row, *fractions):

@@ -20,7 +20,17 @@ from postproc.process.milling_forces import mean_force
 from postproc.process.operations import process_forces
 from postproc.process.path_length import PathLength
 from postproc.process.process_file import read_process
-from postproc.toolpath import Annotation, FrameRef, Kind, Toolpath
+from postproc.toolpath import (
+    Annotation,
+    Arcs,
+    Configuration,
+    EditConstraints,
+    FrameRef,
+    Kind,
+    OrientationControl,
+    PartialTargets,
+    Toolpath,
+)
 
 TIMES = 2 * ROWS // 10
 """Repetitions: a path of 11 to 14 motions then ends in all places of a block."""
@@ -67,31 +77,44 @@ def some_path(draw: np.random.Generator, count: int) -> Toolpath:
         tools.append(tool)
         last = last if what == "lost" else to
     path = path_of(points, kinds, turns, frames=FRAMES, tool=tools)
-    return replace(path, centre=centre, normal=normal, sweep=sweep)
+    return replace(path, arcs=Arcs(centre, normal, sweep))
 
 
 def repeated(path: Toolpath, times: int) -> Toolpath:
     n = len(path)
-    columns = ("kind", "position", "rotation", "axes", "feed", "base", "tool", "status", "turn")
-    columns += ("centre", "normal", "sweep")
+    columns = ("kind", "position", "rotation", "axes", "feed", "base", "tool")
     tiled = {name: np.concatenate([getattr(path, name)] * times) for name in columns}
+    arcs = Arcs(
+        *(
+            np.concatenate([values] * times)
+            for values in (path.arcs.centre, path.arcs.normal, path.arcs.sweep)
+        )
+    )
     notes = [
         Annotation(note.row + n * k, note.text, note.line) for k in range(times) for note in path.annotations
     ]
-    left_out = (
-        "partial_target",
-        "redundant_axis",
-        "approximation",
-        "orientation_path",
-        "rotary_from",
-        "rotary_to",
-        "external",
+    left_out = {
+        name: np.empty(0)
+        for name in (
+            "approximation",
+            "executes",
+            "external",
+            "inverse_time_feed",
+            "stops",
+        )
+    }
+    return replace(
+        path,
+        **tiled,
+        **left_out,
+        line=np.arange(n * times) + 10,
+        annotations=tuple(notes),
+        arcs=arcs,
+        constraints=EditConstraints(),
+        partial_targets=PartialTargets(),
+        configuration=Configuration(),
+        orientation_control=OrientationControl(),
     )
-    rest = {name: np.empty((0, *getattr(path, name).shape[1:])) for name in left_out}
-    return replace(path, **tiled, **rest, line=np.arange(n * times) + 10, annotations=tuple(notes),
-                   inherits_from_row=np.empty(0, int), **{name: np.empty(0, bool) for name in
-                   ("orientation_programmed", "executes", "arc_plane_free", "inverse_time_feed", "stops")},
-                   **{name: np.empty(0, np.int8) for name in ("orientation", "arc_frame")})  # fmt: skip
 
 
 def same(long, short, times: int, seed: int) -> None:

@@ -122,7 +122,7 @@ def test_words_stand_where_their_numbers_are(path: Path) -> None:
 def test_findings_point_into_their_file(path: Path) -> None:
     found = program(path)
     document = found.documents[0]
-    for finding in [*found.findings, *found.toolpath.refused.values()]:
+    for finding in [*found.findings, *found.toolpath.constraints.refused.values()]:
         assert 1 <= finding.line <= len(document.line_starts)
         assert 1 <= finding.column <= max(len(document.line(finding.line)), 1), finding
 
@@ -159,7 +159,7 @@ def body(text: str) -> Program:
 
 
 def refused(found: Program) -> list[int]:
-    return sorted(found.toolpath.refused)
+    return sorted(found.toolpath.constraints.refused)
 
 
 @pytest.mark.parametrize("word", ["A1.5=1", "A-3=1", "A3 3=1", "3=1", "A=", "A3=", "X==1"])
@@ -175,10 +175,10 @@ def test_angles_of_a_mode_that_is_not_read_turn_nothing(angles: str) -> None:
     """ORIRPY2 takes them in another order: the orientation is not known; a tool vector is one in every mode."""
     for mode, known in (("ORIEULER", True), ("ORIRPY", True), ("ORIRPY2", False)):
         path = body(f"{mode}\nG1 X1 Y2 Z3 {angles}").toolpath
-        said = len(path) - 1 not in path.refused and bool(np.isfinite(path.rotation[-1]).all())
+        said = len(path) - 1 not in path.constraints.refused and bool(np.isfinite(path.rotation[-1]).all())
         assert said == known, mode
         vector = body(f"{mode}\nG1 X1 Y2 Z3 A3=0 B3=1 C3=1").toolpath
-        assert not vector.refused
+        assert not vector.constraints.refused
         np.testing.assert_allclose(vector.rotation[-1][:, 2], [0, -(0.5**0.5), -(0.5**0.5)], atol=1e-12)
 
 
@@ -194,12 +194,12 @@ def test_angles_of_the_two_modes_that_are_read_turn_as_they_say() -> None:
 def test_turns_of_an_arc_are_those_said(turns: int) -> None:
     """TURN= counts those beyond the first, P of LinuxCNC all of them."""
     found = body(f"G1 X10 Y0 Z0\nG2 X10 Y0 I-10 J0 TURN={turns}\n").toolpath
-    assert abs(found.sweep[-1]) == pytest.approx(2 * np.pi * (turns + 1))
+    assert abs(found.arcs.sweep[-1]) == pytest.approx(2 * np.pi * (turns + 1))
     if turns:
         other = read(
             NAMES["linuxcnc"], f"G21 G90 G17 T1\nG0 X10 Y0 Z0\nF600\nG2 X10 Y0 I-10 J0 P{turns}\n"
         ).toolpath
-        assert abs(other.sweep[-1]) == pytest.approx(2 * np.pi * turns)
+        assert abs(other.arcs.sweep[-1]) == pytest.approx(2 * np.pi * turns)
 
 
 # Digits

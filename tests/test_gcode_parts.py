@@ -2,6 +2,7 @@
 takes no room."""
 
 from dataclasses import replace
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -16,11 +17,12 @@ from postproc.languages.gcode.code_tables import LINUXCNC
 from postproc.languages.gcode.modal_fill import FilledRows, everywhere, fill_modal
 from postproc.languages.gcode.source import scan
 from postproc.toolpath import Plan, Toolpath
+from postproc.toolpath.columns import MotionColumns
 
 PROGRAMS = Path(__file__).parent / "programs"
 COLUMNS = (
-    "kind position rotation axes feed base tool status turn line centre normal sweep"
-    " approximation orientation_programmed redundant_axis arc_plane_free inverse_time_feed"
+    "kind position rotation axes feed base tool line arcs.centre arcs.normal arcs.sweep arcs.plane_free"
+    " approximation constraints.orientation_programmed orientation_control.redundant_axis inverse_time_feed"
 )
 
 
@@ -53,11 +55,12 @@ def test_parts_are_read_as_the_whole(whole: dict[Path, Program], small: None) ->
         one, other = program.toolpath, whole[path].toolpath
         for name in COLUMNS.split():
             # Increments are summed from the begin of a part.
+            column = attrgetter(name)
             np.testing.assert_allclose(
-                getattr(one, name), getattr(other, name), rtol=1e-12, atol=1e-13, err_msg=f"{path} {name}"
+                column(one), column(other), rtol=1e-12, atol=1e-13, err_msg=f"{path} {name}"
             )
         for name in ("refused", "locked", "no_insert_before"):
-            assert dict(getattr(one, name)) == dict(getattr(other, name)), path
+            assert dict(getattr(one.constraints, name)) == dict(getattr(other.constraints, name)), path
         for name in ("annotations", "comments", "frames"):
             assert str(getattr(one, name)) == str(getattr(other, name)), path
         assert program.findings == whole[path].findings
@@ -150,9 +153,11 @@ def test_words_of_a_part_are_those_of_the_whole(whole: dict[Path, Program]) -> N
 
 
 def bytes_of(thing: object) -> int:
-    """Bytes of the arrays of an object that have more than one row of values."""
-    arrays = [value for value in vars(thing).values() if isinstance(value, np.ndarray)]
-    return sum(array.nbytes for array in arrays if array.strides[:1] != (0,))
+    """Bytes of the arrays of an object and its parts that have more than one row of values."""
+    values = vars(thing).values()
+    arrays = [value for value in values if isinstance(value, np.ndarray)]
+    parts = sum(bytes_of(value) for value in values if isinstance(value, MotionColumns))
+    return parts + sum(array.nbytes for array in arrays if array.strides[:1] != (0,))
 
 
 def long(arcs: bool) -> bytes:
@@ -174,15 +179,13 @@ def test_a_motion_takes_few_bytes(arcs: bool) -> None:
     assert bytes_of(path) - rotation <= (24 + 8 + 4 + 1 + 56 * arcs + 2) * n
     assert bytes_of(program.text) <= (24 + 8 + 2) * n
     for name in (
-        "status",
-        "turn",
-        "inherits_from_row",
-        "redundant_axis",
+        "partial_targets.inherits_from_row",
+        "orientation_control.redundant_axis",
         "inverse_time_feed",
-        "orientation_programmed",
+        "constraints.orientation_programmed",
         "approximation",
     ):
-        column = getattr(path, name)
+        column = attrgetter(name)(path)
         assert not any(column.strides), name
         assert not column.flags.writeable
 

@@ -2,6 +2,7 @@
 
 import random
 import re
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,7 @@ def body(text: str, dialect: str = "linuxcnc") -> Program:
 
 
 def codes(program: Program) -> dict[int, str]:
-    return {row: finding.code for row, finding in program.toolpath.refused.items()}
+    return {row: finding.code for row, finding in program.toolpath.constraints.refused.items()}
 
 
 def told(program: Program) -> list[str]:
@@ -153,7 +154,7 @@ def test_places_are_where_the_numbers_stand(path: Path) -> None:
         for row in np.flatnonzero(
             (words >= 0) & ~places.incremental & np.isfinite(toolpath.position[:, axis])
         ):
-            if int(row) in toolpath.refused:
+            if int(row) in toolpath.constraints.refused:
                 continue
             word = words[row]
             literal = raw[places.text.words.start[word] : places.text.words.stop[word]]
@@ -181,8 +182,9 @@ def test_inches_are_inches() -> None:
         "T1 G21\nG0 X25.4 Y50.8 Z0\nG1 X50.8 F254\nG2 X76.2 Y25.4 I0 J-25.4\nG3 X0 Y0 R127\n"
     ).toolpath
     inch = read("T1 G20\nG0 X1 Y2 Z0\nG1 X2 F10\nG2 X3 Y1 I0 J-1\nG3 X0 Y0 R5\n").toolpath
-    for name in ("position", "centre", "sweep", "feed"):
-        np.testing.assert_allclose(getattr(inch, name), getattr(metric, name), atol=1e-12, err_msg=name)
+    for name in ("position", "arcs.centre", "arcs.sweep", "feed"):
+        column = attrgetter(name)
+        np.testing.assert_allclose(column(inch), column(metric), atol=1e-12, err_msg=name)
 
 
 def test_the_planes_are_alike() -> None:
@@ -194,20 +196,20 @@ def test_the_planes_are_alike() -> None:
     two = read(head + text.translate(turn).format("G19")).toolpath
     three = read(head + text.translate(turn).translate(turn).format("G18")).toolpath
     for turned, steps in ((two, 1), (three, 2)):
-        assert not turned.refused
+        assert not turned.constraints.refused
         np.testing.assert_allclose(np.roll(one.position, steps, axis=1), turned.position, atol=1e-12)
-        np.testing.assert_allclose(np.roll(one.centre, steps, axis=1), turned.centre, atol=1e-12)
-        np.testing.assert_allclose(np.roll(one.normal, steps, axis=1), turned.normal, atol=1e-12)
-        np.testing.assert_allclose(one.sweep, turned.sweep, atol=1e-12)
+        np.testing.assert_allclose(np.roll(one.arcs.centre, steps, axis=1), turned.arcs.centre, atol=1e-12)
+        np.testing.assert_allclose(np.roll(one.arcs.normal, steps, axis=1), turned.arcs.normal, atol=1e-12)
+        np.testing.assert_allclose(one.arcs.sweep, turned.arcs.sweep, atol=1e-12)
 
 
 def test_an_arc_by_its_radius_is_that_by_its_centre() -> None:
     for code, size, i, j in (("G2", 5, 3, -4), ("G3", 5, 3, 4), ("G2", -5, 3, 4), ("G3", -5, 3, -4)):
         one = body(f"{code} X6 Y0 R{size}\n").toolpath
         two = body(f"{code} X6 Y0 I{i} J{j}\n").toolpath
-        np.testing.assert_allclose(one.centre[1], two.centre[1], atol=1e-12)
-        assert one.sweep[1] == pytest.approx(two.sweep[1])
-        assert (one.sweep[1] > np.pi) == (size < 0)
+        np.testing.assert_allclose(one.arcs.centre[1], two.arcs.centre[1], atol=1e-12)
+        assert one.arcs.sweep[1] == pytest.approx(two.arcs.sweep[1])
+        assert (one.arcs.sweep[1] > np.pi) == (size < 0)
 
 
 def test_words_without_a_point_count_increments_where_the_cell_says_so() -> None:
@@ -228,14 +230,14 @@ def test_rotary_axes_turn_the_tool_under_tcp() -> None:
     np.testing.assert_allclose(
         path.rotation[2], about[0] @ about[1] @ about[2] @ rotation_from_abc(DOWN), atol=1e-12
     )
-    assert path.orientation_programmed.tolist()[2]
+    assert path.constraints.orientation_programmed.tolist()[2]
     assert np.isnan(read("T1 G21 G0 X0 Y0 Z0\n", orientation=None).toolpath.rotation).all()
 
 
 def test_three_axes_take_the_orientation_that_the_cell_says() -> None:
     path = body("G1 X1\n").toolpath
     np.testing.assert_allclose(path.rotation, np.broadcast_to(rotation_from_abc(DOWN), (2, 3, 3)))
-    assert not path.orientation_programmed.any()
+    assert not path.constraints.orientation_programmed.any()
 
 
 @pytest.mark.parametrize(
@@ -328,7 +330,7 @@ def test_a_marked_program_shows_its_mark() -> None:
     ],
 )
 def test_ends_that_others_build_on_are_pinned(text: str, pins: list[int]) -> None:
-    assert list(body(text).toolpath.locked) == pins
+    assert list(body(text).toolpath.constraints.locked) == pins
 
 
 @pytest.mark.parametrize(
@@ -341,26 +343,26 @@ def test_ends_that_others_build_on_are_pinned(text: str, pins: list[int]) -> Non
     ],
 )  # fmt: skip
 def test_blocks_that_say_more_than_the_motion_are_whole(text: str, whole: bool) -> None:
-    assert bool(body(text).toolpath.no_insert_before) == whole
+    assert bool(body(text).toolpath.constraints.no_insert_before) == whole
 
 
 def test_nothing_goes_before_a_block_that_a_jump_leads_to() -> None:
     text = "IF[#101GT3]GOTO60\nG1 X4 F100\nN60 G1 X6 Y0 Z0\nN70 X7\n"
     path = body(text, "fanuc").toolpath
-    assert list(path.no_insert_before) == [len(path) - 2]
+    assert list(path.constraints.no_insert_before) == [len(path) - 2]
     text = "GOTOF PAST\nG1 X4 F100\nPAST: G1 X6 Y0 Z0\nX7\n"
     path = body(text, "sinumerik").toolpath
-    assert list(path.no_insert_before) == [len(path) - 2]
+    assert list(path.constraints.no_insert_before) == [len(path) - 2]
 
 
 def test_nothing_goes_before_a_block_that_a_subprogram_returns_to() -> None:
     lines = ["O1", "G21 G90 G17 G54 T1", "G0 X0. Y0. Z0.", "M98 P200", "G54 G90 G1 X4. Y0. Z0. F100"]
     lines += ["N60 G1 X6. Y0. Z0.", "N70 X7.", "M30", "O200", "G1 X1.", "M99 P{}", ""]
     path = read("\n".join(lines).format(60), "fanuc").toolpath
-    whole = {int(path.line[row]): why for row, why in path.no_insert_before.items()}
+    whole = {int(path.line[row]): why for row, why in path.constraints.no_insert_before.items()}
     assert whole[6] == "a jump leads to its block"
     path = read("\n".join(lines).format(""), "fanuc").toolpath
-    assert 6 not in path.line[list(path.no_insert_before)]
+    assert 6 not in path.line[list(path.constraints.no_insert_before)]
 
 
 def test_a_call_leaves_nothing_known_but_the_unit() -> None:
@@ -374,17 +376,17 @@ def test_a_call_leaves_nothing_known_but_the_unit() -> None:
 
 def test_refusals_name_line_and_column() -> None:
     program = body("  N7 G1 X#1\n")
-    finding = program.toolpath.refused[1]
+    finding = program.toolpath.constraints.refused[1]
     assert (finding.code, finding.line, finding.column) == ("GCO005", 4, 3)
-    assert 0 not in program.toolpath.refused
-    assert 1 in program.toolpath.refused
+    assert 0 not in program.toolpath.constraints.refused
+    assert 1 in program.toolpath.constraints.refused
     with pytest.raises(KeyError):
-        program.toolpath.refused[0]
+        program.toolpath.constraints.refused[0]
 
 
 def test_equal_refusals_are_told_once() -> None:
     program = body(100 * "G41 D1 G1 X1 Y1\n")
-    assert len(program.toolpath.refused) == 100
+    assert len(program.toolpath.constraints.refused) == 100
     assert told(program) == ["GCO009"]
     assert "100 motions, lines 4 to 103" in program.findings[0].message
 
@@ -439,7 +441,7 @@ def test_any_bytes_are_read() -> None:
         assert (words.start >= -1).all()
         assert (np.diff(words.at) > 0).all()
         known = np.isfinite(path.position).all(axis=1) & (path.base >= 0) & (path.tool >= 0)
-        assert all(known[row] or row in path.refused for row in range(len(path)))
+        assert all(known[row] or row in path.constraints.refused for row in range(len(path)))
         assert len(list(path.dump())) == len(path)
 
 

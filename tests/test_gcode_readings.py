@@ -53,17 +53,17 @@ def reading(program: Program) -> Iterator[str]:
             said.append("ABC?")
         elif text.orient[row] >= 0:
             said.append(letters("ABC", abc_from_rotation(path.rotation[row]) / DEG))
-        if np.isfinite(path.sweep[row]):
-            centre, normal = path.centre[row] / MM, path.normal[row]
+        if np.isfinite(path.arcs.sweep[row]):
+            centre, normal = path.arcs.centre[row] / MM, path.arcs.normal[row]
             said.append(
-                f"arc {letters('XYZ', centre)} {letters('UVW', normal)} {number(path.sweep[row] / DEG)}deg"
+                f"arc {letters('XYZ', centre)} {letters('UVW', normal)} {number(path.arcs.sweep[row] / DEG)}deg"
             )
         if text.orient[row] >= 0:
-            ways = "written" if path.orientation_programmed[row] else "kept"
+            ways = "written" if path.constraints.orientation_programmed[row] else "kept"
             said.append(f"{letters('abc', text.turned_values[row])} {ways}")
             said.append(f"from {letters('abc', text.turned_before[row])}")
-            if np.isfinite(path.redundant_axis[row, 0]):
-                said.append(f"about {letters('xyz', path.redundant_axis[row])}")
+            if np.isfinite(path.orientation_control.redundant_axis[row, 0]):
+                said.append(f"about {letters('xyz', path.orientation_control.redundant_axis[row])}")
         said.append(f"F{number(path.feed[row] / MM * 60)}")
         for letter, index in (("G", path.base[row]), ("T", path.tool[row])):
             frame = path.frames[index] if index >= 0 else None
@@ -74,7 +74,7 @@ def reading(program: Program) -> Iterator[str]:
         said.append({0: "", 1: "G18", 2: "G19"}.get(int(text.plane[row]), "plane?"))
         said.append("G91" if text.incremental[row] else "")
         said.append("centres absolute" if text.arc_absolute[row] else "")
-        said.append("any plane" if path.arc_plane_free[row] and path.kind[row] == Kind.CIRC else "")
+        said.append("any plane" if path.arcs.plane_free[row] and path.kind[row] == Kind.CIRC else "")
         if text.scale[row] != MM or text.increment[row] != MM:
             said.append(f"unit {number(text.scale[row] / MM)} {number(text.increment[row] / MM)}")
         if text.frame[row]:
@@ -84,11 +84,11 @@ def reading(program: Program) -> Iterator[str]:
         said.append("timed" if path.inverse_time_feed[row] else "")
         yield " ".join(word for word in said if word)
         for name in ("refused", "locked"):
-            finding = getattr(path, name).get(row)
+            finding = getattr(path.constraints, name).get(row)
             if finding:
                 yield f"  {name} {finding.code} {finding.line}:{finding.column} {finding.message}"
-        if row in path.no_insert_before:
-            yield f"  whole: {path.no_insert_before[row]}"
+        if row in path.constraints.no_insert_before:
+            yield f"  whole: {path.constraints.no_insert_before[row]}"
     for note in path.annotations:
         yield f"speaks before {note.row} line {note.line}: {note.text}"
     for note in path.comments:

@@ -49,16 +49,16 @@ def test_words_keep_away_from_a_name_and_from_what_does_not_close() -> None:
         (FANUC, HEAD, "G1 X5 Q#\n"),
     ):
         path = read(dialect, head + text).toolpath
-        assert path.refused[len(path) - 1].code == "GCO001", text
+        assert path.constraints.refused[len(path) - 1].code == "GCO001", text
     path = read(SINUMERIK, MILL + 'MSG("(") G1 X5\n').toolpath
-    assert not path.refused
+    assert not path.constraints.refused
 
 
 @pytest.mark.parametrize("text", ["G1 X99999999999999999999 Y0 Z0\n", "G1 Z-10000001\n"])
 def test_numbers_beyond_any_machine_are_none(text: str) -> None:
     program = read(LINUXCNC, HEAD + text + "G1 X1 Y1 Z1\nX2\n")
     path = program.toolpath
-    assert path.refused[1].code == "GCO005"
+    assert path.constraints.refused[1].code == "GCO005"
     assert np.isnan(path.position[1]).any()
     assert path.known[2:].all()
     assert len(LINUXCNC.edit_targets(program, Plan.of(path), WRITING).edits) == 0
@@ -70,19 +70,19 @@ def test_a_coordinate_is_inherited_through_what_is_not_corrected() -> None:
         ("G1 X1 Y1 Z1 F9\nG28 Z0\nG1 X2 Y#1 Z#1\n", []),
         ("G1 X1 Y1 Z1 F9\nG1 X#1 Y2\nG1 X3 Y#1\n", [1]),
     ):
-        assert list(read(LINUXCNC, HEAD + text).toolpath.locked) == pins, text
+        assert list(read(LINUXCNC, HEAD + text).toolpath.constraints.locked) == pins, text
 
 
 def test_an_arc_without_an_end_has_no_way() -> None:
     path = read(LINUXCNC, HEAD + "G2 X2 I1 F9\nM2\nG2 I3\n").toolpath
     assert np.isnan(path.position[-1]).all()
-    assert np.isnan(path.sweep[-1])
-    assert np.isnan(path.centre[-1]).all()
+    assert np.isnan(path.arcs.sweep[-1])
+    assert np.isnan(path.arcs.centre[-1]).all()
 
 
 def test_far_frames_are_not_known() -> None:
     path = read(KUKA, ROBOT + "#CS DEF[1][0,1e20,0,0,0,0]\n#CS ON[1]\nG1 X0 Y0 Z0 A0 B0 C180\n").toolpath
-    assert 0 in path.refused
+    assert 0 in path.constraints.refused
 
 
 def test_the_time_of_a_motion_stays(compensate, job) -> None:

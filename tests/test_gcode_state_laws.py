@@ -188,14 +188,17 @@ def beside(name: str, words: str) -> Toolpath:
 
 def is_whole(name: str, words: str) -> bool:
     path = beside(name, words)
-    return len(path) - 1 in path.no_insert_before
+    return len(path) - 1 in path.constraints.no_insert_before
 
 
 @pytest.mark.parametrize(("name", "whole"), [("linuxcnc", "ABCDEHLMQSTUVW"), ("kuka_cnc", "DEHLMQSTUVW")])
 def test_blocks_with_which_words_are_whole(name: str, whole: str) -> None:
     """Such that act, or move something beside the tool; rotary axes where they do not turn it about its tip."""
     path = beside(name, "\n".join(f"X2 {letter}1" for letter in BESIDE))
-    assert "".join(letter for row, letter in enumerate(BESIDE, 2) if row in path.no_insert_before) == whole
+    assert (
+        "".join(letter for row, letter in enumerate(BESIDE, 2) if row in path.constraints.no_insert_before)
+        == whole
+    )
     for name, code in (("linuxcnc", "G43.4"), ("fanuc", "G43.4")):
         assert not is_whole(name, f"{code}\nX2 B1")
     assert [is_whole("linuxcnc", f"G2 X2 I.5 P{turns}") for turns in (0, 1, 2)] == [
@@ -212,14 +215,19 @@ def test_expressions_in_which_words_are_refused(name: str) -> None:
     """Those that say where the motion goes; what is said of feeds and tools is no matter of its place."""
     home = "G0 X0 Y0 Z0 A0 B0 C0 T1\nG1 X1 F60"
     path = beside(name, "\n".join(f"{home}\nX2 {letter}#1\nA0" for letter in BESIDE))
-    codes = [path.refused[row].code if row in path.refused else "" for row in range(2, len(path))]
+    codes = [
+        path.constraints.refused[row].code if row in path.constraints.refused else ""
+        for row in range(2, len(path))
+    ]
     first = {**dict.fromkeys("ABCIJKR", "GCO005"), **dict.fromkeys("UVW", "GCO016"), "T": "GCO015"}
     behind = {**dict.fromkeys("BC", "GCO013"), **dict.fromkeys("UVW", "GCO002"), "T": "GCO015"}
     assert dict(zip(BESIDE, codes[2::4], strict=True)) == {letter: first.get(letter, "") for letter in BESIDE}
     assert dict(zip(BESIDE, codes[3::4], strict=True)) == {
         letter: behind.get(letter, "") for letter in BESIDE
     }
-    assert beside(name, "G2 X2 I.5 P#1").refused[2].code == "GCO005" if name == "linuxcnc" else True
+    assert (
+        beside(name, "G2 X2 I.5 P#1").constraints.refused[2].code == "GCO005" if name == "linuxcnc" else True
+    )
 
 
 # Coordinates

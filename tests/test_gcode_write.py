@@ -310,7 +310,7 @@ def test_arcs_that_no_numbers_state_are_held() -> None:
 def test_what_may_not_move_is_not_moved(text: str) -> None:
     program = read(LINUXCNC, HEAD + text)
     path = program.toolpath
-    rows = [*path.refused, *path.locked]
+    rows = [*path.constraints.refused, *path.constraints.locked]
     assert rows
     plan = Plan.of(path)
     position = np.where(np.isnan(plan.position), 0.0, plan.position)

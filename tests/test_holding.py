@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from postproc.base.findings import Refusal
 from postproc.base.geometry import PoseRows, Poses
 from postproc.base.units import DEG, MM
 from postproc.output.readback_check import check_readback, check_residual
-from postproc.toolpath import FrameRef
+from postproc.toolpath import Configuration, FrameRef
 
 BLOCKS = [
     "%", "(PART)", "G21 G90 G17 G94", "G54", "T1 M6", "G0 X0 Y0 Z50", "G0 Z0", "F3000",
@@ -35,10 +36,16 @@ class Seen:
         check_readback(*self.held[:5], replace(self.held[5], **of_back), self.held[6])
 
     def column(self, name: str, at: object, value: object) -> None:
-        """Holds with one value of a column changed."""
-        values = np.array(getattr(self.held[5], name))
+        """Holds with one value of a column changed, of the toolpath or of a part of it (``arcs.sweep``)."""
+        part, _, column = name.rpartition(".")
+        stated = self.path.configuration
+        values = np.array(stated[column] if part == "configuration" else attrgetter(name)(self.path))
         values[at] = value
-        self.hold(**{name: values})
+        changed = {column: values}
+        if part == "configuration":
+            self.hold(configuration=Configuration({**stated.numbers, **changed}))
+        else:
+            self.hold(**({part: replace(getattr(self.path, part), **changed)} if part else changed))
 
     def residual_with(self, division=None, **of_result: object) -> None:
         task, planned, result, made, *rest = self.residual
@@ -104,13 +111,17 @@ def test_as_it_was_read_back_it_holds(krl, blocks):
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("approximation", 0.5), ("executes", False), ("feed", 9.0), ("status", 5), ("turn", 5), ("base", 7),
-     ("tool", 7), ("inverse_time_feed", True), ("kind", 5)],
+    [("approximation", 0.5), ("executes", False), ("feed", 9.0), ("configuration.status", 5), ("configuration.turn", 5),
+     ("base", 7), ("tool", 7), ("inverse_time_feed", True), ("kind", 5)],
 )  # fmt: skip
 def test_what_a_motion_says_beside_its_target(krl, blocks, name, value):
     for one, last in ((krl, 5), (blocks, 6)):
         refuses(
-            f"the {name.replace('_', ' ')} of a motion differs from the plan", one.column, name, last, value
+            f"the {name.rpartition('.')[2].replace('_', ' ')} of a motion differs from the plan",
+            one.column,
+            name,
+            last,
+            value,
         )
 
 
@@ -132,9 +143,19 @@ def test_an_inserted_motion_stops_only_where_its_source_does(krl):
 
 
 def test_whether_the_text_gives_the_orientation(krl, blocks):
-    refuses("the orientation programmed of a motion differs", krl.column, "orientation_programmed", 5, False)
     refuses(
-        "the orientation programmed of a motion differs", blocks.column, "orientation_programmed", 6, True
+        "the orientation programmed of a motion differs",
+        krl.column,
+        "constraints.orientation_programmed",
+        5,
+        False,
+    )
+    refuses(
+        "the orientation programmed of a motion differs",
+        blocks.column,
+        "constraints.orientation_programmed",
+        6,
+        True,
     )
 
 
@@ -225,8 +246,8 @@ def test_frames_stay(seen):
 def test_arcs_go_through_the_middle_that_was_meant(blocks):
     division = blocks.held[2]
     arc = int(np.flatnonzero(np.isfinite(division.sweep))[0])
-    refuses("off the planned arc", blocks.column, "sweep", arc, blocks.path.sweep[arc] + np.pi)
-    refuses("the arcs differ", blocks.column, "sweep", arc, np.nan)
+    refuses("off the planned arc", blocks.column, "arcs.sweep", arc, blocks.path.arcs.sweep[arc] + np.pi)
+    refuses("the arcs differ", blocks.column, "arcs.sweep", arc, np.nan)
 
 
 def test_corrections_are_those_that_were_planned(krl):

@@ -112,7 +112,7 @@ def test_points_of_a_spline_block_are_passed_and_its_last_one_is_not() -> None:
 
 def test_a_block_is_entered_by_a_line_before_its_header() -> None:
     program = read("$VEL.CP=0.1\n" + START + BLOCK)
-    assert program.toolpath.entries == {1: 3 + 3}
+    assert program.toolpath.constraints.spline_headers == {1: 3 + 3}
     lines, _ = written(program, divided(program, 1, LINK))
     assert lines[1:5] == [
         START.strip(),
@@ -157,15 +157,15 @@ def test_a_block_with_conditions_is_entered_with_them(header: str, first: str, l
 )
 def test_where_a_block_is_not_entered(text: str) -> None:
     program = read(text)
-    assert not program.toolpath.entries
-    assert 1 in program.toolpath.no_insert_before
+    assert not program.toolpath.constraints.spline_headers
+    assert 1 in program.toolpath.constraints.no_insert_before
     with pytest.raises(ValueError, match="divided"):
         KRL.edit_targets(program, divided(program, 1, LINK), WritingSettings(3, 3))
 
 
 def test_a_trigger_inside_of_a_block_does_not_close_it() -> None:
     inner = BLOCK.replace("    SPL", "    TRIGGER WHEN PATH=0 DELAY=0 DO $OUT[1]=TRUE\n    SPL", 1)
-    assert read(START + inner).toolpath.entries == {1: 5}
+    assert read(START + inner).toolpath.constraints.spline_headers == {1: 5}
 
 
 @pytest.mark.parametrize("parts", [(PIECE,), (LINK, PIECE), (LINK, LINK)])

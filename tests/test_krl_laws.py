@@ -49,7 +49,7 @@ def test_findings_point_into_their_file(path: Path) -> None:
     """At a character of the line, or the first column where the whole line is meant."""
     program = case(path)
     raws = {str(document.path): document for document in program.documents}
-    for finding in [*program.findings, *program.toolpath.refused.values()]:
+    for finding in [*program.findings, *program.toolpath.constraints.refused.values()]:
         document = raws[finding.file]
         assert 1 <= finding.line <= len(document.line_starts)
         line = document.line(finding.line).rstrip()
@@ -177,7 +177,9 @@ def test_exactly_the_motions_of_a_routine_that_an_interrupt_calls_too_are_left(
     program = read(text)
     first = 5 + before + 4 + 3 + 2
     left = {
-        int(program.toolpath.line[row]) for row, f in program.toolpath.refused.items() if f.code == "KRL015"
+        int(program.toolpath.line[row])
+        for row, f in program.toolpath.constraints.refused.items()
+        if f.code == "KRL015"
     }
     assert left == set(range(first, first + count))
 
@@ -186,10 +188,10 @@ def test_exactly_the_motions_of_a_routine_that_an_interrupt_calls_too_are_left(
 def test_a_motion_to_where_the_robot_stands_loses_no_position(motion: str) -> None:
     """Whether it runs or not, the next one begins where it would."""
     program = body(f"{LINE}IF $IN[1]==TRUE THEN\n{motion}\nENDIF\nLIN {{X 5}}\n")
-    assert not program.toolpath.refused
+    assert not program.toolpath.constraints.refused
     np.testing.assert_allclose(program.toolpath.position[-1] / MM, [5.0, 2.0, 3.0])
     lost = body(f"{LINE}IF $IN[1]==TRUE THEN\nPTP XHOME\nENDIF\nLIN {{X 5}}\n")
-    assert len(lost.toolpath) - 1 in lost.toolpath.refused
+    assert len(lost.toolpath) - 1 in lost.toolpath.constraints.refused
 
 
 @pytest.mark.parametrize(("said", "holds"), [("4.4", 4.0), ("4.5", 5.0), ("-4.5", -5.0), ("-4.4", -4.0)])
@@ -205,7 +207,9 @@ def test_exactly_the_motions_of_a_routine_that_is_also_called_in_a_block_not_fol
 ) -> None:
     calls = "sub()\nIF $IN[1]==TRUE THEN\nsub()\nENDIF\n"
     program = read(f"DEF part()\n{FRAMES}{LINE}{calls}{LINE}END\nDEF sub()\n{LINE * count}END\n")
-    left = {int(program.toolpath.line[row]): f.code for row, f in program.toolpath.refused.items()}
+    left = {
+        int(program.toolpath.line[row]): f.code for row, f in program.toolpath.constraints.refused.items()
+    }
     assert left == {12 + i: "KRL015" for i in range(count)}
 
 
@@ -213,7 +217,7 @@ def test_exactly_the_motions_of_a_routine_that_is_also_called_in_a_block_not_fol
 @pytest.mark.parametrize("kind", ["INT", "REAL"])
 def test_a_number_is_not_made_of_what_is_none(kind: str, value: str) -> None:
     program = body(f"DECL {kind} n\nn={value}\nLIN {{X n,Y 2,Z 3,A 4,B 5,C 6}}\n")
-    assert [f.code for f in program.toolpath.refused.values()] == ["KRL002"]
+    assert [f.code for f in program.toolpath.constraints.refused.values()] == ["KRL002"]
 
 
 def test_an_exit_ends_no_loop_of_the_caller() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +62,7 @@ def body(text: str, data: str = "") -> Program:
 
 
 def codes(program: Program) -> dict[int, str]:
-    return {row: finding.code for row, finding in program.toolpath.refused.items()}
+    return {row: finding.code for row, finding in program.toolpath.constraints.refused.items()}
 
 
 def told(program: Program) -> list[str]:
@@ -132,22 +133,25 @@ def same(docs: tuple[Document, ...]) -> None:
         "feed",
         "base",
         "tool",
-        "status",
-        "turn",
         "line",
         "approximation",
-        "sweep",
+        "arcs.sweep",
     ):
-        np.testing.assert_array_equal(getattr(quick.toolpath, name), getattr(general.toolpath, name))
-        np.testing.assert_array_equal(getattr(quick.toolpath, name), getattr(bare.toolpath, name))
+        column = attrgetter(name)
+        np.testing.assert_array_equal(column(quick.toolpath), column(general.toolpath))
+        np.testing.assert_array_equal(column(quick.toolpath), column(bare.toolpath))
+    for name in ("status", "turn"):
+        for other in (general, bare):
+            stated = other.toolpath.configuration[name]
+            np.testing.assert_array_equal(quick.toolpath.configuration[name], stated)
     for name in ("start", "stop", "file", "insert", "home", "motion", "inherits", "text"):
         np.testing.assert_array_equal(getattr(quick.text, name), getattr(general.text, name))
     assert bare.text is None
     for other in (general, bare):
-        assert quick.toolpath.no_insert_before == other.toolpath.no_insert_before
+        assert quick.toolpath.constraints.no_insert_before == other.toolpath.constraints.no_insert_before
         assert quick.findings == other.findings
-        assert quick.toolpath.refused == other.toolpath.refused
-        assert quick.toolpath.locked == other.toolpath.locked
+        assert quick.toolpath.constraints.refused == other.toolpath.constraints.refused
+        assert quick.toolpath.constraints.locked == other.toolpath.constraints.locked
 
 
 COMMENTED = "LIN {X 1.5,Y -2.,Z +3,A 4,B 5.0,C 6} C_DIS ; layer 3, 'a' 1.5-\n"
@@ -220,7 +224,7 @@ def test_an_axis_motion_is_in_radians_and_has_no_position() -> None:
     assert path.kind[0] == Kind.AXIS
     np.testing.assert_allclose(path.axes[0], np.array([0, -90, 90, 0, 45, 0]) * DEG)
     assert np.isnan(path.position[0]).all()
-    assert not path.refused
+    assert not path.constraints.refused
 
 
 def test_places_are_those_of_the_literals() -> None:
@@ -236,14 +240,14 @@ def test_points_of_the_dat_have_their_places_there() -> None:
     assert program.text.file[0].tolist() == [1] * 6
     assert program.text.home[0] == 1
     assert program.documents[1].raw[program.text.start[0, 2] : program.text.stop[0, 2]] == b"3"
-    assert program.toolpath.status[0] == 2
+    assert program.toolpath.configuration["status"][0] == 2
     assert not program.findings
 
 
 def test_missing_components_come_from_the_point_before() -> None:
     path = body(FULL + "LIN {Y 20}\nLIN {C 60,S 1}\n").toolpath
     np.testing.assert_allclose(path.position / MM, [[1, 2, 3], [1, 20, 3], [1, 20, 3]])
-    assert not path.refused
+    assert not path.constraints.refused
 
 
 @pytest.mark.parametrize(
@@ -277,7 +281,7 @@ def test_a_partial_point_without_a_known_point_before_is_refused(between: str, c
 def test_what_does_not_move_the_robot_leaves_the_point_known(between: str) -> None:
     program = body(FULL + between + "LIN {Y 20}\n")
     last = len(program.toolpath) - 1
-    assert last not in program.toolpath.refused
+    assert last not in program.toolpath.constraints.refused
     np.testing.assert_allclose(program.toolpath.position[last] / MM, [1, 20, 3])
 
 
@@ -306,7 +310,9 @@ def test_what_does_not_move_the_robot_leaves_the_point_known(between: str) -> No
 )
 def test_a_point_that_a_refused_motion_builds_on_is_pinned(later: str, pinned: list[int]) -> None:
     program = body(FULL + FULL + later)
-    assert [row for row in program.toolpath.locked if row not in program.toolpath.refused] == pinned
+    assert [
+        row for row in program.toolpath.constraints.locked if row not in program.toolpath.constraints.refused
+    ] == pinned
 
 
 @pytest.mark.parametrize(
@@ -336,7 +342,7 @@ def test_a_point_that_a_refused_motion_builds_on_is_pinned(later: str, pinned: l
 def test_bases(code: str, setting: str) -> None:
     program = body(setting + "\n" + FULL)
     assert f" {code} tool" in next(program.toolpath.dump())
-    assert (0 in program.toolpath.refused) == code.endswith("?")
+    assert (0 in program.toolpath.constraints.refused) == code.endswith("?")
 
 
 def test_a_base_number_that_the_program_sets_keeps_its_number() -> None:
@@ -384,7 +390,7 @@ def test_a_point_that_other_code_reads_is_understood_and_its_literals_are_locked
     text: str, data: str
 ) -> None:
     program = body(text, data)
-    assert 0 not in program.toolpath.refused
+    assert 0 not in program.toolpath.constraints.refused
     assert program.text.locked[0]
     assert program.text.variables[0].name in (b"XP1", b"P")
 
@@ -432,7 +438,7 @@ def test_a_point_of_the_dat_that_the_program_assigns_is_not_known_before() -> No
 )
 def test_a_point_of_one_motion_alone_is_not_locked(text: str, data: str) -> None:
     program = body(text, data)
-    assert not program.toolpath.refused
+    assert not program.toolpath.constraints.refused
     assert not program.text.locked
 
 
@@ -459,7 +465,10 @@ def test_a_called_subprogram_changes_what_it_sets() -> None:
     assert program.toolpath.frames[program.toolpath.tool[0]].number == 3
     unsure = body("IF $IN[1] THEN\nouter()\nENDIF\n" + FULL + sub)
     assert codes(unsure) == {0: "KRL005"}
-    assert body("outer()\n" + FULL + sub.replace("BAS(#TOOL,3)", "$OUT[1]=TRUE")).toolpath.refused == {}
+    assert (
+        body("outer()\n" + FULL + sub.replace("BAS(#TOOL,3)", "$OUT[1]=TRUE")).toolpath.constraints.refused
+        == {}
+    )
 
 
 def test_a_routine_of_the_file_goes_before_one_of_a_package_with_its_name() -> None:
@@ -493,7 +502,7 @@ def test_functions_in_expressions_are_calls() -> None:
         program = body(FULL + line + "\nLIN {X 5}\n")
         assert codes(program) == {1: "KRL004"}, line
         assert "KRL010" in told(program)
-        assert list(program.toolpath.locked) == [0]
+        assert list(program.toolpath.constraints.locked) == [0]
 
 
 def test_functions_of_krl_itself_move_nothing() -> None:
@@ -521,7 +530,7 @@ def test_external_axes_that_move_are_told(text: str, moves: bool) -> None:
 
 def test_a_frame_of_the_dat_that_the_program_changes_is_not_known() -> None:
     data = "DEFDAT part\nDECL FRAME B1={X 1,Y 2,Z 3,A 0,B 0,C 0}\nENDDAT\n"
-    assert body("$BASE=B1\n" + FULL, data).toolpath.refused == {}
+    assert body("$BASE=B1\n" + FULL, data).toolpath.constraints.refused == {}
     assert codes(body("$BASE=B1\n" + FULL + "B1.Z=B1.Z+10\n", data)) == {0: "KRL005"}
 
 
@@ -532,19 +541,21 @@ def test_an_unread_routine_is_told_once() -> None:
 
 def test_equal_refusals_are_told_once_and_stand_at_every_row() -> None:
     program = body("LIN_REL {X 5}\n" + 200 * "LIN {X 1,Y 2,Z 3}\n")
-    assert len(program.toolpath.refused) == 201
+    assert len(program.toolpath.constraints.refused) == 201
     assert told(program) == ["KRL008", "KRL004"]
     assert "200 motions, lines 5 to 204" in program.findings[1].message
-    assert {finding.line for finding in program.toolpath.refused.values()} == set(range(4, 205))
+    assert {finding.line for finding in program.toolpath.constraints.refused.values()} == set(range(4, 205))
 
 
 def test_components_left_out_after_an_axis_motion_are_left_to_it() -> None:
     program = body("PTP {A1 0,A2 0,A3 0,A4 0,A5 0,A6 0}\nLIN {Z 450}\nLIN {X 1,Y 2}\nLIN {A 1,B 2,C 3}\n")
     path = program.toolpath
-    assert not path.refused
-    assert path.inherits_from_row.tolist() == [-1, 0, 0, -1]
-    np.testing.assert_allclose(path.partial_target[1] * 1e3, [np.nan, np.nan, 450, *[np.nan] * 3])
-    np.testing.assert_allclose(path.partial_target[2] * 1e3, [1, 2, 450, *[np.nan] * 3])
+    assert not path.constraints.refused
+    assert path.partial_targets.inherits_from_row.tolist() == [-1, 0, 0, -1]
+    np.testing.assert_allclose(
+        path.partial_targets.coordinates[1] * 1e3, [np.nan, np.nan, 450, *[np.nan] * 3]
+    )
+    np.testing.assert_allclose(path.partial_targets.coordinates[2] * 1e3, [1, 2, 450, *[np.nan] * 3])
     assert path.known.tolist() == [False, False, False, True]
     there = Poses.from_abc(np.tile([7.0, 8.0, 9.0], (4, 1)), np.tile([0.1, 0.2, 0.3], (4, 1)))
     full = path.completed(there)
@@ -557,8 +568,8 @@ def test_components_left_out_after_an_axis_motion_are_left_to_it() -> None:
 @pytest.mark.parametrize("name", ["$ROBROOT", "$WORLD"])
 def test_a_program_that_places_the_robot_is_not_corrected_from_there_on(name: str) -> None:
     program = body(FULL + name.lower() + " = {X 0,Y 0,Z 500,A 0,B 0,C 0}\n$BASE=BASE_DATA[1]\n" + 2 * FULL)
-    assert [finding.code for finding in program.toolpath.refused.values()] == ["KRL005", "KRL005"]
-    assert sorted(program.toolpath.refused) == [1, 2]
+    assert [finding.code for finding in program.toolpath.constraints.refused.values()] == ["KRL005", "KRL005"]
+    assert sorted(program.toolpath.constraints.refused) == [1, 2]
     assert "set in line 5" in program.findings[0].message
 
 
@@ -645,7 +656,7 @@ def test_what_may_hide_a_motion_is_one_that_is_not_understood(line, coding):
     if coding != "utf-8":  # single bytes of any code page
         hidden = re.sub(rb"[\x80-\xff]+", b"\xb2", hidden)
     found = read(f"DEF part()\n{FRAMES}{FULL}".encode() + hidden + f"\n{NEXT}END\n".encode())
-    told = {row: finding.code for row, finding in found.toolpath.refused.items()}
+    told = {row: finding.code for row, finding in found.toolpath.constraints.refused.items()}
     assert len(found.toolpath) == 4
     assert told == {1: "KRL002" if line.startswith("LIN {") and line[-1] == "}" else "KRL001", 2: "KRL004"}
 
@@ -657,7 +668,7 @@ def test_what_may_set_anything_leaves_nothing_known(line):
     zero = "{X 0,Y 0,Z 0,A 0,B 0,C 0}"
     then = f"\n{FULL}$BASE={zero}\n$TOOL={zero}\n{FULL}END\n"
     found = read(f"DEF part()\n{FRAMES}{FULL}".encode() + line + then.encode())
-    told = {row: finding.code for row, finding in found.toolpath.refused.items()}
+    told = {row: finding.code for row, finding in found.toolpath.constraints.refused.items()}
     assert told == {1: "KRL001", 2: "KRL005"}
     assert "KRL025" in [finding.code for finding in found.findings]
 
@@ -678,7 +689,7 @@ def test_umlauts_in_names(line, lost, coding):
     told = [finding.code for finding in found.findings]
     assert told.count("KRL025") == 1
     assert len(found.toolpath) == 3
-    assert {row: finding.code for row, finding in found.toolpath.refused.items()} == (
+    assert {row: finding.code for row, finding in found.toolpath.constraints.refused.items()} == (
         {1: "KRL004"} if lost else {}
     )
 
@@ -687,14 +698,14 @@ def test_umlauts_in_names(line, lost, coding):
 def test_what_such_a_statement_sets_is_not_known(line):
     data = "DECL REAL R=7\n"
     found = read(f"DEF part()\n{FRAMES}{line}\nLIN {{X R,Y 2,Z 3,A 4,B 5,C 6}}\nEND\n".encode(), data)
-    assert {finding.code for finding in found.toolpath.refused.values()} <= {"KRL002", "KRL005"}
-    assert len(found.toolpath.refused) == 1
+    assert {finding.code for finding in found.toolpath.constraints.refused.values()} <= {"KRL002", "KRL005"}
+    assert len(found.toolpath.constraints.refused) == 1
 
 
 @pytest.mark.parametrize("line", ['Text[]="größe"', "; größe", "&COMMENT größe", '$MSG[]="Zähler" ; Öl'])
 def test_strings_and_comments_may_hold_any_letter(line):
     found = read(f"DEF part()\n{FRAMES}{FULL}{line}\n{NEXT}END\n".encode("latin-1"))
-    assert not found.toolpath.refused
+    assert not found.toolpath.constraints.refused
     assert "KRL025" not in [finding.code for finding in found.findings]
 
 
@@ -705,5 +716,5 @@ def test_a_block_knows_what_may_hide_in_it():
         ("Zähler=1", part, ""), ("Öffnen()", part, "KRL004"),
     ):  # fmt: skip
         found = read(f"DEF part()\n{FRAMES}{FULL}IF $IN[1] THEN\n{line}\nENDIF\n{then}END\n".encode())
-        last = found.toolpath.refused.get(len(found.toolpath) - 1)
+        last = found.toolpath.constraints.refused.get(len(found.toolpath) - 1)
         assert (last.code if last else "") == code

@@ -31,12 +31,12 @@ def body(text: str, rest: str = "") -> Program:
 def xs(found: Program) -> list[float]:
     """X of what was followed, without the first motion."""
     path = found.toolpath
-    rows = [row for row in range(1, len(path)) if row not in path.refused]
+    rows = [row for row in range(1, len(path)) if row not in path.constraints.refused]
     return np.round(path.position[rows, 0] / MM, 9).tolist()
 
 
 def codes(found: Program) -> list[str]:
-    return [finding.code for finding in found.toolpath.refused.values()]
+    return [finding.code for finding in found.toolpath.constraints.refused.values()]
 
 
 @pytest.mark.parametrize(
@@ -138,7 +138,7 @@ def test_a_statement_that_stood_elsewhere_counts_in_its_block_too(first: str, se
 
 def test_rows_of_a_line_that_runs_several_times_are_whole() -> None:
     found = body("FOR i=1 TO 2\nLIN {X i}\nENDFOR\n" + FULL)
-    assert list(found.toolpath.no_insert_before) == [1, 2]
+    assert list(found.toolpath.constraints.no_insert_before) == [1, 2]
     assert found.toolpath.line.tolist() == [6, 8, 8, 10]
 
 
@@ -234,4 +234,4 @@ def test_any_order_of_blocks_is_read(lines: list[str]) -> None:
     for row in text.variables:
         assert row < len(path)
     known = np.isfinite(path.position[:, 0])
-    assert all(row in path.refused for row in range(len(path)) if not known[row])
+    assert all(row in path.constraints.refused for row in range(len(path)) if not known[row])

@@ -33,7 +33,7 @@ def body(text: str, data: str = "", config: str = "") -> Program:
 
 
 def codes(program: Program) -> dict[int, str]:
-    return {row: finding.code for row, finding in program.toolpath.refused.items()}
+    return {row: finding.code for row, finding in program.toolpath.constraints.refused.items()}
 
 
 NAMES = {b"N": 7, b"R": 2.5, b"DEEP": True, b"MODE": b"#FAST"}
@@ -120,10 +120,10 @@ def test_an_arc_passes_its_points_and_turns_by_its_angle(
 
 def test_an_arc_of_the_program_is_in_metres_and_radians() -> None:
     path = body("LIN {X 100,Y 0,Z 50,A 0,B 0,C 0}\nCIRC {X 0,Y 100},{X -100,Y 0}\n").toolpath
-    np.testing.assert_allclose(path.centre[1], [0, 0, 0.05], atol=1e-12)
-    np.testing.assert_allclose(path.normal[1], [0, 0, 1], atol=1e-12)
-    np.testing.assert_allclose(path.sweep[1], math.pi)
-    assert np.isnan(path.sweep[0])
+    np.testing.assert_allclose(path.arcs.centre[1], [0, 0, 0.05], atol=1e-12)
+    np.testing.assert_allclose(path.arcs.normal[1], [0, 0, 1], atol=1e-12)
+    np.testing.assert_allclose(path.arcs.sweep[1], math.pi)
+    assert np.isnan(path.arcs.sweep[0])
     assert path.known.tolist() == [True, True]
 
 
@@ -132,7 +132,7 @@ def test_an_arc_behind_one_with_an_angle_begins_where_that_ends() -> None:
         "LIN {X 10,Y 0,Z 0,A 0,B 0,C 0}\nCIRC {X 0,Y 10},{X -10,Y 0},CA 90\nCIRC {X -10,Y 0},{X 0,Y -10}\n"
     ).toolpath
     np.testing.assert_allclose(path.position[1] / MM, [0, 10, 0], atol=1e-9)
-    np.testing.assert_allclose(path.sweep[2], math.pi, atol=1e-9)
+    np.testing.assert_allclose(path.arcs.sweep[2], math.pi, atol=1e-9)
 
 
 def test_places_of_an_arc() -> None:
@@ -176,9 +176,9 @@ def test_relative_targets(text: str, ends: list[float]) -> None:
 )
 def test_behind_a_relative_motion_that_is_not_understood_nothing_is_taken_over(text: str) -> None:
     path = body(f"LIN {{X 100,Y 200,Z 300,A 90,B 0,C 0}}\n{text}\nLIN {{Z 0}}\nLIN_REL {{Z 1}}\n").toolpath
-    assert [finding.code for finding in path.refused.values()][1:] == ["KRL004", "KRL008"]
+    assert [finding.code for finding in path.constraints.refused.values()][1:] == ["KRL004", "KRL008"]
     assert not np.isfinite(path.position[1:, 0]).any()
-    assert set(path.locked) >= {0}
+    assert set(path.constraints.locked) >= {0}
 
 
 @pytest.mark.parametrize(
@@ -205,12 +205,12 @@ def test_a_spline_is_passed_exactly_and_left_whole() -> None:
     path = program.toolpath
     assert [Kind(k).name for k in path.kind] == ["LIN", "SPL", "LIN", "LIN"]
     np.testing.assert_equal(path.approximation, [0, 0, np.nan, 0])
-    assert list(path.no_insert_before) == [1, 2]
+    assert list(path.constraints.no_insert_before) == [1, 2]
 
 
 def test_what_stands_behind_a_trigger_is_whole() -> None:
     program = body(FULL + "TRIGGER WHEN DISTANCE=0 DELAY=0 DO $OUT[1]=TRUE\n;a word\n" + FULL + FULL)
-    assert list(program.toolpath.no_insert_before) == [1]
+    assert list(program.toolpath.constraints.no_insert_before) == [1]
 
 
 FORM = (
@@ -222,7 +222,7 @@ FORM = (
 def test_an_inline_form_is_whole_where_it_sets_other_frames() -> None:
     text = "".join(FORM.format(n=n, v=v, m=FULL) for n, v in ((1, 0.5), (1, 0.2), (2, 0.2), (2, 0.2)))
     program = body(text + FULL)
-    assert list(program.toolpath.no_insert_before) == [2]
+    assert list(program.toolpath.constraints.no_insert_before) == [2]
     raw = program.documents[0].raw
     assert sorted(program.text.inline) == [0, 1, 2, 3]
     for row, form in program.text.inline.items():
@@ -256,7 +256,7 @@ ENDDAT
 
 def test_points_of_another_file_are_known_and_never_edited() -> None:
     program = body("LIN XAWAY\n", config=CONFIG)
-    assert not program.toolpath.refused
+    assert not program.toolpath.constraints.refused
     assert program.text.locked[0]
     assert (program.text.start[0] == -1).all()
     assert program.text.variables[0].words == b"S 2,T 3"

@@ -76,12 +76,12 @@ def story(program: Program) -> list[str]:
             text += f" round {path.approximation[row] / MM:.6g}"
         if not path.executes[row]:
             text += " apart"
-        if row in path.no_insert_before:
-            text += f" - whole: {path.no_insert_before[row]}"
-        if row in path.refused:
-            text += " - refused " + told(path.refused[row], line)
-        if row in path.locked:
-            text += " - " + BUILDS.sub(r"kept for \2 \1", told(path.locked[row], line))
+        if row in path.constraints.no_insert_before:
+            text += f" - whole: {path.constraints.no_insert_before[row]}"
+        if row in path.constraints.refused:
+            text += " - refused " + told(path.constraints.refused[row], line)
+        if row in path.constraints.locked:
+            text += " - " + BUILDS.sub(r"kept for \2 \1", told(path.constraints.locked[row], line))
         out.append(text)
     for found in program.findings:
         assert not found.help

@@ -151,7 +151,9 @@ def program(text: str, rest: str = "") -> Program:
 
 def xs(found: Program) -> list[float]:
     path = found.toolpath
-    return [round(x, 6) for row, x in enumerate(path.position[:, 0] / MM) if row not in path.refused]
+    return [
+        round(x, 6) for row, x in enumerate(path.position[:, 0] / MM) if row not in path.constraints.refused
+    ]
 
 
 def codes(found: Program) -> list[str]:
@@ -202,7 +204,7 @@ def budget(monkeypatch: pytest.MonkeyPatch) -> int:
 )  # fmt: skip
 def test_statements_are_followed_again_up_to_a_number(text: str, rest: str, followed: bool) -> None:
     found = program(text, rest)
-    assert (not found.toolpath.refused) == followed
+    assert (not found.toolpath.constraints.refused) == followed
     assert any(one.code == "KRL024" for one in found.findings) == (not followed and "GOTO" not in text)
 
 
@@ -242,7 +244,7 @@ def test_calls_inside_of_one_another_are_followed_up_to_a_number(deep: int) -> N
 def test_motions_are_taken_apart_up_to_a_length(length: int) -> None:
     line = LINE.strip()[:-1]
     found = program(line + " " * (length - len(line) - 1) + "}\nLIN {X 2}\n").toolpath
-    messages = {row: one.message for row, one in found.refused.items()}
+    messages = {row: one.message for row, one in found.constraints.refused.items()}
     if length > LONGEST:
         assert messages == {
             0: "'LIN {X 1,Y 2,Z 3,A 4,B 5,C 6         ...' is not understood",

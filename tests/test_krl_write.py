@@ -60,7 +60,7 @@ def moved(program: Program, position: Floats, rotation: Floats) -> tuple[Documen
 def line_moved(line: str, by_mm: tuple[float, float, float] = (0, 0, 0), turn_deg: float = 0.0) -> str:
     """One motion line after its target was shifted, and turned about the base's Z."""
     program = read(FRAMES + line + "\nEND\n")
-    assert not program.toolpath.refused
+    assert not program.toolpath.constraints.refused
     turn = rotation_from_vector(np.array([0, 0, turn_deg * DEG]))
     documents = moved(
         program, program.toolpath.position + np.array(by_mm) * MM, turn @ program.toolpath.rotation
@@ -131,7 +131,7 @@ def programs(draw: st.DrawFn) -> str:
 def test_moved_rows_reach_their_target_and_the_others_stay(text: str, data: st.DataObject) -> None:
     program = read(text)
     path = program.toolpath
-    assert not path.refused
+    assert not path.constraints.refused
     n = len(path)
     moves = np.array(data.draw(st.lists(st.booleans(), min_size=n, max_size=n)), dtype=bool)
     steps = st.lists(st.floats(-0.9, 0.9), min_size=6, max_size=6)

@@ -191,7 +191,7 @@ def test_a_component_that_is_assigned_is_edited_there() -> None:
 def test_a_computed_target_gets_an_aggregate_in_its_line() -> None:
     data = "DECL E6POS P={X 1,Y 2,Z 3,A 0,B 0,C 0,S 2,T 1}\n"
     program = read("LIN P:{X 0,Y 4,Z 0,A 0,B 0,C 0} C_DIS\n", data)
-    if 0 in program.toolpath.refused:
+    if 0 in program.toolpath.constraints.refused:
         pytest.skip("the operator is not read")
     lines, _ = written(program, plan(program, r0=(0.5, 0, 0)))
     assert lines[0].startswith("LIN {X 1.500,Y 6.000,Z 3.000,A 0.000,B 0.000,C 0.000")
@@ -216,19 +216,19 @@ def with_arc(program: Program, row: int, shift: tuple[float, float, float], grow
     """Begin, end and centre of the arc at ``row`` shifted [mm], and its end moved on along it [rad]."""
     path = program.toolpath
     wanted = plan(program, **{f"r{row - 1}": shift, f"r{row}": shift})
-    centre, sweep, position = path.centre.copy(), path.sweep.copy(), wanted.position.copy()
+    centre, sweep, position = path.arcs.centre.copy(), path.arcs.sweep.copy(), wanted.position.copy()
     centre[row] += np.array(shift) * MM
     sweep[row] += grow
-    turn = rotation_from_vector(grow * path.normal[row])
+    turn = rotation_from_vector(grow * path.arcs.normal[row])
     position[row] = centre[row] + turn @ (position[row] - centre[row])
     return dataclasses.replace(wanted, centre=centre, sweep=sweep, position=position)
 
 
 def arcs_agree(program: Program, wanted: Plan, row: int, text: list[str]) -> None:
     back = read("".join(line + "\n" for line in text)).toolpath
-    assert abs(back.sweep[row] - wanted.sweep[row]) < 1e-3
-    np.testing.assert_allclose(back.centre[row], wanted.centre[row], atol=5e-6)
-    np.testing.assert_allclose(back.normal[row], wanted.normal[row], atol=1e-3)
+    assert abs(back.arcs.sweep[row] - wanted.sweep[row]) < 1e-3
+    np.testing.assert_allclose(back.arcs.centre[row], wanted.centre[row], atol=5e-6)
+    np.testing.assert_allclose(back.arcs.normal[row], wanted.normal[row], atol=1e-3)
 
 
 def test_the_auxiliary_point_of_a_moved_arc_stands_half_way() -> None:
@@ -358,7 +358,7 @@ def test_an_arc_is_divided_in_arcs() -> None:
 
 def test_nothing_is_inserted_where_it_may_not_be() -> None:
     program = read(START + "SPLINE\nSPL {X 9,Y 2,Z 3,A 4,B 5,C 6}\nENDSPLINE\n")
-    assert 1 in program.toolpath.no_insert_before or 1 in program.toolpath.refused
+    assert 1 in program.toolpath.constraints.no_insert_before or 1 in program.toolpath.constraints.refused
     with pytest.raises(ValueError, match="divided"):
         KRL.edit_targets(
             program, divided(program, 1, (Role.INTERMEDIATE, (4.25, 2, 3.5))), WritingSettings(3, 3)
@@ -437,7 +437,7 @@ def test_a_point_of_a_file_that_is_never_written_gives_way_to_an_aggregate() -> 
     config = "DEFDAT $CONFIG\nDECL GLOBAL E6POS XSAFE={X 1,Y 2,Z 3,A 4,B 5,C 6,S 2,T 35}\nENDDAT\n"
     references = ReadingSettings(references=(Document(Path("$config.dat"), config.encode()),))
     program = KRL.read((Document(Path("part.src"), (HEAD + "LIN XSAFE C_DIS\nEND\n").encode()),), references)
-    assert not program.toolpath.refused
+    assert not program.toolpath.constraints.refused
     for shared_points in ("copy-inline", "copy-dat"):
         found = KRL.edit_targets(program, plan(program, r0=(0, 0, 1)), WritingSettings(3, 3, shared_points))
         (edit,) = found.edits
@@ -454,7 +454,7 @@ def test_pieces_of_the_first_line_stand_behind_a_byte_order_mark() -> None:
     settings = b"BAS(#BASE,1)\r\nBAS(#TOOL,1)\r\n"
     program = KRL.read((Document(Path("part.src"), raw),))
     assert len(program.toolpath) == 2
-    if 0 in program.toolpath.refused:
+    if 0 in program.toolpath.constraints.refused:
         program = KRL.read((Document(Path("part.src"), raw[:3] + settings + raw[3:]),))
     found = KRL.edit_targets(
         program, divided(program, 0, (Role.INTERMEDIATE, (0, 2, 3))), WritingSettings(3, 3)
@@ -498,8 +498,8 @@ def test_what_is_taken_over_is_judged_by_the_digits_that_are_written() -> None:
 
 def test_what_is_taken_over_from_a_refused_relative_motion_is_where_that_ends() -> None:
     program = read(START + "CIRC_REL {X .,Y 10},{X 20}\nLIN {Y 500}\nLIN {Y 600}\n")
-    assert set(program.toolpath.refused) == {1}
-    assert set(program.toolpath.locked) == {0}
+    assert set(program.toolpath.constraints.refused) == {1}
+    assert set(program.toolpath.constraints.locked) == {0}
     lines, _ = written(program, plan(program, r2=(1, 0, 0)))
     assert lines[2] == "LIN {Y 500,X 22.000,Z 3.000,A 4,B 5,C 6}"
     assert lines[3] == "LIN {Y 600,X 21.000}"

@@ -77,7 +77,7 @@ def planned(program: Program, text: str) -> tuple[Plan, WritingSettings]:
                         centre[other] += np.array(numbers) * MM * (other > row)
                 case "on":
                     sweep[row] += numbers[0] * DEG
-                    turn = rotation_from_vector(numbers[0] * DEG * path.normal[row])
+                    turn = rotation_from_vector(numbers[0] * DEG * path.arcs.normal[row])
                     position[row] = centre[row] + turn @ (position[row] - centre[row])
                 case "sweep":
                     sweep[row] = numbers[0] * DEG
@@ -128,7 +128,7 @@ def written(case: dict[str, str]) -> Iterator[str]:
         back.rotation[known[:, 0]], plan.rotation[known[:, 0]], atol=2 * 10.0**-writing.deg * DEG
     )
     arcs = np.isfinite(plan.sweep)
-    np.testing.assert_allclose(back.centre[arcs], plan.centre[arcs], atol=10 * step)
+    np.testing.assert_allclose(back.arcs.centre[arcs], plan.centre[arcs], atol=10 * step)
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -29,7 +29,7 @@ from postproc.process.wrenches import Turning
 from postproc.robot.axis_track import follow_axes, nominal_flange
 from postproc.robot.inverse import inverse
 from postproc.robot.orientation_modes import as_run
-from postproc.toolpath import ArcFrame, Kind, OrientationMode
+from postproc.toolpath import ArcFrame, Arcs, Kind, OrientationMode
 
 KRL = KrlDialect()
 LIN = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
@@ -79,16 +79,16 @@ FDAT = "DECL FDAT F1={TOOL_NO 1,BASE_NO 1,IPO_FRAME #BASE}\n"
 )  # fmt: skip
 def test_what_the_program_sets_is_read(text: str, orientation: list[int], frame: list[int]) -> None:
     path = read(text, LDAT + FDAT).toolpath
-    assert path.orientation.tolist() == orientation
-    assert path.arc_frame.tolist() == frame
+    assert path.orientation_control.mode.tolist() == orientation
+    assert path.arcs.frame.tolist() == frame
 
 
 def test_a_program_that_sets_nothing_unusual_forgets_nothing() -> None:
     """What is not known to leave it can only leave it as it is everywhere."""
     text = "IF $IN[1] THEN\nBAS(#INITMOV,0)\n$ORI_TYPE=#VAR\n$CIRC_TYPE = #BASE\nENDIF\n$BASE=BASE_DATA[1]\n"
     path = read(text + "$TOOL=TOOL_DATA[1]\n" + LIN).toolpath
-    assert path.orientation.tolist() == [VAR]
-    assert not path.refused
+    assert path.orientation_control.mode.tolist() == [VAR]
+    assert not path.constraints.refused
 
 
 @pytest.mark.parametrize(
@@ -110,12 +110,12 @@ def test_a_program_that_sets_nothing_unusual_forgets_nothing() -> None:
 )
 def test_what_is_not_corrected_is_told(text: str, refused: list[str]) -> None:
     path = read(text).toolpath
-    assert [one.code for one in path.refused.values()] == refused
+    assert [one.code for one in path.constraints.refused.values()] == refused
 
 
 def test_neither_what_keeps_an_orientation_nor_what_gives_it_is_turned() -> None:
     path = read(LIN + LIN + "$ORI_TYPE=#CONSTANT\n" + LIN + LIN + "$ORI_TYPE=#VAR\n" + LIN).toolpath
-    assert path.orientation_programmed.tolist() == [True, False, False, False, True]
+    assert path.constraints.orientation_programmed.tolist() == [True, False, False, False, True]
 
 
 def test_what_leaves_out_angles_behind_an_orientation_that_is_kept() -> None:
@@ -190,7 +190,7 @@ def test_an_axis_motion_or_the_start_gives_the_orientation_or_nothing_does() -> 
     for text in (constant, "PTP XP7\n" + constant):
         run, _ = framed(read(text).toolpath, TURNED, TILTED)
         assert np.isnan(run.rotation[-2:]).all()
-        assert [run.refused[len(run) - k].code for k in (1, 2)] == ["KIN010"] * 2
+        assert [run.constraints.refused[len(run) - k].code for k in (1, 2)] == ["KIN010"] * 2
     plain = read(LIN).toolpath
     assert framed(plain, TURNED, TILTED)[0] is plain
 
@@ -204,8 +204,8 @@ def test_an_arc_turns_what_is_kept_along() -> None:
     run, _ = framed(path, TURNED, TILTED)
     kept = Rotation.from_euler("ZYX", [10, 20, 30], degrees=True)
     for row in range(1, len(path)):
-        if np.isfinite(path.sweep[row]):
-            kept = Rotation.from_rotvec(path.sweep[row] * path.normal[row]) * kept
+        if np.isfinite(path.arcs.sweep[row]):
+            kept = Rotation.from_rotvec(path.arcs.sweep[row] * path.arcs.normal[row]) * kept
         np.testing.assert_allclose(run.rotation[row], kept.as_matrix(), atol=1e-12)
 
 
@@ -220,7 +220,7 @@ def test_an_arc_turns_what_is_kept_along() -> None:
 def test_behind_an_orientation_that_is_not_known_none_is(text: str) -> None:
     run, _ = framed(read(text + LIN + "$ORI_TYPE=#VAR\n" + LIN).toolpath, TURNED, TILTED)
     assert np.isnan(run.rotation[-2]).all()
-    assert run.refused[len(run) - 2].code == "KIN010"
+    assert run.constraints.refused[len(run) - 2].code == "KIN010"
     assert np.isfinite(run.rotation[-1]).all()
 
 
@@ -240,10 +240,12 @@ def part_circle(frame: ArcFrame, turn: float = 40.0):
     path = motions(
         target,
         kind=[Kind.LIN, Kind.LIN, Kind.CIRC],
-        centre=np.array([none, none, [0.1, 0, 0]]),
-        normal=np.array([none, none, [0, 0, -1.0]]),
-        sweep=np.array([np.nan, np.nan, angle]),
-        arc_frame=np.full(3, frame),
+        arcs=Arcs(
+            centre=np.array([none, none, [0.1, 0, 0]]),
+            normal=np.array([none, none, [0, 0, -1.0]]),
+            sweep=np.array([np.nan, np.nan, angle]),
+            frame=np.full(3, frame),
+        ),
     )
     n = len(path)
     base = Poses(np.tile(TURNED.rotation, (n, 1, 1)), np.tile(TURNED.position, (n, 1)))
@@ -324,7 +326,7 @@ def test_a_force_in_the_tool_turns_with_it() -> None:
     base = np.tile(TURNED.rotation, (3, 1, 1))
     frames = Turning(
         np.array([False, False, True]), np.zeros(3, bool), None, base, path.rotation,
-        lambda rows: path.arc_turn(rows, base[rows]),
+        lambda rows: path.arcs.turn(rows, base[rows]),
     )  # fmt: skip
     force = np.array([100.0, 20, -50, 1, 2, 3])
     row = np.array([2])
@@ -444,7 +446,7 @@ def test_what_is_corrected_under_each(compensate, job, switch, corrected) -> Non
 def test_ways_without_an_unusual_turn_are_as_they_were() -> None:
     task = circle()
     rows, share = np.array([1, 2, 3]), np.array([0.3, 0.6, 0.9])
-    assert not task.toolpath.turns_along.any()
-    assert np.array_equal(task.toolpath.arc_turn(rows, np.eye(3)), np.zeros((3, 3)))
+    assert not task.toolpath.arcs.turns_along.any()
+    assert np.array_equal(task.toolpath.arcs.turn(rows, np.eye(3)), np.zeros((3, 3)))
     assert np.isfinite(task.desired_path.at(rows, share).rotation).all()
     assert DEG > 0

@@ -31,7 +31,7 @@ from postproc.report.page_data import WorstPlace, page_data, source_texts
 from postproc.report.page_rows import SHOWN, rows_to_draw, worst_rows
 from postproc.report.page_words import badge, program_verdict, reasons
 from postproc.report.report import Spread
-from postproc.toolpath import Role
+from postproc.toolpath import Arcs, Role
 from postproc.workflows.preparation import Request, prepare
 from postproc.workflows.program import compensate, predict
 
@@ -197,7 +197,7 @@ def test_arcs_are_drawn_by_points_on_them(predicted):
     centre, normal, sweep = position * np.nan, position * np.nan, position[:, 0] * np.nan
     centre[row] = (base.inverse() @ Poses(np.eye(3), middle)).position
     normal[row], sweep[row] = base.rotation.T @ [0, 0, 1], np.pi
-    path = replace(task.toolpath, centre=centre, normal=normal, sweep=sweep)
+    path = replace(task.toolpath, arcs=Arcs(centre, normal, sweep))
     bent = replace(task)
     bent.__dict__["desired_path"] = replace(ways, path=path)
     data = page_data(bent, predicted.result, predicted.report, predicted.documents)
@@ -245,7 +245,7 @@ def test_where_many_motions_are_left_out_the_columns_are_those_of_the_shown(tmp_
     n, task = len(long.task.toolpath), replace(long.task)
     sweep = np.where(np.arange(n) % 3 == 0, 0.5, np.nan)
     round_ = np.where(np.isfinite(sweep)[:, None], [0.0, 0.0, 1.0], np.nan)
-    path = replace(task.toolpath, centre=round_, normal=round_, sweep=sweep)
+    path = replace(task.toolpath, arcs=Arcs(round_, round_, sweep))
     task.__dict__["desired_path"] = replace(long.task.desired_path, path=path)
     every, few = (
         page_data(task, long.result, long.report, long.documents, limit=limit) for limit in (n, 100)

@@ -116,7 +116,11 @@ def agree(program: Path, folder: Path) -> int:
     if canon is None:
         return 0
     path = GcodeDialect(LINUXCNC).read((Document(program, program.read_bytes()),)).toolpath
-    rows = [row for row in range(len(path)) if row not in path.refused or path.refused[row].code != "GCO025"]
+    rows = [
+        row
+        for row in range(len(path))
+        if row not in path.constraints.refused or path.constraints.refused[row].code != "GCO025"
+    ]
     assert len(rows) == len(canon), f"{len(rows)} motions, rs274 has {len(canon)}"
     compared, before = 0, 0.0
     for row, motion in zip(rows, canon, strict=True):
@@ -127,23 +131,27 @@ def agree(program: Path, folder: Path) -> int:
             path.position[row][known], motion.end[known], rtol=0, atol=NEAR * motion.unit, err_msg=where
         )
         compared += bool(known.all())
-        if motion.between is not None and row not in path.refused:
+        if motion.between is not None and row not in path.constraints.refused:
             begin = path.position[row - 1]
             # The begin has four decimals of the unit that was in force there.
             for share, point in zip((1 / 3, 2 / 3), motion.between, strict=True):
                 at = on_arc(
-                    begin[None], path.position[row][None], path.centre[row][None], path.normal[row][None],
-                    path.sweep[row][None], np.array([share]),
+                    begin[None], path.position[row][None], path.arcs.centre[row][None], path.arcs.normal[row][None],
+                    path.arcs.sweep[row][None], np.array([share]),
                 )  # fmt: skip
                 np.testing.assert_allclose(
                     np.ravel(at), point, rtol=0, atol=3 * NEAR * max(motion.unit, before), err_msg=where
                 )
-            plane = np.abs(path.normal[row]) < 0.5
+            plane = np.abs(path.arcs.normal[row]) < 0.5
             np.testing.assert_allclose(
-                path.centre[row][plane], motion.centre[plane], rtol=0, atol=NEAR * motion.unit, err_msg=where
+                path.arcs.centre[row][plane],
+                motion.centre[plane],
+                rtol=0,
+                atol=NEAR * motion.unit,
+                err_msg=where,
             )
-            assert np.sign(path.normal[row].sum()) == np.sign(motion.turn), where
-            assert abs(path.sweep[row] - abs(motion.turn)) < 1e-2, where
+            assert np.sign(path.arcs.normal[row].sum()) == np.sign(motion.turn), where
+            assert abs(path.arcs.sweep[row] - abs(motion.turn)) < 1e-2, where
         before = motion.unit
     return compared
 

@@ -219,7 +219,7 @@ def test_frames_turn_as_the_control_says(first: np.ndarray, second: np.ndarray) 
 def test_a_vector_keeps_its_direction_where_the_frame_turns() -> None:
     text = "G54 G71 G90\nT1\nTRAORI\nG0 X0 Y0 Z0 A3=1 B3=0 C3=0\nROT Z90\nG1 X1 F100\nG1 X2 A3=1 B3=0 C3=0\n"
     path = read(SINUMERIK, text).toolpath
-    tool = np.einsum("nij,nj->ni", path.rotation, path.redundant_axis)
+    tool = np.einsum("nij,nj->ni", path.rotation, path.orientation_control.redundant_axis)
     np.testing.assert_allclose(tool, [[1, 0, 0], [1, 0, 0], [0, 1, 0]], atol=1e-12)
 
 
@@ -276,7 +276,7 @@ def test_at_their_pole_two_rotary_axes_are_written_all_the_same() -> None:
     rotary = ORIENTATIONS[3]
     assert rotary.writable(np.array([[np.nan, 1.0, 20.0], [np.nan, 30.0, 20.0]])).tolist() == [False, True]
     text = "G54 G71 G90\nT1\nTRAORI\nG0 X0 Y0 Z0 B1 C20\nG1 X1 B30 F100\n"
-    assert read(SINUMERIK, text).toolpath.orientation_programmed.tolist() == [True, True]
+    assert read(SINUMERIK, text).toolpath.constraints.orientation_programmed.tolist() == [True, True]
 
 
 HOSTILE = [

@@ -20,7 +20,7 @@ from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits
 from postproc.languages.krl import KrlDialect
 from postproc.output.write import path_errors_as_written
-from postproc.toolpath import Kind
+from postproc.toolpath import Arcs, EditConstraints, Kind
 
 FREE = Limits(max_growth=100.0)
 
@@ -62,9 +62,9 @@ def test_the_motion_in_air_ends_where_the_tool_is_on_the_path_under_the_force():
     [
         {"kind": [Kind.PTP, Kind.PTP, Kind.LIN, Kind.LIN]},
         {"executes": np.array([True, False, True, True])},
-        {"orientation_programmed": np.array([True, False, True, True])},
+        {"constraints": EditConstraints(orientation_programmed=np.array([True, False, True, True]))},
         {"tool": np.array([1, 1, 0, 0])},
-        {"locked": {1: "another motion builds on it"}},
+        {"constraints": EditConstraints(locked={1: "another motion builds on it"})},
     ],
     ids=["a jump", "runs elsewhere", "no orientation", "another tool", "pinned"],
 )
@@ -365,9 +365,11 @@ def test_a_smooth_corner_of_line_and_arc_is_held_against_the_one_that_is_run():
         [[1.55, -0.2, 0.5], begin, [1.55, 0.0, 0.5], end],
         [False, True, True, True],
         kind=[Kind.PTP, Kind.LIN, Kind.LIN, Kind.CIRC],
-        centre=np.array([none, none, none, centre]),
-        normal=np.array([none, none, none, [0.0, 0.0, 1.0]]),
-        sweep=np.array([np.nan, np.nan, np.nan, np.pi / 2]),
+        arcs=Arcs(
+            centre=np.array([none, none, none, centre]),
+            normal=np.array([none, none, none, [0.0, 0.0, 1.0]]),
+            sweep=np.array([np.nan, np.nan, np.nan, np.pi / 2]),
+        ),
         approximation=np.full(4, 8e-3),
     )
     found = compare_corners(job, *divided(job, Limits(no_insert=True)))
@@ -379,7 +381,8 @@ def test_a_smooth_corner_of_line_and_arc_is_held_against_the_one_that_is_run():
 def ramp_ended(distance, exact_stays=False, **limits):
     """The second side of a corner on which a ramp of 5 mm ends: its points, and what rounds them."""
     job = add_force_ramps(rounded(distance, [100.0, 250.0, 50.0, 0, 0, 0], np.pi / 2), 5e-3)
-    job = replace(job, tolerance=2e-5, toolpath=replace(job.toolpath, exact_stays=exact_stays))
+    path = replace(job.toolpath, constraints=EditConstraints(exact_stays=exact_stays))
+    job = replace(job, tolerance=2e-5, toolpath=path)
     result, division = divided(job, Limits(**{"max_growth": 100.0, "ramp_end": 0.5e-3, **limits}))
     places = division.share[(division.source == 2) & ~division.original] * job.desired_path.length[2]
     return places, compare_corners(job, result, division)

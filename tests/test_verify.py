@@ -15,7 +15,7 @@ from postproc.compensation.correct import correct
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits
 from postproc.output.write import plan_motions
-from postproc.toolpath import Kind, Toolpath
+from postproc.toolpath import Arcs, Configuration, Kind, Toolpath
 from postproc.verification.pairing import Different, pair_motions
 from postproc.verification.simulator import Simulator
 from postproc.workflows.preparation import Request, prepare
@@ -39,13 +39,10 @@ def as_run(task, limits=None, gain=1.0):
         feed=old.feed[plan.source],
         base=old.base[plan.source],
         tool=old.tool[plan.source],
-        status=old.status[plan.source],
-        turn=old.turn[plan.source],
+        configuration=Configuration({k: one[plan.source] for k, one in old.configuration.numbers.items()}),
         line=np.arange(len(plan)) + 100,
         frames=old.frames,
-        centre=plan.centre,
-        normal=plan.normal,
-        sweep=plan.sweep,
+        arcs=Arcs(plan.centre, plan.normal, plan.sweep),
         approximation=old.approximation[plan.source],
         stops=old.stops[plan.source],
     )

@@ -9,6 +9,7 @@ from ways_at_work import circle, corner, line, task
 
 from postproc.base.units import MM
 from postproc.process import Wrenches
+from postproc.toolpath import Configuration
 from postproc.verification.differences import in_air, on_cuts
 from postproc.verification.pairing import Different, pair_motions
 from postproc.verification.run_path import RunPath
@@ -192,9 +193,11 @@ def test_what_differs_is_told(column, row, value, what):
     original = approximated(5 * MM)
     feed = np.full(5, 0.02)
     original = replace(original, toolpath=replace(original.toolpath, feed=feed))
-    values = np.array(getattr(original.toolpath, column)).copy()
+    stated = column in original.toolpath.configuration.numbers
+    path = original.toolpath
+    values = np.array(path.configuration[column] if stated else getattr(path, column))
     values[row] = value
-    changes = {column: values}
+    changes = {"configuration": Configuration({column: values})} if stated else {column: values}
     if column == "approximation":
         changes["stops"] = values == 0.0
     run = replace(original, toolpath=replace(original.toolpath, **changes))

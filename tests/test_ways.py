@@ -15,7 +15,7 @@ from postproc.base.geometry import Poses, rotation_from_abc, rotation_from_vecto
 from postproc.compensation.desired_path import DesiredPath, interpolate_poses, start_poses
 from postproc.compensation.path_error import PathSegments
 from postproc.robot.axis_track import AxisTrack
-from postproc.toolpath import Kind
+from postproc.toolpath import Arcs, Kind
 
 BASE = Poses(rotation_from_abc([0.4, -0.3, 1.1]), np.array([1.2, -0.3, 0.4]))
 TOOLS = (
@@ -47,7 +47,7 @@ def every(kinds, tools=None, axes=None, lost=(), turnless=(), arcs=None, seed=3,
         position[row] += arc[3] * normal[row]
     position[list(lost)], rotation[list(lost)], rotation[list(turnless)] = NAN, NAN, NAN
     target = Poses(rotation, position)
-    path = motions(target, np.array(kinds), centre=centre, normal=normal, sweep=sweep)
+    path = motions(target, np.array(kinds), arcs=Arcs(centre, normal, sweep))
     chosen = np.zeros(n, int) if tools is None else np.array(tools)
     path = replace(path, tool=chosen)
     tool = Poses(*(np.stack([getattr(TOOLS[t], name) for t in chosen]) for name in ("rotation", "position")))
@@ -151,7 +151,7 @@ ARCS = {
 def test_an_arc_leads_round_its_centre_and_along_its_normal(arc):
     ways, wanted, _, _ = every([K.LIN, K.LIN, K.CIRC, K.LIN], arcs={2: ARCS[arc]})
     normal, sweep, rise = ARCS[arc][1:]
-    centre = ways.path.centre[2]
+    centre = ways.path.arcs.centre[2]
     assert ways.traceable.tolist() == [False, True, True, True]
     assert ways.arc.tolist() == [False, False, True, False]
     there = BASE @ Poses(np.eye(3), centre)

@@ -11,7 +11,7 @@ from postproc.compensation.subdivision import subdivided_motions
 from postproc.model import NOTHING, StiffnessModel
 from postproc.process import Wrenches
 from postproc.robot.axis_track import follow_axes
-from postproc.toolpath import Kind, Role
+from postproc.toolpath import Arcs, Kind, Role
 
 TOOL = Poses(np.eye(3), np.array([0.0, 0.0, 0.3]))
 DOWN = rotation_from_abc(np.array([0.0, 0.0, np.pi]))
@@ -60,7 +60,7 @@ def in_even_pieces(task, division, row, count):
     if task.toolpath.kind[row] != Kind.CIRC:
         return PathSegments.straight(rows, share - 1 / count, share, begin, end)
     via = commands(task, rows, share - 0.5 / count)
-    free = task.toolpath.arc_plane_free[rows, None]
+    free = task.toolpath.arcs.plane_free[rows, None]
     normal = np.where(free, np.nan, task.desired_path.circles(rows)[1])
     return PathSegments.round(rows, share - 1 / count, share, begin, via, end, normal)
 
@@ -89,9 +89,11 @@ def circle(diameter=0.6, sweep=2 * np.pi, rise=0.0, **words):
         [begin + up, begin, end, end + up],
         [False, False, True, False],
         kind=[Kind.PTP, Kind.PTP, Kind.CIRC, Kind.LIN],
-        centre=np.array([none, none, centre, none]),
-        normal=np.array([none, none, [0.0, 0.0, 1.0], none]),
-        sweep=np.array([np.nan, np.nan, sweep, np.nan]),
+        arcs=Arcs(
+            centre=np.array([none, none, centre, none]),
+            normal=np.array([none, none, [0.0, 0.0, 1.0], none]),
+            sweep=np.array([np.nan, np.nan, sweep, np.nan]),
+        ),
         **words,
     )
 

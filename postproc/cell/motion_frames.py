@@ -45,7 +45,9 @@ def frames_of(
     """
     tools = {number: tool.pose for number, tool in cell.tools.items()}
     robot_from_world = cell.robot_base.inverse()
-    known = toolpath.known | ((toolpath.inherits_from_row >= 0) & (toolpath.base >= 0) & (toolpath.tool >= 0))
+    known = toolpath.known | (
+        (toolpath.partial_targets.inherits_from_row >= 0) & (toolpath.base >= 0) & (toolpath.tool >= 0)
+    )
     missing = _missing(cell, toolpath, toolpath.base[known], cell.bases, "base", str(file))
     missing += _missing(cell, toolpath, toolpath.tool[known], tools, "tool", str(file))
     if missing:

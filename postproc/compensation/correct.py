@@ -207,7 +207,7 @@ def _correct_block(task: CompensationProblem, rows: Ints, may: Bools) -> _Correc
     done = task.command(tried, wanted, wrench[may], goal[may], (start[may], bent[may]))
     path, robot = task.toolpath, task.model.robot
     low, high = robot.limits.T
-    crossed = ((path.status[tried] >= 0) | (path.turn[tried] >= 0)) & (path.kind[tried] == Kind.PTP)
+    crossed = path.configuration.stated[tried] & (path.kind[tried] == Kind.PTP)
     if crossed.any():
         one, two = sides(robot, task.track.q[tried]), sides(robot, done.q)
         crossed &= (one[0] != two[0]) | (one[1] != two[1])
@@ -300,7 +300,7 @@ def _uncorrectable(
     lost = np.flatnonzero(tried & ~cartesian)
     unknown = _at(task, int(lost[0]), "COR003", "its target is not known") if len(lost) else None
     why = {row: unknown for row in lost.tolist() if unknown}
-    for stops in (path.locked, path.refused):
+    for stops in (path.constraints.locked, path.constraints.refused):
         why.update({row: stop for row, stop in stops.items() if tried[row]})
     free = tried & cartesian & ~_in(why, n)
     _refuse(

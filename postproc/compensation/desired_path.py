@@ -65,7 +65,7 @@ class DesiredPath:
         known = np.isin(path.kind, (Kind.LIN, Kind.CIRC)) & path.known
         length, angle = np.zeros(n), np.full(n, np.nan)
         desired_path = DesiredPath(path, begin, wanted, base, known, length, angle, track.half_turns)
-        unlike = path.turns_along | (path.orientation_path != OrientationPath.SINGLE_AXIS)
+        unlike = path.arcs.turns_along | (path.orientation_control.path != OrientationPath.SINGLE_AXIS)
 
         def measured(block: slice) -> None:
             rows = np.arange(block.start, block.stop)
@@ -90,18 +90,18 @@ class DesiredPath:
     @property
     def sweep(self) -> Floats:
         """(N,) [rad] of arcs, NaN elsewhere."""
-        return self.path.sweep
+        return self.path.arcs.sweep
 
     @cached_property
     def arc(self) -> Bools:
         """(N,) the motion is an arc."""
-        return np.asarray(np.isfinite(self.path.sweep))
+        return np.asarray(np.isfinite(self.path.arcs.sweep))
 
     def circles(self, rows: Ints) -> tuple[Floats, Floats, Floats]:
         """Centre (K, 3) [m], normal (K, 3) and sweep (K,) of the arcs ``rows`` (K,), in the robot base."""
         base = self.base[rows]
-        centre = base.position + turned(base.rotation, self.path.centre[rows])
-        return centre, turned(base.rotation, self.path.normal[rows]), self.path.sweep[rows]
+        centre = base.position + turned(base.rotation, self.path.arcs.centre[rows])
+        return centre, turned(base.rotation, self.path.arcs.normal[rows]), self.path.arcs.sweep[rows]
 
     def at(self, rows: Ints, share: Floats) -> Poses:
         """Poses (K) at the shares (K,) of the ways of ``rows`` (K,): straight or round, turning as the program says."""
@@ -121,17 +121,17 @@ class DesiredPath:
         half = self.half_turns.rows
         if not len(half) and not self._along:
             return
-        other = np.flatnonzero(self.path.turns_along[rows] | np.isin(rows, half))
+        other = np.flatnonzero(self.path.arcs.turns_along[rows] | np.isin(rows, half))
         if len(other):
             at = rows[other]
-            along = self.path.arc_turn(at, self.base[at].rotation)
+            along = self.path.arcs.turn(at, self.base[at].rotation)
             turn = turn_beside(start.rotation[other], end.rotation[other], along)
             self.half_turns.put(at, turn)
             found.rotation[other] = turning(start.rotation[other], turn, along, share[other])
 
     @cached_property
     def _along(self) -> bool:
-        return bool(self.path.turns_along.any())
+        return bool(self.path.arcs.turns_along.any())
 
     def turn(
         self, rows: Ints, first: Floats, last: Floats, start: Poses, end: Poses, share: Floats, found: Poses

@@ -55,7 +55,7 @@ class DivisibleMotions:
         self.spline = entered[self.rows]
         self.entry = start_poses(full.command, path, task.tool, task.model.robot, task.track, task.external)
         self.free = np.full(self.n, not limits.no_insert)
-        self.free[list(path.no_insert_before)] = False
+        self.free[list(path.constraints.no_insert_before)] = False
         self.start_at = np.full(len(self.rows), -1, np.int32)
         self.starts = self.entry[:0]
         self.needs_transition, self.has_lead_in = (
@@ -176,7 +176,7 @@ class DivisibleMotions:
 
     def _shares(self, rows: Ints, low: Floats, high: Floats, part: Floats) -> Floats:
         """(K,) the parts ``part`` (K,), 0 to 1, of what lies between the shares ``low`` and ``high`` (K,)."""
-        if self.task.toolpath.turns_by_words:
+        if self.task.toolpath.orientation_control.any_by_words:
             return spread(self.task.toolpath, rows, low, high, part)
         return np.where(part == 1.0, high, low + part * (high - low))
 
@@ -200,4 +200,4 @@ def motions_per_block(count: Ints) -> int:
 
 def arc_normals(task: CompensationProblem, rows: Ints) -> Floats:
     """(K, 3) about which the arcs ``rows`` (K,) have to turn; NaN where any plane will do."""
-    return np.where(task.toolpath.arc_plane_free[rows, None], np.nan, task.desired_path.circles(rows)[1])
+    return np.where(task.toolpath.arcs.plane_free[rows, None], np.nan, task.desired_path.circles(rows)[1])

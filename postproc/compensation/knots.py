@@ -44,7 +44,7 @@ def _with_companions(motions: DivisibleMotions, at: Ints, share: Floats) -> tupl
     length, spacing = motions.task.desired_path.length[rows], motions.spacing(rows, motions.limits.ramp_end)
     blend = path.approximation[rows]
     # of an exact motion it is not known; where nothing is stated of an approximation, nothing is known of the path
-    reach = np.where(blend == 0, 0.0 if path.exact_stays else np.inf, np.nan_to_num(blend))
+    reach = np.where(blend == 0, 0.0 if path.constraints.exact_stays else np.inf, np.nan_to_num(blend))
     last = np.append(at[1:] != at[:-1], True)
     first = np.append(True, last[:-1])
     behind = (np.where(last, 1.0, np.append(share[1:], 1.0)) - share) * length

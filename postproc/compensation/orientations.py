@@ -31,22 +31,24 @@ def interpolate_orientation(
     ``first``, ``last`` (K,): where start and end lie, as shares of the paths of the motions ``rows`` (K,).  ``base``,
     ``wanted`` (N): bases and targets of the motions.  All orientations are in the robot base.
     """
-    if not path.turns_by_words:
+    if not path.orientation_control.any_by_words:
         return
-    law = path.orientation_path[rows]
+    law = path.orientation_control.path[rows]
     at = np.flatnonzero(law == OrientationPath.ROTARY_AXES)
     if len(at):
         words = _Words.of(path, base, wanted, rows[at])
         one, two = words.inside(begin[at]), words.inside(end[at])
-        start = rotary_words.angles_of(one, path.rotary_at(rows[at], first[at]))
-        stop = rotary_words.angles_of(two, path.rotary_at(rows[at], last[at]))
+        start = rotary_words.angles_of(one, path.orientation_control.rotary_at(rows[at], first[at]))
+        stop = rotary_words.angles_of(two, path.orientation_control.rotary_at(rows[at], last[at]))
         # What the words do not say (another base or tool before) turns evenly.
         said = rotary_words.reproduced(one, start) & rotary_words.reproduced(two, stop)
         here = words.outside(rotary_words.rotation_of(start + share[at][:, None] * (stop - start)))
         into[at[said]] = here[said]
     at = np.flatnonzero(law == OrientationPath.GREAT_CIRCLE)
     if len(at):
-        here, known = _on_great_circle(begin[at], end[at], path.redundant_axis[rows[at]], share[at])
+        here, known = _on_great_circle(
+            begin[at], end[at], path.orientation_control.redundant_axis[rows[at]], share[at]
+        )
         into[at[known]] = here[known]
 
 
@@ -81,7 +83,9 @@ class _Words:
     @staticmethod
     def of(path: Toolpath, base: Poses, wanted: Placed, rows: Ints) -> _Words:
         frame = np.broadcast_to(base.shared(rows).rotation, (len(rows), 3, 3))
-        back = np.swapaxes(product(frame, rotary_words.rotation_of(path.rotary_to[rows])), 1, 2)
+        back = np.swapaxes(
+            product(frame, rotary_words.rotation_of(path.orientation_control.rotary_to[rows])), 1, 2
+        )
         return _Words(frame, product(back, wanted[rows].rotation))
 
     def inside(self, rotation: Floats) -> Floats:
@@ -95,11 +99,13 @@ class _Words:
 
 def pairs(path: Toolpath, rows: Ints) -> Ints:
     """Places (P,) among ``rows`` (K,) of the motions that two rotary axes turn and whose words can be written."""
-    if not path.turns_by_words:
+    if not path.orientation_control.any_by_words:
         return rows[:0]
-    by_axes = (path.orientation_path[rows] == OrientationPath.ROTARY_AXES) & path.orientation_programmed[rows]
+    by_axes = (
+        path.orientation_control.path[rows] == OrientationPath.ROTARY_AXES
+    ) & path.constraints.orientation_programmed[rows]
     # All motions of a program use the same words.
-    two = np.isfinite(path.rotary_to[rows]).sum(axis=1) == 2
+    two = np.isfinite(path.orientation_control.rotary_to[rows]).sum(axis=1) == 2
     return np.flatnonzero(by_axes & two)
 
 
@@ -110,7 +116,9 @@ def nearest_expressible(
     their paths, with the tool along that of ``rotation`` (K, 3, 3) as far as they can: ``rotary_words.pointing``."""
     words = _Words.of(path, base, wanted, rows)
     tool = words.inside(rotation)[:, :, 2]
-    return words.outside(rotary_words.rotation_of(rotary_words.pointing(tool, path.rotary_at(rows, share))))
+    return words.outside(
+        rotary_words.rotation_of(rotary_words.pointing(tool, path.orientation_control.rotary_at(rows, share)))
+    )
 
 
 POLE = np.radians(1.0)
@@ -150,7 +158,9 @@ def _leans(path: Toolpath, rows: Ints, low: Floats, high: Floats) -> tuple[Ints,
     at = pairs(path, rows)
     if not len(at):
         return at, (low[at], high[at])
-    ends = [rotary_words.lean(path.rotary_at(rows[at], share[at])) for share in (low, high)]
+    ends = [
+        rotary_words.lean(path.orientation_control.rotary_at(rows[at], share[at])) for share in (low, high)
+    ]
     half = np.pi * np.rint(0.5 * (ends[0] + ends[1]) / np.pi)  # the pole that lies nearest
     start, stop = ends[0] - half, ends[1] - half
     some = np.abs(stop - start) > 0.1 * POLE

@@ -167,7 +167,7 @@ def _errors(
     wanted = task.desired_path.at(rows, along)
     wrench = task.force.along(rows, along)
     shares = np.broadcast_to(share, len(rows))
-    command = segments.at(shares, task.toolpath.turns_along[rows])
+    command = segments.at(shares, task.toolpath.arcs.turns_along[rows])
     task.desired_path.turn(rows, segments.first, segments.last, segments.start, segments.end, shares, command)
     real = task.simulated(rows, command, wrench, share=along, corrected=True)
     goal = task.goal(rows, wanted, along)

@@ -267,7 +267,7 @@ class CompensationProblem:
         if not len(pairs):
             return turn
         found, at = turn.copy(), rows[pairs]
-        here, tool = command.rotation[pairs], self.toolpath.redundant_axis[at]
+        here, tool = command.rotation[pairs], self.toolpath.orientation_control.redundant_axis[at]
         better = self.expressible_orientations(
             at, share[pairs], product(rotation_from_vector(-turn[pairs]), here)
         )
@@ -303,8 +303,8 @@ class CompensationProblem:
         """Whether the texts of all motions ``rows`` (K,) can express any orientation."""
         path = self.toolpath
         return (
-            bool(path.orientation_programmed[rows].all())
-            and not np.isfinite(path.redundant_axis[rows, 0]).any()
+            bool(path.constraints.orientation_programmed[rows].all())
+            and not np.isfinite(path.orientation_control.redundant_axis[rows, 0]).any()
         )
 
     def orientation_projection(self, rows: Ints, rotation: Floats) -> Floats | None:
@@ -313,9 +313,9 @@ class CompensationProblem:
         path = self.toolpath
         if self.turn_freely(rows):
             return None
-        axis = (rotation @ np.nan_to_num(path.redundant_axis[rows])[..., None])[..., 0]
+        axis = (rotation @ np.nan_to_num(path.orientation_control.redundant_axis[rows])[..., None])[..., 0]
         across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
-        return np.where(path.orientation_programmed[rows][:, None, None], across, 0.0)
+        return np.where(path.constraints.orientation_programmed[rows][:, None, None], across, 0.0)
 
     def pose_errors(self, rows: Ints, real: Poses, goal: Poses) -> tuple[Floats, Floats]:
         """real (-) goal (K, 3) [m], [rad] of motions ``rows`` (K,), without rotations that cannot be corrected."""
@@ -327,7 +327,7 @@ class CompensationProblem:
         """real (-) goal, (K, 3) [m] and (K, 3) [rad], of motions ``rows`` (K,) as it shows on the part: a turn about a
         free axis does not."""
         shift, turn = pose_error(real, goal)
-        free = np.nan_to_num(self.toolpath.redundant_axis[rows])
+        free = np.nan_to_num(self.toolpath.orientation_control.redundant_axis[rows])
         if not free.any():
             return shift, turn
         axis = (goal.rotation @ free[..., None])[..., 0]

@@ -50,7 +50,7 @@ def add_transitions(motions: DivisibleMotions) -> None:
     entered = np.flatnonzero(motions.needs_transition)
     motions.has_lead_in[entered] = _can_lead(motions, rows[entered]) & _turns_alike(motions, entered)
     # before a spline block a transition move may be, though nothing else may be inserted before its points
-    enters = np.isin(rows, list(task.toolpath.entries)) & (not motions.limits.no_insert)
+    enters = np.isin(rows, list(task.toolpath.constraints.spline_headers)) & (not motions.limits.no_insert)
     motions.needs_transition &= ~motions.has_lead_in & (motions.free[rows] | enters)
     _return_by_transition(motions)
 
@@ -63,12 +63,12 @@ def _can_lead(motions: DivisibleMotions, rows: Ints) -> Bools:
     can &= (motions.full.state[before] == MotionOutcome.AIR) & ~motions.task.carries[before]
     can &= feed_motions(path)[before] & (motions.task.track.status[before] >= 0)
     can &= (path.tool[before] == path.tool[rows]) & (
-        path.orientation_programmed[before] == path.orientation_programmed[rows]
+        path.constraints.orientation_programmed[before] == path.constraints.orientation_programmed[rows]
     )
-    free = path.redundant_axis
+    free = path.orientation_control.redundant_axis
     can &= np.isclose(free[before], free[rows], atol=1e-9, equal_nan=True).all(axis=1)
     fixed = np.zeros(motions.n, bool)
-    fixed[[*path.refused, *path.locked]] = True
+    fixed[[*path.constraints.refused, *path.constraints.locked]] = True
     return np.asarray(can & ~fixed[before])
 
 

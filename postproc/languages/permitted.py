@@ -70,7 +70,7 @@ def _lines_of_motions(path: Toolpath, document: Document) -> Bools:
     """Of each number of a line, from 1, whether a motion is there, or a block starts before which one may."""
     lines = np.zeros(len(document.line_starts) + 1, np.bool_)
     lines[path.line] = True
-    lines[list(path.entries.values())] = True
+    lines[list(path.constraints.spline_headers.values())] = True
     return lines
 
 

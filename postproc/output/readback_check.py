@@ -4,11 +4,13 @@ motion, in its own line, and no prediction from its digits is worse than what wa
 from __future__ import annotations
 
 from codecs import BOM_UTF8
-from typing import Literal
+from collections.abc import Iterable
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from postproc.base.arrays import Bools, Floats, Ints, is_shared
+from postproc.base.arrays import Bools, FewRows, Floats, Ints, is_shared
 from postproc.base.batches import blocks, each_block, in_blocks
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses, lengths, on_arc, turn_between
@@ -36,7 +38,10 @@ def intended_motions(
     command = to_base @ division.command[rows]
     # What is inserted has the orientation of its own place, if words say it.
     inserted = division.role[rows] != Role.ORIGINAL
-    turned = moved & (path.orientation_programmed[source] | (inserted & (path.orientation_path[source] != 0)))
+    turned = moved & (
+        path.constraints.orientation_programmed[source]
+        | (inserted & (path.orientation_control.path[source] != 0))
+    )
     arc, kept = np.isfinite(division.sweep[rows]), ~moved & ~division.transitions[rows]
     centre = (to_base @ Poses(np.eye(3), division.centre[rows])).position
     normal = (to_base.rotation @ division.normal[rows][..., None])[..., 0]
@@ -51,9 +56,9 @@ def intended_motions(
         division.role[rows],
         np.where(moved[:, None], command.position, path.position[source]),
         np.where(turned[:, None, None], command.rotation, path.programmed_rotation[source]),
-        way(centre, path.centre),
-        way(normal, path.normal),
-        way(division.sweep[rows], path.sweep),
+        way(centre, path.arcs.centre),
+        way(normal, path.arcs.normal),
+        way(division.sweep[rows], path.arcs.sweep),
         approximated_motions(task, division, rows),
         division.share[rows],
     )
@@ -85,7 +90,7 @@ def check_readback(
             Finding("FIL008", f"{len(division)} motions are planned, {len(back)} are read back", file)
         )
     place = np.flatnonzero(division.original)
-    if set(back.refused) != {int(place[row]) for row in program.toolpath.refused}:
+    if set(back.constraints.refused) != {int(place[row]) for row in program.toolpath.constraints.refused}:
         raise Refusal(Finding("FIL008", "other motions than before are not understood", file))
     _check_frames(path, back, file)
     lines = _LineCheck(path, division, program, again)
@@ -151,7 +156,7 @@ class _LineCheck:
         first = self._moved(line, "left")
         last = self._moved(line, "right") if len(self.inserted) else first
         above = self.path.inserted_before[source]
-        if self.path.entries:
+        if self.path.constraints.spline_headers:
             added = ~self.division.original[start : rows.stop]
             first = np.where(added, self._moved(above, "left"), first)
             last = np.where(added, self._moved(above, "right"), last)
@@ -182,29 +187,44 @@ def _line_after_mark(program: Program) -> int:
     return line if head in (b"", BOM_UTF8) or head.endswith(b"\n") else line + 1
 
 
+def _stated(path: Toolpath, configuration: Iterable[str]) -> dict[str, NDArray[Any] | FewRows]:
+    """Name -> column (N, ...) of what a motion says beside its target; ``configuration``: names of its numbers."""
+    return {
+        "base": path.base,
+        "tool": path.tool,
+        "kind": path.kind,
+        **{name: path.configuration[name] for name in configuration},
+        "axes": path.axes,
+        "inverse time feed": path.inverse_time_feed,
+        "approximation": path.approximation,
+        "stops": path.stops,
+        "orientation programmed": path.constraints.orientation_programmed,
+        "executes": path.executes,
+        "feed": path.feed,
+    }
+
+
 def _check_texts(path: Toolpath, back: Toolpath, plan: Plan, rows: slice, file: str) -> None:
     """What a motion says beside its target."""
     source, own, transition = plan.source, plan.own, plan.role == Role.TRANSITION
-    for name, chosen in (
-        ("base", ~transition | transition),
-        ("tool", ~transition | transition),
-        ("kind", ~transition),
-        ("status", own),
-        ("turn", own),
-        ("axes", own),
-        ("inverse_time_feed", own),
-        ("approximation", own),
-        ("stops", own),
-        ("orientation_programmed", own & (path.orientation_path[source] == OrientationPath.SINGLE_AXIS)),
-        ("executes", own),
-        ("feed", (path.kind[source] != Kind.PTP) & ~path.inverse_time_feed[source]),
-    ):
-        before, after = getattr(path, name)[source], getattr(back, name)[rows]
+    every = np.ones(len(source), np.bool_)
+    single_axis = path.orientation_control.path[source] == OrientationPath.SINGLE_AXIS
+    checked = {
+        "base": every,
+        "tool": every,
+        "kind": ~transition,
+        "orientation programmed": own & single_axis,
+        "feed": (path.kind[source] != Kind.PTP) & ~path.inverse_time_feed[source],
+    }
+    numbers = dict.fromkeys((*path.configuration.numbers, *back.configuration.numbers))
+    again = _stated(back, numbers)
+    for name, column in _stated(path, numbers).items():
+        before, after = column[source], again[name][rows]
         same = (before == after) | ((before != before) & (after != after))
-        wrong = ~same.reshape(len(source), -1).all(axis=1) & chosen
+        wrong = ~same.reshape(len(source), -1).all(axis=1) & checked.get(name, own)
         if wrong.any():
             line = int(path.line[source[np.argmax(wrong)]])
-            words = f"the {name.replace('_', ' ')} of a motion differs from the plan"
+            words = f"the {name} of a motion differs from the plan"
             raise Refusal(Finding("FIL008", words, file, line))
     halts = plan.flows & back.stops[rows] & ~path.stops[source]
     if halts.any():
@@ -243,8 +263,8 @@ def _check_targets(
     step_mm, step_deg = 10.0**-writing.mm, 10.0**-writing.deg
     off = np.abs(back.position[rows] - plan.position[:]).max(axis=1) / MM
     # Rotary axes say the whole orientation that is meant, though the turn about the tool is free: no axis swings.
-    by_axes = path.orientation_path[plan.source] == OrientationPath.ROTARY_AXES
-    free_axis = np.where(by_axes[:, None], np.nan, path.redundant_axis[plan.source])
+    by_axes = path.orientation_control.path[plan.source] == OrientationPath.ROTARY_AXES
+    free_axis = np.where(by_axes[:, None], np.nan, path.orientation_control.redundant_axis[plan.source])
     angle = _angle(plan.rotation[:], back.rotation[rows], free_axis) / DEG
     most = np.where(path.kind[plan.source] == Kind.CIRC, 2 * HALF, HALF) * step_mm
     _close(off > most, off, path, plan.source, file, "mm off the plan")
@@ -256,8 +276,8 @@ def _check_arcs(
 ) -> None:
     path, source = task.toolpath, division.source
     kept = ~moved & ~division.transitions
-    arc = np.isfinite(division.sweep) | (kept & np.isfinite(path.sweep[source]))
-    if not np.array_equal(np.isfinite(back.sweep), arc):
+    arc = np.isfinite(division.sweep) | (kept & np.isfinite(path.arcs.sweep[source]))
+    if not np.array_equal(np.isfinite(back.arcs.sweep), arc):
         raise Refusal(Finding("FIL008", "the arcs differ from the plan", file))
     for rows in blocks(len(division)) if arc.any() else ():
         start = max(rows.start - 1, 0)
@@ -269,8 +289,8 @@ def _check_arcs(
             continue
         there, half = at + start, np.full(len(at), 0.5)
         one, other = (
-            on_arc(p.position[k - 1], p.position[k], p.centre[k], p.normal[k], p.sweep[k], half)
-            for p, k in ((plan, at), (back, there))
+            on_arc(p.position[k - 1], p.position[k], arcs.centre[k], arcs.normal[k], arcs.sweep[k], half)
+            for p, arcs, k in ((plan, plan, at), (back, back.arcs, there))
         )
         off = np.abs(other - one).max(axis=1) / MM
         _close(off > FAR * step_mm, off, path, plan.source[at], file, "mm off the planned arc")
@@ -307,7 +327,9 @@ def check_residual(
         file,
     )
     worse = (
-        corrected & path.orientation_programmed & ~(result.after_angle <= before_angle + task.tolerance_angle)
+        corrected
+        & path.constraints.orientation_programmed
+        & ~(result.after_angle <= before_angle + task.tolerance_angle)
     )
     _refuse(
         path,

@@ -119,7 +119,7 @@ def plan_motions(task: CompensationProblem, division: Subdivision) -> Plan:
     target = PoseRows(m, made).remembered()
     none = np.broadcast_to(np.nan, (m, 3))
     centre, normal, sweep = none, none, none[:, 0]
-    if np.isfinite(division.sweep).any() or np.isfinite(task.toolpath.sweep).any():
+    if np.isfinite(division.sweep).any() or np.isfinite(task.toolpath.arcs.sweep).any():
         centre, normal, sweep = np.empty((m, 3)), np.empty((m, 3)), np.empty(m)
 
         def put(rows: slice) -> None:
@@ -292,9 +292,9 @@ def _as_written(task: CompensationProblem, division: Subdivision, back: Toolpath
         return there
     centre, normal, sweep = division.centre.copy(), division.normal.copy(), division.sweep.copy()
     own = base[source[bent]]
-    centre[bent] = (own @ Poses(np.eye(3), back.centre[bent])).position
-    normal[bent] = (own.rotation @ back.normal[bent][..., None])[..., 0]
-    sweep[bent] = back.sweep[bent]
+    centre[bent] = (own @ Poses(np.eye(3), back.arcs.centre[bent])).position
+    normal[bent] = (own.rotation @ back.arcs.normal[bent][..., None])[..., 0]
+    sweep[bent] = back.arcs.sweep[bent]
     return replace(there, centre=centre, normal=normal, sweep=sweep)
 
 

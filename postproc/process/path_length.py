@@ -32,7 +32,7 @@ class PathLength:
     def __init__(self, toolpath: Toolpath, frames: MotionFrames) -> None:
         n = len(toolpath)
         self._toolpath, self._base = toolpath, frames.base_in_robot
-        self.sweep = toolpath.sweep
+        self.sweep = toolpath.arcs.sweep
         self._end = np.empty((n, 3))
 
         def placed(rows: slice) -> None:
@@ -48,7 +48,7 @@ class PathLength:
         self._changed, self._from = _with_other_tool(toolpath, frames)
         self.begins = there.copy()
         self.begins[self._changed] = False
-        self.arc = there & np.isfinite(toolpath.sweep)
+        self.arc = there & np.isfinite(toolpath.arcs.sweep)
         self.moved, self.length = np.zeros(n, bool), np.zeros(n)
 
         def measured(rows: slice) -> None:
@@ -78,11 +78,11 @@ class PathLength:
     @property
     def turns_along(self) -> Bools:
         """(N,) arcs with which the tool turns."""
-        return self._toolpath.turns_along
+        return self._toolpath.arcs.turns_along
 
     def arc_turn(self, rows: Ints) -> Floats:
         """(K, 3) [rad] by which the tool turns with the arcs ``rows`` (K,), in the robot root; 0 on others."""
-        return self._toolpath.arc_turn(rows, self._base.rotation[rows])
+        return self._toolpath.arcs.turn(rows, self._base.rotation[rows])
 
     def _step(self, rows: Ints) -> tuple[Floats, Floats]:
         """(K, 3) [m] where motions start, NaN where that is not known, and from there to their end."""
@@ -98,8 +98,8 @@ class PathLength:
         """The arcs ``rows`` (M,) in the robot root: normal, radius vector at the start (M, 3), rise (M,)."""
         base, path = self._base, self._toolpath
         rotation = base.rotation[rows]
-        normal = np.einsum("nij,nj->ni", rotation, path.normal[rows])
-        out = start - (base.position[rows] + np.einsum("nij,nj->ni", rotation, path.centre[rows]))
+        normal = np.einsum("nij,nj->ni", rotation, path.arcs.normal[rows])
+        out = start - (base.position[rows] + np.einsum("nij,nj->ni", rotation, path.arcs.centre[rows]))
         radius = out - np.einsum("ni,ni->n", out, normal)[:, None] * normal
         return normal, radius, np.asarray(np.einsum("ni,ni->n", step, normal))
 

@@ -40,7 +40,9 @@ class Checked:
     @property
     def refused(self) -> dict[str, int]:
         """Code -> number of motions that cannot be corrected for this reason."""
-        return dict(sorted(Counter(finding.code for finding in self.toolpath.refused.values()).items()))
+        return dict(
+            sorted(Counter(finding.code for finding in self.toolpath.constraints.refused.values()).items())
+        )
 
     def summary(self) -> Iterator[str]:
         total, refused = len(self.toolpath), sum(self.refused.values())

@@ -107,8 +107,8 @@ def follow_axes(
 
         each_block(solved, len(solve))
         half_turns = _settle(robot, q, status, toolpath, on_axes, start, base, tool)
-        stated = np.flatnonzero((toolpath.turn >= 0) & cartesian)
-        bits = (toolpath.turn[stated, None] >> np.arange(6)) & 1 == 1
+        stated = np.flatnonzero((toolpath.configuration["turn"] >= 0) & cartesian)
+        bits = (toolpath.configuration["turn"][stated, None] >> np.arange(6)) & 1 == 1
         arm = q[stated, -6:]
         wrong = (bits != (arm < 0)) & (np.abs(arm) > SIGN_MARGIN) & np.isfinite(arm)
         turn_holds[stated] = ~wrong.any(axis=1)
@@ -117,6 +117,12 @@ def follow_axes(
     margin = 1e-9
     within = ~((q < low - margin) | (q > high + margin)).any(axis=1)
     return AxisTrack(q, status, reachable, within, turn_holds, half_turns)
+
+
+def status_matches(toolpath: Toolpath, track: AxisTrack) -> Bools:
+    """(N,) the stated S, if there is one, is that of the branch taken."""
+    stated = toolpath.configuration["status"]
+    return np.asarray((stated < 0) | (track.status < 0) | (stated & 7 == track.status))
 
 
 def external_joint(robot: Robot, toolpath: Toolpath, rows: Ints, start: Floats | None) -> Floats:
@@ -173,7 +179,8 @@ def _follow_on(
 def home_rows(toolpath: Toolpath) -> Ints:
     """Rows (K,) that go to the controller's HOME, which is where a program starts."""
     return np.array(
-        [row for row, finding in toolpath.refused.items() if finding.topic is Topic.HOME], np.int64
+        [row for row, finding in toolpath.constraints.refused.items() if finding.topic is Topic.HOME],
+        np.int64,
     )
 
 
@@ -187,18 +194,21 @@ def _branches(
 ) -> Ints:
     """(N,) the branch in force at each motion; ``axes`` (R, n): of the motions ``on_axes``."""
     jump = np.isin(toolpath.kind, (Kind.PTP, Kind.AXIS))
-    stated = jump & cartesian & (toolpath.status >= 0)
+    stated = jump & cartesian & (toolpath.configuration["status"] >= 0)
     if isinstance(robot.nominal, SerialArm):
         stated = np.zeros_like(stated)
     # A path motion keeps its branch wherever it leads; only a jump to an unknown place loses it.
     lost = (
-        toolpath.ptp_may_change_configuration & (jump | (toolpath.kind == Kind.OTHER)) & ~on_axes & ~cartesian
+        toolpath.constraints.ptp_may_change_configuration
+        & (jump | (toolpath.kind == Kind.OTHER))
+        & ~on_axes
+        & ~cartesian
     )
     home = home_rows(toolpath)
     value = np.full(len(toolpath) + 1, -1, np.int8)
     value[0] = -1 if start is None else status_of(robot.nominal, start[None])[0]
     value[1:][on_axes] = status_of(robot.nominal, axes)
-    value[1:][stated] = toolpath.status[stated] & 7
+    value[1:][stated] = toolpath.configuration["status"][stated] & 7
     value[1:][home] = value[0]
     sets = np.concatenate([[True], on_axes | stated | lost])
     return np.asarray(value[np.maximum.accumulate(np.where(sets, np.arange(len(sets)), 0))][1:])
@@ -235,7 +245,7 @@ def _settle(
         angles[:, 5] = np.where(straight, wrapped(total - angles[:, 3]), angles[:, 5])
         values[straight] = controller_values(arm, angles, values)[straight]
 
-    turn = np.where(rows >= 0, toolpath.turn[rows], -1)
+    turn = np.where(rows >= 0, toolpath.configuration["turn"][rows], -1)
     stated = (turn >= 0) & (np.where(rows >= 0, toolpath.kind[rows], -1) == Kind.PTP)
     reset = given | stated
     reset[0] = True
@@ -338,7 +348,7 @@ def _large(
 
 def _winds(toolpath: Toolpath, rows: Ints) -> Bools:
     """(K,) arcs on which an axis may turn far and end near its start: long ones, and those that turn the tool."""
-    return np.asarray((toolpath.sweep[rows] > np.pi) | toolpath.turns_along[rows])
+    return np.asarray((toolpath.arcs.sweep[rows] > np.pi) | toolpath.arcs.turns_along[rows])
 
 
 def _motions(
@@ -358,10 +368,10 @@ def _motions(
         nominal_flange(robot, values[place - 1]),
         nominal_flange(robot, values[place]),
         nowhere if tool is None else tool[at],
-        (frame @ Poses(same, toolpath.centre[at])).position,
-        (frame.rotation @ toolpath.normal[at][..., None])[..., 0],
-        toolpath.sweep[at],
-        toolpath.arc_turn(at, frame.rotation),
+        (frame @ Poses(same, toolpath.arcs.centre[at])).position,
+        (frame.rotation @ toolpath.arcs.normal[at][..., None])[..., 0],
+        toolpath.arcs.sweep[at],
+        toolpath.arcs.turn(at, frame.rotation),
     )
 
 

@@ -218,10 +218,14 @@ class External:
 
 def needed_rows(path: Toolpath) -> Bools:
     """(N,) motions of which it matters where the external axes are: those that lead to a place that is known."""
-    needed = path.known | path.on_axes | ((path.inherits_from_row >= 0) & (path.base >= 0) & (path.tool >= 0))
-    if path.refused:
+    needed = (
+        path.known
+        | path.on_axes
+        | ((path.partial_targets.inherits_from_row >= 0) & (path.base >= 0) & (path.tool >= 0))
+    )
+    if path.constraints.refused:
         needed = needed.copy()
-        needed[list(path.refused)] = False
+        needed[list(path.constraints.refused)] = False
     return np.asarray(needed)
 
 

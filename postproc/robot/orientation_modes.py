@@ -38,8 +38,8 @@ def as_run(
     anchor = np.maximum.accumulate(np.where(keeps, -1, np.arange(len(path))))[rows]
     flange = _flange(path, base, tool, robot, start, anchor)
     flange[~path.executes[rows]] = np.nan
-    turn = path.arc_turn(rows, base.rotation[rows])
-    unclear = (path.kind == Kind.CIRC) & (path.arc_frame != ArcFrame.BASE) & ~path.turns_along
+    turn = path.arcs.turn(rows, base.rotation[rows])
+    unclear = (path.kind == Kind.CIRC) & (path.arcs.frame != ArcFrame.BASE) & ~path.arcs.turns_along
     turn[unclear[rows]] = np.nan
     turns = _along(turn, anchor)
     own = product(
@@ -50,13 +50,16 @@ def as_run(
     rotation = path.rotation.copy()
     rotation[rows] = own
     lost = rows[np.isnan(own[:, 0, 0]) & np.isfinite(said[:, 0, 0])]
-    refused = dict(path.refused)
+    refused = dict(path.constraints.refused)
     for row in lost.tolist():
         message = (
             "it keeps the orientation of the motion before, which is not known (constant orientation control)"
         )
         refused.setdefault(row, Finding("KIN010", message, file, int(path.line[row])))
-    run = replace(path, rotation=rotation, programmed=path.rotation, refused=dict(sorted(refused.items())))
+    control = replace(path.orientation_control, programmed=path.rotation)
+    run = replace(path, rotation=rotation, orientation_control=control).with_refused(
+        dict(sorted(refused.items()))
+    )
     return run, _without_effect(path, rows, said, own, file)
 
 
@@ -75,7 +78,7 @@ def _flange(
         axes = all_axes(robot, path.axes[at], external_joint(robot, path, at, start))
         found[on_axes] = nominal_flange(robot, axes).rotation
     jumps = np.isin(path.kind, (Kind.PTP, Kind.AXIS))
-    ends: Bools = path.known & (jumps | (path.orientation != OrientationMode.UNKNOWN))
+    ends: Bools = path.known & (jumps | (path.orientation_control.mode != OrientationMode.UNKNOWN))
     known: Bools = ~starts & ~on_axes & ends[anchor]
     at = anchor[known]
     tool_in_robot = product(base.rotation[at], path.rotation[at])

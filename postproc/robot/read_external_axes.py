@@ -154,14 +154,14 @@ def fill_external_axes(
         return path
     needed = needed_rows(path)
     columns: dict[int, Floats] = {}
-    refused = dict(path.refused)
+    refused = dict(path.constraints.refused)
     for place in places:
         values = place.fill(path.external[:, place.column])
         place.check(values, needed, path, file, cell)
         for row in np.flatnonzero(needed & np.isinf(values)).tolist():
             refused.setdefault(row, place.not_known(values[row], path, row, file))
         columns[place.column] = np.where(np.isfinite(values), values, np.nan)
-    return replace(path, external=_with(path.external, columns), refused=refused)
+    return replace(path, external=_with(path.external, columns)).with_refused(refused)
 
 
 def follow_external_axes(

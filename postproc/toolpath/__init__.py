@@ -1,16 +1,17 @@
 """The wanted motions of a program: where the text side and the physics side meet."""
 
+from postproc.toolpath.arcs import ArcFrame, Arcs
+from postproc.toolpath.configuration import Configuration
+from postproc.toolpath.edit_constraints import EditConstraints
+from postproc.toolpath.orientation_control import OrientationControl, OrientationMode, OrientationPath
+from postproc.toolpath.partial_targets import PartialTargets
+from postproc.toolpath.plan import Plan, Role
 from postproc.toolpath.toolpath import (
     COMPUTED,
     LOST,
     Annotation,
-    ArcFrame,
     FrameRef,
     Kind,
-    OrientationMode,
-    OrientationPath,
-    Plan,
-    Role,
     Toolpath,
     external_at,
 )
@@ -20,10 +21,15 @@ __all__ = [
     "LOST",
     "Annotation",
     "ArcFrame",
+    "Arcs",
+    "Configuration",
+    "EditConstraints",
     "FrameRef",
     "Kind",
+    "OrientationControl",
     "OrientationMode",
     "OrientationPath",
+    "PartialTargets",
     "Plan",
     "Role",
     "Toolpath",

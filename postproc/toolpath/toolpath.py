@@ -13,10 +13,16 @@ from functools import cached_property
 
 import numpy as np
 
-from postproc.base.arrays import Bools, FewRows, Floats, Ints, LazyRows, frozen, shared
+from postproc.base.arrays import Bools, FewRows, Floats, Ints, frozen, shared
 from postproc.base.findings import Finding
-from postproc.base.geometry import Placed, Poses, abc_from_rotation, rotation_from_abc, turned
+from postproc.base.geometry import Placed, Poses, abc_from_rotation, rotation_from_abc
 from postproc.base.units import DEG, MM
+from postproc.toolpath.arcs import ArcFrame, Arcs
+from postproc.toolpath.columns import MotionColumns, column, not_given
+from postproc.toolpath.configuration import Configuration
+from postproc.toolpath.edit_constraints import EditConstraints
+from postproc.toolpath.orientation_control import OrientationControl, OrientationMode
+from postproc.toolpath.partial_targets import PartialTargets
 
 COMPUTED, LOST = np.inf, -np.inf
 """An external axis whose value is an expression that is not constant; one that something else may have moved."""
@@ -30,34 +36,7 @@ class Kind(IntEnum):
     LIN = 2  # straight line
     CIRC = 3  # circular arc, or a helix
     OTHER = 4  # a motion that is none of these
-    SPL = 5  # a point of a spline: the way between is the controller's
-
-
-class OrientationPath(IntEnum):
-    """How the orientation runs from the begin of a motion to its end."""
-
-    SINGLE_AXIS = 0  # evenly about the one axis that leads there
-    ROTARY_AXES = 1  # the words of rotary axes run linearly
-    GREAT_CIRCLE = 2  # the tool's direction runs on a great circle, the turn about it evenly
-
-
-class OrientationMode(IntEnum):
-    """How the tool turns on a path motion (KRL's $ORI_TYPE)."""
-
-    VAR = 0  # evenly from its orientation at the begin to that of the target
-    CONSTANT = 1  # not at all: what the target says of it has no effect
-    JOINT = (
-        2  # as the wrist axes, each of which turns evenly from its angle at the begin to that at the target
-    )
-    UNKNOWN = 3
-
-
-class ArcFrame(IntEnum):
-    """To what the orientation on an arc refers (KRL's $CIRC_TYPE)."""
-
-    BASE = 0  # to the base, as on a straight line
-    PATH = 1  # to the frame of the path, which turns with the tangent
-    UNKNOWN = 2
+    SPL = 5  # a point of a spline: the path between is the controller's
 
 
 @dataclass(frozen=True)
@@ -76,8 +55,7 @@ class FrameRef:
 
 @dataclass(frozen=True)
 class Annotation:
-    """A comment, which stands before the motion ``row``; one that speaks to this tool (FORCE, COMPENSATE) holds from
-    there on."""
+    """A comment before the motion ``row``; one that speaks to this tool (FORCE, COMPENSATE) holds from there on."""
 
     row: int
     text: str
@@ -85,118 +63,64 @@ class Annotation:
 
 
 @dataclass(frozen=True)
-class Toolpath:
+class Toolpath(MotionColumns):
     """N motions in the order of the text.
 
-    kind (N,) Kind; position (N, 3) [m] and rotation (N, 3, 3): target of the TCP in the programmed base,
-    NaN where the target is not known; axes (N, 6) [rad] for AXIS motions, NaN elsewhere; feed (N,) [m/s],
-    NaN if unknown; base, tool (N,) index into ``frames``, -1 where unknown; status, turn (N,) KUKA's S and
-    T as stated with the motion, -1 where not; line (N,) from 1.
+    What every motion states:
 
-    ``inherits_from_row`` (N,): the AXIS row whose end point gives the components that a partial target
-    leaves out, -1 where none; ``partial_target`` (N, 6) [m, rad] X, Y, Z, A, B, C of such a target, NaN
-    where left out. ``completed`` fills them in.
+    ``kind`` (N,): Kind.
+    ``position`` (N, 3) [m], ``rotation`` (N, 3, 3): target of the TCP in the programmed base, NaN where it is not
+    known; the rotation is the one that the controller runs (see ``programmed_rotation``).
+    ``axes`` (N, 6) [rad]: target of AXIS motions, NaN for others.
+    ``external`` (N, 6) [mm or deg, as in the text]: external axes E1..E6 at the end of each motion; NaN where nothing
+    has stated them yet, ``COMPUTED`` or ``LOST`` where they are not known.
+    ``feed`` (N,) [m/s]: NaN where it is not known.
+    ``inverse_time_feed`` (N,): the text gives the time that the motion takes, its feed follows from its length (G93).
+    ``base``, ``tool`` (N,): index into ``frames``, -1 where it is not known.
+    ``line`` (N,): from 1.
+    ``approximation`` (N,) [m]: the controller may leave the path that far before the end point; 0 where it stops or
+    passes exactly, NaN where the distance is not known.
+    ``stops`` (N,): the controller comes to rest at the end point: it is not approximated (``approximation`` is 0), and
+    is no inner point of a spline block; without it wherever ``approximation`` is 0.
+    ``executes`` (N,): the motion follows the one before it; False for motions of which it is not known whether, or
+    where, they run: these come last.
 
-    ``refused``: row -> why that motion can not be corrected by an edit of its own (its target is not known,
-    its text serves another motion too, ...). ``locked``: rows whose end point a later, refused motion
-    builds on: moving them would move that one, so they can not be corrected either.
+    What few motions state, and what holds of a dialect, is in types of its own.
 
-    Arcs (CIRC; NaN elsewhere), in the programmed base: ``centre`` (N, 3) [m], ``normal`` (N, 3) unit
-    vector, ``sweep`` (N,) > 0 [rad] counter-clockwise seen from the tip of the normal. The way at the share
-    t is the begin, turned about the centre by t * sweep, and moved along the normal by its share of what
-    begin and end lie apart there. ``arc_plane_free`` (N,): the text gives an arc by three points, which may
-    lie in any plane but leave no advance; False: it lies in a plane that the program selects (its normal
-    stays, an advance along it is possible). ``no_insert_before``: row -> why no motion can be inserted
-    before it (a spline, a TRIGGER, a line that runs many times). ``approximation`` (N,) [m]: the controller
-    may leave the path that far before the end point (approximation); 0 where it stops or passes exactly,
-    NaN where the distance is not known. ``exact_stays``: what is inserted before such an end point is
-    passed exactly as well (G61); without, it is approximated. ``orientation_programmed`` (N,): the text
-    programs the orientation and it can be written; else it is given from outside and only the position can
-    be corrected. ``redundant_axis`` (N, 3): unit vector in tool axes about which the text does not say how
-    the tool is turned (tool vectors, two rotary axes); NaN where it gives the whole orientation.
-    ``executes`` (N,): the motion follows the one before it; False for motions of which it is not known
-    whether, or where, they run: these come last. ``inverse_time_feed`` (N,): the text gives the time that
-    the motion takes: its feed follows from its length (G93). ``ptp_may_change_configuration``: a jump may
-    lead into another configuration of the robot (KRL's S); without, no motion does. ``annotations``:
-    comments that speak to this tool; ``comments``: all others that stand on a line of their own. ``stops``
-    (N,): the controller comes to rest at the end point: it is not approximated (``approximation`` is 0),
-    and is no inner point of a spline block. ``orientation`` (N,) Orientation and ``arc_frame`` (N,)
-    ArcFrame of path motions. ``programmed`` (N, 3, 3): the rotations of the text, where ``rotation`` is
-    what the controller runs instead (see ``programmed_rotation``). ``entries``: row -> line of the header
-    of the spline block that begins with it. Such a row is ``no_insert_before``, but one straight link may
-    stand before that line. ``orientation_path`` (N,) OrientationPath; ``rotary_from``, ``rotary_to`` (N, 3)
-    [rad]: of ROTARY_AXES, A, B, C where the motion begins and where it ends, R = Rz(C) Ry(B) Rx(A); NaN
-    where a word is not used or not known. ``external`` (N, 6): where the external axes E1..E6 stand at the
-    end of each motion, in mm or deg as the text has them; NaN where nothing has stated it yet, ``COMPUTED``
-    or ``LOST`` where it is not known.
+    ``annotations``: comments that speak to this tool; ``comments``: all others that are alone on their line.
     """
 
-    kind: Ints
-    position: Floats
-    rotation: Floats
+    kind: Ints = field(metadata=column(dtype=np.int8))
+    position: Floats = field(metadata=column(3))
+    rotation: Floats = field(metadata=column(3, 3))
     axes: FewRows | Floats
-    feed: Floats
-    base: Ints
-    tool: Ints
-    status: Ints
-    turn: Ints
-    line: Ints
+    feed: Floats = field(metadata=column())
+    base: Ints = field(metadata=column(dtype=np.int32))
+    tool: Ints = field(metadata=column(dtype=np.int32))
+    line: Ints = field(metadata=column(dtype=np.int32))
     frames: tuple[FrameRef, ...]
-    refused: Mapping[int, Finding] = field(default_factory=dict)
-    locked: Mapping[int, Finding] = field(default_factory=dict)
+    arcs: Arcs = field(default_factory=Arcs)
+    constraints: EditConstraints = field(default_factory=EditConstraints)
+    partial_targets: PartialTargets = field(default_factory=PartialTargets)
+    orientation_control: OrientationControl = field(default_factory=OrientationControl)
+    configuration: Configuration = field(default_factory=Configuration)
+    external: Floats = field(default_factory=not_given, metadata=column(6, default=np.nan))
+    approximation: Floats = field(default_factory=not_given, metadata=column(default=0.0))
+    stops: Bools = field(default_factory=not_given)
+    executes: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=True))
+    inverse_time_feed: Bools = field(
+        default_factory=not_given, metadata=column(dtype=np.bool_, default=False)
+    )
     annotations: tuple[Annotation, ...] = ()
-    inherits_from_row: Ints = field(default_factory=lambda: np.empty(0, np.int64))
-    partial_target: Floats = field(default_factory=lambda: np.empty((0, 6)))
-    centre: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    normal: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    sweep: Floats = field(default_factory=lambda: np.empty(0))
-    approximation: Floats = field(default_factory=lambda: np.empty(0))
-    orientation_programmed: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    redundant_axis: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    executes: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    arc_plane_free: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    inverse_time_feed: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    ptp_may_change_configuration: bool = True
-    exact_stays: bool = False
-    no_insert_before: Mapping[int, str] = field(default_factory=dict)
     comments: tuple[Annotation, ...] = ()
-    stops: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    entries: Mapping[int, int] = field(default_factory=dict)
-    orientation_path: Ints = field(default_factory=lambda: np.empty(0, np.int8))
-    rotary_from: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    rotary_to: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    orientation: Ints = field(default_factory=lambda: np.empty(0, np.int8))
-    arc_frame: Ints = field(default_factory=lambda: np.empty(0, np.int8))
-    programmed: Floats = field(default_factory=lambda: np.empty((0, 3, 3)))
-    external: Floats = field(default_factory=lambda: np.empty((0, 6)))
 
     def __post_init__(self) -> None:
         n = len(self.kind)
-        # (shape, type, what stands for all rows where nothing is given)
-        columns: dict[str, tuple[tuple[int, ...], type[np.generic], float | None]] = {
-            "kind": ((n,), np.int8, None),
-            **dict.fromkeys(("base", "tool", "status", "turn", "line"), ((n,), np.int32, None)),
-            "inherits_from_row": ((n,), np.int32, -1),
-            "position": ((n, 3), np.float64, None),
-            "rotation": ((n, 3, 3), np.float64, None),
-            "feed": ((n,), np.float64, None),
-            **dict.fromkeys(("partial_target", "external"), ((n, 6), np.float64, np.nan)),
-            **dict.fromkeys(("centre", "normal", "redundant_axis"), ((n, 3), np.float64, np.nan)),
-            **dict.fromkeys(("rotary_from", "rotary_to"), ((n, 3), np.float64, np.nan)),
-            "orientation_path": ((n,), np.int8, OrientationPath.SINGLE_AXIS),
-            "sweep": ((n,), np.float64, np.nan),
-            "approximation": ((n,), np.float64, 0.0),
-            **dict.fromkeys(("orientation_programmed", "executes", "arc_plane_free"), ((n,), np.bool_, True)),
-            "inverse_time_feed": ((n,), np.bool_, False),
-            **dict.fromkeys(("orientation", "arc_frame"), ((n,), np.int8, 0)),
-        }
-        for name, (shape, dtype, default) in columns.items():
-            values = getattr(self, name)
-            if not len(values) and default is not None:
-                values = np.broadcast_to(np.asarray(default, dtype), shape)
-            object.__setattr__(self, name, shared(frozen(values, shape, dtype)))
+        self._fill(n)
         stops = self.stops if len(self.stops) else self.approximation == 0.0
         object.__setattr__(self, "stops", shared(frozen(stops, (n,), np.bool_)))
+        for part in ("arcs", "constraints", "partial_targets", "orientation_control", "configuration"):
+            object.__setattr__(self, part, getattr(self, part).for_motions(n))
         object.__setattr__(self, "axes", FewRows.of(self.axes))
         if self.axes.shape != (n, 6):
             raise ValueError(f"axes have the shape {self.axes.shape} for {n} motions")
@@ -206,10 +130,10 @@ class Toolpath:
 
     @cached_property
     def known(self) -> Bools:
-        """(N,) the Cartesian target, its base and its tool are known; of an arc its way as well."""
+        """(N,) the Cartesian target, its base and its tool are known; of an arc its path as well."""
         pose = np.isfinite(self.position).all(axis=1) & np.isfinite(self.rotation[:, 0, 0])
-        way = (self.kind != Kind.CIRC) | np.isfinite(self.sweep)
-        return np.asarray(pose & way & (self.base >= 0) & (self.tool >= 0))
+        path = (self.kind != Kind.CIRC) | np.isfinite(self.arcs.sweep)
+        return np.asarray(pose & path & (self.base >= 0) & (self.tool >= 0))
 
     @cached_property
     def on_axes(self) -> Bools:
@@ -221,53 +145,25 @@ class Toolpath:
 
     @cached_property
     def keeps_orientation(self) -> Bools:
-        """(N,) path motions that end with the orientation with which they begin, on arcs maybe turned with the arc."""
+        """(N,) path motions that end with the orientation with which they start, on arcs maybe turned with the arc."""
         on_path = np.isin(self.kind, (Kind.LIN, Kind.CIRC, Kind.SPL))
-        return np.asarray(on_path & (self.orientation == OrientationMode.CONSTANT))
-
-    @cached_property
-    def turns_along(self) -> Bools:
-        """(N,) arcs with which the tool turns."""
-        return np.asarray((self.arc_frame == ArcFrame.PATH) & np.isfinite(self.sweep))
-
-    def arc_turn(self, rows: Ints, base: Floats) -> Floats:
-        """(K, 3) [rad] the rotation vectors by which the tool turns along with the arcs ``rows`` (K,), 0 where it does
-        not; base (K, 3, 3) or (3, 3): rotation of their programmed base in the axes that are asked for."""
-        turn = np.zeros((len(rows), 3))
-        along = np.flatnonzero(self.turns_along[rows])
-        if len(along):
-            at = rows[along]
-            turn[along] = turned(
-                base if base.ndim == 2 else base[along], self.sweep[at, None] * self.normal[at]
-            )
-        return turn
+        return np.asarray(on_path & (self.orientation_control.mode == OrientationMode.CONSTANT))
 
     @property
     def programmed_rotation(self) -> Floats:
         """(N, 3, 3) the orientations of the text."""
-        return self.programmed if len(self.programmed) else self.rotation
+        programmed = self.orientation_control.programmed
+        return self.rotation if programmed is None else programmed
 
     @cached_property
     def inserted_before(self) -> Ints:
-        """(N,) line before which stands what is inserted before each motion."""
-        if not self.entries:
+        """(N,) line before which is written what is inserted before each motion."""
+        headers = self.constraints.spline_headers
+        if not headers:
             return self.line
         line = self.line.copy()
-        line[list(self.entries)] = list(self.entries.values())
+        line[list(headers)] = list(headers.values())
         return line
-
-    @cached_property
-    def turns_by_words(self) -> bool:
-        """Whether any motion's orientation runs otherwise than about a single axis."""
-        return bool(self.orientation_path.any())
-
-    def rotary_at(self, rows: Ints, share: Floats) -> Floats:
-        """A, B, C (K, 3) [rad] at the shares (K,) of motions ``rows`` (K,) of ROTARY_AXES; at their end where their
-        begin is not known."""
-        end = self.rotary_to[rows]
-        start = self.rotary_from[rows]
-        known = np.isfinite(start)
-        return np.where(known, end + (1.0 - share)[:, None] * (np.where(known, start, end) - end), end)
 
     @cached_property
     def moves_external(self) -> Bools:
@@ -280,15 +176,21 @@ class Toolpath:
     def target_in_base(self) -> Poses:
         return Poses(self.rotation, self.position)
 
+    def with_refused(self, refused: Mapping[int, Finding]) -> Toolpath:
+        """The toolpath with these rows refused instead: row -> why."""
+        return replace(self, constraints=replace(self.constraints, refused=refused))
+
     def completed(self, reached: Placed) -> Toolpath:
         """The toolpath with its partial targets known; ``reached`` (N): where the AXIS motion of
-        ``inherits_from_row`` brings the TCP, in the base and with the tool of the row itself."""
-        rows = np.flatnonzero(self.inherits_from_row >= 0)
+        ``partial_targets`` brings the TCP, in the base and with the tool of the row itself."""
+        rows = np.flatnonzero(self.partial_targets.inherits_from_row >= 0)
         if not len(rows):
             return self
         end = reached[rows]
         there = np.concatenate([end.position, abc_from_rotation(end.rotation)], axis=1)
-        values = np.where(np.isnan(self.partial_target[rows]), there, self.partial_target[rows])
+        values = np.where(
+            np.isnan(self.partial_targets.coordinates[rows]), there, self.partial_targets.coordinates[rows]
+        )
         position, rotation = self.position.copy(), self.rotation.copy()
         position[rows], rotation[rows] = values[:, :3], rotation_from_abc(values[:, 3:])
         return replace(self, position=position, rotation=rotation)
@@ -302,42 +204,44 @@ class Toolpath:
             words = [f"{self.line[row]}", kind.name]
             if self.on_axes[row]:
                 words += [f"A{i + 1} {_number(a / DEG)}" for i, a in enumerate(self.axes[row])]
-            elif self.inherits_from_row[row] >= 0:
+            elif self.partial_targets.inherits_from_row[row] >= 0:
                 words += [
                     f"{k} {'?' if np.isnan(v) else _number(v / unit)}"
                     for k, v, unit in zip(
-                        "XYZABC", self.partial_target[row], [MM] * 3 + [DEG] * 3, strict=True
+                        "XYZABC", self.partial_targets.coordinates[row], [MM] * 3 + [DEG] * 3, strict=True
                     )
                 ]
-                words.append(f"from line {self.line[self.inherits_from_row[row]]}")
+                words.append(f"from line {self.line[self.partial_targets.inherits_from_row[row]]}")
             elif np.isfinite(self.position[row, 0]):
                 words += [f"{k} {_number(v / MM)}" for k, v in zip("XYZ", self.position[row], strict=True)]
                 if np.isfinite(self.rotation[row, 0, 0]):
                     words += [f"{k} {_number(v)}" for k, v in zip("ABC", abc[row], strict=True)]
                 else:
                     words += ["A ?", "B ?", "C ?"]
-            if np.isfinite(self.sweep[row]):
-                for word, vector in (("centre", self.centre[row] / MM), ("normal", self.normal[row])):
+            if np.isfinite(self.arcs.sweep[row]):
+                for word, vector in (
+                    ("centre", self.arcs.centre[row] / MM),
+                    ("normal", self.arcs.normal[row]),
+                ):
                     words.append(word + " " + " ".join(_number(value) for value in vector))
-                words.append(f"sweep {_number(self.sweep[row] / DEG)}")
+                words.append(f"sweep {_number(self.arcs.sweep[row] / DEG)}")
             for axis in shown:
                 value = self.external[row, axis]
                 if value == value:
                     words.append(f"E{axis + 1} {_number(value) if np.isfinite(value) else '?'}")
-            if self.status[row] >= 0:
-                words.append(f"S {self.status[row]}")
-            if self.turn[row] >= 0:
-                words.append(f"T {self.turn[row]}")
+            for name, numbers in self.configuration.numbers.items():
+                if numbers[row] >= 0:
+                    words.append(f"{name[0].upper()} {numbers[row]}")
             for word, index in (("base", self.base[row]), ("tool", self.tool[row])):
                 words.append(f"{word} {self._frame_name(int(index))}")
             if np.isfinite(self.feed[row]):
                 words.append(f"feed {_number(self.feed[row])} m/s")
-            if self.orientation[row] and kind in (Kind.LIN, Kind.CIRC, Kind.SPL):
-                words.append(f"orientation {OrientationMode(self.orientation[row]).name}")
-            if self.arc_frame[row] and kind == Kind.CIRC:
-                words.append(f"arc {ArcFrame(self.arc_frame[row]).name}")
-            if row in self.refused:
-                words.append(f"refused {self.refused[row].code}")
+            if self.orientation_control.mode[row] and kind in (Kind.LIN, Kind.CIRC, Kind.SPL):
+                words.append(f"orientation {OrientationMode(self.orientation_control.mode[row]).name}")
+            if self.arcs.frame[row] and kind == Kind.CIRC:
+                words.append(f"arc {ArcFrame(self.arcs.frame[row]).name}")
+            if row in self.constraints.refused:
+                words.append(f"refused {self.constraints.refused[row].code}")
             yield " ".join(words)
 
     def _frame_name(self, index: int) -> str:
@@ -349,82 +253,6 @@ class Toolpath:
         angles = abc_from_rotation(frame.pose.rotation) / DEG
         numbers = [*(frame.pose.position / MM), *angles]
         return "{" + " ".join(_number(value) for value in numbers) + "}"
-
-
-class Role(IntEnum):
-    """What a motion of the output is to the motion of the input that it stems from."""
-
-    ORIGINAL = 0  # the last of them: it ends where that motion ends, and takes its text
-    INTERMEDIATE = 1  # an earlier part of its way, inserted before it
-    TRANSITION = 2  # a straight line to where its way begins, inserted before it
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """The motions that an output has to make, M >= N, all in the programmed base of their source.
-
-    source (M,): row of the input, ascending; each has one OWN, last of its group.  role (M,) Role.
-    position (M, 3) [m], rotation (M, 3, 3): targets, NaN where the input's is not known; a dialect asks for those of
-    some rows at a time.
-    centre, normal (M, 3), sweep (M,): way of arcs, as in a Toolpath; NaN for all others.
-    flows (M,): inserted motions at whose end the controller must not come to rest; without it the PIECEs.
-    share (M,): of the source's way, where the motion ends; 1 for all where none is given.
-    external (M, 6) [mm or deg]: where E1..E6 stand, as in a Toolpath; None where they do not move.
-    """
-
-    source: Ints
-    role: Ints
-    position: Floats | LazyRows
-    rotation: Floats | LazyRows
-    centre: Floats
-    normal: Floats
-    sweep: Floats
-    flows: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    share: Floats = field(default_factory=lambda: np.empty(0))
-    external: Floats | LazyRows | None = None
-
-    def __post_init__(self) -> None:
-        m = len(self.source)
-        shapes = {
-            "position": (m, 3),
-            "rotation": (m, 3, 3),
-            "centre": (m, 3),
-            "normal": (m, 3),
-            "sweep": (m,),
-        }
-        for name, shape in shapes.items():
-            values = getattr(self, name)
-            if not isinstance(values, LazyRows):
-                object.__setattr__(self, name, frozen(values, shape))
-        share = self.share if len(self.share) else np.broadcast_to(1.0, m)
-        object.__setattr__(self, "share", frozen(share, (m,)))
-        for name, dtype in (("source", np.int32), ("role", np.int8)):
-            object.__setattr__(self, name, frozen(getattr(self, name), (m,), dtype))
-        flows = self.flows if len(self.flows) else self.role == Role.INTERMEDIATE
-        object.__setattr__(self, "flows", frozen(flows, (m,), np.bool_))
-
-    def __len__(self) -> int:
-        return len(self.source)
-
-    @property
-    def own(self) -> Bools:
-        """(M,) the motions that take the text of their source."""
-        return np.asarray(self.role == Role.ORIGINAL)
-
-    @staticmethod
-    def of(path: Toolpath) -> Plan:
-        """The plan that leaves everything as it is."""
-        n = len(path)
-        return Plan(
-            np.arange(n),
-            np.zeros(n, np.int64),
-            path.position,
-            path.rotation,
-            path.centre,
-            path.normal,
-            path.sweep,
-            external=path.external if path.external.strides[0] else None,
-        )
 
 
 def external_at(path: Toolpath, rows: Ints, share: Floats | None = None) -> Floats:

@@ -237,8 +237,10 @@ def _same_target(
     axes, others = original.toolpath.axes[rows], run.toolpath.axes[run_rows]
     same &= np.isclose(axes, others, rtol=0, atol=1e-9, equal_nan=True).all(axis=1)
     path, other = original.toolpath, run.toolpath
-    arcs = np.isfinite(path.sweep[rows])
-    return np.asarray(same & (~arcs | np.isclose(path.sweep[rows], other.sweep[run_rows], rtol=0, atol=1e-4)))
+    arcs = np.isfinite(path.arcs.sweep[rows])
+    return np.asarray(
+        same & (~arcs | np.isclose(path.arcs.sweep[rows], other.arcs.sweep[run_rows], rtol=0, atol=1e-4))
+    )
 
 
 def _same_kind(original: CompensationProblem, run: CompensationProblem, rows: Ints, run_rows: Ints) -> Bools:

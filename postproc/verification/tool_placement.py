@@ -94,11 +94,11 @@ def judged(original: CompensationProblem, rows: Ints, rotation: Floats, turn: Fl
     """(K, 3) [rad]: ``turn`` (K, 3) of tools at ``rotation`` (K, 3, 3), without what the text of ``rows`` (K,) cannot
     say: a turn about the tool's own axis where that is free, all of it where the orientation comes from outside."""
     path = original.toolpath
-    free = np.nan_to_num(path.redundant_axis[rows])
+    free = np.nan_to_num(path.orientation_control.redundant_axis[rows])
     if free.any():
         axis = (rotation @ free[..., None])[..., 0]
         turn = turn - np.sum(turn * axis, axis=1, keepdims=True) * axis
-    return np.where(path.orientation_programmed[rows][:, None], turn, 0.0)
+    return np.where(path.constraints.orientation_programmed[rows][:, None], turn, 0.0)
 
 
 class _Solution:

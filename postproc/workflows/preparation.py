@@ -24,7 +24,14 @@ from postproc.languages import DIALECTS, detect
 from postproc.languages.dialect import Dialect, Program, ReadingSettings
 from postproc.model import StiffnessModel
 from postproc.process import Wrenches, is_no_force, wrenches
-from postproc.robot.axis_track import AxisTrack, all_axes, external_joint, follow_axes, nominal_flange
+from postproc.robot.axis_track import (
+    AxisTrack,
+    all_axes,
+    external_joint,
+    follow_axes,
+    nominal_flange,
+    status_matches,
+)
 from postproc.robot.description import Robot, find_robot, load_robot
 from postproc.robot.external_axes import External
 from postproc.robot.geometries import SerialArm
@@ -224,7 +231,7 @@ def _read_findings(program: Program, path: Toolpath) -> list[Finding]:
     """The findings of the reader, but for the external axes: what they carry, the cell has said by now; and the motions
     at which one of them is not known."""
     findings = [finding for finding in program.findings if finding.topic is not Topic.EXTERNAL_AXES]
-    lost = [finding for finding in path.refused.values() if finding.code == "EXT004"]
+    lost = [finding for finding in path.constraints.refused.values() if finding.code == "EXT004"]
     if lost:
         more = f" ({len(lost)} motions)" if len(lost) > 1 else ""
         findings.append(replace(lost[0], message=lost[0].message + more))
@@ -234,8 +241,7 @@ def _read_findings(program: Program, path: Toolpath) -> list[Finding]:
 def _disagreeing(program: Path, path: Toolpath, track: AxisTrack) -> list[Finding]:
     """What S and T state with a motion, and the axes that bring the robot there, disagree on (KIN007)."""
     # A path motion keeps the branch that the robot is in, whatever its S says.
-    elsewhere = (path.status >= 0) & (track.status >= 0) & (path.status & 7 != track.status)
-    elsewhere &= path.known & np.isin(path.kind, (Kind.LIN, Kind.CIRC))
+    elsewhere = ~status_matches(path, track) & path.known & np.isin(path.kind, (Kind.LIN, Kind.CIRC))
     findings = []
     for mask, message in (
         (~track.turn_matches, "the stated T (Turn) is not that of this pose"),
@@ -322,7 +328,7 @@ def _missing_points(program: Program, force: Wrenches) -> None:
     """Refuse a cut whose points are declared nowhere because the file that declares them is not there."""
     if len(program.documents) > 1:
         return
-    refused = program.toolpath.refused
+    refused = program.toolpath.constraints.refused
     lost = [row for row, why in refused.items() if why.topic is Topic.UNDECLARED_POINT and force.carries[row]]
     if lost:
         path, first = program.documents[0].path, refused[min(lost)]
@@ -358,7 +364,7 @@ def _other_carrier(request: Request, path: Toolpath, force: Wrenches, external: 
 
 def _missing_orientation(request: Request, path: Toolpath, force: Wrenches, cell: Cell) -> None:
     """Refuse cuts of a program that says positions only, in a cell that does not say how the tool stands."""
-    lost = force.carries & ~path.orientation_programmed & np.isfinite(path.position).all(axis=1)
+    lost = force.carries & ~path.constraints.orientation_programmed & np.isfinite(path.position).all(axis=1)
     lost &= ~np.isfinite(path.rotation[:, 0, 0]) & ~path.keeps_orientation
     if lost.any():
         row = int(np.argmax(lost))
@@ -393,14 +399,14 @@ def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpa
     where that one leads."""
     start = _start(cell, robot)
     path = fill_external_axes(path, cell.external_axes, robot, start, program, cell.path)
-    rows = np.flatnonzero(path.inherits_from_row >= 0)
+    rows = np.flatnonzero(path.partial_targets.inherits_from_row >= 0)
     if not len(rows):
         return path
     external = External.of(path, cell.external_axes, robot, cell.robot_base)
     frames = frames_of(cell, path, program, external)
 
     def reached(rows: Ints) -> Poses:
-        anchor = path.inherits_from_row[rows]
+        anchor = path.partial_targets.inherits_from_row[rows]
         axes = all_axes(robot, path.axes[anchor], external_joint(robot, path, anchor, start))
         flange = nominal_flange(robot, axes)
         if external is not None and external.constant is None:

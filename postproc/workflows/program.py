@@ -174,7 +174,7 @@ def _corrected(
     task, cell = ready.task, ready.cell
     if worse:
         path = task.toolpath
-        task = replace(task, toolpath=replace(path, refused={**worse, **path.refused}))
+        task = replace(task, toolpath=path.with_refused({**worse, **path.constraints.refused}))
     allowed = Limits(
         request.no_insert,
         cell.min_segment,
@@ -199,14 +199,14 @@ def _corrected(
         moved = EditedTargets((), {**beyond, **division.not_refined})
         if not moved.unwritten:
             moved = ready.dialect.edit_targets(ready.program, plan_motions(task, division), writing)
-        known = task.toolpath.refused
+        known = task.toolpath.constraints.refused
         held = {row: finding for row, finding in moved.unwritten.items() if row not in known}
         if not moved.unwritten:
             edits = edit_program(ready.program, ready.dialect, moved.edits, ready.robot, stem)
             return task, result, division, edits
         if not held:
             raise ValueError("motions that are not corrected are refused again")
-        task = replace(task, toolpath=replace(task.toolpath, refused={**known, **held}))
+        task = replace(task, toolpath=task.toolpath.with_refused({**known, **held}))
 
 
 def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
@@ -233,7 +233,7 @@ def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list
         said = f"{request.gain:.0%} of the correction is applied, as --gain requests"
         findings.append(Finding("COR007", said, file))
     beyond = "" if request.gain == 1.0 else " beyond the share that --gain keeps"
-    turns = corrected & path.orientation_programmed
+    turns = corrected & path.constraints.orientation_programmed
     for off, limit, rows, unit, word in (
         (written.residual, tolerance, corrected, MM, "mm"),
         (written.off_angle, ready.cell.tolerance_angle, turns, DEG, "deg"),
@@ -255,7 +255,7 @@ def _not_turned(ready: Prepared, written: WrittenProgram) -> list[Finding]:
     """Cutting motions whose text cannot say the orientation that would be needed: those that keep the one before
     (COR019), and those that have no words for it (COR021)."""
     path, division, limit = ready.task.toolpath, written.division, ready.cell.tolerance_angle
-    motion = written.result.corrected & ready.task.carries & ~path.orientation_programmed
+    motion = written.result.corrected & ready.task.carries & ~path.constraints.orientation_programmed
     off = np.where(motion, np.nan_to_num(written.result.after_angle), 0.0)
     np.fmax.at(off, division.source, np.where(motion[division.source], written.between_angle, 0.0))
     findings = []
@@ -302,12 +302,16 @@ def _splines(ready: Prepared, written: WrittenProgram) -> list[Finding]:
 def _assumed(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
     """How rotary axes are taken to run between blocks, where another control would lead the tool elsewhere."""
     path = ready.task.toolpath
-    if not path.turns_by_words:
+    if not path.orientation_control.any_by_words:
         return []
     rows = np.flatnonzero(
-        written.result.corrected & (path.orientation_path == OrientationPath.ROTARY_AXES) & path.known
+        written.result.corrected & (path.orientation_control.path == OrientationPath.ROTARY_AXES) & path.known
     )
-    apart = np.nan_to_num(rotary_words.beside_great_circle(path.rotary_from[rows], path.rotary_to[rows]))
+    apart = np.nan_to_num(
+        rotary_words.beside_great_circle(
+            path.orientation_control.rotary_from[rows], path.orientation_control.rotary_to[rows]
+        )
+    )
     above = apart > ready.cell.tolerance_angle
     if not above.any():
         return []
@@ -327,7 +331,7 @@ def _between(request: Request, ready: Prepared, written: WrittenProgram) -> list
         (written.off_between, None, cell.tolerance, MM, "path", "mm"),
         (
             written.off_between_angle,
-            path.orientation_programmed,
+            path.constraints.orientation_programmed,
             cell.tolerance_angle,
             DEG,
             "orientation",
@@ -407,8 +411,8 @@ _POLE = (
 
 def _by_pair(path: Toolpath, row: int) -> bool:
     """Whether two rotary axes turn the tool in a motion."""
-    by_axes = path.orientation_path[row] == OrientationPath.ROTARY_AXES
-    return bool(by_axes and np.isfinite(path.rotary_to[row]).sum() == 2)
+    by_axes = path.orientation_control.path[row] == OrientationPath.ROTARY_AXES
+    return bool(by_axes and np.isfinite(path.orientation_control.rotary_to[row]).sum() == 2)
 
 
 def _target(request: Request) -> Path:

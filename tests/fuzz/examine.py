@@ -108,27 +108,31 @@ def _near(rows: list[int], free: Bools, n: int) -> bool:
 
 def movable(path: Toolpath) -> Bools:
     """(N,) the motions that may be planned elsewhere."""
-    free = path.known & (path.kind != Kind.AXIS) & (path.inherits_from_row < 0)
-    free[[*path.refused, *path.locked]] = False
+    free = path.known & (path.kind != Kind.AXIS) & (path.partial_targets.inherits_from_row < 0)
+    free[[*path.constraints.refused, *path.constraints.locked]] = False
     # Beyond it doubles do not hold the digits that are written.
     with np.errstate(invalid="ignore"):
         return (
             free
             & (np.abs(path.position).max(axis=1) < FARTHEST)
-            & ~(np.abs(path.centre).max(axis=1) > FARTHEST)
+            & ~(np.abs(path.arcs.centre).max(axis=1) > FARTHEST)
         )
 
 
 def dividable(path: Toolpath) -> Bools:
     """(N,) the straight motions, and plane arcs of no more than a turn and a half, that another one may be inserted
     before."""
-    free = path.known & ((path.kind == Kind.LIN) | (path.kind == Kind.CIRC)) & (path.inherits_from_row < 0)
-    free[[*path.refused, *path.no_insert_before]] = False
+    free = (
+        path.known
+        & ((path.kind == Kind.LIN) | (path.kind == Kind.CIRC))
+        & (path.partial_targets.inherits_from_row < 0)
+    )
+    free[[*path.constraints.refused, *path.constraints.no_insert_before]] = False
     arcs = np.flatnonzero(path.kind == Kind.CIRC)
     before = np.maximum(arcs - 1, 0)
-    advance = np.sum((path.position[arcs] - path.position[before]) * path.normal[arcs], axis=1)
+    advance = np.sum((path.position[arcs] - path.position[before]) * path.arcs.normal[arcs], axis=1)
     free[arcs] &= (np.abs(advance) < 1e-9) & (path.base[arcs] == path.base[before]) & (arcs > 0)
-    free[arcs] &= path.sweep[arcs] < 600 * DEG
+    free[arcs] &= path.arcs.sweep[arcs] < 600 * DEG
     return free
 
 
@@ -137,22 +141,26 @@ def planned(path: Toolpath, free: Bools, shift: Floats, turn: Floats, divided: n
     piece or a link stands before each of ``divided``; of an arc it is its first half."""
     n = len(path)
     shift = _joined(path, np.where(free[:, None], shift, 0.0))
-    turns = free & path.orientation_programmed & np.isnan(path.redundant_axis[:, 0])
+    turns = (
+        free
+        & path.constraints.orientation_programmed
+        & np.isnan(path.orientation_control.redundant_axis[:, 0])
+    )
     turned = rotation_from_vector(np.where(turns[:, None], turn, 0.0))
     rotation = np.where(turns[:, None, None], turned @ path.rotation, path.rotation)
     moves = (shift != 0).any(axis=1)[:, None]
     position = np.where(moves, path.position + shift, path.position)
-    centre = np.where(moves, path.centre + shift, path.centre)
+    centre = np.where(moves, path.arcs.centre + shift, path.arcs.centre)
     source = np.sort(np.concatenate([np.arange(n), divided])).astype(np.int64)
     own = np.append(source[1:] != source[:-1], True) if len(source) else np.empty(0, bool)
     arcs = path.kind[source] == Kind.CIRC
-    sweep = path.sweep[source] * np.where(np.isin(source, divided), 0.5, 1.0)
+    sweep = path.arcs.sweep[source] * np.where(np.isin(source, divided), 0.5, 1.0)
     role = np.where(own, Role.ORIGINAL, np.where(arcs | (source % 3 > 0), Role.INTERMEDIATE, Role.TRANSITION))
-    half = rotation_from_vector(np.nan_to_num(-sweep[:, None] * path.normal[source]))
+    half = rotation_from_vector(np.nan_to_num(-sweep[:, None] * path.arcs.normal[source]))
     halves = centre[source] + (half @ (position[source] - centre[source])[..., None])[..., 0]
     aside = position[source] + np.array([1.0, -2.0, 3.0]) * MM
     there = np.where(own[:, None], position[source], np.where(arcs[:, None], halves, aside))
-    return Plan(source, role, there, rotation[source], centre[source], path.normal[source], sweep)
+    return Plan(source, role, there, rotation[source], centre[source], path.arcs.normal[source], sweep)
 
 
 def _joined(path: Toolpath, shift: Floats) -> Floats:
@@ -176,13 +184,16 @@ def _compare(path: Toolpath, plan: Plan, back: Toolpath) -> None:
     if len(back) != len(plan):
         raise Broken(f"{len(plan)} motions became {len(back)}")
     own = plan.own
-    codes = {row: finding.code for row, finding in path.refused.items()}
-    again = {int(source[m]): finding.code for m, finding in back.refused.items()}
+    codes = {row: finding.code for row, finding in path.constraints.refused.items()}
+    again = {int(source[m]): finding.code for m, finding in back.constraints.refused.items()}
     if codes != again:
         differ = set(codes.items()) ^ set(again.items())
         raise Broken(f"other refusals: {sorted(differ)[:3]}")
-    for name in ("kind", "base", "tool", "axes", "feed", "status", "turn", "inverse_time_feed"):
-        before, after = getattr(path, name)[source], getattr(back, name)[:]
+    for name in ("kind", "base", "tool", "axes", "feed", *path.configuration.numbers, "inverse_time_feed"):
+        if name in path.configuration.numbers:
+            before, after = path.configuration[name][source], back.configuration[name]
+        else:
+            before, after = getattr(path, name)[source], getattr(back, name)[:]
         if name in ("base", "tool"):
             before, after = _frames(path, before), _frames(back, after)
         same = (before == after) | ((before != before) & (after != after))
@@ -213,12 +224,12 @@ def _compare(path: Toolpath, plan: Plan, back: Toolpath) -> None:
 def _compare_ways(path: Toolpath, plan: Plan, back: Toolpath) -> None:
     """Arcs pass through the same places: half way, within what rounding their three points does."""
     arcs = np.isfinite(plan.sweep) & np.isfinite(plan.centre[:, 0])
-    if not np.array_equal(arcs, np.isfinite(back.sweep) & np.isfinite(back.centre[:, 0])):
+    if not np.array_equal(arcs, np.isfinite(back.arcs.sweep) & np.isfinite(back.arcs.centre[:, 0])):
         raise Broken("the way of an arc was lost or appeared")
     if not arcs.any():
         return
     middles = []
-    for some, end in ((plan, plan.position), (back, back.position)):
+    for some, end in ((plan, plan.position), (back.arcs, back.position)):
         turn = rotation_from_vector(-0.5 * some.sweep[arcs, None] * some.normal[arcs])
         radius = end[arcs] - some.centre[arcs]
         middles.append(some.centre[arcs] + (turn @ radius[..., None])[..., 0])

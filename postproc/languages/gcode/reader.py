@@ -47,7 +47,7 @@ from postproc.languages.gcode.source import scan
 from postproc.languages.gcode.source_map import STATE, GcodeSourceMap
 from postproc.languages.gcode.tool_orientation import ToolOrientations
 from postproc.languages.gcode.words import How, Note, key
-from postproc.toolpath import Kind, Toolpath
+from postproc.toolpath import Arcs, EditConstraints, Kind, OrientationControl, Toolpath
 
 PART = 1 << 14
 """Blocks whose motions are worked out at a time."""
@@ -76,7 +76,6 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     refused = collector.done(document, line, start, lines.first[rows])
     frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line)
     said = remarks(document, source, line)
-    number = everywhere(-1, len(rows), np.int32)
     state = {name: found.taken(name) for name in STATE}
     timed = state["feed_mode"] == Feed.INVERSE_TIME
     path = Toolpath(
@@ -87,28 +86,25 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         feed=found.taken("feed"),
         base=frame_of_base,
         tool=frame_of_tool,
-        status=number,
-        turn=number,
         line=line,
         frames=cell_frames,
-        refused=refused,
-        locked=locked_rows(document, given, built, collector),
+        constraints=EditConstraints(
+            refused=refused,
+            locked=locked_rows(document, given, built, collector),
+            no_insert_before={**moves_external(external), **_whole(given, rows)},
+            orientation_programmed=found.taken("orientation_programmed"),
+            exact_stays=True,
+            ptp_may_change_configuration=False,
+        ),
         annotations=said.annotations,
-        centre=found.taken("centre"),
-        normal=found.taken("normal"),
-        sweep=found.taken("sweep"),
+        arcs=Arcs(*(found.taken(name) for name in ("centre", "normal", "sweep", "plane_free"))),
         approximation=found.taken("blend"),
-        no_insert_before={**moves_external(external), **_whole(given, rows)},
         comments=said.comments,
-        orientation_programmed=found.taken("orientation_programmed"),
-        redundant_axis=found.taken("redundant_axis"),
-        arc_plane_free=found.taken("arc_plane_free"),
         inverse_time_feed=timed if timed.any() else everywhere(False, len(rows)),
-        ptp_may_change_configuration=False,
-        exact_stays=True,
-        orientation_path=found.taken("orientation_path"),
-        rotary_from=found.taken("rotary_from"),
-        rotary_to=found.taken("rotary_to"),
+        orientation_control=OrientationControl(
+            path=found.taken("orientation_path"),
+            **{name: found.taken(name) for name in ("rotary_from", "rotary_to", "redundant_axis")},
+        ),
         external=external,
     )
     findings = [*refused.findings(), *diagnostics(document, given, rows, tool, named, settings)]
@@ -213,7 +209,7 @@ def _columns(
         "orientation_path": stand.path,
         "rotary_from": rotary_from,
         "rotary_to": rotary_to,
-        "arc_plane_free": _by_point(given, rows),
+        "plane_free": _by_point(given, rows),
         "turned": stand.stated | (stand.orient < 0),
         "move": moves.move,
         "plane": force[Group.PLANE][rows],

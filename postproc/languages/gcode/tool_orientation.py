@@ -38,7 +38,7 @@ _SEQUENCES = {EULER: ((2, 0), (0, 1), (2, 2)), RPY: ((2, 2), (1, 1), (0, 0))}
 
 @dataclass(frozen=True, eq=False)
 class ToolOrientation:
-    """rotation (N, 3, 3); oriented (N,): the words can be written; free_axis (N, 3): as in a Toolpath; wrong (N,):
+    """rotation (N, 3, 3); oriented (N,): the words can be written; free_axis (N, 3): redundant axis; wrong (N,):
     0, or 1 rotary axes away from 0 or not known without a TCP mode, 2 not known in one.  orient (N,) row in
     ``Stands.orientations``, -1 where none is in force; values, before (N, 3): as in Places.  stated (N,): the block
     itself states the whole orientation in force.  path (N,) OrientationPath."""

@@ -102,7 +102,11 @@ class _Forbidden:
     def of(program: Program) -> _Forbidden:
         path = program.toolpath
         masks = [np.zeros(len(path), np.bool_) for _ in range(3)]
-        for mask, found in zip(masks, (path.refused, path.locked, path.no_insert_before), strict=True):
+        for mask, found in zip(
+            masks,
+            (path.constraints.refused, path.constraints.locked, path.constraints.no_insert_before),
+            strict=True,
+        ):
             mask[np.array([*found], dtype=np.int64)] = True
         refused, fixed_, whole = masks
         return _Forbidden(refused, refused | fixed_, refused | whole)
@@ -199,8 +203,8 @@ class WrittenMotions:
                 path.base[rows],
                 path.position[rows],
                 path.rotation[rows],
-                path.centre[rows],
-                path.sweep[rows],
+                path.arcs.centre[rows],
+                path.arcs.sweep[rows],
             ),
             here,
             first,

@@ -27,7 +27,7 @@ class DependentTargets:
     def __init__(self, task: KrlWritePlan, touched: Bools) -> None:
         self.task, self.touched = task, touched
         refused = np.zeros(len(touched), dtype=bool)
-        refused[list(task.path.refused)] = True
+        refused[list(task.path.constraints.refused)] = True
         self._refused = refused
         self.depends: Bools = ((task.places.inherits > 0) | task.is_relative) & ~refused
         self.completed = np.zeros((len(touched), 6), dtype=bool)
@@ -98,7 +98,7 @@ class DependentTargets:
     def again(self, way: Bools) -> Bools:
         """(N,) rows to be written for the sake of the row before; ``way`` (N,): arcs that are planned otherwise."""
         arcs = np.zeros(len(way), dtype=bool)
-        known = [row for row in self.task.places.arcs if np.isfinite(self.task.path.sweep[row])]
+        known = [row for row in self.task.places.arcs if np.isfinite(self.task.path.arcs.sweep[row])]
         arcs[known] = True
         # Where an arc with CA ends follows from where it starts.
         before = np.zeros(len(way), dtype=bool)

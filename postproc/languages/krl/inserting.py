@@ -47,7 +47,7 @@ def insertions(task: KrlWritePlan, among: Ints) -> Iterator[Edits]:
         wanted = task.wanted(rows, said.own, task.plan.position[block], task.plan.rotation[block])
         kept = said.kept(wanted)
         line = np.searchsorted(source.line_starts, task.places.motion[rows, 0], side="right") - 1
-        if task.path.entries:
+        if task.path.constraints.spline_headers:
             line = task.path.inserted_before[rows] - 1
         start = source.line_starts[line]
         if source.raw.startswith(BOM_UTF8):
@@ -97,8 +97,8 @@ def _line(task: KrlWritePlan, motion: int, said: Components, wanted: Floats, kep
     if task.plan.flows[motion] and _APPROXIMATION.search(behind) is None:
         behind += _APPROXIMATION_OF.get(word[:1].upper(), APPROXIMATION)
     indent = raw[raw.rfind(b"\n", 0, at) + 1 : at]
-    if row in task.path.entries:
-        above = task.documents[0].line(task.path.entries[row])
+    if row in task.path.constraints.spline_headers:
+        above = task.documents[0].line(task.path.constraints.spline_headers[row])
         indent = above[: len(above) - len(above.lstrip(b" \t"))]
     return (indent if not indent.strip() else b"") + word + b" " + target + behind + newline
 
@@ -109,7 +109,7 @@ def _transition_words(
     """The word of a transition move, and what is after its target: the conditions of its source, and the approximation
     of that where it ``flows``.  Before a spline block it is a LIN, or where the block has conditions an SLIN with
     them."""
-    source, entered = task.documents[0], task.path.entries.get(row)
+    source, entered = task.documents[0], task.path.constraints.spline_headers.get(row)
     found = _CONDITIONS.search(behind) if word[:1] in b"Ss" else None
     own = found[0] if found else b""
     if entered is not None:

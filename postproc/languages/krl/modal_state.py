@@ -83,7 +83,7 @@ class InlineFormState:
 class ModalState:
     """Everything that a motion's meaning depends on besides variables.
 
-    orientation, arc_frame: $ORI_TYPE and $CIRC_TYPE, as of a Toolpath;
+    orientation, arc_frame: $ORI_TYPE and $CIRC_TYPE, modes of OrientationControl and frames of Arcs;
     feed [m/s], blend [mm] ($APO.CDIS): NaN where not known; point: X..C of the last end point [mm, deg], stated in
     ``point_frames``; axes [deg]: those of the last end point, where it was programmed so; form: the inline form that
     was entered last; external [mm, deg]: E1..E6; external_apart: what the

@@ -34,7 +34,7 @@ class RowRefusal:
 
 
 class MotionRow(NamedTuple):
-    """A motion that was read alone; see Toolpath and Places for what its entries mean (mm, deg)."""
+    """A motion that was read alone; see Toolpath and KrlSourceMap for what its entries mean (mm, deg)."""
 
     kind: int
     line: int

@@ -18,7 +18,18 @@ from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
 from postproc.languages.krl.motion_table import MotionTable, Spots
 from postproc.languages.krl.program_structure import closure
 from postproc.languages.krl.source_map import KrlSourceMap
-from postproc.toolpath import COMPUTED, FrameRef, Kind, OrientationMode, Toolpath
+from postproc.toolpath import (
+    COMPUTED,
+    Arcs,
+    Configuration,
+    EditConstraints,
+    FrameRef,
+    Kind,
+    OrientationControl,
+    OrientationMode,
+    PartialTargets,
+    Toolpath,
+)
 
 READ_TOO = "other code reads it too"
 SEVERAL = "its line runs several times"
@@ -53,28 +64,29 @@ def to_toolpath(
         feed=_kept(table.feed),
         base=_kept(table.base),
         tool=_kept(table.tool),
-        status=_kept(table.status),
-        turn=_kept(table.turn),
         line=_kept(table.line),
         frames=used,
-        refused=refused,
-        locked=_pinned(rows, table, refused),
+        constraints=EditConstraints(
+            refused=refused,
+            locked=_pinned(rows, table, refused),
+            no_insert_before=_whole(rows, several),
+            spline_headers=_entries(rows, several),
+            orientation_programmed=_oriented(table),
+        ),
         annotations=tuple(rows.annotations),
-        inherits_from_row=anchor,
-        partial_target=given,
-        centre=_sparse((n, 3), np.nan, {row: way[:3] for row, way in table.ways.items()}, MM),
-        normal=_sparse((n, 3), np.nan, {row: way[3:6] for row, way in table.ways.items()}),
-        sweep=_sparse((n,), np.nan, {row: way[6] for row, way in table.ways.items()}, DEG),
+        partial_targets=PartialTargets(anchor, given),
+        arcs=Arcs(
+            centre=_sparse((n, 3), np.nan, {row: arc[:3] for row, arc in table.ways.items()}, MM),
+            normal=_sparse((n, 3), np.nan, {row: arc[3:6] for row, arc in table.ways.items()}),
+            sweep=_sparse((n,), np.nan, {row: arc[6] for row, arc in table.ways.items()}, DEG),
+            frame=_kept(table.arc_frame),
+        ),
         approximation=_kept(table.blend),
-        redundant_axis=np.broadcast_to(np.nan, (n, 3)),
-        no_insert_before=_whole(rows, several),
         comments=tuple(rows.comments),
         executes=_runs(rows, n),
         stops=_stops(rows, table),
-        entries=_entries(rows, several),
-        orientation_programmed=_oriented(table),
-        orientation=_kept(table.orientation),
-        arc_frame=_kept(table.arc_frame),
+        configuration=Configuration({"status": _kept(table.status), "turn": _kept(table.turn)}),
+        orientation_control=OrientationControl(mode=_kept(table.orientation)),
         external=_kept(table.external),
     )
     found = None if table.spots is None else _places(rows, table, table.spots)

@@ -76,7 +76,11 @@ def _touched(task: KrlWritePlan) -> tuple[Bools, Bools]:
     each_block(ends, n)
     for rows in _blocks(np.flatnonzero(path.kind == Kind.CIRC)):
         there = task.own[rows]
-        for new, old in ((plan.centre, path.centre), (plan.normal, path.normal), (plan.sweep, path.sweep)):
+        for new, old in (
+            (plan.centre, path.arcs.centre),
+            (plan.normal, path.arcs.normal),
+            (plan.sweep, path.arcs.sweep),
+        ):
             other = differs(new[there], old[rows])
             way[rows] |= other.any(axis=1) if other.ndim > 1 else other
     return touched, way
@@ -84,13 +88,14 @@ def _touched(task: KrlWritePlan) -> tuple[Bools, Bools]:
 
 def _refuse_forbidden(task: KrlWritePlan, touched: Bools, way: Bools) -> None:
     path = task.path
-    fixed_rows = {row for row in (*path.refused, *path.locked) if touched[row]}
-    fixed_rows |= {row for row in path.refused if way[row]}
+    fixed = path.constraints
+    fixed_rows = {row for row in (*fixed.refused, *fixed.locked) if touched[row]}
+    fixed_rows |= {row for row in fixed.refused if way[row]}
     fixed_rows |= set(np.flatnonzero(touched & (path.kind == Kind.AXIS)).tolist())
     if fixed_rows:
         raise ValueError(f"motions that cannot be corrected are moved: rows {sorted(fixed_rows)[:5]}")
-    whole = {row for row in (*path.refused, *path.no_insert_before) if task.inserted[row]}
-    whole -= {row for row in path.entries if _enters(task, row)} - path.refused.keys()
+    whole = {row for row in (*fixed.refused, *fixed.no_insert_before) if task.inserted[row]}
+    whole -= {row for row in fixed.spline_headers if _enters(task, row)} - fixed.refused.keys()
     inserted = _blocks(np.flatnonzero(task.plan.role != Role.ORIGINAL))
     if any((task.plan.sweep[motions] > FULL).any() for motions in inserted):
         raise ValueError("an inserted arc is nearly a full turn: three points do not define it")
