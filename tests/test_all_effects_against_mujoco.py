@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from effects_at_work import conditions, made, sampled, with_terms
+from effect_cases import conditions, made, sampled, with_terms
 from plant import SOFTER, Plant, kr270, random_angles, random_tools, random_wrenches, with_compensator
 
 from postproc.base.geometry import vector_from_rotation

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from ways_at_work import circle, corner, line
+from path_cases import circle, corner, line
 
 import postproc.base.batches
 import postproc.compensation.divisible_motions

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from path_cases import FORCE as PUSH
+from path_cases import circle, corner, line
+from path_cases import task as at_points
 from test_mirror import CARRIES, FORCE, TOOL, Problem, full, program_angles, task
-from ways_at_work import FORCE as PUSH
-from ways_at_work import circle, corner, line
-from ways_at_work import task as at_points
 
 from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.compensation.axis_limits import check_limits

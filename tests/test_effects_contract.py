@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effects_at_work import (
+from effect_cases import (
     TOOL,
     conditions,
     elastic,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from effects_at_work import conditions, elastic, made, nulls, random_arm, with_terms
+from effect_cases import conditions, elastic, made, nulls, random_arm, with_terms
 from plant import kr270, random_angles, random_tools, random_wrenches
 
 from postproc.base.findings import Refusal

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effects_at_work import TOOL, conditions, elastic, made, sampled, with_terms
+from effect_cases import TOOL, conditions, elastic, made, sampled, with_terms
 from plant import SOFTER, kr270, random_angles, random_tools, random_wrenches, with_compensator
 
 from postproc.base.geometry import Poses, vector_from_rotation

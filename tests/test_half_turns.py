@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from motions import motions
+from path_cases import task as task_to
 from plant import kr270
-from ways_at_work import task as task_to
 
 from postproc.base.geometry import Poses, abc_from_rotation, lengths, rotation_from_vector, turn_between
 from postproc.base.units import DEG, MM

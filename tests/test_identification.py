@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from effects_at_work import TOOL, conditions, made, nulls, random_arm, sampled, with_terms
+from effect_cases import TOOL, conditions, made, nulls, random_arm, sampled, with_terms
 from measured import MARKERS, Straight, arm, on_markers, plan, read, robot, scattered, somewhere, taken
 
 from postproc.base.findings import Refusal

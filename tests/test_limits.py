@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ways_at_work import START, TOOL, corner, line
+from path_cases import START, TOOL, corner, line
 
 from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.correct import correct

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effects_at_work import made, nulls, with_terms
-from ways_at_work import START, circle, line, task
+from effect_cases import made, nulls, with_terms
+from path_cases import START, circle, line, task
 
 from postproc.compensation.gap_sides import MotorPath, Reversals
 from postproc.compensation.lost_motion import ROOM, add_lost_motion, dead_band, position_digit

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from motions import motions
+from path_cases import circle
 from plant import Plant, kr270
 from scipy.spatial.transform import Rotation, Slerp
-from ways_at_work import circle
 
 from postproc.base.document import Document
 from postproc.base.geometry import Poses, rotation_from_abc

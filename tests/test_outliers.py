@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from effects_at_work import TOOL, made, random_arm, sampled, with_terms
+from effect_cases import TOOL, made, random_arm, sampled, with_terms
 from measured import Straight, arm, on_markers, plan, scattered, somewhere, taken
 
 from postproc.identification.campaign import Campaign

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ways_at_work import corner, line
+from path_cases import corner, line
 
 from postproc.compensation.ramped_forces import STEEPEST, add_force_ramps, correction_steps
 from postproc.process import Wrenches

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from effects_at_work import TOOL
+from effect_cases import TOOL
 from measured import plan, robot, scattered, somewhere, taken
 
 from postproc.base.geometry import vector_from_rotation

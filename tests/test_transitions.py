@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import CELL, JUMPED_LINES, LINES
+from path_cases import FORCE, circle, corner, line, task
 from scipy.spatial.transform import Rotation
-from ways_at_work import FORCE, circle, corner, line, task
 
 from postproc.base.document import Document
 from postproc.base.geometry import Poses

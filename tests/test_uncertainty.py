@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from plant import SOFTER, with_compensator
 from scipy.spatial.transform import Rotation
-from test_doubt import (
+from test_expanded_uncertainty import (
     WITHIN,
     covariance_of,
     deviations,
@@ -173,9 +173,9 @@ def test_ten_degrees_leave_what_ten_degrees_do():
 )
 def test_the_bound_holds_for_95_of_100_robots(monkeypatch, model, process, force):
     """500 robots, drawn from the stated intervals and solved anew: 95 % of them, within three standard errors."""
-    import test_doubt
+    import test_expanded_uncertainty
 
-    monkeypatch.setattr(test_doubt, "DRAWS", 500)
+    monkeypatch.setattr(test_expanded_uncertainty, "DRAWS", 500)
     task = job(model, 12, process=process, seed=6)
     result = correct(task)
     ci95 = COVERAGE * force if force else None

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from effects_at_work import TOOL, random_arm
+from effect_cases import TOOL, random_arm
 from measured import Straight, arm, on_markers, plan, read, robot, scattered, somewhere, taken
 
 from postproc.identification.campaign import Campaign

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import LINES
-from ways_at_work import circle, line
-from ways_at_work import task as hand_made
+from path_cases import circle, line
+from path_cases import task as hand_made
 
 from postproc.base.units import MM
 from postproc.compensation.correct import correct

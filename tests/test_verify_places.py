@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from path_cases import circle, corner, line, task
 from test_verify import as_run, bend, simulated
-from ways_at_work import circle, corner, line, task
 
 from postproc.base.units import MM
 from postproc.process import Wrenches

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from effects_at_work import TOOL, conditions, made, sampled, with_terms
+from effect_cases import TOOL, conditions, made, sampled, with_terms
 from motions import milling_angles
 from plant import SOFTER, kr270, random_tools, random_wrenches, with_compensator
 

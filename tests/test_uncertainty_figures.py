@@ -10,7 +10,7 @@ import pytest
 from plant import SOFTER, with_compensator
 from scipy.optimize import brentq
 from scipy.stats import chi2
-from test_doubt import INTERVALS, TOOL, every, job, paper, restated
+from test_expanded_uncertainty import INTERVALS, TOOL, every, job, paper, restated
 
 from postproc.base.geometry import Poses
 from postproc.compensation import uncertainty as doubt

@@ -7,10 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from path_cases import FORCE, circle, commands, corner, in_even_pieces, line
+from path_cases import task as at_points
 from test_mirror import CARRIES
 from test_mirror import task as joints_task
-from ways_at_work import FORCE, circle, commands, corner, in_even_pieces, line
-from ways_at_work import task as at_points
 
 from postproc.base.geometry import Poses, arc_through, rotation_from_vector
 from postproc.compensation.correct import correct

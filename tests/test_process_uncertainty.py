@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_doubt import job, paper, restated
+from test_expanded_uncertainty import job, paper, restated
 
 from postproc.compensation.correct import correct
 from postproc.compensation.uncertain_inputs import FORCE

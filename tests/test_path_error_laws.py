@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from path_cases import circle, line
 from test_mirror import full
-from ways_at_work import circle, line
 
 from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.compensation.path_error import PathSegments, path_errors

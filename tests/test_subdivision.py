@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ways_at_work import FORCE, circle, corner, in_even_pieces, line
-from ways_at_work import task as task_to
+from path_cases import FORCE, circle, corner, in_even_pieces, line
+from path_cases import task as task_to
 
 import postproc.compensation.divisible_motions as divisible_motions
 from postproc.base.units import MM
