@@ -65,6 +65,13 @@ def test_help_shows_the_present_names_only(command):
     assert not {option_of(name) for name in FORMER_OPTIONS} & {item.value for item in offered}
 
 
+def test_a_misspelt_option_leads_to_the_present_names_only(compensate, job):
+    run = compensate(job.program, "--keep-pointss")
+    assert run.code == 2
+    assert "--no-insert" in run.err
+    assert "--keep-points" not in run.err
+
+
 def test_the_note_disturbs_no_script(compensate, job):
     done = compensate(job.program, "--force", "--keep-points", "--own-points", "refuse")
     assert done.code == 0

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 from click.shell_completion import CompletionItem, get_completion_class
+
+from postproc.workflows.option_names import FORMER_OPTIONS
 
 SHELLS = ("bash", "zsh", "fish")
 VARIABLE = "_COMPENSATE_COMPLETE"
@@ -20,12 +24,28 @@ class Commands(click.Group):
             return "program", self.commands["program"], args
         return super().resolve_command(ctx, args)
 
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except click.NoSuchOption as error:
+            # former names are taken, but nobody is sent to them
+            names = [_present_option(name) for name in error.possibilities or ()]
+            shown = " or ".join(dict.fromkeys(names))
+            hint = f" Did you mean {shown}?" if shown else ""
+            raise click.UsageError(f"No such option {error.option_name!r}.{hint}", error.ctx) from None
+
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Commands, and files: a program may stand in place of a command."""
         items = super().shell_complete(ctx, incomplete)
         if incomplete.startswith("-"):
             return items + self.commands["program"].shell_complete(ctx, incomplete)
         return [item for item in items if item.value != "program"] + [CompletionItem(incomplete, type="file")]
+
+
+def _present_option(name: str) -> str:
+    """``--no-insert`` for ``--keep-points``, its former name."""
+    present = FORMER_OPTIONS.get(name.removeprefix("--").replace("-", "_"))
+    return name if present is None else f"--{present.replace('_', '-')}"
 
 
 @click.command()
