@@ -7,7 +7,6 @@ what it claims has to hold each time that it runs.  A row that a finding refuses
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -31,7 +30,7 @@ class Difference:
 
 @dataclass
 class Comparison:
-    """motions: of rs274; known: those that a row claims, and rightly; located: those whose place is right, refused or
+    """motions: of rs274, but those without a row that move nothing (a G0 alone); known: those that a row claims, and rightly; located: those whose place is right, refused or
     not; misplaced: refused rows with another place than rs274's, which are no difference."""
 
     motions: int = 0
@@ -59,7 +58,9 @@ def compare(motions: list[Motion], reading: Reading) -> Comparison:
         here, there = rows[line], runs[line]
         claimed = [row for row in here if reading.rows[row].claimed]
         if not here:
-            if not reading.reported(line):
+            there = [index for index in there if not motions[index].still]
+            result.motions -= len(runs[line]) - len(there)
+            if there and not reading.reported(line):
                 differ("missing", line, f"{len(there)} motions of rs274 without row and without finding")
             continue
         if not there:
@@ -140,7 +141,3 @@ def _check_arc(row: Row, motion: Motion) -> list[tuple[str, str]]:
 
 def _shown(vector: np.ndarray) -> str:
     return "(" + ", ".join(f"{value:.5f}" for value in vector) + ")"
-
-
-Judge = Callable[[Reading], Reading]
-"""What may be done to a reading before it is compared: a planted fault."""

@@ -71,6 +71,9 @@ FEATURES = {
     "sparse": 0.7,
 }
 """Feature -> the share of programs that have it."""
+PLAIN = 0.35
+"""The share of programs without any of these."""
+COMPUTED = {"parameters", "rich", "flow", "subs", "slash"}
 PLANES = {17: (0, 1, 2), 18: (2, 0, 1), 19: (1, 2, 0)}
 OFFSETS = ("54", "55", "56", "57", "58", "59", "59.1", "59.2", "59.3")
 GROUPS = (
@@ -110,6 +113,8 @@ class Generator:
     def __init__(self, seed: int) -> None:
         self.chance = random.Random(seed)
         self.features = {name for name, share in FEATURES.items() if self.chance.random() < share}
+        if self.chance.random() < PLAIN:
+            self.features -= COMPUTED
         self.reals = Expressions(self.chance, "rich" in self.features, "loose" in self.features)
         self.blocks: list[Block] = []
         self.modes = Modes()

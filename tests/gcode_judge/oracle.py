@@ -33,7 +33,7 @@ class Motion:
 
     line: from 1.  kind: "PTP", "LIN" or "CIRC".  start, end (3,) [mm]: in the coordinates of the work offset in force,
     with the shift of G92 in them, as the program's reader has them.  step [mm]: of the last digit printed.
-    centre (3,) [mm] and turn [rad], counter-clockwise seen from the tip of ``normal``: of arcs.  base: number of the
+    still: it moves nothing, as of a G0 alone.  centre (3,) [mm] and turn [rad], counter-clockwise seen from the tip of ``normal``: of arcs.  base: number of the
     work offset; rewritten: the program has changed it.  tool: number in the spindle, -1 before any change.
     """
 
@@ -48,6 +48,10 @@ class Motion:
     centre: np.ndarray | None = None
     turn: float = 0.0
     plane: tuple[int, int, int] = (0, 1, 2)
+
+    @property
+    def still(self) -> bool:
+        return self.kind != "CIRC" and bool(np.abs(self.end - self.start).max() < 2 * self.step)
 
 
 def execute(made: Made, folder: Path, numbered: bool = True) -> list[Motion] | None:
@@ -86,10 +90,11 @@ class _Account:
         self.unit = 1.0
         self.axes = _AXES["XY"]
         self.shift, self.shift_unit = np.zeros(3), 1.0
-        self.here = np.full(3, np.nan)
+        self.offset, self.length, self.rotation = np.zeros(3), np.zeros(3), 0.0
+        self.here = np.zeros(3)
         self.base, self.tool = 1, -1
         self.offsets: dict[int, np.ndarray] = {}
-        self.rotation, self.rewritten = 0.0, set[int]()
+        self.rewritten: set[int] = set()
         self.motions: list[Motion] = []
 
     def of(self, text: str) -> list[Motion]:
@@ -105,22 +110,37 @@ class _Account:
         return self.motions
 
     def state(self, name: str, arguments: str) -> None:
+        """What holds from here on; the machine stays where it is."""
+        place = self.turned(self.here, self.rotation) + self.offset + self.length
+        self.set(name, arguments)
+        self.here = self.turned(place - self.offset - self.length, -self.rotation)
+
+    @staticmethod
+    def turned(vector: np.ndarray, angle: float) -> np.ndarray:
+        cos, sin = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        return np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]) @ vector
+
+    def set(self, name: str, arguments: str) -> None:
         if name == "USE_LENGTH_UNITS":
             self.unit = INCH if "INCH" in arguments else 1.0
         elif name == "SELECT_PLANE":
             self.axes = _AXES[arguments[-2:]]
         elif name == "SET_G92_OFFSET":
-            shift = np.array([float(word) for word in arguments.split(",")[:3]]) * self.unit
-            self.here = self.here + self.shift - shift if np.isfinite(self.here).all() else self.here
-            self.shift, self.shift_unit = shift, self.unit
+            # What the program's reader has as coordinates are those with this shift: they stay.
+            self.shift = np.array([float(word) for word in arguments.split(",")[:3]]) * self.unit
+            self.shift_unit = self.unit
         elif name == "SET_G5X_OFFSET":
             words = arguments.split(",")
             self.base = int(words[0])
             values = np.array([float(word) for word in words[1:4]]) * self.unit
+            self.offset = values
             if np.abs(self.offsets.setdefault(self.base, values) - values).max() > 0.01:
                 self.rewritten.add(self.base)
         elif name == "SET_XY_ROTATION":
             self.rotation = float(arguments)
+        elif name == "USE_TOOL_LENGTH_OFFSET":
+            first = arguments.replace(",", " ").split()[:3]
+            self.length = np.array([float(word) for word in first]) * self.unit
         elif name == "CHANGE_TOOL":
             self.tool = int(float(arguments))
 

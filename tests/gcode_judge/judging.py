@@ -1,0 +1,91 @@
+"""Programs judged by their seeds, on all processors, and differences shrunk."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from .blocks import Made
+from .comparison import Comparison, Difference, compare
+from .generator import make
+from .oracle import execute
+from .reading import Reading, read
+from .shrinking import Shrinking
+
+PART = 25
+"""Seeds that a process takes at a time."""
+
+
+@dataclass
+class Totals:
+    """programs, accepted by rs274; counts of motions as in ``Comparison``; differing: seed -> its first difference."""
+
+    programs: int = 0
+    accepted: int = 0
+    motions: int = 0
+    known: int = 0
+    located: int = 0
+    misplaced: int = 0
+    differing: dict[int, Difference] = field(default_factory=dict)
+
+    def add(self, other: Totals) -> None:
+        for name in ("programs", "accepted", "motions", "known", "located", "misplaced"):
+            setattr(self, name, getattr(self, name) + getattr(other, name))
+        self.differing.update(other.differing)
+
+
+def judge(made: Made, folder: Path, reader: Callable[[Made], Reading] = read) -> Comparison | None:
+    """What the reader makes of a program against rs274; None where that does not accept it."""
+    motions = execute(made, folder)
+    return None if motions is None else compare(motions, reader(made))
+
+
+def judge_seeds(seeds: Iterable[int]) -> Totals:
+    totals = Totals()
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in seeds:
+            totals.programs += 1
+            found = judge(make(seed), Path(folder))
+            if found is None:
+                continue
+            totals.accepted += 1
+            totals.motions += found.motions
+            totals.known += found.known
+            totals.located += found.located
+            totals.misplaced += found.misplaced
+            if found.differences:
+                totals.differing[seed] = found.differences[0]
+    return totals
+
+
+def judge_all(count: int, seed: int, processes: int = 0) -> Iterator[Totals]:
+    """``count`` programs from ``seed`` on, part by part."""
+    parts = [range(at, min(at + PART, seed + count)) for at in range(seed, seed + count, PART)]
+    with ProcessPoolExecutor(processes or os.cpu_count()) as pool:
+        yield from pool.map(judge_seeds, parts)
+
+
+def shrink(seed: int, kind: str) -> Made:
+    """The least program made of that of a seed with a difference of this kind."""
+    return shrink_program(make(seed), kind)
+
+
+def shrink_program(made: Made, kind: str, reader: Callable[[Made], Reading] = read) -> Made:
+    with tempfile.TemporaryDirectory() as folder:
+
+        def holds(candidate: Made) -> bool:
+            found = judge(candidate, Path(folder), reader)
+            return found is not None and any(one.kind == kind for one in found.differences)
+
+        return Shrinking(holds).least(made)
+
+
+def shrink_all(differing: dict[int, Difference], processes: int = 0) -> Iterator[tuple[int, Made]]:
+    """Seed and shrunk program of each."""
+    seeds = sorted(differing)
+    with ProcessPoolExecutor(processes or os.cpu_count()) as pool:
+        yield from zip(seeds, pool.map(shrink, seeds, [differing[seed].kind for seed in seeds]), strict=True)
