@@ -69,23 +69,23 @@ def judge_all(count: int, seed: int, processes: int = 0) -> Iterator[Totals]:
         yield from pool.map(judge_seeds, parts)
 
 
-def shrink(seed: int, kind: str) -> Made:
-    """The least program made of that of a seed with a difference of this kind."""
-    return shrink_program(make(seed), kind)
+def shrink(seed: int, difference: Difference) -> Made:
+    """The least program made of that of a seed with a difference of the same kind."""
+    return shrink_program(make(seed), difference)
 
 
-def shrink_program(made: Made, kind: str, reader: Callable[[Made], Reading] = read) -> Made:
+def shrink_program(made: Made, difference: Difference, reader: Callable[[Made], Reading] = read) -> Made:
     with tempfile.TemporaryDirectory() as folder:
 
         def holds(candidate: Made) -> bool:
             found = judge(candidate, Path(folder), reader)
-            return found is not None and any(one.kind == kind for one in found.differences)
+            return found is not None and any(one.kind == difference.kind for one in found.differences)
 
-        return Shrinking(holds).least(made)
+        return Shrinking(holds).least(made, difference.line)
 
 
 def shrink_all(differing: dict[int, Difference], processes: int = 0) -> Iterator[tuple[int, Made]]:
     """Seed and shrunk program of each."""
     seeds = sorted(differing)
     with ProcessPoolExecutor(processes or os.cpu_count()) as pool:
-        yield from zip(seeds, pool.map(shrink, seeds, [differing[seed].kind for seed in seeds]), strict=True)
+        yield from zip(seeds, pool.map(shrink, seeds, [differing[seed] for seed in seeds]), strict=True)

@@ -7,6 +7,7 @@ comes from: the program is run with its line numbers there, which mean nothing t
 
 from __future__ import annotations
 
+import os
 import random
 import re
 import shutil
@@ -66,7 +67,15 @@ def execute(made: Made, folder: Path, numbered: bool = True) -> list[Motion] | N
     if made.delete:
         command.insert(1, "-b")
     try:
-        done = subprocess.run(command, cwd=folder, capture_output=True, timeout=TIMEOUT, check=False)
+        # The table of tools is kept in a file of the home folder, which all runs at a time would share.
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            env={**os.environ, "HOME": str(folder)},
+            capture_output=True,
+            timeout=TIMEOUT,
+            check=False,
+        )
     except subprocess.TimeoutExpired:
         return None
     if done.returncode or done.stderr.decode("latin-1").strip() != "executing":
@@ -98,13 +107,14 @@ class _Account:
         self.motions: list[Motion] = []
 
     def of(self, text: str) -> list[Motion]:
-        for number, name, arguments in _CALL.findall(text):
+        for word, name, arguments in _CALL.findall(text):
+            number = int(word) if word.isdigit() else -1
             if name in ("STRAIGHT_TRAVERSE", "STRAIGHT_FEED"):
-                end = np.array([float(word) for word in arguments.split(",")[:3]]) * self.unit + self.shift
+                end = np.array([float(value) for value in arguments.split(",")[:3]]) * self.unit + self.shift
                 kind = "PTP" if name == "STRAIGHT_TRAVERSE" else "LIN"
-                self.add(int(number or -1), kind, end)
+                self.add(number, kind, end)
             elif name == "ARC_FEED":
-                self.arc(int(number or -1), [float(word) for word in arguments.split(",")[:6]])
+                self.arc(number, [float(value) for value in arguments.split(",")[:6]])
             else:
                 self.state(name, arguments)
         return self.motions
@@ -127,7 +137,7 @@ class _Account:
             self.axes = _AXES[arguments[-2:]]
         elif name == "SET_G92_OFFSET":
             # What the program's reader has as coordinates are those with this shift: they stay.
-            self.shift = np.array([float(word) for word in arguments.split(",")[:3]]) * self.unit
+            self.shift = np.array([float(value) for value in arguments.split(",")[:3]]) * self.unit
             self.shift_unit = self.unit
         elif name == "SET_G5X_OFFSET":
             words = arguments.split(",")

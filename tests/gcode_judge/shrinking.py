@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from .blocks import Block, Made
@@ -17,88 +17,89 @@ class Shrinking:
     """``holds``: of a program; ``trials``: how many more are tried."""
 
     holds: Callable[[Made], bool]
-    trials: int = 400
+    trials: int = 600
 
-    def least(self, made: Made) -> Made:
-        """The least program that is found."""
-        made = self.first(made, [made._replace(delete=False)])
+    def least(self, made: Made, line: int) -> Made:
+        """The least program that is found; ``line``: where the difference is, what is after it goes first."""
+        ends = [index for index, block in enumerate(made.blocks) if index > line and not _label(block)]
+        whole = made
+        for kept in (ends[-1:], ends[-2:]):
+            blocks = whole.blocks[:line] + tuple(whole.blocks[index] for index in kept)
+            made = self.tried(made, whole._replace(blocks=blocks)) if made is whole else made
+        made = self.tried(made, made._replace(delete=False))
         changed = True
         while changed and self.trials > 0:
             before = made
-            for candidates in (self.without_blocks, self.without_pairs, self.without_words, self.plainer):
-                made = self.improve(made, candidates)
+            made = self.without_blocks(made)
+            made = self.without_labels(made)
+            made = self.without_words(made)
+            made = self.plainer(made)
             changed = made != before
         return made
 
-    def first(self, made: Made, candidates: list[Made]) -> Made:
-        for candidate in candidates:
-            if candidate != made and self.trials > 0:
-                self.trials -= 1
-                if self.holds(candidate):
-                    return candidate
-        return made
+    def tried(self, made: Made, candidate: Made) -> Made:
+        """The candidate where it holds."""
+        if candidate == made or self.trials <= 0:
+            return made
+        self.trials -= 1
+        return candidate if self.holds(candidate) else made
 
-    def improve(self, made: Made, candidates: Callable[[Made], Iterator[Made]]) -> Made:
-        """The first candidate that holds replaces the program, as long as there is one."""
-        again = True
-        while again and self.trials > 0:
-            again = False
-            for candidate in candidates(made):
-                if self.trials <= 0:
-                    break
-                self.trials -= 1
-                if self.holds(candidate):
-                    made, again = candidate, True
-                    break
-        return made
-
-    @staticmethod
-    def without_blocks(made: Made) -> Iterator[Made]:
-        """Without a run of blocks: the longest first, the last blocks first."""
-        count = len(made.blocks)
-        size = count // 2
+    def without_blocks(self, made: Made) -> Made:
+        """Without runs of blocks: the longest first, the last blocks first."""
+        size = max(len(made.blocks) // 2, 1)
         while size:
-            for stop in range(count, 0, -size):
+            stop = len(made.blocks)
+            while stop > 0:
                 start = max(stop - size, 0)
-                yield made._replace(blocks=made.blocks[:start] + made.blocks[stop:])
+                made = self.tried(made, made._replace(blocks=made.blocks[:start] + made.blocks[stop:]))
+                stop = start
             size //= 2
+        return made
 
-    @staticmethod
-    def without_pairs(made: Made) -> Iterator[Made]:
-        """Without the O words of a label."""
-        labels = [_label(block) for block in made.blocks]
-        for label in sorted({label for label in labels if label}):
-            kept = [block for block, own in zip(made.blocks, labels, strict=True) if own != label]
-            yield made._replace(blocks=tuple(kept))
-            places = [index for index, own in enumerate(labels) if own == label]
-            yield made._replace(blocks=made.blocks[: places[0]] + made.blocks[places[-1] + 1 :])
+    def without_labels(self, made: Made) -> Made:
+        """Without the O words of a label, with or without what is between them."""
+        for label in sorted({_label(block) for block in made.blocks} - {""}):
+            places = [index for index, block in enumerate(made.blocks) if _label(block) == label]
+            blocks = made.blocks
+            shorter = self.tried(made, made._replace(blocks=blocks[: places[0]] + blocks[places[-1] + 1 :]))
+            if shorter is made:
+                kept = tuple(block for block in blocks if _label(block) != label)
+                shorter = self.tried(made, made._replace(blocks=kept))
+            made = shorter
+        return made
 
-    @staticmethod
-    def without_words(made: Made) -> Iterator[Made]:
+    def without_words(self, made: Made) -> Made:
+        for index in reversed(range(len(made.blocks))):
+            made = self.tried(made, _with(made, index, made.blocks[index]._replace(slash=False)))
+            for at in reversed(range(len(made.blocks[index].pieces))):
+                block = made.blocks[index]
+                if len(block.pieces) > 1:
+                    fewer = block.pieces[:at] + block.pieces[at + 1 :]
+                    made = self.tried(made, _with(made, index, block._replace(pieces=fewer)))
+        return made
+
+    def plainer(self, made: Made) -> Made:
+        """Single blanks and capitals; numbers for expressions."""
+        whole = self.tried(made, made._replace(blocks=tuple(_plain(block) for block in made.blocks)))
+        for index in range(len(made.blocks) if whole is made else 0):
+            whole = self.tried(whole, _with(whole, index, _plain(whole.blocks[index])))
+        made = whole
         for index, block in enumerate(made.blocks):
-            if block.slash:
-                yield _with(made, index, block._replace(slash=False))
-            for at in range(len(block.pieces) if len(block.pieces) > 1 else 0):
-                yield _with(made, index, block._replace(pieces=block.pieces[:at] + block.pieces[at + 1 :]))
+            for at, piece in enumerate(() if _label(block) else block.pieces):
+                head, equals, tail = piece.rpartition("=")
+                for found in _INNER.finditer(tail):
+                    text = head + equals + tail[: found.start()] + "3" + tail[found.end() :]
+                    pieces = (*made.blocks[index].pieces[:at], text, *made.blocks[index].pieces[at + 1 :])
+                    simpler = self.tried(made, _with(made, index, block._replace(pieces=pieces)))
+                    if simpler is not made:
+                        made = simpler
+                        break
+        return made
 
-    @staticmethod
-    def plainer(made: Made) -> Iterator[Made]:
-        """Numbers for expressions, single blanks, capitals."""
-        for index, block in enumerate(made.blocks):
-            plain = tuple(piece.strip().upper() for piece in block.pieces)
-            plain = tuple(piece if at == 0 else " " + piece for at, piece in enumerate(plain))
-            if plain != block.pieces:
-                yield _with(made, index, block._replace(pieces=plain))
-            if _label(block):
-                continue
-            for at, piece in enumerate(block.pieces):
-                for found in _INNER.finditer(piece):
-                    if "=" in piece and found.start() <= piece.index("#"):
-                        continue
-                    text = piece[: found.start()] + "3" + piece[found.end() :]
-                    yield _with(
-                        made, index, block._replace(pieces=(*block.pieces[:at], text, *block.pieces[at + 1 :]))
-                    )
+
+def _plain(block: Block) -> Block:
+    pieces = [piece.strip().upper() for piece in block.pieces]
+    return block._replace(pieces=tuple(piece if at == 0 else " " + piece for at, piece in enumerate(pieces)))
 
 
 def _label(block: Block) -> str:
