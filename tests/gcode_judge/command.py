@@ -1,7 +1,7 @@
 """``python -m tests.gcode_judge --count 10000 --seed 1``: how G-code is read against LinuxCNC's interpreter.
 
-Prints how many programs rs274 accepts, the coverage, and every difference with its shrunk program, those of a known class
-once.  Exit code 1 where one is of no known class.
+Prints how many programs rs274 accepts, the coverage, and every difference with its shrunk program, a known
+class once.  Exit code 1 where one is of no known class.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from .generator import make
 from .judging import Totals, judge, judge_all, shrink_all
 from .known import KNOWN, find_known
 from .oracle import MISSING, RS274
+from .spelling import FEATURES
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -26,23 +27,30 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the first program (1)")
     parser.add_argument("--shrink", type=int, default=100, help="differing programs that are shrunk (100)")
     parser.add_argument("--processes", type=int, default=0, help="all processors without")
-    parser.add_argument("--show", type=int, help="print the program of this seed and its differences, no more")
+    parser.add_argument(
+        "--without", nargs="*", default=[], metavar="FEATURE", choices=sorted(FEATURES),
+        help="features that no program has, so that what is known of them hides nothing else",
+    )  # fmt: skip
+    parser.add_argument(
+        "--show", type=int, help="print the program of this seed and its differences, no more"
+    )
     options = parser.parse_args(arguments)
     if RS274 is None:
         print(MISSING, file=sys.stderr)
         return 2
+    without = tuple(options.without)
     if options.show is not None:
-        return show(options.show)
+        return show(options.show, without)
     start = time.monotonic()
     totals = Totals()
-    for part in judge_all(options.count, options.seed, options.processes):
+    for part in judge_all(options.count, options.seed, options.processes, without):
         totals.add(part)
     print(summary(totals, time.monotonic() - start), flush=True)
-    return report(totals, options.shrink, options.processes)
+    return report(totals, options.shrink, options.processes, without)
 
 
-def show(seed: int) -> int:
-    made = make(seed)
+def show(seed: int, without: tuple[str, ...]) -> int:
+    made = make(seed, without)
     print(made.text, end="")
     with tempfile.TemporaryDirectory() as folder:
         found = judge(made, Path(folder))
@@ -74,12 +82,12 @@ def summary(totals: Totals, seconds: float) -> str:
     )
 
 
-def report(totals: Totals, limit: int, processes: int) -> int:
+def report(totals: Totals, limit: int, processes: int, without: tuple[str, ...] = ()) -> int:
     """Shrinks and prints; 1 where a difference is of no known class."""
     shrunk = {seed: totals.differing[seed] for seed in sorted(totals.differing)[:limit]}
     known: Counter[str] = Counter()
     new = 0
-    for seed, made in shrink_all(shrunk, processes):
+    for seed, made in shrink_all(shrunk, processes, without):
         name = find_known(made, shrunk[seed].kind)
         if name is not None:
             known[name] += 1

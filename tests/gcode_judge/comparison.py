@@ -1,13 +1,14 @@
 """What a reading and the motions of rs274 differ in.
 
-Rows and motions are paired by their line.  As many rows as motions: in order; one row: with every motion of its line, as
-what it claims has to hold each time that it runs.  A row that a finding refuses claims nothing.
+Rows and motions are paired by their line.  As many rows as motions: in order; one row: with every motion of its
+line, as what it claims has to hold each time that it runs.  A row that a finding refuses claims nothing.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -30,8 +31,9 @@ class Difference:
 
 @dataclass
 class Comparison:
-    """motions: of rs274, but those without a row that move nothing (a G0 alone); known: those that a row claims, and rightly; located: those whose place is right, refused or
-    not; misplaced: refused rows with another place than rs274's, which are no difference."""
+    """motions: of rs274, but those without a row that move nothing (a G0 alone); known: those that a row claims, and
+    rightly; located: those whose place is right, refused or not; misplaced: refused rows with another place than
+    rs274's, which are no difference."""
 
     motions: int = 0
     known: int = 0
@@ -90,7 +92,7 @@ def compare(motions: list[Motion], reading: Reading) -> Comparison:
             if len(pairs) == len(here) and row.executes:
                 first[number] = index
     order = [first[number] for number in sorted(first)]
-    for before, after in zip(order, order[1:], strict=False):
+    for before, after in pairwise(order):
         if after < before:
             differ("order", motions[after].line, f"it runs before line {motions[before].line}")
             break

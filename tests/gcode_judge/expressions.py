@@ -52,7 +52,9 @@ class Scope:
 
     @property
     def known(self) -> dict[str, float]:
-        return {name: value for name, value in self.names.items() if value is not None and abs(value) < LARGEST}
+        return {
+            name: value for name, value in self.names.items() if value is not None and abs(value) < LARGEST
+        }
 
 
 def _whole(value: float) -> float:

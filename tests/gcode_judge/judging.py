@@ -7,6 +7,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from itertools import repeat
 from pathlib import Path
 
 from .blocks import Made
@@ -44,12 +45,13 @@ def judge(made: Made, folder: Path, reader: Callable[[Made], Reading] = read) ->
     return None if motions is None else compare(motions, reader(made))
 
 
-def judge_seeds(seeds: Iterable[int]) -> Totals:
+def judge_seeds(seeds: Iterable[int], without: tuple[str, ...] = ()) -> Totals:
+    """``without``: features that the programs do not have."""
     totals = Totals()
     with tempfile.TemporaryDirectory() as folder:
         for seed in seeds:
             totals.programs += 1
-            found = judge(make(seed), Path(folder))
+            found = judge(make(seed, without), Path(folder))
             if found is None:
                 continue
             totals.accepted += 1
@@ -62,16 +64,16 @@ def judge_seeds(seeds: Iterable[int]) -> Totals:
     return totals
 
 
-def judge_all(count: int, seed: int, processes: int = 0) -> Iterator[Totals]:
+def judge_all(count: int, seed: int, processes: int = 0, without: tuple[str, ...] = ()) -> Iterator[Totals]:
     """``count`` programs from ``seed`` on, part by part."""
     parts = [range(at, min(at + PART, seed + count)) for at in range(seed, seed + count, PART)]
     with ProcessPoolExecutor(processes or os.cpu_count()) as pool:
-        yield from pool.map(judge_seeds, parts)
+        yield from pool.map(judge_seeds, parts, repeat(without))
 
 
-def shrink(seed: int, difference: Difference) -> Made:
+def shrink(seed: int, difference: Difference, without: tuple[str, ...] = ()) -> Made:
     """The least program made of that of a seed with a difference of the same kind."""
-    return shrink_program(make(seed), difference)
+    return shrink_program(make(seed, without), difference)
 
 
 def shrink_program(made: Made, difference: Difference, reader: Callable[[Made], Reading] = read) -> Made:
@@ -84,8 +86,11 @@ def shrink_program(made: Made, difference: Difference, reader: Callable[[Made], 
         return Shrinking(holds).least(made, difference.line)
 
 
-def shrink_all(differing: dict[int, Difference], processes: int = 0) -> Iterator[tuple[int, Made]]:
+def shrink_all(
+    differing: dict[int, Difference], processes: int = 0, without: tuple[str, ...] = ()
+) -> Iterator[tuple[int, Made]]:
     """Seed and shrunk program of each."""
     seeds = sorted(differing)
     with ProcessPoolExecutor(processes or os.cpu_count()) as pool:
-        yield from zip(seeds, pool.map(shrink, seeds, [differing[seed] for seed in seeds]), strict=True)
+        shrunk = pool.map(shrink, seeds, [differing[seed] for seed in seeds], repeat(without))
+        yield from zip(seeds, shrunk, strict=True)

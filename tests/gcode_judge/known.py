@@ -26,7 +26,39 @@ class Known:
         return written(self.program)
 
 
-KNOWN: tuple[Known, ...] = ()
+_ASSIGNED = r"#(?:\d+|<[^>\n]*>)="
+KNOWN = (
+    Known(
+        "words beside an assignment",
+        "A block with an assignment loses all its other words: a motion vanishes, a mode is not set.",
+        ("missing", "target", "kind", "arc", "base", "tool", "offset", "extra"),
+        "G21 G90 G0 X1 Y2 Z3\nF100\n#1=4 G1 X80\nM2",
+        rf"^[^#\nO][^\n]*?{_ASSIGNED}|^{_ASSIGNED}[-+]?(?:[\d.]+|#\d+|[A-Z]*\[[^\n]*\]|#<[^>\n]*>)+[A-Z]",
+    ),
+    Known(
+        "the place after a canned cycle",
+        "After a cycle the depth axis is taken to be where it was before it; LinuxCNC leaves it at R without G98, and"
+        " with G98 where R is above.",
+        ("target", "arc"),
+        "G21 G90 G0 X1 Y2 Z3\nF100 G81 X5 Z-5 R1\nG1 X9\nM2",
+        r"^[^\n]*G0?(?:73|8[1-9])(?!\d)",
+    ),
+    Known(
+        "coordinates after a tool length offset",
+        "G43 and G49 leave the coordinates as they were; LinuxCNC shifts Z by the difference of the lengths.",
+        ("target", "arc"),
+        "G21 G90 G0 X1 Y2 Z3\nF100 G43 H2\nG1 X9\nM2",
+        r"^[^\n]*G(?:43|49)(?!\d)",
+    ),
+    Known(
+        "a code that is computed",
+        "G[55+1] is passed over: the work offset, the plane or the distance mode before it stays in force.",
+        ("target", "kind", "arc", "base", "extra", "missing"),
+        "G21 G90 G0 X1 Y2 Z3\nG[55+1]\nG1 X5 Y3 Z2 F100\nM2",
+        r"^[^\n]*[GM]\[",
+    ),
+)
+"""The first that fits names a difference."""
 
 
 def written(text: str) -> Made:

@@ -33,9 +33,9 @@ class Motion:
     """A motion of rs274.
 
     line: from 1.  kind: "PTP", "LIN" or "CIRC".  start, end (3,) [mm]: in the coordinates of the work offset in force,
-    with the shift of G92 in them, as the program's reader has them.  step [mm]: of the last digit printed.
-    still: it moves nothing, as of a G0 alone.  centre (3,) [mm] and turn [rad], counter-clockwise seen from the tip of ``normal``: of arcs.  base: number of the
-    work offset; rewritten: the program has changed it.  tool: number in the spindle, -1 before any change.
+    with the shift of G92 in them, as the program's reader has them.  step [mm]: of the last digit printed.  base:
+    number of the work offset; rewritten: the program has changed it.  tool: number in the spindle, -1 before any change to a
+    tool of a T word.  Of arcs: centre (3,) [mm]; turn [rad], counter-clockwise about the third axis of the plane.
     """
 
     line: int
@@ -52,6 +52,7 @@ class Motion:
 
     @property
     def still(self) -> bool:
+        """It moves nothing, as a G0 alone."""
         return self.kind != "CIRC" and bool(np.abs(self.end - self.start).max() < 2 * self.step)
 
 
@@ -67,7 +68,8 @@ def execute(made: Made, folder: Path, numbered: bool = True) -> list[Motion] | N
     if made.delete:
         command.insert(1, "-b")
     try:
-        # The table of tools is kept in a file of the home folder, which all runs at a time would share.
+        # The table of tools is kept in a file of the home folder, which all runs would share.
+        (folder / ".tool.mmap").unlink(missing_ok=True)
         done = subprocess.run(
             command,
             cwd=folder,
@@ -101,7 +103,7 @@ class _Account:
         self.shift, self.shift_unit = np.zeros(3), 1.0
         self.offset, self.length, self.rotation = np.zeros(3), np.zeros(3), 0.0
         self.here = np.zeros(3)
-        self.base, self.tool = 1, -1
+        self.base, self.tool, self.selected = 1, -1, False
         self.offsets: dict[int, np.ndarray] = {}
         self.rewritten: set[int] = set()
         self.motions: list[Motion] = []
@@ -151,7 +153,9 @@ class _Account:
         elif name == "USE_TOOL_LENGTH_OFFSET":
             first = arguments.replace(",", " ").split()[:3]
             self.length = np.array([float(word) for word in first]) * self.unit
-        elif name == "CHANGE_TOOL":
+        elif name == "SELECT_TOOL":
+            self.selected = True
+        elif name == "CHANGE_TOOL" and self.selected:
             self.tool = int(float(arguments))
 
     def add(self, line: int, kind: str, end: np.ndarray, **arc: object) -> None:
