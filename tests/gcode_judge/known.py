@@ -57,13 +57,21 @@ KNOWN = (
         "G21 G90 G0 X1 Y2 Z3\nG[55+1]\nG1 X5 Y3 Z2 F100\nM2",
         r"^[^\n]*[GM]\[",
     ),
+    Known(
+        "a full circle that may run often or never",
+        "G2 and G3 without axis words, in a loop, a subprogram or behind a slash, are no motion and no finding.",
+        ("missing",),
+        "G21 G90 G0 X1 Y2 Z3\no1 repeat [2]\nG2 I5 F100\no1 endrepeat\nM2",
+        r"^/?(?=[^\n]*G0?[23](?!\d))[^XYZ\n]*$",
+    ),
 )
 """The first that fits names a difference."""
 
 
 def written(text: str) -> Made:
     """A program from its text, every line a block of words."""
-    return Made(tuple(Block((line,)) for line in text.splitlines()), False, 1)
+    lines = text.splitlines()
+    return Made(tuple(Block((line.removeprefix("/"),), line.startswith("/")) for line in lines), False, 1)
 
 
 def normalised(made: Made) -> str:
