@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
+from dataclasses import dataclass
 
 _NUMBER = re.compile(r"[ \t]*[nN][ \t]*[\d ]+")
 _FLOW = re.compile(r"[ \t]*[oO]")
 
 
-class Block(NamedTuple):
+@dataclass(frozen=True)
+class Block:
     """``pieces``: words, assignments and comments with the blanks around them; ``slash``: the block may be skipped."""
 
     pieces: tuple[str, ...]
@@ -28,7 +29,8 @@ class Block(NamedTuple):
         return f"{'/' if self.slash else ''}N{number} {rest}"
 
 
-class Made(NamedTuple):
+@dataclass(frozen=True)
+class Made:
     """A program; ``delete``: the operator's switch skips blocks with a slash; ``offsets``: seed of the nine offsets in
     the control's memory."""
 

@@ -125,6 +125,7 @@ def _check(row: Row, motion: Motion) -> list[tuple[str, str]]:
 def _check_arc(row: Row, motion: Motion) -> list[tuple[str, str]]:
     u, v, w = motion.plane
     plane, axis = [u, v], np.eye(3)[w]
+    step = max(motion.step, motion.start_step)
     assert motion.centre is not None
     sign = float(row.normal @ axis)
     if abs(abs(sign) - 1.0) > 1e-9:
@@ -133,10 +134,10 @@ def _check_arc(row: Row, motion: Motion) -> list[tuple[str, str]]:
     if sign * motion.turn < 0:
         return [("arc", "the other sense of turn")]
     off = float(np.abs(row.centre - motion.centre)[plane].max())
-    if off > 3 * motion.step:
+    if off > 3 * step:
         return [("arc", f"centre {_shown(row.centre)}, rs274 has {_shown(motion.centre)}")]
     radius = float(np.linalg.norm((motion.end - motion.centre)[plane]))
-    if abs(row.sweep - abs(motion.turn)) > 10 * motion.step / max(radius, motion.step):
+    if abs(row.sweep - abs(motion.turn)) > 10 * step / max(radius, step):
         return [("arc", f"turns by {row.sweep:.5f}, rs274 by {abs(motion.turn):.5f}")]
     return []
 

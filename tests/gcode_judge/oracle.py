@@ -33,9 +33,9 @@ class Motion:
     """A motion of rs274.
 
     line: from 1.  kind: "PTP", "LIN" or "CIRC".  start, end (3,) [mm]: in the coordinates of the work offset in force,
-    with the shift of G92 in them, as the program's reader has them.  step [mm]: of the last digit printed.  base:
-    number of the work offset; rewritten: the program has changed it.  tool: in the spindle, -1 before any change to a
-    tool of a T word.  Of arcs: centre (3,) [mm]; turn [rad], counter-clockwise about the third axis of the plane.
+    with the shift of G92 in them, as the program's reader has them.  step, start_step [mm]: of the last
+    digits printed.  base: number of the work offset; rewritten: the program has changed it.  tool: in the spindle, -1
+    before any change to a tool of a T word.  Of arcs: centre (3,) [mm]; turn [rad], counter-clockwise about the third axis of the plane.
     """
 
     line: int
@@ -43,6 +43,7 @@ class Motion:
     start: np.ndarray
     end: np.ndarray
     step: float
+    start_step: float
     base: int
     rewritten: bool
     tool: int
@@ -53,7 +54,9 @@ class Motion:
     @property
     def still(self) -> bool:
         """It moves nothing, as a G0 alone."""
-        return self.kind != "CIRC" and bool(np.abs(self.end - self.start).max() < 2 * self.step)
+        return self.kind != "CIRC" and bool(
+            np.abs(self.end - self.start).max() < 2 * max(self.step, self.start_step)
+        )
 
 
 def execute(made: Made, folder: Path, numbered: bool = True) -> list[Motion] | None:
@@ -102,7 +105,7 @@ class _Account:
         self.axes = _AXES["XY"]
         self.shift, self.shift_unit = np.zeros(3), 1.0
         self.offset, self.length, self.rotation = np.zeros(3), np.zeros(3), 0.0
-        self.here = np.zeros(3)
+        self.here, self.step = np.zeros(3), 1e-4
         self.base, self.tool, self.selected = 1, -1, False
         self.offsets: dict[int, np.ndarray] = {}
         self.rewritten: set[int] = set()
@@ -159,12 +162,13 @@ class _Account:
             self.tool = int(float(arguments))
 
     def add(self, line: int, kind: str, end: np.ndarray, **arc: object) -> None:
-        step = 1e-4 * max(self.unit, self.shift_unit)
+        # Both the place and the shift are printed with four decimals.
+        step = 1e-4 * (self.unit + self.shift_unit * self.shift.any())
         changed = self.base in self.rewritten or self.rotation != 0.0
         self.motions.append(
-            Motion(line, kind, self.here, end, step, self.base, changed, self.tool, **arc)  # type: ignore[arg-type]
+            Motion(line, kind, self.here, end, step, self.step, self.base, changed, self.tool, **arc)  # type: ignore[arg-type]
         )
-        self.here = end
+        self.here, self.step = end, step
 
     def arc(self, line: int, numbers: list[float]) -> None:
         one, two, first, second, third = (value * self.unit for value in (*numbers[:4], numbers[5]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .blocks import Block, Made
 
@@ -25,8 +25,8 @@ class Shrinking:
         whole = made
         for kept in (ends[-1:], ends[-2:]):
             blocks = whole.blocks[:line] + tuple(whole.blocks[index] for index in kept)
-            made = self.tried(made, whole._replace(blocks=blocks)) if made is whole else made
-        made = self.tried(made, made._replace(delete=False))
+            made = self.tried(made, replace(whole, blocks=blocks)) if made is whole else made
+        made = self.tried(made, replace(made, delete=False))
         changed = True
         while changed and self.trials > 0:
             before = made
@@ -51,7 +51,7 @@ class Shrinking:
             stop = len(made.blocks)
             while stop > 0:
                 start = max(stop - size, 0)
-                made = self.tried(made, made._replace(blocks=made.blocks[:start] + made.blocks[stop:]))
+                made = self.tried(made, replace(made, blocks=made.blocks[:start] + made.blocks[stop:]))
                 stop = start
             size //= 2
         return made
@@ -60,27 +60,29 @@ class Shrinking:
         """Without the O words of a label, with or without what is between them."""
         for label in sorted({_label(block) for block in made.blocks} - {""}):
             places = [index for index, block in enumerate(made.blocks) if _label(block) == label]
+            if not places:
+                continue
             blocks = made.blocks
-            shorter = self.tried(made, made._replace(blocks=blocks[: places[0]] + blocks[places[-1] + 1 :]))
+            shorter = self.tried(made, replace(made, blocks=blocks[: places[0]] + blocks[places[-1] + 1 :]))
             if shorter is made:
                 kept = tuple(block for block in blocks if _label(block) != label)
-                shorter = self.tried(made, made._replace(blocks=kept))
+                shorter = self.tried(made, replace(made, blocks=kept))
             made = shorter
         return made
 
     def without_words(self, made: Made) -> Made:
         for index in reversed(range(len(made.blocks))):
-            made = self.tried(made, _with(made, index, made.blocks[index]._replace(slash=False)))
+            made = self.tried(made, _with(made, index, replace(made.blocks[index], slash=False)))
             for at in reversed(range(len(made.blocks[index].pieces))):
                 block = made.blocks[index]
                 if len(block.pieces) > 1:
                     fewer = block.pieces[:at] + block.pieces[at + 1 :]
-                    made = self.tried(made, _with(made, index, block._replace(pieces=fewer)))
+                    made = self.tried(made, _with(made, index, replace(block, pieces=fewer)))
         return made
 
     def plainer(self, made: Made) -> Made:
         """Single blanks and capitals; numbers for expressions."""
-        whole = self.tried(made, made._replace(blocks=tuple(_plain(block) for block in made.blocks)))
+        whole = self.tried(made, replace(made, blocks=tuple(_plain(block) for block in made.blocks)))
         for index in range(len(made.blocks) if whole is made else 0):
             whole = self.tried(whole, _with(whole, index, _plain(whole.blocks[index])))
         made = whole
@@ -90,7 +92,7 @@ class Shrinking:
                 for found in _INNER.finditer(tail):
                     text = head + equals + tail[: found.start()] + "3" + tail[found.end() :]
                     pieces = (*made.blocks[index].pieces[:at], text, *made.blocks[index].pieces[at + 1 :])
-                    simpler = self.tried(made, _with(made, index, block._replace(pieces=pieces)))
+                    simpler = self.tried(made, _with(made, index, replace(block, pieces=pieces)))
                     if simpler is not made:
                         made = simpler
                         break
@@ -99,7 +101,7 @@ class Shrinking:
 
 def _plain(block: Block) -> Block:
     pieces = [piece.strip().upper() for piece in block.pieces]
-    return block._replace(pieces=tuple(piece if at == 0 else " " + piece for at, piece in enumerate(pieces)))
+    return replace(block, pieces=tuple(piece if at == 0 else " " + piece for at, piece in enumerate(pieces)))
 
 
 def _label(block: Block) -> str:
@@ -108,4 +110,4 @@ def _label(block: Block) -> str:
 
 
 def _with(made: Made, index: int, block: Block) -> Made:
-    return made._replace(blocks=(*made.blocks[:index], block, *made.blocks[index + 1 :]))
+    return replace(made, blocks=(*made.blocks[:index], block, *made.blocks[index + 1 :]))
