@@ -33,9 +33,9 @@ class Motion:
     """A motion of rs274.
 
     line: from 1.  kind: "PTP", "LIN" or "CIRC".  start, end (3,) [mm]: in the coordinates of the work offset in force,
-    with the shift of G92 in them, as the program's reader has them.  step, start_step [mm]: of the last
-    digits printed.  base: number of the work offset; rewritten: the program has changed it.  tool: in the spindle, -1
-    before any change to a tool of a T word.  Of arcs: centre (3,) [mm]; turn [rad], counter-clockwise about the third axis of the plane.
+    with the shift of G92 in them, as the program's reader has them.  step, start_step [mm]: of the last digits printed.
+    base: number of the work offset; rewritten: the program has changed it.  tool: in the spindle, -1 before any change
+    to a tool of a T word.  Of arcs: centre (3,) [mm]; turn [rad], counter-clockwise about the plane's third axis.
     """
 
     line: int
