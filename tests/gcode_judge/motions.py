@@ -1,0 +1,184 @@
+"""Straight motions, arcs and canned cycles."""
+
+from __future__ import annotations
+
+import math
+
+from .expressions import Real
+from .spelling import PLANES, Spelling
+
+
+class Motions(Spelling):
+    @property
+    def size(self) -> float:
+        return 4.0 if self.modes.inch else 100.0
+
+    def feed(self) -> list[str]:
+        modes = self.modes
+        if modes.timed or not modes.fed or self.maybe(0.06):
+            modes.fed = True
+            real = self.reals.number(self.chance.uniform(50, 900), 1)
+            return [self.word("F", real)]
+        return []
+
+    def targets(self, end: list[float], which: list[int]) -> list[str]:
+        """Words that lead to ``end``; where the axes are afterwards."""
+        words, modes = [], self.modes
+        for axis in which:
+            here = modes.here[axis]
+            base = (here or 0.0) if modes.incremental else 0.0
+            value = end[axis] - base
+            if modes.incremental and here is None:
+                value = self.chance.uniform(-0.1, 0.1) * self.size
+            decimals = self.chance.choice((3, 4)) if modes.inch else None
+            word, value_there = self.length("XYZ"[axis], value, decimals)
+            words.append(word)
+            if value_there is None or (modes.incremental and here is None):
+                modes.here[axis] = None
+            else:
+                modes.here[axis] = base + value_there
+        return words
+
+    def place(self) -> list[float]:
+        return [self.chance.uniform(-self.size, self.size) for _ in range(3)]
+
+    def line(self) -> None:
+        modes = self.modes
+        which = [0, 1, 2]
+        if self.has("sparse") and self.maybe(0.7):
+            which = sorted(self.chance.sample(which, self.chance.randint(1, 2)))
+        code = self.chance.choice("0111")
+        words = self.feed() if code == "1" else []
+        if not (modes.motion == code and self.maybe(0.5)):
+            words.insert(0, self.code(code))
+        modes.motion = code
+        words += self.targets(self.place(), which)
+        if self.has("rotary") and self.maybe(0.25):
+            words.append(self.length(self.chance.choice("AABC"), self.chance.uniform(-90, 90))[0])
+        self.put(*words)
+
+    def anchor(self, *codes: str) -> None:
+        """All axes at known places."""
+        self.flush()
+        self.modes.incremental, self.modes.motion = False, "0"
+        words = [self.code("90"), *(self.code(code) for code in codes), self.code("0")]
+        self.put(*words, *self.targets(self.place(), [0, 1, 2]), plain=True)
+
+    def arc(self) -> None:
+        modes, chance = self.modes, self.chance
+        u, v, w = PLANES[modes.plane]
+        if not modes.incremental and (modes.here[u] is None or modes.here[v] is None):
+            self.anchor()
+            if modes.here[u] is None or modes.here[v] is None:
+                return
+        if modes.absolute_centres and modes.incremental and (modes.here[u] is None or modes.here[v] is None):
+            return self.line()
+        start = [value or 0.0 for value in modes.here]
+        radius = chance.uniform(0.05, 0.5) * self.size
+        angle, sweep = chance.uniform(0, 2 * math.pi), chance.uniform(0.3, 5.5)
+        code = chance.choice("23")
+        words = self.feed()
+        if not (modes.motion == code and self.maybe(0.4)):
+            words.insert(0, self.code(code))
+        modes.motion = code
+        end = list(start)
+        helix = [w] if self.has("helix") and self.maybe(0.4) else []
+        if helix:
+            end[w] += chance.uniform(-0.1, 0.1) * self.size
+        rich, self.reals.rich = self.reals.rich, self.reals.rich and self.maybe(0.5)
+        if self.has("radius") and self.maybe(0.4):
+            chord = chance.uniform(0.4, 1.8) * radius
+            end[u], end[v] = start[u] + chord * math.cos(angle), start[v] + chord * math.sin(angle)
+            words += self._ends(end, [u, v, *helix])
+            words.append(self.length("R", chance.choice((1, 1, -1)) * radius)[0])
+        else:
+            centre = list(start)
+            for axis, by in ((u, radius * math.cos(angle)), (v, radius * math.sin(angle))):
+                base = 0.0 if modes.absolute_centres else start[axis]
+                real = self.reals.number(start[axis] + by - base, 4)
+                words.append(self.word("IJK"[axis], real))
+                centre[axis] = base + (real.value or 0.0)
+            ends = list(helix)
+            if self.maybe(0.85):
+                turn = sweep if code == "3" else -sweep
+                du, dv = start[u] - centre[u], start[v] - centre[v]
+                end[u] = centre[u] + du * math.cos(turn) - dv * math.sin(turn)
+                end[v] = centre[v] + du * math.sin(turn) + dv * math.cos(turn)
+                ends = [u, v, *helix]
+            words += self._ends(end, ends)
+            if self.maybe(0.12):
+                words.append(self.word("P", self.reals.number(chance.randint(1, 3), 0)))
+        self.reals.rich = rich
+        self.put(*words)
+
+    def _ends(self, end: list[float], which: list[int]) -> list[str]:
+        """Ends of an arc, exact to four decimals; incremental ones need no start."""
+        words, modes = [], self.modes
+        for axis in which:
+            here = modes.here[axis]
+            base = (here or 0.0) if modes.incremental else 0.0
+            rich, self.reals.rich = self.reals.rich, self.reals.rich and self.maybe(0.3)
+            word, value = self.length("XYZ"[axis], end[axis] - base, 4)
+            self.reals.rich = rich
+            words.append(word)
+            modes.here[axis] = None if value is None or (modes.incremental and here is None) else base + value
+        return words
+
+    def start_spindle(self) -> None:
+        self.flush()
+        self.put(self.code("3", "M"), self.word("S", Real("1000", None)))
+        self.modes.spindle = True
+
+    def cycles(self) -> None:
+        """A canned cycle, further holes, its end."""
+        modes, chance = self.modes, self.chance
+        if modes.timed or self.depth > 2:
+            return self.line()
+        self.flush()
+        u, v, w = PLANES[modes.plane]
+        code = chance.choice(("73", "81", "81", "82", "83", "85", "86", "87", "88", "89", "81"))
+        if not modes.spindle:
+            self.start_spindle()
+        modes.motion = code
+        for hole in range(chance.randint(1, 4)):
+            words = self.feed()
+            if hole == 0 or self.maybe(0.3):
+                words.append(self.code(code))
+            if self.maybe(0.3):
+                words.append(self.code(chance.choice(("98", "99"))))
+            which = chance.sample([u, v], chance.choice((0, 1, 2, 2)) if hole == 0 else chance.choice((1, 2)))
+            words += self.targets(self.place(), which)
+            if hole == 0 or self.maybe(0.15):
+                words += self._depths("XYZ"[w])
+            elif code in ("73", "83", "82", "86", "88", "89", "87"):
+                pass
+            if code in ("73", "83") and (hole == 0 or self.maybe(0.2)):
+                words.append(self.word("Q", self.reals.number(chance.uniform(0.03, 0.2) * self.size, 3)))
+            if code in ("82", "86", "88", "89") and (hole == 0 or self.maybe(0.2)):
+                words.append(self.word("P", self.reals.number(0.25, 2)))
+            if code == "87" and hole == 0:
+                words += [self.word(letter, self.reals.number(0.02 * self.size, 2)) for letter in ("I", "J")]
+                words.append(self.word("K", self.reals.number(-0.6 * self.size, 2)))
+            if self.maybe(0.2):
+                words.append(self.word("L", Real(str(chance.randint(1, 3)), None)))
+                modes.lost()
+            self.put(*words)
+            modes.here[w] = None
+        if self.maybe(0.6):
+            modes.motion = ""
+            self.put(self.code("80"))
+        else:
+            modes.motion = "cycle"
+            self.line()
+
+    def _depths(self, axis: str) -> list[str]:
+        size, chance = self.size, self.chance
+        if self.modes.incremental:
+            retract, depth = chance.uniform(-0.2, 0.2) * size, -chance.uniform(0.02, 0.3) * size
+        else:
+            depth = chance.uniform(-0.5, 0.0) * size
+            retract = depth + chance.uniform(0.05, 1.0) * size
+        return [
+            self.length("R", retract, 3)[0],
+            self.length(axis, depth, 3)[0],
+        ]

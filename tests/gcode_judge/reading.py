@@ -1,0 +1,99 @@
+"""What the reader of ``postproc`` claims to know of a program: nothing else here names it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from postproc.base.document import Document
+from postproc.languages.gcode import LINUXCNC, GcodeDialect
+from postproc.toolpath import Kind
+
+from .blocks import Made
+
+MM = 1e-3
+_LINES = re.compile(r"lines (\d+) to (\d+)")
+
+
+@dataclass(frozen=True)
+class Row:
+    """A motion as it is read; lengths in mm.
+
+    code: of the finding that says that the motion is not known or not corrected, "" without.  end, centre, normal (3,),
+    NaN where not known.  base, tool: their numbers, -1 where not known.  executes: it follows the row before it.
+    """
+
+    line: int
+    kind: str
+    end: np.ndarray
+    centre: np.ndarray
+    normal: np.ndarray
+    sweep: float
+    base: int
+    tool: int
+    code: str
+    executes: bool = True
+
+    @property
+    def claimed(self) -> bool:
+        """The reader says that it knows the target."""
+        return not self.code and self.located
+
+    @property
+    def located(self) -> bool:
+        return bool(np.isfinite(self.end).all())
+
+
+@dataclass(frozen=True)
+class Reading:
+    """rows in the order of the reader; findings: code -> lines (first, last) that one of them names."""
+
+    rows: tuple[Row, ...]
+    findings: tuple[tuple[str, int, int], ...]
+
+    def reported(self, line: int) -> bool:
+        """A warning, or a finding of its own, names the line."""
+        return any(first <= line <= last for _, first, last in self.findings)
+
+
+UNSAID = ("GCO020", "GCO021", "GCO022", "GCO023")
+"""Findings that say nothing of a motion: unit and tool that are assumed."""
+
+
+def read(made: Made) -> Reading:
+    """The reader's result for a program."""
+    path = Path("made.ngc")
+    program = GcodeDialect(LINUXCNC).read((Document(path, made.text.encode("latin-1")),))
+    toolpath = program.toolpath
+
+    def number(index: int) -> int:
+        found = toolpath.frames[index].number if index >= 0 else None
+        return -1 if found is None else found
+
+    rows = []
+    for row in range(len(toolpath)):
+        rows.append(
+            Row(
+                line=int(toolpath.line[row]),
+                kind=Kind(toolpath.kind[row]).name,
+                end=np.array(toolpath.position[row]) / MM,
+                centre=np.array(toolpath.centre[row]) / MM,
+                normal=np.array(toolpath.normal[row]),
+                sweep=float(toolpath.sweep[row]),
+                base=number(int(toolpath.base[row])),
+                tool=number(int(toolpath.tool[row])),
+                code=toolpath.refused[row].code if row in toolpath.refused else "",
+                executes=bool(toolpath.executes[row]),
+            )
+        )
+    findings = []
+    for finding in program.findings:
+        if finding.code in UNSAID:
+            continue
+        line = finding.line or 0
+        span = _LINES.search(finding.message)
+        findings.append((finding.code, line, int(span[2]) if span else line))
+    return Reading(tuple(rows), tuple(findings))
