@@ -66,7 +66,7 @@ def test_help_shows_the_present_names_only(command):
 
 
 def test_a_misspelt_option_leads_to_the_present_names_only(compensate, job):
-    run = compensate(job.program, "--keep-pointss")
+    run = compensate(job.program, "--keep-point")
     assert run.code == 2
     assert "--no-insert" in run.err
     assert "--keep-points" not in run.err
