@@ -1,0 +1,64 @@
+"""Misreadings of the present reader that are known, each with a small program.
+
+A disagreement that vanishes where the interpreter makes the same mistake is explained by it.  What is mended here is
+taken out: its name in ``machine``, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+from .judge import Case, Disagreement, Reader, judge
+
+
+@dataclass(frozen=True)
+class Known:
+    name: str
+    """As ``machine`` and ``judge`` know it."""
+    what: str
+    case: Case
+
+
+KNOWN = (
+    Known(
+        "partial axes",
+        "A PTP to some axes moves the robot also where the other axes are not known; a partial point behind it takes its"
+        " components from before that PTP.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "PTP {A3 66}\n"
+            "LIN {X 9}\n"
+            "END\n"
+        ),
+    ),
+    Known(
+        "tables",
+        "BASE_DATA and TOOL_DATA outlive the program: a motion before the assignment of an entry stands in the old frame"
+        " in the first run and in the new one in the next.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "BASE_DATA[1]={X 9,Y 0,Z 0,A 0,B 0,C 0}\n"
+            "END\n"
+        ),
+    ),
+)  # fmt: skip
+
+
+def unexplained(case: Case, reader: Reader | None = None) -> tuple[Disagreement, ...]:
+    """The disagreements that no known misreading explains, nor several together."""
+    left = judge(case, reader).disagreements
+    for count in range(1, len(KNOWN) + 1):
+        for chosen in combinations(KNOWN, count):
+            if not left:
+                return ()
+            still = judge(case, reader, frozenset(known.name for known in chosen)).disagreements
+            places = {(d.line, d.word) for d in still}
+            left = tuple(d for d in left if (d.line, d.word) in places)
+    return left
