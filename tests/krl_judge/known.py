@@ -48,7 +48,45 @@ KNOWN = (
             "END\n"
         ),
     ),
-)  # fmt: skip
+    Known(
+        "never",
+        "A subprogram that is followed for one call, and called elsewhere where the flow is not followed: what the followed"
+        " call does not reach is said to run never.",
+        Case(
+            "DEF part()\n"
+            "DECL INT n\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "IF $IN[1] THEN\n"
+            "sub(4)\n"
+            "ENDIF\n"
+            "sub(3)\n"
+            "END\n"
+            "DEF sub(v:IN)\n"
+            "INT v\n"
+            "IF v==4 THEN\n"
+            "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "ENDIF\n"
+            "END\n",
+            inputs=({1: (True,)},),
+        ),
+    ),
+    Known(
+        "aggregates",
+        "What an aggregate leaves out of a point that had it is not documented: unset, as it is read, or as it was.",
+        Case(
+            "DEF part()\n"
+            "DECL FRAME f\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "f={X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "LIN {X 0,Y 0,Z 0,A 0,B 0,C 0}\n"
+            "f={X 9}\n"
+            "LIN f\n"
+            "END\n"
+        ),
+    ),
+)
 
 
 def unexplained(case: Case, reader: Reader | None = None) -> tuple[Disagreement, ...]:

@@ -269,7 +269,8 @@ class Machine:
             value = self.value(reader.expression())
             reader.end()
             if cell is not None:
-                assign(cell, value)
+                # what becomes of the components that an aggregate leaves out is not documented
+                assign(cell, value, None if "aggregates" in self.misread else UNDETERMINED)
             return at + 1
         if line.block:
             return self.block(scope, line, at, reader)

@@ -60,14 +60,17 @@ class Generator:
     def case(self) -> Case:
         rng = self.rng
         self.subprograms = rng.choice([0, 1, 1, 2, 3])
+        self.takes_frame = [rng.choice(["", "", "IN", "OUT"]) for _ in range(self.subprograms)]
         self.has_function = rng.random() < 0.2
+        self.frame_type = "FRAME" if "OUT" in self.takes_frame else rng.choice(["FRAME", "POS", "E6POS"])
         if rng.random() < 0.3:
             self.lines += ["&ACCESS RVP", "&REL 1"]
         self.main()
         for number in range(1, self.subprograms + 1):
             self.subprogram(number)
         if self.has_function:
-            self.lines += ["DEFFCT INT twice(v:IN)", "INT v", "RETURN 2*v", "ENDFCT"]
+            does = rng.choice([[], [], ["mi=mi+1"], ["BAS(#BASE,2)"], ["$TOOL=TOOL_DATA[3]"], ["LIN {Z 5}"], ["mr=v"]])
+            self.lines += ["DEFFCT INT twice(v:IN)", "INT v", *does, "RETURN 2*v", "ENDFCT"]
         spelling = Spelling(rng)
         src = "".join(spelling.line(line) + "\n" for line in self.lines)
         dat = "".join(spelling.line(line) + "\n" for line in self.dat())
@@ -220,6 +223,8 @@ class Generator:
         tail = self.rng.choice([f",Z {z}", f",Z {z},A 10,B 20,C 30", ",A 0,B 0,C 90", ""])
         begin = [f"LIN {{X {x + r},Y {y},Z {z},A {self.angle()},B {self.angle()},C 0}}"] * (rng.random() < 0.8)
         word = rng.choice(["CIRC", "CIRC", "SCIRC"])
+        if rng.random() < 0.15:
+            return [*begin, f"CIRC_REL {{X {r},Y {r}}},{{X {2 * r},Y 3}}{rng.choice(['', ' #TOOL'])}"]
         return [*begin, f"{word} {{X {x},Y {y + r},Z {z}}},{{X {x - r},Y {y + 3}{tail}}}{angle}{self.rounding()}"]
 
     # statements
@@ -260,6 +265,8 @@ class Generator:
             return [f"{rng.choice(names.frames)}={self.frame_value()}"]
         if kind < 0.8 and names.frames:
             return [f"{rng.choice(names.frames)}.{rng.choice('XYZABC')}={self.real()}"]
+        if kind < 0.81 and names.frames:
+            return [f"{rng.choice(names.frames)}={self.aggregate(self.keys())}"]
         if kind < 0.85 and names.bools:
             return [f"{rng.choice(names.bools)}={self.condition()}"]
         if kind < 0.9:
@@ -276,7 +283,7 @@ class Generator:
         return [
             rng.choice(
                 [f"$VEL.CP={speed}", f"BAS(#VEL_CP,{speed})", f"$APO.CDIS={rng.randint(1, 9)}", "$ORI_TYPE=#VAR",
-                 "$ORI_TYPE=#JOINT", f"$VEL={{CP {speed},ORI1 200,ORI2 200}}", f"$VEL.ORI1={rng.randint(50, 200)}"]
+                 "$ORI_TYPE=#JOINT", rng.choice(["$ORI_TYPE=#CONSTANT", "$ORI_TYPE=#VAR"]), f"$VEL={{CP {speed},ORI1 200,ORI2 200}}", f"$VEL.ORI1={rng.randint(50, 200)}"]
             )
         ]  # fmt: skip
 
@@ -286,6 +293,8 @@ class Generator:
         if rng.random() < 0.5:
             inner = [f"LDAT_ACT=LCPDAT{n}", f"FDAT_ACT=FP{n}", f"BAS(#CP_PARAMS,{rng.choice(['0.5', '2'])})",
                      f"LIN {point}{rng.choice(['', ' C_DIS', ' C_DIS C_DIS'])}"]  # fmt: skip
+        elif rng.random() < 0.3:
+            return [f"FDAT_ACT=FP{n}", f"FDAT_ACT.{rng.choice(['BASE_NO', 'TOOL_NO'])}={rng.randint(1, 4)}", "BAS(#FRAMES)"]
         else:
             inner = [f"PDAT_ACT=PPDAT{n}", f"FDAT_ACT=FP{n}", "BAS(#PTP_PARAMS,100)", f"PTP {point}"]
         return [f";FOLD {inner[-1]} Vel=1 m/s", "$BWDSTART=FALSE", *inner, ";ENDFOLD"]
@@ -396,6 +405,12 @@ class Generator:
     def jump(self, depth: int) -> list[str]:
         self.labels += 1
         label, names, rng = f"lab{self.labels}", self.names, self.rng
+        if rng.random() < 0.3:
+            away = [f"IF {self.condition()} THEN", *self.assignment(), f"GOTO {label}", "ENDIF"]
+            body = rng.choice([self.counted, self.loop, self.branch])(depth)
+            at = next((n for n, line in enumerate(body) if line.startswith(("FOR", "WHILE", "LOOP", "REPEAT", "IF"))), None)
+            if at is not None:
+                return [*body[: at + 1], *away, *body[at + 1 :], *self.motion(), f"{label}:"]
         if rng.random() < 0.65 or not names.free:
             go = [f"IF {self.condition()} THEN", f"GOTO {label}", "ENDIF"] if rng.random() < 0.85 else [f"GOTO {label}"]
             return [*go, *self.inner(depth), f"{label}:"]
@@ -412,21 +427,30 @@ class Generator:
         if not later or not self.names.ints or not self.names.reals:
             return self.motion()
         number = self.rng.choice(later)
-        return [f"sub{number}({self.whole()},{self.rng.choice(self.names.reals)})"]
+        given = [self.whole(), self.rng.choice(self.names.reals)]
+        if way := self.takes_frame[number - 1]:
+            given.append(self.frame_value() if way == "IN" else self.rng.choice(self.names.frames))
+        return [f"sub{number}({','.join(given)})"]
 
     # routines
 
     def locals(self, more: bool) -> list[str]:
-        """Declarations of a routine, and what gives its variables their first values."""
+        """Declarations of a routine, and what gives its variables their first values; not ``more``: some variables of
+        the .dat are hidden by local ones."""
         rng = self.rng
         names = self.names = Names(["n", "m"], ["r", "q"], ["f", "g"], ["b"], [], ["i", "j", "k"])
-        if more and self.module:
+        hidden: list[str] = []
+        if self.module:
             names.frames += MODULE_FRAMES
             names.ints += MODULE_INTS
             names.reals += MODULE_REALS
-        out = ["DECL INT n,m,i,j,k", "DECL REAL r,q", f"DECL {rng.choice(['FRAME', 'POS', 'E6POS'])} f,g", "DECL BOOL b"]
+            if not more:
+                hidden = ["mi=2", "mj=3", f"pf={self.aggregate(plain=True)}"]
+        out = ["DECL INT mi,mj", "DECL FRAME pf"] if hidden else []
+        out += ["DECL INT n,m,i,j,k", "DECL REAL r,q", f"DECL {self.frame_type} f,g", "DECL BOOL b"]
         first = [f"n={rng.randint(0, 6)}", f"m={rng.randint(0, 6)}", f"r={self.number(0, 50)}", f"q={self.number(0, 50)}",
                  f"f={self.aggregate(plain=True)}", f"g={self.aggregate(plain=True)}", f"b={rng.choice(['TRUE', 'FALSE'])}"]  # fmt: skip
+        first += hidden
         rng.shuffle(first)
         return out + first
 
@@ -444,10 +468,14 @@ class Generator:
         rng = self.rng
         self.routine = number
         way = rng.choice([":OUT", ""])
-        self.lines += [f"DEF sub{number}(v:IN,w{way})"]
-        own = self.locals(True)
+        frame = self.takes_frame[number - 1]
+        self.lines += [f"DEF sub{number}(v:IN,w{way}{',p:' + frame if frame else ''})"]
+        own = self.locals(rng.random() < 0.8)
         self.names.ints.append("v")
         self.names.reals.append("w")
+        if frame:
+            own = ["FRAME p", *own]
+            self.names.frames.append("p")
         self.lines += ["INT v", "DECL REAL w", *own, *self.block(1, rng.randint(1, 5)), "END"]
 
     def dat(self) -> list[str]:

@@ -81,8 +81,8 @@ def content(cell: Cell) -> object:
     return cell.value
 
 
-def assign(cell: Cell, value: object) -> None:
-    """Components that the new value does not have: unset ones stay so, what others become is not documented."""
+def assign(cell: Cell, value: object, left_out: object = UNDETERMINED) -> None:
+    """Components that the new value does not have: unset ones stay so, others become ``left_out``."""
     if cell.is_array:
         raise Stop("an array is assigned")
     if cell.parts:
@@ -94,11 +94,11 @@ def assign(cell: Cell, value: object) -> None:
             raise Stop("nothing fits")
         for key, part in cell.parts.items():
             if key in value:
-                assign(part, value[key])
+                assign(part, value[key], left_out)
             elif is_set(part):
                 if part.parts:
                     raise Stop("a part of a structure is left out")
-                part.value = UNDETERMINED
+                part.value = left_out
         return
     cell.value = converted(cell.type, value)
 
