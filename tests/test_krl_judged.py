@@ -1,9 +1,9 @@
 """The reader of KRL before a judge of its own: random programs, executed as the controller would.
 
-First the judge is held itself: the interpreter against executions that are worked out by hand from the description of the
-language (``krl_judge/executions.txt``: ``### name``, a program as in the readings, ``=== dat``, ``=== inputs`` with what
-$IN[n] shows one time after the other, ``=== runs`` with a line a motion: ``~`` is given by axis angles, ``?`` is not
-determined), then the comparison against readers that are made wrong.
+First the judge is held itself: the interpreter against executions that are worked out by hand from the description of
+the language (``krl_judge/executions.txt``: ``### name``, a program as in the readings, ``=== dat``, ``=== inputs`` with
+what $IN[n] shows one time after the other, ``=== runs`` with a line a motion: ``~`` is given by axis angles, ``?`` is
+not determined), then the comparison against readers that are made wrong.
 """
 
 from __future__ import annotations
@@ -225,7 +225,9 @@ def careless(line: int) -> Callable:
     """A reader that takes a branch for run through, or for passed over."""
 
     def reader(src: str, dat: str, config: str, tables: Tables) -> list[Claim]:
-        through = read_claims(src.replace("IF $IN[1] THEN\n", "\n").replace("ENDIF\n", "\n"), dat, config, tables)
+        through = read_claims(
+            src.replace("IF $IN[1] THEN\n", "\n").replace("ENDIF\n", "\n"), dat, config, tables
+        )
         rows = read_claims(src, dat, config, tables)
         return [next(t for t in through if t.line == row.line) if row.line == line else row for row in rows]
 
@@ -289,7 +291,14 @@ def test_a_program_is_shrunk_to_what_disagrees() -> None:
     wrong = f"LIN {FULL}\nPTP {{A3 66}}\nLIN {{X 9}}\n"
     body = case.src.splitlines(keepends=True)
     end = next(n for n, line in enumerate(body) if line.strip().upper() == "END")
-    case = replace(case, src=HEAD + "DECL INT i\n" + wrong + "i=5\nWHILE i<6\ni=i+1\nENDWHILE\nEND\n" + "".join(body[end + 1 :]))
+    case = replace(
+        case,
+        src=HEAD
+        + "DECL INT i\n"
+        + wrong
+        + "i=5\nWHILE i<6\ni=i+1\nENDWHILE\nEND\n"
+        + "".join(body[end + 1 :]),
+    )
     small = shrunk(case, lambda smaller: any(d.word == "target" for d in judge(smaller).disagreements))
     assert small.src == f"{HEAD}{wrong}END\n"
     assert not small.dat

@@ -15,7 +15,9 @@ from .programs import Generator
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.krl_judge", description=__doc__)
     parser.add_argument("--count", type=int, default=1000)
-    parser.add_argument("--seed", type=int, default=1, help="of the first program; each next one has the next")
+    parser.add_argument(
+        "--seed", type=int, default=1, help="of the first program; each next one has the next"
+    )
     parser.add_argument("--show", type=int, default=10, help="disagreements that are shrunk and printed")
     given = parser.parse_args()
     total: Counter[str] = Counter()
@@ -24,7 +26,10 @@ def main() -> int:
         case = Generator(seed).case()
         verdict = judge(case)
         total.update(
-            {name: getattr(verdict, name) for name in ("runs", "motions", "known", "constant", "constant_known", "stopped")}
+            {
+                name: getattr(verdict, name)
+                for name in ("runs", "motions", "known", "constant", "constant_known", "stopped")
+            }
         )
         if not verdict.disagreements:
             continue

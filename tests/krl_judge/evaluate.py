@@ -24,8 +24,8 @@ _BITS: dict[str, Callable] = {"B_AND": int.__and__, "B_OR": int.__or__, "B_EXOR"
 
 
 def evaluate(tree: tuple, resolve: Resolve, call: Call) -> object:
-    """``resolve``: the value of a place (("name", ..), ("element", ..), ("member", ..)); ``call``: that of a function of
-    the program, with its arguments as trees."""
+    """``resolve``: the value of a place (("name", ..), ("element", ..), ("member", ..)); ``call``: that of a function
+    of the program, with its arguments as trees."""
 
     def of(tree: tuple) -> object:
         kind = tree[0]

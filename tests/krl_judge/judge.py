@@ -1,8 +1,8 @@
 """Compares what the reader claims with what several runs of the program execute; makes a program smaller.
 
 Every execution of a line is held against the rows of that line.  One row speaks for all of them.  Where a line has
-several rows, as many as it is executed, or more, they follow each other in that order.  Where it is executed more often,
-or inputs decide the flow, each execution has to be that of some row.
+several rows, as many as it is executed, or more, they follow each other in that order.  Where it is executed more
+often, or inputs decide the flow, each execution has to be that of some row.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ import numpy as np
 
 from . import claims
 from .claims import Claim, Tables
-from .machine import NOTHING, Inputs, Misread, Run, load, run
+from .machine import NOTHING, Inputs, Run, load, run
 from .motions import Executed, Six
+from .robot import Misread
 from .syntax import routines
 from .values import FRAME, Stop, matrix, rotation
 
@@ -139,7 +140,8 @@ def _one_motion(motions: Sequence[Executed]) -> bool:
     frames = first.base is not None and first.tool is not None
     determined = (frames or first.axes is not None) and not any(v != v for v in (first.axes or first.target))
     return determined and all(
-        (m.target, m.axes, m.base, m.tool, m.origin) == (first.target, first.axes, first.base, first.tool, first.origin)
+        (m.target, m.axes, m.base, m.tool, m.origin)
+        == (first.target, first.axes, first.base, first.tool, first.origin)
         for m in motions
     )
 
@@ -150,7 +152,7 @@ def align(rows: Sequence[Claim], motions: Sequence[Executed], inputs: bool) -> t
         return 0, "missing: the line has no row"
     if all(row.never for row in rows):
         return 0, "never: it runs and is said not to"
-    if len(rows) == 1 or len(rows) == len(motions) and not inputs:
+    if len(rows) == 1 or (len(rows) == len(motions) and not inputs):
         pairs = list(zip(list(rows) * (len(motions) if len(rows) == 1 else 1), motions, strict=True))
         why = next((text for row, motion in pairs if (text := differs(row, motion))), "")
         return sum(row.claimed for row, _ in pairs), why
@@ -160,7 +162,9 @@ def align(rows: Sequence[Claim], motions: Sequence[Executed], inputs: bool) -> t
         turn = range(at, len(rows)) if in_order else [k % len(rows) for k in range(at, at + len(rows))]
         fit = next((k for k in turn if not differs(rows[k], motion)), None)
         if fit is None:
-            return known, "none of the rows: " + "; ".join(filter(None, (differs(row, motion) for row in rows)))
+            return known, "none of the rows: " + "; ".join(
+                filter(None, (differs(row, motion) for row in rows))
+            )
         known += rows[fit].claimed
         at = fit + 1
     return known, ""
@@ -183,9 +187,9 @@ def differs(row: Claim, motion: Executed) -> str:
         return why
     if math.isfinite(row.feed) and (motion.feed is None or abs(row.feed - motion.feed) > 1e-9):
         return f"feed: {row.feed}, it is {motion.feed}"
-    if motion.approximation is not None and math.isfinite(row.approximation):
-        if not abs(row.approximation - motion.approximation) <= LENGTH:
-            return f"approximation: {row.approximation}, it is {motion.approximation}"
+    told = motion.approximation is not None and math.isfinite(row.approximation)
+    if told and not abs(row.approximation - motion.approximation) <= LENGTH:
+        return f"approximation: {row.approximation}, it is {motion.approximation}"
     if row.orientation and motion.ori_type is not None and row.orientation != motion.ori_type:
         return f"orientation: {row.orientation}, it is {motion.ori_type}"
     return _arc(row, motion)
@@ -198,7 +202,9 @@ def _target(row: Claim, motion: Executed) -> str:
     true = motion.target
     if row.partial is not None:
         for key, claimed, value in zip(FRAME, row.partial, true, strict=True):
-            if math.isnan(claimed) != (value is None) or (value is not None and not abs(claimed - value) <= LENGTH):
+            if math.isnan(claimed) != (value is None) or (
+                value is not None and not abs(claimed - value) <= LENGTH
+            ):
                 return f"partial: {key} {claimed}, it is {value}"
         near = row.origin is not None and motion.origin is not None and _near(row.origin, motion.origin, 1e-7)
         return "" if near else f"origin: from {row.origin}, it is from {motion.origin}"

@@ -1,31 +1,38 @@
 """A slow and plain interpreter of KRL: executes a program statement by statement and notes its motions.
 
-Written from the description of the language.  Where that leaves something open (the counter of a FOR after its end, what
-a partial point keeps under another base), values become undetermined; where a program reads them to decide, it stops.
+Written from the description of the language.  Where that leaves something open (the counter of a FOR after its end,
+what a partial point keeps under another base), values become undetermined; where they decide what comes next, it stops.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from . import motions as way
 from .evaluate import evaluate
-from .motions import NAN, End, Executed, Six
+from .motions import NAN, Executed, Six
+from .robot import ZERO, Misread, Motion, Robot
 from .syntax import CLOSES, LOOPS, Line, Reader, Routine, tokens
-from .values import AXES, FRAME, STRUCTURES, UNDETERMINED, Cell, Stop, assign, content, copied, is_set, new_cell
+from .values import (
+    FRAME,
+    STRUCTURES,
+    UNDETERMINED,
+    Cell,
+    Stop,
+    assign,
+    content,
+    copied,
+    is_set,
+    new_cell,
+    restore,
+)
 
 Inputs = Mapping[int, tuple[bool, ...]]
 """$IN[n]: what it shows each time that it is read, from the first again after the last."""
 
-Misread = frozenset[str]
-"""Known misreadings (``known``) that are made here too, to tell whether they are all that is wrong."""
-
 NOTHING: Misread = frozenset()
 MOST_STEPS = 800
 SIMPLE = ("INT", "REAL", "BOOL", "CHAR")
-ZERO = dict.fromkeys(FRAME, 0.0)
 
 
 class _Return(Exception):
@@ -84,27 +91,17 @@ def run(code: list[Routine], memory: Memory, inputs: Inputs, misread: Misread = 
         machine.run_routine(machine.routines[0], {})
     except Stop as stop:
         stopped = str(stop)
-    return Run(tuple(machine.executed), stopped, bool(machine.reads))
+    return Run(tuple(machine.robot.executed), stopped, bool(machine.reads))
 
 
 class Machine:
-    def __init__(
-        self, of: list[Routine], memory: Memory, inputs: Inputs, misread: Misread = NOTHING
-    ) -> None:
+    def __init__(self, of: list[Routine], memory: Memory, inputs: Inputs, misread: Misread = NOTHING) -> None:
         self.routines, self.memory, self.inputs, self.misread = of, memory, inputs, misread
         self.reads: dict[int, int] = {}
         self.scopes: list[Scope] = []
-        self.executed: list[Executed] = []
-        self.end = End()
         self.steps = 0
-        self.system = {
-            name: new_cell(of, STRUCTURES)
-            for name, of in {
-                "$BASE": "FRAME", "$TOOL": "FRAME", "$VEL": "CP", "$APO": "APO", "$ORI_TYPE": "word",
-                "$CIRC_TYPE": "word", "$IPO_MODE": "word", "$ADVANCE": "INT",
-                "FDAT_ACT": "FDAT", "LDAT_ACT": "LDAT", "PDAT_ACT": "PDAT",
-            }.items()
-        }  # fmt: skip
+        self.robot = Robot(memory.cells, misread)
+        self.system = self.robot.system
 
     # places and values
 
@@ -303,7 +300,8 @@ class Machine:
             arguments = reader.arguments()
             reader.end()
             if word == "BAS":
-                self.bas(arguments)
+                values = [0 if tree is None else self.value(tree) for tree in (*arguments, None)]
+                self.robot.bas(*values[:2])
             else:
                 self.call(word, arguments)
         else:
@@ -316,7 +314,7 @@ class Machine:
         name = tree
         while name[0] != "name":
             name = name[1]
-        if name[1].startswith("$") and name[1] not in self.system or name[1] == "$ADVANCE":
+        if (name[1].startswith("$") and name[1] not in self.system) or name[1] == "$ADVANCE":
             return None
         if name[1] == "$VEL" and tree[0] == "member" and tree[2] != "CP":
             return None
@@ -388,75 +386,7 @@ class Machine:
             if not case.accept(","):
                 return False
 
-    # KUKA's own routine
-
-    def bas(self, arguments: list) -> None:
-        command = self.value(arguments[0])
-        number = self.value(arguments[1]) if len(arguments) > 1 and arguments[1] is not None else 0
-        if command == "#INITMOV":
-            self.frame("$BASE", 0)
-            self.frame("$TOOL", 1)
-            speed = self.memory.cells.get("DEF_VEL_CP")
-            assign(self.system["$VEL"], UNDETERMINED)
-            assign(self.system["$APO"], {"CPTP": 50.0, "CDIS": 3.0, "CORI": 5.0, "CVEL": 100.0})
-            if speed is not None and speed.value is not None:
-                self.system["$VEL"].parts["CP"].value = speed.value
-            assign(self.system["$ORI_TYPE"], "#VAR")
-            assign(self.system["$CIRC_TYPE"], "#BASE")
-            assign(self.system["$IPO_MODE"], "#BASE")
-        elif command in ("#BASE", "#TOOL"):
-            self.frame("$" + command[1:], number)
-        elif command == "#VEL_CP":
-            assign(self.system["$VEL"].parts["CP"], number)
-        elif command in ("#FRAMES", "#CP_PARAMS", "#PTP_PARAMS"):
-            record = self.system["FDAT_ACT"].parts
-            self.frame("$TOOL", record["TOOL_NO"].value)
-            self.frame("$BASE", record["BASE_NO"].value)
-            if command == "#CP_PARAMS":
-                self.take_record()
-                assign(self.system["$VEL"].parts["CP"], number)
-            elif command == "#PTP_PARAMS":
-                self.take_jump_record()
-        elif command == "#CP_DAT":
-            self.take_record()
-        elif command == "#PTP_DAT":
-            self.take_jump_record()
-        elif command not in ("#VEL_PTP", "#ACC_PTP", "#ACC_CP"):
-            raise Stop(f"BAS({command})")
-
-    def frame(self, name: str, number: object) -> None:
-        if isinstance(number, bool) or not isinstance(number, int):
-            raise Stop("the number of a frame")
-        value: object = dict(ZERO)
-        if number:
-            table = self.memory.cells[{"$BASE": "BASE_DATA", "$TOOL": "TOOL_DATA"}[name]]
-            if (number,) not in table.parts:
-                raise Stop("no such frame")
-            value = content(table.parts[number,])
-        assign(self.system[name], value)
-
-    def take_record(self) -> None:
-        record = self.system["LDAT_ACT"].parts
-        distance = record["APO_DIST"].value
-        assign(self.system["$APO"].parts["CDIS"], UNDETERMINED if distance is None else distance)
-        for of, name in (("ORI_TYP", "$ORI_TYPE"), ("CIRC_TYP", "$CIRC_TYPE")):
-            if record[of].value is not None:
-                assign(self.system[name], record[of].value)
-
-    def take_jump_record(self) -> None:
-        record, apo = self.system["PDAT_ACT"].parts, self.system["$APO"].parts
-        if record["APO_MODE"].value == "#CDIS" and record["APO_DIST"].value is not None:
-            assign(apo["CDIS"], record["APO_DIST"].value)
-        elif record["APO_MODE"].value != "#CPTP":
-            assign(apo["CDIS"], UNDETERMINED)
-
     # motions
-
-    def frame_in_force(self, name: str) -> Six | None:
-        cell = self.system[name]
-        if not is_set(cell):
-            return None
-        return tuple(NAN if p.value in (None, UNDETERMINED) else p.value for p in cell.parts.values())
 
     def point(self, reader: Reader) -> dict:
         value = self.value(reader.expression())
@@ -465,6 +395,22 @@ class Machine:
         return value
 
     def move(self, line: Line, reader: Reader) -> None:
+        if "functions" not in self.misread:
+            self.robot.move(line.number, self.motion(reader))
+            return
+        cells = [
+            cell for of in (self.system, self.memory.cells, self.scopes[-1].cells) for cell in of.values()
+        ]
+        former = [copied(cell) for cell in cells]
+        end, executed = self.robot.end, len(self.robot.executed)
+        motion = self.motion(reader)
+        for cell, kept in zip(cells, former, strict=True):
+            restore(cell, kept)
+        self.robot.end = end
+        del self.robot.executed[executed:]
+        self.robot.move(line.number, motion)
+
+    def motion(self, reader: Reader) -> Motion:
         word = reader.take()
         relative = word.endswith("_REL")
         kind = word.removesuffix("_REL").removeprefix("S")
@@ -487,63 +433,7 @@ class Machine:
                 rounds.append(reader.take())
             else:
                 reader.end()
-        base, tool = self.frame_in_force("$BASE"), self.frame_in_force("$TOOL")
-        if self.system["$IPO_MODE"].value == "#TCP":
-            raise Stop("a stationary tool")
-        before = self.end.seen_in(base, tool)
-        if kind == "PTP" and way.is_axes(value):
-            self.move_axes(line, value, relative, base, tool)
-            return
-        if way.is_axes(value):
-            raise Stop("a path to axis angles")
-        own = way.numbers(value, FRAME)
-        target = way.plus(before, own, in_tool) if relative else way.fill(own, before)
-        found_arc = None
-        if aux is not None:
-            given = [*way.numbers(aux, FRAME)[:3], None, None, None]
-            through = way.plus(before, given, in_tool) if relative else way.fill(given, before)
-            found_arc = way.arc(before, through, target, angle)
-            if angle is not None:
-                start = tuple(NAN if v is None else v for v in before)
-                target = (*way.turned(start, *found_arc), *target[3:])
-        origin = self.end.origin if None in target else None
-        ori_type = self.system["$ORI_TYPE"].value
-        self.executed.append(
-            Executed(
-                line.number, kind, target, None, base, tool, origin,
-                feed=_number(self.system["$VEL"].parts["CP"].value),
-                approximation=self.distance(rounds),
-                ori_type=str(ori_type) if ori_type is not None else None, arc=found_arc,
-            )
-        )  # fmt: skip
-        angles = target[3:]
-        if kind != "PTP" and ori_type not in (None, "#VAR", "#JOINT") and angles != before[3:]:
-            angles = (NAN,) * 3  # what a partial point inherits behind an orientation that was not reached
-        self.end = End((*target[:3], *angles), (NAN,) * 6, origin, base, tool)
-
-    def move_axes(self, line: Line, value: dict, relative: bool, base: Six | None, tool: Six | None) -> None:
-        own = way.numbers(value, AXES)
-        if relative:
-            axes = tuple(v + (o or 0.0) for v, o in zip(self.end.axes, own, strict=True))
-        else:
-            axes = way.fill(own, self.end.axes)
-        self.executed.append(Executed(line.number, "AXIS", (None,) * 6, axes, base, tool, approximation=None))
-        known = not any(math.isnan(a) for a in axes)
-        if not known and not relative and "partial axes" in self.misread:
-            return
-        self.end = End((None if known else NAN,) * 6, axes, axes if known else None, base, tool)
-
-    def distance(self, rounds: list[str]) -> float | None:
-        if not rounds:
-            return 0.0
-        if set(rounds) != {"C_DIS"}:
-            return None
-        found = _number(self.system["$APO"].parts["CDIS"].value)
-        return NAN if found is None else found
-
-
-def _number(value: object) -> float | None:
-    return None if value is None or value is UNDETERMINED else float(value)
+        return Motion(kind, relative, value, aux, angle, tuple(rounds), in_tool)
 
 
 _MOTIONS = {

@@ -19,8 +19,8 @@ class Executed:
 
     kind: PTP, AXIS, LIN or CIRC.  target: X, Y, Z, A, B, C [mm, deg] in the base, None where it is what the axis angles
     ``origin`` of an earlier motion give, NaN where the language leaves it open; axes: of AXIS.  base, tool: X .. C,
-    None where nothing has set them.  feed [m/s]: None where not set; approximation [mm]: 0 for none, NaN where not set, None
-    where it is not by a distance; ori_type: None where not set.  arc: centre, normal (counter-clockwise), sweep [deg].
+    None where nothing has set them.  feed [m/s]: None where not set; approximation [mm]: 0 for none, NaN where not set,
+    None where it is not by a distance; ori_type: None where not set.  arc: centre, normal, sweep [deg].
     """
 
     line: int
@@ -61,7 +61,7 @@ def numbers(values: dict, keys: tuple[str, ...]) -> list:
     """Numbers of the components, None where left out."""
     out = [values.get(key) for key in keys]
     for value in out:
-        if isinstance(value, bool) or isinstance(value, str | dict):
+        if isinstance(value, bool | str | dict):
             raise Stop("a component is no number")
     return [NAN if v is UNDETERMINED else v if v is None else float(v) for v in out]
 

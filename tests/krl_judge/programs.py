@@ -2,12 +2,12 @@
 
     program    = DEF part() declarations settings block END subprogram* function?
     block      = statement+
-    statement  = motion | frame | assignment | if | switch | for | while | repeat | loop | call | jump | state | form | idle
+    statement  = motion | frame | assignment | if | switch | for | while | repeat | loop | call | jump | state | form
     motion     = full | partial | named | jump to axes | relative | arc; each with C_DIS, C_VEL or exact
     target     = {X .. C} of numbers, variables, expressions; a point of the .dat or $config.dat; a local frame; an
                  element; a part of a structure; frame : frame
-    frame      = $BASE= / $TOOL= a number of the table (a constant, a variable), an aggregate, a variable, frame : frame;
-                 BAS(#BASE,..); $BASE.X=; BASE_DATA[n]=
+    frame      = $BASE= / $TOOL= a number of the table (a constant, a variable), an aggregate, a variable, frame :
+                 frame; BAS(#BASE,..); $BASE.X=; BASE_DATA[n]=
     assignment = a number, a truth, a frame, a component, an element; constants, expressions, and values from inputs
     if, switch = on constants, on variables, on inputs
     for        = constant bounds, STEP, or a bound from a variable that inputs decide
@@ -22,40 +22,18 @@ Every local variable is set before it is read, as far as the flow does not skip 
 
 from __future__ import annotations
 
-import random
-from dataclasses import dataclass, field
-
+from .data import MODULE_FRAMES, MODULE_INTS, MODULE_REALS, Data
 from .judge import Case
+from .operands import INPUTS, Names
 from .spelling import Spelling
 
-MODULE_FRAMES, MODULE_INTS, MODULE_REALS = ("pf", "pg"), ("mi", "mj"), ("mr",)
-INPUTS = (1, 2, 3)
 
-
-@dataclass
-class Names:
-    """What a routine can use.  ``counters``: variables of loops, which nothing else sets."""
-
-    ints: list[str] = field(default_factory=list)
-    reals: list[str] = field(default_factory=list)
-    frames: list[str] = field(default_factory=list)
-    bools: list[str] = field(default_factory=list)
-    counters: list[str] = field(default_factory=list)
-    free: list[str] = field(default_factory=list)
-
-
-class Generator:
+class Generator(Data):
     def __init__(self, seed: int) -> None:
-        self.rng = random.Random(seed)
+        super().__init__(seed)
         self.lines: list[str] = []
-        self.names = Names()
         self.labels = 0
-        self.routine = 0
-        self.loops = 0
-        self.inputs = self.rng.random() < 0.75
         self.module = self.rng.random() < 0.5
-        self.straight = self.rng.random() < 0.35
-        """Whether points are mostly full, as posts write them."""
 
     def case(self) -> Case:
         rng = self.rng
@@ -69,7 +47,9 @@ class Generator:
         for number in range(1, self.subprograms + 1):
             self.subprogram(number)
         if self.has_function:
-            does = rng.choice([[], [], ["mi=mi+1"], ["BAS(#BASE,2)"], ["$TOOL=TOOL_DATA[3]"], ["LIN {Z 5}"], ["mr=v"]])
+            does = rng.choice(
+                [[], [], ["mi=mi+1"], ["BAS(#BASE,2)"], ["$TOOL=TOOL_DATA[3]"], ["LIN {Z 5}"], ["mr=v"]]
+            )
             self.lines += ["DEFFCT INT twice(v:IN)", "INT v", *does, "RETURN 2*v", "ENDFCT"]
         spelling = Spelling(rng)
         src = "".join(spelling.line(line) + "\n" for line in self.lines)
@@ -79,117 +59,14 @@ class Generator:
 
     def runs(self) -> tuple[dict[int, tuple[bool, ...]], ...]:
         out: list[dict[int, tuple[bool, ...]]] = [
-            {n: (*(shown,) * 6, not shown) for n in INPUTS} for shown in (False, True)
+            dict.fromkeys(INPUTS, (*(shown,) * 6, not shown)) for shown in (False, True)
         ]
         for _ in range(2):
             some = [tuple(self.rng.random() < 0.5 for _ in range(self.rng.randint(1, 4))) for _ in INPUTS]
             out.append(dict(zip(INPUTS, some, strict=True)))
         return tuple(out)
 
-    # numbers and expressions
-
-    def number(self, low: float = -300.0, high: float = 300.0) -> str:
-        value = self.rng.uniform(low, high)
-        return self.rng.choice([f"{value:.0f}", f"{value:.1f}", f"{value:.3f}", f"{value:.3f}", f"{value:.2E}"])
-
-    def angle(self) -> str:
-        return self.number(-85.0, 85.0)
-
-    def whole(self, depth: int = 0) -> str:
-        """An INT expression."""
-        rng, names = self.rng, self.names
-        kind = rng.random()
-        if depth > 1 or kind < 0.35:
-            return str(rng.randint(0, 9))
-        if kind < 0.65 and names.ints + names.counters:
-            return rng.choice(names.ints + names.counters)
-        if kind < 0.72 and self.has_function and self.routine == 0:
-            return f"twice({rng.randint(1, 5)})"
-        one, other = self.whole(depth + 1), self.whole(depth + 1)
-        return rng.choice(
-            [f"{one}+{other}", f"({one}-{other})", f"{one}*{rng.randint(1, 4)}", f"{one}/{rng.randint(1, 4)}",
-             f"ABS({one}-{other})", f"({one} B_AND {other})", f"-{one}", f"({one}+{other})/{rng.randint(2, 3)}"]
-        )  # fmt: skip
-
-    def real(self, depth: int = 0) -> str:
-        rng, names = self.rng, self.names
-        kind = rng.random()
-        if depth > 1 or kind < 0.4:
-            return self.number(0, 90)
-        if kind < 0.6 and names.reals:
-            return rng.choice(names.reals)
-        if kind < 0.75:
-            return self.whole(depth + 1)
-        if kind < 0.82 and names.frames:
-            return f"{rng.choice(names.frames)}.{rng.choice('XYZABC')}"
-        one, other = self.real(depth + 1), self.real(depth + 1)
-        return rng.choice(
-            [f"{one}+{other}", f"({one}-{other})", f"{one}*{rng.choice(['2', '0.5', '1.25'])}", f"{one}/4.",
-             f"SIN({one})", f"COS({one})*10", f"SQRT(ABS({one}))", f"ATAN2({one},1.5)", f"-{one}", f"({one})"]
-        )  # fmt: skip
-
-    def condition(self, inputs: bool | None = None) -> str:
-        rng, names = self.rng, self.names
-        wants = self.inputs and rng.random() < 0.5 if inputs is None else inputs
-        if wants and self.inputs:
-            n = rng.choice(INPUTS)
-            return rng.choice([f"$IN[{n}]", f"NOT $IN[{n}]", f"$IN[{n}]==TRUE", f"($IN[{n}]) OR (1>2)"])
-        whole = self.whole()
-        choices = [f"{whole}{rng.choice(['==', '<>', '<', '>', '<=', '>='])}{rng.randint(0, 9)}", "TRUE", "FALSE"]
-        if names.bools:
-            choices += [rng.choice(names.bools), f"NOT {rng.choice(names.bools)}"]
-        choices.append(f"({choices[0]}) {rng.choice(['AND', 'OR', 'EXOR'])} ({self.whole(1)}<5)")
-        return rng.choice([choices[0], *choices])
-
-    # points
-
-    def aggregate(self, keys: str = "XYZABC", plain: bool = False) -> str:
-        rng = self.rng
-        computed = not plain and rng.random() < 0.25
-        parts = []
-        for key in keys:
-            value = self.angle() if key in "ABC" else self.number()
-            if computed and rng.random() < 0.4:
-                value = self.real()
-            parts.append(f"{key} {value}")
-        if len(keys) == 6 and rng.random() < 0.1:
-            parts += ["S 2", "T 35"]
-        if rng.random() < 0.1:
-            rng.shuffle(parts)
-        tag = rng.choice(["FRAME: ", "POS: "]) if rng.random() < 0.04 and len(parts) == 6 else ""
-        return "{" + tag + ",".join(parts) + "}"
-
-    def frame_value(self) -> str:
-        rng, names = self.rng, self.names
-        kind = rng.random()
-        if kind < 0.55 or not names.frames:
-            return self.aggregate()
-        one = rng.choice(names.frames)
-        if kind < 0.75:
-            return one
-        small = self.aggregate(plain=True)
-        return rng.choice([f"{one}:{small}", f"{small}:{one}", f"{one}:{rng.choice(names.frames)}", f"INV_POS({one})"])
-
-    def keys(self) -> str:
-        share = self.rng.choice([0.2, 0.5, 0.8])
-        found = "".join(key for key in "XYZ" if self.rng.random() < share)
-        found += self.rng.choice(["", "", "", "A", "ABC", "BC"])
-        return found or "X"
-
-    def target(self) -> str:
-        rng, names = self.rng, self.names
-        kind = rng.random()
-        if kind < (0.6 if self.straight else 0.35):
-            return self.aggregate()
-        if kind < 0.7:
-            return self.aggregate(self.keys())
-        if kind < 0.8 and names.frames:
-            return rng.choice(names.frames)
-        if kind < 0.88:
-            return rng.choice(["XP1", "XP2", "XC1", "job.P", "list[1]", "list[2]"])
-        if kind < 0.92 and names.counters:
-            return f"list[{rng.choice(names.counters)}]"
-        return self.frame_value()
+    # motions
 
     def rounding(self) -> str:
         return self.rng.choice(["", "", "", " C_DIS", " C_DIS", " C_VEL", " C_ORI"])
@@ -221,11 +98,16 @@ class Generator:
         z = rng.randint(0, 50)
         angle = rng.choice(["", "", f",CA {rng.choice([45, 200, -90, 400])}"])
         tail = self.rng.choice([f",Z {z}", f",Z {z},A 10,B 20,C 30", ",A 0,B 0,C 90", ""])
-        begin = [f"LIN {{X {x + r},Y {y},Z {z},A {self.angle()},B {self.angle()},C 0}}"] * (rng.random() < 0.8)
+        begin = [f"LIN {{X {x + r},Y {y},Z {z},A {self.angle()},B {self.angle()},C 0}}"] * (
+            rng.random() < 0.8
+        )
         word = rng.choice(["CIRC", "CIRC", "SCIRC"])
         if rng.random() < 0.15:
             return [*begin, f"CIRC_REL {{X {r},Y {r}}},{{X {2 * r},Y 3}}{rng.choice(['', ' #TOOL'])}"]
-        return [*begin, f"{word} {{X {x},Y {y + r},Z {z}}},{{X {x - r},Y {y + 3}{tail}}}{angle}{self.rounding()}"]
+        return [
+            *begin,
+            f"{word} {{X {x},Y {y + r},Z {z}}},{{X {x - r},Y {y + 3}{tail}}}{angle}{self.rounding()}",
+        ]
 
     # statements
 
@@ -241,7 +123,11 @@ class Generator:
             return [f"BAS(#{name[1:]},{rng.choice([n, n, n, '0'])})"]
         if kind < 0.58 and names.ints:
             i = rng.choice(names.ints)
-            return [f"{i}={n}", f"{name}={table}[{i}]"] if rng.random() < 0.5 else [f"BAS(#{name[1:]},{i} B_AND 3)"]
+            return (
+                [f"{i}={n}", f"{name}={table}[{i}]"]
+                if rng.random() < 0.5
+                else [f"BAS(#{name[1:]},{i} B_AND 3)"]
+            )
         if kind < 0.7:
             return [f"{name}={self.frame_value()}"]
         if kind < 0.78:
@@ -280,12 +166,17 @@ class Generator:
     def state(self) -> list[str]:
         rng = self.rng
         speed = rng.choice(["0.5", "0.05", "1", "0.125"])
-        return [
-            rng.choice(
-                [f"$VEL.CP={speed}", f"BAS(#VEL_CP,{speed})", f"$APO.CDIS={rng.randint(1, 9)}", "$ORI_TYPE=#VAR",
-                 "$ORI_TYPE=#JOINT", rng.choice(["$ORI_TYPE=#CONSTANT", "$ORI_TYPE=#VAR"]), f"$VEL={{CP {speed},ORI1 200,ORI2 200}}", f"$VEL.ORI1={rng.randint(50, 200)}"]
-            )
-        ]  # fmt: skip
+        states = [
+            f"$VEL.CP={speed}",
+            f"BAS(#VEL_CP,{speed})",
+            f"$VEL={{CP {speed},ORI1 200,ORI2 200}}",
+            f"$VEL.ORI1={rng.randint(50, 200)}",
+            f"$APO.CDIS={rng.randint(1, 9)}",
+            "$ORI_TYPE=#VAR",
+            "$ORI_TYPE=#JOINT",
+            rng.choice(["$ORI_TYPE=#CONSTANT", "$ORI_TYPE=#VAR"]),
+        ]
+        return [rng.choice(states)]
 
     def form(self) -> list[str]:
         rng = self.rng
@@ -294,41 +185,71 @@ class Generator:
             inner = [f"LDAT_ACT=LCPDAT{n}", f"FDAT_ACT=FP{n}", f"BAS(#CP_PARAMS,{rng.choice(['0.5', '2'])})",
                      f"LIN {point}{rng.choice(['', ' C_DIS', ' C_DIS C_DIS'])}"]  # fmt: skip
         elif rng.random() < 0.3:
-            return [f"FDAT_ACT=FP{n}", f"FDAT_ACT.{rng.choice(['BASE_NO', 'TOOL_NO'])}={rng.randint(1, 4)}", "BAS(#FRAMES)"]
+            return [
+                f"FDAT_ACT=FP{n}",
+                f"FDAT_ACT.{rng.choice(['BASE_NO', 'TOOL_NO'])}={rng.randint(1, 4)}",
+                "BAS(#FRAMES)",
+            ]
         else:
             inner = [f"PDAT_ACT=PPDAT{n}", f"FDAT_ACT=FP{n}", "BAS(#PTP_PARAMS,100)", f"PTP {point}"]
         return [f";FOLD {inner[-1]} Vel=1 m/s", "$BWDSTART=FALSE", *inner, ";ENDFOLD"]
 
     def idle(self) -> list[str]:
         n = self.rng.choice(INPUTS)
-        return [self.rng.choice([";note", "HALT", "WAIT SEC 0.5", f"$OUT[{n}]=TRUE", f"WAIT FOR $IN[{n}]", ";LIN {X 9}", ""])]
+        return [
+            self.rng.choice(
+                [";note", "HALT", "WAIT SEC 0.5", f"$OUT[{n}]=TRUE", f"WAIT FOR $IN[{n}]", ";LIN {X 9}", ""]
+            )
+        ]
+
+    def probe(self) -> list[str]:
+        """A motion that shows what the flow before has left in variables, frames and the position."""
+        rng, names = self.rng, self.names
+        plain = self.aggregate("ABC", plain=True)[1:]
+        kind = rng.random()
+        if kind < 0.35:
+            return [f"LIN {self.aggregate(plain=True)}{rng.choice(['', ' C_DIS'])}"]
+        if kind < 0.7 and names.ints and names.reals:
+            return [
+                f"LIN {{X {rng.choice(names.ints)},Y {rng.choice(names.reals)},Z {rng.choice(names.ints)},{plain}"
+            ]
+        if kind < 0.85 and names.frames:
+            return [f"LIN {rng.choice(names.frames)}"]
+        return [f"LIN {self.aggregate(rng.choice(['X', 'XY', 'Z', 'YZ']), plain=True)}"]
 
     def block(self, depth: int, size: int) -> list[str]:
         out: list[str] = []
         while size > 0:
             size -= 1
             kind = self.rng.random()
-            if kind < 0.42:
+            if kind < 0.3:
                 out += self.motion()
-            elif kind < 0.5:
+            elif kind < 0.38:
                 out += self.frame()
-            elif kind < 0.62:
+            elif kind < 0.5:
                 out += self.assignment()
-            elif kind < 0.66:
+            elif kind < 0.54:
                 out += self.state()
-            elif kind < 0.69:
+            elif kind < 0.57:
                 out += self.form()
-            elif kind < 0.72:
+            elif kind < 0.58:
                 out += self.idle()
-            elif kind < 0.79:
+            elif kind < 0.66:
                 out += self.call()
             elif depth < 3:
                 size -= 1
-                out += self.rng.choice([self.branch, self.branch, self.switch, self.counted, self.loop, self.jump])(depth)
+                out += self.rng.choice(
+                    [self.branch, self.branch, self.switch, self.counted, self.loop, self.jump]
+                )(depth)
+                if self.rng.random() < 0.7:
+                    out += self.probe()
         return out
 
     def inner(self, depth: int) -> list[str]:
-        return self.block(depth + 1, self.rng.randint(1, 4))
+        out = self.block(depth + 1, self.rng.randint(1, 4))
+        if self.rng.random() < 0.5:
+            out += self.rng.choice([self.assignment, self.assignment, self.frame, self.state])()
+        return out
 
     def branch(self, depth: int) -> list[str]:
         out = [f"IF {self.condition()} THEN", *self.inner(depth)]
@@ -343,7 +264,12 @@ class Generator:
         out = []
         chosen = rng.choice(names.ints) if names.ints else "3"
         if names.ints and self.inputs and rng.random() < 0.4:
-            out += [f"{chosen}=1", f"IF {self.condition(True)} THEN", f"{chosen}={rng.randint(2, 3)}", "ENDIF"]
+            out += [
+                f"{chosen}=1",
+                f"IF {self.condition(True)} THEN",
+                f"{chosen}={rng.randint(2, 3)}",
+                "ENDIF",
+            ]
         out.append(f"SWITCH {chosen if rng.random() < 0.8 else self.whole()}")
         for case in rng.sample(["1", "2,3", "3", "4,5", "0"], rng.randint(1, 3)):
             out += [f"CASE {case}", *self.inner(depth)]
@@ -356,7 +282,9 @@ class Generator:
         if not names.free:
             return self.motion()
         counter = names.free.pop()
-        first, last, step = rng.choice([(1, "3", ""), (1, "2", ""), (3, "1", " STEP -1"), (1, "3", " STEP 2"), (2, "1", "")])
+        first, last, step = rng.choice(
+            [(1, "3", ""), (1, "2", ""), (3, "1", " STEP -1"), (1, "3", " STEP 2"), (2, "1", "")]
+        )
         before = []
         if names.ints and rng.random() < 0.3:
             bound = rng.choice(names.ints)
@@ -367,11 +295,9 @@ class Generator:
             names.ints.remove(bound)
             last, first, step = bound, 1, ""
         names.counters.append(counter)
-        self.loops += 1
         body = self.inner(depth)
         if rng.random() < 0.15:
             body += [f"IF {self.condition()} THEN", "EXIT", "ENDIF", *self.motion()]
-        self.loops -= 1
         names.counters.remove(counter)
         if before:
             names.ints.append(before[0].partition("=")[0])
@@ -385,9 +311,7 @@ class Generator:
         counter = names.free.pop()
         limit = rng.randint(1, 3)
         names.counters.append(counter)
-        self.loops += 1
         body = self.inner(depth)
-        self.loops -= 1
         names.counters.remove(counter)
         names.free.append(counter)
         count = f"{counter}={counter}+1"
@@ -408,11 +332,22 @@ class Generator:
         if rng.random() < 0.3:
             away = [f"IF {self.condition()} THEN", *self.assignment(), f"GOTO {label}", "ENDIF"]
             body = rng.choice([self.counted, self.loop, self.branch])(depth)
-            at = next((n for n, line in enumerate(body) if line.startswith(("FOR", "WHILE", "LOOP", "REPEAT", "IF"))), None)
+            at = next(
+                (
+                    n
+                    for n, line in enumerate(body)
+                    if line.startswith(("FOR", "WHILE", "LOOP", "REPEAT", "IF"))
+                ),
+                None,
+            )
             if at is not None:
                 return [*body[: at + 1], *away, *body[at + 1 :], *self.motion(), f"{label}:"]
         if rng.random() < 0.65 or not names.free:
-            go = [f"IF {self.condition()} THEN", f"GOTO {label}", "ENDIF"] if rng.random() < 0.85 else [f"GOTO {label}"]
+            go = (
+                [f"IF {self.condition()} THEN", f"GOTO {label}", "ENDIF"]
+                if rng.random() < 0.85
+                else [f"GOTO {label}"]
+            )
             return [*go, *self.inner(depth), f"{label}:"]
         counter = names.free.pop()
         names.counters.append(counter)
@@ -420,7 +355,15 @@ class Generator:
         names.counters.remove(counter)
         names.free.append(counter)
         again = self.condition(True) if self.inputs and rng.random() < 0.4 else f"{counter}<3"
-        return [f"{counter}=1", f"{label}:", *body, f"{counter}={counter}+1", f"IF {again} THEN", f"GOTO {label}", "ENDIF"]
+        return [
+            f"{counter}=1",
+            f"{label}:",
+            *body,
+            f"{counter}={counter}+1",
+            f"IF {again} THEN",
+            f"GOTO {label}",
+            "ENDIF",
+        ]
 
     def call(self) -> list[str]:
         later = range(self.routine + 1, self.subprograms + 1)
@@ -448,8 +391,10 @@ class Generator:
                 hidden = ["mi=2", "mj=3", f"pf={self.aggregate(plain=True)}"]
         out = ["DECL INT mi,mj", "DECL FRAME pf"] if hidden else []
         out += ["DECL INT n,m,i,j,k", "DECL REAL r,q", f"DECL {self.frame_type} f,g", "DECL BOOL b"]
-        first = [f"n={rng.randint(0, 6)}", f"m={rng.randint(0, 6)}", f"r={self.number(0, 50)}", f"q={self.number(0, 50)}",
-                 f"f={self.aggregate(plain=True)}", f"g={self.aggregate(plain=True)}", f"b={rng.choice(['TRUE', 'FALSE'])}"]  # fmt: skip
+        first = [f"{name}={rng.randint(0, 6)}" for name in ("n", "m")]
+        first += [f"{name}={self.number(0, 50)}" for name in ("r", "q")]
+        first += [f"{name}={self.aggregate(plain=True)}" for name in ("f", "g")]
+        first.append(f"b={rng.choice(['TRUE', 'FALSE'])}")
         first += hidden
         rng.shuffle(first)
         return out + first
@@ -458,10 +403,18 @@ class Generator:
         rng = self.rng
         self.lines += ["DEF part()", *self.locals(True)]
         if rng.random() < 0.9:
-            self.lines += rng.choice([["BAS(#INITMOV,0)"], ["BAS(#BASE,1)", "BAS(#TOOL,1)"], ["$TOOL=TOOL_DATA[2]", "$BASE=BASE_DATA[1]"]])
+            self.lines += rng.choice(
+                [
+                    ["BAS(#INITMOV,0)"],
+                    ["BAS(#BASE,1)", "BAS(#TOOL,1)"],
+                    ["$TOOL=TOOL_DATA[2]", "$BASE=BASE_DATA[1]"],
+                ]
+            )
         if rng.random() < 0.8:
-            self.lines += rng.choice([["PTP {A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}"], [f"PTP {self.aggregate(plain=True)}"]])
-        self.lines += self.block(0, rng.randint(4, 16))
+            self.lines += rng.choice(
+                [["PTP {A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}"], [f"PTP {self.aggregate(plain=True)}"]]
+            )
+        self.lines += self.block(0, rng.randint(4, 14))
         self.lines.append("END")
 
     def subprogram(self, number: int) -> None:
@@ -476,24 +429,22 @@ class Generator:
         if frame:
             own = ["FRAME p", *own]
             self.names.frames.append("p")
-        self.lines += ["INT v", "DECL REAL w", *own, *self.block(1, rng.randint(1, 5)), "END"]
+        self.lines += [
+            "INT v",
+            "DECL REAL w",
+            *own,
+            *self.changes(),
+            *self.block(1, rng.randint(1, 5)),
+            "END",
+        ]
 
-    def dat(self) -> list[str]:
-        rng = self.rng
-        out = [rng.choice(["DEFDAT part", "DEFDAT part PUBLIC"]), "STRUC jobtype FRAME P,INT count"]
-        for name, type_ in (("XP1", "E6POS"), ("XP2", "POS"), ("XP3", "FRAME")):
-            out.append(f"DECL {type_} {name}={self.aggregate(plain=True)}")
-        for name in MODULE_FRAMES:
-            out.append(f"DECL FRAME {name}={self.aggregate(plain=True)}")
-        out += [f"DECL INT {name}={rng.randint(0, 6)}" for name in MODULE_INTS]
-        out += [f"DECL REAL {name}={self.number(0, 50)}" for name in MODULE_REALS]
-        out.append(f"DECL jobtype job={{P {self.aggregate(plain=True)},count 3}}")
-        out += ["DECL FRAME list[3]", *(f"list[{n}]={self.aggregate(plain=True)}" for n in (1, 2, 3))]
-        for n in (1, 2):
-            out.append(f'DECL FDAT FP{n}={{TOOL_NO {rng.randint(1, 3)},BASE_NO {rng.randint(0, 3)},IPO_FRAME #BASE,POINT2[] " "}}')
-            out.append(f"DECL LDAT LCPDAT{n}={{VEL 2.0,ACC 100.0,APO_DIST {rng.randint(1, 50)}.0,APO_FAC 50.0,ORI_TYP #VAR}}")
-            out.append(f"DECL PDAT PPDAT{n}={{VEL 100.0,ACC 100.0,APO_DIST {rng.randint(1, 50)}.0,APO_MODE {rng.choice(['#CDIS', '#CPTP'])}}}")
-        return [*out, "ENDDAT"]
-
-    def config(self) -> list[str]:
-        return ["DEFDAT $CONFIG", f"DECL E6POS XC1={self.aggregate(plain=True)}", "DECL REAL DEF_VEL_CP=2.5", "ENDDAT"]
+    def changes(self) -> list[str]:
+        """What a subprogram does to its parameters."""
+        out = [f"v={self.whole()}"] * (self.rng.random() < 0.3) + [f"w={self.real()}"] * (
+            self.rng.random() < 0.5
+        )
+        if "p" in self.names.frames and self.rng.random() < 0.6:
+            out.append(f"p.{self.rng.choice('XYZ')}={self.real()}")
+        if self.rng.random() < 0.2:
+            out += [f"IF v>{self.rng.randint(0, 5)} THEN", "RETURN", "ENDIF"]
+        return out

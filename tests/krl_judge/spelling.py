@@ -5,7 +5,9 @@ from __future__ import annotations
 import random
 import re
 
-_PART = re.compile(r"""("[^"]*"|'[^']*'|[A-Za-z_$#][\w$]*|\d+\.?\d*(?:E[-+]?\d+)?|[ ]+|==|<>|<=|>=|.)""", re.I)
+_PART = re.compile(
+    r"""("[^"]*"|'[^']*'|[A-Za-z_$#][\w$]*|\d+\.?\d*(?:E[-+]?\d+)?|[ ]+|==|<>|<=|>=|.)""", re.I
+)
 
 
 class Spelling:

@@ -175,7 +175,14 @@ class Reader:
         return ("aggregate", items)
 
 
-OPENS = {"IF": "ENDIF", "SWITCH": "ENDSWITCH", "FOR": "ENDFOR", "WHILE": "ENDWHILE", "LOOP": "ENDLOOP", "REPEAT": "UNTIL"}
+OPENS = {
+    "IF": "ENDIF",
+    "SWITCH": "ENDSWITCH",
+    "FOR": "ENDFOR",
+    "WHILE": "ENDWHILE",
+    "LOOP": "ENDLOOP",
+    "REPEAT": "UNTIL",
+}
 CLOSES = {end: start for start, end in OPENS.items()}
 LOOPS = ("FOR", "WHILE", "LOOP", "REPEAT")
 
