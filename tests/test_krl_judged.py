@@ -246,6 +246,39 @@ def test_one_value_where_inputs_decide_is_caught(line: int) -> None:
         assert not judge(replace(case, inputs=(inputs,)), careless(line)).disagreements
 
 
+def altered(pattern: str, by: str) -> Callable:
+    """A reader to which some words are others."""
+
+    def reader(src: str, dat: str, config: str, tables: Tables) -> list[Claim]:
+        return read_claims(re.sub(pattern, by, src, flags=re.I | re.M), dat, config, tables)
+
+    return reader
+
+
+CARELESS = {
+    "inputs are true": (altered(r"\$IN\s*\[[^\]]*\]", "TRUE"), 0.3),
+    "inputs are false": (altered(r"\$IN\s*\[[^\]]*\]", "FALSE"), 0.3),
+    "no jump is taken": (altered(r"^\s*GOTO.*$", ""), 0.05),
+    "no component is set": (altered(r"^\s*\w+\s*\.\s*[XYZABC]\s*=.*$", ""), 0.05),
+    "no frame is set in a table": (altered(r"^\s*(BASE|TOOL)_DATA\s*\[.*$", ""), 0.02),
+    "no subprogram is called": (altered(r"^\s*sub\d\s*\(.*$", ""), 0.05),
+    "no record of frames is taken": (altered(r"^\s*FDAT_ACT\s*=.*$", "FDAT_ACT={TOOL_NO 1,BASE_NO 1}"), 0.05),
+}
+"""And the share of random programs in which that shows, at least."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CARELESS)
+def test_a_careless_reader_is_caught_in_random_programs(name: str) -> None:
+    reader, share = CARELESS[name]
+    caught = 0
+    for seed in range(1, 41):
+        case = Generator(seed).case()
+        found = judge(case).disagreements
+        caught += any(wrong not in found for wrong in judge(case, reader).disagreements)
+    assert caught >= share * 40
+
+
 def test_a_value_that_a_former_run_leaves_is_caught() -> None:
     case = Case(f"{HEAD}LIN P\nP.X=9\nEND\n", f"DECL FRAME P={FULL}\n")
     assert not judge(case).disagreements

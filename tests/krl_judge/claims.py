@@ -24,7 +24,8 @@ NEVER_RUNS = "KRL023"
 class Claim:
     """One row of a toolpath, in mm and deg.
 
-    claimed: its target is said to be known and can be corrected.  never: it is said not to run.  position (3,),
+    claimed: its target is said to be known and can be corrected.  never: it is said not to run; apart: it is not said
+    when it runs, if it does.  position (3,),
     rotation (3, 3) or None; partial: X .. C of a target whose NaN components are what the axis angles ``origin`` give;
     base, tool: (4, 4), None where not known.
     """
@@ -33,6 +34,7 @@ class Claim:
     kind: str
     claimed: bool
     never: bool
+    apart: bool
     position: np.ndarray
     rotation: np.ndarray
     partial: np.ndarray | None
@@ -65,6 +67,7 @@ def _claim(path: Toolpath, row: int, tables: Tables) -> Claim:
         kind=Kind(path.kind[row]).name,
         claimed=said and refused is None and bool(path.executes[row]),
         never=refused is not None and refused.code == NEVER_RUNS,
+        apart=not bool(path.executes[row]),
         position=path.position[row] / MM,
         rotation=path.programmed_rotation[row],
         partial=path.partial_target[row] / ([MM] * 3 + [DEG] * 3) if from_row >= 0 else None,

@@ -152,6 +152,7 @@ def align(rows: Sequence[Claim], motions: Sequence[Executed], inputs: bool) -> t
         return 0, "missing: the line has no row"
     if all(row.never for row in rows):
         return 0, "never: it runs and is said not to"
+    inputs = inputs or any(row.apart for row in rows)  # such rows stand where nothing is said of the order
     if len(rows) == 1 or (len(rows) == len(motions) and not inputs):
         pairs = list(zip(list(rows) * (len(motions) if len(rows) == 1 else 1), motions, strict=True))
         why = next((text for row, motion in pairs if (text := differs(row, motion))), "")

@@ -66,8 +66,6 @@ class Generator(Data):
             out.append(dict(zip(INPUTS, some, strict=True)))
         return tuple(out)
 
-    # motions
-
     def rounding(self) -> str:
         return self.rng.choice(["", "", "", " C_DIS", " C_DIS", " C_VEL", " C_ORI"])
 
@@ -132,10 +130,9 @@ class Generator(Data):
             return [f"{name}={self.frame_value()}"]
         if kind < 0.78:
             return [f"{name}.{rng.choice('XYZA')}={self.real()}"]
-        if kind < 0.84:
-            return [f"{table}[{n}]={self.aggregate()}"]
         if kind < 0.88:
-            return [f"{table}[{n}].{rng.choice('XYZ')}={self.number()}"]
+            value = f"={self.aggregate()}" if kind < 0.84 else f".{rng.choice('XYZ')}={self.number()}"
+            return [f"{table}[{n}]{value}", *[f"{name}={table}[{n}]", *self.probe()] * (rng.random() < 0.5)]
         if kind < 0.94:
             return [f"{name}={table}[{n}]:{self.aggregate()}"]
         return [f"{name}={rng.choice(['$NULLFRAME', '$WORLD'])}" if name == "$BASE" else f"{name}=$NULLFRAME"]
@@ -150,7 +147,8 @@ class Generator(Data):
         if kind < 0.6 and names.frames:
             return [f"{rng.choice(names.frames)}={self.frame_value()}"]
         if kind < 0.8 and names.frames:
-            return [f"{rng.choice(names.frames)}.{rng.choice('XYZABC')}={self.real()}"]
+            f = rng.choice(names.frames)
+            return [f"{f}.{rng.choice('XYZABC')}={self.real()}", *[f"LIN {f}"] * (rng.random() < 0.4)]
         if kind < 0.81 and names.frames:
             return [f"{rng.choice(names.frames)}={self.aggregate(self.keys())}"]
         if kind < 0.85 and names.bools:
@@ -203,7 +201,7 @@ class Generator(Data):
         ]
 
     def probe(self) -> list[str]:
-        """A motion that shows what the flow before has left in variables, frames and the position."""
+        """A motion that shows what the flow before has left."""
         rng, names = self.rng, self.names
         plain = self.aggregate("ABC", plain=True)[1:]
         kind = rng.random()
