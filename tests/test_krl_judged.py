@@ -279,6 +279,12 @@ def test_a_careless_reader_is_caught_in_random_programs(name: str) -> None:
     assert caught >= share * 40
 
 
+def test_passes_backwards_are_caught_where_inputs_are_read() -> None:
+    case = Case(PROGRAM.replace("CIRC", "WAIT FOR $IN[1]\nCIRC"), inputs=INPUTS)
+    assert not judge(case).disagreements
+    assert judge(case, FAULTS["passes backwards"]).disagreements
+
+
 def test_a_value_that_a_former_run_leaves_is_caught() -> None:
     case = Case(f"{HEAD}LIN P\nP.X=9\nEND\n", f"DECL FRAME P={FULL}\n")
     assert not judge(case).disagreements

@@ -2,7 +2,7 @@
 
 Every execution of a line is held against the rows of that line.  One row speaks for all of them.  Where a line has
 several rows, as many as it is executed, or more, they follow each other in that order.  Where it is executed more
-often, or inputs decide the flow, each execution has to be that of some row.
+often, or inputs decide how often, each execution has to be that of some row.
 """
 
 from __future__ import annotations
@@ -93,13 +93,12 @@ def judge(case: Case, reader: Reader | None = None, misread: Misread = NOTHING) 
     found: dict[tuple[int, str], Disagreement] = {}
     known: dict[int, int] = defaultdict(int)
     executed: dict[int, list[Executed]] = defaultdict(list)
-    for one in runs:
-        of_line: dict[int, list[Executed]] = defaultdict(list)
-        for motion in one.motions:
-            of_line[motion.line].append(motion)
+    by_line = [_by_line(one.motions) for one in runs]
+    for one, of_line in zip(runs, by_line, strict=True):
         for line, motions in of_line.items():
             executed[line] += motions
-            matched, why = align(rows[line], motions, one.reads_inputs)
+            always = all(len(other.get(line, ())) == len(rows[line]) for other in by_line)
+            matched, why = align(rows[line], motions, one.reads_inputs and not always)
             known[line] += matched
             if why:
                 found.setdefault((line, why.partition(":")[0]), Disagreement(line, why))
@@ -127,6 +126,13 @@ def execute(case: Case, misread: Misread = NOTHING) -> list[Run]:
     return runs
 
 
+def _by_line(motions: Sequence[Executed]) -> dict[int, list[Executed]]:
+    out: dict[int, list[Executed]] = defaultdict(list)
+    for motion in motions:
+        out[motion.line].append(motion)
+    return out
+
+
 def lines_called_often(src: str) -> set[int]:
     """Lines of subprograms that are called in several places."""
     code = routines(src)
@@ -147,7 +153,7 @@ def _one_motion(motions: Sequence[Executed]) -> bool:
 
 
 def align(rows: Sequence[Claim], motions: Sequence[Executed], inputs: bool) -> tuple[int, str]:
-    """How many executions of a line are claimed, and what is wrong, or ""."""
+    """How many executions of a line are claimed, and what is wrong, or "".  inputs: they decide how often it runs."""
     if not rows:
         return 0, "missing: the line has no row"
     if all(row.never for row in rows):
