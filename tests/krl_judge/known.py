@@ -113,6 +113,25 @@ KNOWN = (
         ),
     ),
     Known(
+        "aliases",
+        "A parameter :OUT is the variable of the caller itself: where the subprogram sets that variable of the .dat"
+        " under its own name too, the last value counts.",
+        Case(
+            "DEF part()\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "sub(r)\n"
+            "LIN {X r,Y 2,Z 3,A 4,B 5,C 6}\n"
+            "END\n"
+            "DEF sub(w:OUT)\n"
+            "REAL w\n"
+            "w=5\n"
+            "r=8\n"
+            "END\n",
+            "DECL REAL r=1\n",
+        ),
+    ),
+    Known(
         "aggregates",
         "What an aggregate leaves out of a point that had it is not documented: unset, as it is read, or as it was.",
         Case(

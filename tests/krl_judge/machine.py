@@ -168,7 +168,14 @@ class Machine:
                 given[parameter] = self.value(tree) if by_value else self.cell(tree)
         if len(arguments) > len(routine.parameters) or len(self.scopes) > 20:
             raise Stop("too many arguments or calls")
-        return self.run_routine(routine, given)
+        if "aliases" not in self.misread:
+            return self.run_routine(routine, given)
+        own = {name: copied(value) if isinstance(value, Cell) else value for name, value in given.items()}
+        result = self.run_routine(routine, dict(own))
+        for name, value in given.items():
+            if isinstance(value, Cell):
+                restore(value, own[name])
+        return result
 
     def run_routine(self, routine: Routine, given: dict[str, object]) -> object:
         """``given``: a value, or the cell of the caller."""
