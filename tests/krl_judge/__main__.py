@@ -1,0 +1,69 @@
+"""Judges random programs: ``python -m tests.krl_judge --count 5000 --seed 1``."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections import Counter
+
+from .judge import Case, judge, shrunk
+from .known import KNOWN, unexplained
+from .programs import Generator
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m tests.krl_judge", description=__doc__)
+    parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument(
+        "--seed", type=int, default=1, help="of the first program; each next one has the next"
+    )
+    parser.add_argument("--show", type=int, default=10, help="disagreements that are shrunk and printed")
+    given = parser.parse_args()
+    total: Counter[str] = Counter()
+    start, wrong = time.perf_counter(), 0
+    for seed in range(given.seed, given.seed + given.count):
+        case = Generator(seed).case()
+        verdict = judge(case)
+        total.update(
+            {
+                name: getattr(verdict, name)
+                for name in ("runs", "motions", "known", "constant", "constant_known", "stopped")
+            }
+        )
+        if not verdict.disagreements:
+            continue
+        total["explained"] += 1
+        found = unexplained(case)
+        if found:
+            total["explained"] -= 1
+            wrong += 1
+            if wrong <= given.show:
+                show(seed, case, found[0].word)
+    print(f"{given.count} programs, {total['runs']} runs, {total['stopped']} of them stopped before the end")
+    print(f"{total['motions']} motions executed, claimed known {share(total['known'], total['motions'])}")
+    print(
+        f"{total['constant']} of a line that runs the same each time, "
+        f"claimed known {share(total['constant_known'], total['constant'])}"
+    )
+    print(f"{total['explained']} programs that are known misreadings ({', '.join(k.name for k in KNOWN)})")
+    print(f"{wrong} programs with other disagreements; {time.perf_counter() - start:.0f} s")
+    return min(wrong, 1)
+
+
+def share(part: int, whole: int) -> str:
+    return f"{part} ({100 * part / max(whole, 1):.1f} %)"
+
+
+def show(seed: int, case: Case, word: str) -> None:
+    """Prints the smallest program that still disagrees in that word."""
+    small = shrunk(case, lambda smaller: any(d.word == word for d in unexplained(smaller)))
+    print(f"--- seed {seed}")
+    print(small, end="")
+    for found in unexplained(small):
+        print(f"    line {found.line}: {found.what}")
+    print(flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,95 @@
+"""What the reader says of each motion of a program; the only place that knows it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from postproc.base.document import Document
+from postproc.base.units import DEG, MM
+from postproc.languages import DIALECTS
+from postproc.languages.dialect import ReadingSettings
+from postproc.toolpath import FrameRef, Kind, Toolpath
+
+from .motions import Six
+from .values import FRAME, matrix
+
+Tables = dict[str, dict[int, Six]]
+NEVER_RUNS = "KRL023"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One row of a toolpath, in mm and deg.
+
+    claimed: its target is said to be known and can be corrected.  never: it is said not to run; apart: it is not said
+    when it runs, if it does.  position (3,),
+    rotation (3, 3) or None; partial: X .. C of a target whose NaN components are what the axis angles ``origin`` give;
+    base, tool: (4, 4), None where not known.
+    """
+
+    line: int
+    kind: str
+    claimed: bool
+    never: bool
+    apart: bool
+    position: np.ndarray
+    rotation: np.ndarray
+    partial: np.ndarray | None
+    origin: np.ndarray | None
+    axes: np.ndarray | None
+    base: np.ndarray | None
+    tool: np.ndarray | None
+    feed: float
+    approximation: float
+    orientation: str
+    arc: tuple[np.ndarray, np.ndarray, float] | None
+
+
+def read_claims(src: str, dat: str, config: str, tables: Tables) -> list[Claim]:
+    documents = [Document(Path("part.src"), src.encode("latin-1"))]
+    if dat:
+        documents.append(Document(Path("part.dat"), dat.encode("latin-1")))
+    references = (Document(Path("$config.dat"), config.encode("latin-1")),) if config else ()
+    program = DIALECTS["krl"].read(tuple(documents), ReadingSettings(references=references))
+    return [_claim(program.toolpath, row, tables) for row in range(len(program.toolpath))]
+
+
+def _claim(path: Toolpath, row: int, tables: Tables) -> Claim:
+    refused = path.refused.get(row)
+    from_row = int(path.inherits_from_row[row])
+    on_axes = bool(path.on_axes[row])
+    said = bool(path.known[row]) or on_axes or from_row >= 0
+    return Claim(
+        line=int(path.line[row]),
+        kind=Kind(path.kind[row]).name,
+        claimed=said and refused is None and bool(path.executes[row]),
+        never=refused is not None and refused.code == NEVER_RUNS,
+        apart=not bool(path.executes[row]),
+        position=path.position[row] / MM,
+        rotation=path.programmed_rotation[row],
+        partial=path.partial_target[row] / ([MM] * 3 + [DEG] * 3) if from_row >= 0 else None,
+        origin=np.asarray(path.axes[from_row]) / DEG if from_row >= 0 else None,
+        axes=np.asarray(path.axes[row]) / DEG if on_axes else None,
+        base=_frame(path.frames, int(path.base[row]), tables["BASE_DATA"]),
+        tool=_frame(path.frames, int(path.tool[row]), tables["TOOL_DATA"]),
+        feed=float(path.feed[row]),
+        approximation=float(path.approximation[row]) / MM,
+        orientation=("#VAR", "#CONSTANT", "#JOINT", "")[path.orientation[row]],
+        arc=(path.centre[row] / MM, path.normal[row], float(path.sweep[row]) / DEG)
+        if np.isfinite(path.sweep[row])
+        else None,
+    )
+
+
+def _frame(frames: tuple[FrameRef, ...], index: int, table: dict[int, Six]) -> np.ndarray | None:
+    if index < 0:
+        return None
+    frame = frames[index]
+    if frame.pose is None:
+        return matrix(dict(zip(FRAME, table[frame.number], strict=True)))
+    out = np.eye(4)
+    out[:3, :3], out[:3, 3] = frame.pose.rotation, frame.pose.position / MM
+    return out
