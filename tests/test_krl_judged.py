@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 from krl_judge.claims import Claim, Tables, read_claims
 from krl_judge.judge import TABLES, Case, align, differs, execute, judge, shrunk
-from krl_judge.known import KNOWN, Known, unexplained
 from krl_judge.machine import load, run
+from krl_judge.misreadings import MISREADINGS, Misreading
 from krl_judge.motions import Executed, Six
 from krl_judge.programs import Generator
 from krl_judge.syntax import routines
@@ -327,7 +327,7 @@ def test_a_claim_is_true_or_tells_why_not() -> None:
 
 def test_a_program_is_shrunk_to_what_disagrees() -> None:
     case = Generator(3).case()
-    wrong = f"LIN {FULL}\nPTP {{A3 66}}\nLIN {{X 9}}\n"
+    wrong = f"LIN {FULL}\nLIN {{X 9}}\n"
     body = case.src.splitlines(keepends=True)
     end = next(n for n, line in enumerate(body) if line.strip().upper() == "END")
     case = replace(
@@ -338,7 +338,10 @@ def test_a_program_is_shrunk_to_what_disagrees() -> None:
         + "i=5\nWHILE i<6\ni=i+1\nENDWHILE\nEND\n"
         + "".join(body[end + 1 :]),
     )
-    small = shrunk(case, lambda smaller: any(d.word == "target" for d in judge(smaller).disagreements))
+    reader = altered(r"X 9\}", "X 8}")
+    small = shrunk(
+        case, lambda smaller: any(d.word == "target" for d in judge(smaller, reader).disagreements)
+    )
     assert small.src == f"{HEAD}{wrong}END\n"
     assert not small.dat
     assert len(small.inputs) == 1
@@ -347,18 +350,16 @@ def test_a_program_is_shrunk_to_what_disagrees() -> None:
 # The reader
 
 
-@pytest.mark.parametrize("known", KNOWN, ids=lambda known: known.name)
-def test_a_known_misreading_is_one_still(known: Known) -> None:
-    assert judge(known.case).disagreements
-    assert not judge(known.case, misread=frozenset([known.name])).disagreements
-    assert not unexplained(known.case)
+@pytest.mark.parametrize("once", MISREADINGS, ids=lambda once: once.name)
+def test_what_was_misread_is_not_any_more(once: Misreading) -> None:
+    assert not judge(once.case).disagreements
 
 
 def disagreements(seeds: range) -> list[str]:
     out = []
     for seed in seeds:
         case = Generator(seed).case()
-        out += [f"seed {seed}, line {found.line}: {found.what}" for found in unexplained(case)]
+        out += [f"seed {seed}, line {found.line}: {found.what}" for found in judge(case).disagreements]
     return out
 
 

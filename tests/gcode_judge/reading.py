@@ -59,7 +59,7 @@ class Reading:
         return any(first <= line <= last for _, first, last in self.findings)
 
 
-UNSAID = ("GCO020", "GCO021", "GCO022", "GCO023")
+UNSAID = ("GCO020", "GCO021", "GCO022", "GCO023", "GCO027", "GCO028")
 """Findings that say nothing of a motion: unit and tool that are assumed."""
 
 
@@ -80,12 +80,12 @@ def read(made: Made) -> Reading:
                 line=int(toolpath.line[row]),
                 kind=Kind(toolpath.kind[row]).name,
                 end=np.array(toolpath.position[row]) / MM,
-                centre=np.array(toolpath.centre[row]) / MM,
-                normal=np.array(toolpath.normal[row]),
-                sweep=float(toolpath.sweep[row]),
+                centre=np.array(toolpath.arcs.centre[row]) / MM,
+                normal=np.array(toolpath.arcs.normal[row]),
+                sweep=float(toolpath.arcs.sweep[row]),
                 base=number(int(toolpath.base[row])),
                 tool=number(int(toolpath.tool[row])),
-                code=toolpath.refused[row].code if row in toolpath.refused else "",
+                code=toolpath.constraints.refused[row].code if row in toolpath.constraints.refused else "",
                 executes=bool(toolpath.executes[row]),
             )
         )

@@ -58,8 +58,8 @@ def read_claims(src: str, dat: str, config: str, tables: Tables) -> list[Claim]:
 
 
 def _claim(path: Toolpath, row: int, tables: Tables) -> Claim:
-    refused = path.refused.get(row)
-    from_row = int(path.inherits_from_row[row])
+    refused = path.constraints.refused.get(row)
+    from_row = int(path.partial_targets.inherits_from_row[row])
     on_axes = bool(path.on_axes[row])
     said = bool(path.known[row]) or on_axes or from_row >= 0
     return Claim(
@@ -70,16 +70,16 @@ def _claim(path: Toolpath, row: int, tables: Tables) -> Claim:
         apart=not bool(path.executes[row]),
         position=path.position[row] / MM,
         rotation=path.programmed_rotation[row],
-        partial=path.partial_target[row] / ([MM] * 3 + [DEG] * 3) if from_row >= 0 else None,
+        partial=path.partial_targets.coordinates[row] / ([MM] * 3 + [DEG] * 3) if from_row >= 0 else None,
         origin=np.asarray(path.axes[from_row]) / DEG if from_row >= 0 else None,
         axes=np.asarray(path.axes[row]) / DEG if on_axes else None,
         base=_frame(path.frames, int(path.base[row]), tables["BASE_DATA"]),
         tool=_frame(path.frames, int(path.tool[row]), tables["TOOL_DATA"]),
         feed=float(path.feed[row]),
         approximation=float(path.approximation[row]) / MM,
-        orientation=("#VAR", "#CONSTANT", "#JOINT", "")[path.orientation[row]],
-        arc=(path.centre[row] / MM, path.normal[row], float(path.sweep[row]) / DEG)
-        if np.isfinite(path.sweep[row])
+        orientation=("#VAR", "#CONSTANT", "#JOINT", "")[path.orientation_control.mode[row]],
+        arc=(path.arcs.centre[row] / MM, path.arcs.normal[row], float(path.arcs.sweep[row]) / DEG)
+        if np.isfinite(path.arcs.sweep[row])
         else None,
     )
 

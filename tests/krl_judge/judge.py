@@ -8,18 +8,16 @@ often, or inputs decide how often, each execution has to be that of some row.
 from __future__ import annotations
 
 import math
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from . import claims
 from .claims import Claim, Tables
-from .machine import NOTHING, Inputs, Run, load, run
+from .machine import Inputs, Run, load, run
 from .motions import Executed, Six
-from .robot import Misread
 from .syntax import routines
 from .values import FRAME, Stop, matrix, rotation
 
@@ -76,19 +74,16 @@ TABLES: Tables = {
 }
 
 
-def judge(case: Case, reader: Reader | None = None, misread: Misread = NOTHING) -> Verdict:
+def judge(case: Case, reader: Reader | None = None) -> Verdict:
     """Runs a case with each of its inputs, first with the .dat as it is written, then again with what the runs before
-    have left in it.  ``misread``: known misreadings that do not count."""
+    have left in it."""
     claimed = (reader or claims.read_claims)(case.src, case.dat, case.config, TABLES)
     try:
-        runs = execute(case, misread)
+        runs = execute(case)
     except Stop:
         return Verdict()
     rows: dict[int, list[Claim]] = defaultdict(list)
-    excused = lines_called_often(case.src) if "never" in misread else range(0)
     for claim in claimed:
-        if claim.line in excused:
-            claim = replace(claim, never=False)
         rows[claim.line].append(claim)
     found: dict[tuple[int, str], Disagreement] = {}
     known: dict[int, int] = defaultdict(int)
@@ -114,15 +109,13 @@ def judge(case: Case, reader: Reader | None = None, misread: Misread = NOTHING) 
     )
 
 
-def execute(case: Case, misread: Misread = NOTHING) -> list[Run]:
+def execute(case: Case) -> list[Run]:
     first = load(TABLES, case.dat, case.config)
     code = routines(case.src)
-    runs = [run(code, first.copy(), inputs, misread) for inputs in case.inputs]
+    runs = [run(code, first.copy(), inputs) for inputs in case.inputs]
     memory = first.copy()
     for inputs in (*case.inputs[-2:], case.inputs[0]):
-        if "tables" in misread:
-            memory.cells.update({name: first.copy().cells[name] for name in TABLES})
-        runs.append(run(code, memory, inputs, misread))
+        runs.append(run(code, memory, inputs))
     return runs
 
 
@@ -131,14 +124,6 @@ def _by_line(motions: Sequence[Executed]) -> dict[int, list[Executed]]:
     for motion in motions:
         out[motion.line].append(motion)
     return out
-
-
-def lines_called_often(src: str) -> set[int]:
-    """Lines of subprograms that are called in several places."""
-    code = routines(src)
-    pairs = (pair for routine in code for line in routine.lines for pair in pairwise(line.tokens))
-    called = Counter(one[1] for one, other in pairs if other[1] == "(")
-    return {line.number for routine in code if called[routine.name] > 1 for line in routine.lines}
 
 
 def _one_motion(motions: Sequence[Executed]) -> bool:

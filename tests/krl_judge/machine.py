@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from .evaluate import evaluate
 from .motions import NAN, Executed, Six
-from .robot import ZERO, Misread, Motion, Robot
+from .robot import ZERO, Motion, Robot
 from .syntax import CLOSES, LOOPS, Line, Reader, Routine, tokens
 from .values import (
     FRAME,
@@ -24,13 +24,11 @@ from .values import (
     copied,
     is_set,
     new_cell,
-    restore,
 )
 
 Inputs = Mapping[int, tuple[bool, ...]]
 """$IN[n]: what it shows each time that it is read, from the first again after the last."""
 
-NOTHING: Misread = frozenset()
 MOST_STEPS = 800
 SIMPLE = ("INT", "REAL", "BOOL", "CHAR")
 
@@ -83,9 +81,9 @@ class Run:
     reads_inputs: bool
 
 
-def run(code: list[Routine], memory: Memory, inputs: Inputs, misread: Misread = NOTHING) -> Run:
+def run(code: list[Routine], memory: Memory, inputs: Inputs) -> Run:
     """Executes a program as far as it goes.  ``memory`` is what the run leaves."""
-    machine = Machine(code, memory, inputs, misread)
+    machine = Machine(code, memory, inputs)
     stopped = ""
     try:
         machine.run_routine(machine.routines[0], {})
@@ -95,12 +93,12 @@ def run(code: list[Routine], memory: Memory, inputs: Inputs, misread: Misread = 
 
 
 class Machine:
-    def __init__(self, of: list[Routine], memory: Memory, inputs: Inputs, misread: Misread = NOTHING) -> None:
-        self.routines, self.memory, self.inputs, self.misread = of, memory, inputs, misread
+    def __init__(self, of: list[Routine], memory: Memory, inputs: Inputs) -> None:
+        self.routines, self.memory, self.inputs = of, memory, inputs
         self.reads: dict[int, int] = {}
         self.scopes: list[Scope] = []
         self.steps = 0
-        self.robot = Robot(memory.cells, misread)
+        self.robot = Robot(memory.cells)
         self.system = self.robot.system
 
     # places and values
@@ -168,14 +166,7 @@ class Machine:
                 given[parameter] = self.value(tree) if by_value else self.cell(tree)
         if len(arguments) > len(routine.parameters) or len(self.scopes) > 20:
             raise Stop("too many arguments or calls")
-        if "aliases" not in self.misread:
-            return self.run_routine(routine, given)
-        own = {name: copied(value) if isinstance(value, Cell) else value for name, value in given.items()}
-        result = self.run_routine(routine, dict(own))
-        for name, value in given.items():
-            if isinstance(value, Cell):
-                restore(value, own[name])
-        return result
+        return self.run_routine(routine, given)
 
     def run_routine(self, routine: Routine, given: dict[str, object]) -> object:
         """``given``: a value, or the cell of the caller."""
@@ -274,7 +265,7 @@ class Machine:
             reader.end()
             if cell is not None:
                 # what becomes of the components that an aggregate leaves out is not documented
-                assign(cell, value, None if "aggregates" in self.misread else UNDETERMINED)
+                assign(cell, value, UNDETERMINED)
             return at + 1
         if line.block:
             return self.block(scope, line, at, reader)
@@ -402,20 +393,7 @@ class Machine:
         return value
 
     def move(self, line: Line, reader: Reader) -> None:
-        if "functions" not in self.misread:
-            self.robot.move(line.number, self.motion(reader))
-            return
-        cells = [
-            cell for of in (self.system, self.memory.cells, self.scopes[-1].cells) for cell in of.values()
-        ]
-        former = [copied(cell) for cell in cells]
-        end, executed = self.robot.end, len(self.robot.executed)
-        motion = self.motion(reader)
-        for cell, kept in zip(cells, former, strict=True):
-            restore(cell, kept)
-        self.robot.end = end
-        del self.robot.executed[executed:]
-        self.robot.move(line.number, motion)
+        self.robot.move(line.number, self.motion(reader))
 
     def motion(self, reader: Reader) -> Motion:
         word = reader.take()

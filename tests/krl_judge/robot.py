@@ -9,9 +9,6 @@ from . import motions as way
 from .motions import NAN, End, Executed, Six
 from .values import AXES, FRAME, STRUCTURES, UNDETERMINED, Cell, Stop, assign, content, is_set, new_cell
 
-Misread = frozenset[str]
-"""Known misreadings (``known``) that are made here too, to tell whether they are all that is wrong."""
-
 ZERO = dict.fromkeys(FRAME, 0.0)
 SYSTEM = {
     "$BASE": "FRAME", "$TOOL": "FRAME", "$VEL": "CP", "$APO": "APO", "$ORI_TYPE": "word", "$CIRC_TYPE": "word",
@@ -35,8 +32,8 @@ class Motion:
 class Robot:
     """``system``: its variables; ``shared``: those of the controller (BASE_DATA, TOOL_DATA, DEF_VEL_CP)."""
 
-    def __init__(self, shared: dict[str, Cell], misread: Misread) -> None:
-        self.shared, self.misread = shared, misread
+    def __init__(self, shared: dict[str, Cell]) -> None:
+        self.shared = shared
         self.system = {name: new_cell(of, STRUCTURES) for name, of in SYSTEM.items()}
         self.executed: list[Executed] = []
         self.end = End()
@@ -138,7 +135,7 @@ class Robot:
         )  # fmt: skip
         angles = target[3:]
         keeps = motion.kind != "PTP" and ori_type not in (None, "#VAR", "#JOINT")
-        if keeps and angles != before[3:] and "orientation" not in self.misread:
+        if keeps and angles != before[3:]:
             angles = (NAN,) * 3  # what a partial point inherits behind an orientation that was not reached
         self.end = End((*target[:3], *angles), (NAN,) * 6, origin, base, tool)
 
@@ -150,8 +147,6 @@ class Robot:
             axes = way.fill(own, self.end.axes)
         self.executed.append(Executed(line, "AXIS", (None,) * 6, axes, base, tool, approximation=None))
         known = not any(math.isnan(a) for a in axes)
-        if not known and not motion.relative and "partial axes" in self.misread:
-            return
         self.end = End((None if known else NAN,) * 6, axes, axes if known else None, base, tool)
 
     def distance(self, rounds: tuple[str, ...]) -> float | None:

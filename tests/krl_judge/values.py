@@ -72,13 +72,6 @@ def copied(cell: Cell) -> Cell:
     return Cell(cell.type, cell.value, {k: copied(part) for k, part in cell.parts.items()}, cell.is_array)
 
 
-def restore(cell: Cell, former: Cell) -> None:
-    """Gives a cell the value that it had when ``former`` was copied from it."""
-    cell.value = former.value
-    for key, part in cell.parts.items():
-        restore(part, former.parts[key])
-
-
 def content(cell: Cell) -> object:
     """The value; of a structure a dict of what is set."""
     if cell.is_array:

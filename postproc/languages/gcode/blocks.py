@@ -215,6 +215,8 @@ class BlockWords:
             *(key(letter) for letter in "IJK"), *(one for one in THROUGH if one in self.columns)
         )
         arc &= centre | (modal.states & self.has(key("R")))
+        # where it is not known what is active, a block with a centre and no other code may be one
+        arc |= (modal.flow.reason != FlowReason.NONE) & centre & (modal.states | ~self.has(key("G")))
         return modal.flow.tape & ((self.axis | arc) & ~silent | modal.has(Once.HOME))
 
     @cached_property

@@ -19,10 +19,20 @@ from postproc.languages.gcode.words import How, key
 from postproc.toolpath import Kind
 
 FLOW_MESSAGES = {
-    FlowReason.DELETED: "the block runs only sometimes: it starts with a slash, or with a condition",
-    FlowReason.FLOW: "the motion is in a loop, branch or subprogram: it may run many times or never",
-    FlowReason.PROGRAM: "the motion is in a subprogram of the file: it runs where that is called",
-    FlowReason.ENDED: "the motion follows the end of the program and does not run",
+    FlowReason.DELETED: (
+        "GCO006",
+        "the block runs only sometimes: it starts with a slash, or with a condition",
+    ),
+    FlowReason.FLOW: (
+        "GCO006",
+        "the motion is in a loop, branch or subprogram: it may run many times or never",
+    ),
+    FlowReason.PROGRAM: (
+        "GCO006",
+        "the motion is in a subprogram of the file: it runs where that is called",
+    ),
+    FlowReason.ENDED: ("GCO025", "the motion follows the end of the program and does not run"),
+    FlowReason.COMPUTED: ("GCO005", "a G or M code before it is computed: what is active is not known"),
 }
 ARCS = {
     2: "the arc has no centre in its plane: I J K of the plane or R",
@@ -66,8 +76,7 @@ def check_correctability(
     rows = moves.block
     refuse, modal = collector.refuse, given.modal
     force = {group: values[rows] for group, values in modal.force.items()}
-    for uncertainty, message in FLOW_MESSAGES.items():
-        code = "GCO025" if uncertainty == FlowReason.ENDED else "GCO006"
+    for uncertainty, (code, message) in FLOW_MESSAGES.items():
         refuse(modal.flow.reason[rows] == uncertainty, code, message)
     refuse(force[Group.MACRO] != 0, "GCO007", "every block calls a macro or a cycle here (G66, MCALL)")
     refuse(modal.has(Once.HOME)[rows], "GCO004", "the block leads to the reference point")

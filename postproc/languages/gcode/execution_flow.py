@@ -30,6 +30,7 @@ class FlowReason(IntEnum):
     FLOW = 2
     PROGRAM = 3
     ENDED = 4
+    COMPUTED = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +70,8 @@ def follow(source: Source, control: Control, once: Ints) -> ExecutionFlow:
     m = source.column(key("M"))
     forget[m.block[np.isin(m.value, CALLS)] + 1] = True
     forget[1:] |= (once & (1 << Once.CALL)) != 0
+    if "unknown" in source.noted:  # what is not read may select anything
+        forget[source.noted["unknown"] + 1] = True
     if control.calls:
         forget[1:] |= source.mask(*control.calls) & ~source.mask(key("G"), key("M"))
     edge = np.zeros(n + 1, np.int32)
@@ -78,6 +81,10 @@ def follow(source: Source, control: Control, once: Ints) -> ExecutionFlow:
         edge[end] -= 1
     if edge.any():
         uncertainty[np.cumsum(edge)[:n] > 0] = FlowReason.FLOW
+    computed = [column.block[np.isnan(column.value)] for column in (source.column(key("G")), m)]
+    first = min((int(blocks[0]) for blocks in computed if len(blocks)), default=n)
+    rest = uncertainty[first:]
+    rest[rest == FlowReason.NONE] = FlowReason.COMPUTED
     programs = _programs(source)
     if len(programs) > 1:
         uncertainty[programs[1] :] = FlowReason.PROGRAM

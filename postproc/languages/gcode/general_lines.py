@@ -15,7 +15,7 @@ _TOKEN = re.compile(
     rb"|(?P<name>[A-Za-z_][A-Za-z_]+)"
     rb"|(?P<letter>[A-Za-z])[ \t]*+(?:(?P<number>"
     + _NUMBER
-    + rb")(?![\d.#\[])|(?P<sign>[-+]?[ \t]*)(?P<open>[#\[]"
+    + rb")(?![\d.\[])|(?P<sign>[-+]?[ \t]*)(?P<open>[#\[]"
     rb"|[A-Za-z]{2,5}[ \t]*\[))"
     rb"|(?P<bare>[A-Za-z])(?![A-Za-z_0-9.\[#])"
     rb"|(?P<assign>#)"

@@ -287,7 +287,13 @@ def _numbered(run: ExecutionContext, table: bytes, at: int, line: int) -> FrameI
     """Entry ``at`` of BASE_DATA or TOOL_DATA as the program left it so far."""
     if at == 0:
         return run.frames.known(0, ZERO, line)
-    value = run.variables.get(table + b"_DATA", b"[%d]" % at)
+    entry = b"[%d]" % at
+    value = run.variables.get(table + b"_DATA", entry)
+    if value is None and not run.survey.table_entries.isdisjoint((table + b"_DATA" + entry, None)):
+        name = f"{table.decode()}_DATA[{at}]"
+        return UnknownValue(
+            "KRL012", f"{name} is what the last run has left: the program assigns it elsewhere"
+        )
     if value is None:
         return run.frames.known(at, None, line)
     numbers = value.numbers if isinstance(value, KrlTarget) else None
@@ -339,6 +345,9 @@ def _set_variable(run: ExecutionContext, said: Assignment) -> None:
         path = b"[" + indices + b"]"
     if not said.path:
         value = _value(run, said.value.rstrip(), said.at)
+        if isinstance(value, KrlTarget) and value.missing and run.variables.get(name, path) is not None:
+            missing = ", ".join(value.missing)
+            value = UnknownValue("KRL002", f"the aggregate assigned to {shown(name)} omits {missing}")
         keep(run, name, path, value)
         return
     inner, _, key = said.path.rpartition(b".")

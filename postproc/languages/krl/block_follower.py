@@ -47,7 +47,8 @@ class BlockFollower:
 
     spent: statements that were followed again; seen: those that were followed in loops and calls (index); jumped: a
     GOTO led back, so that every line may run again; repeating: loops and calls that are followed and open; text_called:
-    routines that were called where it is not known that, or with what, they run.
+    routines that were called where it is not known that, or with what, they run; mentioned_from: start of a routine ->
+    the names in its text.
     """
 
     def __init__(self, run: ExecutionContext, uncertain_blocks: UncertainBlocks) -> None:
@@ -56,6 +57,7 @@ class BlockFollower:
         self.seen = bytearray(len(run.code))
         self.jumped = False
         self.text_called: set[bytes] = set()
+        self.mentioned_from: dict[int, frozenset[bytes]] = {}
         self.comments: dict[int, Annotation] = {}
 
     def _push(self, block: Block, followed: bool) -> BlockFrame:

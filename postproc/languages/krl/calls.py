@@ -6,9 +6,9 @@ import re
 
 from postproc.languages.krl.assignments import command, keep
 from postproc.languages.krl.block_follower import BlockFollower
-from postproc.languages.krl.execution_context import BlockFrame
-from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, value_end
-from postproc.languages.krl.program_structure import Routine
+from postproc.languages.krl.execution_context import BlockFrame, Item
+from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
+from postproc.languages.krl.program_structure import Routine, closure
 from postproc.languages.krl.statement_effects import PATH_FROM_FILE, is_harmless
 from postproc.languages.krl.target import shown
 from postproc.languages.krl.variables import Entry
@@ -113,7 +113,7 @@ class Calls(BlockFollower):
             command(run, item, said.arguments)
             return pc + 1
         routine = run.survey.routines.get(said.name)
-        if routine is not None and self._follows(said.name, routine):
+        if routine is not None and self._follows(said.name, routine) and not self._aliased(said, routine):
             return self._enter_call(pc, said, routine)
         run.mentioned |= identifiers(said.arguments)
         self._called(item, said.name, said.arguments)
@@ -128,14 +128,39 @@ class Calls(BlockFollower):
             return False
         return sum(opened.back >= 0 for opened in run.stack) < MOST_CALLS
 
+    def _aliased(self, said: Call, routine: Routine) -> bool:
+        """Whether a parameter that comes back is a variable that the subprogram knows by its own name too."""
+        run = self.run
+        given = [text.strip() for text in split_values(said.arguments)]
+        names = [
+            found[1].upper()
+            for (_, comes_back), text in zip(routine.parameters, given, strict=False)
+            if comes_back and (found := _PLAIN_NAME.match(text))
+        ]
+        if not names:
+            return False
+        if len(set(names)) < len(names):
+            return True
+        for name in closure(run.survey, [routine.name]):
+            inner = run.survey.routines[name]
+            first, last = run.code[inner.start], run.code[min(inner.end, len(run.code) - 1)]
+            mentioned = self._mentioned(first, last)
+            if any(one in mentioned and one not in inner.types for one in names):
+                return True
+        return False
+
+    def _mentioned(self, first: Item, last: Item) -> frozenset[bytes]:
+        """The names between two statements."""
+        start, stop = (
+            item.at if isinstance(item, Statement) else int(item.motion[0, 0]) for item in (first, last)
+        )
+        if start not in self.mentioned_from:
+            self.mentioned_from[start] = identifiers(self.run.document.raw[start:stop])
+        return self.mentioned_from[start]
+
     def _enter_call(self, pc: int, said: Call, routine: Routine) -> int:
         run, variables = self.run, self.run.variables
-        texts = []
-        place = 0
-        while place < len(said.arguments):
-            end = value_end(said.arguments, place)
-            texts.append(said.arguments[place:end].strip())
-            place = end + 1
+        texts = [text.strip() for text in split_values(said.arguments)]
         given: dict[bytes, Entry] = {}
         returned = []
         for (name, comes_back), text in zip(routine.parameters, texts, strict=False):

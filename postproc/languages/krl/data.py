@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from postproc.base.document import Document, Span
 from postproc.languages.krl.expressions import Value, evaluate
 from postproc.languages.krl.lexing import (
+    FRAME_TABLES,
     POINT_TYPES,
     RECORD_TYPES,
     SCALARS,
@@ -30,9 +31,6 @@ from postproc.languages.krl.variables import Entry
 
 _DEFAULTS = b"DEF_"
 """Begin of the names that KUKA's bas.src takes its defaults from; other numbers of other files may change."""
-
-_FRAME_TABLES = (b"BASE_DATA", b"TOOL_DATA")
-"""What they hold is the cell's to say."""
 
 _POINT_KEYS = frozenset([*COMPONENTS, *AXES, *EXTERNAL, b"S", b"T"])
 
@@ -75,7 +73,7 @@ def read_data(result: Declarations, document: Document, file: int) -> None:
             key = said.key
             if key is not None and said.value.startswith(b"{"):
                 root = key.split(b"[")[0]
-                if root in _FRAME_TABLES:
+                if root in FRAME_TABLES:
                     continue
                 if result.types.get(root) in RECORD_TYPES:
                     result.records[key] = fields(said.value)
@@ -93,7 +91,7 @@ def _declare(
         result.types[root] = said.type
     if said.is_global or foreign:
         result.shared.add(root)
-    if root in _FRAME_TABLES:
+    if root in FRAME_TABLES:
         return
     if said.type in RECORD_TYPES:
         if value.startswith(b"{") and not (foreign and key in result.records):

@@ -37,6 +37,8 @@ CLOSES: dict[bytes, frozenset[bytes]] = {
 }
 BRANCHES = {b"ELSE": b"IF", b"CASE": b"SWITCH", b"DEFAULT": b"SWITCH"}
 POINT_TYPES = frozenset([b"FRAME", b"POS", b"E3POS", b"E6POS", b"AXIS", b"E3AXIS", b"E6AXIS"])
+FRAME_TABLES = (b"BASE_DATA", b"TOOL_DATA")
+"""What they hold is the cell's to say."""
 RECORD_TYPES = frozenset([b"FDAT", b"LDAT", b"PDAT", b"ODAT"])
 SCALARS = frozenset([b"INT", b"REAL", b"BOOL", b"CHAR"])
 TYPES = POINT_TYPES | RECORD_TYPES | SCALARS
@@ -327,6 +329,15 @@ def value_end(code: bytes, start: int) -> int:
         elif letter == b"," and depth <= 0:
             return found.start()
     return len(code)
+
+
+def split_values(text: bytes) -> Iterator[bytes]:
+    """The values between the commas outside of all braces."""
+    place = 0
+    while place < len(text):
+        end = value_end(text, place)
+        yield text[place:end]
+        place = end + 1
 
 
 def module_name(raw: bytes, word: bytes) -> tuple[int, int] | None:

@@ -14,6 +14,8 @@ from postproc.languages.krl.target import Six, UnknownValue
 from postproc.toolpath import ArcFrame, FrameRef, OrientationMode
 
 ZERO: Numbers = (0.0,) * 6
+NOT_TO_TARGET = (OrientationMode.CONSTANT, OrientationMode.UNKNOWN)
+"""Modes in which a path motion may end with another orientation than that of its target."""
 NAN = float("nan")
 Source = int | bytes
 """A row after which the robot may be here, or the mark of a label or routine from where it may come."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, apart, reached
 from postproc.languages.krl.lexing import SPLINES, Statement
-from postproc.languages.krl.modal_state import NAN, Anchor, ModalState
+from postproc.languages.krl.modal_state import NAN, NOT_TO_TARGET, Anchor, ModalState
 from postproc.languages.krl.motion_refusals import (
     frames_missing,
     is_detached,
@@ -20,13 +20,13 @@ from postproc.languages.krl.partial import anchored, filled, incomplete
 from postproc.languages.krl.source_map import InlineForm
 from postproc.languages.krl.spatial import Arc, Numbers
 from postproc.languages.krl.target import KrlTarget, UnknownValue
-from postproc.toolpath import ArcFrame, Kind, OrientationMode
+from postproc.toolpath import ArcFrame, Kind
 
 
 def _reached(state: ModalState, kind: Kind, values: Numbers | None) -> Numbers | None:
     """Where a motion ends, X..C: of one that keeps its orientation the angles are not those of its text, if it starts
     with others, and are then not known in numbers."""
-    keeps = state.orientation == OrientationMode.CONSTANT and kind in (Kind.LIN, Kind.CIRC, Kind.SPL)
+    keeps = state.orientation in NOT_TO_TARGET and kind in (Kind.LIN, Kind.CIRC, Kind.SPL)
     if values is None or not keeps:
         return values
     point = state.point if state.point_frames == (state.base, state.tool) else None

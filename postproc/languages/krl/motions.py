@@ -8,7 +8,7 @@ from postproc.languages.krl.arc_motions import move_on_arc
 from postproc.languages.krl.assignments import with_clause
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.lexing import LONGEST, Statement, identifiers
-from postproc.languages.krl.modal_state import NAN, ModalState
+from postproc.languages.krl.modal_state import NAN, NOT_TO_TARGET, ModalState
 from postproc.languages.krl.motion_entry import enter_motion, extent
 from postproc.languages.krl.motion_refusals import (
     frames_missing,
@@ -23,7 +23,7 @@ from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.statement_effects import HERE
 from postproc.languages.krl.target import UnknownValue, shown
 from postproc.languages.krl.vectorised import VectorisedLines
-from postproc.toolpath import Kind, OrientationMode
+from postproc.toolpath import Kind
 
 _POINTS = (b"PTP", b"SPTP", b"PTP_REL", b"SPTP_REL")
 
@@ -74,7 +74,7 @@ def move_bulk(run: ExecutionContext, bulk: VectorisedLines) -> None:
 def _bulk_end(state: ModalState, bulk: VectorisedLines) -> Numbers:
     """Where a run of common lines ends, X..C."""
     x, y, z, a, b, c = bulk.values[-1].tolist()
-    if state.orientation != OrientationMode.CONSTANT or not bulk.is_line[-1]:
+    if state.orientation not in NOT_TO_TARGET or not bulk.is_line[-1]:
         return x, y, z, a, b, c
     point = state.point if state.point_frames == (state.base, state.tool) else None
     jumps = np.flatnonzero(~bulk.is_line)

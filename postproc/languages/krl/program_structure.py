@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from postproc.languages.krl.lexing import (
     BRANCHES,
     CLOSES,
+    FRAME_TABLES,
     LOOPS,
     NAME,
     Assignment,
@@ -78,13 +79,15 @@ class Routine(Block):
 class ProgramStructure:
     """``events``: index of a statement -> what it opens, branches or closes, in this order of closing.
 
-    ``routine_at``: index of the DEF -> routine; ``unclosed``: (line, what) of blocks without an end and ends without a
-    begin; ``assigned``: names that the program assigns as a whole, or with ``.X`` after them a component of; ``read``:
-    names that code reads, other than as the target of a motion; ``later``: names that run or change at a time of their
-    own (interrupts, triggers); ``later_effects``: what these change of base, tool and modes; ``inline``: lines of
-    motions in the fold of an inline form; ``jumps``: start of the routine and name of every label that a GOTO names ->
-    first and last index of these; ``effects``: all that the program changes anywhere; ``blocks``: all of them;
-    ``passed_through``: the same labels -> what differs between the paths that lead there.
+    ``routine_at``: index of the DEF -> routine; ``unclosed``: (line, what) of blocks without an end and ends
+    without a begin; ``assigned``: names that the program assigns as a whole, or with ``.X`` after them a
+    component of; ``read``: names that code reads, other than as the target of a motion; ``table_entries``:
+    entries of BASE_DATA and TOOL_DATA that it assigns, None for one whose number is computed; ``later``:
+    names that run or change at a time of their own (interrupts, triggers); ``later_effects``: what these
+    change of base, tool and modes; ``inline``: lines of motions in the fold of an inline form; ``jumps``:
+    start of the routine and name of every label that a GOTO names -> first and last index of these;
+    ``effects``: all that the program changes anywhere; ``blocks``: all of them; ``passed_through``: the same
+    labels -> what differs between the paths that lead there.
     """
 
     events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
@@ -92,6 +95,7 @@ class ProgramStructure:
     routine_at: dict[int, Routine] = field(default_factory=dict)
     assigned: set[bytes] = field(default_factory=set)
     read: set[bytes] = field(default_factory=set)
+    table_entries: set[bytes | None] = field(default_factory=set)
     later: set[bytes] = field(default_factory=set)
     later_effects: Effects = field(default_factory=set)
     jumps: dict[tuple[int, bytes], tuple[int, int]] = field(default_factory=dict)
@@ -123,6 +127,8 @@ class _Surveyor:
         if kind == "motion":
             if stack and not _stays(statement.code):
                 stack[-1].effects.add("point")
+            if functions_of(statement):
+                self.note(statement)
             if self.inline:
                 self.found.inline.add(statement.line)
         elif kind == "comment":
@@ -259,6 +265,8 @@ class _Surveyor:
             effects = effects | identifiers(statement.code)
         _join(found.effects, effects)
         said = statement.strings
+        if isinstance(said, Assignment) and said.name in FRAME_TABLES:
+            found.table_entries.add(said.key)
         if isinstance(said, Assignment) and said.path and said.element is None and len(effects) == 1:
             found.assigned.add(said.name + b"." + said.path)
         else:

@@ -58,7 +58,7 @@ _FUNCTION = re.compile(rb"(?<![A-Za-z0-9_$#.'])(" + NAME + rb")[ \t]*\(")
 _WORDS = frozenset(
     b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN WHILE UNTIL FOR TO STEP SWITCH CASE WAIT SEC RETURN".split()
 )
-_CALLING = frozenset(["assignment", "call", "foreign", "open", "close", "return"])
+_CALLING = frozenset(["assignment", "call", "foreign", "open", "close", "return", "motion"])
 """Kinds of statement whose expressions may call functions, besides WAIT."""
 
 _COUNTER = re.compile(rb"FOR[ \t]+(" + NAME + rb")[ \t]*=", re.I)

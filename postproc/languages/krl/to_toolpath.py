@@ -46,7 +46,10 @@ def to_toolpath(
     table = MotionTable(rows, places)
     for start, stop, reason in elsewhere:
         for row in np.flatnonzero((table.line >= start) & (table.line <= stop)).tolist():
-            rows.reasons.setdefault(row, reason)
+            if (
+                rows.reasons.setdefault(row, reason).code == "KRL023"
+            ):  # not reached by the calls that are followed
+                rows.reasons[row] = reason
     _lock(run)
     refused = _refused(rows, table)
     table.base, table.tool, used = _used(table.base, table.tool, run.frames.refs())

@@ -1,27 +1,21 @@
-"""Misreadings of the present reader that are known, each with a small program.
-
-A disagreement that vanishes where the interpreter makes the same mistake is explained by it.  What is mended here is
-taken out: its name in ``machine``, too.
-"""
+"""Small programs that were once misread, each for a reason of its own."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 
-from .judge import Case, Disagreement, Reader, judge
+from .judge import Case
 
 
 @dataclass(frozen=True)
-class Known:
+class Misreading:
     name: str
-    """As ``machine`` and ``judge`` know it."""
     what: str
     case: Case
 
 
-KNOWN = (
-    Known(
+MISREADINGS = (
+    Misreading(
         "partial axes",
         "A PTP to some axes moves the robot also where the other axes are not known; a partial point behind it is read"
         " with components from before that PTP.",
@@ -35,7 +29,7 @@ KNOWN = (
             "END\n"
         ),
     ),
-    Known(
+    Misreading(
         "tables",
         "BASE_DATA and TOOL_DATA outlive the program: a motion before the assignment of an entry stands in the old"
         " frame in the first run and in the new one in the next.",
@@ -48,7 +42,7 @@ KNOWN = (
             "END\n"
         ),
     ),
-    Known(
+    Misreading(
         "never",
         "A subprogram that is followed for one call, and called elsewhere where the flow is not followed: what the"
         " followed call does not reach is said to run never.",
@@ -71,7 +65,7 @@ KNOWN = (
             inputs=({1: (True,)},),
         ),
     ),
-    Known(
+    Misreading(
         "orientation",
         "Under $ORI_TYPE=#CONSTANT the robot does not turn to the orientation of the point, and a partial point behind"
         " such a motion is not read; but it is, with that orientation, where inputs decide on #CONSTANT in a loop.",
@@ -94,7 +88,7 @@ KNOWN = (
             inputs=({1: (True,)},),
         ),
     ),
-    Known(
+    Misreading(
         "functions",
         "A function that is called in the point of a motion may set frames and variables, and move; what it does there"
         " is not seen.",
@@ -112,7 +106,7 @@ KNOWN = (
             "ENDFCT\n"
         ),
     ),
-    Known(
+    Misreading(
         "aliases",
         "A parameter :OUT is the variable of the caller itself: where the subprogram sets that variable of the .dat"
         " under its own name too, the last value counts.",
@@ -131,7 +125,7 @@ KNOWN = (
             "DECL REAL r=1\n",
         ),
     ),
-    Known(
+    Misreading(
         "aggregates",
         "What an aggregate leaves out of a point that had it is not documented: unset, as it is read, or as it was.",
         Case(
@@ -147,15 +141,3 @@ KNOWN = (
         ),
     ),
 )
-
-
-def unexplained(case: Case, reader: Reader | None = None) -> tuple[Disagreement, ...]:
-    """The disagreements that no known misreading explains, nor two or all of them together."""
-    left = judge(case, reader).disagreements
-    for chosen in (*combinations(KNOWN, 1), *combinations(KNOWN, 2), KNOWN):
-        if not left:
-            break
-        still = judge(case, reader, frozenset(known.name for known in chosen)).disagreements
-        places = {(d.line, d.word) for d in still}
-        left = tuple(d for d in left if (d.line, d.word) in places)
-    return left
