@@ -104,7 +104,7 @@ def test_defaults(tmp_path):
     assert cell.tolerance_angle == pytest.approx(np.radians(0.01))
     assert (cell.min_segment, cell.max_growth) == (pytest.approx(1e-3), 2.0)
     assert not cell.controller.absolute_accuracy
-    assert cell.integer_words == "mm"
+    assert cell.integer_words == ""
     assert (cell.cycle_ms, cell.force_ramp, cell.temperature) == (12.0, None, None)
     assert (cell.force_ci95, cell.force_vector, cell.touch_points) == (None, None, {})
     assert cell.tools[1].diameter is None

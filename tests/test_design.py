@@ -58,7 +58,7 @@ PHYSICS = {"robot", "effects", "process"}
 
 SAME_MODULE_NAMES = {
     "one part of each family of languages": {
-        "arcs": {"languages/gcode", "languages/krl"},
+        "arcs": {"languages/gcode", "languages/krl", "toolpath"},
         "lexing": {"languages/gcode", "languages/krl"},
         "motions": {"languages/gcode", "languages/krl"},
         "source_map": {"languages/gcode", "languages/krl"},

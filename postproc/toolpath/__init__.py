@@ -5,7 +5,7 @@ from postproc.toolpath.configuration import Configuration
 from postproc.toolpath.edit_constraints import EditConstraints
 from postproc.toolpath.orientation_control import OrientationControl, OrientationMode, OrientationPath
 from postproc.toolpath.partial_targets import PartialTargets
-from postproc.toolpath.plan import Plan, Role
+from postproc.toolpath.planned_motions import Plan, Role
 from postproc.toolpath.toolpath import (
     COMPUTED,
     LOST,

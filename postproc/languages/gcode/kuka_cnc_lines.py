@@ -26,7 +26,7 @@ _ADDRESS = re.compile(rb"([A-Za-z])([0-9]{0,3})[ \t]*=[ \t]*")
 _WORD = re.compile(rb"([A-Za-z])[ \t]*((?:[-+][ \t]*)?(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)", re.I)
 _NAME = re.compile(rb"[A-Za-z_][A-Za-z_.][A-Za-z0-9_.]*")
 _ASSIGNED = re.compile(rb"[ \t]*+=(?!=)[ \t]*+")
-_BRACKETS = re.compile(rb"\[[^\]]*+\]")
+_BRACKETS = re.compile(rb"\[[^\[\]]*+\]")
 _MOVES = re.compile(rb"(?<![A-Za-z])[GXYZABCIJKF][ \t]*+[-+]?+[ \t]*+[.\d=]", re.I)
 _NUMBER = re.compile(rb"(?:[-+][ \t]*)?(?:\d+\.?\d*|\.\d+)")
 

@@ -102,11 +102,8 @@ class _Forbidden:
     def of(program: Program) -> _Forbidden:
         path = program.toolpath
         masks = [np.zeros(len(path), np.bool_) for _ in range(3)]
-        for mask, found in zip(
-            masks,
-            (path.constraints.refused, path.constraints.locked, path.constraints.no_insert_before),
-            strict=True,
-        ):
+        own = path.constraints
+        for mask, found in zip(masks, (own.refused, own.locked, own.no_insert_before), strict=True):
             mask[np.array([*found], dtype=np.int64)] = True
         refused, fixed_, whole = masks
         return _Forbidden(refused, refused | fixed_, refused | whole)

@@ -30,7 +30,8 @@ _DEEPEST = 80
 """Blanks of an indentation."""
 
 _BLANKS = np.isin(np.arange(256), np.frombuffer(b" \t", np.uint8))
-_CONDITIONS = re.compile(rb"\bWITH\b.*?(?=(?:[ \t,]C_(?:DIS|VEL|ORI|PTP|SPL))?[ \t]*\Z)", re.I | re.S)
+_WITH = re.compile(rb"\bWITH\b", re.I)
+_LAST = re.compile(rb"[ \t,]C_(?:DIS|VEL|ORI|PTP|SPL)\Z", re.I)
 _APPROXIMATION = re.compile(rb"(?<![A-Za-z0-9_$])C_(?:DIS|VEL|ORI|PTP|SPL)(?![A-Za-z0-9_$])", re.I)
 _WORD = re.compile(rb"[A-Za-z_]+")
 
@@ -110,8 +111,7 @@ def _transition_words(
     of that where it ``flows``.  Before a spline block it is a LIN, or where the block has conditions an SLIN with
     them."""
     source, entered = task.documents[0], task.path.constraints.spline_headers.get(row)
-    found = _CONDITIONS.search(behind) if word[:1] in b"Ss" else None
-    own = found[0] if found else b""
+    own = _with_clause(behind) if word[:1] in b"Ss" else b""
     if entered is not None:
         own = _joined(_conditions(source, entered), own)
     spline = bool(own) if entered is not None else word[:1] in b"Ss"
@@ -124,8 +124,17 @@ def _conditions(source: Document, line: int) -> bytes:
     """The WITH of the header of a spline block."""
     text = source.line(line)
     header = statement(text, line, 0, len(text))
-    found = None if header is None else _CONDITIONS.search(header.code)
-    return found[0] if found else b""
+    return b"" if header is None else _with_clause(header.code)
+
+
+def _with_clause(code: bytes) -> bytes:
+    """From WITH to the end, without an approximation after it; b"" where there is none."""
+    match = _WITH.search(code)
+    if match is None:
+        return b""
+    clause = code[match.start() :].rstrip(b" \t")
+    last = _LAST.search(clause, max(len(clause) - 6, 0))
+    return clause if last is None else clause[: last.start()]
 
 
 def _joined(outer: bytes, inner: bytes) -> bytes:
