@@ -51,9 +51,9 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
         )
         raise Refusal(Finding("MEA002", message, str(path), help="fill in the measured values"))
     if len(rows) < len(table):
-        left = table.lines[~measured]
-        message = f"{len(left)} rows have no reading and are excluded ({_lines(left)})"
-        findings.append(Finding("MEA003", message, str(path), int(left[0])))
+        unmeasured = table.lines[~measured]
+        message = f"{len(unmeasured)} rows have no reading and are excluded ({_lines(unmeasured)})"
+        findings.append(Finding("MEA003", message, str(path), int(unmeasured[0])))
 
     targets, target = numbered(_of(names, rows))
     if "TARGET" not in table:

@@ -164,7 +164,7 @@ class Mechanics:
 def approach(q: Floats) -> Floats:
     """(N, n) sense -1, 0, 1 in which each motor came to its place, from the order of the states ``q`` (N, n) [rad, m];
     the last one stays where a motor did not move by more than ``STILL``, and the first state has none."""
-    way = np.diff(q, axis=0, prepend=q[:1])
-    moved = np.where(np.abs(way) <= STILL, 0.0, np.sign(way))
+    travel = np.diff(q, axis=0, prepend=q[:1])
+    moved = np.where(np.abs(travel) <= STILL, 0.0, np.sign(travel))
     last = np.maximum.accumulate(np.where(moved != 0, np.arange(len(q))[:, None], 0), axis=0)
     return np.take_along_axis(moved, last, axis=0)

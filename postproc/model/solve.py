@@ -120,8 +120,8 @@ def solve_equilibrium(
     ``StiffnessModel.equilibrium``."""
     conditions = model.completed(q, conditions)
     parts: list[tuple[Ints, Equilibrium]] = []
-    for begin in range(0, max(len(q), 1), CHUNK):
-        rows = slice(begin, begin + CHUNK)
+    for first in range(0, max(len(q), 1), CHUNK):
+        rows = slice(first, first + CHUNK)
         motors, given = np.ascontiguousarray(q[rows].T), conditions.part(rows)
         there = _Problems(
             motors,
@@ -135,7 +135,7 @@ def solve_equilibrium(
             theta = np.repeat(aside[:, None], motors.shape[1], axis=1)
         else:
             theta = np.array(start[rows].T, order="C")
-        parts += ((begin + ended, rest) for ended, rest in _ended(model, there, theta, tolerance))
+        parts += ((first + ended, rest) for ended, rest in _ended(model, there, theta, tolerance))
     return parts[0][1] if len(parts) == 1 else _joined(len(q), parts)
 
 
@@ -156,9 +156,9 @@ def _ended(
         stable &= holds
         size = np.abs(step).max(axis=0)
         # of a geometric series; the first step states nothing of its rate
-        left = np.where(size < last, size * size / np.where(size < last, last - size, 1.0), size)
-        last, resting = size, left <= tolerance
-        ends = ~(left > tolerance) if steps < MAX_STEPS else np.ones(len(rows), bool)
+        remaining = np.where(size < last, size * size / np.where(size < last, last - size, 1.0), size)
+        last, resting = size, remaining <= tolerance
+        ends = ~(remaining > tolerance) if steps < MAX_STEPS else np.ones(len(rows), bool)
         if len(rows) and not ends.any():
             continue
         # The last step is so small that nothing has to be re-evaluated.  Each state stops at its own, whatever

@@ -31,8 +31,8 @@ class StiffnessModel(Mechanics):
     def without_effects(self, effects: Iterable[str] = (), families: Iterable[str] = ()) -> StiffnessModel:
         """The model with some effects, or families of effects, taken out."""
         names, kinds = set(effects), set(families)
-        kept = (t for t in self.terms if t.effect.name not in names and t.effect.family not in kinds)
-        model = replace(self, terms=tuple(kept))
+        terms = (t for t in self.terms if t.effect.name not in names and t.effect.family not in kinds)
+        model = replace(self, terms=tuple(terms))
         return replace(model, covariance=select_covariance(self.covariance, dict(label_parameters(model))))
 
     def with_values(self, values: Mapping[tuple[int, str], float]) -> StiffnessModel:

@@ -42,8 +42,8 @@ def write_atomically(
     where it raises, everything stays as it was.  Raises Refusal FIL004 when the disk or its rights do not
     allow it; the files that were there before are then there again.
     """
-    with contextlib.ExitStack() as held:
-        _publish(files, last, still, held)
+    with contextlib.ExitStack() as locks:
+        _publish(files, last, still, locks)
 
 
 def sweep(files: Iterable[Path]) -> None:
@@ -53,8 +53,8 @@ def sweep(files: Iterable[Path]) -> None:
     locks.
     """
     there = [path for path in files if path.parent.is_dir()]
-    with contextlib.ExitStack() as held:
-        if _alone({path.parent for path in there}, held):
+    with contextlib.ExitStack() as locks:
+        if _lock_folders({path.parent for path in there}, locks):
             _sweep(there)
 
 
@@ -64,7 +64,7 @@ def refused(path: Path, message: str, help: str) -> Refusal:
 
 
 def _publish(
-    files: Mapping[Path, Content], last: Path | None, still: Callable[[], None], held: contextlib.ExitStack
+    files: Mapping[Path, Content], last: Path | None, still: Callable[[], None], locks: contextlib.ExitStack
 ) -> None:
     # names are noted before their files are made: a signal may come between the two
     ready = {path: path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp") for path in files}
@@ -76,7 +76,7 @@ def _publish(
             if at.is_dir() and not at.is_symlink():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             at.parent.mkdir(parents=True, exist_ok=True)
-        if _alone({path.parent for path in files}, held):
+        if _lock_folders({path.parent for path in files}, locks):
             _sweep(files)
         for at, content in files.items():
             _write(ready[at], content)
@@ -113,8 +113,8 @@ def _publish(
                 cleanup.callback(_unlink, path)
 
 
-def _alone(folders: Iterable[Path], held: contextlib.ExitStack) -> bool:
-    """Keep other writers out of ``folders`` until ``held`` is closed or this process dies; False where the system or
+def _lock_folders(folders: Iterable[Path], locks: contextlib.ExitStack) -> bool:
+    """Keep other writers out of ``folders`` until ``locks`` is closed or this process dies; False where the system or
     the file system has no such locks."""
     try:
         import fcntl
@@ -124,7 +124,7 @@ def _alone(folders: Iterable[Path], held: contextlib.ExitStack) -> bool:
     try:
         for folder in folders:
             handle = os.open(folder, os.O_RDONLY)
-            held.callback(os.close, handle)
+            locks.callback(os.close, handle)
             stat = os.fstat(handle)
             handles[stat.st_dev, stat.st_ino] = handle  # one folder may have two names
         for _, handle in sorted(handles.items()):  # all in one order: no two wait for each other

@@ -60,7 +60,7 @@ class StatedForces:
                 object.__setattr__(self, name, frozen(getattr(self, name), shape))
 
     @property
-    def begin(self) -> Floats:
+    def start_values(self) -> Floats:
         """(K, 6) the wrench where a motion starts."""
         return self.values if self.start is None else self.start
 
@@ -81,7 +81,7 @@ class StatedForces:
     def any(self, channels: Sequence[int]) -> Bools:
         """(N,) the motion has a part in one of the ``channels`` at either end."""
         acts = np.zeros(len(self.values), bool)
-        for wrenches in (self.values, self.begin):
+        for wrenches in (self.values, self.start_values):
             for channel in channels:
                 acts |= wrenches[:, channel] != 0
         return acts[self.row]

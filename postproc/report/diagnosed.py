@@ -110,10 +110,10 @@ class Diagnosed:
         return tuple(named for named in self.verdict.named if named.candidate.key not in ambiguous)
 
     @property
-    def lacking(self) -> bool:
+    def scatter_exceeded(self) -> bool:
         """Whether the residual clearly exceeds the scatter, with all that was found."""
-        found = self.diagnosis.search
-        return reduced_chi2_of(found, found.explained)[1] or bool(self.verdict.remainder)
+        search = self.diagnosis.search
+        return reduced_chi2_of(search, search.explained)[1] or bool(self.verdict.remainder)
 
     # Residuals.
 
@@ -285,12 +285,12 @@ def _candidate(candidate: Candidate) -> dict[str, object]:
 
 
 def _parameter(estimate: Estimate) -> dict[str, object]:
-    told: dict[str, object] = {
+    entry: dict[str, object] = {
         "value": estimate.value,
         "ci95": _finite(estimate.ci95),
         "unit": estimate.unknown.parameter.unit,
     }
-    return told | ({"at_bound": True} if estimate.at_bound else {})
+    return entry | ({"at_bound": True} if estimate.at_bound else {})
 
 
 def _refitted(estimate: Estimate) -> dict[str, object]:

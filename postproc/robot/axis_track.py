@@ -102,8 +102,8 @@ def follow_axes(
             near = np.zeros((len(rows), q.shape[1]))
             if robot.external is not None:
                 near[:, robot.external] = external[rows]
-            found = inverse(robot.nominal, flange[rows], status[rows], near)
-            q[rows], reachable[rows] = found.q, found.reachable
+            solution = inverse(robot.nominal, flange[rows], status[rows], near)
+            q[rows], reachable[rows] = solution.q, solution.reachable
 
         each_block(solved, len(solve))
         half_turns = _settle(robot, q, status, toolpath, on_axes, start, base, tool)
@@ -168,12 +168,12 @@ def _follow_on(
     place = np.maximum.accumulate(np.where(anchor != -1, np.arange(len(toolpath)), -1))
     last = np.where(place >= 0, anchor[place], -2)[solve]
     where = place[solve]
-    begins = np.concatenate([[True], where[1:] != where[:-1]])
+    is_start = np.concatenate([[True], where[1:] != where[:-1]])
     begun = np.full(q.shape[1], np.nan) if start is None else start
     starts = np.where((last >= 0)[:, None], q[np.maximum(last, 0)], begun)
     jumps = np.asarray(toolpath.kind[solve] == Kind.PTP)
-    held = None if robot.external is None else external[solve]
-    q[solve], _ = follow_rows(robot.nominal, flange[solve], begins, starts, jumps, held)
+    fixed_values = None if robot.external is None else external[solve]
+    q[solve], _ = follow_rows(robot.nominal, flange[solve], is_start, starts, jumps, fixed_values)
 
 
 def home_rows(toolpath: Toolpath) -> Ints:
@@ -250,13 +250,13 @@ def _settle(
     reset = given | stated
     reset[0] = True
     last = np.maximum.accumulate(np.where(reset, order, 0))
-    desired_path = _large(robot, values, rows, reset, status, toolpath, base, tool)
+    large = _large(robot, values, rows, reset, status, toolpath, base, tool)
 
     def turned(axis: int, step: Floats) -> tuple[Floats, Floats]:
         """(R,) the values of an axis that goes on from the first, and by how much they are beside those stated."""
         value = values[:, axis - 6]
         by = wrapped(np.diff(value))
-        by[desired_path.place - 1] = step
+        by[large.place - 1] = step
         smooth = np.concatenate([[value[0]], value[0] + np.cumsum(by)])
         signed = np.where(
             (turn >> axis) & 1 == 1,
@@ -266,21 +266,21 @@ def _settle(
         wish = np.where(given | ~stated, value, signed)
         return smooth, (wish - smooth)[last]
 
-    other = np.zeros(len(desired_path.place), np.bool_)
-    either = np.flatnonzero(desired_path.either)
+    other = np.zeros(len(large.place), np.bool_)
+    either = np.flatnonzero(large.either)
     if len(either):
-        axes = [sum(turned(axis, desired_path.step[:, k])) for k, axis in enumerate(TURNING)]
+        axes = [sum(turned(axis, large.step[:, k])) for k, axis in enumerate(TURNING)]
         low, high = robot.limits[[axis - 6 for axis in TURNING]].T
-        choices = TurnChoices(desired_path.place[either], desired_path.more[either])
+        choices = TurnChoices(large.place[either], large.more[either])
         other[either] = choose_senses(np.stack(axes, axis=1), np.flatnonzero(reset), choices, low, high)
-    step = desired_path.step + np.where(other[:, None], desired_path.more, 0.0)
+    step = large.step + np.where(other[:, None], large.more, 0.0)
     for k, axis in enumerate(TURNING):
         smooth, beside = turned(axis, step[:, k])
         values[:, axis - 6] += 2 * np.pi * np.round((smooth + beside - values[:, axis - 6]) / (2 * np.pi))
     keep = rows >= 0
     q[rows[keep]] = values[keep]
-    half = np.flatnonzero(desired_path.either & np.isfinite(desired_path.vector[:, 0, 0]))
-    return HalfTurns(rows[desired_path.place[half]], desired_path.vector[half, other[half].astype(np.int64)])
+    half = np.flatnonzero(large.either & np.isfinite(large.vector[:, 0, 0]))
+    return HalfTurns(rows[large.place[half]], large.vector[half, other[half].astype(np.int64)])
 
 
 class _Large(NamedTuple):

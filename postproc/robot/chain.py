@@ -75,7 +75,7 @@ class ChainKinematics:
         w = sum of s_i z_i over the turns; dp = sum of s_i z_i x (p - p_i) over the turns, and of s_i z_i over the
         shifts.  What is left out has the size of the step's square.
         """
-        turn, shift, behind = (np.zeros((3, step.shape[1])) for _ in range(3))
+        turn, shift, spindle_shift = (np.zeros((3, step.shape[1])) for _ in range(3))
         mounted, at = len(self.axes) - self.spindles, 0
         while at < len(self.axes):
             about = np.zeros_like(turn)  # one origin
@@ -87,14 +87,16 @@ class ChainKinematics:
                 elif at < mounted:
                     shift += move
                 else:
-                    behind += move
+                    spindle_shift += move
                 at += 1
                 if at == len(self.axes) or self.apart[at]:
                     break
             turn += about
             shift -= cross(about, origin)
         mount = self.mount + shift + cross(turn, self.mount)
-        position = self.position + shift + cross(turn, self.position) + behind if self.spindles else mount
+        position = (
+            self.position + shift + cross(turn, self.position) + spindle_shift if self.spindles else mount
+        )
         tcp = tuple(column + cross(turn, column) for column in self.tcp)
         return replace(self, position=position, mount=mount, _columns=tcp, _tool=None)
 
@@ -294,11 +296,11 @@ def generalized_force(swept: ChainKinematics, point: Floats, wrench: Floats) -> 
 
 def cross(a: Floats, b: Floats) -> Floats:
     """a x b (3, N) of ``a``, ``b`` (3, N)."""
-    found = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    vectors = np.empty(np.broadcast_shapes(a.shape, b.shape))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        np.multiply(a[j], b[k], out=found[i])
-        found[i] -= a[k] * b[j]
-    return found
+        np.multiply(a[j], b[k], out=vectors[i])
+        vectors[i] -= a[k] * b[j]
+    return vectors
 
 
 def weight_about(axis: Floats, moment: Floats, gravity: Floats) -> tuple[Floats, Floats]:

@@ -159,15 +159,15 @@ class External:
     def moves(self, rows: Ints) -> Bools:
         """(K,) an external axis moves so far on the motion of ``rows`` (K,) that its middle says little of the rest."""
         with np.errstate(invalid="ignore"):  # axes that are not known
-            way = np.abs(self.at(rows) - self.at(rows, np.zeros(len(rows))))
+            travel = np.abs(self.at(rows) - self.at(rows, np.zeros(len(rows))))
         far = np.zeros(len(rows), np.bool_)
         for column, _ in self.tracks:
-            far |= way[:, column] > FAR_MM
+            far |= travel[:, column] > FAR_MM
         for column in {turn.column for stack in self.positioners for turn in stack}:
-            far |= way[:, column] > FAR_DEG
+            far |= travel[:, column] > FAR_DEG
         if self.joint is not None:
             column, _, unit = self.joint
-            far |= way[:, column] > (FAR_DEG if unit == DEG else FAR_MM)
+            far |= travel[:, column] > (FAR_DEG if unit == DEG else FAR_MM)
         return far
 
     def robot_from_path(self, rows: Ints, share: Floats | None = None) -> Poses | None:
@@ -193,17 +193,17 @@ class External:
         shift = np.zeros((len(values), 3))
         for column, direction in self.tracks:
             shift -= (values[:, column] * MM)[:, None] * direction
-        found = Poses(np.broadcast_to(np.eye(3), (len(values), 3, 3)), shift)
+        poses = Poses(np.broadcast_to(np.eye(3), (len(values), 3, 3)), shift)
         for number, stack in enumerate(self.positioners):
             rows = np.flatnonzero(carrier == number)
             if not len(rows):
                 continue
-            found = found.copy()
-            there = found[rows]
+            poses = poses.copy()
+            there = poses[rows]
             for turn in stack:
                 there = there @ _turned(turn, values[rows, turn.column] * DEG)
-            found.put(rows, there)
-        return found
+            poses.put(rows, there)
+        return poses
 
     def joint_values(self, q: Floats, rows: Ints, share: Floats | None) -> Floats:
         """(K, n) [rad, m]: ``q`` (K, n) of motions ``rows`` (K,) with the robot's own external joint where it is at the

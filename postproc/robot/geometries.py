@@ -104,7 +104,7 @@ class KukaLengths:
     def flange(self) -> Poses:
         """The flange in the frame of A6: its z axis points out along the forearm (R = Ry(90 deg) at zero)."""
         at_zero = Poses(turn_about("y", np.pi / 2), np.array([self.d6, 0.0, 0.0]))
-        return _held(self.links()[-1].after @ at_zero)
+        return _frozen(self.links()[-1].after @ at_zero)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,7 @@ class KukaVariant:
         return _link_frames(self.links(), self.axes)
 
     def flange(self) -> Poses:
-        return _held(_flip(self.axes[-1]) @ self.lengths.flange())
+        return _frozen(_flip(self.axes[-1]) @ self.lengths.flange())
 
     @property
     def signs(self) -> Floats:
@@ -149,7 +149,7 @@ class KukaVariant:
 
 @dataclass(frozen=True, eq=False)
 class SerialArm:
-    """Any other arm of six joints, or of seven of which one is ``held`` (its column) while the others place the flange.
+    """Any other arm of six joints, or of seven of which one is ``fixed`` (its column).
 
     ``axes``: as the controller counts them; ``chain``: their frames; ``tip``: the flange in the last link's frame.
     """
@@ -158,7 +158,7 @@ class SerialArm:
     axes: tuple[Axis, ...]
     chain: tuple[Link, ...]
     tip: Poses
-    held: int | None = None
+    fixed: int | None = None
 
     def links(self) -> list[Link]:
         return list(self.chain)
@@ -170,7 +170,7 @@ class SerialArm:
         return _link_frames(self.links(), self.axes)
 
     def flange(self) -> Poses:
-        return _held(_flip(self.axes[-1]) @ self.chain[-1].after @ self.tip)
+        return _frozen(_flip(self.axes[-1]) @ self.chain[-1].after @ self.tip)
 
     @property
     def limits(self) -> Floats:
@@ -232,7 +232,7 @@ def _folded(links: Sequence[Link], axes: Sequence[Axis]) -> tuple[Joint, ...]:
         else:
             zero = Poses(turn_about("z", axis.offset), np.zeros(3))
         flip = _flip(axis)
-        placement = _held(at @ link.before @ zero @ flip)
+        placement = _frozen(at @ link.before @ zero @ flip)
         joints.append(Joint(axis.name, placement, axis.lower, axis.upper, axis.kind))
         at = flip @ link.after
     return tuple(joints)
@@ -254,7 +254,7 @@ def _renamed(axes: Sequence[Axis], names: Sequence[str], limits: Limits) -> list
     ]
 
 
-def _held(pose: Poses) -> Poses:
+def _frozen(pose: Poses) -> Poses:
     return Poses(frozen(pose.rotation), frozen(pose.position))
 
 

@@ -109,15 +109,15 @@ class PathMotions:
         """Flange poses (K) at the shares (K,) of the paths of the TCP, which turn evenly by ``turn`` (K, 3) [rad]."""
         start, end = self.start @ self.tool, self.end @ self.tool
         position = start.position + share[:, None] * (end.position - start.position)
-        bent = np.flatnonzero(np.isfinite(self.sweep))
-        if len(bent):
-            position[bent] = on_arc(
-                start.position[bent],
-                end.position[bent],
-                self.centre[bent],
-                self.normal[bent],
-                self.sweep[bent],
-                share[bent],
+        arcs = np.flatnonzero(np.isfinite(self.sweep))
+        if len(arcs):
+            position[arcs] = on_arc(
+                start.position[arcs],
+                end.position[arcs],
+                self.centre[arcs],
+                self.normal[arcs],
+                self.sweep[arcs],
+                share[arcs],
             )
         return Poses(turning(start.rotation, turn, self.along, share), position) @ self.tool.inverse()
 
@@ -237,18 +237,18 @@ def _best(lowest: Floats, highest: Floats, more: Floats, low: Floats, high: Floa
         under, over = low - (lowest + by), (highest + by) - high
         return np.asarray((np.maximum(under, 0) + np.maximum(over, 0)).sum(axis=1))
 
-    found: dict[tuple[int, ...], Floats] = {}
+    excesses: dict[tuple[int, ...], Floats] = {}
     for at, turn in enumerate(turns.tolist()):
         following: dict[tuple[int, ...], float] = {}
         came: dict[tuple[int, ...], tuple[tuple[int, ...], bool]] = {}
         for state, cost in states.items():
             for other in (False, True):
                 there = tuple(a + b for a, b in zip(state, turn, strict=True)) if other else state
-                if there not in found:
-                    found[there] = excess(there)
-                    beyond = np.flatnonzero(found[there] > _MARGIN)
+                if there not in excesses:
+                    excesses[there] = excess(there)
+                    beyond = np.flatnonzero(excesses[there] > _MARGIN)
                     clear[there] = int(beyond[-1]) + 1 if len(beyond) else 0
-                total = cost + 1e3 * float(found[there][at]) + 1e-6 * other
+                total = cost + 1e3 * float(excesses[there][at]) + 1e-6 * other
                 if total < following.get(there, np.inf):
                     following[there], came[there] = total, (state, other)
         states = dict(sorted(following.items(), key=lambda item: item[1])[:_MOST_STATES])

@@ -40,10 +40,10 @@ def inverse(arm: Geometry, flange: Poses, status: Ints, near: Floats) -> Inverse
     if isinstance(arm, KukaLengths):
         return _closed_form(arm, flange, status, near)
     if arm.rail is not None:
-        way = arm.signs[0] * near[:, 0] + arm.offsets[0]
-        flange = Poses(flange.rotation, flange.position - way[:, None] * arm.rail)
-    found = _closed_form(arm.lengths, flange, status, kuka_angles(arm, near))
-    return Inverse(controller_values(arm, found.q, near), found.reachable)
+        travel = arm.signs[0] * near[:, 0] + arm.offsets[0]
+        flange = Poses(flange.rotation, flange.position - travel[:, None] * arm.rail)
+    solution = _closed_form(arm.lengths, flange, status, kuka_angles(arm, near))
+    return Inverse(controller_values(arm, solution.q, near), solution.reachable)
 
 
 def kuka_angles(arm: KukaLengths | KukaVariant, q: Floats) -> Floats:

@@ -316,7 +316,7 @@ def _reads(entry: EffectEntry, effect: WrittenEffect) -> bool:
 def _untouched(section: YamlSection, effect: WrittenEffect | None) -> tuple[dict[str, Tree], list[Tree]]:
     """What an entry holds beside the parameters of ``effect``."""
     written = {parameter.name for parameter in effect.parameters} if effect else set()
-    others = {key: held for key, held in tree(section.node) if key != "parameters"}
+    others = {key: value for key, value in tree(section.node) if key != "parameters"}
     return others, [pair for pair in tree(section.section("parameters", {}).node) if pair[0] not in written]
 
 

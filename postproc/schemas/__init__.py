@@ -47,5 +47,5 @@ RESULT_SCHEMAS: dict[str, Callable[[], Schema]] = {
 
 def schema_of(name: str) -> Schema:
     """The schema of a kind of file or result: one of ``SCHEMAS`` or ``RESULT_SCHEMAS``."""
-    made = {**SCHEMAS, **RESULT_SCHEMAS}[name]()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}
+    schema = {**SCHEMAS, **RESULT_SCHEMAS}[name]()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

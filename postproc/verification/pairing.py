@@ -136,37 +136,37 @@ def _extras(
     for here, following in pairwise(inside.tolist()):
         rows = np.arange(stretches.stop[here], stretches.start[following])
         off = _away(original, run, rows, int(stretches.stop[here]), shift, extra)
-        found: dict[int, tuple[float, tuple[int, ...]]] = {}
+        best: dict[int, tuple[float, tuple[int, ...]]] = {}
         for more in np.flatnonzero(np.isfinite(off)).tolist():
             earlier = [
                 (cost + off[more], (*path, more)) for less, (cost, path) in before.items() if less <= more
             ]
             if earlier:
-                found[more] = min(earlier)
-        if not found:
+                best[more] = min(earlier)
+        if not best:
             line = int(original.toolpath.line[min(stretches.stop[here], len(original.toolpath) - 1)])
             raise Different("no motion of the second program leads to where this one leads", line)
-        before = found
+        before = best
     _, path = min(before.values())
     return np.array([*path, extra])
 
 
 def _away(
-    original: CompensationProblem, run: CompensationProblem, rows: Ints, behind: int, shift: int, extra: int
+    original: CompensationProblem, run: CompensationProblem, rows: Ints, stop: int, shift: int, extra: int
 ) -> Floats:
     """(extra + 1,) [m] how far the targets of the air moves ``rows`` are from those of the rows of ``run`` that stand
     for them with so many motions added before; infinite where they are not the same.  The last of them leads to a cut
     and may be moved.  Where two stretches meet without a move in air, the last point of the one before has to serve."""
     more = np.arange(extra + 1)
     total = np.zeros(extra + 1)
-    probes, loose = (rows, rows[-1:]) if len(rows) else (np.array([behind - 1]), np.array([behind - 1]))
+    probes, loose = (rows, rows[-1:]) if len(rows) else (np.array([stop - 1]), np.array([stop - 1]))
     for row in probes:
-        left = more[np.isfinite(total)]
-        at = row + shift + left
+        feasible = more[np.isfinite(total)]
+        at = row + shift + feasible
         distance = _apart(original, run, np.full(len(at), row), at)
         limit = original.max_correction if row in loose else SAME
         other = ~_alike(original, run, np.full(len(at), row), at)
-        total[left] += np.where(distance <= limit, distance + _OTHER_MOTION * other, np.inf)
+        total[feasible] += np.where(distance <= limit, distance + _OTHER_MOTION * other, np.inf)
     return total
 
 

@@ -49,28 +49,28 @@ class RunPath:
 
     def at(self, rows: Ints, share: Floats) -> Poses:
         """Poses (K) at the shares (K,) of the motions ``rows`` (K,)."""
-        found = self.task.desired_path.at(rows, share)
+        poses = self.task.desired_path.at(rows, share)
         for some, vertex, u in self._near(rows, share):
             before, after = self._both(vertex, u)
             weight = u[:, None]
             over = turn_between(before.rotation, after.rotation)
-            found.rotation[some] = product(rotation_from_vector(weight * over), before.rotation)
-            found.position[some] = (1 - weight) * before.position + weight * after.position
-        return found
+            poses.rotation[some] = product(rotation_from_vector(weight * over), before.rotation)
+            poses.position[some] = (1 - weight) * before.position + weight * after.position
+        return poses
 
     def tangent(self, rows: Ints, share: Floats) -> Floats:
         """(K, 3) unit vectors along the path at the shares (K,) of ``rows`` (K,); zero where a motion only turns the
         tool."""
         desired_path, length = self.task.desired_path, self.task.desired_path.length
-        found = desired_path.tangent(rows, share)
+        tangents = desired_path.tangent(rows, share)
         for some, vertex, u in self._near(rows, share):
             before, after = self._both(vertex, u)
             reach, weight = self.reach[vertex], u[:, None]
             one = desired_path.tangent(vertex - 1, 1 - reach * (1 - u) / length[vertex - 1])
             two = desired_path.tangent(vertex, reach * u / length[vertex])
             along = (after.position - before.position) / reach[:, None] + (1 - weight) * one + weight * two
-            found[some] = along / np.maximum(lengths(along), _NO_LENGTH)[:, None]
-        return found
+            tangents[some] = along / np.maximum(lengths(along), _NO_LENGTH)[:, None]
+        return tangents
 
     def _near(self, rows: Ints, share: Floats) -> Iterator[tuple[Ints, Ints, Floats]]:
         """Which of ``rows`` (K,) at the shares (K,) are on the parabola where they start, and then which on the one

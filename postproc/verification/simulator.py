@@ -136,17 +136,17 @@ class Simulator:
 
     def run(self, run: CompensationProblem, start: Ints, stop: Ints, step: float = STEP) -> Simulation:
         """``run`` with the rows ``start`` to before ``stop`` (K,) in the place of each stretch."""
-        cuts, way = self.pairing.stretches, self.pairing.stretches.length
+        cuts, has_length = self.pairing.stretches, self.pairing.stretches.length
         path = self.path if run is self.original else RunPath.of(run)
         first, last = start.copy(), stop.copy()
         added = (stop - start) > (cuts.stop - cuts.start)
         for number in np.flatnonzero(added):
             first[number] += self._leads(run, int(start[number]), int(cuts.start[number]))
-        for number in np.flatnonzero(added & (stop - first > cuts.stop - cuts.start) & way):
+        for number in np.flatnonzero(added & (stop - first > cuts.stop - cuts.start) & has_length):
             last[number] -= self._leads_back(run, int(stop[number]) - 1, int(cuts.stop[number]) - 1)
         outside = np.concatenate([_rows(start, first), _rows(last, stop)])
         points, wanted, error, turn = self._points(run, last)
-        samples, change, change_angle = self._dense(run, path, first[way], last[way], step)
+        samples, change, change_angle = self._dense(run, path, first[has_length], last[has_length], step)
         return Simulation(
             samples,
             change,
@@ -154,7 +154,7 @@ class Simulator:
             self._missed(samples),
             outside,
             float(run.desired_path.length[outside].sum()),
-            _rows(first[~way], (last - cuts.stop + cuts.start)[~way]),
+            _rows(first[~has_length], (last - cuts.stop + cuts.start)[~has_length]),
             points,
             wanted,
             error,
@@ -255,9 +255,9 @@ class Simulator:
         motion, where = rows[number], stretch[number]
         place = place_tool(self.grid, path, where, motion, share)
         before = np.append(0.0, np.where(number[1:] == number[:-1], share[:-1], 0.0))[: len(share)]
-        way = (share - before) * run.desired_path.length[motion]
+        distance = (share - before) * run.desired_path.length[motion]
         return PathSamples(
-            where, motion, share, place, end, (share == 0) & opens[number], end & closes[number], way
+            where, motion, share, place, end, (share == 0) & opens[number], end & closes[number], distance
         )
 
     def _missed(self, samples: PathSamples) -> float:

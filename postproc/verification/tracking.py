@@ -46,11 +46,11 @@ class _Tracking:
         done, here = 0, float(self.arc[0])
         while done < len(command):
             block = slice(done, min(done + _BLOCK, len(command)))
-            found, share, here = self._found(command[block], step[block], here)
-            interval[done : done + len(found)], part[done : done + len(found)] = found, share
-            done += len(found)
+            placed, share, here = self._locate(command[block], step[block], here)
+            interval[done : done + len(placed)], part[done : done + len(placed)] = placed, share
+            done += len(placed)
 
-    def _found(self, command: Floats, step: Floats, here: float) -> tuple[Ints, Floats, float]:
+    def _locate(self, command: Floats, step: Floats, here: float) -> tuple[Ints, Floats, float]:
         """Of the commands (B, 3), or of the first of them whose path stays in view: of the intervals near the last
         place, ``here`` [m], where h changes from positive to negative, the one that the tool is nearest to."""
         start = np.searchsorted(self.arc, [here - 2 * self.reach, here + 2 * self.reach + step.sum()])
@@ -80,13 +80,13 @@ class _Tracking:
     def _candidates(self, command: Floats, low: int, high: int) -> _Candidates:
         """Where, in the intervals ``low`` to ``high``, the tools of the commands may be found."""
         value = command @ self.tangent[low : high + 2].T - self.level[low : high + 2]
-        behind = value < 0
-        row, interval = np.nonzero(~behind[:, :-1] & behind[:, 1:])
+        is_behind = value < 0
+        row, interval = np.nonzero(~is_behind[:, :-1] & is_behind[:, 1:])
         one, two = value[row, interval], value[row, interval + 1]
         share, interval = one / (one - two), interval + low
         # before the start and after the end of the stretch these are the places
-        before = np.flatnonzero(behind[:, 0]) if low == 0 else np.zeros(0, np.int64)
-        beyond = np.flatnonzero(~behind[:, -1]) if high == self.last else np.zeros(0, np.int64)
+        before = np.flatnonzero(is_behind[:, 0]) if low == 0 else np.zeros(0, np.int64)
+        beyond = np.flatnonzero(~is_behind[:, -1]) if high == self.last else np.zeros(0, np.int64)
         row = np.concatenate([row, before, beyond])
         interval = np.concatenate(
             [interval, np.zeros(len(before), np.int64), np.full(len(beyond), self.last)]

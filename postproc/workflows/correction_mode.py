@@ -131,10 +131,10 @@ def _points_by_frame(task: CompensationProblem, cell: Cell, used: Sequence[int])
                 f"{_bases([numbers[frame]])} has no touch points, and the program cuts in it (line {line})",
                 "every base in which a program cuts needs its own points",
             )
-    found = {frame: cell.touch_points[n] for frame, n in numbers.items() if n in cell.touch_points}
-    if not found:
+    points = {frame: cell.touch_points[n] for frame, n in numbers.items() if n in cell.touch_points}
+    if not points:
         raise _refused(cell, f"the program uses {_bases(numbers.values())}, none of which has touch points")
-    return found
+    return points
 
 
 def _bases(numbers: Iterable[int | None]) -> str:
@@ -176,12 +176,10 @@ def _touched_finding(task: CompensationProblem, touched: TouchedOff, frame: int)
     turn = float(np.linalg.norm(vector_from_rotation(touched.motion.rotation[frame])))
     count, number = int(own.sum()), path.frames[frame].number
     tool = path.frames[path.tool[row]].number
-    stands = (
-        "" if task.external is None or task.external.joint is None else ", with the external axis as there"
-    )
+    note = "" if task.external is None or task.external.joint is None else ", with the external axis as there"
     message = (
         f"base {'' if number is None else f'{number} '}is touched off at {count} point{'' if count == 1 else 's'}"
-        f" with {'the tool' if tool is None else f'tool {tool}'} and orientation of this line{stands}, without load: it"
+        f" with {'the tool' if tool is None else f'tool {tool}'} and orientation of this line{note}, without load: it"
         f" contains {np.linalg.norm(shift.mean(axis=0)) / MM:.3f} mm"
     )
     if count > 1:
@@ -203,24 +201,24 @@ def mode_findings(full: StiffnessModel, cell: Cell, file: str) -> list[Finding]:
     if cell.correct == "process":
         return _excluded_by_process(full, acting, cell, file)
     findings = []
-    left = [term for term in acting if _corrected_by_controller(term, cell)]
-    if left:
-        said = f"the controller corrects these, as the cell states: {_in_groups(left)}"
-        findings.append(Finding("COR030", said, file))
+    by_controller = [term for term in acting if _corrected_by_controller(term, cell)]
+    if by_controller:
+        message = f"the controller corrects these, as the cell states: {_in_groups(by_controller)}"
+        findings.append(Finding("COR030", message, file))
     thermal = [t for t in acting if isinstance(t.effect, ThermalGrowth)]
     by_temperature = [t for t in thermal if t.effect.described()["variable"] == "temperature"]
     path, line = str(cell.path), cell.temperature_line
     if cell.temperature is not None and not by_temperature:
-        said = (
+        message = (
             "temperature: the robot file has no thermal_growth by temperature, so the growth is not corrected"
         )
-        findings.append(Finding("COR031", said, path, line))
+        findings.append(Finding("COR031", message, path, line))
     if cell.temperature is None and by_temperature:
-        said = "thermal_growth of the robot file is not corrected: the cell states no temperature"
-        findings.append(Finding("COR031", said, path, help="add temperature: 24 (degC, of the robot)"))
+        message = "thermal_growth of the robot file is not corrected: the cell states no temperature"
+        findings.append(Finding("COR031", message, path, help="add temperature: 24 (degC, of the robot)"))
     if len(thermal) > len(by_temperature):
-        said = "thermal_growth by time is not corrected: the time of a run is not known"
-        findings.append(Finding("COR031", said, path))
+        message = "thermal_growth by time is not corrected: the time of a run is not known"
+        findings.append(Finding("COR031", message, path))
     return findings
 
 
@@ -242,8 +240,8 @@ def _excluded_by_process(
             )
         )
     if cell.temperature is not None:
-        said = "temperature: is not used with correct: process"
-        findings.append(Finding("COR030", said, str(cell.path), cell.temperature_line))
+        message = "temperature: is not used with correct: process"
+        findings.append(Finding("COR030", message, str(cell.path), cell.temperature_line))
     return findings
 
 

@@ -177,7 +177,7 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     external = External.of(path, cell.external_axes, robot, cell.robot_base)
     frames = frames_of(cell, path, request.program, external)
     base, tool, start = frames.base_in_robot, frames.tool_in_flange, _start(cell, robot)
-    path, kept = as_run(path, base, tool, robot, start, str(request.program))
+    path, orientation_findings = as_run(path, base, tool, robot, start, str(request.program))
     force = wrenches(request.program, path, frames, cell, request.force, request.tare)
     _missing_points(program, force)
     _missing_orientation(request, path, force, cell)
@@ -211,12 +211,17 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     task = add_force_ramps(task, _ramp(cell, path, force))
     spacing = np.maximum(cell.min_segment, 1e-3 * cell.cycle_ms * np.nan_to_num(path.feed))
     task = add_lost_motion(task, start, spacing)
-    findings = [*_read_findings(program, path), *kept, *force.findings, *model.plausibility_findings()]
+    findings = [
+        *_read_findings(program, path),
+        *orientation_findings,
+        *force.findings,
+        *model.plausibility_findings(),
+    ]
     findings += mode_findings(full, cell, str(request.program))
     if cell.correct == "touched_off":
-        touched, told = touch_off(task, cell)
+        touched, touch_findings = touch_off(task, cell)
         task = replace(task, touched_off=touched)
-        findings += told
+        findings += touch_findings
     findings += follow_external_axes(path, cell.external_axes, robot, request.program)
     if force.any and not model.is_compliant:
         findings.append(
@@ -318,10 +323,10 @@ def _ramp(cell: Cell, path: Toolpath, force: Wrenches) -> Floats:
             radius[index] = 0.5 * tool.diameter
     if force.radius is None and np.isnan(radius).all():
         return np.broadcast_to(ASSUMED, (len(path),))
-    found = radius[path.tool]
+    ramp = radius[path.tool]
     if force.radius is not None:
-        found = np.where(np.isnan(force.radius), found, force.radius)
-    return np.where(np.isnan(found), ASSUMED, found)
+        ramp = np.where(np.isnan(force.radius), ramp, force.radius)
+    return np.where(np.isnan(ramp), ASSUMED, ramp)
 
 
 def _missing_points(program: Program, force: Wrenches) -> None:
