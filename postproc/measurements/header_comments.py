@@ -26,8 +26,8 @@ _CLOSE = 0.75  # of difflib's ratio: sigma is close to sigma_mm, load is not clo
 
 @dataclass(frozen=True)
 class HeaderComments:
-    """What the comments say, in SI; ``frame`` is "" and ``sigma`` NaN where not stated; ``places``: name of a target ->
-    its place (3,) [m] on the flange; ``lines``: name of a target -> line."""
+    """What the comments state, in SI; ``frame`` is "" and ``sigma`` NaN where not stated; ``places``: name of a target
+    -> its place (3,) [m] on the flange; ``lines``: name of a target -> line."""
 
     robot: str
     frame: str
@@ -49,7 +49,7 @@ def robot_named(path: Path) -> str:
 
 
 def stated_in(table: CsvTable) -> HeaderComments:
-    """Raises Refusal where a key stands twice, or its value cannot be used."""
+    """Raises Refusal where a key occurs twice, or its value cannot be used."""
     values, findings = _stated(table)
 
     def named(key: str) -> str:
@@ -149,7 +149,7 @@ def _almost_a_key(text: str, key: str, value: str) -> str:
 
 
 def _close(word: str) -> str:
-    """The key that ``word`` is, or is a slip of the hand away from, or ""."""
+    """The key that ``word`` is, or differs from by a typing error, or ""."""
     return next(iter(difflib.get_close_matches(word, KEYS, 1, _CLOSE)), "")
 
 

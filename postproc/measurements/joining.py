@@ -91,7 +91,7 @@ def _check_alike(one: Readings, other: Readings) -> None:
 
 
 def _facts(readings: Readings) -> dict[str, str]:
-    """What must be the same where two files both say it."""
+    """What must be the same where two files both state it."""
     one = readings
     facts = {
         "joints": expected_joints([name for name, _ in one.joints], one.joints),

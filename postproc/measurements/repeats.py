@@ -19,8 +19,8 @@ hanging of the same weight do."""
 
 
 def with_repeats(readings: Readings, ids: Sequence[str]) -> Readings:
-    """With the numbers of repeated states: by their REPEAT ``ids`` (R,), or of rows that say the same where no id is
-    given.  An id that stands for several states is reported (MEA007)."""
+    """With the numbers of repeated states: by their REPEAT ``ids`` (R,), or of rows with equal values where no id is
+    given.  An id of several states is reported (MEA007)."""
     one = readings
     given = np.array([not is_missing(text) for text in ids], bool)
     if not given.any():

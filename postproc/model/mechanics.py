@@ -25,7 +25,7 @@ NOTHING = Conditions()
 
 @dataclass(frozen=True)
 class EffectInstance:
-    """An effect of the model with the values of its parameters (SI) and what the robot file says of them."""
+    """An effect of the model with the values of its parameters (SI) and what the robot file states of them."""
 
     effect: Effect
     values: Values
@@ -73,7 +73,7 @@ class Mechanics:
 
     @cached_property
     def zero_without_load(self) -> bool:
-        """Whether the robot stands, without a wrench, where its controller believes."""
+        """Whether the robot is, without a wrench, at the pose that its controller assumes."""
         return self.robot.nominal is self.robot.arm and all(
             term.effect.zero_without_load for term in self.terms
         )

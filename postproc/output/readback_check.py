@@ -36,7 +36,7 @@ def intended_motions(
     path, source, moved = task.toolpath, division.source[rows], moved[rows]
     to_base = task.base.shared(source).inverse()
     command = to_base @ division.command[rows]
-    # What is inserted has the orientation of its own place, if words say it.
+    # What is inserted has the orientation of its own place, if words state it.
     inserted = division.role[rows] != Role.ORIGINAL
     turned = moved & (
         path.constraints.orientation_programmed[source]
@@ -111,7 +111,7 @@ def check_readback(
 
 
 def _check_frames(path: Toolpath, back: Toolpath, file: str) -> None:
-    """The frames that the program says are the same."""
+    """The frames that the program states are the same."""
     if len(path.frames) != len(back.frames):
         raise Refusal(Finding("FIL008", "other frames than before are set", file))
     for one, other in zip(path.frames, back.frames, strict=True):
@@ -129,7 +129,7 @@ def _same_frame(one: FrameRef, other: FrameRef) -> bool:
 
 
 class _LineCheck:
-    """Where the lines of a program are in the output: after those that were inserted, one for each motion, and behind
+    """Where the lines of a program are in the output: after those that were inserted, one for each motion, and after
     the mark."""
 
     def __init__(self, path: Toolpath, division: Subdivision, program: Program, again: Program) -> None:
@@ -145,7 +145,7 @@ class _LineCheck:
         self.mark = _line_after_mark(program) if marked else int(np.iinfo(np.int32).max)
 
     def _moved(self, line: Ints, side: Literal["left", "right"]) -> Ints:
-        """(K,) where lines (K,) are, before ("left") or behind ("right") what is inserted there."""
+        """(K,) where lines (K,) are, before ("left") or after ("right") what is inserted there."""
         return np.asarray(line + (line >= self.mark) + np.searchsorted(self.inserted, line, side))
 
     def check_motions(self, back: Toolpath, rows: slice) -> None:
@@ -188,7 +188,7 @@ def _line_after_mark(program: Program) -> int:
 
 
 def _stated(path: Toolpath, configuration: Iterable[str]) -> dict[str, NDArray[Any] | FewRows]:
-    """Name -> column (N, ...) of what a motion says beside its target; ``configuration``: names of its numbers."""
+    """Name -> column (N, ...) of what a motion states beside its target; ``configuration``: names of its numbers."""
     return {
         "base": path.base,
         "tool": path.tool,
@@ -205,7 +205,7 @@ def _stated(path: Toolpath, configuration: Iterable[str]) -> dict[str, NDArray[A
 
 
 def _check_texts(path: Toolpath, back: Toolpath, plan: Plan, rows: slice, file: str) -> None:
-    """What a motion says beside its target."""
+    """What a motion states beside its target."""
     source, own, transition = plan.source, plan.own, plan.role == Role.TRANSITION
     every = np.ones(len(source), np.bool_)
     single_axis = path.orientation_control.path[source] == OrientationPath.SINGLE_AXIS
@@ -262,7 +262,7 @@ def _check_targets(
     # Half a written step a coordinate; three angles add up, and where CA ends an arc the rounding of its start does.
     step_mm, step_deg = 10.0**-writing.mm, 10.0**-writing.deg
     off = np.abs(back.position[rows] - plan.position[:]).max(axis=1) / MM
-    # Rotary axes say the whole orientation that is meant, though the turn about the tool is free: no axis swings.
+    # Rotary axes state the whole orientation that is meant, though the turn about the tool is free: no axis swings.
     by_axes = path.orientation_control.path[plan.source] == OrientationPath.ROTARY_AXES
     free_axis = np.where(by_axes[:, None], np.nan, path.orientation_control.redundant_axis[plan.source])
     angle = _angle(plan.rotation[:], back.rotation[rows], free_axis) / DEG
@@ -304,7 +304,7 @@ def check_residual(
     writing: WritingSettings,
     file: str,
 ) -> None:
-    """The corrections that the digits say, of ``result`` and of ``division``, are those that were ``planned``, and
+    """The corrections as written, of ``result`` and of ``division``, are those that were ``planned``, and
     bring no motion further off.  Raises Refusal FIL008, or COR002 where one is larger than the cell allows."""
     path, corrected = task.toolpath, result.corrected
     step = 3**0.5 * HALF * 10.0**-writing.mm * MM
@@ -316,7 +316,7 @@ def check_residual(
     rows = division.source[added]
     sizes = [size[:0], *in_blocks(lambda part: _added(task, division, added[part]), len(added))]
     _refuse_large(task, np.concatenate(sizes), path.line[rows], step, file)
-    # where the robot found no rest before, nothing is further off
+    # where the robot had no equilibrium before, nothing is further off
     before, before_angle = (np.nan_to_num(a, nan=np.inf) for a in (result.before, result.before_angle))
     worse = corrected & ~(result.after <= before + task.tolerance)
     _refuse(

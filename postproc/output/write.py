@@ -42,7 +42,7 @@ class WrittenProgram:
     """``edits`` make the output; ``contents`` are its bytes, a document each; ``result`` has the residual predicted
     from the digits in them, ``division`` the commands as they are in them.
 
-    residual (N,) [m], off_angle (N,) [rad]: the same residuals, from what the gain leaves.
+    residual (N,) [m], off_angle (N,) [rad]: the same residuals, from the pose that the gain asks for.
     """
 
     task: CompensationProblem
@@ -65,12 +65,12 @@ class WrittenProgram:
 
     @property
     def off_between(self) -> Floats:
-        """(M,) [m] as ``between``, from the way that the gain leaves."""
+        """(M,) [m] as ``path_error``, from the path that the gain asks for."""
         return self._path_of_gain[0]
 
     @property
     def off_between_angle(self) -> Floats:
-        """(M,) [rad] as ``between_angle``, from the way that the gain leaves."""
+        """(M,) [rad] as ``between_angle``, from the path that the gain asks for."""
         return self._path_of_gain[1]
 
     @cached_property
@@ -182,7 +182,7 @@ def write(
 ) -> WrittenProgram:
     """Turn the edits of ``program`` into files, and read them back.
 
-    ``completed``: fills in what a target that was read back leaves to the axis motion before it.
+    ``completed``: fills in what a target that was read back inherits from the axis motion before it.
     Raises Refusal FIL008 (what was read back is not what was meant), COR002 (it corrects by more than may be).
     """
     documents = program.documents
@@ -228,12 +228,12 @@ def _with_lead_ins(
 
 
 def _beside_uncorrected(task: CompensationProblem, result: CorrectionResult) -> tuple[Floats, Floats]:
-    """(N,) [m] and (N,) [rad] how far the tool is from where the part of the correction that is made leaves it; NaN
+    """(N,) [m] and (N,) [rad] how far the tool is from where the applied share of the correction brings it; NaN
     where nothing is corrected."""
     rows, uncorrected_share = np.flatnonzero(result.corrected), 1.0 - task.gain
     off, angle = np.full((2, len(result.state)), np.nan)
 
-    def predicted(part: slice) -> None:
+    def fill_distances(part: slice) -> None:
         at = rows[part]
         wanted = task.wanted[at]
         goal = task.goal(at, wanted)
@@ -248,7 +248,7 @@ def _beside_uncorrected(task: CompensationProblem, result: CorrectionResult) -> 
             for now, then in zip(after, before, strict=True)
         )
 
-    each_block(predicted, len(rows))
+    each_block(fill_distances, len(rows))
     return off, angle
 
 
@@ -258,7 +258,7 @@ def path_errors_as_written(
     """(M,) [m] and (M,) [rad] the largest distance from the wanted path, and angle from the wanted orientation, inside
     of each corrected motion under force, NaN for all others.
 
-    ``left``: the share of the error without a correction that is meant to stay.
+    ``uncorrected_share``: the share of the error without a correction that is meant to stay.
     """
     errors, angles = np.full((2, len(division)), np.nan)
     source, transitions = division.source, division.transitions
@@ -266,18 +266,18 @@ def path_errors_as_written(
     cut = result.corrected & task.desired_path.traceable & task.carries
     chosen = np.flatnonzero(cut[source] & ~transitions)
 
-    def looked(part: slice) -> None:
+    def fill_errors(part: slice) -> None:
         some = chosen[part]
         segments = subdivided_motions(task, division, some)
         first = (segments.first == 0.0) & task.steps(segments.rows, result.corrected)
         errors[some], angles[some] = path_errors(task, segments, first, uncorrected_share, shown=True)
 
-    each_block(looked, len(chosen))
+    each_block(fill_errors, len(chosen))
     return errors, angles
 
 
 def _as_written(task: CompensationProblem, division: Subdivision, back: Toolpath) -> Subdivision:
-    """The division with what its digits say."""
+    """The division with the commands as written."""
     source, base = division.source, task.base
 
     def command(rows: Ints) -> Poses:
@@ -307,7 +307,7 @@ def _decimals(tolerance: float) -> int:
 
 
 def _mark(program: Program, robot: Robot) -> str:
-    """Says which version, robot file and source made the output."""
+    """States which version, robot file and source the output is from."""
     digests = [document.digest for document in program.documents]
     source = digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
     return f"{__version__}, robot {robot.name} sha256:{robot.digest[:16]}, source sha256:{source[:16]}"

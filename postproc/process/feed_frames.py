@@ -19,7 +19,7 @@ ALONG_SPINDLE = 1 * DEG
 
 
 class FeedFrames:
-    """The feed frame at the start and at the end of N motions, and on their path, made for the rows that are asked for.
+    """The feed frame at the start and at the end of N motions, and on their path, computed for the rows asked for.
 
     matters (N,): the force or the moment has a part across z, so that x and y are needed.
     """
@@ -78,16 +78,16 @@ class FeedFrames:
 
         for _ in in_blocks(mark_undefined, len(without)):
             pass
-        # a run with an unknown target is left as it is, whatever its force
+        # a run with an unknown target stays as it is, whatever its force
         unknown = np.append(np.int32(0), np.cumsum(carries & ~path_length.known, dtype=np.int32))
         lost = np.flatnonzero(undefined)
         lost = lost[unknown[runs.stop[lost] + 1] == unknown[runs.start[lost]]]
         if len(lost):
             raise Refusal(_no_direction(lost, toolpath, file))
-        lacks = without[~undefined[without]]
-        before, after = latest[2 * lacks + 1], coming[2 * lacks + 1]
+        unresolved = without[~undefined[without]]
+        before, after = latest[2 * unresolved + 1], coming[2 * unresolved + 1]
         findings = []
-        continued, borrowed = lacks[before >= 0], lacks[(before < 0) & (after >= 0)]
+        continued, borrowed = unresolved[before >= 0], unresolved[(before < 0) & (after >= 0)]
         if len(continued):
             what = f"{len(continued)} motions have no feed direction across the spindle and keep the last one"
             findings.append(Finding("FRC010", what, file, int(toolpath.line[continued[0]])))
@@ -97,8 +97,8 @@ class FeedFrames:
         self.findings = tuple(findings)
 
     def back(self, rows: Ints, side: Ints | int) -> Floats:
-        """(M, 3) z of ``rows`` (M,) at their start (``side``, scalar or (M,): 0) or end (1); of a begin that is not
-        known that at the end."""
+        """(M, 3) z of ``rows`` (M,) at their start (``side``, scalar or (M,): 0) or end (1); where the start is not
+        known, that at the end."""
         at = rows - ((np.asarray(side) == 0) & self.path_length.starts[rows])
         return np.asarray(self._back.take(at, axis=0))
 

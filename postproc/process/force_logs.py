@@ -1,8 +1,8 @@
 """Measured forces over the path length or over time, brought to the motions of a program.
 
-``s_mm`` counts along the programmed path from the first known point on: lines and arcs by their length, PTP by the
-straight path between its ends, moves from and to axis positions and turns on the spot not at all.  ``t_s`` counts the
-time at the programmed feed; motions without a feed (PTP) take none.
+``s_mm`` counts along the programmed path from the first known point on: lines and arcs by their length, point-to-point
+motions by the straight line between their ends, moves from and to axis positions and turns on the spot not at all.
+``t_s`` counts the time at the programmed feed; motions without a feed (point to point) take none.
 """
 
 from __future__ import annotations
@@ -210,7 +210,7 @@ def _summary(
     toolpath: Toolpath,
     program: str,
 ) -> list[Finding]:
-    """What there is to say of readings on a path, and their largest forces."""
+    """The findings on readings along a path, and their largest forces."""
     rows = scale.cutting
     if not len(rows):
         return []

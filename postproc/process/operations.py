@@ -33,9 +33,9 @@ def process_forces(
 ) -> tuple[StatedForces, tuple[Finding, ...]]:
     """The mean milling force of every motion that an operation of the process file ``path`` has, in the feed frame.
 
-    Air, with no force, are: motions of no operation, PTP and G0, those under FORCE OFF, at the operation's ``rapid``
-    and above, those that come from axis positions (approaches, with no known direction), and those along the spindle
-    axis (of plunges the model knows nothing).  Refusal: of the file; FRC011
+    Air, with no force, are: motions of no operation, point-to-point and rapid motions, those under FORCE OFF, at the
+    operation's ``rapid`` and above, those that come from axis positions (approaches, with no known direction), and
+    those along the spindle axis (of plunges the model knows nothing).  Refusal: of the file; FRC011
     where no operation has any motion; FRC013 where a feed is not known.
     """
     operations = read_process(path)

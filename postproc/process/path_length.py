@@ -1,7 +1,7 @@
 """The path of the tool centre point in the robot root: where motions start and end, how they run, how the path turns.
 
-A *run* is a row of consecutive motions that carry force: what an air move, or a motion without force, separates has
-nothing to say about each other's feed direction.
+A *run* is a row of consecutive motions that carry force: what an air move, or a motion without force, separates does
+not share its feed direction.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ _NO_MOVE = 1e-7  # m; a tenth of the last digit that programs write
 
 
 class PathLength:
-    """The path of N motions; what takes more than a few bytes a motion is made of the rows that are asked for.
+    """The path of N motions; what takes more than a few bytes a motion is computed for the rows asked for.
 
     known (N,): target, base and tool are known.  starts (N,): the row before is known and has the same tool on the
     flange, so that its end pose is where this one starts.  moved (N,): the motion has a length, ``length`` (N,) [m],
-    0 where it has none or is not known.  arc (N,): the motion is an arc of known begin; sweep (N,) [rad].
+    0 where it has none or is not known.  arc (N,): the motion is an arc of known start; sweep (N,) [rad].
     """
 
     def __init__(self, toolpath: Toolpath, frames: MotionFrames) -> None:

@@ -138,7 +138,7 @@ def _resampled(readings: ForceReadings, rows: slice) -> tuple[Floats, Floats, Fl
     start[line] = y[line, 0] + slope * (motion_start[line] - x[line, 0])[:, None]
     value[line] = y[line, 1] + slope * (end[line] - x[line, 1])[:, None]
 
-    # the mean points lie a quarter of the way from the ends: there the line has 5 / total of the scatter's variance
+    # the mean points lie a quarter of the length from the ends: there the line has 5 / total of the scatter's variance
     variance = np.ones(n)
     variance[line] = 5.0
     error = scatter[:, 0] * np.sqrt(variance / np.maximum(total, 1))

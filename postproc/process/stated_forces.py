@@ -30,8 +30,8 @@ class StatedForces:
 
     ``values`` (K, 6): where the motion ends; ``start`` (K, 6): where it starts (the same where it is not given), linear
     in between.  Of the motions: ``ci95`` (N,), half width of the 95 % interval of the force as a share of it; ``peak``
-    (N,) [N], the largest force on the way.  NaN where not known, None where known of no motion.  ``error`` (N,) [N]:
-    standard error of the force at the ends, where it was measured.  ``radius`` (N,) [m]: of the cutter, where the
+    (N,) [N], the largest force along the path.  NaN where not known, None where known of no motion.  ``error`` (N,)
+    [N]: standard error of the force at the ends, where it was measured.  ``radius`` (N,) [m]: of the cutter, where the
     process states it.
     """
 
@@ -130,7 +130,7 @@ def is_number_like(word: str) -> bool:
 def is_force_word(word: str) -> bool:
     """Whether a word of the command line is the value of --force: a list of numbers, or a CSV or YAML file.
 
-    A list counts whatever its length, so that a wrong one is told rather than taken for a program's name.
+    A list counts whatever its length, so that a wrong one is reported rather than taken for a program's name.
     """
     if word.lower().endswith((".csv", ".yaml", ".yml")):
         return True

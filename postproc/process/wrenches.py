@@ -34,8 +34,8 @@ CLEAR = 4.0
 class Wrenches:
     """What the workpiece does to the tool, at the TCP, in the axes of the robot root [N, N m].
 
-    values (N, 6): at the end point of each motion; start (N, 6): where it leaves the end point before it (the same
-    as there, unless the force steps at that vertex; only where it is another is it kept); both without ``ramps``.
+    values (N, 6): at the end point of each motion; start (N, 6): at the end point before it (the same
+    as there, unless the force steps at that vertex; stored only where it is another); both without ``ramps``.
     ``along`` states what acts there and between.  carries (N,): the motion was given a force (even where both sides of
     its end point cancel).
     steps (N,): it carries force, and the wrench does not go over from the motion before: a cut starts, the path turns
@@ -120,7 +120,7 @@ class Wrenches:
         )
 
     def along(self, rows: Ints, fraction: Floats) -> Floats:
-        """(K, 6) the wrench at the shares ``fraction`` (K,), 0 to 1, of the way of the motions ``rows`` (K,).
+        """(K, 6) the wrench at the shares ``fraction`` (K,), 0 to 1, of the path of the motions ``rows`` (K,).
 
         Linear between ``start`` and ``values``, with what ``ramps`` add.  On an arc a force stated in the feed frame or
         the tool frame is linear in that frame, which turns with the tangent or with the tool.
@@ -167,7 +167,7 @@ class Turning:
     def along(self, rows: Ints, fraction: Floats, start: Floats, values: Floats) -> Floats:
         """(K, 6) C(t) ((1 - t) C(0)^T start + t C(1)^T values) [N, N m] at the shares ``fraction`` (K,) of motions
         ``rows`` (K,), ``start`` and ``values`` (K, 6), with the frame C in the robot's axes."""
-        # tool in the robot where the motion starts, and how it turns on the way
+        # tool in the robot where the motion starts, and how it turns along the path
         first_rotation, last_rotation = (
             self.base_in_robot[at] @ self.tool_in_base[at] for at in (rows - 1, rows)
         )

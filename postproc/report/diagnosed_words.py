@@ -299,7 +299,7 @@ def _nearest(several: Sequence[Named]) -> Iterator[str]:
 
 
 def _rest(result: Diagnosed) -> Iterator[str]:
-    """The residual, where that is no lack of fit."""
+    """The residual, where the fit is adequate."""
     residual = _mm(result.rms["after"])
     if result.verdict.conditional:
         return

@@ -70,7 +70,7 @@ def unified_diff(document: Document, name: str, edits: Iterable[Edit], written: 
 
 
 class _DiffLines:
-    """The lines of a text, with their endings; one without an ending has what diff says of it."""
+    """The lines of a text, with their endings; one without an ending has the note that diff writes."""
 
     def __init__(self, document: Document) -> None:
         self.raw, self.starts = document.raw, document.line_starts
@@ -118,11 +118,11 @@ def _apart(raw: bytes, edits: Edits) -> Iterator[tuple[int, int]]:
 
 def _touched(old: _DiffLines, edits: Edits, low: int, high: int) -> Ints:
     """(3, B) first and last line of the blocks of the edits low .. high - 1, and the lines by which each grows."""
-    at, last = _joined(old, edits, low, high)
+    at, last = _abutting_edits(old, edits, low, high)
     start, stop, ends = edits.start[at], edits.stop[last], edits.ends[np.append(at, high)]
     first, stop_line = old.of(start), old.of(stop)
     cut, at_start, to_start = stop > start, old.starts[first] == start, old.starts[stop_line] == stop
-    ended, emptied = _ended(edits.texts, ends[:-1], ends[1:]), ends[1:] == ends[:-1]
+    ended, emptied = _end_lines(edits.texts, ends[:-1], ends[1:]), ends[1:] == ends[:-1]
     last = np.where(cut & to_start, stop_line - 1, stop_line)
     breaks = np.flatnonzero(np.frombuffer(edits.texts, np.uint8)[ends[0] : ends[-1]] == _LF) + int(ends[0])
     growth = np.diff(np.searchsorted(breaks, ends)) - (stop_line - first)
@@ -139,18 +139,20 @@ def _touched(old: _DiffLines, edits: Edits, low: int, high: int) -> Ints:
     return lines.astype(np.int32)
 
 
-def _joined(old: _DiffLines, edits: Edits, low: int, high: int) -> tuple[Ints, Ints]:
+def _abutting_edits(old: _DiffLines, edits: Edits, low: int, high: int) -> tuple[Ints, Ints]:
     """Runs of edits that abut: their first ones and their last ones.  A run ends where a line does on both sides."""
     parted = edits.start[low + 1 : high] > edits.stop[low : high - 1]
     k = np.flatnonzero(~parted) + low + 1
     start = edits.start[k]
     line = np.searchsorted(old.starts, start, side="right") - 1
-    parted[k - low - 1] = (old.starts[line] == start) & _ended(edits.texts, edits.ends[k - 1], edits.ends[k])
+    parted[k - low - 1] = (old.starts[line] == start) & _end_lines(
+        edits.texts, edits.ends[k - 1], edits.ends[k]
+    )
     run_start = np.flatnonzero(parted) + low + 1
     return np.append(low, run_start), np.append(run_start, high) - 1
 
 
-def _ended(texts: bytes, start: Ints, end: Ints) -> Bools:
+def _end_lines(texts: bytes, start: Ints, end: Ints) -> Bools:
     """(K,) whether each of these parts of ``texts`` ends a line; an empty one does not."""
     ends_line = end > start
     ends_line[ends_line] = np.frombuffer(texts, np.uint8)[end[ends_line] - 1] == _LF

@@ -38,8 +38,8 @@ SAME_FORCE = 0.01
 
 @dataclass(frozen=True)
 class Sum:
-    """Parameters that only show together: ``of`` name -> weight, of which the first is found and the others are fixed;
-    ``value`` and ``ci95`` (SI) of their sum."""
+    """Parameters that only show together: ``of`` name -> weight, of which the first is identified and the others are
+    fixed; ``value`` and ``ci95`` (SI) of their sum."""
 
     of: Mapping[str, float]
     value: float
@@ -112,7 +112,7 @@ class Identified:
         return {name: lengths_of(values, measured) for name, values in residuals.items()}
 
     def gap_mm(self) -> dict[str, float]:
-        """Root mean squares of residuals, and the scatter of the readings; what is not known is left out."""
+        """Root mean squares of residuals, and the scatter of the readings; what is not known is omitted."""
         return gap_of(self.lengths, self.after.noise)
 
     @property
@@ -123,7 +123,7 @@ class Identified:
 
     @cached_property
     def joints(self) -> tuple[ResidualVariable, ...]:
-        """Where each joint stood."""
+        """The position of each joint."""
         return joint_variables(self.after.campaign.readings)
 
     @cached_property
@@ -151,9 +151,9 @@ class Identified:
 
     @cached_property
     def sums(self) -> tuple[Sum, ...]:
-        """What is known of parameters that were left out because they only show together with others.
+        """What is known of parameters that were dropped because they only show together with others.
 
-        The columns of a dropped parameter d being the sum of w_i times those of parameters p_i that were found, the
+        The columns of a dropped parameter d being the sum of w_i times those of identified parameters p_i, the
         model depends on each p_i + w_i d only.
         """
         after = self.after
@@ -181,7 +181,7 @@ class Identified:
 
     @cached_property
     def bootstrap_ci95(self) -> dict[str, float]:
-        """(SI) half widths by the bootstrap, as the others are made of their deviations; {} without."""
+        """(SI) half widths by the bootstrap, from their deviations as the others; {} without."""
         if self.bootstrap is None:
             return {}
         wide = self.after.quantile * self.bootstrap.deviation

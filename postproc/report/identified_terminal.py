@@ -25,7 +25,7 @@ IN_TABLES = frozenset({"IDN018", "IDN019", "IDN020", "IDN021", "IDN022", "IDN025
 
 
 def show_identified(console: Console, result: Identified, verbose: bool = False) -> None:
-    """The verdict, the data, the parameters, what was not found, the residuals, and findings."""
+    """The verdict, the data, the parameters, what was not identified, the residuals, and findings."""
     console.print(Text(verdict(result), style="bold"), soft_wrap=True)
     show_rows(console, ((key, Text(sanitize(value))) for key, value in _rows(result)))
     console.print(_parameters(result))

@@ -56,8 +56,8 @@ class WorstPlace:
 class PageData:
     """K motions of the ``motions`` of one program: those that figures and table show, mm and N.
 
-    report: figures, findings, model and digests.  tolerance: what the output may keep.  off: motions that are left
-    alone on the program's own word.  rows (K,): the motions shown, ascending.  line, kind, state, cut (K,): as in
+    report: figures, findings, model and digests.  tolerance: what the output may keep.  off: motions that the
+    program itself excludes.  rows (K,): the motions shown, ascending.  line, kind, state, cut (K,): as in
     Toolpath and Result; cut -1 in air.  path_length (K,) [mm]: length of the cutting path to the end of each motion.
     position (K, 3): wanted end point; arcs (A,): which of the K are arcs from the one before, and arc_points (A, B, 3)
     points inside of them; force (K, 3) [N]; deflection (K, 3) before: all in the robot base. correction (K, 3): command
@@ -151,7 +151,7 @@ def page_data(
 
 
 def _by_blocks(compute: Callable[[Ints], Floats], rows: Ints, each: int = 1) -> Floats:
-    """(K each, 3) what ``made`` gives of ``rows`` (K,)."""
+    """(K each, 3) what ``compute`` returns for ``rows`` (K,)."""
     parts = in_blocks(lambda block: compute(rows[block]), len(rows), ROWS // each)
     return np.concatenate([np.empty((0, 3)), *parts])
 

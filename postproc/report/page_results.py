@@ -1,4 +1,4 @@
-"""Pages of an identification, a diagnosis and a map: what the terminal says, and the picture."""
+"""Pages of an identification, a diagnosis and a map: the text of the terminal, and the picture."""
 
 from __future__ import annotations
 
@@ -177,5 +177,5 @@ def _place(mapped: Mapped, row: int) -> str:
 
 
 def _plain(cell: object) -> str:
-    """What a cell of a terminal's table says."""
+    """The text of a cell of a terminal's table."""
     return cell.plain if isinstance(cell, Text) else Text.from_markup(str(cell)).plain

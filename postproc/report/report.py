@@ -31,7 +31,7 @@ class Spread:
 
     @staticmethod
     def of(values: Floats) -> Spread:
-        """Of ``values`` (N,) [m]; those that are not finite are left out."""
+        """Of ``values`` (N,) [m]; those that are not finite are omitted."""
         seen = values[np.isfinite(values)]
         if not len(seen):
             return Spread(np.nan, np.nan, np.nan)
@@ -245,7 +245,7 @@ def failure(command: str, program: str, findings: Sequence[Finding]) -> dict[str
 
 
 def in_order_of_place(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """By file and line, each said once."""
+    """By file and line, each once."""
     return tuple(sorted(dict.fromkeys(findings), key=lambda f: (f.file, f.line, f.column, f.code)))
 
 

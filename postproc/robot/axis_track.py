@@ -44,7 +44,7 @@ marks about as many states of a KR 270 as the places of its closed form do."""
 class AxisTrack:
     """q (N, n) [rad, m], NaN where unknown or out of reach; status (N,) branch taken (0 for an arm that is not KUKA's),
     -1 where nothing states it; reachable (N,); within (N,) inside of the axis limits; turn_matches (N,) the stated T is
-    that of ``q``; half_turns: path motions that turn the tool by half a turn, and which way."""
+    that of ``q``; half_turns: path motions that turn the tool by half a turn, and in which sense."""
 
     q: Floats
     status: Ints
@@ -67,12 +67,12 @@ def follow_axes(
     ``base``, ``tool`` (N): frames of the motions, in the robot base and on the flange, where there are any.
 
     KUKA-type arms: a PTP takes the branch of its S and the turns of its T; without them the branch stays and each axis
-    goes the short way.  On path motions the branch stays and the axes follow the way (see ``HalfTurns``).  After a PTP
-    to an unknown target the branch is unknown until something states it.
+    takes the shorter turn.  On path motions the branch stays and the axes follow the path (see ``HalfTurns``).  After a
+    PTP to an unknown target the branch is unknown until something states it.
 
     Other arms have no S and T.  Each motion is solved from the one before it (see ``newton.follow_rows``), so branch
     and turns are those that lead on from ``start`` or from the last axis motion; only a PTP may take others, where
-    these have no way to its target within the limits.  A motion that cannot be reached is passed over.
+    these have no path to its target within the limits.  A motion that cannot be reached is passed over.
     """
     n = len(toolpath)
     rows = np.flatnonzero(toolpath.on_axes)
@@ -97,7 +97,7 @@ def follow_axes(
         reachable[solve] = np.isfinite(q[solve]).all(axis=1)
     else:
 
-        def solved(part: slice) -> None:
+        def solve_block(part: slice) -> None:
             rows = solve[part]
             near = np.zeros((len(rows), q.shape[1]))
             if robot.external is not None:
@@ -105,7 +105,7 @@ def follow_axes(
             solution = inverse(robot.nominal, flange[rows], status[rows], near)
             q[rows], reachable[rows] = solution.q, solution.reachable
 
-        each_block(solved, len(solve))
+        each_block(solve_block, len(solve))
         half_turns = _settle(robot, q, status, toolpath, on_axes, start, base, tool)
         stated = np.flatnonzero((toolpath.configuration["turn"] >= 0) & cartesian)
         bits = (toolpath.configuration["turn"][stated, None] >> np.arange(6)) & 1 == 1
@@ -169,8 +169,8 @@ def _follow_on(
     last = np.where(place >= 0, anchor[place], -2)[solve]
     where = place[solve]
     is_start = np.concatenate([[True], where[1:] != where[:-1]])
-    begun = np.full(q.shape[1], np.nan) if start is None else start
-    starts = np.where((last >= 0)[:, None], q[np.maximum(last, 0)], begun)
+    program_start = np.full(q.shape[1], np.nan) if start is None else start
+    starts = np.where((last >= 0)[:, None], q[np.maximum(last, 0)], program_start)
     jumps = np.asarray(toolpath.kind[solve] == Kind.PTP)
     fixed_values = None if robot.external is None else external[solve]
     q[solve], _ = follow_rows(robot.nominal, flange[solve], is_start, starts, jumps, fixed_values)
@@ -224,7 +224,8 @@ def _settle(
     base: Poses | None,
     tool: Poses | None,
 ) -> HalfTurns:
-    """Choose the turns of A1, A4, A6 in place, and A4 where A5 = 0 leaves it open; gives the half turns among them."""
+    """Choose the turns of A1, A4, A6 in place, and A4 where A5 = 0 does not determine it; gives the half turns among
+    them."""
     arm = robot.nominal
     assert not isinstance(arm, SerialArm)
     rows = np.flatnonzero(np.isfinite(q).all(axis=1))
@@ -285,8 +286,8 @@ def _settle(
 
 class _Large(NamedTuple):
     """Motions on which axes turn far: place (K,) among all, ascending; step (K, 3) [rad] by which A1, A4, A6 turn; and
-    of those that may go ``either`` (K,) way what the other one adds, more (K, 3), and the rotation vectors of the tool
-    both ways, vector (K, 2, 3), NaN for a PTP."""
+    of those that may turn in ``either`` (K,) sense what the other one adds, more (K, 3), and the rotation vectors of
+    the tool in both senses, vector (K, 2, 3), NaN for a PTP."""
 
     place: Ints
     step: Floats
@@ -305,7 +306,7 @@ def _large(
     base: Poses | None,
     tool: Poses | None,
 ) -> _Large:
-    """The motions that do not simply go the short way.  values (R, n): joint values of ``rows`` (R,)."""
+    """The motions that do not simply take the shorter turn.  values (R, n): joint values of ``rows`` (R,)."""
     arm = values[:, -6:]
     far = np.zeros(len(rows), np.bool_)
     for axis in range(6):

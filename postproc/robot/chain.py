@@ -73,7 +73,7 @@ class ChainKinematics:
         """The TCP and the mount after a small ``step`` (m, N) [rad, m] of the coordinates; all else stays as it is.
 
         w = sum of s_i z_i over the turns; dp = sum of s_i z_i x (p - p_i) over the turns, and of s_i z_i over the
-        shifts.  What is left out has the size of the step's square.
+        shifts.  The error has the size of the step's square.
         """
         turn, shift, spindle_shift = (np.zeros((3, step.shape[1])) for _ in range(3))
         mounted, at = len(self.axes) - self.spindles, 0
@@ -177,7 +177,7 @@ class Chain:
         count = coordinates.shape[1]
         axes: list[Floats] = []
         origins: list[Floats] = []
-        # what all states share has one column until a coordinate tells them apart
+        # what all states share has one column until a coordinate differs between them
         columns: list[Floats] = list(np.eye(3)[:, :, None])
         position = np.zeros((3, 1))
         links = []
@@ -308,7 +308,7 @@ def weight_about(axis: Floats, moment: Floats, gravity: Floats) -> tuple[Floats,
     under ``gravity`` (3,) [m/s2], and its derivative by the turn: a . (M x g) and a . ((a x M) x g) = (a . M)(a . g) -
     M . g."""
     (ax, ay, az), (mx, my, mz), (gx, gy, gz) = axis, moment, gravity.tolist()
-    if gx == 0.0 and gy == 0.0:  # the robot stands upright
+    if gx == 0.0 and gy == 0.0:  # the robot is upright
         return gz * (ax * my - ay * mx), gz * ((ax * mx + ay * my + az * mz) * az - mz)
     torque = ax * (my * gz - mz * gy) + ay * (mz * gx - mx * gz) + az * (mx * gy - my * gx)
     slope = (ax * mx + ay * my + az * mz) * (gx * ax + gy * ay + gz * az) - (gx * mx + gy * my + gz * mz)

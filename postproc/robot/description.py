@@ -120,7 +120,7 @@ class Robot:
 
     @property
     def speeds(self) -> Floats:
-        """(n,) [rad/s, m/s] the fastest that each joint moves, NaN where the file does not say it."""
+        """(n,) [rad/s, m/s] the fastest that each joint moves, NaN where the file does not state it."""
         stated = [np.nan if axis.speed is None else axis.speed for axis in self.axes]
         return np.array(stated or [np.nan] * len(self.joints))
 

@@ -41,7 +41,7 @@ class ExternalAxis:
     along ``direction``) or FIXED (it moves neither).  direction (3,): unit vector, point (3,) [m], both in the world
     with all external axes at zero.  lower, upper, start [mm or deg]; start: where the axis is before a program
     states it, None where nothing states it.  bases: numbers of those that are on a positioner; on: the positioner on
-    which this one stands.  line: of the cell file.
+    which this one is mounted.  line: of the cell file.
     """
 
     name: str
@@ -92,7 +92,7 @@ class External:
     direction (3,) of each; positioners: their turning axes, from the lowest to the one that carries the part; carriers:
     number of a base -> the positioner that it is on; carrier (N,): that of each motion's base, -1 for none.
     constant: ``robot_from_path`` without a positioner and with each of them, where no track or positioner moves: then
-    the base of a motion is taken as if it stood there, and path axes are those of the robot base.
+    the base of a motion is taken as if it were there, and path axes are those of the robot base.
     """
 
     path: Toolpath
@@ -157,7 +157,8 @@ class External:
         return external_at(self.path, rows, share)
 
     def moves(self, rows: Ints) -> Bools:
-        """(K,) an external axis moves so far on the motion of ``rows`` (K,) that its middle says little of the rest."""
+        """(K,) an external axis moves so far on the motion of ``rows`` (K,) that its middle does not represent the
+        rest."""
         with np.errstate(invalid="ignore"):  # axes that are not known
             travel = np.abs(self.at(rows) - self.at(rows, np.zeros(len(rows))))
         far = np.zeros(len(rows), np.bool_)

@@ -35,8 +35,8 @@ class Joint:
 
 @dataclass(frozen=True)
 class Axis:
-    """A joint as its controller counts it: sign * value + offset is the angle or the way of the geometry [rad, m].
-    ``speed`` [rad/s, m/s]: the fastest that it moves, None where the file does not say it."""
+    """A joint as its controller counts it: sign * value + offset is the angle or the travel of the geometry [rad, m].
+    ``speed`` [rad/s, m/s]: the fastest that it moves, None where the file does not state it."""
 
     name: str
     lower: float
@@ -149,7 +149,8 @@ class KukaVariant:
 
 @dataclass(frozen=True, eq=False)
 class SerialArm:
-    """Any other arm of six joints, or of seven of which one is ``fixed`` (its column).
+    """Any other arm of six joints, or of seven of which one is ``fixed`` (its column) and the
+    others place the flange.
 
     ``axes``: as the controller counts them; ``chain``: their frames; ``tip``: the flange in the last link's frame.
     """
@@ -217,7 +218,7 @@ def based(links: Sequence[Link], base: Poses) -> tuple[Link, ...]:
 
 
 def turn_about(axis: str, angle: float) -> Floats:
-    """Rotation (3, 3) by ``angle`` [rad] about a coordinate axis; quarter turns are made of zeros and ones."""
+    """Rotation (3, 3) by ``angle`` [rad] about a coordinate axis; quarter turns consist of zeros and ones."""
     quarters = angle / (np.pi / 2)
     rotation = rotation_from_vector(angle * np.eye(3)["xyz".index(axis)])
     return np.round(rotation) if abs(quarters - round(quarters)) < 1e-12 else np.asarray(rotation)
@@ -243,7 +244,7 @@ def _link_frames(links: Sequence[Link], axes: Sequence[Axis]) -> list[Poses]:
 
 
 def _flip(axis: Axis) -> Poses:
-    """Half a turn about x, its own inverse, where the controller counts the other way: F Rz(q) F = Rz(-q)."""
+    """Half a turn about x, its own inverse, where the controller counts in the opposite sense: F Rz(q) F = Rz(-q)."""
     return Poses(np.diag([1.0, -1.0, -1.0]) if axis.sign < 0 else np.eye(3), np.zeros(3))
 
 

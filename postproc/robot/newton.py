@@ -2,7 +2,7 @@
 
     J dq = e,  dq = (J^T J + (|e|^2 / 2 + w) I)^-1 J^T e        (damping after Sugihara, IEEE T-RO 27, 2011)
 
-e: what is left to the target, position over the arm's size and rotation vector.  The damping goes with the error, so
+e: what remains to the target, position over the arm's size and rotation vector.  The damping goes with the error, so
 that the last steps are Newton's own.  A target that is far is gone to in steps along the straight path to it, so that
 the solution stays in the branch of its start.
 """
@@ -55,7 +55,7 @@ class Solver:
         self.reach = float(sum(after) + travels[~self.turns[self.first :]].sum())
 
     def residual(self, q: Floats, target: Poses) -> tuple[Floats, Floats]:
-        """What is left to the targets, e (N, 6), and the Jacobian (N, 6, k) of the moving columns, both scaled."""
+        """What remains to the targets, e (N, 6), and the Jacobian (N, 6, k) of the moving columns, both scaled."""
         swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
         here = swept.pose
         turn = vector_from_rotation(target.rotation @ np.swapaxes(here.rotation, 1, 2))
@@ -65,7 +65,7 @@ class Solver:
         return error, slope
 
     def solve(self, q: Floats, target: Poses, steps: int = 40, done: float = 0.0) -> tuple[Floats, Bools]:
-        """From ``q`` (N, n) [rad, m] to ``target`` (N): the joint values (N, n), and where (N,) what is left is below
+        """From ``q`` (N, n) [rad, m] to ``target`` (N): the joint values (N, n), and where (N,) what remains is below
         the tolerance.
 
         ``done``: stop at this error instead of the tolerance.  Rows that make no headway are given up.
@@ -102,7 +102,7 @@ class Solver:
         )
 
     def beyond(self, q: Floats, target: Poses) -> Bools:
-        """(N,) ``target`` (N) is farther from the first joint that moves than all links and ways after it together;
+        """(N,) ``target`` (N) is farther from the first joint that moves than all links and travels after it together;
         ``q`` (N, n) states where that joint is."""
         swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
         away = np.linalg.norm(target.position - swept.origins[self.first].T, axis=1)
@@ -110,7 +110,7 @@ class Solver:
 
     def follow(self, q: Floats, target: Poses, stride: float = STEP) -> tuple[Floats, Bools, Bools]:
         """Joint values (N, n) and where (N,) they hold, as ``solve``, along the straight path from where the flange is
-        at ``q`` (N, n), in steps of ``stride``; third (N,), where no step failed on the way."""
+        at ``q`` (N, n), in steps of ``stride``; third (N,), where no step failed along the path."""
         swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
         here = swept.pose
         translation = target.position - here.position
@@ -177,7 +177,7 @@ def solver_of(arm: SerialArm) -> Solver:
 def solve_near(arm: SerialArm, flange: Poses, near: Floats) -> tuple[Floats, Bools]:
     """(N, n) [rad, m] the solution that ``near`` (N, n) leads to, and where (N,) there is one.
 
-    The held joint keeps its value of ``near``.  A target near to where ``near`` stands is solved in its branch or not
+    The fixed joint has its value of ``near``.  A target near to the pose at ``near`` is solved in its branch or not
     at all; for one that is ``FAR`` any branch will do, within the limits and near to ``near`` if there is a choice.
     """
     solver = solver_of(arm)
@@ -210,14 +210,14 @@ def follow_rows(
 ) -> tuple[Floats, Bools]:
     """Rows in order, each solved from the one before; (M, n) [rad, m] NaN where not reached, and (M,) reached.
 
-    ``begins`` (M,): the row before is not the last solution but ``starts`` (M, n); it must be set in row 0.  ``jumps``
-    (M,): point to point, so that another branch or turn may be taken where the one so far has no way or leaves the
-    limits.  A path, on the contrary, that leads through a singular place or out of reach is not followed into another
-    branch: its end counts as not reached.  A row that is not reached is passed over.  ``held`` (M,) [rad, m]: where the
-    held joint is at the end of each row; without, it stays.
+    ``is_start`` (M,): the row before is not the last solution but ``starts`` (M, n); it must be set in row 0.
+    ``jumps`` (M,): point to point, so that another branch or turn may be taken where the one so far has no path or
+    exceeds the limits.  A path, on the contrary, that leads through a singular place or out of reach is not followed
+    into another branch: its end counts as not reached.  A row that is not reached is passed over.  ``fixed_values``
+    (M,) [rad, m]: of the fixed joint at the end of each row; without, it stays.
 
     Solved in about sqrt(M) stretches side by side.  A quick run over the ends of the stretches guesses where each
-    starts; then all march together, one row at a time; a stretch that turns out to have begun elsewhere than the one
+    starts; then all march together, one row at a time; a stretch that turns out to have started elsewhere than the one
     before it ends is marched again.  So the result is that of one march from the first row to the last.
     """
     solver = solver_of(arm)
@@ -257,7 +257,7 @@ def follow_rows(
 
 
 def _taken(arm: SerialArm, base: Floats, fixed_values: Floats | None, rows: Ints | slice) -> Floats:
-    """The angles ``base`` (K, n) with the held joint where it is in ``rows``."""
+    """The angles ``base`` (K, n) with the fixed joint where it is in ``rows``."""
     if fixed_values is None or arm.fixed is None:
         return base
     base = base.copy()

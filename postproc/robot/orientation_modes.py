@@ -1,4 +1,4 @@
-"""The orientations that a controller runs where the text says others: motions keep that with which they start."""
+"""The orientations that a controller runs where the text states others: motions keep that with which they start."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def as_run(
     """The toolpath with the orientations that the controller runs, and what is to be reported of it.
 
     Under $ORI_TYPE=#CONSTANT a path motion keeps the orientation of the flange with which it starts, whatever its
-    target says; an arc under $CIRC_TYPE=#PATH turns it with its tangent (KUKA System Software, programming manual for
+    target states; an arc under $CIRC_TYPE=#PATH turns it with its tangent (KUKA System Software, programming manual for
     system integrators, orientation control of CP motions, recalled).  So the orientation is that of the last motion
     before that is no such one.
 

@@ -90,7 +90,7 @@ def _gap(section: YamlSection) -> dict[str, float]:
 
 
 def correlations(identified: Sequence[Identification]) -> tuple[tuple[str, ...], Floats]:
-    """Names (k,) and correlation (k, k) of all parameters fitted.  What a later run refitted counts as it says;
+    """Names (k,) and correlation (k, k) of all parameters fitted.  What a later run refitted counts as it states;
     parameters of different runs are independent."""
     names: list[str] = []
     blocks: list[Floats] = []

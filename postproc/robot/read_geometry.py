@@ -221,7 +221,7 @@ def _check_count(section: YamlSection, axes: tuple[Axis, ...], count: int) -> No
 
 
 def _fixed_joint(axes: tuple[Axis, ...], section: YamlSection) -> int | None:
-    """Column of the joint of seven that the other six leave where it is."""
+    """Column of the joint of seven that the other six do not move."""
     names = [axis.name for axis in axes]
     if len(axes) == 6:
         if "external" in section:

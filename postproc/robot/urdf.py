@@ -1,9 +1,9 @@
 """A strict, small reader of URDF: the joints between two links, with fixed ones merged.
 
 Only what kinematics needs is read (links, joints, origins, axes); masses and limits are passed over, and no mesh is
-opened.  A mesh that is named by a path must all the same lie where it says, inside of the URDF's folder: a file that
-was torn from its place is hardly the one that was meant.  ``package://`` names, which only a ROS installation can
-resolve, are passed over.  Lengths are metres and angles radians, as the format says.
+opened.  A mesh that is named by a path must all the same lie where the path leads, inside of the URDF's folder: a file
+that was torn from its place is hardly the one that was meant.  ``package://`` names, which only a ROS installation can
+resolve, are passed over.  Lengths are metres and angles radians, as the format states.
 """
 
 from __future__ import annotations
@@ -222,7 +222,7 @@ def _mesh(path: Path, line: int, name: str) -> None:
 
 
 def _snapped(rotation: Floats) -> Floats:
-    """Quarter turns written with nine digits or more are meant: made of zeros and ones."""
+    """Quarter turns written with nine digits or more are meant: they consist of zeros and ones."""
     near = np.round(rotation)
     return near if np.abs(rotation - near).max() < 1e-9 else rotation
 

@@ -1,6 +1,6 @@
 """YAML files with other values, by ruamel.yaml's round trip: comments, order, quotes and numbers stay as written.
 
-ruamel.yaml lays some lines out again (blanks in braces, a value below its key).  Where such a line holds what it held,
+ruamel.yaml lays some lines out again (blanks in braces, a value below its key).  Where such a line has its old content,
 the old file's is put back.
 """
 
@@ -106,7 +106,7 @@ def _append(block: CommentedMap | CommentedSeq, key: object, value: object, gap:
 
 
 def _cut_comment(block: CommentedMap | CommentedSeq, gap: bool) -> str:
-    """Take away, and return, the comment lines below a block; leave an empty line there for a ``gap``."""
+    """Remove, and return, the comment lines below a block; keep an empty line there for a ``gap``."""
     owner, last, slot = _end(block)
     token = owner.ca.items.get(last, [None] * 4)[slot]
     text = token.value if token else ""
@@ -135,8 +135,8 @@ def _set_comment(owner: Any, key: Any, slot: int, text: str | None) -> None:
 def edited(raw: bytes, path: Path, edit: Callable[[CommentedMap], None]) -> bytes:
     """The bytes ``raw`` of a YAML file after ``edit`` of its top mapping.
 
-    Lines that hold what they held are byte for byte those of ``raw``, unless the indentation of the file leaves no way
-    to do so.  Raises Refusal ROB002 where ruamel.yaml does not read it.
+    Lines with their old content are byte for byte those of ``raw``, unless the indentation of the file does not
+    allow it.  Raises Refusal ROB002 where ruamel.yaml does not read it.
     """
     text = raw.decode("utf-8-sig")
     newline = "\r\n" if "\r\n" in text[: text.find("\n") + 1] else "\n"

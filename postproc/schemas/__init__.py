@@ -1,6 +1,6 @@
 """JSON Schemas (draft 2020-12) of the files that people write, for their editors, and of the results, for scripts.
 
-Of files: names of keys, units, choices, effects and parameters are those of the readers' own tables.  A schema says
+Of files: names of keys, units, choices, effects and parameters are those of the readers' own tables.  A schema states
 what one key may hold; what goes together (limits that rise, joints as many as the geometry has) only the reader checks.
 """
 

@@ -1,4 +1,5 @@
-"""What two programs differ in beside their places: stops, ways back, points that are missing, frames, feeds, air."""
+"""What two programs differ in beside their places: stops, backward motions, points that are missing, frames, feeds,
+air."""
 
 from __future__ import annotations
 
@@ -109,7 +110,7 @@ def on_cuts(simulator: Simulator, run: CompensationProblem, simulation: Simulati
     """What the motions on the cuts differ in from those of the original at their places."""
     original, samples = simulator.original, simulation.samples
     motions = ComparedMotions.of(samples)
-    # a motion from one place to another stands for what lies between: in its middle, but short ones at a vertex
+    # a motion from one place to another represents what lies between: in its middle, but short ones at a vertex
     owners = [samples.place.row[at] for at in (motions.middle, motions.start, motions.end)]
     owners += [np.minimum(owners[1] + 1, len(original.toolpath) - 1)]
     differences: list[Difference] = []
@@ -247,7 +248,7 @@ def _same_target(
 
 def _same_kind(original: CompensationProblem, run: CompensationProblem, rows: Ints, run_rows: Ints) -> Bools:
     one, two = original.toolpath, run.toolpath
-    path = (Kind.LIN, Kind.CIRC)  # an arc may be divided into straight motions, and the other way round
+    path = (Kind.LIN, Kind.CIRC)  # an arc may be divided into straight motions, and vice versa
     kind, other = one.kind[rows], two.kind[run_rows]
     return np.asarray((kind == other) | (np.isin(kind, path) & np.isin(other, path)))
 

@@ -1,6 +1,6 @@
 """Which motions of two programs belong together: air moves one by one, cuts as a whole, in their order.
 
-Nothing but air moves tells where a cut of the second program ends: their targets are those of the original, except of
+Nothing but air moves shows where a cut of the second program ends: their targets are those of the original, except of
 the last one before a cut, which may lead to where the cut starts corrected.
 """
 
@@ -61,8 +61,8 @@ class Stretches:
 
 @dataclass(frozen=True, eq=False)
 class Pairing:
-    """K stretches of the original and what stands for them, rows ``start`` to before ``stop`` (K,) of the second
-    program; air, run_air (A,): rows of both that stand for themselves."""
+    """K stretches of the original and their counterparts, rows ``start`` to before ``stop`` (K,) of the second
+    program; air, run_air (A,): rows of both that correspond one to one."""
 
     stretches: Stretches
     start: Ints
@@ -127,7 +127,7 @@ def _extras(
     shift: int,
     extra: int,
 ) -> Ints:
-    """(K,) how many motions are added up to the end of each of the stretches ``inside`` (K,) one another behind.
+    """(K,) how many motions are added up to the end of each of the stretches ``inside`` (K,), one after another.
 
     For each air move between two of them: the rows of the second program that lead where it leads, and of these
     the choice, in their order, that leads nearest.
@@ -154,9 +154,10 @@ def _extras(
 def _away(
     original: CompensationProblem, run: CompensationProblem, rows: Ints, stop: int, shift: int, extra: int
 ) -> Floats:
-    """(extra + 1,) [m] how far the targets of the air moves ``rows`` are from those of the rows of ``run`` that stand
-    for them with so many motions added before; infinite where they are not the same.  The last of them leads to a cut
-    and may be moved.  Where two stretches meet without a move in air, the last point of the one before has to serve."""
+    """(extra + 1,) [m] how far the targets of the air moves ``rows`` are from those of the rows of ``run`` that
+    correspond to them with so many motions added before; infinite where they are not the same.  The last of them leads
+    to a cut and may be moved.  Where two stretches meet without a move in air, the last point of the one before has to
+    serve."""
     more = np.arange(extra + 1)
     total = np.zeros(extra + 1)
     probes, loose = (rows, rows[-1:]) if len(rows) else (np.array([stop - 1]), np.array([stop - 1]))

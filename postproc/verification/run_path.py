@@ -1,11 +1,12 @@
 """The path as a controller runs it: approximated vertices are passed on a parabola.
 
-The path leaves the polygon the distance d before a vertex and joins it d behind.  With u from 0 to 1 in between it is
+The path departs from the polygon the distance d before a vertex and joins it d after.  In between, with u from 0 to 1,
+it is
 
     (1 - u) A + u B
 
 A the place (1 - u) d before the vertex on the motion that ends there, B the one u d after it: of straight motions the
-quadratic Bezier curve with the vertex in its middle.  Orientations go over in the same way.  d is the approximation
+quadratic Bezier curve with the vertex in its middle.  Orientations change likewise.  d is the approximation
 distance, and at most half of either motion.
 """
 
@@ -83,7 +84,7 @@ class RunPath:
                 yield some, vertex[some], 0.5 + 0.5 * distance[some] / self.reach[vertex[some]]
 
     def _both(self, vertex: Ints, u: Floats) -> tuple[Poses, Poses]:
-        """A and B at the vertices where motions (K,) begin."""
+        """A and B at the vertices where motions (K,) start."""
         desired_path, reach = self.task.desired_path, self.reach[vertex]
         before = desired_path.at(vertex - 1, 1 - reach * (1 - u) / desired_path.length[vertex - 1])
         return before, desired_path.at(vertex, reach * u / desired_path.length[vertex])

@@ -57,7 +57,7 @@ class PathSamples:
 
     @cached_property
     def weight(self) -> Floats:
-        """(S,) [m] of the program's path that each sample stands for."""
+        """(S,) [m] of the program's path that each sample represents."""
         half = 0.5 * np.append(self.distance_along, 0.0)
         return half[:-1] + half[1:]
 
@@ -81,7 +81,7 @@ class Simulation:
     [m]: the largest distance of an end point of the original from the path of the tool; approaches (K,): rows that lead
     from where a cut starts in the original to where it starts corrected, or back, in air; approach_length [m]; points
     (P,): rows of the program whose end point alone is looked at, point_rows (P,) those of the original, point_error
-    (P,) [m] and point_turn (P,) [rad] theirs; added (A,): rows before such points that stand for nothing; unknown:
+    (P,) [m] and point_turn (P,) [rad] theirs; added (A,): rows before such points without a counterpart; unknown:
     vertices that are passed at a distance that is not known, taken as they are programmed; skipped: motions under force
     that cannot be simulated.
     """
@@ -262,7 +262,7 @@ class Simulator:
 
     def _missed(self, samples: PathSamples) -> float:
         """[m] the largest distance of an end point of the original from the path of the tool, near where it passes:
-        what is left out where a place leaps over a corner."""
+        what is skipped where a place leaps over a corner."""
         grid, place = self.grid, samples.place
         if not len(samples.motion) or not place.settled.all():
             return float("nan") if len(samples.motion) else 0.0
@@ -302,7 +302,7 @@ def _shares(
     """The samples of the motions ``rows`` (R,): their numbers among these, shares, and whether they are at ends.
 
     Each motion in ``parts`` (R,) even ones; of the parabolas on it at ``halves`` of their halves; of its
-    begin nothing, as it is the end of another, but where a stretch ``opens`` (R,).
+    start nothing, as it is the end of another, but where a stretch ``opens`` (R,).
     """
     number = np.repeat(np.arange(len(rows)), parts)
     share = (np.arange(len(number)) - np.repeat(sums(parts)[:-1], parts) + 1) / np.repeat(parts, parts)

@@ -1,4 +1,4 @@
-"""Force and place of a tool, found together.
+"""Force and place of a tool, solved together.
 
 The force on the tool belongs to the place on the wanted path at which the *deflected* tool is nearest to it, and it is
 that force which deflects the tool:
@@ -47,7 +47,7 @@ FLAT = 0.02
 class PlacedTool:
     """S commands of a program.  row, share (S,): place on the original; arc (S,) [m]: the same along its stretch; error
     (S, 3) [m]: tool minus the wanted path there, robot base axes; turn (S,) [rad]: by how much the tool is turned
-    against it, as far as that shows and the text can say it; force (S,) [N]; settled (S,): place and force agree."""
+    against it, as far as that shows and the text can state it; force (S,) [N]; settled (S,): place and force agree."""
 
     row: Ints
     share: Floats
@@ -92,7 +92,7 @@ def place_tool(grid: PathGrid, path: RunPath, stretch: Ints, motion: Ints, share
 
 def judged(original: CompensationProblem, rows: Ints, rotation: Floats, turn: Floats) -> Floats:
     """(K, 3) [rad]: ``turn`` (K, 3) of tools at ``rotation`` (K, 3, 3), without what the text of ``rows`` (K,) cannot
-    say: a turn about the tool's own axis where that is free, all of it where the orientation comes from outside."""
+    state: a turn about the tool's own axis where that is free, all of it where the orientation comes from outside."""
     path = original.toolpath
     free = np.nan_to_num(path.orientation_control.redundant_axis[rows])
     if free.any():
@@ -137,7 +137,7 @@ class _Solution:
         self._bracket(active, interval[active])
 
     def turn_on_the_spot(self) -> None:
-        """Where a motion of the original only turns the tool, all of its path is one place: there the orientation tells
+        """Where a motion of the original only turns the tool, all of its path is one place: there the orientation shows
         how far it is gone."""
         grid = self.grid
         if not grid.on_the_spot.any():
@@ -206,7 +206,7 @@ class _Solution:
         self.interval[active] = interval + forth - back
 
     def _real(self, active: Ints, wrench: Floats) -> Prediction:
-        """Where the tools of ``active`` are; what is found for the first time is begun with from then on."""
+        """Where the tools of ``active`` are; the first solution is the start of the next."""
         motion, share, command = self.motion[active], self.share[active], self.command[active]
         if self.q is None:  # asked for all
             real = self.task.simulated(motion, command, wrench, share=share)
@@ -217,8 +217,8 @@ class _Solution:
         return real
 
     def _bracket(self, active: Ints, interval: Ints) -> None:
-        """Between a place that the tool is ahead of and one that it is behind, as near as there are such: the secant
-        through both, of which the one that stays counts half (Illinois)."""
+        """Between a place that the tool is ahead of and one that it has not reached, as near as there are such: the
+        secant through both, of which the one that stays counts half (Illinois)."""
         at = interval.astype(float)
         below, above = at.copy(), at + 1
         one, two = np.full(len(at), np.nan), np.full(len(at), np.nan)

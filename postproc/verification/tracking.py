@@ -1,4 +1,4 @@
-"""Where on the grid of the wanted path each command is found, going on from the one before."""
+"""Where on the grid of the wanted path each command is, going on from the one before."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _BLOCK = 128
 
 
 def track_commands(grid: PathGrid, stretch: Ints, command: Floats) -> tuple[Ints, Floats]:
-    """Interval and part of it (S,) of the grid in which each command (S, 3) is found, going on from the one before;
+    """Interval and part of it (S,) of the grid in which each command (S, 3) is, going on from the one before;
     ``stretch`` (S,): that of the grid on which it is, ascending."""
     interval, part = np.empty(len(command), np.int64), np.empty(len(command))
     start = np.flatnonzero(np.append(True, stretch[1:] != stretch[:-1])[: len(stretch)])
@@ -69,7 +69,7 @@ class _Tracking:
             for number in range(first[row], first[row + 1]):
                 if away[number] < nearest and back <= arc[number] <= ahead:
                     best, nearest = number, away[number]
-            if best < 0:  # nowhere square to it: the solution will tell
+            if best < 0:  # nowhere square to it: the solution will show
                 if row:
                     break
                 return self._node(command[:1], back, ahead)
@@ -78,7 +78,7 @@ class _Tracking:
         return some.interval[chosen], some.share[chosen], here
 
     def _candidates(self, command: Floats, low: int, high: int) -> _Candidates:
-        """Where, in the intervals ``low`` to ``high``, the tools of the commands may be found."""
+        """Where, in the intervals ``low`` to ``high``, the tools of the commands may be."""
         value = command @ self.tangent[low : high + 2].T - self.level[low : high + 2]
         is_behind = value < 0
         row, interval = np.nonzero(~is_behind[:, :-1] & is_behind[:, 1:])

@@ -1,4 +1,4 @@
-"""What the cell asks to have corrected: the model for it, what touching off a base saw, and what is left out."""
+"""What the cell asks to have corrected: the model for it, what touching off a base saw, and what is excluded."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _corrected_by_controller(term: EffectInstance, cell: Cell) -> bool:
 def temperature_rise(model: StiffnessModel, cell: Cell) -> float | None:
     """[K] by which the robot is warmer than at its calibration; None where that is not asked for.
 
-    Raises Refusal CEL011 where the robot file does not say at which temperature it was calibrated.
+    Raises Refusal CEL011 where the robot file does not state at which temperature it was calibrated.
     """
     if cell.correct == "process" or cell.temperature is None:
         return None
@@ -71,11 +71,11 @@ def temperature_rise(model: StiffnessModel, cell: Cell) -> float | None:
 
 
 def touch_off(task: CompensationProblem, cell: Cell) -> tuple[TouchedOff, list[Finding]]:
-    """What touching the cell's points sees of the bases of a program, and what there is to say of it.
+    """What touching the cell's points sees of the bases of a program, and the findings on it.
 
     The points of a base are touched without load, with the tool, orientation and configuration of the first cutting
     motion in it (the first path motion, where none cuts).  Raises Refusal CEL012 where it is not clear which base was
-    touched off or where external axes of the cell stood meanwhile, or a point cannot be touched.
+    touched off or where external axes of the cell were meanwhile, or a point cannot be touched.
     """
     path, track = task.toolpath, task.track
     if task.external is not None and task.external.constant is None:
@@ -192,7 +192,7 @@ def _touched_finding(task: CompensationProblem, touched: TouchedOff, frame: int)
     return Finding("COR032", message, task.file, int(path.line[row]))
 
 
-# what is left out
+# what is excluded
 
 
 def mode_findings(full: StiffnessModel, cell: Cell, file: str) -> list[Finding]:

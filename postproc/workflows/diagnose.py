@@ -103,7 +103,7 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
         campaign = diagnosis.final.campaign
     stage("leaving poses out")
     folds = min(FOLDS, campaign.poses)
-    heldout = held_out(diagnosis.stated, folds), held_out(diagnosis.final, folds)
+    residuals = held_out(diagnosis.stated, folds), held_out(diagnosis.final, folds)
     planned = None
     if diagnosis.verdict.word == "ambiguous":
         stage("looking for poses that settle it")
@@ -116,8 +116,8 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
             (p.name, d) for p, d in zip(measured.readings.files, measured.readings.digests, strict=True)
         ),
         diagnosis=diagnosis,
-        held_out_before=heldout[0],
-        held_out_after=heldout[1],
+        held_out_before=residuals[0],
+        held_out_after=residuals[1],
         next_poses=planned,
         findings=tuple(findings),
         robot_file=None,
@@ -174,7 +174,7 @@ def _discriminating_poses(
     base = diagnosis.search.base
     model, first = composed(base.model, [one])
     model, second = composed(model, [other])
-    # the first shows what was found of it; the second what its usual size makes
+    # the first has its fitted values; the second those of its usual size
     model = model.with_values(_values(diagnosis.search.final, first, one))
     common = [u for u in base.unknowns if u.prior is None]
     try:
@@ -209,7 +209,7 @@ def _like(measured: Measured, planned: Readings) -> Readings:
 
 
 def _values(final: Fit, unknowns: Sequence[Unknown], candidate: Candidate) -> dict[tuple[int, str], float]:
-    """What the final fit found of a candidate's parameters, as values of a model in which they are ``unknowns``."""
+    """The fitted values of a candidate's parameters, as values of a model in which they are ``unknowns``."""
     wanted = (candidate.name, candidate.effect.described())
     fitted = next(
         (t.values for t in final.model.terms if (t.effect.name, t.effect.described()) == wanted), {}

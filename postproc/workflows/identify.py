@@ -109,10 +109,10 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
     if not after.unknowns:
         raise Refusal(_no_parameter_identified(measured, after))
     folds = min(request.folds, campaign.poses)
-    heldout: list[Floats | None] = [None, None]
+    residuals: list[Floats | None] = [None, None]
     if folds > 1:
         stage(f"leaving poses out ({folds}-fold)")
-        heldout = [
+        residuals = [
             held_out(before, folds),
             held_out(after, folds, lambda done, of: progress("leaving poses out", done, of)),
         ]
@@ -125,7 +125,7 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
     if request.validate:
         stage("validating")
         validation = _validated(request, measured, before, after)
-    findings += _result(measured, asked, after, detected, request.drop_outliers, drawn, validation, heldout)
+    findings += _result(measured, asked, after, detected, request.drop_outliers, drawn, validation, residuals)
     result = Identified(
         robot=measured.robot.name,
         robot_file=measured.robot.path,
@@ -137,8 +137,8 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
         before=before,
         after=after,
         fixed=asked.fixed,
-        held_out_before=heldout[0],
-        held_out_after=heldout[1],
+        held_out_before=residuals[0],
+        held_out_after=residuals[1],
         folds=folds if folds > 1 else 0,
         validation=validation,
         outliers=detected,
@@ -218,7 +218,7 @@ def _spare(output: Path | None, robot: Path) -> None:
 
 
 def _outliers(after: Fit, exclude: bool) -> tuple[tuple[Outlier, ...], Bools]:
-    """All outliers, and the rows that count.  Where outliers are left out, those that they hid are looked for too."""
+    """All outliers, and the rows that count.  Where outliers are excluded, those that they hid are looked for too."""
     rows = np.ones(len(after.campaign), bool)
     detected: tuple[Outlier, ...] = ()
     for _ in range(ROUNDS if exclude else 1):
@@ -263,7 +263,7 @@ def _result(
     excluded: bool,
     drawn: Bootstrap | None,
     validation: Validation | None,
-    heldout: Sequence[Floats | None],
+    residuals: Sequence[Floats | None],
 ) -> list[Finding]:
     """What needs review about a fit."""
     file = str(measured.readings.files[0])
@@ -327,8 +327,8 @@ def _result(
                         file,
                     )
                 )
-    if heldout[0] is not None and heldout[1] is not None:
-        without, with_ = (np.sqrt(np.nanmean(h**2)) for h in (heldout[0], heldout[1]))
+    if residuals[0] is not None and residuals[1] is not None:
+        without, with_ = (np.sqrt(np.nanmean(h**2)) for h in (residuals[0], residuals[1]))
         if with_ > without:
             findings.append(
                 Finding(

@@ -146,7 +146,7 @@ def _load(request: MapRequest) -> MapLoad:
 
 
 def _map_findings(survey: WorkspaceMap, status: int | None, drawn: bool) -> list[Finding]:
-    """What is to be said of a map as a whole."""
+    """The findings on a map as a whole."""
     findings = []
     cells, unsettled = len(survey.q), int(survey.unsettled.sum())
     if status is None:

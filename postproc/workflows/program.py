@@ -33,11 +33,7 @@ from postproc.report.corrections_csv import corrections_csv
 from postproc.report.diff import unified_diff
 from postproc.report.page import beside, program_page
 from postproc.report.page_data import page_data
-from postproc.report.report import (
-    Report,
-    in_order_of_place,
-    json_bytes,
-)
+from postproc.report.report import Report, in_order_of_place, json_bytes
 from postproc.toolpath import OrientationPath, Role, Toolpath
 from postproc.workflows.figures import report_of
 from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, silent
@@ -77,7 +73,7 @@ def predict(request: Request, stage: Stage = silent) -> Report:
 def compensate(request: Request, stage: Stage = silent) -> Report:
     """The main job: read, predict, correct, write, read back.
 
-    ``stage`` is told what is being done.  Raises Refusal, and has then written nothing.
+    ``stage`` is called with what is being done.  Raises Refusal, and has then written nothing.
     """
     ready = prepare(request)
     program = ready.program
@@ -169,7 +165,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
 def _corrected(
     request: Request, ready: Prepared, stem: str, worse: Mapping[int, Finding]
 ) -> tuple[CompensationProblem, CorrectionResult, Subdivision, Edits]:
-    """The correction and its edits; what cannot be divided or written as planned stays, and the rest is made again.
+    """The correction and its edits; what cannot be divided or written as planned stays, and the rest is computed again.
     worse: rows whose cuts stay as they are, and why."""
     task, cell = ready.task, ready.cell
     if worse:
@@ -210,7 +206,7 @@ def _corrected(
 
 
 def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """What is to be said of the corrected program as a whole."""
+    """The findings on the corrected program as a whole."""
     file, findings = str(request.program), []
     result, division = written.result, written.division
     path, tolerance = ready.task.toolpath, ready.cell.tolerance
@@ -230,8 +226,8 @@ def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list
         )
     findings += _corners(ready, written)
     if request.gain < 1.0:
-        applied = f"{request.gain:.0%} of the correction is applied, as --gain requests"
-        findings.append(Finding("COR007", applied, file))
+        share = f"{request.gain:.0%} of the correction is applied, as --gain requests"
+        findings.append(Finding("COR007", share, file))
     beyond = "" if request.gain == 1.0 else " beyond the share that --gain keeps"
     turns = corrected & path.constraints.orientation_programmed
     for off, limit, rows, unit, word in (
@@ -252,7 +248,7 @@ def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list
 
 
 def _not_turned(ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """Cutting motions whose text cannot say the orientation that would be needed: those that keep the one before
+    """Cutting motions whose text cannot state the orientation that would be needed: those that keep the one before
     (COR019), and those that have no words for it (COR021)."""
     path, division, limit = ready.task.toolpath, written.division, ready.cell.tolerance_angle
     motion = written.result.corrected & ready.task.carries & ~path.constraints.orientation_programmed
@@ -324,7 +320,7 @@ def _assumed(request: Request, ready: Prepared, written: WrittenProgram) -> list
 
 
 def _between(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """What is to be said of the path between the points."""
+    """The findings on the path between the points."""
     path, source, cell, findings = ready.task.toolpath, written.division.source, ready.cell, []
     beyond = "" if request.gain == 1.0 else " beyond the share that --gain keeps"
     for off, rows, limit, unit, what, word in (
@@ -373,7 +369,7 @@ def _corners(ready: Prepared, written: WrittenProgram) -> list[Finding]:
     """Approximated corners of the output that differ from the path of the original by more than the tolerance: where
     the approximation is stated (COR017), and where it is not (COR015)."""
     corners, tolerance, findings = written.corners, ready.cell.tolerance, []
-    if ready.task.gain < 1.0:  # a share of the correction leaves corners where it leaves the rest
+    if ready.task.gain < 1.0:  # a share of the correction moves corners as it moves the rest
         return []
     for code, stated in (("COR017", ~corners.unknown), ("COR015", corners.unknown)):
         above = stated & ~(corners.difference <= tolerance)
@@ -444,7 +440,7 @@ def _output_paths(program: Program, target: Path) -> list[Path]:
 
 def _not_over_inputs(ready: Prepared, outputs: Sequence[str]) -> None:
     cell = ready.cell
-    # a force may be a file, read in this run or not, or be said in numbers, which name none
+    # a force may be a file, read in this run or not, or be stated in numbers, which name none
     named = (cell.path.parent / name for name in (cell.force, cell.process) if name)
     ready.inputs.refuse_outputs(map(Path, outputs), named)
     if len({place(Path(output)) for output in outputs}) < len(outputs):

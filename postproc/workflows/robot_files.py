@@ -33,9 +33,9 @@ def new_robot_file(
     gap: Mapping[str, float],
     destination: Path,
 ) -> bytes:
-    """The bytes of ``destination``: the file of ``robot`` with what ``fitted`` found, read back by its writer.
+    """The bytes of ``destination``: the file of ``robot`` with the values of ``fitted``, read back by its writer.
 
-    A dimension of which the readings say no more than its prior did keeps what the file states of it.  ``effects``: as
+    A dimension of which the readings show no more than its prior did keeps what the file states of it.  ``effects``: as
     they were asked for or named; ``gap``: of it those keys count that provenance knows [mm].
     """
     deviation = np.sqrt(np.diag(fitted.covariance))
@@ -96,7 +96,7 @@ def effect_options(term: EffectInstance, readings: Readings) -> dict[str, object
 
 
 def _observed_value(unknown: Unknown, value: float, deviation: float) -> bool:
-    """Whether readings say more of an unknown than its prior did."""
+    """Whether readings show more of an unknown than its prior did."""
     if unknown.prior is None:
         return True
     moved, stated = abs(value - unknown.value), unknown.stated

@@ -26,7 +26,7 @@ WORST = 10
 def verify(request: Request, compensated: Path, step: float = STEP, stage: Stage = silent) -> Verified:
     """The path error of ``request.program`` and of ``compensated``, both under the original's forces.
 
-    ``step`` [m]: distance of the first samples.  Raises Refusal, VER001 where the second is not made of the first.
+    ``step`` [m]: distance of the first samples.  Raises Refusal, VER001 where the second does not come from the first.
     """
     ready = prepare(request)
     stage("reading the compensated program")
@@ -151,7 +151,7 @@ def _marks(other: Prepared, compensated: Path) -> list[Finding]:
 def _figures(
     ready: Prepared, run: Prepared, simulation: Simulation, file: Path, judged: bool
 ) -> list[Finding]:
-    """What is to say of the figures of one program; ``judged``: its errors have to be within the tolerances."""
+    """The findings on the figures of one program; ``judged``: its errors have to be within the tolerances."""
     samples, line = simulation.samples, run.task.toolpath.line
     findings: list[Finding] = []
     if not simulation.converged:
@@ -212,7 +212,7 @@ def _differences(
     original: Path,
     compensated: Path,
 ) -> list[Finding]:
-    """What differs beside places; one finding for all motions of which the same is to say."""
+    """What differs beside places; one finding for all motions with the same difference."""
     differences = [*on_cuts(simulator, other.task, after), *in_air(simulator, other.task, after)]
     samples = after.samples
     # of a program that is beside its path none ends where it should
@@ -250,6 +250,6 @@ def _grouped(
 
 
 def _first(code: str, message: str, file: Path, lines: Ints) -> Finding:
-    """A finding at the first of these lines, which tells how many there are."""
+    """A finding at the first of these lines, which states how many there are."""
     more = f" ({len(lines)} motions, to line {lines.max()})" if len(lines) > 1 else ""
     return Finding(code, message + more, str(file), int(lines.min()) if len(lines) else 0)
