@@ -190,9 +190,9 @@ def test_the_diagnoses_are_what_they_are_made_of(spring, stale):
     assert (named.effect, named.joints) == ("gravity_compensator", ("A2",))
     assert stale.verdict.word == "nothing_missing"
     assert stale.verdict.refitted
-    assert not spring.lacking
-    assert not stale.lacking
-    assert lacking(spring).lacking
+    assert not spring.scatter_exceeded
+    assert not stale.scatter_exceeded
+    assert lacking(spring).scatter_exceeded
 
 
 def test_the_gap_is_that_of_the_fits(spring):

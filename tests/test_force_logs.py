@@ -361,6 +361,6 @@ def test_the_line_of_each_motion_keeps_the_mean_of_its_samples(tmp_path_factory,
     table = read_table(log, "FRC003")
     stated, _ = read_log(table, "s_mm", path, frames_of(cell_of(), path, "part.src"), "part.src", False)
     mean = [force[a:b].mean() for a, b in pairwise(ends)]
-    assert np.allclose(0.5 * (stated.begin + stated.values)[1:, 0], mean, atol=1e-9)
+    assert np.allclose(0.5 * (stated.start_values + stated.values)[1:, 0], mean, atol=1e-9)
     largest = [np.abs(force[a:b]).max() for a, b in pairwise(ends)]
     assert np.allclose(stated.peak[1:], largest)

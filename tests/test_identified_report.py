@@ -110,7 +110,7 @@ def found(readings, words=("joint_compliance",), model=None, rows=None, folds=0,
         "folds": folds,
         "validation": None,
         "outliers": (),
-        "outliers_left_out": False,
+        "outliers_excluded": False,
         "bootstrap": None,
     }
     return Identified(**{**given, **change})
@@ -189,7 +189,7 @@ def test_outliers_left_out_do_not_count(plant):
     readings = replace(readings, value=value)
     rows = np.arange(len(readings)) != 7
     outlier = (Outlier(7, "loads.csv", 11, 2e-3, 99.0, "fits no other value"),)
-    without = found(readings, rows=rows, folds=3, outliers=outlier, outliers_left_out=True)
+    without = found(readings, rows=rows, folds=3, outliers=outlier, outliers_excluded=True)
     assert without.counts.sum() == len(readings) - 1
     assert without.as_json()["fitted_readings"] == len(readings) - 1
     assert np.isnan([lengths[7] for lengths in without.lengths.values()]).all()
@@ -490,7 +490,7 @@ def test_verdicts(result):
         ({"after": replace(after, unknowns=after.unknowns[:2])}, "2 of 6 parameters found"),
     ):
         assert words in verdict(replace(result, **change))
-    assert "check these first" not in verdict(replace(result, outliers=outlier, outliers_left_out=True))
+    assert "check these first" not in verdict(replace(result, outliers=outlier, outliers_excluded=True))
 
 
 def test_long_lists_are_cut_unless_all_is_asked_for(result):

@@ -83,7 +83,7 @@ def split_columns(table: CsvTable, joints: Sequence[tuple[str, bool]]) -> tuple[
 
 
 def _heads(table: CsvTable, joints: Sequence[tuple[str, bool]]) -> Mapping[str, tuple[str, str]]:
-    """Name of a column without its unit -> name as it stands, unit or ""."""
+    """Name of a column without its unit -> name as written, unit or ""."""
     own = [name.lower() for name, _ in joints]
     heads: dict[str, tuple[str, str]] = {}
     for head in table.columns:

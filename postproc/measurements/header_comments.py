@@ -26,8 +26,8 @@ _CLOSE = 0.75  # of difflib's ratio: sigma is close to sigma_mm, load is not clo
 
 @dataclass(frozen=True)
 class HeaderComments:
-    """What the comments say, in SI; ``frame`` is "" and ``sigma`` NaN where not stated; ``places``: name of a target ->
-    its place (3,) [m] on the flange; ``lines``: name of a target -> line."""
+    """What the comments state, in SI; ``frame`` is "" and ``sigma`` NaN where not stated; ``places``: name of a target
+    -> its place (3,) [m] on the flange; ``lines``: name of a target -> line."""
 
     robot: str
     frame: str
@@ -49,39 +49,39 @@ def robot_named(path: Path) -> str:
 
 
 def stated_in(table: CsvTable) -> HeaderComments:
-    """Raises Refusal where a key stands twice, or its value cannot be used."""
-    said, findings = _stated(table)
+    """Raises Refusal where a key occurs twice, or its value cannot be used."""
+    values, findings = _stated(table)
 
     def named(key: str) -> str:
-        line, text = said.get((key, ""), (0, ""))
+        line, text = values.get((key, ""), (0, ""))
         if line and not text:
             raise _wrong(table, line, f"# {key}: the name is missing")
         return text
 
     def numbers(key: str, counts: tuple[int, ...], form: str, name: str = "") -> list[float]:
-        if (key, name) not in said:
+        if (key, name) not in values:
             return []
-        line, text = said[key, name]
-        found = _numbers(text.replace(",", ".") if counts == (1,) else text)
-        if found is not None and len(found) in counts:
-            return found
-        what = f"{text[:40]!r} is not understood" if found is None else f"{len(found)} numbers are given"
+        line, text = values[key, name]
+        parsed = _numbers(text.replace(",", ".") if counts == (1,) else text)
+        if parsed is not None and len(parsed) in counts:
+            return parsed
+        what = f"{text[:40]!r} is not understood" if parsed is None else f"{len(parsed)} numbers are given"
         help = "separate the numbers by blanks; a comma in a number is a decimal comma then"
         raise _wrong(table, line, f"# {_title(key, name)}: {what} where {form} is expected", help)
 
     def sigma(key: str, unit: float) -> float | None:
         given = numbers(key, (1,), "one number without a unit")
         if given and given[0] <= 0:
-            raise _wrong(table, said[key, ""][0], f"# {key}: {given[0]:g} is not above zero")
+            raise _wrong(table, values[key, ""][0], f"# {key}: {given[0]:g} is not above zero")
         return given[0] * unit if given else None
 
     tool = numbers("tool", (3, 6), "x y z [a b c] (mm, deg)")
     robot, frame = named("robot"), named("frame").lower()
     if frame and frame not in FRAMES:
         message = f"# frame: {frame[:40]!r} is not a frame{nearest(frame, FRAMES)}"
-        raise _wrong(table, said["frame", ""][0], message, "use one of " + ", ".join(FRAMES))
+        raise _wrong(table, values["frame", ""][0], message, "use one of " + ", ".join(FRAMES))
     sigma_place, sigma_turn = sigma("sigma_mm", MM), sigma("sigma_deg", DEG)
-    lines = {name: line for (key, name), (line, _) in said.items() if key == "target"}
+    lines = {name: line for (key, name), (line, _) in values.items() if key == "target"}
     return HeaderComments(
         robot=robot,
         frame=frame,
@@ -96,7 +96,7 @@ def stated_in(table: CsvTable) -> HeaderComments:
 
 def _stated(table: CsvTable) -> tuple[dict[tuple[str, str], tuple[int, str]], list[Finding]]:
     """(key, name of a target) -> line, value; and the comments that look like keys, but are not used (MEA004)."""
-    said: dict[tuple[str, str], tuple[int, str]] = {}
+    values: dict[tuple[str, str], tuple[int, str]] = {}
     findings: list[Finding] = []
     for line, text in table.comments:
         key, name, value = _keyed(text)
@@ -108,8 +108,8 @@ def _stated(table: CsvTable) -> tuple[dict[tuple[str, str], tuple[int, str]], li
         elif key not in KEYS:
             uncertainty = _almost_a_key(text, key, value)
             help = "write # key: value with one of " + ", ".join(KEYS)
-        elif (key, name) in said:
-            raise _wrong(table, line, f"# {_title(key, name)} occurs in line {said[key, name][0]} already")
+        elif (key, name) in values:
+            raise _wrong(table, line, f"# {_title(key, name)} occurs in line {values[key, name][0]} already")
         elif key == "target" and not name:
             raise _wrong(
                 table,
@@ -118,10 +118,10 @@ def _stated(table: CsvTable) -> tuple[dict[tuple[str, str], tuple[int, str]], li
                 "write # target NAME: x y z (mm, on the flange)",
             )
         else:
-            said[key, name] = line, value
+            values[key, name] = line, value
         if uncertainty:
             findings.append(Finding("MEA004", uncertainty, str(table.path), line, help=help))
-    return said, findings
+    return values, findings
 
 
 def _keyed(text: str) -> tuple[str, str, str]:
@@ -149,7 +149,7 @@ def _almost_a_key(text: str, key: str, value: str) -> str:
 
 
 def _close(word: str) -> str:
-    """The key that ``word`` is, or is a slip of the hand away from, or ""."""
+    """The key that ``word`` is, or differs from by a typing error, or ""."""
     return next(iter(difflib.get_close_matches(word, KEYS, 1, _CLOSE)), "")
 
 

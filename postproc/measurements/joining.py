@@ -82,16 +82,16 @@ def _check_alike(one: Readings, other: Readings) -> None:
         message = f"the file equals {_named(one)}: every reading would count twice"
         raise Refusal(Finding("MEA008", message, _named(other), help="name each file once"))
     here, there = _facts(one), _facts(other)
-    for what, said in here.items():
-        if what in there and there[what] != said:
-            message = f"the files differ in {what}: {there[what]} here, but {said} in {_named(one)}"
+    for what, fact in here.items():
+        if what in there and there[what] != fact:
+            message = f"the files differ in {what}: {there[what]} here, but {fact} in {_named(one)}"
             raise Refusal(
                 Finding("MEA008", message, _named(other), help="identify from each file on its own")
             )
 
 
 def _facts(readings: Readings) -> dict[str, str]:
-    """What must be the same where two files both say it."""
+    """What must be the same where two files both state it."""
     one = readings
     facts = {
         "joints": expected_joints([name for name, _ in one.joints], one.joints),

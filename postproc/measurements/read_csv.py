@@ -32,7 +32,7 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
         message = "# frame: tracker is ignored: DX, DY, DZ are in the axes of the robot base"
         findings.append(Finding("MEA009", message, str(path)))
 
-    # rows without a reading are left out, but what is in them is checked as well
+    # rows without a reading are excluded, but their values are checked as well
     values, angles = value_columns(deflection)
     q = np.stack([axes.numbers(name) for name in axes.columns], axis=1) * joint_units(joints)
     wrench = np.nan_to_num(_block(table, WRENCH))
@@ -51,9 +51,9 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
         )
         raise Refusal(Finding("MEA002", message, str(path), help="fill in the measured values"))
     if len(rows) < len(table):
-        left = table.lines[~measured]
-        message = f"{len(left)} rows have no reading and are excluded ({_lines(left)})"
-        findings.append(Finding("MEA003", message, str(path), int(left[0])))
+        unmeasured = table.lines[~measured]
+        message = f"{len(unmeasured)} rows have no reading and are excluded ({_lines(unmeasured)})"
+        findings.append(Finding("MEA003", message, str(path), int(unmeasured[0])))
 
     targets, target = numbered(_of(names, rows))
     if "TARGET" not in table:

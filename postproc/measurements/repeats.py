@@ -19,8 +19,8 @@ hanging of the same weight do."""
 
 
 def with_repeats(readings: Readings, ids: Sequence[str]) -> Readings:
-    """With the numbers of repeated states: by their REPEAT ``ids`` (R,), or of rows that say the same where no id is
-    given.  An id that stands for several states is reported (MEA007)."""
+    """With the numbers of repeated states: by their REPEAT ``ids`` (R,), or of rows with equal values where no id is
+    given.  An id of several states is reported (MEA007)."""
     one = readings
     given = np.array([not is_missing(text) for text in ids], bool)
     if not given.any():
@@ -55,8 +55,8 @@ def _first(group: Ints) -> Ints:
 def _differ(readings: Readings, other: Ints) -> Bools:
     """(R,) whether a row is of another state than the row ``other`` (R,)."""
     q, wrench = readings.q, readings.wrench
-    way: Floats = np.array([SAME_WAY if slides else SAME_ANGLE for _, slides in readings.joints])
-    moved = (np.abs(q - q[other]) > way).any(axis=1)
+    allowed: Floats = np.array([SAME_WAY if slides else SAME_ANGLE for _, slides in readings.joints])
+    moved = (np.abs(q - q[other]) > allowed).any(axis=1)
     change = np.abs(wrench - wrench[other]).reshape(-1, 2, 3).max(axis=2)
     size = np.abs(wrench[other]).reshape(-1, 2, 3).max(axis=2)
     return np.asarray(moved | (change > SAME_LOAD + SAME_SHARE * size).any(axis=1))

@@ -29,7 +29,7 @@ def measurements_csv(readings: Readings, about: Sequence[str] = ()) -> bytes:
     comments = [line for text in about for line in text.splitlines()] + _comments(readings)
     state = _state(readings)
     columns = state | _measured(readings)
-    # without the column rows that say the same are repeats
+    # without the column rows with equal values are repeats
     repeat = readings.repeat
     if (repeat >= 0).any() or len(set(zip(*state.values(), strict=True))) < len(readings):
         single = repeat < 0
@@ -73,7 +73,7 @@ def _comments(readings: Readings) -> list[str]:
 
 
 def _state(readings: Readings) -> dict[str, list[str]]:
-    """The columns that say what was measured, under which conditions."""
+    """The columns that state what was measured, under which conditions."""
     columns = _all_fixed(_joint_names(readings), readings.q / joint_units(readings.joints), 4)
     for name, load in zip(WRENCH, readings.wrench.T, strict=True):
         if load.any():

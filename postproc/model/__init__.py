@@ -1,4 +1,4 @@
-"""The stiffness model of a robot: what it is made of, its equilibrium, and what follows from it."""
+"""The stiffness model of a robot: its parts, its equilibrium, and what follows from it."""
 
 from postproc.model import codes as codes
 from postproc.model.mechanics import NOTHING, STANDARD_GRAVITY, EffectInstance, Mechanics, approach

@@ -51,7 +51,7 @@ def read_terms(robot: Robot) -> tuple[EffectInstance, ...]:
 
 
 def label_parameters(model: Mechanics) -> Iterator[tuple[str, Value | None]]:
-    """Each parameter as label.name, and what the robot file says of it."""
+    """Each parameter as label.name, and what the robot file states of it."""
     for index, term in enumerate(model.terms):
         for parameter in term.effect.parameters:
             yield f"{model.label(index)}.{parameter.name}", term.stated.get(parameter.name)
@@ -67,9 +67,9 @@ def read_covariance(model: Mechanics) -> tuple[tuple[str, ...], Floats] | None:
 
 
 def select_covariance(
-    covariance: tuple[tuple[str, ...], Floats] | None, kept: Container[str]
+    covariance: tuple[tuple[str, ...], Floats] | None, selected: Container[str]
 ) -> tuple[tuple[str, ...], Floats] | None:
-    """The part (j, j) of a ``covariance``, names (k,) and matrix (k, k), of the names ``kept``; None of none."""
+    """The part (j, j) of a ``covariance``, names (k,) and matrix (k, k), of the names ``selected``; None of none."""
     names, matrix = covariance or ((), np.zeros((0, 0)))
-    rows = [i for i, name in enumerate(names) if name in kept]
+    rows = [i for i, name in enumerate(names) if name in selected]
     return (tuple(names[i] for i in rows), frozen(matrix[np.ix_(rows, rows)])) if rows else None

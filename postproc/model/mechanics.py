@@ -25,7 +25,7 @@ NOTHING = Conditions()
 
 @dataclass(frozen=True)
 class EffectInstance:
-    """An effect of the model with the values of its parameters (SI) and what the robot file says of them."""
+    """An effect of the model with the values of its parameters (SI) and what the robot file states of them."""
 
     effect: Effect
     values: Values
@@ -73,7 +73,7 @@ class Mechanics:
 
     @cached_property
     def zero_without_load(self) -> bool:
-        """Whether the robot stands, without a wrench, where its controller believes."""
+        """Whether the robot is, without a wrench, at the pose that its controller assumes."""
         return self.robot.nominal is self.robot.arm and all(
             term.effect.zero_without_load for term in self.terms
         )
@@ -164,7 +164,7 @@ class Mechanics:
 def approach(q: Floats) -> Floats:
     """(N, n) sense -1, 0, 1 in which each motor came to its place, from the order of the states ``q`` (N, n) [rad, m];
     the last one stays where a motor did not move by more than ``STILL``, and the first state has none."""
-    way = np.diff(q, axis=0, prepend=q[:1])
-    moved = np.where(np.abs(way) <= STILL, 0.0, np.sign(way))
+    travel = np.diff(q, axis=0, prepend=q[:1])
+    moved = np.where(np.abs(travel) <= STILL, 0.0, np.sign(travel))
     last = np.maximum.accumulate(np.where(moved != 0, np.arange(len(q))[:, None], 0), axis=0)
     return np.take_along_axis(moved, last, axis=0)

@@ -51,14 +51,14 @@ def compute_sensitivity(
 
 def _alone(model: Mechanics, effect: Effect, values: Values, state: ChainState, force: Floats) -> Floats:
     """(m, N) what one effect adds: a force, an offset, or a displacement under ``force``."""
-    found, slope = np.zeros_like(force), np.zeros_like(force)
+    contribution, slope = np.zeros_like(force), np.zeros_like(force)
     if isinstance(effect, Load):
-        effect.add_force(values, state, found, slope)
+        effect.add_force(values, state, contribution, slope)
     elif isinstance(effect, Offset):
-        effect.add_offset(values, model.chain, state.motors, state.conditions, found)
+        effect.add_offset(values, model.chain, state.motors, state.conditions, contribution)
     elif isinstance(effect, ComplianceLaw):
-        effect.add_displacement(values, state, force, found, slope)
-    return found
+        effect.add_displacement(values, state, force, contribution, slope)
+    return contribution
 
 
 def compute_curvature(

@@ -49,7 +49,7 @@ class Equilibrium:
     def part(self, rows: Ints) -> Equilibrium:
         """The states ``rows`` (K,)."""
         return Equilibrium(
-            # component first, as they are made
+            # component first, as they are computed
             self.coordinates.T.take(rows, axis=1).T,
             self.displacement.T.take(rows, axis=1).T,
             self.pose[rows],
@@ -67,7 +67,7 @@ def _at_rest(
     return Equilibrium(coordinates.T, theta.T, swept.pose, swept.mount.T, good, steps)
 
 
-def _joined(count: int, parts: Sequence[tuple[Ints, Equilibrium]]) -> Equilibrium:
+def _join_states(count: int, parts: Sequence[tuple[Ints, Equilibrium]]) -> Equilibrium:
     """``count`` states of which each part has its own."""
     rows, order = np.concatenate([rows for rows, _ in parts]), np.empty(count, np.int64)
     order[rows] = np.arange(count)
@@ -120,8 +120,8 @@ def solve_equilibrium(
     ``StiffnessModel.equilibrium``."""
     conditions = model.completed(q, conditions)
     parts: list[tuple[Ints, Equilibrium]] = []
-    for begin in range(0, max(len(q), 1), CHUNK):
-        rows = slice(begin, begin + CHUNK)
+    for first in range(0, max(len(q), 1), CHUNK):
+        rows = slice(first, first + CHUNK)
         motors, given = np.ascontiguousarray(q[rows].T), conditions.part(rows)
         there = _Problems(
             motors,
@@ -135,11 +135,11 @@ def solve_equilibrium(
             theta = np.repeat(aside[:, None], motors.shape[1], axis=1)
         else:
             theta = np.array(start[rows].T, order="C")
-        parts += ((begin + ended, rest) for ended, rest in _ended(model, there, theta, tolerance))
-    return parts[0][1] if len(parts) == 1 else _joined(len(q), parts)
+        parts += ((first + ended, rest) for ended, rest in _solve_in_order(model, there, theta, tolerance))
+    return parts[0][1] if len(parts) == 1 else _join_states(len(q), parts)
 
 
-def _ended(
+def _solve_in_order(
     model: Mechanics, given: _Problems, theta: Floats, tolerance: float
 ) -> Iterator[tuple[Ints, Equilibrium]]:
     """The states in the order in which they come to rest: their numbers (K,) and where they do."""
@@ -156,13 +156,13 @@ def _ended(
         stable &= holds
         size = np.abs(step).max(axis=0)
         # of a geometric series; the first step states nothing of its rate
-        left = np.where(size < last, size * size / np.where(size < last, last - size, 1.0), size)
-        last, resting = size, left <= tolerance
-        ends = ~(left > tolerance) if steps < MAX_STEPS else np.ones(len(rows), bool)
+        remaining = np.where(size < last, size * size / np.where(size < last, last - size, 1.0), size)
+        last, resting = size, remaining <= tolerance
+        ends = ~(remaining > tolerance) if steps < MAX_STEPS else np.ones(len(rows), bool)
         if len(rows) and not ends.any():
             continue
         # The last step is so small that nothing has to be re-evaluated.  Each state stops at its own, whatever
-        # the others do: what is found of it does not depend on them.
+        # the others do: its result does not depend on them.
         good = stable & (resting | (size <= ENOUGH))
         there = _at_rest(swept.first_order_update(step), given.rest + theta, theta, good, steps)
         if ends.all():

@@ -31,8 +31,8 @@ class StiffnessModel(Mechanics):
     def without_effects(self, effects: Iterable[str] = (), families: Iterable[str] = ()) -> StiffnessModel:
         """The model with some effects, or families of effects, taken out."""
         names, kinds = set(effects), set(families)
-        kept = (t for t in self.terms if t.effect.name not in names and t.effect.family not in kinds)
-        model = replace(self, terms=tuple(kept))
+        terms = (t for t in self.terms if t.effect.name not in names and t.effect.family not in kinds)
+        model = replace(self, terms=tuple(terms))
         return replace(model, covariance=select_covariance(self.covariance, dict(label_parameters(model))))
 
     def with_values(self, values: Mapping[tuple[int, str], float]) -> StiffnessModel:
@@ -66,10 +66,10 @@ class StiffnessModel(Mechanics):
         the TCP, robot base axes; ``tool``: TCP on the flange, one pose or N.
 
         ``start`` (N, m): displacement to start with, that of a state nearby; the result does not depend on it.
-        ``tolerance`` [rad, m]: what may be left after the last step, by the rate at which the steps became smaller.
+        ``tolerance`` [rad, m]: what may remain after the last step, by the rate at which the steps became smaller.
 
         Solves theta = C(J^T w + loads) at coordinates rest + theta, the balance on the deflected pose, by a Newton
-        iteration with the diagonal of the loads' and laws' derivatives.  What the diagonal leaves out (the lever of
+        iteration with the diagonal of the loads' and laws' derivatives.  What the diagonal omits (the lever of
         the wrench moving with the pose, weights) makes it linear with a rate of about 5e-3.
         """
         return solve_equilibrium(self, q, wrench, tool, conditions, start, tolerance)
@@ -77,7 +77,7 @@ class StiffnessModel(Mechanics):
     def inverse_equilibrium(
         self, coordinates: Floats, wrench: Floats, tool: Poses, conditions: Conditions = NOTHING
     ) -> tuple[Floats, Floats]:
-        """Motors (N, n) that leave the loaded joints at ``coordinates`` (N, n), and the displacement (N, m) there.
+        """Motors (N, n) that bring the loaded joints to ``coordinates`` (N, n), and the displacement (N, m) there.
 
         q = z - theta(z, q) - offsets(q): the chain is evaluated once, at z, and only what depends on the motors (a
         balanced load, an offset) is repeated.  Exact where only the joints are compliant; elsewhere a value to start
@@ -114,7 +114,7 @@ class StiffnessModel(Mechanics):
     ) -> Floats:
         """(N, m, P) derivative of the coordinates at rest by parameters (SI), at an equilibrium of ``q`` (N, n) under
         ``wrench`` (N, 6) [N, N m] whose ``displacement`` (N, m) is known; ``spans``: the two values of a parameter
-        whose difference stands for it.
+        whose difference approximates it.
 
         By the implicit function of theta = D(F(z, rest)), z = rest + theta, with C = dD/dF:
 

@@ -1,1 +1,1 @@
-"""Where bytes leave the house: written, read back and checked, replaced atomically."""
+"""The output: written, read back and checked, replaced atomically."""

@@ -26,7 +26,7 @@ CODES = define(
 )
 
 Content = bytes | Iterable[bytes]
-"""Of a file: as a whole, or in parts that are made while it is written."""
+"""Of a file: as a whole, or in parts that are built while it is written."""
 
 
 def write_atomically(
@@ -36,25 +36,25 @@ def write_atomically(
 
     Every file is written whole beside its place and synced before the first one is renamed into it.  ``last``, the
     program itself, is taken away first and comes last: at any moment it is absent or belongs to its companions.
-    Folders are made as needed.  A name that is a link is replaced; what it leads to is left alone.  Of runs that write
-    into one folder at once each waits for the one before it, so what is there is of one of them; what one that was
-    killed left half-written of these files is taken away.  ``still``: called when all are written beside their places;
+    Folders are made as needed.  A name that is a link is replaced; what it leads to stays as it is.  Of runs that write
+    into one folder at once each waits for the one before it, so what is there is of one of them; half-written
+    files of one that was killed are removed.  ``still``: called when all are written beside their places;
     where it raises, everything stays as it was.  Raises Refusal FIL004 when the disk or its rights do not
     allow it; the files that were there before are then there again.
     """
-    with contextlib.ExitStack() as held:
-        _publish(files, last, still, held)
+    with contextlib.ExitStack() as locks:
+        _publish(files, last, still, locks)
 
 
 def sweep(files: Iterable[Path]) -> None:
-    """Take away what a run that was killed left half-written of ``files``.
+    """Remove the half-written ``files`` of a run that was killed.
 
     Waits for runs that write into these folders now, as ``write_atomically`` does; does nothing where there are no
     locks.
     """
     there = [path for path in files if path.parent.is_dir()]
-    with contextlib.ExitStack() as held:
-        if _alone({path.parent for path in there}, held):
+    with contextlib.ExitStack() as locks:
+        if _lock_folders({path.parent for path in there}, locks):
             _sweep(there)
 
 
@@ -64,9 +64,9 @@ def refused(path: Path, message: str, help: str) -> Refusal:
 
 
 def _publish(
-    files: Mapping[Path, Content], last: Path | None, still: Callable[[], None], held: contextlib.ExitStack
+    files: Mapping[Path, Content], last: Path | None, still: Callable[[], None], locks: contextlib.ExitStack
 ) -> None:
-    # names are noted before their files are made: a signal may come between the two
+    # names are noted before their files are created: a signal may come between the two
     ready = {path: path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp") for path in files}
     spare: dict[Path, Path] = {}
     placed: list[Path] = []
@@ -76,7 +76,7 @@ def _publish(
             if at.is_dir() and not at.is_symlink():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             at.parent.mkdir(parents=True, exist_ok=True)
-        if _alone({path.parent for path in files}, held):
+        if _lock_folders({path.parent for path in files}, locks):
             _sweep(files)
         for at, content in files.items():
             _write(ready[at], content)
@@ -113,8 +113,8 @@ def _publish(
                 cleanup.callback(_unlink, path)
 
 
-def _alone(folders: Iterable[Path], held: contextlib.ExitStack) -> bool:
-    """Keep other writers out of ``folders`` until ``held`` is closed or this process dies; False where the system or
+def _lock_folders(folders: Iterable[Path], locks: contextlib.ExitStack) -> bool:
+    """Keep other writers out of ``folders`` until ``locks`` is closed or this process dies; False where the system or
     the file system has no such locks."""
     try:
         import fcntl
@@ -124,7 +124,7 @@ def _alone(folders: Iterable[Path], held: contextlib.ExitStack) -> bool:
     try:
         for folder in folders:
             handle = os.open(folder, os.O_RDONLY)
-            held.callback(os.close, handle)
+            locks.callback(os.close, handle)
             stat = os.fstat(handle)
             handles[stat.st_dev, stat.st_ino] = handle  # one folder may have two names
         for _, handle in sorted(handles.items()):  # all in one order: no two wait for each other
@@ -135,7 +135,7 @@ def _alone(folders: Iterable[Path], held: contextlib.ExitStack) -> bool:
 
 
 def _sweep(files: Iterable[Path]) -> None:
-    """Take away temporary files of ``files``: whoever holds their folders knows that a killed run has left them."""
+    """Remove temporary files of ``files``: with their folders locked, only a killed run can have written them."""
     names: dict[Path, list[str]] = {}
     for path in files:
         names.setdefault(path.parent, []).append(re.escape(path.name))

@@ -36,19 +36,19 @@ def intended_motions(
     path, source, moved = task.toolpath, division.source[rows], moved[rows]
     to_base = task.base.shared(source).inverse()
     command = to_base @ division.command[rows]
-    # What is inserted has the orientation of its own place, if words say it.
+    # What is inserted has the orientation of its own place, if words state it.
     inserted = division.role[rows] != Role.ORIGINAL
     turned = moved & (
         path.constraints.orientation_programmed[source]
         | (inserted & (path.orientation_control.path[source] != 0))
     )
-    arc, kept = np.isfinite(division.sweep[rows]), ~moved & ~division.transitions[rows]
+    arc, unchanged = np.isfinite(division.sweep[rows]), ~moved & ~division.transitions[rows]
     centre = (to_base @ Poses(np.eye(3), division.centre[rows])).position
     normal = (to_base.rotation @ division.normal[rows][..., None])[..., 0]
 
-    def way(new: Floats, old: Floats) -> Floats:
+    def select_arc(new: Floats, old: Floats) -> Floats:
         more = (1,) * (new.ndim - 1)
-        stays = np.where(kept.reshape(-1, *more), old[source], np.nan)
+        stays = np.where(unchanged.reshape(-1, *more), old[source], np.nan)
         return np.where(arc.reshape(-1, *more), new, stays)
 
     return Plan(
@@ -56,9 +56,9 @@ def intended_motions(
         division.role[rows],
         np.where(moved[:, None], command.position, path.position[source]),
         np.where(turned[:, None, None], command.rotation, path.programmed_rotation[source]),
-        way(centre, path.arcs.centre),
-        way(normal, path.arcs.normal),
-        way(division.sweep[rows], path.arcs.sweep),
+        select_arc(centre, path.arcs.centre),
+        select_arc(normal, path.arcs.normal),
+        select_arc(division.sweep[rows], path.arcs.sweep),
         approximated_motions(task, division, rows),
         division.share[rows],
     )
@@ -99,19 +99,19 @@ def check_readback(
     moved = result.corrected[division.source] | division.transitions
     moved[np.flatnonzero(division.original)[division.lead_ins]] = True
 
-    def held(rows: slice) -> None:
+    def check_block(rows: slice) -> None:
         plan = intended_motions(task, division, moved, rows)
         lines.check_motions(back, rows)
         _check_texts(path, back, plan, rows, file)
         _check_external(path, back, division, rows, writing, file)
         _check_targets(path, back, plan, rows, writing, file)
 
-    each_block(held, len(division))
+    each_block(check_block, len(division))
     _check_arcs(task, division, moved, back, 10.0**-writing.mm, file)
 
 
 def _check_frames(path: Toolpath, back: Toolpath, file: str) -> None:
-    """The frames that the program says are the same."""
+    """The frames that the program states are the same."""
     if len(path.frames) != len(back.frames):
         raise Refusal(Finding("FIL008", "other frames than before are set", file))
     for one, other in zip(path.frames, back.frames, strict=True):
@@ -129,7 +129,7 @@ def _same_frame(one: FrameRef, other: FrameRef) -> bool:
 
 
 class _LineCheck:
-    """Where the lines of a program are in the output: after those that were inserted, one for each motion, and behind
+    """Where the lines of a program are in the output: after those that were inserted, one for each motion, and after
     the mark."""
 
     def __init__(self, path: Toolpath, division: Subdivision, program: Program, again: Program) -> None:
@@ -145,7 +145,7 @@ class _LineCheck:
         self.mark = _line_after_mark(program) if marked else int(np.iinfo(np.int32).max)
 
     def _moved(self, line: Ints, side: Literal["left", "right"]) -> Ints:
-        """(K,) where lines (K,) are, before ("left") or behind ("right") what is inserted there."""
+        """(K,) where lines (K,) are, before ("left") or after ("right") what is inserted there."""
         return np.asarray(line + (line >= self.mark) + np.searchsorted(self.inserted, line, side))
 
     def check_motions(self, back: Toolpath, rows: slice) -> None:
@@ -168,15 +168,15 @@ class _LineCheck:
 
     def check_comments(self, one: tuple[Annotation, ...], other: tuple[Annotation, ...]) -> None:
         """Comments are as they were, and in their lines; the mark is none."""
-        before, after = (_without_mark(said) for said in (one, other))
-        lines = [np.array([said.line for said in part], np.int64) for part in (before, after)]
-        texts = [[said.text for said in part] for part in (before, after)]
+        before, after = (_without_mark(comments) for comments in (one, other))
+        lines = [np.array([comment.line for comment in part], np.int64) for part in (before, after)]
+        texts = [[comment.text for comment in part] for part in (before, after)]
         if texts[0] != texts[1] or not np.array_equal(self._moved(lines[0], "right"), lines[1]):
             raise Refusal(Finding("FIL008", "comments differ from the program", self.file))
 
 
-def _without_mark(said: tuple[Annotation, ...]) -> list[Annotation]:
-    return [comment for comment in said if not comment.text.startswith(MARK)]
+def _without_mark(comments: tuple[Annotation, ...]) -> list[Annotation]:
+    return [comment for comment in comments if not comment.text.startswith(MARK)]
 
 
 def _line_after_mark(program: Program) -> int:
@@ -188,7 +188,7 @@ def _line_after_mark(program: Program) -> int:
 
 
 def _stated(path: Toolpath, configuration: Iterable[str]) -> dict[str, NDArray[Any] | FewRows]:
-    """Name -> column (N, ...) of what a motion says beside its target; ``configuration``: names of its numbers."""
+    """Name -> column (N, ...) of what a motion states beside its target; ``configuration``: names of its numbers."""
     return {
         "base": path.base,
         "tool": path.tool,
@@ -205,7 +205,7 @@ def _stated(path: Toolpath, configuration: Iterable[str]) -> dict[str, NDArray[A
 
 
 def _check_texts(path: Toolpath, back: Toolpath, plan: Plan, rows: slice, file: str) -> None:
-    """What a motion says beside its target."""
+    """What a motion states beside its target."""
     source, own, transition = plan.source, plan.own, plan.role == Role.TRANSITION
     every = np.ones(len(source), np.bool_)
     single_axis = path.orientation_control.path[source] == OrientationPath.SINGLE_AXIS
@@ -242,11 +242,11 @@ def _check_external(
     if not moves and np.array_equal(path.external[:1], back.external[:1], equal_nan=True):
         return
     source, own = division.source[rows], division.original[rows]
-    found, end = back.external[rows], path.external[source]
-    same = (found == end) | (np.isnan(found) & np.isnan(end))
+    actual, end = back.external[rows], path.external[source]
+    same = (actual == end) | (np.isnan(actual) & np.isnan(end))
     wanted = external_at(path, source, division.share[rows])
     with np.errstate(invalid="ignore"):
-        near = np.abs(found - wanted) <= HALF * 10.0**-writing.mm
+        near = np.abs(actual - wanted) <= HALF * 10.0**-writing.mm
     wrong = np.where(own[:, None], ~same, np.isfinite(wanted) & ~near).any(axis=1)
     if wrong.any():
         line = int(path.line[source[np.argmax(wrong)]])
@@ -256,13 +256,13 @@ def _check_external(
 def _check_targets(
     path: Toolpath, back: Toolpath, plan: Plan, rows: slice, writing: WritingSettings, file: str
 ) -> None:
-    for found, wanted in ((back.position[rows], plan.position[:]), (back.rotation[rows], plan.rotation[:])):
-        if not np.array_equal(np.isfinite(found), np.isfinite(wanted)):
+    for actual, wanted in ((back.position[rows], plan.position[:]), (back.rotation[rows], plan.rotation[:])):
+        if not np.array_equal(np.isfinite(actual), np.isfinite(wanted)):
             raise Refusal(Finding("FIL008", "the known targets differ from the plan", file))
     # Half a written step a coordinate; three angles add up, and where CA ends an arc the rounding of its start does.
     step_mm, step_deg = 10.0**-writing.mm, 10.0**-writing.deg
     off = np.abs(back.position[rows] - plan.position[:]).max(axis=1) / MM
-    # Rotary axes say the whole orientation that is meant, though the turn about the tool is free: no axis swings.
+    # Rotary axes state the whole orientation that is meant, though the turn about the tool is free: no axis swings.
     by_axes = path.orientation_control.path[plan.source] == OrientationPath.ROTARY_AXES
     free_axis = np.where(by_axes[:, None], np.nan, path.orientation_control.redundant_axis[plan.source])
     angle = _angle(plan.rotation[:], back.rotation[rows], free_axis) / DEG
@@ -275,8 +275,8 @@ def _check_arcs(
     task: CompensationProblem, division: Subdivision, moved: Bools, back: Toolpath, step_mm: float, file: str
 ) -> None:
     path, source = task.toolpath, division.source
-    kept = ~moved & ~division.transitions
-    arc = np.isfinite(division.sweep) | (kept & np.isfinite(path.arcs.sweep[source]))
+    unchanged = ~moved & ~division.transitions
+    arc = np.isfinite(division.sweep) | (unchanged & np.isfinite(path.arcs.sweep[source]))
     if not np.array_equal(np.isfinite(back.arcs.sweep), arc):
         raise Refusal(Finding("FIL008", "the arcs differ from the plan", file))
     for rows in blocks(len(division)) if arc.any() else ():
@@ -304,7 +304,7 @@ def check_residual(
     writing: WritingSettings,
     file: str,
 ) -> None:
-    """The corrections that the digits say, of ``result`` and of ``division``, are those that were ``planned``, and
+    """The corrections as written, of ``result`` and of ``division``, are those that were ``planned``, and
     bring no motion further off.  Raises Refusal FIL008, or COR002 where one is larger than the cell allows."""
     path, corrected = task.toolpath, result.corrected
     step = 3**0.5 * HALF * 10.0**-writing.mm * MM
@@ -316,7 +316,7 @@ def check_residual(
     rows = division.source[added]
     sizes = [size[:0], *in_blocks(lambda part: _added(task, division, added[part]), len(added))]
     _refuse_large(task, np.concatenate(sizes), path.line[rows], step, file)
-    # where the robot found no rest before, nothing is further off
+    # where the robot had no equilibrium before, nothing is further off
     before, before_angle = (np.nan_to_num(a, nan=np.inf) for a in (result.before, result.before_angle))
     worse = corrected & ~(result.after <= before + task.tolerance)
     _refuse(

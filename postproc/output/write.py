@@ -42,7 +42,7 @@ class WrittenProgram:
     """``edits`` make the output; ``contents`` are its bytes, a document each; ``result`` has the residual predicted
     from the digits in them, ``division`` the commands as they are in them.
 
-    residual (N,) [m], off_angle (N,) [rad]: the same residuals, from what the gain leaves.
+    residual (N,) [m], off_angle (N,) [rad]: the same residuals, from the pose that the gain asks for.
     """
 
     task: CompensationProblem
@@ -65,20 +65,20 @@ class WrittenProgram:
 
     @property
     def off_between(self) -> Floats:
-        """(M,) [m] as ``between``, from the way that the gain leaves."""
-        return self._off_ways[0]
+        """(M,) [m] as ``path_error``, from the path that the gain asks for."""
+        return self._path_of_gain[0]
 
     @property
     def off_between_angle(self) -> Floats:
-        """(M,) [rad] as ``between_angle``, from the way that the gain leaves."""
-        return self._off_ways[1]
+        """(M,) [rad] as ``between_angle``, from the path that the gain asks for."""
+        return self._path_of_gain[1]
 
     @cached_property
     def _path(self) -> tuple[Floats, Floats]:
         return path_errors_as_written(self.task, self.result, self.division)
 
     @cached_property
-    def _off_ways(self) -> tuple[Floats, Floats]:
+    def _path_of_gain(self) -> tuple[Floats, Floats]:
         if self.task.gain == 1.0:
             return self._path
         return path_errors_as_written(self.task, self.result, self.division, 1.0 - self.task.gain)
@@ -112,11 +112,11 @@ def plan_motions(task: CompensationProblem, division: Subdivision) -> Plan:
     """A division in the programmed bases: what a dialect is to write."""
     m = len(division)
 
-    def made(rows: Ints) -> Poses:
+    def intended_targets(rows: Ints) -> Poses:
         part = intended_motions(task, division, division.moved, rows)
         return Poses(part.rotation[:], part.position[:])
 
-    target = PoseRows(m, made).remembered()
+    target = PoseRows(m, intended_targets).remembered()
     none = np.broadcast_to(np.nan, (m, 3))
     centre, normal, sweep = none, none, none[:, 0]
     if np.isfinite(division.sweep).any() or np.isfinite(task.toolpath.arcs.sweep).any():
@@ -182,7 +182,7 @@ def write(
 ) -> WrittenProgram:
     """Turn the edits of ``program`` into files, and read them back.
 
-    ``completed``: fills in what a target that was read back leaves to the axis motion before it.
+    ``completed``: fills in what a target that was read back inherits from the axis motion before it.
     Raises Refusal FIL008 (what was read back is not what was meant), COR002 (it corrects by more than may be).
     """
     documents = program.documents
@@ -200,8 +200,10 @@ def write(
     release_free_memory()
     check_residual(task, result, written, there, writing, documents[0].path.name)
     release_free_memory()
-    left = (written.after, written.after_angle) if task.gain == 1.0 else _beside_uncorrected(task, written)
-    return WrittenProgram(task, edits, contents, written, there, *left)
+    residuals = (
+        (written.after, written.after_angle) if task.gain == 1.0 else _beside_uncorrected(task, written)
+    )
+    return WrittenProgram(task, edits, contents, written, there, *residuals)
 
 
 def _read_back(
@@ -226,12 +228,12 @@ def _with_lead_ins(
 
 
 def _beside_uncorrected(task: CompensationProblem, result: CorrectionResult) -> tuple[Floats, Floats]:
-    """(N,) [m] and (N,) [rad] how far the tool is from where the part of the correction that is made leaves it; NaN
+    """(N,) [m] and (N,) [rad] how far the tool is from where the applied share of the correction brings it; NaN
     where nothing is corrected."""
-    rows, left = np.flatnonzero(result.corrected), 1.0 - task.gain
+    rows, uncorrected_share = np.flatnonzero(result.corrected), 1.0 - task.gain
     off, angle = np.full((2, len(result.state)), np.nan)
 
-    def predicted(part: slice) -> None:
+    def fill_distances(part: slice) -> None:
         at = rows[part]
         wanted = task.wanted[at]
         goal = task.goal(at, wanted)
@@ -242,20 +244,21 @@ def _beside_uncorrected(task: CompensationProblem, result: CorrectionResult) -> 
             for command, corrected in ((result.command[at], True), (wanted, False))
         )
         off[at], angle[at] = (
-            np.linalg.norm(now - left * then, axis=1) for now, then in zip(after, before, strict=True)
+            np.linalg.norm(now - uncorrected_share * then, axis=1)
+            for now, then in zip(after, before, strict=True)
         )
 
-    each_block(predicted, len(rows))
+    each_block(fill_distances, len(rows))
     return off, angle
 
 
 def path_errors_as_written(
-    task: CompensationProblem, result: CorrectionResult, division: Subdivision, left: float = 0.0
+    task: CompensationProblem, result: CorrectionResult, division: Subdivision, uncorrected_share: float = 0.0
 ) -> tuple[Floats, Floats]:
     """(M,) [m] and (M,) [rad] the largest distance from the wanted path, and angle from the wanted orientation, inside
     of each corrected motion under force, NaN for all others.
 
-    ``left``: the share of the error without a correction that is meant to stay.
+    ``uncorrected_share``: the share of the error without a correction that is meant to stay.
     """
     errors, angles = np.full((2, len(division)), np.nan)
     source, transitions = division.source, division.transitions
@@ -263,38 +266,38 @@ def path_errors_as_written(
     cut = result.corrected & task.desired_path.traceable & task.carries
     chosen = np.flatnonzero(cut[source] & ~transitions)
 
-    def looked(part: slice) -> None:
+    def fill_errors(part: slice) -> None:
         some = chosen[part]
         segments = subdivided_motions(task, division, some)
         first = (segments.first == 0.0) & task.steps(segments.rows, result.corrected)
-        errors[some], angles[some] = path_errors(task, segments, first, left, shown=True)
+        errors[some], angles[some] = path_errors(task, segments, first, uncorrected_share, shown=True)
 
-    each_block(looked, len(chosen))
+    each_block(fill_errors, len(chosen))
     return errors, angles
 
 
 def _as_written(task: CompensationProblem, division: Subdivision, back: Toolpath) -> Subdivision:
-    """The division with what its digits say."""
+    """The division with the commands as written."""
     source, base = division.source, task.base
 
     def command(rows: Ints) -> Poses:
-        found = task.wanted[source[rows]].copy()
+        poses = task.wanted[source[rows]].copy()
         known = np.flatnonzero(np.isfinite(back.position[rows, 0]))
-        kept = np.flatnonzero(task.toolpath.keeps_orientation[source[rows]])
-        orientation = found.rotation[kept]
-        found.put(known, base.shared(source[rows[known]]) @ back.target_in_base[rows[known]])
-        found.rotation[kept] = orientation  # not that of the text
-        return found
+        constant = np.flatnonzero(task.toolpath.keeps_orientation[source[rows]])
+        orientation = poses.rotation[constant]
+        poses.put(known, base.shared(source[rows[known]]) @ back.target_in_base[rows[known]])
+        poses.rotation[constant] = orientation  # not that of the text
+        return poses
 
     there = replace(division, command=PoseRows(len(division), command), blend=back.approximation)
-    bent = np.flatnonzero(np.isfinite(division.sweep))
-    if not len(bent):
+    arcs = np.flatnonzero(np.isfinite(division.sweep))
+    if not len(arcs):
         return there
     centre, normal, sweep = division.centre.copy(), division.normal.copy(), division.sweep.copy()
-    own = base[source[bent]]
-    centre[bent] = (own @ Poses(np.eye(3), back.arcs.centre[bent])).position
-    normal[bent] = (own.rotation @ back.arcs.normal[bent][..., None])[..., 0]
-    sweep[bent] = back.arcs.sweep[bent]
+    own = base[source[arcs]]
+    centre[arcs] = (own @ Poses(np.eye(3), back.arcs.centre[arcs])).position
+    normal[arcs] = (own.rotation @ back.arcs.normal[arcs][..., None])[..., 0]
+    sweep[arcs] = back.arcs.sweep[arcs]
     return replace(there, centre=centre, normal=normal, sweep=sweep)
 
 
@@ -304,7 +307,7 @@ def _decimals(tolerance: float) -> int:
 
 
 def _mark(program: Program, robot: Robot) -> str:
-    """Says which version, robot file and source made the output."""
+    """States which version, robot file and source the output is from."""
     digests = [document.digest for document in program.documents]
     source = digests[0] if len(digests) == 1 else hashlib.sha256("".join(digests).encode()).hexdigest()
     return f"{__version__}, robot {robot.name} sha256:{robot.digest[:16]}, source sha256:{source[:16]}"

@@ -142,11 +142,11 @@ def _arm(model: StiffnessModel, places: Floats, load: MapLoad) -> tuple[Floats, 
     flange = Poses(np.broadcast_to(load.orientation, (count, 3, 3)), places) @ load.tool.inverse()
     low, high = robot.limits.T
     middle = np.nan_to_num((low + high) / 2)
-    found = inverse(
+    solution = inverse(
         robot.nominal, flange, np.full(count, load.status), np.broadcast_to(middle, (count, len(middle)))
     )
-    inside = ((found.q >= low - MARGIN) & (found.q <= high + MARGIN)).all(axis=1)
-    return found.q, found.reachable, found.reachable & inside
+    inside = ((solution.q >= low - MARGIN) & (solution.q <= high + MARGIN)).all(axis=1)
+    return solution.q, solution.reachable, solution.reachable & inside
 
 
 def _deflection(model: StiffnessModel, angles: Floats, mapped: Bools, load: MapLoad) -> Floats:

@@ -19,7 +19,7 @@ ALONG_SPINDLE = 1 * DEG
 
 
 class FeedFrames:
-    """The feed frame at the start and at the end of N motions, and on their path, made for the rows that are asked for.
+    """The feed frame at the start and at the end of N motions, and on their path, computed for the rows asked for.
 
     matters (N,): the force or the moment has a part across z, so that x and y are needed.
     """
@@ -29,41 +29,41 @@ class FeedFrames:
         stated: StatedForces,
         toolpath: Toolpath,
         frames: MotionFrames,
-        way: PathLength,
+        path_length: PathLength,
         runs: MotionRuns,
         carries: Bools,
         file: str,
     ) -> None:
         """Of N motions, of which ``carries`` (N,) have a force.  Raises Refusal where the frame is not defined on the
         motions that need it."""
-        self.way = way
+        self.path_length = path_length
         asked = carries & (stated.frames == FEED)
-        _check_spindle(asked & way.known, toolpath, frames, file)
+        _check_spindle(asked & path_length.known, toolpath, frames, file)
         # x and y matter only to a force or moment across z
         self.matters = stated.any((0, 1, 3, 4))
-        needed = asked & way.known & self.matters
+        needed = asked & path_length.known & self.matters
 
         n = len(toolpath)
         self._back = np.empty((n, 3))
 
-        def leant(rows: slice) -> None:
+        def fill_back(rows: slice) -> None:
             spindle = np.einsum("nij,nj->ni", toolpath.rotation[rows], frames.spindle_in_tool[rows])
             turned = np.einsum("nij,nj->ni", frames.base_in_robot.rotation[rows], spindle)
             np.negative(turned, out=self._back[rows])
 
-        for _ in in_blocks(leant, n):
+        for _ in in_blocks(fill_back, n):
             pass
 
         # starts and ends in turn, as the tool comes by them: which of them have a direction, and whose each takes
         own = np.zeros((n, 2), bool)
 
-        def directed(rows: slice) -> None:
+        def mark_own(rows: slice) -> None:
             at = rows.start + np.flatnonzero(carries[rows])
             for side in (0, 1):
                 own[at, side] = ~np.isnan(across(self._tangent(at, side), self.back(at, side))[:, 0])
 
         if needed.any():
-            for _ in in_blocks(directed, n):
+            for _ in in_blocks(mark_own, n):
                 pass
         self._own = own.reshape(-1)
         latest, coming = runs.latest(self._own), runs.coming(self._own)
@@ -72,47 +72,47 @@ class FeedFrames:
         without = np.flatnonzero(needed & ~own[:, 1])
         undefined = np.zeros(n, bool)
 
-        def lacking(part: slice) -> None:
+        def mark_undefined(part: slice) -> None:
             at = without[part]
             undefined[at] = np.isnan(across(self._ahead(at, 1), self.back(at, 1))[:, 0])
 
-        for _ in in_blocks(lacking, len(without)):
+        for _ in in_blocks(mark_undefined, len(without)):
             pass
-        # a run with an unknown target is left as it is, whatever its force
-        unknown = np.append(np.int32(0), np.cumsum(carries & ~way.known, dtype=np.int32))
+        # a run with an unknown target stays as it is, whatever its force
+        unknown = np.append(np.int32(0), np.cumsum(carries & ~path_length.known, dtype=np.int32))
         lost = np.flatnonzero(undefined)
         lost = lost[unknown[runs.stop[lost] + 1] == unknown[runs.start[lost]]]
         if len(lost):
             raise Refusal(_no_direction(lost, toolpath, file))
-        lacks = without[~undefined[without]]
-        before, after = latest[2 * lacks + 1], coming[2 * lacks + 1]
+        unresolved = without[~undefined[without]]
+        before, after = latest[2 * unresolved + 1], coming[2 * unresolved + 1]
         findings = []
-        kept, borrowed = lacks[before >= 0], lacks[(before < 0) & (after >= 0)]
-        if len(kept):
-            what = f"{len(kept)} motions have no feed direction across the spindle and keep the last one"
-            findings.append(Finding("FRC010", what, file, int(toolpath.line[kept[0]])))
+        continued, borrowed = unresolved[before >= 0], unresolved[(before < 0) & (after >= 0)]
+        if len(continued):
+            what = f"{len(continued)} motions have no feed direction across the spindle and keep the last one"
+            findings.append(Finding("FRC010", what, file, int(toolpath.line[continued[0]])))
         if len(borrowed):
             what = f"{len(borrowed)} motions before any feed use the direction of the next motion"
             findings.append(Finding("FRC008", what, file, int(toolpath.line[borrowed[0]])))
         self.findings = tuple(findings)
 
     def back(self, rows: Ints, side: Ints | int) -> Floats:
-        """(M, 3) z of ``rows`` (M,) at their start (``side``, scalar or (M,): 0) or end (1); of a begin that is not
-        known that at the end."""
-        at = rows - ((np.asarray(side) == 0) & self.way.begins[rows])
+        """(M, 3) z of ``rows`` (M,) at their start (``side``, scalar or (M,): 0) or end (1); where the start is not
+        known, that at the end."""
+        at = rows - ((np.asarray(side) == 0) & self.path_length.starts[rows])
         return np.asarray(self._back.take(at, axis=0))
 
     def _tangent(self, rows: Ints, side: Ints | int) -> Floats:
         """(M, 3) of each motion at its start or end; that of an arc from inside where it lies along z there."""
         side = np.broadcast_to(side, len(rows))
-        tangent = self.way.tangent(rows, side.astype(float))
-        curved = np.flatnonzero(self.way.arc[rows] & self.way.moved[rows])
+        tangent = self.path_length.tangent(rows, side.astype(float))
+        curved = np.flatnonzero(self.path_length.arc[rows] & self.path_length.moved[rows])
         along = np.isnan(across(tangent[curved], self.back(rows[curved], side[curved]))[:, 0])
         curved = curved[along]
         if len(curved):
-            inwards = np.minimum(0.5, 2 * ALONG_SPINDLE / self.way.sweep[rows[curved]])
+            inwards = np.minimum(0.5, 2 * ALONG_SPINDLE / self.path_length.sweep[rows[curved]])
             inside = side[curved] + np.where(side[curved] == 0, 1, -1) * inwards
-            tangent[curved] = self.way.tangent(rows[curved], inside)
+            tangent[curved] = self.path_length.tangent(rows[curved], inside)
         return tangent
 
     def _ahead(self, rows: Ints, side: Ints | int) -> Floats:
@@ -142,10 +142,10 @@ class FeedFrames:
         lies along it, x is that of the nearer end.
         """
         share = fraction[:, None]
-        arc = self.way.arc_turn(rows)
+        arc = self.path_length.arc_turn(rows)
         z = (1 - share) * self.back(rows, 0) + share * turned(rotation_from_vector(-arc), self.back(rows, 1))
         z = turned(rotation_from_vector(share * arc), z / np.linalg.norm(z, axis=1, keepdims=True))
-        ahead = self.way.tangent(rows, fraction)
+        ahead = self.path_length.tangent(rows, fraction)
         for ends, side in ((fraction <= 0, 0), (fraction >= 1, 1)):
             ahead[ends] = self._ahead(rows[ends], side)
         along = np.flatnonzero(np.isnan(across(ahead, z)[:, 0]))

@@ -26,7 +26,7 @@ _OFF = ((0.0,) * 6, BASE)
 def read_annotations(toolpath: Toolpath, file: str) -> tuple[StatedForces | None, tuple[Finding, ...]]:
     """What the FORCE comments state for every motion; None where there is none.
 
-    Comments that only begin with FORCE are reported (FRC006).  Refusal FRC002 for every malformed one.
+    Comments that only start with FORCE are reported (FRC006).  Refusal FRC002 for every malformed one.
     """
     rows, forces = [], []
     ignored, wrong = [], []
@@ -55,7 +55,7 @@ def read_annotations(toolpath: Toolpath, file: str) -> tuple[StatedForces | None
 
 
 def marked_air(toolpath: Toolpath) -> Bools:
-    """(N,) motions under FORCE OFF: air, whatever another source says of their force."""
+    """(N,) motions under FORCE OFF: air, whatever another source states of their force."""
     rows, off = [], [False]
     for annotation in sorted(toolpath.annotations, key=lambda a: a.row):
         with contextlib.suppress(NotAForce):

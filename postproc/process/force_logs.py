@@ -1,8 +1,8 @@
 """Measured forces over the path length or over time, brought to the motions of a program.
 
-``s_mm`` counts along the programmed path from the first known point on: lines and arcs by their length, PTP by the
-straight path between its ends, moves from and to axis positions and turns on the spot not at all.  ``t_s`` counts the
-time at the programmed feed; motions without a feed (PTP) take none.
+``s_mm`` counts along the programmed path from the first known point on: lines and arcs by their length, point-to-point
+motions by the straight line between their ends, moves from and to axis positions and turns on the spot not at all.
+``t_s`` counts the time at the programmed feed; motions without a feed (point to point) take none.
 """
 
 from __future__ import annotations
@@ -83,8 +83,8 @@ def read_log(
     readings = ForceReadings(owner[within], place[within], channels[within], scale.start, scale.end)
     start, value, peak, error = resampled(readings)
     start[scale.air], value[scale.air], peak[scale.air] = 0.0, 0.0, np.nan
-    for made in (start, value):
-        made.setflags(write=False)
+    for array in (start, value):
+        array.setflags(write=False)
     each = np.arange(len(toolpath), dtype=np.int32)
     stated = StatedForces(value, np.full(len(toolpath), frame), each, start, peak=peak, error=error)
     findings += _summary(table, readings, place, spacing, scale, stated, toolpath, program)
@@ -94,12 +94,12 @@ def read_log(
 def _scale(
     column: str, toolpath: Toolpath, frames: MotionFrames, program: str, findings: list[Finding]
 ) -> Scale:
-    way = PathLength(toolpath, frames)
+    path_length = PathLength(toolpath, frames)
     air = is_air(toolpath) | marked_air(toolpath)
-    known = np.flatnonzero(way.known)
+    known = np.flatnonzero(path_length.known)
     start = known[0] if len(known) else len(toolpath)
     index = np.arange(len(toolpath))
-    lost = np.flatnonzero(~air & (index > start) & ~(way.known & shifted(way.known)))
+    lost = np.flatnonzero(~air & (index > start) & ~(path_length.known & shifted(path_length.known)))
     if len(lost):
         raise Refusal(
             Finding(
@@ -110,10 +110,10 @@ def _scale(
                 help="state the forces of this program by line",
             )
         )
-    uncounted = (index > start) & (way.length == 0)
-    extent = way.length
+    uncounted = (index > start) & (path_length.length == 0)
+    extent = path_length.length
     if column == "t_s":
-        slow = np.flatnonzero(~air & (way.length > 0) & ~(toolpath.feed > 0))
+        slow = np.flatnonzero(~air & (path_length.length > 0) & ~(toolpath.feed > 0))
         if len(slow):
             raise Refusal(
                 Finding(
@@ -124,8 +124,8 @@ def _scale(
                     help="set the feed in the program before the motion ($VEL.CP, F), or record the log over s_mm",
                 )
             )
-        timed = (way.length > 0) & (toolpath.feed > 0)
-        extent = np.where(timed, way.length / np.where(timed, toolpath.feed, 1.0), 0.0)
+        timed = (path_length.length > 0) & (toolpath.feed > 0)
+        extent = np.where(timed, path_length.length / np.where(timed, toolpath.feed, 1.0), 0.0)
         uncounted |= (index > start) & ~timed
     # a first run-in to the cut is no loss; what is between cuts shifts all that comes after
     cutting = np.flatnonzero(~air & (extent > 0))
@@ -210,7 +210,7 @@ def _summary(
     toolpath: Toolpath,
     program: str,
 ) -> list[Finding]:
-    """What there is to say of readings on a path, and their largest forces."""
+    """The findings on readings along a path, and their largest forces."""
     rows = scale.cutting
     if not len(rows):
         return []
@@ -233,7 +233,7 @@ def _summary(
         )
         findings.append(Finding("FRC024", what, str(table.path), int(table.lines[widest])))
 
-    off, deviation = uneven(readings, stated.begin, stated.values)
+    off, deviation = uneven(readings, stated.start_values, stated.values)
     off, deviation = off[~scale.air[off]], deviation[~scale.air[off]]
     if len(off):
         worst = off[np.argmax(deviation)]
@@ -246,7 +246,7 @@ def _summary(
 
     size = np.zeros(len(toolpath))
     for part in blocks(len(toolpath)):
-        both = stated.values[part, :3] + stated.begin[part, :3]
+        both = stated.values[part, :3] + stated.start_values[part, :3]
         size[part] = 0.5 * np.linalg.norm(both, axis=1)
     peaks = np.zeros(len(toolpath)) if stated.peak is None else stated.peak
     mean, peak = rows[np.argmax(size[rows])], rows[np.argmax(peaks[rows])]

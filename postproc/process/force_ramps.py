@@ -70,8 +70,8 @@ class Ramps:
 
     def ends(self) -> tuple[Ints, Floats]:
         """Motions (E',) inside of which a ramp ends, ascending, and the shares of their length (E',) where it does."""
-        left = self.length - self.start
-        inside = (left > 0.0) & (left < self.extent)
-        row, share = self.row[inside], left[inside] / self.extent[inside]
+        remaining = self.length - self.start
+        inside = (remaining > 0.0) & (remaining < self.extent)
+        row, share = self.row[inside], remaining[inside] / self.extent[inside]
         order = np.lexsort((share, row))
         return row[order], share[order]

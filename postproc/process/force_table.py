@@ -73,27 +73,27 @@ def read_force_table(
     # every motion of the program finds its row: a line may hold several motions where a dialect allows it
     place = np.minimum(np.searchsorted(lines[order], toolpath.line), len(lines) - 1)
     row = order[place]
-    found = lines[row] == toolpath.line
+    has_row = lines[row] == toolpath.line
     used = np.zeros(len(table), bool)
-    used[row[found]] = True
+    used[row[has_row]] = True
     if not np.all(used):
         raise Refusal(*_no_motion(table, lines, np.flatnonzero(~used), toolpath, program))
 
     air = is_air(toolpath) | marked_air(toolpath)
     in_air = np.zeros(len(table), bool)
-    in_air[row[found & air]] = True
+    in_air[row[has_row & air]] = True
     if offset:
         values[:-1] = checked_gauge(table, values[:-1], in_air, offset, findings)
     values.setflags(write=False)
-    stated = StatedForces(values, frame, np.where(found & ~air, row, len(table)))
-    lost = np.flatnonzero(found & air)
+    stated = StatedForces(values, frame, np.where(has_row & ~air, row, len(table)))
+    lost = np.flatnonzero(has_row & air)
     lost = lost[np.any(values[row[lost]] != 0, axis=1)]
     if len(lost) and not offset:
         first = lost[0]
         what = f"line {toolpath.line[first]} of {program} is an air move (PTP, G0 or FORCE OFF); its force is ignored"
         more = f" (and {len(lost) - 1} more)" if len(lost) > 1 else ""
         findings.append(Finding("FRC009", what + more, str(table.path), int(table.lines[row[first]])))
-    without = np.flatnonzero(~found & ~air)
+    without = np.flatnonzero(~has_row & ~air)
     if len(without):
         first_line = f"the first is in line {toolpath.line[without[0]]} of {program}"
         what = f"{len(without)} motions have no row and count as air; {first_line}"

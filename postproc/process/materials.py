@@ -66,14 +66,14 @@ def _coefficients(section: YamlSection) -> Coefficients:
 @cache
 def _table() -> dict[str, Material]:
     top = load(TABLE)
-    found = {}
+    materials = {}
     for name in top:
         section = top.section(name)
         section.only("also", "source", "date", *CUTTING, *EDGE, "published_ktc")
         coefficients = _coefficients(section)
         published = section.numbers("published_ktc", None)
         half = (max(published) - min(published)) / 2 / section.number("ktc")
-        found[name] = Material(
+        materials[name] = Material(
             name,
             coefficients,
             half if half > 0 else None,
@@ -81,7 +81,7 @@ def _table() -> dict[str, Material]:
             section.text("date"),
             "kac" in section,
         )
-    return found
+    return materials
 
 
 @cache

@@ -35,7 +35,7 @@ class Coefficients:
 @dataclass(frozen=True)
 class Engagement:
     """A cutter in its material: ``diameter``, ``depth`` (axial) [m], ``helix`` [rad], and the angles [rad] at which a
-    tooth enters and leaves."""
+    tooth enters and exits."""
 
     diameter: float
     teeth: int

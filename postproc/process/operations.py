@@ -33,9 +33,9 @@ def process_forces(
 ) -> tuple[StatedForces, tuple[Finding, ...]]:
     """The mean milling force of every motion that an operation of the process file ``path`` has, in the feed frame.
 
-    Air, with no force, are: motions of no operation, PTP and G0, those under FORCE OFF, at the operation's ``rapid``
-    and above, those that come from axis positions (approaches, with no known direction), and those along the spindle
-    axis (of plunges the model knows nothing).  Refusal: of the file; FRC011
+    Air, with no force, are: motions of no operation, point-to-point and rapid motions, those under FORCE OFF, at the
+    operation's ``rapid`` and above, those that come from axis positions (approaches, with no known direction), and
+    those along the spindle axis (of plunges the model knows nothing).  Refusal: of the file; FRC011
     where no operation has any motion; FRC013 where a feed is not known.
     """
     operations = read_process(path)
@@ -88,12 +88,12 @@ def join(operations: Sequence[Operation], toolpath: Toolpath) -> Ints:
     names in one comment the longer counts.  A name has to be there as whole words; case and blanks do not matter.
     """
     n = len(toolpath)
-    found = np.full(n, -1)
+    owner = np.full(n, -1)
     numbers = np.array([frame.number or 0 for frame in toolpath.frames] + [0])
     tool = numbers[toolpath.tool]
     for index, operation in enumerate(operations):
         if operation.tool:
-            found[tool == operation.tool] = index
+            owner[tool == operation.tool] = index
     named = [(name, index) for index, name in enumerate(o.name for o in operations) if name]
     rows, which = [-1], [-1]
     for comment in sorted(toolpath.comments, key=lambda c: (c.row, c.line)):
@@ -103,13 +103,13 @@ def join(operations: Sequence[Operation], toolpath: Toolpath) -> Ints:
             which.append(match)
     place = np.searchsorted(np.array(rows), np.arange(n), side="right") - 1
     changes = np.append(0, np.cumsum(tool[1:] != tool[:-1]))[:n]
-    held = changes[np.maximum(np.array(rows)[place], 0)] == changes
-    by_name = np.where(held, np.array(which)[place], -1)
-    found = np.where(by_name >= 0, by_name, found)
+    same_tool = changes[np.maximum(np.array(rows)[place], 0)] == changes
+    by_name = np.where(same_tool, np.array(which)[place], -1)
+    owner = np.where(by_name >= 0, by_name, owner)
     for index, operation in enumerate(operations):
         if operation.lines[1]:
-            found[(toolpath.line >= operation.lines[0]) & (toolpath.line <= operation.lines[1])] = index
-    return found
+            owner[(toolpath.line >= operation.lines[0]) & (toolpath.line <= operation.lines[1])] = index
+    return owner
 
 
 def _longest(comment: Annotation, named: Sequence[tuple[str, int]]) -> int:
@@ -125,17 +125,17 @@ def _longest(comment: Annotation, named: Sequence[tuple[str, int]]) -> int:
 def _along_spindle(cutting: Bools, toolpath: Toolpath, frames: MotionFrames) -> Bools:
     """(N,) straight motions, of those that are ``cutting``, along the spindle axis at their end; False where one of
     them is not known."""
-    way = PathLength(toolpath, frames)
+    path_length = PathLength(toolpath, frames)
     along = np.zeros(len(toolpath), bool)
 
-    def looked(part: slice) -> None:
-        rows = part.start + np.flatnonzero(cutting[part] & ~way.arc[part])
+    def compare(part: slice) -> None:
+        rows = part.start + np.flatnonzero(cutting[part] & ~path_length.arc[part])
         spindle = np.einsum("nij,nj->ni", toolpath.rotation[rows], frames.spindle_in_tool[rows])
         spindle = np.einsum("nij,nj->ni", frames.base_in_robot.rotation[rows], spindle)
-        cosine = np.abs(np.einsum("ni,ni->n", way.tangent(rows, 1.0), spindle))
+        cosine = np.abs(np.einsum("ni,ni->n", path_length.tangent(rows, 1.0), spindle))
         along[rows] = cosine >= np.cos(ALONG_SPINDLE)
 
-    for _ in in_blocks(looked, len(toolpath)):
+    for _ in in_blocks(compare, len(toolpath)):
         pass
     return along
 

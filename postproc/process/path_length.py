@@ -1,7 +1,7 @@
 """The path of the tool centre point in the robot root: where motions start and end, how they run, how the path turns.
 
-A *run* is a row of consecutive motions that carry force: what an air move, or a motion without force, separates has
-nothing to say about each other's feed direction.
+A *run* is a row of consecutive motions that carry force: what an air move, or a motion without force, separates does
+not share its feed direction.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ _NO_MOVE = 1e-7  # m; a tenth of the last digit that programs write
 
 
 class PathLength:
-    """The path of N motions; what takes more than a few bytes a motion is made of the rows that are asked for.
+    """The path of N motions; what takes more than a few bytes a motion is computed for the rows asked for.
 
     known (N,): target, base and tool are known.  starts (N,): the row before is known and has the same tool on the
     flange, so that its end pose is where this one starts.  moved (N,): the motion has a length, ``length`` (N,) [m],
-    0 where it has none or is not known.  arc (N,): the motion is an arc of known begin; sweep (N,) [rad].
+    0 where it has none or is not known.  arc (N,): the motion is an arc of known start; sweep (N,) [rad].
     """
 
     def __init__(self, toolpath: Toolpath, frames: MotionFrames) -> None:
@@ -35,45 +35,45 @@ class PathLength:
         self.sweep = toolpath.arcs.sweep
         self._end = np.empty((n, 3))
 
-        def placed(rows: slice) -> None:
+        def place_ends(rows: slice) -> None:
             base = frames.base_in_robot[rows]
             turned = np.einsum("nij,nj->ni", base.rotation, toolpath.position[rows])
             np.add(base.position, turned, out=self._end[rows])
 
-        for _ in in_blocks(placed, n):
+        for _ in in_blocks(place_ends, n):
             pass
         tool = np.isfinite(frames.tool_in_flange.position[:, 0])
         self.known = toolpath.known & tool & np.isfinite(self._end[:, 0])
         there = self.known & shifted(self.known)
         self._changed, self._from = _with_other_tool(toolpath, frames)
-        self.begins = there.copy()
-        self.begins[self._changed] = False
+        self.starts = there.copy()
+        self.starts[self._changed] = False
         self.arc = there & np.isfinite(toolpath.arcs.sweep)
         self.moved, self.length = np.zeros(n, bool), np.zeros(n)
 
-        def measured(rows: slice) -> None:
+        def measure(rows: slice) -> None:
             start, step = self._step(np.arange(rows.start, rows.stop))
             length = np.sqrt(np.einsum("ni,ni->n", step, step))
-            bent = np.flatnonzero(self.arc[rows])
-            arcs = rows.start + bent
-            _, radius, rise = self._laid(arcs, start[bent], step[bent])
-            length[bent] = np.hypot(self.sweep[arcs] * np.sqrt(np.einsum("ni,ni->n", radius, radius)), rise)
+            curved = np.flatnonzero(self.arc[rows])
+            arcs = rows.start + curved
+            _, radius, rise = self._arc_geometry(arcs, start[curved], step[curved])
+            length[curved] = np.hypot(self.sweep[arcs] * np.sqrt(np.einsum("ni,ni->n", radius, radius)), rise)
             self.moved[rows] = there[rows] & (length > _NO_MOVE)
             self.length[rows] = np.where(self.moved[rows], length, 0.0)
 
-        for _ in in_blocks(measured, n):
+        for _ in in_blocks(measure, n):
             pass
 
     def tangent(self, rows: Ints, fraction: Floats | float) -> Floats:
         """(K, 3) unit tangent of ``rows`` (K,) at the shares ``fraction`` (K,) of their path; NaN without one."""
         start, step = self._step(rows)
         length = np.where(self.moved[rows], self.length[rows], np.nan)
-        found = step / length[:, None]
+        tangents = step / length[:, None]
         curved = np.flatnonzero(self.arc[rows] & self.moved[rows])
         if len(curved):
             arcs, share = rows[curved], np.broadcast_to(fraction, len(rows))[curved]
-            found[curved] = self._bent(arcs, share, start[curved], step[curved])
-        return found
+            tangents[curved] = self._arc_tangents(arcs, share, start[curved], step[curved])
+        return tangents
 
     @property
     def turns_along(self) -> Bools:
@@ -94,7 +94,7 @@ class PathLength:
             start[other] = self._from[at[other]]
         return start, self._end.take(rows, axis=0) - start
 
-    def _laid(self, rows: Ints, start: Floats, step: Floats) -> tuple[Floats, Floats, Floats]:
+    def _arc_geometry(self, rows: Ints, start: Floats, step: Floats) -> tuple[Floats, Floats, Floats]:
         """The arcs ``rows`` (M,) in the robot root: normal, radius vector at the start (M, 3), rise (M,)."""
         base, path = self._base, self._toolpath
         rotation = base.rotation[rows]
@@ -103,11 +103,11 @@ class PathLength:
         radius = out - np.einsum("ni,ni->n", out, normal)[:, None] * normal
         return normal, radius, np.asarray(np.einsum("ni,ni->n", step, normal))
 
-    def _bent(self, rows: Ints, fraction: Floats, start: Floats, step: Floats) -> Floats:
+    def _arc_tangents(self, rows: Ints, fraction: Floats, start: Floats, step: Floats) -> Floats:
         """The tangent of arcs with radius vector r, normal n, sweep s and rise h: s n x R(n, t s) r + h n."""
-        normal, begun, rise = self._laid(rows, start, step)
+        normal, first_radius, rise = self._arc_geometry(rows, start, step)
         sweep = self.sweep[rows, None]
-        radius = rotation_from_vector(fraction[:, None] * sweep * normal) @ begun[..., None]
+        radius = rotation_from_vector(fraction[:, None] * sweep * normal) @ first_radius[..., None]
         tangent = sweep * np.cross(normal, radius[..., 0]) + rise[:, None] * normal
         return np.asarray(tangent / np.linalg.norm(tangent, axis=1, keepdims=True))
 
@@ -132,7 +132,7 @@ class MotionRuns:
     before this row lies in one run, is known, and turns by less than SMOOTH_TURN.
     """
 
-    def __init__(self, way: PathLength, carries: Bools) -> None:
+    def __init__(self, path_length: PathLength, carries: Bools) -> None:
         n = len(carries)
         index = np.arange(n, dtype=np.int32)
         before = shifted(carries)
@@ -142,19 +142,19 @@ class MotionRuns:
         self.stop = np.minimum(stop, np.int32(n - 1))
 
         # motions that only turn the tool do not hide the corner that they are on: the last direction counts
-        latest = self.latest(way.moved & carries)
-        self.smooth = carries & before & way.begins
+        latest = self.latest(path_length.moved & carries)
+        self.smooth = carries & before & path_length.starts
 
-        def turned(rows: slice) -> None:
+        def mark_corners(rows: slice) -> None:
             inner = rows.start + np.flatnonzero(self.smooth[rows])
             lead = latest[inner - 1]
-            heading = np.where((lead >= 0)[:, None], way.tangent(np.maximum(lead, 0), 1.0), np.nan)
-            cosine = np.einsum("ni,ni->n", heading, way.tangent(inner, 0.0))
+            heading = np.where((lead >= 0)[:, None], path_length.tangent(np.maximum(lead, 0), 1.0), np.nan)
+            cosine = np.einsum("ni,ni->n", heading, path_length.tangent(inner, 0.0))
             self.smooth[inner[cosine <= np.cos(SMOOTH_TURN)]] = (
                 False  # not where there is no turn to speak of
             )
 
-        for _ in in_blocks(turned, n):
+        for _ in in_blocks(mark_corners, n):
             pass
 
     def latest(self, mask: Bools) -> Ints:
@@ -165,9 +165,9 @@ class MotionRuns:
         """
         sides = len(mask) // max(len(self.start), 1)
         index = np.arange(len(mask), dtype=np.int32)
-        found = np.maximum.accumulate(np.where(mask, index, np.int32(-1)))
-        found[found < np.repeat(np.int32(sides) * self.start, sides)] = -1
-        return found
+        entry = np.maximum.accumulate(np.where(mask, index, np.int32(-1)))
+        entry[entry < np.repeat(np.int32(sides) * self.start, sides)] = -1
+        return entry
 
     def coming(self, mask: Bools) -> Ints:
         """The next entry of ``mask`` (N,), or (2 N,), at or after each, within its run, in the same shape; -1 if there
@@ -175,9 +175,9 @@ class MotionRuns:
         n = len(mask)
         sides = n // max(len(self.start), 1)
         index = np.arange(n, dtype=np.int32)
-        found = np.minimum.accumulate(np.where(mask, index, np.int32(n))[::-1])[::-1]
-        found[found >= np.repeat(np.int32(sides) * (self.stop + np.int32(1)), sides)] = -1
-        return found
+        entry = np.minimum.accumulate(np.where(mask, index, np.int32(n))[::-1])[::-1]
+        entry[entry >= np.repeat(np.int32(sides) * (self.stop + np.int32(1)), sides)] = -1
+        return entry
 
 
 def shifted(mask: Bools) -> Bools:

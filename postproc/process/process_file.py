@@ -91,12 +91,12 @@ def read_process(path: Path) -> tuple[Operation, ...]:
     if not sections:
         message = "contains no operation" if "operations" in top else "the key 'operations' is missing"
         raise top.error("YML003", message, help="operations: [{name: ..., diameter: ..., teeth: ...}, ...]")
-    found: list[Operation] = []
+    operations: list[Operation] = []
     for section in sections:
         operation = _operation(section, defaults)
-        _check_apart(section, operation, found)
-        found.append(operation)
-    return tuple(found)
+        _check_apart(section, operation, operations)
+        operations.append(operation)
+    return tuple(operations)
 
 
 def _operation(section: YamlSection, defaults: YamlSection) -> Operation:
@@ -113,14 +113,14 @@ def _operation(section: YamlSection, defaults: YamlSection) -> Operation:
     own = _Values(section, defaults)
     diameter = own.number("diameter") * MM
     material = _material(own)
-    entry, leave = _engagement(own, diameter)
+    entry, exit_angle = _engagement(own, diameter)
     cut = Engagement(
         diameter=diameter,
         teeth=_whole(own.place("teeth"), "teeth", _MOST_TEETH),
         helix=own.number("helix") * DEG,
         depth=own.number("axial_depth") * MM,
         entry=entry,
-        exit=leave,
+        exit=exit_angle,
         coefficients=material.coefficients,
     )
     return Operation(
@@ -181,9 +181,9 @@ def _material(own: _Values) -> Material:
         if "material" in section and "coefficients" in section:
             raise section.error("YML004", "excludes 'material'; state only one of them", "coefficients")
         if "coefficients" in section:
-            held = section.section("coefficients")
-            held.only(*CUTTING, *EDGE, "source")
-            return _with_interval(stated_coefficients(held), own)
+            coefficients = section.section("coefficients")
+            coefficients.only(*CUTTING, *EDGE, "source")
+            return _with_interval(stated_coefficients(coefficients), own)
         if "material" in section:
             name = section.text("material")
             material = find_material(name)

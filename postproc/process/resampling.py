@@ -47,16 +47,18 @@ class ForceReadings:
     @cached_property
     def second(self) -> tuple[Floats, Floats]:
         """(M - 2,) the squares of the second differences of force and moment."""
-        found = np.zeros((2, max(len(self.at) - 2, 0)))
+        differences = np.zeros((2, max(len(self.at) - 2, 0)))
 
         def differ(part: slice) -> None:
             values = self.values[part.start : part.stop + 2]
             squares = (values[:-2] - 2 * values[1:-1] + values[2:]) ** 2
-            found[0, part], found[1, part] = (np.sum(squares[:, kind], axis=1) for kind in (FORCE, MOMENT))
+            differences[0, part], differences[1, part] = (
+                np.sum(squares[:, kind], axis=1) for kind in (FORCE, MOMENT)
+            )
 
-        for _ in in_blocks(differ, found.shape[1]):
+        for _ in in_blocks(differ, differences.shape[1]):
             pass
-        return found[0], found[1]
+        return differences[0], differences[1]
 
     @cached_property
     def total(self) -> tuple[Floats, Floats]:
@@ -108,18 +110,21 @@ def resampled(readings: ForceReadings) -> tuple[Floats, Floats, Floats, Floats]:
 
 def _resampled(readings: ForceReadings, rows: slice) -> tuple[Floats, Floats, Floats, Floats]:
     n, part = rows.stop - rows.start, readings.of(rows)
-    begin, end = readings.start[rows], readings.end[rows]
+    motion_start, end = readings.start[rows], readings.end[rows]
     at, values, own = readings.at[part], readings.values[part], readings.own[part] - rows.start
-    half = 2 * own + (at >= 0.5 * (begin + end)[own])
+    half = 2 * own + (at >= 0.5 * (motion_start + end)[own])
     count, mean = means(half, np.column_stack([at, values]), 2 * n)
     both, x, y = count.reshape(n, 2), mean[:, 0].reshape(n, 2), mean[:, 1:].reshape(n, 2, 6)
     some = both.any(axis=1)
 
-    low, high = np.searchsorted(readings.at, begin[0]), np.searchsorted(readings.at, end[-1], side="right")
+    low, high = (
+        np.searchsorted(readings.at, motion_start[0]),
+        np.searchsorted(readings.at, end[-1], side="right"),
+    )
     near = slice(max(int(low) - 1, 0), int(high) + 1)
     start, value = (
         np.stack([np.interp(to, readings.at[near], channel) for channel in readings.values[near].T], axis=1)
-        for to in (begin, end)
+        for to in (motion_start, end)
     )
     total, whole = means(own, values, n)
     start[some], value[some] = whole[some], whole[some]
@@ -130,10 +135,10 @@ def _resampled(readings: ForceReadings, rows: slice) -> tuple[Floats, Floats, Fl
     clear = np.any(apart > CLEAR * expected, axis=1) & np.all(both >= FEW, axis=1)
     line = np.flatnonzero(clear & (x[:, 1] > x[:, 0]))
     slope = (y[line, 1] - y[line, 0]) / (x[line, 1] - x[line, 0])[:, None]
-    start[line] = y[line, 0] + slope * (begin[line] - x[line, 0])[:, None]
+    start[line] = y[line, 0] + slope * (motion_start[line] - x[line, 0])[:, None]
     value[line] = y[line, 1] + slope * (end[line] - x[line, 1])[:, None]
 
-    # the mean points lie a quarter of the way from the ends: there the line has 5 / total of the scatter's variance
+    # the mean points lie a quarter of the length from the ends: there the line has 5 / total of the scatter's variance
     variance = np.ones(n)
     variance[line] = 5.0
     error = scatter[:, 0] * np.sqrt(variance / np.maximum(total, 1))
@@ -155,20 +160,20 @@ def uneven(readings: ForceReadings, start: Floats, value: Floats) -> tuple[Ints,
 
     for _ in in_blocks(off, n):
         pass
-    found = np.flatnonzero(worst > 0)
-    return found, worst[found]
+    motions = np.flatnonzero(worst > 0)
+    return motions, worst[motions]
 
 
 def _off(readings: ForceReadings, rows: slice, start: Floats, value: Floats, largest: float) -> Floats:
     """(K,) how far off the motions ``rows`` are, 0 where they are even."""
     part = readings.of(rows)
-    own, begin = readings.own[part] - rows.start, readings.start[rows]
-    length = (readings.end[rows] - begin)[own]
-    share = (readings.at[part] - begin[own]) / np.where(length > 0, length, 1.0)
+    own, motion_start = readings.own[part] - rows.start, readings.start[rows]
+    length = (readings.end[rows] - motion_start)[own]
+    share = (readings.at[part] - motion_start[own]) / np.where(length > 0, length, 1.0)
     line = (1 - share)[:, None] * start[own] + share[:, None] * value[own]
     off = readings.values[part, FORCE] - line
     quarter = 4 * own + np.clip(4 * share, 0, 3).astype(np.int64)
-    count, both = means(quarter, np.column_stack([off, off**2]), 4 * len(begin))
+    count, both = means(quarter, np.column_stack([off, off**2]), 4 * len(motion_start))
     mean, square = both[:, :3], both[:, 3:]
     error = np.sqrt(np.maximum(square - mean**2, 0).sum(axis=1) / np.maximum(count - 1, 1))
     distance = np.linalg.norm(mean, axis=1)

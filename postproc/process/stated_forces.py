@@ -30,8 +30,8 @@ class StatedForces:
 
     ``values`` (K, 6): where the motion ends; ``start`` (K, 6): where it starts (the same where it is not given), linear
     in between.  Of the motions: ``ci95`` (N,), half width of the 95 % interval of the force as a share of it; ``peak``
-    (N,) [N], the largest force on the way.  NaN where not known, None where known of no motion.  ``error`` (N,) [N]:
-    standard error of the force at the ends, where it was measured.  ``radius`` (N,) [m]: of the cutter, where the
+    (N,) [N], the largest force along the path.  NaN where not known, None where known of no motion.  ``error`` (N,)
+    [N]: standard error of the force at the ends, where it was measured.  ``radius`` (N,) [m]: of the cutter, where the
     process states it.
     """
 
@@ -60,7 +60,7 @@ class StatedForces:
                 object.__setattr__(self, name, frozen(getattr(self, name), shape))
 
     @property
-    def begin(self) -> Floats:
+    def start_values(self) -> Floats:
         """(K, 6) the wrench where a motion starts."""
         return self.values if self.start is None else self.start
 
@@ -81,7 +81,7 @@ class StatedForces:
     def any(self, channels: Sequence[int]) -> Bools:
         """(N,) the motion has a part in one of the ``channels`` at either end."""
         acts = np.zeros(len(self.values), bool)
-        for wrenches in (self.values, self.begin):
+        for wrenches in (self.values, self.start_values):
             for channel in channels:
                 acts |= wrenches[:, channel] != 0
         return acts[self.row]
@@ -130,7 +130,7 @@ def is_number_like(word: str) -> bool:
 def is_force_word(word: str) -> bool:
     """Whether a word of the command line is the value of --force: a list of numbers, or a CSV or YAML file.
 
-    A list counts whatever its length, so that a wrong one is told rather than taken for a program's name.
+    A list counts whatever its length, so that a wrong one is reported rather than taken for a program's name.
     """
     if word.lower().endswith((".csv", ".yaml", ".yml")):
         return True

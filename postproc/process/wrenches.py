@@ -34,8 +34,8 @@ CLEAR = 4.0
 class Wrenches:
     """What the workpiece does to the tool, at the TCP, in the axes of the robot root [N, N m].
 
-    values (N, 6): at the end point of each motion; start (N, 6): where it leaves the end point before it (the same
-    as there, unless the force steps at that vertex; only where it is another is it kept); both without ``ramps``.
+    values (N, 6): at the end point of each motion; start (N, 6): at the end point before it (the same
+    as there, unless the force steps at that vertex; stored only where it is another); both without ``ramps``.
     ``along`` states what acts there and between.  carries (N,): the motion was given a force (even where both sides of
     its end point cancel).
     steps (N,): it carries force, and the wrench does not go over from the motion before: a cut starts, the path turns
@@ -120,7 +120,7 @@ class Wrenches:
         )
 
     def along(self, rows: Ints, fraction: Floats) -> Floats:
-        """(K, 6) the wrench at the shares ``fraction`` (K,), 0 to 1, of the way of the motions ``rows`` (K,).
+        """(K, 6) the wrench at the shares ``fraction`` (K,), 0 to 1, of the path of the motions ``rows`` (K,).
 
         Linear between ``start`` and ``values``, with what ``ramps`` add.  On an arc a force stated in the feed frame or
         the tool frame is linear in that frame, which turns with the tangent or with the tool.
@@ -128,9 +128,9 @@ class Wrenches:
         share = fraction[:, None]
         wrench = (1 - share) * self.start[rows] + share * self.values[rows]
         if self.turning is not None:
-            bent = np.flatnonzero(self.turning.mask[rows])
-            at = rows[bent]
-            wrench[bent] = self.turning.along(at, fraction[bent], self.start[at], self.values[at])
+            turned = np.flatnonzero(self.turning.mask[rows])
+            at = rows[turned]
+            wrench[turned] = self.turning.along(at, fraction[turned], self.start[at], self.values[at])
         if self.ramps is not None:
             wrench += self.ramps.at(rows, fraction)
         return wrench
@@ -167,18 +167,20 @@ class Turning:
     def along(self, rows: Ints, fraction: Floats, start: Floats, values: Floats) -> Floats:
         """(K, 6) C(t) ((1 - t) C(0)^T start + t C(1)^T values) [N, N m] at the shares ``fraction`` (K,) of motions
         ``rows`` (K,), ``start`` and ``values`` (K, 6), with the frame C in the robot's axes."""
-        # tool in the robot where the motion starts, and how it turns on the way
-        begin, end = (self.base_in_robot[at] @ self.tool_in_base[at] for at in (rows - 1, rows))
+        # tool in the robot where the motion starts, and how it turns along the path
+        first_rotation, last_rotation = (
+            self.base_in_robot[at] @ self.tool_in_base[at] for at in (rows - 1, rows)
+        )
         arc = self.arc_turn(rows)
-        turn = turn_beside(begin, end, arc)
+        turn = turn_beside(first_rotation, last_rotation, arc)
 
         def axes(share: Floats) -> Floats:
             """(K, 3, 3): the rows of a matrix are the axes of the frame."""
-            found = np.swapaxes(turning(begin, turn, arc, share), 1, 2)
+            matrices = np.swapaxes(turning(first_rotation, turn, arc, share), 1, 2)
             chosen = np.flatnonzero(self.feed[rows])
             if self.frames is not None and len(chosen):
-                found[chosen] = self.frames.along(rows[chosen], share[chosen])
-            return found
+                matrices[chosen] = self.frames.along(rows[chosen], share[chosen])
+            return matrices
 
         first, here, last = axes(0 * fraction), axes(fraction), axes(0 * fraction + 1)
         share = fraction[:, None, None]
@@ -211,19 +213,19 @@ def turn_to_robot_axes(
     if not np.any(carries):
         return Wrenches.zero(len(toolpath), source, findings)
     _check_world(stated, carries, toolpath, frames, file)
-    way = PathLength(toolpath, frames)
-    runs = MotionRuns(way, carries)
+    path_length = PathLength(toolpath, frames)
+    runs = MotionRuns(path_length, carries)
     feed = None
     if np.any(carries & (stated.frames == FEED)):
-        feed = FeedFrames(stated, toolpath, frames, way, runs, carries, file)
+        feed = FeedFrames(stated, toolpath, frames, path_length, runs, carries, file)
         findings = (*findings, *feed.findings)
-    turn = _WrenchTurning(stated, toolpath, frames, cell, way, feed)
+    turn = _WrenchTurning(stated, toolpath, frames, cell, path_length, feed)
 
     n = len(toolpath)
     values, start = np.zeros((n, 6)), np.zeros((n, 6))
     placed, steps = np.zeros(n, bool), carries.copy()
 
-    def ended(part: slice) -> float:
+    def fill_ends(part: slice) -> float:
         """The wrenches of both sides of no vertex shared yet; the square of the largest force."""
         rows = part.start + np.flatnonzero(carries[part])
         own = turn.at_end(rows, stated.values)
@@ -232,18 +234,18 @@ def turn_to_robot_axes(
         values[rows], placed[rows] = own, ~unknown
         return _largest(own)
 
-    largest = float(np.sqrt(max(in_blocks(ended, n))))
+    largest = float(np.sqrt(max(in_blocks(fill_ends, n))))
 
-    def begun(part: slice) -> None:
+    def fill_starts(part: slice) -> None:
         rows = part.start + np.flatnonzero(carries[part])
         # where no vertex is known to start at, the end's pose has to serve
         leaving = np.full((len(rows), 6), np.nan)
-        starts = way.begins[rows]
-        leaving[starts] = turn.at_begin(rows[starts], stated.begin)
+        starts = path_length.starts[rows]
+        leaving[starts] = turn.at_start(rows[starts], stated.start_values)
         lost = np.isnan(leaving[:, 0])
-        instead = turn.at_end(rows[lost], stated.begin)
+        instead = turn.at_end(rows[lost], stated.start_values)
         unknown = np.isnan(instead[:, 0])
-        instead[unknown] = turn.unturned(rows[lost][unknown], stated.begin)
+        instead[unknown] = turn.unturned(rows[lost][unknown], stated.start_values)
         leaving[lost] = instead
         start[rows] = leaving
 
@@ -259,10 +261,10 @@ def turn_to_robot_axes(
         values[after - 1] = start[after] = 0.5 * (own[even] + leaving[even])
         steps[after] = False
 
-    for _ in in_blocks(begun, n):
+    for _ in in_blocks(fill_starts, n):
         pass
-    for made in (values, start, steps):
-        made.setflags(write=False)
+    for array in (values, start, steps):
+        array.setflags(write=False)
     return Wrenches(
         values,
         start,
@@ -322,21 +324,21 @@ class _WrenchTurning:
         toolpath: Toolpath,
         frames: MotionFrames,
         cell: Cell,
-        way: PathLength,
+        path_length: PathLength,
         feed: FeedFrames | None,
     ) -> None:
         self.stated = stated
         self.base_in_robot = frames.base_in_robot.rotation
         self.tool_in_base = toolpath.rotation
         self.world_in_robot = cell.robot_base.rotation.T
-        self.way = way
+        self.path_length = path_length
         self.feed = feed
 
     def at_end(self, rows: Ints, values: Floats) -> Floats:
         """(M, 6) ``values`` (K, 6) of ``rows`` (M,) at their end poses; NaN where that cannot be known."""
         return self._turned(rows, values, 1)
 
-    def at_begin(self, rows: Ints, values: Floats) -> Floats:
+    def at_start(self, rows: Ints, values: Floats) -> Floats:
         """(M, 6) the same at the poses in which they start, the end poses of the rows before."""
         return self._turned(rows, values, 0)
 
@@ -351,12 +353,12 @@ class _WrenchTurning:
         frame = self.stated.frames
         framed = frame == TOOL
         if self.feed is not None:
-            framed |= (frame == FEED) & (self.feed.matters | self.way.turns_along)
-        mask = carries & framed & self.way.arc & self.way.begins
+            framed |= (frame == FEED) & (self.feed.matters | self.path_length.turns_along)
+        mask = carries & framed & self.path_length.arc & self.path_length.starts
         if not mask.any():
             return None
         return Turning(
-            mask, frame == FEED, self.feed, self.base_in_robot, self.tool_in_base, self.way.arc_turn
+            mask, frame == FEED, self.feed, self.base_in_robot, self.tool_in_base, self.path_length.arc_turn
         )
 
     def _turned(self, rows: Ints, values: Floats, side: int) -> Floats:
@@ -383,10 +385,10 @@ class _WrenchTurning:
         at = rows - (1 - side)
         in_base = np.einsum("nij,nkj->nki", self.tool_in_base[at], pairs)
         turned = np.einsum("nij,nkj->nki", self.base_in_robot[at], in_base)
-        return np.where(self.way.known[at][:, None, None], turned, np.nan)
+        return np.where(self.path_length.known[at][:, None, None], turned, np.nan)
 
     def _feed(self, pairs: Floats, rows: Ints, side: int) -> Floats:
         if self.feed is None:
             raise ValueError("forces in the feed frame need feed frames")
         turned = np.einsum("nki,nij->nkj", pairs, self.feed.end(rows, side))
-        return np.where(self.way.known[rows - (1 - side)][:, None, None], turned, np.nan)
+        return np.where(self.path_length.known[rows - (1 - side)][:, None, None], turned, np.nan)

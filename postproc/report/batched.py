@@ -115,8 +115,8 @@ class Batched:
     @property
     def counts(self) -> dict[str, int]:
         """State -> programs, of all states."""
-        found = Counter(outcome.state for outcome in self.outcomes)
-        return {state: found[state] for state in STATES}
+        by_state = Counter(outcome.state for outcome in self.outcomes)
+        return {state: by_state[state] for state in STATES}
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public.  It states no times: the same run gives the same result."""

@@ -36,9 +36,9 @@ USUAL = 10.0
 
 @dataclass(frozen=True, eq=False)
 class NextPoses:
-    """Poses worth measuring next: they tell the explanations ``between`` apart.  readings: still to be taken;
-    separation: standard deviations by which they show that the first is no case of the second, and the other way
-    round."""
+    """Poses worth measuring next: they distinguish the explanations ``between``.  readings: still to be taken;
+    separation: standard deviations by which they show that the first is no case of the second, and vice
+    versa."""
 
     readings: Readings
     between: tuple[Candidate, Candidate]
@@ -110,10 +110,10 @@ class Diagnosed:
         return tuple(named for named in self.verdict.named if named.candidate.key not in ambiguous)
 
     @property
-    def lacking(self) -> bool:
-        """Whether the residual clearly exceeds the scatter, with all that was found."""
-        found = self.diagnosis.search
-        return reduced_chi2_of(found, found.explained)[1] or bool(self.verdict.remainder)
+    def scatter_exceeded(self) -> bool:
+        """Whether the residual clearly exceeds the scatter, with all effects found."""
+        search = self.diagnosis.search
+        return reduced_chi2_of(search, search.explained)[1] or bool(self.verdict.remainder)
 
     # Residuals.
 
@@ -154,7 +154,7 @@ class Diagnosed:
         return float(np.sqrt(3 * np.mean(noise.sigma**2) * (1.0 if noise.known else self.final.factor)))
 
     def gap_mm(self) -> dict[str, float]:
-        """Root mean squares of residuals, and the scatter of the readings; what is not known is left out."""
+        """Root mean squares of residuals, and the scatter of the readings; what is not known is omitted."""
         gap = gap_of(self.lengths, self.final.noise)
         return {key: gap[key] for key in GAP if key in gap}
 
@@ -181,7 +181,7 @@ class Diagnosed:
 
     @property
     def detectable(self) -> float | None:
-        """[m] Root mean square from which on ``NEARLY_ALL`` candidates that were not found would have been."""
+        """[m] Root mean square from which on ``NEARLY_ALL`` candidates that were not found would have been found."""
         shown = sorted(one.rms for one in self._smallest if np.isfinite(one.rms))
         return float(np.quantile(shown, NEARLY_ALL)) if shown else None
 
@@ -285,12 +285,12 @@ def _candidate(candidate: Candidate) -> dict[str, object]:
 
 
 def _parameter(estimate: Estimate) -> dict[str, object]:
-    told: dict[str, object] = {
+    entry: dict[str, object] = {
         "value": estimate.value,
         "ci95": _finite(estimate.ci95),
         "unit": estimate.unknown.parameter.unit,
     }
-    return told | ({"at_bound": True} if estimate.at_bound else {})
+    return entry | ({"at_bound": True} if estimate.at_bound else {})
 
 
 def _refitted(estimate: Estimate) -> dict[str, object]:

@@ -160,15 +160,15 @@ def betrayals(result: Diagnosed) -> list[Betrayal]:
 
 def _along(fitted: Fit) -> dict[str, tuple[ResidualVariable, Floats, bool]]:
     """Of each variable that residuals are screened by: its values, the residuals [mm], whether along a turn."""
-    residual, found = fitted.point.residual[:, :3], {}
+    residual, screened = fitted.point.residual[:, :3], {}
     for name, values, turns, (unit, size) in patterns(fitted, fitted.campaign):
         if turns is None:
             along = np.sqrt(np.nansum(residual**2, axis=1))
         else:
             length = np.maximum(np.linalg.norm(turns, axis=1), 1e-12)
             along = np.nansum(residual * turns, axis=1) / length
-        found[name] = (ResidualVariable(name, unit, values / size), along / MM, turns is not None)
-    return found
+        screened[name] = (ResidualVariable(name, unit, values / size), along / MM, turns is not None)
+    return screened
 
 
 def _betrayed(axes: Axes, betrayal: Betrayal, result: Diagnosed) -> None:
@@ -243,7 +243,7 @@ def _rms(lengths: Floats) -> float:
 def _title(result: Diagnosed) -> str:
     gap, campaign = result.gap_mm(), result.final.campaign
     of = f"{len(campaign)} readings at {campaign.poses} poses"
-    told = f"{gap['before_rms_mm']:.3f} mm RMS before, {gap['after_rms_mm']:.3f} mm after"
+    residuals = f"{gap['before_rms_mm']:.3f} mm RMS before, {gap['after_rms_mm']:.3f} mm after"
     if "held_out_after_rms_mm" in gap:
-        told += f", {gap['held_out_after_rms_mm']:.3f} mm on held-out poses"
-    return f"{result.robot}, {of}: {told}\n{fill(headline(result), LINE)}"
+        residuals += f", {gap['held_out_after_rms_mm']:.3f} mm on held-out poses"
+    return f"{result.robot}, {of}: {residuals}\n{fill(headline(result), LINE)}"

@@ -57,14 +57,14 @@ FAR_OFF = 1.5
 
 def paragraph(result: Diagnosed) -> str:
     """The verdict, its uncertainty, its limits."""
-    told = {
+    sentences = {
         "nothing_missing": _nothing_missing,
         "named": _named,
         "partly_named": _named,
         "ambiguous": _ambiguous,
         "unknown": _unknown,
     }[result.verdict.word](result)
-    return " ".join([*told, *_conditional(result), *_not_tested(result)])
+    return " ".join([*sentences, *_conditional(result), *_not_tested(result)])
 
 
 def headline(result: Diagnosed) -> str:
@@ -72,16 +72,16 @@ def headline(result: Diagnosed) -> str:
     verdict = result.verdict
     names = ", ".join(named.candidate.label for named in result.clear)
     sets = "; ".join(" or ".join(c.label for c in one) for one in verdict.alternatives)
-    told = {
+    words = {
         "nothing_missing": "nothing missing" + (", but parameters have moved" if verdict.refitted else ""),
         "named": f"named: {names}",
         "partly_named": f"partly named: {names}",
         "ambiguous": f"ambiguous: {sets}{f'; named: {names}' if names else ''}",
         "unknown": "unknown: no effect that was tried explains the residual"
-        if result.lacking
+        if result.scatter_exceeded
         else "unknown: not clear whether an effect is missing",
     }[verdict.word]
-    return f"{told} (if the residual is scatter)" if verdict.conditional else told
+    return f"{words} (if the residual is scatter)" if verdict.conditional else words
 
 
 def _nothing_missing(result: Diagnosed) -> Iterator[str]:
@@ -158,7 +158,7 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
 
 def _unknown(result: Diagnosed) -> Iterator[str]:
     search = result.diagnosis.search
-    if not result.lacking:
+    if not result.scatter_exceeded:
         yield "It is not clear whether an effect is missing."
     else:
         yield (
@@ -200,8 +200,10 @@ def _missing(result: Diagnosed, several: Sequence[Named]) -> Iterator[str]:
 def _fixed(named: Named) -> str:
     """``s0 (fixed at 300 mm)``"""
     units = {u.parameter.name: shown_unit(u.parameter.unit) for u in named.candidate.unknowns}
-    told = [f"{name} (fixed at {value / units[name][1]:.4g} {units[name][0]})" for name, value in named.fixed]
-    return _list(told)
+    entries = [
+        f"{name} (fixed at {value / units[name][1]:.4g} {units[name][0]})" for name, value in named.fixed
+    ]
+    return _list(entries)
 
 
 def noun(named: Named) -> str:
@@ -215,10 +217,10 @@ def _parameters(named: Named) -> str:
     several = sorted(
         named.estimates, key=lambda e: e.ci95 / max(abs(e.value - e.unknown.parameter.null), 1e-300)
     )
-    told = [f"{e.unknown.parameter.name} = {with_interval(e)}" for e in several[:PARAMETERS]]
+    entries = [f"{e.unknown.parameter.name} = {with_interval(e)}" for e in several[:PARAMETERS]]
     if len(several) > PARAMETERS:
-        told.append(f"{len(several) - PARAMETERS} more below")
-    return ", ".join(told)
+        entries.append(f"{len(several) - PARAMETERS} more below")
+    return ", ".join(entries)
 
 
 def with_interval(estimate: Estimate) -> str:
@@ -245,10 +247,10 @@ def _closed(result: Diagnosed) -> Iterator[str]:
     if not np.isfinite(before + after):
         return
     if after >= before:
-        kept, others = _most_poses(result)
-        if kept < before:
+        without_worst, others = _most_poses(result)
+        if without_worst < before:
             yield (
-                f"On held-out poses the residual falls from {_mm(before)} to {_mm(kept)} mm RMS, except at"
+                f"On held-out poses the residual falls from {_mm(before)} to {_mm(without_worst)} mm RMS, except at"
                 f" {count(others, 'pose')} that can not be held out: the other poses do not show what"
                 f" {'it shows' if others == 1 else 'they show'}."
             )
@@ -268,10 +270,10 @@ def _closed(result: Diagnosed) -> Iterator[str]:
 
 def _most_poses(result: Diagnosed) -> tuple[float, int]:
     """[m] root mean square of the residuals of held-out poses, without the worst of them, and how many those are."""
-    pose, left = result.final.campaign.pose, result.lengths["held_out_after"]
-    squares = np.array([np.nansum(left[pose == k] ** 2) for k in range(result.final.campaign.poses)])
+    pose, residual = result.final.campaign.pose, result.lengths["held_out_after"]
+    squares = np.array([np.nansum(residual[pose == k] ** 2) for k in range(result.final.campaign.poses)])
     worst = np.argsort(-squares)[: max(1, len(squares) // KEY)]
-    rest = left[~np.isin(pose, worst)]
+    rest = residual[~np.isin(pose, worst)]
     return float(np.sqrt(np.nanmean(rest**2))), len(worst)
 
 
@@ -297,27 +299,27 @@ def _nearest(several: Sequence[Named]) -> Iterator[str]:
 
 
 def _rest(result: Diagnosed) -> Iterator[str]:
-    """The residual, where that is no lack of fit."""
-    left = _mm(result.rms["after"])
+    """The residual, where the fit is adequate."""
+    residual = _mm(result.rms["after"])
     if result.verdict.conditional:
         return
     if result.verdict.reduced_chi2 < OVERSTATED:
         yield (
-            f"The residual, {left} mm RMS, is clearly smaller than the scatter ({_mm(result.scatter)} mm, from:"
+            f"The residual, {residual} mm RMS, is clearly smaller than the scatter ({_mm(result.scatter)} mm, from:"
             f" {result.final.noise.source}): if that is overstated, it hides small effects."
         )
     elif result.rms["after"] > FAR_OFF * result.scatter:
         yield (
-            f"The residual is {left} mm RMS where readings scatter by {_mm(result.scatter)} mm: a few of them are far"
-            " off, the others agree with the scatter."
+            f"The residual is {residual} mm RMS where readings scatter by {_mm(result.scatter)} mm: a few of them"
+            " are far off, the others agree with the scatter."
         )
     else:
-        yield f"The residual, {left} mm RMS, is the scatter of the readings ({_mm(result.scatter)} mm)."
+        yield f"The residual, {residual} mm RMS, is the scatter of the readings ({_mm(result.scatter)} mm)."
 
 
 def _more(result: Diagnosed, start: str, fit: str) -> Iterator[str]:
     """The part that a fit does not explain."""
-    if result.lacking:
+    if result.scatter_exceeded:
         yield (
             f"{start} the residual is {_mm(result.rms[fit])} mm RMS{_against_scatter(result)}, and none of the"
             f" {len(result.tried)} effects that were tried explains the rest."
@@ -359,14 +361,14 @@ def _moved_too(result: Diagnosed) -> Iterator[str]:
 def _changes(moved: Sequence[Estimate]) -> str:
     """``c2 from 0.302 to 0.268 +- 0.003 urad/(N m)``, those that moved most in their interval first."""
     several = sorted(moved, key=lambda e: -abs(e.value - e.unknown.value) / max(e.ci95, 1e-300))[:PARAMETERS]
-    told = []
+    entries = []
     for name, estimate in zip(_once([e.unknown.name for e in several]), several, strict=True):
         _, size = shown_unit(estimate.unknown.parameter.unit)
         before = fixed(estimate.unknown.value / size, estimate.ci95 / size)
-        told.append(f"{name} from {before} to {with_interval(estimate)}")
+        entries.append(f"{name} from {before} to {with_interval(estimate)}")
     if len(moved) > PARAMETERS:
-        told.append(f"{len(moved) - PARAMETERS} more below")
-    return ", ".join(told)
+        entries.append(f"{len(moved) - PARAMETERS} more below")
+    return ", ".join(entries)
 
 
 def _against_scatter(result: Diagnosed) -> str:

@@ -59,18 +59,18 @@ class _Hunks:
 def unified_diff(document: Document, name: str, edits: Iterable[Edit], written: bytes) -> Iterator[bytes]:
     """The change of one document into ``written`` by ``edits``, in parts; every changed line is before its new form
     (lines keep their bytes, CR included)."""
-    found = Edits.joined(edits)
-    if not found:
+    joined = Edits.joined(edits)
+    if not joined:
         return
     old, new = _DiffLines(document), _DiffLines(Document(document.path, written))
-    blocks = _blocks(old, new, found)
+    blocks = _blocks(old, new, joined)
     hunks = _hunks(old, blocks)
     yield b"--- %s\n+++ %s\n" % (os.fsencode(document.path.name), os.fsencode(name))
     yield from in_blocks(lambda rows: _part(old, new, hunks, blocks, rows), len(blocks), BLOCKS)
 
 
 class _DiffLines:
-    """The lines of a text, with their endings; one without an ending has what diff says of it."""
+    """The lines of a text, with their endings; one without an ending has the note that diff writes."""
 
     def __init__(self, document: Document) -> None:
         self.raw, self.starts = document.raw, document.line_starts
@@ -107,10 +107,10 @@ def _apart(raw: bytes, edits: Edits) -> Iterator[tuple[int, int]]:
         high = low + EDITS
         while high < len(edits):
             line = raw.find(b"\n", int(edits.stop[high - 1])) + 1 or len(raw) + 1
-            behind = bisect_left(edits.start, line)
-            if behind == high:
+            after = bisect_left(edits.start, line)
+            if after == high:
                 break
-            high = behind
+            high = after
         high = min(high, len(edits))
         yield low, high
         low = high
@@ -118,18 +118,18 @@ def _apart(raw: bytes, edits: Edits) -> Iterator[tuple[int, int]]:
 
 def _touched(old: _DiffLines, edits: Edits, low: int, high: int) -> Ints:
     """(3, B) first and last line of the blocks of the edits low .. high - 1, and the lines by which each grows."""
-    at, last = _joined(old, edits, low, high)
+    at, last = _abutting_edits(old, edits, low, high)
     start, stop, ends = edits.start[at], edits.stop[last], edits.ends[np.append(at, high)]
-    first, behind = old.of(start), old.of(stop)
-    cut, at_begin, to_begin = stop > start, old.starts[first] == start, old.starts[behind] == stop
-    ended, emptied = _ended(edits.texts, ends[:-1], ends[1:]), ends[1:] == ends[:-1]
-    last = np.where(cut & to_begin, behind - 1, behind)
+    first, stop_line = old.of(start), old.of(stop)
+    cut, at_start, to_start = stop > start, old.starts[first] == start, old.starts[stop_line] == stop
+    ended, emptied = _end_lines(edits.texts, ends[:-1], ends[1:]), ends[1:] == ends[:-1]
+    last = np.where(cut & to_start, stop_line - 1, stop_line)
     breaks = np.flatnonzero(np.frombuffer(edits.texts, np.uint8)[ends[0] : ends[-1]] == _LF) + int(ends[0])
-    growth = np.diff(np.searchsorted(breaks, ends)) - (behind - first)
+    growth = np.diff(np.searchsorted(breaks, ends)) - (stop_line - first)
     # Whole lines that are inserted touch no line; a line whose ending goes, joins the one after it.
-    whole = ~cut & at_begin & ended
-    joined = cut & to_begin & ~(ended | (emptied & at_begin))
-    last = np.where(joined, behind, last)
+    whole = ~cut & at_start & ended
+    joined = cut & to_start & ~(ended | (emptied & at_start))
+    last = np.where(joined, stop_line, last)
     last = np.where(whole, first - 1, last)
     reached = np.maximum.accumulate(last)
     starts = np.ones(len(start), dtype=bool)
@@ -139,22 +139,24 @@ def _touched(old: _DiffLines, edits: Edits, low: int, high: int) -> Ints:
     return lines.astype(np.int32)
 
 
-def _joined(old: _DiffLines, edits: Edits, low: int, high: int) -> tuple[Ints, Ints]:
+def _abutting_edits(old: _DiffLines, edits: Edits, low: int, high: int) -> tuple[Ints, Ints]:
     """Runs of edits that abut: their first ones and their last ones.  A run ends where a line does on both sides."""
     parted = edits.start[low + 1 : high] > edits.stop[low : high - 1]
     k = np.flatnonzero(~parted) + low + 1
     start = edits.start[k]
     line = np.searchsorted(old.starts, start, side="right") - 1
-    parted[k - low - 1] = (old.starts[line] == start) & _ended(edits.texts, edits.ends[k - 1], edits.ends[k])
-    begin = np.flatnonzero(parted) + low + 1
-    return np.append(low, begin), np.append(begin, high) - 1
+    parted[k - low - 1] = (old.starts[line] == start) & _end_lines(
+        edits.texts, edits.ends[k - 1], edits.ends[k]
+    )
+    run_start = np.flatnonzero(parted) + low + 1
+    return np.append(low, run_start), np.append(run_start, high) - 1
 
 
-def _ended(texts: bytes, start: Ints, end: Ints) -> Bools:
+def _end_lines(texts: bytes, start: Ints, end: Ints) -> Bools:
     """(K,) whether each of these parts of ``texts`` ends a line; an empty one does not."""
-    found = end > start
-    found[found] = np.frombuffer(texts, np.uint8)[end[found] - 1] == _LF
-    return found
+    ends_line = end > start
+    ends_line[ends_line] = np.frombuffer(texts, np.uint8)[end[ends_line] - 1] == _LF
+    return ends_line
 
 
 def _hunks(old: _DiffLines, blocks: _Blocks) -> _Hunks:

@@ -38,8 +38,8 @@ SAME_FORCE = 0.01
 
 @dataclass(frozen=True)
 class Sum:
-    """Parameters that only show together: ``of`` name -> weight, of which the first is found and the others are fixed;
-    ``value`` and ``ci95`` (SI) of their sum."""
+    """Parameters that only show together: ``of`` name -> weight, of which the first is identified and the others are
+    fixed; ``value`` and ``ci95`` (SI) of their sum."""
 
     of: Mapping[str, float]
     value: float
@@ -69,7 +69,7 @@ class Identified:
     folds: int
     validation: Validation | None
     outliers: tuple[Outlier, ...]
-    outliers_left_out: bool
+    outliers_excluded: bool
     bootstrap: Bootstrap | None
     findings: tuple[Finding, ...] = ()
     outputs: tuple[str, ...] = ()
@@ -90,8 +90,8 @@ class Identified:
     def residuals(self) -> dict[str, Floats]:
         """(R, 3) [m] of all readings, under the names that ``gap`` starts with; NaN where nothing was measured."""
         known = {"before": self.before.residual, "after": self.after.residual}
-        held = {"held_out_before": self.held_out_before, "held_out_after": self.held_out_after}
-        return known | {name: values for name, values in held.items() if values is not None}
+        held_out = {"held_out_before": self.held_out_before, "held_out_after": self.held_out_after}
+        return known | {name: values for name, values in held_out.items() if values is not None}
 
     @cached_property
     def lengths(self) -> dict[str, Floats]:
@@ -112,7 +112,7 @@ class Identified:
         return {name: lengths_of(values, measured) for name, values in residuals.items()}
 
     def gap_mm(self) -> dict[str, float]:
-        """Root mean squares of residuals, and the scatter of the readings; what is not known is left out."""
+        """Root mean squares of residuals, and the scatter of the readings; what is not known is omitted."""
         return gap_of(self.lengths, self.after.noise)
 
     @property
@@ -123,7 +123,7 @@ class Identified:
 
     @cached_property
     def joints(self) -> tuple[ResidualVariable, ...]:
-        """Where each joint stood."""
+        """The position of each joint."""
         return joint_variables(self.after.campaign.readings)
 
     @cached_property
@@ -151,27 +151,27 @@ class Identified:
 
     @cached_property
     def sums(self) -> tuple[Sum, ...]:
-        """What is known of parameters that were left out because they only show together with others.
+        """What is known of parameters that were dropped because they only show together with others.
 
-        The columns of a dropped parameter d being the sum of w_i times those of parameters p_i that were found, the
+        The columns of a dropped parameter d being the sum of w_i times those of identified parameters p_i, the
         model depends on each p_i + w_i d only.
         """
         after = self.after
-        held = {u.name: after.model.terms[u.term].values[u.parameter.name] for u in after.asked}
-        found = []
+        values = {u.name: after.model.terms[u.term].values[u.parameter.name] for u in after.asked}
+        sums = []
         for estimate in after.estimates:
             name = estimate.unknown.name
             others = {
                 dropped.name: weight
                 for dropped in after.dropped
-                for kept, weight in dropped.together
-                if kept == name
+                for partner, weight in dropped.together
+                if partner == name
             }
             if others:
-                value = estimate.value + sum(weight * held[other] for other, weight in others.items())
+                value = estimate.value + sum(weight * values[other] for other, weight in others.items())
                 unit = estimate.unknown.parameter.unit
-                found.append(Sum({name: 1.0, **others}, value, estimate.ci95, unit))
-        return tuple(found)
+                sums.append(Sum({name: 1.0, **others}, value, estimate.ci95, unit))
+        return tuple(sums)
 
     @cached_property
     def correlations(self) -> tuple[tuple[str, str, float], ...]:
@@ -181,7 +181,7 @@ class Identified:
 
     @cached_property
     def bootstrap_ci95(self) -> dict[str, float]:
-        """(SI) half widths by the bootstrap, as the others are made of their deviations; {} without."""
+        """(SI) half widths by the bootstrap, from their deviations as the others; {} without."""
         if self.bootstrap is None:
             return {}
         wide = self.after.quantile * self.bootstrap.deviation
@@ -248,7 +248,7 @@ class Identified:
                 }
                 for one in self.outliers
             ],
-            "outliers_excluded": self.outliers_left_out,
+            "outliers_excluded": self.outliers_excluded,
             "findings": [finding.as_json() for finding in self.findings],
             "outputs": list(self.outputs),
             "exit": self.exit,
@@ -257,33 +257,33 @@ class Identified:
 
     def _parameter(self, estimate: Estimate) -> dict[str, object]:
         unknown = estimate.unknown
-        told: dict[str, object] = {
+        entry: dict[str, object] = {
             "value": estimate.value,
             "ci95": estimate.ci95,
             "unit": unknown.parameter.unit,
             "before": None if unknown.stated is None else unknown.value,
         }
         if unknown.name in self.bootstrap_ci95:
-            told["bootstrap_ci95"] = self.bootstrap_ci95[unknown.name]
+            entry["bootstrap_ci95"] = self.bootstrap_ci95[unknown.name]
         if estimate.at_bound:
-            told["at_bound"] = True
+            entry["at_bound"] = True
         if unknown.prior is not None:
-            told["prior"] = True
-        return told
+            entry["prior"] = True
+        return entry
 
     def _gap(self) -> dict[str, float | None]:
         known = self.gap_mm()
-        told: dict[str, float | None] = {key: known.get(key) for key in GAP}
+        gap: dict[str, float | None] = {key: known.get(key) for key in GAP}
         for name, lengths in self.lengths.items():
             size = Sizes.of(lengths)
-            told[f"{name}_mean_mm"] = mm(size.mean) if size else None
-            told[f"{name}_max_mm"] = mm(size.max) if size else None
-        return told
+            gap[f"{name}_mean_mm"] = mm(size.mean) if size else None
+            gap[f"{name}_max_mm"] = mm(size.max) if size else None
+        return gap
 
     def _validation(self) -> dict[str, object] | None:
         if self.validation is None:
             return None
-        told: dict[str, object] = {
+        entry: dict[str, object] = {
             "data": [path.name for path in self.validation.campaign.readings.files],
             "readings": len(self.validation.campaign),
             "registration_refitted": self.validation.registered_anew,
@@ -291,20 +291,20 @@ class Identified:
         for name, lengths in self.validation_lengths.items():
             size = Sizes.of(lengths)
             for key in ("rms", "mean", "max"):
-                told[f"{name}_{key}_mm"] = mm(getattr(size, key)) if size else None
-        return told
+                entry[f"{name}_{key}_mm"] = mm(getattr(size, key)) if size else None
+        return entry
 
     def _residuals(self) -> dict[str, object]:
         """Root mean squares by direction, and by parts of what the readings differ in."""
         directions: dict[str, dict[str, float | None]] = {}
         for k, axis in enumerate("xyz"):
-            told: dict[str, float | None] = {}
+            figures: dict[str, float | None] = {}
             for name, values in self.residuals.items():
                 column = values[self.counts, k]
                 column = column[np.isfinite(column)]
-                told[f"{name}_rms_mm"] = mm(np.sqrt(np.mean(column**2))) if len(column) else None
-                told[f"{name}_mean_mm"] = mm(column.mean()) if len(column) else None
-            directions[axis] = told
+                figures[f"{name}_rms_mm"] = mm(np.sqrt(np.mean(column**2))) if len(column) else None
+                figures[f"{name}_mean_mm"] = mm(column.mean()) if len(column) else None
+            directions[axis] = figures
         return {
             "direction": directions,
             "joint": {variable.name: self._by(variable) for variable in self.joints},

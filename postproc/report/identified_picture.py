@@ -166,8 +166,8 @@ def _legend(figure: Figure, result: Identified) -> None:
 
 def _title(result: Identified) -> str:
     gap, campaign = result.gap_mm(), result.after.campaign
-    told = f"{gap['before_rms_mm']:.3f} mm RMS before, {gap['after_rms_mm']:.3f} mm fitted"
+    residuals = f"{gap['before_rms_mm']:.3f} mm RMS before, {gap['after_rms_mm']:.3f} mm fitted"
     if "held_out_after_rms_mm" in gap:
-        told += f", {gap['held_out_after_rms_mm']:.3f} mm on held-out poses"
+        residuals += f", {gap['held_out_after_rms_mm']:.3f} mm on held-out poses"
     of = f"{len(campaign)} readings at {campaign.poses} poses"
-    return f"{result.robot}, {', '.join(result.effects)}: {of}\n{told}"
+    return f"{result.robot}, {', '.join(result.effects)}: {of}\n{residuals}"

@@ -25,7 +25,7 @@ IN_TABLES = frozenset({"IDN018", "IDN019", "IDN020", "IDN021", "IDN022", "IDN025
 
 
 def show_identified(console: Console, result: Identified, verbose: bool = False) -> None:
-    """The verdict, the data, the parameters, what was not found, the residuals, and findings."""
+    """The verdict, the data, the parameters, what was not identified, the residuals, and findings."""
     console.print(Text(verdict(result), style="bold"), soft_wrap=True)
     show_rows(console, ((key, Text(sanitize(value))) for key, value in _rows(result)))
     console.print(_parameters(result))
@@ -42,27 +42,31 @@ def show_identified(console: Console, result: Identified, verbose: bool = False)
 def verdict(result: Identified) -> str:
     """How many parameters were found, the residuals, and how these compare with the scatter of the readings."""
     after, gap = result.after, result.gap_mm()
-    found, asked = len(after.unknowns), len(after.asked)
-    told = f"{found} of {asked} parameters found." if found < asked else f"All {asked} parameters found."
+    identified, asked = len(after.unknowns), len(after.asked)
+    sentence = (
+        f"{identified} of {asked} parameters found."
+        if identified < asked
+        else f"All {asked} parameters found."
+    )
     if asked == 1:
-        told = "The parameter was found."
-    told += f" The residual falls from {gap['before_rms_mm']:.3f} to {gap['after_rms_mm']:.3f} mm RMS"
-    without, held = gap.get("held_out_before_rms_mm"), gap.get("held_out_after_rms_mm")
-    told += "." if held is None else f", to {held:.3f} mm on held-out poses."
-    if held is not None and without is not None and held >= without:
-        return f"{told} There the fit is no better than before: do not use it."
-    if result.outliers and not result.outliers_left_out:
-        return f"{told} {count(len(result.outliers), 'outlier')} among the readings: check these first."
+        sentence = "The parameter was found."
+    sentence += f" The residual falls from {gap['before_rms_mm']:.3f} to {gap['after_rms_mm']:.3f} mm RMS"
+    without, held_out = gap.get("held_out_before_rms_mm"), gap.get("held_out_after_rms_mm")
+    sentence += "." if held_out is None else f", to {held_out:.3f} mm on held-out poses."
+    if held_out is not None and without is not None and held_out >= without:
+        return f"{sentence} There the fit is no better than before: do not use it."
+    if result.outliers and not result.outliers_excluded:
+        return f"{sentence} {count(len(result.outliers), 'outlier')} among the readings: check these first."
     if after.freedom == 0:
-        return f"{told} There are as many unknowns as measured numbers: this proves nothing."
+        return f"{sentence} There are as many unknowns as measured numbers: this proves nothing."
     if not after.noise.known:
-        return (
-            f"{told} How much of it is scatter is not known: no SIGMA is stated and no reading is repeated."
-        )
+        return f"{sentence} How much of it is scatter is not known: no SIGMA is stated and no reading is repeated."
     scatter = f"{gap['noise_mm']:.3f} mm"
     if after.scatter_exceeded:
-        return f"{told} Readings scatter by {scatter}: the model lacks an effect, or the scatter is larger."
-    return f"{told} Readings scatter by {scatter}: they show nothing more."
+        return (
+            f"{sentence} Readings scatter by {scatter}: the model lacks an effect, or the scatter is larger."
+        )
+    return f"{sentence} Readings scatter by {scatter}: they show nothing more."
 
 
 def _rows(result: Identified) -> Iterator[tuple[str, str]]:
@@ -194,7 +198,7 @@ def _outliers(result: Identified, verbose: bool) -> Iterator[str]:
     if result.outliers:
         how = (
             "excluded"
-            if result.outliers_left_out
+            if result.outliers_excluded
             else "fitted with the others; --drop-outliers excludes them"
         )
         yield f"{count(len(result.outliers), 'outlier')} ({how})"

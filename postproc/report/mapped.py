@@ -242,7 +242,7 @@ def slices_shown(count: int) -> Ints:
 def map_csv(mapped: Mapped) -> bytes:
     """One row a cell: place, reachable 0/1, deflection with and without compensator, difference, axes.
 
-    Empty where there is no value; the axes stand wherever the arm gets, within its limits or not.
+    Empty where there is no value; the axes have values wherever the arm reaches, within its limits or not.
     """
     survey = mapped.survey
     nothing = np.full(mapped.cells, np.nan)
@@ -278,7 +278,7 @@ def _texts(values: Floats, decimals: int) -> list[str]:
 
 
 def _mm(lengths: Floats) -> list[float]:
-    """[mm] without the last bits that the conversion leaves."""
+    """[mm] without rounding errors of the conversion."""
     return [float(value) for value in np.round(lengths / MM, 9) + 0.0]
 
 

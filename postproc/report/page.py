@@ -135,11 +135,11 @@ def beside(page: Path, files: Mapping[str, Path | None]) -> dict[str, str]:
 
 def linked(links: Mapping[str, str]) -> list[tuple[str, str, str]]:
     """Words -> path as (word, what is shown, address); a colon or a percent sign in a name is no part of an address."""
-    told = []
+    rows = []
     for word, path in links.items():
         parts = Path(path).as_posix()
-        told.append((word, parts, "./" + quote(os.fsencode(parts))))
-    return told
+        rows.append((word, parts, "./" + quote(os.fsencode(parts))))
+    return rows
 
 
 def _places(data: PageData) -> list[dict[str, object]]:

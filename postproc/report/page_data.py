@@ -56,8 +56,8 @@ class WorstPlace:
 class PageData:
     """K motions of the ``motions`` of one program: those that figures and table show, mm and N.
 
-    report: figures, findings, model and digests.  tolerance: what the output may keep.  off: motions that are left
-    alone on the program's own word.  rows (K,): the motions shown, ascending.  line, kind, state, cut (K,): as in
+    report: figures, findings, model and digests.  tolerance: what the output may keep.  off: motions that the
+    program itself excludes.  rows (K,): the motions shown, ascending.  line, kind, state, cut (K,): as in
     Toolpath and Result; cut -1 in air.  path_length (K,) [mm]: length of the cutting path to the end of each motion.
     position (K, 3): wanted end point; arcs (A,): which of the K are arcs from the one before, and arc_points (A, B, 3)
     points inside of them; force (K, 3) [N]; deflection (K, 3) before: all in the robot base. correction (K, 3): command
@@ -110,13 +110,13 @@ def page_data(
     if output is not None:
         first = np.searchsorted(output.division.source, first)
         between = np.fmax.reduceat(output.path_error, first[:-1])
-    found = worst_rows(result, scope, between, output is not None)
+    worst = worst_rows(result, scope, between, output is not None)
     before, after, between = (_known(values, scope) for values in (result.before, result.after, between))
     size = np.sqrt(np.einsum("ni,ni->n", result.correction, result.correction))
     turns = (cut[1:] != cut[:-1]) | (state[1:] != state[:-1])
     quantities = [(1, before), (-1, before), (1, after), (-1, after), (1, between), (1, size)]
-    rows = rows_to_draw(n, [row for row, _ in found], turns, quantities, limit)
-    lines = [int(path.line[row]) for row, _ in found]
+    rows = rows_to_draw(n, [row for row, _ in worst], turns, quantities, limit)
+    lines = [int(path.line[row]) for row, _ in worst]
     texts = source_texts(documents[0], lines, () if output is None else output.edits)
     arcs, arc_points = _arc_points(task, rows)
     return PageData(
@@ -145,14 +145,14 @@ def page_data(
         evaluated=len(report.uncertainty.expanded),
         places=tuple(
             WorstPlace(int(np.searchsorted(rows, row)), why, source, () if output is None else written)
-            for (row, why), (source, written) in zip(found, texts, strict=True)
+            for (row, why), (source, written) in zip(worst, texts, strict=True)
         ),
     )
 
 
-def _by_blocks(made: Callable[[Ints], Floats], rows: Ints, each: int = 1) -> Floats:
-    """(K each, 3) what ``made`` gives of ``rows`` (K,)."""
-    parts = in_blocks(lambda block: made(rows[block]), len(rows), ROWS // each)
+def _by_blocks(compute: Callable[[Ints], Floats], rows: Ints, each: int = 1) -> Floats:
+    """(K each, 3) what ``compute`` returns for ``rows`` (K,)."""
+    parts = in_blocks(lambda block: compute(rows[block]), len(rows), ROWS // each)
     return np.concatenate([np.empty((0, 3)), *parts])
 
 
@@ -181,10 +181,10 @@ def source_texts(
     """The text of each of ``lines`` (from 1) before, and what the edits make of it; "" of a line that is not there."""
     every, starts, raw = Edits.joined(edits), document.line_starts, document.raw
     high = bisect_left(every.file, 1)
-    told: list[tuple[str, tuple[str, ...]]] = []
+    texts: list[tuple[str, tuple[str, ...]]] = []
     for line in lines:
         if not 0 < line <= len(starts):
-            told.append(("", ()))
+            texts.append(("", ()))
             continue
         start = int(starts[line - 1])
         stop = raw.find(b"\n", start) + 1 or len(raw)
@@ -192,8 +192,8 @@ def source_texts(
         piece = Document(document.path, raw[start:stop])
         after = apply(piece, [_moved(edit, start) for edit in own]).splitlines()
         more = [f"and {len(after) - LINES} more lines"] if len(after) > LINES else []
-        told.append((_text(piece.raw.rstrip(b"\r\n")), tuple([_text(row) for row in after[-LINES:]] + more)))
-    return told
+        texts.append((_text(piece.raw.rstrip(b"\r\n")), tuple([_text(row) for row in after[-LINES:]] + more)))
+    return texts
 
 
 def _moved(edit: Edit, start: int) -> Edit:
@@ -216,9 +216,9 @@ def _known(values: Floats, scope: Bools) -> Floats:
 
 def _widths(report: Report, rows: Ints) -> Floats:
     """(K, 2) [mm] half widths at ``rows`` (K,), between those that were evaluated interpolated."""
-    found, uncertainty = np.full((len(rows), 2), np.nan), report.uncertainty
-    for width, evaluated in zip(found.T, uncertainty.expanded.T, strict=True):
+    widths, uncertainty = np.full((len(rows), 2), np.nan), report.uncertainty
+    for width, evaluated in zip(widths.T, uncertainty.expanded.T, strict=True):
         known = np.isfinite(evaluated)
         if known.any():
             width[:] = np.interp(rows, uncertainty.rows[: len(known)][known], evaluated[known] / MM)
-    return found
+    return widths

@@ -1,4 +1,4 @@
-"""Pages of an identification, a diagnosis and a map: what the terminal says, and the picture."""
+"""Pages of an identification, a diagnosis and a map: the text of the terminal, and the picture."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def mapped_page(mapped: Mapped, links: Mapping[str, str]) -> bytes:
             table.add_row(quantity.title, *(cell for pair in cells for cell in pair))
     extremes = mapped.quantities[0].extremes
     drawn = extremes is not None and mapped.cells > 1
-    told = (
+    verdict = (
         "No cell is in reach."
         if extremes is None
         else (
@@ -120,7 +120,7 @@ def mapped_page(mapped: Mapped, links: Mapping[str, str]) -> bytes:
     return _page(
         "map",
         mapped.robot,
-        told,
+        verdict,
         [],
         mapped.exit,
         map_rows(mapped),
@@ -137,7 +137,7 @@ def mapped_page(mapped: Mapped, links: Mapping[str, str]) -> bytes:
 def _page(
     what: str,
     title: str,
-    told: str,
+    verdict: str,
     words: Iterable[str],
     exit: int,
     facts: Iterable[tuple[str, str]],
@@ -154,7 +154,7 @@ def _page(
         goes=False,
         what=what,
         title=title,
-        verdict=told,
+        verdict=verdict,
         words=list(words),
         badge=badge(exit, None),
         facts=list(facts),
@@ -177,5 +177,5 @@ def _place(mapped: Mapped, row: int) -> str:
 
 
 def _plain(cell: object) -> str:
-    """What a cell of a terminal's table says."""
+    """The text of a cell of a terminal's table."""
     return cell.plain if isinstance(cell, Text) else Text.from_markup(str(cell)).plain

@@ -24,18 +24,18 @@ def worst_rows(
     before = np.where(scope & np.isfinite(result.before), result.before, -1.0)
     if before.max(initial=-1.0) < 0:
         return []
-    found = {int(np.argmax(before)): "largest before"}
+    reasons = {int(np.argmax(before)): "largest before"}
     after = (("largest after", result.after), ("largest path error between points after", between))
     for why, values in after if corrected else ():
         error = np.where(scope & np.isfinite(values), values, -1.0)
         if error.max() > 0:
             row = int(np.argmax(error))
-            found[row] = f"{found[row]}, {why}" if row in found else why
+            reasons[row] = f"{reasons[row]}, {why}" if row in reasons else why
     for row in _largest_of_each(before, result.cut)[:PLACES].tolist():
-        found.setdefault(row, f"largest of cut {result.cut[row] + 1}" if result.cut[row] >= 0 else "")
+        reasons.setdefault(row, f"largest of cut {result.cut[row] + 1}" if result.cut[row] >= 0 else "")
     for row in _largest(before, 2 * PLACES).tolist():
-        found.setdefault(row, "")
-    return list(found.items())[:PLACES]
+        reasons.setdefault(row, "")
+    return list(reasons.items())[:PLACES]
 
 
 def _largest(values: Floats, count: int) -> Ints:
@@ -70,11 +70,11 @@ def rows_to_draw(
     turn = np.flatnonzero(turns)
     if 2 * len(turn) > limit // 4:
         turn = turn[:0]
-    kept = np.unique(np.concatenate([[0, n - 1], must, turn, turn + 1])).astype(np.int64)
-    room = limit - len(kept)
+    required = np.unique(np.concatenate([[0, n - 1], must, turn, turn + 1])).astype(np.int64)
+    room = limit - len(required)
     stretches = room // 2 // len(quantities)
     starts = -(-np.arange(stretches) * n // stretches)
-    chosen = [kept, np.linspace(0, n - 1, room // 2).astype(np.int64)]
+    chosen = [required, np.linspace(0, n - 1, room // 2).astype(np.int64)]
     for sign, values in quantities:
         chosen.append(_last_largest(np.where(np.isnan(values), -np.inf, sign * values), starts))
     return np.unique(np.concatenate(chosen))

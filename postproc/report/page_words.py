@@ -74,8 +74,8 @@ def program_verdict(data: PageData) -> str:
         share = f" {count(report.inserted, 'motion')} {'was' if report.inserted == 1 else 'were'} inserted.{share}"
     allowed = f" (tolerance {data.tolerance:g} mm)"
     sentence = verdict_sentence(report)
-    told = f" {sentence[0].upper()}{sentence[1:]}." if sentence else ""
-    return f"{which}: the largest predicted error falls from {before} to {after}{allowed}.{share}{told}"
+    conclusion = f" {sentence[0].upper()}{sentence[1:]}." if sentence else ""
+    return f"{which}: the largest predicted error falls from {before} to {after}{allowed}.{share}{conclusion}"
 
 
 def program_tiles(data: PageData) -> list[Tile]:
@@ -114,9 +114,11 @@ def _uncertainty(report: Report) -> Tile:
     if uncertainty.unknown:
         return Tile("uncertainty", "not known", missing_intervals(uncertainty))
     value = f"{'at least ' if uncertainty.lower_bound else ''}± {two_digits(width / MM)} mm"
-    told = f"95 %, mostly {uncertainty.budget[0][0]}" if uncertainty.budget else "95 %"
+    description = f"95 %, mostly {uncertainty.budget[0][0]}" if uncertainty.budget else "95 %"
     return Tile(
-        "uncertainty", value, told + ("; not every input has an interval" if uncertainty.lower_bound else "")
+        "uncertainty",
+        value,
+        description + ("; not every input has an interval" if uncertainty.lower_bound else ""),
     )
 
 
@@ -124,10 +126,10 @@ def reasons(data: PageData) -> list[str]:
     """What is not corrected and why, cut by cut; [] where everything is."""
     if not data.corrected:
         return []
-    told = [f.message for f in data.report.findings if f.code == "COR003"]
-    more = [f"and {len(told) - LISTED} more cuts, see the findings"] if len(told) > LISTED else []
+    messages = [f.message for f in data.report.findings if f.code == "COR003"]
+    more = [f"and {len(messages) - LISTED} more cuts, see the findings"] if len(messages) > LISTED else []
     off = f"{count(data.off, 'motion')} between COMPENSATE OFF and ON, as the program says"
-    return told[:LISTED] + more + ([off] if data.off else [])
+    return messages[:LISTED] + more + ([off] if data.off else [])
 
 
 def program_facts(report: Report) -> list[tuple[str, str]]:

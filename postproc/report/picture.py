@@ -75,8 +75,8 @@ def _slices(mapped: Mapped, ranged: list[int]) -> Figure:
     rows = -(-len(shown) // columns)
     wide = float(np.clip(np.ptp(across) / np.ptp(up), 0.4, 2.5))
     figure = Figure(figsize=(3.0 * columns + 1.4, 3.0 * rows / wide + 1.3), layout="constrained")
-    told = "" if len(shown) == len(levels) else f", {len(shown)} of {len(levels)} slices"
-    figure.suptitle(f"{_title(mapped)}\n{_heading(quantity, cube)}{told}", fontsize=10, parse_math=False)
+    selection = "" if len(shown) == len(levels) else f", {len(shown)} of {len(levels)} slices"
+    figure.suptitle(f"{_title(mapped)}\n{_heading(quantity, cube)}{selection}", fontsize=10, parse_math=False)
     panels = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
     for place, axes in enumerate(panels.ravel()):
         if place >= len(shown):
@@ -221,7 +221,7 @@ def _legend(figure: Figure, mapped: Mapped, marks: bool) -> None:
 
 def _title(mapped: Mapped) -> str:
     grid = mapped.survey.grid
-    held = [
+    fixed_axes = [
         f"{name} {_coordinates(mapped, axis)[0]:g} mm"
         for axis, name in enumerate("xyz")
         if grid.shape[axis] == 1
@@ -229,7 +229,7 @@ def _title(mapped: Mapped) -> str:
     how = ["linear, eq. (5)" if mapped.load.linear else "deflected equilibrium"]
     if mapped.sign:
         how.append(f"compensator sign {mapped.sign}")
-    return f"{sanitize(mapped.robot)}, force {mapped.force}\n{', '.join([*held, *how])}"
+    return f"{sanitize(mapped.robot)}, force {mapped.force}\n{', '.join([*fixed_axes, *how])}"
 
 
 def _heading(quantity: MappedQuantity, values: Floats) -> str:

@@ -124,11 +124,11 @@ class Planned:
 
     def _intervals(self, ci95: Floats) -> dict[str, object]:
         """effect -> parameter -> half width, None of what is excluded."""
-        found: dict[str, dict[str, object]] = {}
+        intervals: dict[str, dict[str, object]] = {}
         for unknown, width in zip(self.unknowns, ci95.tolist(), strict=True):
             effect, _, name = unknown.name.partition(".")
-            found.setdefault(effect, {})[name] = {"ci95": _number(width), "unit": unknown.parameter.unit}
-        return dict(found)
+            intervals.setdefault(effect, {})[name] = {"ci95": _number(width), "unit": unknown.parameter.unit}
+        return dict(intervals)
 
 
 def discrimination_words(alternatives: Sequence[str], separation: Sequence[float]) -> str:

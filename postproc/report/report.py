@@ -31,7 +31,7 @@ class Spread:
 
     @staticmethod
     def of(values: Floats) -> Spread:
-        """Of ``values`` (N,) [m]; those that are not finite are left out."""
+        """Of ``values`` (N,) [m]; those that are not finite are omitted."""
         seen = values[np.isfinite(values)]
         if not len(seen):
             return Spread(np.nan, np.nan, np.nan)
@@ -76,19 +76,19 @@ class PathFigures:
     transitions: Transitions
 
     def as_json(self) -> dict[str, object]:
-        made = self.transitions
+        transitions = self.transitions
         return {
             "along_feed_mm": {"before": self.along_before.as_mm(), "after": self.along_after.as_mm()},
             "across_feed_mm": {"before": self.across_before.as_mm(), "after": self.across_after.as_mm()},
             "force_ramp_mm": round(self.ramp / MM, 6),
             "force_ramps": self.ramps,
-            "lead_ins": made.lead_ins,
-            "stops_added": made.stops,
-            "backwards": made.backwards,
+            "lead_ins": transitions.lead_ins,
+            "stops_added": transitions.stops,
+            "backwards": transitions.backwards,
             "correction_rate": {
-                "mm_per_mm": _finite(made.rate),
-                "mm_per_s": _finite(made.speed / MM),
-                "line": made.rate_line,
+                "mm_per_mm": _finite(transitions.rate),
+                "mm_per_s": _finite(transitions.speed / MM),
+                "line": transitions.rate_line,
             },
         }
 
@@ -245,7 +245,7 @@ def failure(command: str, program: str, findings: Sequence[Finding]) -> dict[str
 
 
 def in_order_of_place(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """By file and line, each said once."""
+    """By file and line, each once."""
     return tuple(sorted(dict.fromkeys(findings), key=lambda f: (f.file, f.line, f.column, f.code)))
 
 

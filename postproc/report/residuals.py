@@ -1,4 +1,4 @@
-"""What fits leave of readings: lengths, their sizes, parts of the readings that are alike, one CSV for all.
+"""Residuals of fits: lengths, their sizes, parts of the readings that are alike, one CSV for all.
 
 All residuals are measured minus expected, in axes of the robot base.  The size of one is its length in space; where
 fewer than three coordinates were measured, the length that three like them would have.
@@ -37,7 +37,7 @@ class Sizes(NamedTuple):
 
     @classmethod
     def of(cls, lengths: Floats) -> Sizes | None:
-        """Of ``lengths`` (R,) [m]; None where there is none; NaN are left out."""
+        """Of ``lengths`` (R,) [m]; None where there is none; NaN are omitted."""
         seen = lengths[np.isfinite(lengths)]
         if not len(seen):
             return None
@@ -63,7 +63,7 @@ class ResidualVariable:
 
 
 def joint_variables(readings: Readings) -> tuple[ResidualVariable, ...]:
-    """Where each joint stood."""
+    """The position of each joint."""
     return tuple(
         ResidualVariable(name, "mm" if slides else "deg", column / (MM if slides else DEG))
         for (name, slides), column in zip(readings.joints, readings.q.T, strict=True)
@@ -80,7 +80,7 @@ def lengths_of(residual: Floats, measured: Bools) -> Floats:
 
 
 def gap_of(lengths: Mapping[str, Floats], noise: Noise) -> dict[str, float]:
-    """Root mean squares [mm] of ``lengths`` (R,) [m], and the scatter of the readings; what is unknown is left out."""
+    """Root mean squares [mm] of ``lengths`` (R,) [m], and the scatter of the readings; what is unknown is omitted."""
     sizes = {name: Sizes.of(values) for name, values in lengths.items()}
     known = {f"{name}_rms_mm": size.rms / MM for name, size in sizes.items() if size}
     if noise.known:
@@ -128,5 +128,5 @@ def residuals_csv(
 
 
 def mm(length: float) -> float:
-    """[mm] without the last bits that the conversion leaves."""
+    """[mm] without rounding errors of the conversion."""
     return round(float(length) / MM, 7) + 0.0

@@ -1,6 +1,6 @@
 """What every machine-readable result carries, and the former names of its keys, which stay beside them for one version.
 
-A result is made with its present keys only; ``complete_result`` adds the rest where it leaves the house.
+A result is built with its present keys only; ``complete_result`` adds the rest where it is written.
 """
 
 from __future__ import annotations

@@ -182,8 +182,8 @@ def _geometry_json(robot: Robot) -> dict[str, object]:
         {"name": axis.name, "kind": axis.kind, "sign": axis.sign, "offset": axis.offset}
         for axis in robot.axes
     ]
-    found: dict[str, object] = {"kind": robot.arm.kind, "axes": axes}
-    return found if lengths is None else {**found, "kuka_m": asdict(lengths)}
+    geometry: dict[str, object] = {"kind": robot.arm.kind, "axes": axes}
+    return geometry if lengths is None else {**geometry, "kuka_m": asdict(lengths)}
 
 
 def _limits_words(robot: Robot) -> str:

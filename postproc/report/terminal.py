@@ -109,13 +109,13 @@ def _before_after(before: Spread, after: Spread) -> str:
 
 def _transitions(path: PathFigures) -> str:
     """Lead-ins, and what the output does where its correction changes."""
-    made = path.transitions
+    transitions = path.transitions
     ramps = f", {_count(path.ramps, 'force ramp')} of at least {path.ramp / MM:g} mm" if path.ramps else ""
-    speed = f", {made.speed / MM:.1f} mm/s" if math.isfinite(made.speed) else ""
+    speed = f", {transitions.speed / MM:.1f} mm/s" if math.isfinite(transitions.speed) else ""
     return (
-        f"{_count(made.lead_ins, 'lead-in')} in air{ramps}; in cuts {_count(made.stops, 'stop')} added,"
-        f" {_count(made.backwards, 'backward motion')}, correction changes by at most {made.rate:.3f} mm/mm{speed}"
-        f" (line {made.rate_line})"
+        f"{_count(transitions.lead_ins, 'lead-in')} in air{ramps}; in cuts {_count(transitions.stops, 'stop')} added,"
+        f" {_count(transitions.backwards, 'backward motion')},"
+        f" correction changes by at most {transitions.rate:.3f} mm/mm{speed} (line {transitions.rate_line})"
     )
 
 
@@ -167,7 +167,7 @@ def _uncertainty(report: Report) -> list[str]:
 
 def describe_budget(uncertainty: Uncertainty) -> str:
     """Where the intervals come from."""
-    seen, told = 0.0, []
+    seen, contributions = 0.0, []
     for name, share in uncertainty.budget[:NAMED]:
         if name == FORCE:
             name += (
@@ -175,11 +175,13 @@ def describe_budget(uncertainty: Uncertainty) -> str:
             )
         if name == DIRECTION:
             name = "direction of the force"
-        told.append(f"{name} ({100 * share:.0f} %)")
+        contributions.append(f"{name} ({100 * share:.0f} %)")
         seen += share
         if seen > 0.95:
             break
-    parts = ["mostly " + ", ".join(_once(told)) if told else "no contribution of the intervals"]
+    parts = [
+        "mostly " + ", ".join(_once(contributions)) if contributions else "no contribution of the intervals"
+    ]
     if len(uncertainty.level_unstated) == 1:
         parts.append("the level of 1 interval is not stated")
     elif uncertainty.level_unstated:

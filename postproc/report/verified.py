@@ -141,24 +141,32 @@ def show(console: Console, done: Verified, verbose: bool = False) -> None:
     )
     for number, head in enumerate((*heads, "samples")):
         table.add_column(head, justify="right" if number else "left")
-    for name, way in (("original", done.original), ("compensated", done.compensated)):
+    for name, comparison in (("original", done.original), ("compensated", done.compensated)):
         table.add_row(
             name,
             *(
                 in_decimals(v / MM, 4)
-                for v in (way.error.max, way.error.rms, way.error.p95, way.ends.max, way.along_at_ends)
+                for v in (
+                    comparison.error.max,
+                    comparison.error.rms,
+                    comparison.error.p95,
+                    comparison.ends.max,
+                    comparison.along_at_ends,
+                )
             ),
-            "-" if math.isnan(way.turn) else f"{way.turn / DEG:.4f}",
-            *(str(count) for count in (way.stops, way.backwards, way.samples)),
+            "-" if math.isnan(comparison.turn) else f"{comparison.turn / DEG:.4f}",
+            *(str(count) for count in (comparison.stops, comparison.backwards, comparison.samples)),
         )
     console.print(table)
     console.print(_describe_sampling(done.compensated), soft_wrap=True)
-    way = done.compensated
-    if way.approaches:
-        console.print(f"{way.approaches} lead-ins and lead-outs in air, {way.approach_length / MM:.1f} mm")
-    if way.unknown_corners:
+    comparison = done.compensated
+    if comparison.approaches:
         console.print(
-            f"{way.unknown_corners} points have an unknown approximation distance; both programs are simulated"
+            f"{comparison.approaches} lead-ins and lead-outs in air, {comparison.approach_length / MM:.1f} mm"
+        )
+    if comparison.unknown_corners:
+        console.print(
+            f"{comparison.unknown_corners} points have an unknown approximation distance; both programs are simulated"
             " through these points",
             soft_wrap=True,
         )
@@ -173,14 +181,14 @@ def show(console: Console, done: Verified, verbose: bool = False) -> None:
     show_findings(console, done.findings, verbose)
 
 
-def _describe_sampling(way: PathComparison) -> str:
-    if not way.converged:
+def _describe_sampling(comparison: PathComparison) -> str:
+    if not comparison.converged:
         return "force and position do not converge everywhere in the compensated program: its errors are not known"
-    if math.isnan(way.change):
+    if math.isnan(comparison.change):
         return "the samples are not doubled: there are too many"
     return (
-        f"twice as many samples change the largest error by {way.change / MM * 1e3:.2f} um,"
-        f" and the largest orientation error by {way.change_turn / DEG:.5f} deg"
+        f"twice as many samples change the largest error by {comparison.change / MM * 1e3:.2f} um,"
+        f" and the largest orientation error by {comparison.change_turn / DEG:.5f} deg"
     )
 
 

@@ -44,7 +44,7 @@ marks about as many states of a KR 270 as the places of its closed form do."""
 class AxisTrack:
     """q (N, n) [rad, m], NaN where unknown or out of reach; status (N,) branch taken (0 for an arm that is not KUKA's),
     -1 where nothing states it; reachable (N,); within (N,) inside of the axis limits; turn_matches (N,) the stated T is
-    that of ``q``; half_turns: path motions that turn the tool by half a turn, and which way."""
+    that of ``q``; half_turns: path motions that turn the tool by half a turn, and in which sense."""
 
     q: Floats
     status: Ints
@@ -67,12 +67,12 @@ def follow_axes(
     ``base``, ``tool`` (N): frames of the motions, in the robot base and on the flange, where there are any.
 
     KUKA-type arms: a PTP takes the branch of its S and the turns of its T; without them the branch stays and each axis
-    goes the short way.  On path motions the branch stays and the axes follow the way (see ``HalfTurns``).  After a PTP
-    to an unknown target the branch is unknown until something states it.
+    takes the shorter turn.  On path motions the branch stays and the axes follow the path (see ``HalfTurns``).  After a
+    PTP to an unknown target the branch is unknown until something states it.
 
     Other arms have no S and T.  Each motion is solved from the one before it (see ``newton.follow_rows``), so branch
     and turns are those that lead on from ``start`` or from the last axis motion; only a PTP may take others, where
-    these have no way to its target within the limits.  A motion that cannot be reached is passed over.
+    these have no path to its target within the limits.  A motion that cannot be reached is passed over.
     """
     n = len(toolpath)
     rows = np.flatnonzero(toolpath.on_axes)
@@ -97,15 +97,15 @@ def follow_axes(
         reachable[solve] = np.isfinite(q[solve]).all(axis=1)
     else:
 
-        def solved(part: slice) -> None:
+        def solve_block(part: slice) -> None:
             rows = solve[part]
             near = np.zeros((len(rows), q.shape[1]))
             if robot.external is not None:
                 near[:, robot.external] = external[rows]
-            found = inverse(robot.nominal, flange[rows], status[rows], near)
-            q[rows], reachable[rows] = found.q, found.reachable
+            solution = inverse(robot.nominal, flange[rows], status[rows], near)
+            q[rows], reachable[rows] = solution.q, solution.reachable
 
-        each_block(solved, len(solve))
+        each_block(solve_block, len(solve))
         half_turns = _settle(robot, q, status, toolpath, on_axes, start, base, tool)
         stated = np.flatnonzero((toolpath.configuration["turn"] >= 0) & cartesian)
         bits = (toolpath.configuration["turn"][stated, None] >> np.arange(6)) & 1 == 1
@@ -168,12 +168,12 @@ def _follow_on(
     place = np.maximum.accumulate(np.where(anchor != -1, np.arange(len(toolpath)), -1))
     last = np.where(place >= 0, anchor[place], -2)[solve]
     where = place[solve]
-    begins = np.concatenate([[True], where[1:] != where[:-1]])
-    begun = np.full(q.shape[1], np.nan) if start is None else start
-    starts = np.where((last >= 0)[:, None], q[np.maximum(last, 0)], begun)
+    is_start = np.concatenate([[True], where[1:] != where[:-1]])
+    program_start = np.full(q.shape[1], np.nan) if start is None else start
+    starts = np.where((last >= 0)[:, None], q[np.maximum(last, 0)], program_start)
     jumps = np.asarray(toolpath.kind[solve] == Kind.PTP)
-    held = None if robot.external is None else external[solve]
-    q[solve], _ = follow_rows(robot.nominal, flange[solve], begins, starts, jumps, held)
+    fixed_values = None if robot.external is None else external[solve]
+    q[solve], _ = follow_rows(robot.nominal, flange[solve], is_start, starts, jumps, fixed_values)
 
 
 def home_rows(toolpath: Toolpath) -> Ints:
@@ -224,7 +224,8 @@ def _settle(
     base: Poses | None,
     tool: Poses | None,
 ) -> HalfTurns:
-    """Choose the turns of A1, A4, A6 in place, and A4 where A5 = 0 leaves it open; gives the half turns among them."""
+    """Choose the turns of A1, A4, A6 in place, and A4 where A5 = 0 does not determine it; gives the half turns among
+    them."""
     arm = robot.nominal
     assert not isinstance(arm, SerialArm)
     rows = np.flatnonzero(np.isfinite(q).all(axis=1))
@@ -250,13 +251,13 @@ def _settle(
     reset = given | stated
     reset[0] = True
     last = np.maximum.accumulate(np.where(reset, order, 0))
-    desired_path = _large(robot, values, rows, reset, status, toolpath, base, tool)
+    large = _large(robot, values, rows, reset, status, toolpath, base, tool)
 
     def turned(axis: int, step: Floats) -> tuple[Floats, Floats]:
         """(R,) the values of an axis that goes on from the first, and by how much they are beside those stated."""
         value = values[:, axis - 6]
         by = wrapped(np.diff(value))
-        by[desired_path.place - 1] = step
+        by[large.place - 1] = step
         smooth = np.concatenate([[value[0]], value[0] + np.cumsum(by)])
         signed = np.where(
             (turn >> axis) & 1 == 1,
@@ -266,27 +267,27 @@ def _settle(
         wish = np.where(given | ~stated, value, signed)
         return smooth, (wish - smooth)[last]
 
-    other = np.zeros(len(desired_path.place), np.bool_)
-    either = np.flatnonzero(desired_path.either)
+    other = np.zeros(len(large.place), np.bool_)
+    either = np.flatnonzero(large.either)
     if len(either):
-        axes = [sum(turned(axis, desired_path.step[:, k])) for k, axis in enumerate(TURNING)]
+        axes = [sum(turned(axis, large.step[:, k])) for k, axis in enumerate(TURNING)]
         low, high = robot.limits[[axis - 6 for axis in TURNING]].T
-        choices = TurnChoices(desired_path.place[either], desired_path.more[either])
+        choices = TurnChoices(large.place[either], large.more[either])
         other[either] = choose_senses(np.stack(axes, axis=1), np.flatnonzero(reset), choices, low, high)
-    step = desired_path.step + np.where(other[:, None], desired_path.more, 0.0)
+    step = large.step + np.where(other[:, None], large.more, 0.0)
     for k, axis in enumerate(TURNING):
         smooth, beside = turned(axis, step[:, k])
         values[:, axis - 6] += 2 * np.pi * np.round((smooth + beside - values[:, axis - 6]) / (2 * np.pi))
     keep = rows >= 0
     q[rows[keep]] = values[keep]
-    half = np.flatnonzero(desired_path.either & np.isfinite(desired_path.vector[:, 0, 0]))
-    return HalfTurns(rows[desired_path.place[half]], desired_path.vector[half, other[half].astype(np.int64)])
+    half = np.flatnonzero(large.either & np.isfinite(large.vector[:, 0, 0]))
+    return HalfTurns(rows[large.place[half]], large.vector[half, other[half].astype(np.int64)])
 
 
 class _Large(NamedTuple):
     """Motions on which axes turn far: place (K,) among all, ascending; step (K, 3) [rad] by which A1, A4, A6 turn; and
-    of those that may go ``either`` (K,) way what the other one adds, more (K, 3), and the rotation vectors of the tool
-    both ways, vector (K, 2, 3), NaN for a PTP."""
+    of those that may turn in ``either`` (K,) sense what the other one adds, more (K, 3), and the rotation vectors of
+    the tool in both senses, vector (K, 2, 3), NaN for a PTP."""
 
     place: Ints
     step: Floats
@@ -305,7 +306,7 @@ def _large(
     base: Poses | None,
     tool: Poses | None,
 ) -> _Large:
-    """The motions that do not simply go the short way.  values (R, n): joint values of ``rows`` (R,)."""
+    """The motions that do not simply take the shorter turn.  values (R, n): joint values of ``rows`` (R,)."""
     arm = values[:, -6:]
     far = np.zeros(len(rows), np.bool_)
     for axis in range(6):

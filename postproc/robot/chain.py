@@ -73,9 +73,9 @@ class ChainKinematics:
         """The TCP and the mount after a small ``step`` (m, N) [rad, m] of the coordinates; all else stays as it is.
 
         w = sum of s_i z_i over the turns; dp = sum of s_i z_i x (p - p_i) over the turns, and of s_i z_i over the
-        shifts.  What is left out has the size of the step's square.
+        shifts.  The error has the size of the step's square.
         """
-        turn, shift, behind = (np.zeros((3, step.shape[1])) for _ in range(3))
+        turn, shift, spindle_shift = (np.zeros((3, step.shape[1])) for _ in range(3))
         mounted, at = len(self.axes) - self.spindles, 0
         while at < len(self.axes):
             about = np.zeros_like(turn)  # one origin
@@ -87,14 +87,16 @@ class ChainKinematics:
                 elif at < mounted:
                     shift += move
                 else:
-                    behind += move
+                    spindle_shift += move
                 at += 1
                 if at == len(self.axes) or self.apart[at]:
                     break
             turn += about
             shift -= cross(about, origin)
         mount = self.mount + shift + cross(turn, self.mount)
-        position = self.position + shift + cross(turn, self.position) + behind if self.spindles else mount
+        position = (
+            self.position + shift + cross(turn, self.position) + spindle_shift if self.spindles else mount
+        )
         tcp = tuple(column + cross(turn, column) for column in self.tcp)
         return replace(self, position=position, mount=mount, _columns=tcp, _tool=None)
 
@@ -175,7 +177,7 @@ class Chain:
         count = coordinates.shape[1]
         axes: list[Floats] = []
         origins: list[Floats] = []
-        # what all states share has one column until a coordinate tells them apart
+        # what all states share has one column until a coordinate differs between them
         columns: list[Floats] = list(np.eye(3)[:, :, None])
         position = np.zeros((3, 1))
         links = []
@@ -294,11 +296,11 @@ def generalized_force(swept: ChainKinematics, point: Floats, wrench: Floats) -> 
 
 def cross(a: Floats, b: Floats) -> Floats:
     """a x b (3, N) of ``a``, ``b`` (3, N)."""
-    found = np.empty(np.broadcast_shapes(a.shape, b.shape))
+    vectors = np.empty(np.broadcast_shapes(a.shape, b.shape))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        np.multiply(a[j], b[k], out=found[i])
-        found[i] -= a[k] * b[j]
-    return found
+        np.multiply(a[j], b[k], out=vectors[i])
+        vectors[i] -= a[k] * b[j]
+    return vectors
 
 
 def weight_about(axis: Floats, moment: Floats, gravity: Floats) -> tuple[Floats, Floats]:
@@ -306,7 +308,7 @@ def weight_about(axis: Floats, moment: Floats, gravity: Floats) -> tuple[Floats,
     under ``gravity`` (3,) [m/s2], and its derivative by the turn: a . (M x g) and a . ((a x M) x g) = (a . M)(a . g) -
     M . g."""
     (ax, ay, az), (mx, my, mz), (gx, gy, gz) = axis, moment, gravity.tolist()
-    if gx == 0.0 and gy == 0.0:  # the robot stands upright
+    if gx == 0.0 and gy == 0.0:  # the robot is upright
         return gz * (ax * my - ay * mx), gz * ((ax * mx + ay * my + az * mz) * az - mz)
     torque = ax * (my * gz - mz * gy) + ay * (mz * gx - mx * gz) + az * (mx * gy - my * gx)
     slope = (ax * mx + ay * my + az * mz) * (gx * ax + gy * ay + gz * az) - (gx * mx + gy * my + gz * mz)

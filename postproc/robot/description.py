@@ -120,7 +120,7 @@ class Robot:
 
     @property
     def speeds(self) -> Floats:
-        """(n,) [rad/s, m/s] the fastest that each joint moves, NaN where the file does not say it."""
+        """(n,) [rad/s, m/s] the fastest that each joint moves, NaN where the file does not state it."""
         stated = [np.nan if axis.speed is None else axis.speed for axis in self.axes]
         return np.array(stated or [np.nan] * len(self.joints))
 
@@ -249,7 +249,7 @@ def robot_of(raw: bytes, path: Path) -> Robot:
 
 def _external(arm: Geometry) -> int | None:
     if isinstance(arm, SerialArm):
-        return arm.held
+        return arm.fixed
     return 0 if isinstance(arm, KukaVariant) and arm.rail is not None else None
 
 
@@ -271,17 +271,17 @@ def _masses(section: YamlSection, names: list[str], arm: Geometry) -> tuple[Mass
 
 def _mechanisms(top: YamlSection, names: list[str]) -> tuple[Mechanism, ...]:
     """{name, kind, source[, joint, about]} and numbers, each {value, unit[, source]}; several of a name are refused."""
-    found: dict[str, Mechanism] = {}
+    mechanisms: dict[str, Mechanism] = {}
     for section in top.sections("mechanisms"):
         name = section.text("name")
-        if name in found:
-            raise section.error("YML004", f"{name!r} occurs in line {found[name].line} already", "name")
+        if name in mechanisms:
+            raise section.error("YML004", f"{name!r} occurs in line {mechanisms[name].line} already", "name")
         quantities = {
             key: _quantity(section.section(key))
             for key in section
             if key not in ("name", "kind", "joint", "about", "source")
         }
-        found[name] = Mechanism(
+        mechanisms[name] = Mechanism(
             name,
             section.text("kind"),
             section.text("joint", choices=names) if "joint" in section else None,
@@ -290,7 +290,7 @@ def _mechanisms(top: YamlSection, names: list[str]) -> tuple[Mechanism, ...]:
             quantities,
             section.line,
         )
-    return tuple(found.values())
+    return tuple(mechanisms.values())
 
 
 def _quantity(section: YamlSection) -> Quantity:

@@ -41,7 +41,7 @@ class ExternalAxis:
     along ``direction``) or FIXED (it moves neither).  direction (3,): unit vector, point (3,) [m], both in the world
     with all external axes at zero.  lower, upper, start [mm or deg]; start: where the axis is before a program
     states it, None where nothing states it.  bases: numbers of those that are on a positioner; on: the positioner on
-    which this one stands.  line: of the cell file.
+    which this one is mounted.  line: of the cell file.
     """
 
     name: str
@@ -92,7 +92,7 @@ class External:
     direction (3,) of each; positioners: their turning axes, from the lowest to the one that carries the part; carriers:
     number of a base -> the positioner that it is on; carrier (N,): that of each motion's base, -1 for none.
     constant: ``robot_from_path`` without a positioner and with each of them, where no track or positioner moves: then
-    the base of a motion is taken as if it stood there, and path axes are those of the robot base.
+    the base of a motion is taken as if it were there, and path axes are those of the robot base.
     """
 
     path: Toolpath
@@ -157,17 +157,18 @@ class External:
         return external_at(self.path, rows, share)
 
     def moves(self, rows: Ints) -> Bools:
-        """(K,) an external axis moves so far on the motion of ``rows`` (K,) that its middle says little of the rest."""
+        """(K,) an external axis moves so far on the motion of ``rows`` (K,) that its middle does not represent the
+        rest."""
         with np.errstate(invalid="ignore"):  # axes that are not known
-            way = np.abs(self.at(rows) - self.at(rows, np.zeros(len(rows))))
+            travel = np.abs(self.at(rows) - self.at(rows, np.zeros(len(rows))))
         far = np.zeros(len(rows), np.bool_)
         for column, _ in self.tracks:
-            far |= way[:, column] > FAR_MM
+            far |= travel[:, column] > FAR_MM
         for column in {turn.column for stack in self.positioners for turn in stack}:
-            far |= way[:, column] > FAR_DEG
+            far |= travel[:, column] > FAR_DEG
         if self.joint is not None:
             column, _, unit = self.joint
-            far |= way[:, column] > (FAR_DEG if unit == DEG else FAR_MM)
+            far |= travel[:, column] > (FAR_DEG if unit == DEG else FAR_MM)
         return far
 
     def robot_from_path(self, rows: Ints, share: Floats | None = None) -> Poses | None:
@@ -193,17 +194,17 @@ class External:
         shift = np.zeros((len(values), 3))
         for column, direction in self.tracks:
             shift -= (values[:, column] * MM)[:, None] * direction
-        found = Poses(np.broadcast_to(np.eye(3), (len(values), 3, 3)), shift)
+        poses = Poses(np.broadcast_to(np.eye(3), (len(values), 3, 3)), shift)
         for number, stack in enumerate(self.positioners):
             rows = np.flatnonzero(carrier == number)
             if not len(rows):
                 continue
-            found = found.copy()
-            there = found[rows]
+            poses = poses.copy()
+            there = poses[rows]
             for turn in stack:
                 there = there @ _turned(turn, values[rows, turn.column] * DEG)
-            found.put(rows, there)
-        return found
+            poses.put(rows, there)
+        return poses
 
     def joint_values(self, q: Floats, rows: Ints, share: Floats | None) -> Floats:
         """(K, n) [rad, m]: ``q`` (K, n) of motions ``rows`` (K,) with the robot's own external joint where it is at the

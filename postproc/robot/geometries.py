@@ -35,8 +35,8 @@ class Joint:
 
 @dataclass(frozen=True)
 class Axis:
-    """A joint as its controller counts it: sign * value + offset is the angle or the way of the geometry [rad, m].
-    ``speed`` [rad/s, m/s]: the fastest that it moves, None where the file does not say it."""
+    """A joint as its controller counts it: sign * value + offset is the angle or the travel of the geometry [rad, m].
+    ``speed`` [rad/s, m/s]: the fastest that it moves, None where the file does not state it."""
 
     name: str
     lower: float
@@ -104,7 +104,7 @@ class KukaLengths:
     def flange(self) -> Poses:
         """The flange in the frame of A6: its z axis points out along the forearm (R = Ry(90 deg) at zero)."""
         at_zero = Poses(turn_about("y", np.pi / 2), np.array([self.d6, 0.0, 0.0]))
-        return _held(self.links()[-1].after @ at_zero)
+        return _frozen(self.links()[-1].after @ at_zero)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,7 @@ class KukaVariant:
         return _link_frames(self.links(), self.axes)
 
     def flange(self) -> Poses:
-        return _held(_flip(self.axes[-1]) @ self.lengths.flange())
+        return _frozen(_flip(self.axes[-1]) @ self.lengths.flange())
 
     @property
     def signs(self) -> Floats:
@@ -149,7 +149,8 @@ class KukaVariant:
 
 @dataclass(frozen=True, eq=False)
 class SerialArm:
-    """Any other arm of six joints, or of seven of which one is ``held`` (its column) while the others place the flange.
+    """Any other arm of six joints, or of seven of which one is ``fixed`` (its column) and the
+    others place the flange.
 
     ``axes``: as the controller counts them; ``chain``: their frames; ``tip``: the flange in the last link's frame.
     """
@@ -158,7 +159,7 @@ class SerialArm:
     axes: tuple[Axis, ...]
     chain: tuple[Link, ...]
     tip: Poses
-    held: int | None = None
+    fixed: int | None = None
 
     def links(self) -> list[Link]:
         return list(self.chain)
@@ -170,7 +171,7 @@ class SerialArm:
         return _link_frames(self.links(), self.axes)
 
     def flange(self) -> Poses:
-        return _held(_flip(self.axes[-1]) @ self.chain[-1].after @ self.tip)
+        return _frozen(_flip(self.axes[-1]) @ self.chain[-1].after @ self.tip)
 
     @property
     def limits(self) -> Floats:
@@ -217,7 +218,7 @@ def based(links: Sequence[Link], base: Poses) -> tuple[Link, ...]:
 
 
 def turn_about(axis: str, angle: float) -> Floats:
-    """Rotation (3, 3) by ``angle`` [rad] about a coordinate axis; quarter turns are made of zeros and ones."""
+    """Rotation (3, 3) by ``angle`` [rad] about a coordinate axis; quarter turns consist of zeros and ones."""
     quarters = angle / (np.pi / 2)
     rotation = rotation_from_vector(angle * np.eye(3)["xyz".index(axis)])
     return np.round(rotation) if abs(quarters - round(quarters)) < 1e-12 else np.asarray(rotation)
@@ -232,7 +233,7 @@ def _folded(links: Sequence[Link], axes: Sequence[Axis]) -> tuple[Joint, ...]:
         else:
             zero = Poses(turn_about("z", axis.offset), np.zeros(3))
         flip = _flip(axis)
-        placement = _held(at @ link.before @ zero @ flip)
+        placement = _frozen(at @ link.before @ zero @ flip)
         joints.append(Joint(axis.name, placement, axis.lower, axis.upper, axis.kind))
         at = flip @ link.after
     return tuple(joints)
@@ -243,7 +244,7 @@ def _link_frames(links: Sequence[Link], axes: Sequence[Axis]) -> list[Poses]:
 
 
 def _flip(axis: Axis) -> Poses:
-    """Half a turn about x, its own inverse, where the controller counts the other way: F Rz(q) F = Rz(-q)."""
+    """Half a turn about x, its own inverse, where the controller counts in the opposite sense: F Rz(q) F = Rz(-q)."""
     return Poses(np.diag([1.0, -1.0, -1.0]) if axis.sign < 0 else np.eye(3), np.zeros(3))
 
 
@@ -254,7 +255,7 @@ def _renamed(axes: Sequence[Axis], names: Sequence[str], limits: Limits) -> list
     ]
 
 
-def _held(pose: Poses) -> Poses:
+def _frozen(pose: Poses) -> Poses:
     return Poses(frozen(pose.rotation), frozen(pose.position))
 
 

@@ -1,10 +1,10 @@
-"""How far A1, A4 and A6 of a KUKA-type arm turn on their way from one motion to the next.
+"""How far A1, A4 and A6 of a KUKA-type arm turn from one motion to the next.
 
-Between two postures an axis has turned by the difference of its angles and any number of whole turns; which, the way
-says: on a path motion the axes follow the pose continuously, in a PTP each goes the short way.  Where a path motion
-turns the tool by half a turn, both senses are equally short and rounding would decide.  The program has run: of two
-senses the one is taken that leaves all axes within their limits until a motion states its axes or its T; where both do,
-the one that leads through zero.
+Between two postures an axis has turned by the difference of its angles and any number of whole turns; the kind
+of motion decides: on a path motion the axes follow the pose continuously, in a PTP each takes the shorter turn.  Where
+a path motion turns the tool by half a turn, both senses are equally short and rounding would decide.  The program has
+run: of two senses the one is taken that keeps all axes within their limits until a motion states its axes or its T;
+where both do, the one that leads through zero.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class HalfTurns:
 
 @dataclass(frozen=True, eq=False)
 class PathMotions:
-    """K path motions.  begin, end: flange poses in the robot base; tool: on the flange; centre, normal (K, 3), sweep
+    """K path motions.  start, end: flange poses in the robot base; tool: on the flange; centre, normal (K, 3), sweep
     (K,): of arcs in the robot base, NaN for straight ones; along (K, 3) [rad]: by which the tool turns with its arc."""
 
     start: Poses
@@ -86,12 +86,12 @@ class PathMotions:
 
     @cached_property
     def turn(self) -> Floats:
-        """(K, 3) [rad] the short way, in axes of the robot base, beside what the tool turns with its arc."""
+        """(K, 3) [rad] the shorter turn, in axes of the robot base, beside what the tool turns with its arc."""
         return turn_beside(self.start.rotation, self.end.rotation, self.along)
 
     @property
     def half(self) -> Bools:
-        """(K,) either way is as short."""
+        """(K,) both senses are equally short."""
         return np.asarray(lengths(self.turn) > np.pi - HALF)
 
     def __getitem__(self, rows: Ints) -> PathMotions:
@@ -109,15 +109,15 @@ class PathMotions:
         """Flange poses (K) at the shares (K,) of the paths of the TCP, which turn evenly by ``turn`` (K, 3) [rad]."""
         start, end = self.start @ self.tool, self.end @ self.tool
         position = start.position + share[:, None] * (end.position - start.position)
-        bent = np.flatnonzero(np.isfinite(self.sweep))
-        if len(bent):
-            position[bent] = on_arc(
-                start.position[bent],
-                end.position[bent],
-                self.centre[bent],
-                self.normal[bent],
-                self.sweep[bent],
-                share[bent],
+        arcs = np.flatnonzero(np.isfinite(self.sweep))
+        if len(arcs):
+            position[arcs] = on_arc(
+                start.position[arcs],
+                end.position[arcs],
+                self.centre[arcs],
+                self.normal[arcs],
+                self.sweep[arcs],
+                share[arcs],
             )
         return Poses(turning(start.rotation, turn, self.along, share), position) @ self.tool.inverse()
 
@@ -127,8 +127,8 @@ Solve = Callable[[Ints, Poses], Floats]
 
 
 def axis_travel(motions: PathMotions, turn: Floats, first: Floats, last: Floats, solve: Solve) -> Floats:
-    """(K, 3) [rad] by how much A1, A4, A6 turn on ways that turn the tool by ``turn`` (K, 3); first, last (K, 6): the
-    angles at their ends.  NaN where a way leads out of reach."""
+    """(K, 3) [rad] by how much A1, A4, A6 turn on paths that turn the tool by ``turn`` (K, 3); first, last (K, 6): the
+    angles at their ends.  NaN where a path leads out of reach."""
     total = np.zeros((len(motions), 3))
     owner = np.arange(len(motions))
     low, high = np.zeros(len(owner)), np.ones(len(owner))
@@ -136,7 +136,7 @@ def axis_travel(motions: PathMotions, turn: Floats, first: Floats, last: Floats,
     for depth in range(DEEPEST + 1):
         step = wrapped(there - here)
         far = (np.abs(step) > FINE).any(axis=1) & (depth < DEEPEST)
-        far |= depth < 2  # ways are looked at in four parts at least: a whole turn shows nothing at its ends
+        far |= depth < 2  # paths are looked at in four parts at least: a whole turn shows nothing at its ends
         near = np.flatnonzero(~far)
         np.add.at(total, owner[near], step[near])
         if not far.any():
@@ -152,8 +152,8 @@ def axis_travel(motions: PathMotions, turn: Floats, first: Floats, last: Floats,
 
 @dataclass(frozen=True)
 class TurnChoices:
-    """Motions that may turn either way: place (H,) ascending, and by how much the other way differs in A1, A4, A6: more
-    (H, 3) [rad], whole turns."""
+    """Motions that may turn in either sense: place (H,) ascending, and by how much the other one differs in A1, A4, A6:
+    more (H, 3) [rad], whole turns."""
 
     place: Ints
     more: Floats
@@ -163,7 +163,7 @@ def turn_senses(
     motions: PathMotions, first: Floats, last: Floats, solve: Solve
 ) -> tuple[Floats, Floats, Floats, Bools]:
     """Steps (K, 3) of A1, A4, A6; what the other sense adds to them (K, 3); the rotation vectors of both (K, 2, 3); and
-    which motions (K,) may turn either way.
+    which motions (K,) may turn in either sense.
 
     The first of two senses is the shorter one, or where they are even the one that leads from angle to angle in
     (-pi, pi] without a whole turn, that is through zero.
@@ -201,10 +201,10 @@ def signed(angle: Floats) -> Floats:
 
 
 def choose_senses(value: Floats, resets: Ints, choices: TurnChoices, low: Floats, high: Floats) -> Bools:
-    """(H,) the choices that go the other way.
+    """(H,) the choices that take the other sense.
 
-    value (R, 3): A1, A4, A6 [rad] of R motions one after the other with the first way everywhere; resets (Q,): motions
-    that state their own, ascending from 0; low, high (3,): limits.
+    value (R, 3): A1, A4, A6 [rad] of R motions one after the other with the first sense everywhere; resets (Q,):
+    motions that state their own, ascending from 0; low, high (3,): limits.
     """
     take = np.zeros(len(choices.place), np.bool_)
     bad = ((value < low - _MARGIN) | (value > high + _MARGIN)).any(axis=1)
@@ -222,9 +222,9 @@ def choose_senses(value: Floats, resets: Ints, choices: TurnChoices, low: Floats
 
 
 def _best(lowest: Floats, highest: Floats, more: Floats, low: Floats, high: Floats) -> Bools:
-    """(H,) which of H choices one after the other go the other way, so that the least is beyond the limits.
+    """(H,) which of H choices one after the other take the other sense, so that the least is beyond the limits.
 
-    lowest, highest (H, 3): the range of the axes from each choice to the next; more (H, 3): what the other way adds
+    lowest, highest (H, 3): the range of the axes from each choice to the next; more (H, 3): what the other sense adds
     from there on.
     """
     turns = np.round(more / (2 * np.pi)).astype(int)
@@ -237,18 +237,18 @@ def _best(lowest: Floats, highest: Floats, more: Floats, low: Floats, high: Floa
         under, over = low - (lowest + by), (highest + by) - high
         return np.asarray((np.maximum(under, 0) + np.maximum(over, 0)).sum(axis=1))
 
-    found: dict[tuple[int, ...], Floats] = {}
+    excesses: dict[tuple[int, ...], Floats] = {}
     for at, turn in enumerate(turns.tolist()):
         following: dict[tuple[int, ...], float] = {}
         came: dict[tuple[int, ...], tuple[tuple[int, ...], bool]] = {}
         for state, cost in states.items():
             for other in (False, True):
                 there = tuple(a + b for a, b in zip(state, turn, strict=True)) if other else state
-                if there not in found:
-                    found[there] = excess(there)
-                    beyond = np.flatnonzero(found[there] > _MARGIN)
+                if there not in excesses:
+                    excesses[there] = excess(there)
+                    beyond = np.flatnonzero(excesses[there] > _MARGIN)
                     clear[there] = int(beyond[-1]) + 1 if len(beyond) else 0
-                total = cost + 1e3 * float(found[there][at]) + 1e-6 * other
+                total = cost + 1e3 * float(excesses[there][at]) + 1e-6 * other
                 if total < following.get(there, np.inf):
                     following[there], came[there] = total, (state, other)
         states = dict(sorted(following.items(), key=lambda item: item[1])[:_MOST_STATES])

@@ -40,10 +40,10 @@ def inverse(arm: Geometry, flange: Poses, status: Ints, near: Floats) -> Inverse
     if isinstance(arm, KukaLengths):
         return _closed_form(arm, flange, status, near)
     if arm.rail is not None:
-        way = arm.signs[0] * near[:, 0] + arm.offsets[0]
-        flange = Poses(flange.rotation, flange.position - way[:, None] * arm.rail)
-    found = _closed_form(arm.lengths, flange, status, kuka_angles(arm, near))
-    return Inverse(controller_values(arm, found.q, near), found.reachable)
+        travel = arm.signs[0] * near[:, 0] + arm.offsets[0]
+        flange = Poses(flange.rotation, flange.position - travel[:, None] * arm.rail)
+    solution = _closed_form(arm.lengths, flange, status, kuka_angles(arm, near))
+    return Inverse(controller_values(arm, solution.q, near), solution.reachable)
 
 
 def kuka_angles(arm: KukaLengths | KukaVariant, q: Floats) -> Floats:
@@ -54,8 +54,8 @@ def kuka_angles(arm: KukaLengths | KukaVariant, q: Floats) -> Floats:
 
 
 def controller_values(arm: KukaLengths | KukaVariant, angles: Floats, like: Floats) -> Floats:
-    """(N, n) [rad, m] the other way, of ``angles`` (N, n): A2, A3 and A5 within half a turn of the middle of their
-    limits; a linear axis keeps its value of ``like`` (N, n)."""
+    """(N, n) [rad, m] the inverse of that, of ``angles`` (N, n): A2, A3 and A5 within half a turn of the middle of
+    their limits; a linear axis keeps its value of ``like`` (N, n)."""
     if isinstance(arm, KukaLengths):
         return angles
     values = like.copy()
@@ -90,7 +90,7 @@ def _closed_form(arm: KukaLengths, flange: Poses, status: Ints, near: Floats) ->
     a2 = np.arctan2(-up, forward) - np.arctan2(second * sine, arm.a2 + second * cosine)
     a3 = np.arctan2(sine, cosine) - forearm_tilt(arm)
 
-    # Wrist: M = Rx(-A4) Ry(A5) Rx(-A6), what is left of the rotation past the forearm; of its rows what is needed.
+    # Wrist: M = Rx(-A4) Ry(A5) Rx(-A6), the remaining rotation past the forearm; of its rows what is needed.
     (s1, c1), (s23, c23) = sine_and_cosine(a1), sine_and_cosine(a2 + a3)
     level = c1 * fz[0] - s1 * fz[1]
     m00, m10, m20 = c23 * level - s23 * fz[2], s1 * fz[0] + c1 * fz[1], s23 * level + c23 * fz[2]

@@ -2,7 +2,7 @@
 
     J dq = e,  dq = (J^T J + (|e|^2 / 2 + w) I)^-1 J^T e        (damping after Sugihara, IEEE T-RO 27, 2011)
 
-e: what is left to the target, position over the arm's size and rotation vector.  The damping goes with the error, so
+e: what remains to the target, position over the arm's size and rotation vector.  The damping goes with the error, so
 that the last steps are Newton's own.  A target that is far is gone to in steps along the straight path to it, so that
 the solution stays in the branch of its start.
 """
@@ -44,18 +44,18 @@ class Solver:
         limits = [(axis.lower, axis.upper) for axis in arm.axes]
         joints = arm.joints(names, limits)
         self.chain = Chain(joints, arm.flange())
-        self.free = np.array([i for i in range(len(joints)) if i != arm.held])
+        self.free = np.array([i for i in range(len(joints)) if i != arm.fixed])
         self.low, self.high = arm.limits.T
         self.turns = np.array([joint.kind == "revolute" for joint in joints])
         places = [joint.placement.position for joint in joints[1:]] + [arm.flange().position]
         self.size = float(sum(np.linalg.norm(place) for place in places))
         self.first = int(self.free[0])
         after = [np.linalg.norm(place) for place in places[self.first :]]
-        desired_path = np.maximum(np.abs(self.low), np.abs(self.high))[self.first :]
-        self.reach = float(sum(after) + desired_path[~self.turns[self.first :]].sum())
+        travels = np.maximum(np.abs(self.low), np.abs(self.high))[self.first :]
+        self.reach = float(sum(after) + travels[~self.turns[self.first :]].sum())
 
     def residual(self, q: Floats, target: Poses) -> tuple[Floats, Floats]:
-        """What is left to the targets, e (N, 6), and the Jacobian (N, 6, k) of the moving columns, both scaled."""
+        """What remains to the targets, e (N, 6), and the Jacobian (N, 6, k) of the moving columns, both scaled."""
         swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
         here = swept.pose
         turn = vector_from_rotation(target.rotation @ np.swapaxes(here.rotation, 1, 2))
@@ -65,7 +65,7 @@ class Solver:
         return error, slope
 
     def solve(self, q: Floats, target: Poses, steps: int = 40, done: float = 0.0) -> tuple[Floats, Bools]:
-        """From ``q`` (N, n) [rad, m] to ``target`` (N): the joint values (N, n), and where (N,) what is left is below
+        """From ``q`` (N, n) [rad, m] to ``target`` (N): the joint values (N, n), and where (N,) what remains is below
         the tolerance.
 
         ``done``: stop at this error instead of the tolerance.  Rows that make no headway are given up.
@@ -102,7 +102,7 @@ class Solver:
         )
 
     def beyond(self, q: Floats, target: Poses) -> Bools:
-        """(N,) ``target`` (N) is farther from the first joint that moves than all links and ways after it together;
+        """(N,) ``target`` (N) is farther from the first joint that moves than all links and travels after it together;
         ``q`` (N, n) states where that joint is."""
         swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
         away = np.linalg.norm(target.position - swept.origins[self.first].T, axis=1)
@@ -110,12 +110,12 @@ class Solver:
 
     def follow(self, q: Floats, target: Poses, stride: float = STEP) -> tuple[Floats, Bools, Bools]:
         """Joint values (N, n) and where (N,) they hold, as ``solve``, along the straight path from where the flange is
-        at ``q`` (N, n), in steps of ``stride``; third (N,), where no step failed on the way."""
+        at ``q`` (N, n), in steps of ``stride``; third (N,), where no step failed along the path."""
         swept = self.chain.evaluate(np.ascontiguousarray(q.T), TOOL)
         here = swept.pose
-        way = target.position - here.position
+        translation = target.position - here.position
         turn = vector_from_rotation(target.rotation @ np.swapaxes(here.rotation, 1, 2))
-        length = np.maximum(np.linalg.norm(way, axis=1) / self.size, np.linalg.norm(turn, axis=1))
+        length = np.maximum(np.linalg.norm(translation, axis=1) / self.size, np.linalg.norm(turn, axis=1))
         pieces = np.ceil(np.nan_to_num(length, nan=0.0) / stride).astype(np.int64)
         q, smooth = q.copy(), ~self.beyond(q, target)
         for piece in range(1, int(pieces.max(initial=0))):
@@ -124,10 +124,10 @@ class Solver:
                 break
             share = (piece / pieces[rows])[:, None]
             rotation = rotation_from_vector(share * turn[rows]) @ here.rotation[rows]
-            between = Poses(rotation, here.position[rows] + share * way[rows])
+            between = Poses(rotation, here.position[rows] + share * translation[rows])
             q[rows], smooth[rows] = self.solve(q[rows], between, steps=7, done=1e-4)
-        found, good = self.solve(q, target)
-        return found, good, smooth & good
+        solution, good = self.solve(q, target)
+        return solution, good, smooth & good
 
     def search(self, near: Floats, target: Poses) -> tuple[Floats, Bools]:
         """Solutions (N, n) in any branch, and where there is one (N,): within the limits if there is one, and of those
@@ -146,11 +146,11 @@ class Solver:
         for draw in draws:
             start = near.copy()
             start[:, self.free] = (low + draw * (high - low))[self.free]
-            found, fine = self.solve(start, target)
-            found = self.inside(found, near)
-            away = np.abs(found - near).max(axis=1) + 1e3 * ~self.within(found)
+            candidate, fine = self.solve(start, target)
+            candidate = self.inside(candidate, near)
+            away = np.abs(candidate - near).max(axis=1) + 1e3 * ~self.within(candidate)
             better = fine & (away < cost)
-            best[better], cost[better], good[better] = found[better], away[better], True
+            best[better], cost[better], good[better] = candidate[better], away[better], True
         return best, good
 
     def inside(self, q: Floats, near: Floats) -> Floats:
@@ -177,7 +177,7 @@ def solver_of(arm: SerialArm) -> Solver:
 def solve_near(arm: SerialArm, flange: Poses, near: Floats) -> tuple[Floats, Bools]:
     """(N, n) [rad, m] the solution that ``near`` (N, n) leads to, and where (N,) there is one.
 
-    The held joint keeps its value of ``near``.  A target near to where ``near`` stands is solved in its branch or not
+    The fixed joint has its value of ``near``.  A target near to the pose at ``near`` is solved in its branch or not
     at all; for one that is ``FAR`` any branch will do, within the limits and near to ``near`` if there is a choice.
     """
     solver = solver_of(arm)
@@ -193,9 +193,9 @@ def _inverse_near(solver: Solver, flange: Poses, near: Floats) -> tuple[Floats, 
     q[far] = solver.inside(q[far], near[far])
     again = far[~good[far] | ~solver.within(q[far])]
     if len(again):
-        found, fine = solver.search(near[again], flange[again])
-        better = fine & (~good[again] | solver.within(found))
-        q[again[better]], good[again[better]] = found[better], True
+        candidate, fine = solver.search(near[again], flange[again])
+        better = fine & (~good[again] | solver.within(candidate))
+        q[again[better]], good[again[better]] = candidate[better], True
     q[~good] = np.nan
     return q, good
 
@@ -203,21 +203,21 @@ def _inverse_near(solver: Solver, flange: Poses, near: Floats) -> tuple[Floats, 
 def follow_rows(
     arm: SerialArm,
     flange: Poses,
-    begins: Bools,
+    is_start: Bools,
     starts: Floats,
     jumps: Bools,
-    held: Floats | None = None,
+    fixed_values: Floats | None = None,
 ) -> tuple[Floats, Bools]:
     """Rows in order, each solved from the one before; (M, n) [rad, m] NaN where not reached, and (M,) reached.
 
-    ``begins`` (M,): the row before is not the last solution but ``starts`` (M, n); it must be set in row 0.  ``jumps``
-    (M,): point to point, so that another branch or turn may be taken where the one so far has no way or leaves the
-    limits.  A path, on the contrary, that leads through a singular place or out of reach is not followed into another
-    branch: its end counts as not reached.  A row that is not reached is passed over.  ``held`` (M,) [rad, m]: where the
-    held joint is at the end of each row; without, it stays.
+    ``is_start`` (M,): the row before is not the last solution but ``starts`` (M, n); it must be set in row 0.
+    ``jumps`` (M,): point to point, so that another branch or turn may be taken where the one so far has no path or
+    exceeds the limits.  A path, on the contrary, that leads through a singular place or out of reach is not followed
+    into another branch: its end counts as not reached.  A row that is not reached is passed over.  ``fixed_values``
+    (M,) [rad, m]: of the fixed joint at the end of each row; without, it stays.
 
     Solved in about sqrt(M) stretches side by side.  A quick run over the ends of the stretches guesses where each
-    starts; then all march together, one row at a time; a stretch that turns out to have begun elsewhere than the one
+    starts; then all march together, one row at a time; a stretch that turns out to have started elsewhere than the one
     before it ends is marched again.  So the result is that of one march from the first row to the last.
     """
     solver = solver_of(arm)
@@ -226,15 +226,15 @@ def follow_rows(
     heads = np.arange(0, count, stride)
     q, good = np.full(starts.shape, np.nan), np.zeros(count, bool)
 
-    last_begin = np.maximum.accumulate(np.where(begins, np.arange(count), 0))
+    last_start = np.maximum.accumulate(np.where(is_start, np.arange(count), 0))
     state = np.empty((len(heads), starts.shape[1]))
     state[0] = starts[0]
     for k in range(1, len(heads)):
         before = heads[k] - 1
-        fresh = last_begin[before] >= heads[k - 1]
-        base = starts[last_begin[before]] if fresh else state[k - 1]
+        fresh = last_start[before] >= heads[k - 1]
+        base = starts[last_start[before]] if fresh else state[k - 1]
         one = slice(before, before + 1)
-        there, fine = _stepped(solver, _taken(arm, base[None], held, one), flange[one], jumps[one])
+        there, fine = _stepped(solver, _taken(arm, base[None], fixed_values, one), flange[one], jumps[one])
         state[k] = there[0] if fine[0] else base
     ends = state.copy()
     dirty = np.ones(len(heads), bool)
@@ -244,39 +244,41 @@ def follow_rows(
         for offset in range(stride):
             part = todo[heads[todo] + offset < count]
             rows = heads[part] + offset
-            base = np.where(begins[rows, None], starts[rows], ends[part])
-            found, fine = _stepped(solver, _taken(arm, base, held, rows), flange[rows], jumps[rows])
-            ends[part] = np.where(fine[:, None], found, base)
-            q[rows], good[rows] = np.where(fine[:, None], found, np.nan), fine
+            base = np.where(is_start[rows, None], starts[rows], ends[part])
+            solution, fine = _stepped(
+                solver, _taken(arm, base, fixed_values, rows), flange[rows], jumps[rows]
+            )
+            ends[part] = np.where(fine[:, None], solution, base)
+            q[rows], good[rows] = np.where(fine[:, None], solution, np.nan), fine
         moved = np.abs(ends[:-1] - state[1:]).max(axis=1, initial=0.0) > 1e-7
-        dirty = np.concatenate([[False], moved & ~begins[heads[1:]]])
+        dirty = np.concatenate([[False], moved & ~is_start[heads[1:]]])
         state[1:][dirty[1:]] = ends[:-1][dirty[1:]]
     return q, good
 
 
-def _taken(arm: SerialArm, base: Floats, held: Floats | None, rows: Ints | slice) -> Floats:
-    """The angles ``base`` (K, n) with the held joint where it is in ``rows``."""
-    if held is None or arm.held is None:
+def _taken(arm: SerialArm, base: Floats, fixed_values: Floats | None, rows: Ints | slice) -> Floats:
+    """The angles ``base`` (K, n) with the fixed joint where it is in ``rows``."""
+    if fixed_values is None or arm.fixed is None:
         return base
     base = base.copy()
-    base[:, arm.held] = held[rows]
+    base[:, arm.fixed] = fixed_values[rows]
     return base
 
 
 def _stepped(solver: Solver, base: Floats, flange: Poses, jumps: Bools) -> tuple[Floats, Bools]:
     """One motion on from ``base``: a path in its own branch or not at all, a jump in another one if need be."""
-    found, fine, smooth = solver.follow(base, flange)
+    solution, fine, smooth = solver.follow(base, flange)
     rows = np.flatnonzero(~jumps & fine & ~smooth)
     if len(rows):
-        found[rows], _, fine[rows] = solver.follow(base[rows], flange[rows], FINE_STEP)
+        solution[rows], _, fine[rows] = solver.follow(base[rows], flange[rows], FINE_STEP)
     rows = np.flatnonzero(jumps & fine)
-    found[rows] = solver.inside(found[rows], found[rows])
-    again = np.flatnonzero(jumps & ~(fine & solver.within(found)) & np.isfinite(base).all(axis=1))
+    solution[rows] = solver.inside(solution[rows], solution[rows])
+    again = np.flatnonzero(jumps & ~(fine & solver.within(solution)) & np.isfinite(base).all(axis=1))
     if len(again):
         other, well = solver.search(base[again], flange[again])
         better = well & (~fine[again] | solver.within(other))
-        found[again[better]], fine[again[better]] = other[better], True
-    return found, fine
+        solution[again[better]], fine[again[better]] = other[better], True
+    return solution, fine
 
 
 def weakest(arm: SerialArm, q: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""The orientations that a controller runs where the text says others: motions keep that with which they start."""
+"""The orientations that a controller runs where the text states others: motions keep that with which they start."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def as_run(
     """The toolpath with the orientations that the controller runs, and what is to be reported of it.
 
     Under $ORI_TYPE=#CONSTANT a path motion keeps the orientation of the flange with which it starts, whatever its
-    target says; an arc under $CIRC_TYPE=#PATH turns it with its tangent (KUKA System Software, programming manual for
+    target states; an arc under $CIRC_TYPE=#PATH turns it with its tangent (KUKA System Software, programming manual for
     system integrators, orientation control of CP motions, recalled).  So the orientation is that of the last motion
     before that is no such one.
 
@@ -45,11 +45,11 @@ def as_run(
     own = product(
         np.swapaxes(base.rotation[rows], 1, 2), product(product(turns, flange), tool.rotation[rows])
     )
-    said = path.rotation[rows]
-    own[np.isnan(said[:, 0, 0])] = np.nan
+    written = path.rotation[rows]
+    own[np.isnan(written[:, 0, 0])] = np.nan
     rotation = path.rotation.copy()
     rotation[rows] = own
-    lost = rows[np.isnan(own[:, 0, 0]) & np.isfinite(said[:, 0, 0])]
+    lost = rows[np.isnan(own[:, 0, 0]) & np.isfinite(written[:, 0, 0])]
     refused = dict(path.constraints.refused)
     for row in lost.tolist():
         message = (
@@ -60,7 +60,7 @@ def as_run(
     run = replace(path, rotation=rotation, orientation_control=control).with_refused(
         dict(sorted(refused.items()))
     )
-    return run, _without_effect(path, rows, said, own, file)
+    return run, _without_effect(path, rows, written, own, file)
 
 
 def _flange(
@@ -68,22 +68,22 @@ def _flange(
 ) -> Floats:
     """(K, 3, 3) orientations of the flange in the robot base after the motions ``anchor`` (K,), -1 for the start; NaN
     where they are not known."""
-    found = np.full((len(anchor), 3, 3), np.nan)
+    rotations = np.full((len(anchor), 3, 3), np.nan)
     starts = (anchor < 0) | np.isin(anchor, home_rows(path))
     if start is not None and starts.any():
-        found[starts] = nominal_flange(robot, start[None]).rotation
+        rotations[starts] = nominal_flange(robot, start[None]).rotation
     on_axes = ~starts & path.on_axes[anchor]
     if on_axes.any():
         at = anchor[on_axes]
         axes = all_axes(robot, path.axes[at], external_joint(robot, path, at, start))
-        found[on_axes] = nominal_flange(robot, axes).rotation
+        rotations[on_axes] = nominal_flange(robot, axes).rotation
     jumps = np.isin(path.kind, (Kind.PTP, Kind.AXIS))
     ends: Bools = path.known & (jumps | (path.orientation_control.mode != OrientationMode.UNKNOWN))
     known: Bools = ~starts & ~on_axes & ends[anchor]
     at = anchor[known]
     tool_in_robot = product(base.rotation[at], path.rotation[at])
-    found[known] = product(tool_in_robot, np.swapaxes(tool.rotation[at], 1, 2))
-    return found
+    rotations[known] = product(tool_in_robot, np.swapaxes(tool.rotation[at], 1, 2))
+    return rotations
 
 
 def _along(turn: Floats, anchor: Ints) -> Floats:
@@ -101,9 +101,9 @@ def _along(turn: Floats, anchor: Ints) -> Floats:
     return total
 
 
-def _without_effect(path: Toolpath, rows: Ints, said: Floats, own: Floats, file: str) -> list[Finding]:
-    known = np.isfinite(said[:, 0, 0]) & np.isfinite(own[:, 0, 0])
-    off = lengths(turn_between(own[known], said[known]))
+def _without_effect(path: Toolpath, rows: Ints, written: Floats, own: Floats, file: str) -> list[Finding]:
+    known = np.isfinite(written[:, 0, 0]) & np.isfinite(own[:, 0, 0])
+    off = lengths(turn_between(own[known], written[known]))
     if not (off > NO_EFFECT).any():
         return []
     first = int(rows[known][np.argmax(off > NO_EFFECT)])

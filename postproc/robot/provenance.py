@@ -79,18 +79,18 @@ def read_identification(section: YamlSection) -> Identification:
 
 
 def _gap(section: YamlSection) -> dict[str, float]:
-    found = {}
+    values = {}
     for former, key in [*((key, key) for key in GAP), *FORMER_GAP.items()]:
         if former not in section:
             continue
-        if key in found:
+        if key in values:
             raise section.error("YML004", f"is the former name of {key!r}, which is given too", former)
-        found[key] = section.number(former, low=0.0, unit="mm")
-    return {key: found[key] for key in GAP if key in found}
+        values[key] = section.number(former, low=0.0, unit="mm")
+    return {key: values[key] for key in GAP if key in values}
 
 
 def correlations(identified: Sequence[Identification]) -> tuple[tuple[str, ...], Floats]:
-    """Names (k,) and correlation (k, k) of all parameters fitted.  What a later run refitted counts as it says;
+    """Names (k,) and correlation (k, k) of all parameters fitted.  What a later run refitted counts as it states;
     parameters of different runs are independent."""
     names: list[str] = []
     blocks: list[Floats] = []

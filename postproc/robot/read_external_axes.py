@@ -174,16 +174,16 @@ def follow_external_axes(
     own = own_column(robot)
     if own is not None:
         units[own] = ("mm" if joint_unit(robot) == MM else "deg", f"joint of {robot.name}")
-    rows, said = np.flatnonzero(needed_rows(path)) if units else np.empty(0, np.int64), []
+    rows, parts = np.flatnonzero(needed_rows(path)) if units else np.empty(0, np.int64), []
     for column, (unit, what) in sorted(units.items()):
         values = path.external[rows, column]
         values = values[np.isfinite(values)]
         if not values.any():
             continue
         low, high = values.min(), values.max()
-        way = f"{low:g} {unit}" if low == high else f"{low:g} .. {high:g} {unit}"
-        said.append(f"{NAMES[column]} ({what}) {'is at' if low == high else 'moves in'} {way}")
-    return [Finding("EXT006", "; ".join(said), str(file), int(path.line[rows[0]]))] if said else []
+        extent = f"{low:g} {unit}" if low == high else f"{low:g} .. {high:g} {unit}"
+        parts.append(f"{NAMES[column]} ({what}) {'is at' if low == high else 'moves in'} {extent}")
+    return [Finding("EXT006", "; ".join(parts), str(file), int(path.line[rows[0]]))] if parts else []
 
 
 def _unknown(path: Toolpath, column: int, file: Path, cell: Path) -> Finding:
@@ -191,11 +191,11 @@ def _unknown(path: Toolpath, column: int, file: Path, cell: Path) -> Finding:
     name, values = NAMES[column], path.external[:, column]
     there = np.isfinite(values) & (values != 0) | (values == COMPUTED)
     row = int(np.argmax(there))
-    said = "a value that is not a number of the program" if values[row] == COMPUTED else f"{values[row]:g}"
+    target = "a value that is not a number of the program" if values[row] == COMPUTED else f"{values[row]:g}"
     known = values[np.isfinite(values)]
     moves = len(known) and (known != known[0]).any()
     message = (
-        f"{name} moves to {said}{' and to other values' if moves else ''}; the cell does not state"
+        f"{name} moves to {target}{' and to other values' if moves else ''}; the cell does not state"
         f" what it carries"
     )
     return Finding("EXT001", message, str(file), int(path.line[row]), help=f"add it to {cell}: {SHOWN}")
@@ -203,22 +203,22 @@ def _unknown(path: Toolpath, column: int, file: Path, cell: Path) -> Finding:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where one external axis stands: its column, limits and start in the unit of the text (mm or deg).  ``told``: the
-    key that gives the start; ``strict``: without a start nothing can be predicted, which is told here."""
+    """The place of one external axis: its column, limits and start in the unit of the text (mm or deg).  ``key``: what
+    gives the start in the cell file; ``strict``: without a start nothing can be predicted, which is refused here."""
 
     column: int
     lower: float
     upper: float
     start: float | None
     unit: str
-    told: str
+    key: str
     strict: bool
 
     @staticmethod
     def of_axis(axis: ExternalAxis) -> _Place:
         unit = "mm" if axis.kind == TRACK else "deg"
-        told = f"start: below {KEY}, {axis.name}"
-        return _Place(axis.column, axis.lower, axis.upper, axis.start, unit, told, True)
+        key = f"start: below {KEY}, {axis.name}"
+        return _Place(axis.column, axis.lower, axis.upper, axis.start, unit, key, True)
 
     @staticmethod
     def of_joint(robot: Robot, column: int, start: Floats | None) -> _Place:
@@ -249,7 +249,7 @@ class _Place:
                     f"the place of {self.name} is not known here: the program does not state it before this motion",
                     str(file),
                     int(path.line[np.argmax(lost)]),
-                    help=f"add {self.told} in {cell}",
+                    help=f"add {self.key} in {cell}",
                 )
             )
         beyond = (
@@ -270,12 +270,12 @@ class _Place:
             )
 
     def not_known(self, value: float, path: Toolpath, row: int, file: Path) -> Finding:
-        said = "an earlier statement may move it"
+        reason = "an earlier statement may move it"
         if value == COMPUTED:
-            said = "its value is computed, or it moves asynchronously"
+            reason = "its value is computed, or it moves asynchronously"
         return Finding(
             "EXT004",
-            f"the place of {self.name} is not known: {said}",
+            f"the place of {self.name} is not known: {reason}",
             str(file),
             int(path.line[row]),
             help=f"state {self.name} as a number in this motion",
@@ -288,10 +288,10 @@ def _with(external: Floats, columns: Mapping[int, Floats]) -> Floats:
         row = external[0].copy()
         row[list(columns)] = [values[0] for values in columns.values()]
         return np.broadcast_to(row, external.shape)
-    found = external.copy()
+    filled = external.copy()
     for column, values in columns.items():
-        found[:, column] = values
-    return found
+        filled[:, column] = values
+    return filled
 
 
 def _even(values: Floats) -> bool:

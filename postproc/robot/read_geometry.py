@@ -30,7 +30,7 @@ from postproc.robot.urdf import read_urdf
 
 KINDS = ("kuka", "dh", "mdh", "urdf")
 MAX_TURN = 1000 * DEG
-MAX_WAY = 200.0
+MAX_TRAVEL = 200.0
 """[m] Limits beyond these were written in another unit."""
 
 
@@ -60,10 +60,10 @@ def read_geometry(
         given = section.section("urdf")
         given.only("file", "base", "tip")
         path = beside(given)
-        found = read_urdf(path, *(given.text(key) if key in given else None for key in ("base", "tip")))
-        read, tip = [path], found.tip
-        links: Sequence[Link] = found.links
-        for axis, name, moves in zip(axes, found.names, found.kinds, strict=False):
+        arm = read_urdf(path, *(given.text(key) if key in given else None for key in ("base", "tip")))
+        read, tip = [path], arm.tip
+        links: Sequence[Link] = arm.links
+        for axis, name, moves in zip(axes, arm.names, arm.kinds, strict=False):
             if axis.kind != moves:
                 raise joints.error("YML004", f"is {axis.kind}, {name} of the URDF is {moves}", axis.name)
     else:
@@ -81,8 +81,8 @@ def _kuka(section: YamlSection, axes: tuple[Axis, ...], joints: YamlSection) -> 
     lengths = _lengths(section.section("kuka"))
     rail = None
     if "rail" in section:
-        desired_path = {f"{sign}{axis}": (sign, axis) for axis in "xyz" for sign in "+-"}
-        sign, axis = desired_path[section.text("rail", choices=tuple(desired_path))]
+        directions = {f"{sign}{axis}": (sign, axis) for axis in "xyz" for sign in "+-"}
+        sign, axis = directions[section.text("rail", choices=tuple(directions))]
         rail = frozen((1.0 if sign == "+" else -1.0) * np.eye(3)["xyz".index(axis)])
     _check_count(joints, axes, 6 if rail is None else 7)
     for i, joint in enumerate(axes):
@@ -192,7 +192,7 @@ def _axis(section: YamlSection, name: str, factor: float) -> Axis:
     at = "unit" if "unit" in given else key
     if kind == "revolute" and max(largest, abs(offset)) > MAX_TURN:
         raise given.error("YML004", "an axis limit or offset exceeds 1000 deg; is it the right unit?", at)
-    if kind == "prismatic" and max(largest, abs(offset)) > MAX_WAY:
+    if kind == "prismatic" and max(largest, abs(offset)) > MAX_TRAVEL:
         raise given.error("YML004", "an axis limit or offset exceeds 200 m; is it the right unit?", at)
     return Axis(name, lower * factor, upper * factor, kind, sign, offset, speed)
 
@@ -221,7 +221,7 @@ def _check_count(section: YamlSection, axes: tuple[Axis, ...], count: int) -> No
 
 
 def _fixed_joint(axes: tuple[Axis, ...], section: YamlSection) -> int | None:
-    """Column of the joint of seven that the other six leave where it is."""
+    """Column of the joint of seven that the other six do not move."""
     names = [axis.name for axis in axes]
     if len(axes) == 6:
         if "external" in section:

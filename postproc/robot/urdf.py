@@ -1,9 +1,9 @@
 """A strict, small reader of URDF: the joints between two links, with fixed ones merged.
 
 Only what kinematics needs is read (links, joints, origins, axes); masses and limits are passed over, and no mesh is
-opened.  A mesh that is named by a path must all the same lie where it says, inside of the URDF's folder: a file that
-was torn from its place is hardly the one that was meant.  ``package://`` names, which only a ROS installation can
-resolve, are passed over.  Lengths are metres and angles radians, as the format says.
+opened.  A mesh that is named by a path must all the same lie where the path leads, inside of the URDF's folder: a file
+that was torn from its place is hardly the one that was meant.  ``package://`` names, which only a ROS installation can
+resolve, are passed over.  Lengths are metres and angles radians, as the format states.
 """
 
 from __future__ import annotations
@@ -72,37 +72,37 @@ def read_urdf(path: Path, base: str | None = None, tip: str | None = None) -> Ar
             raise _wrong(path, 0, f"the link {name!r} is not defined{nearest(name, links)}")
     parents = {joint.parent for joint in joints}
     end = tip or _only(path, [link for link in links if link not in parents], "tip")
-    way, at = [], end
+    chain, at = [], end
     while at in by_child and at != base:
         joint = by_child[at]
-        way.append(joint)
+        chain.append(joint)
         at = joint.parent
-        if len(way) > len(joints):
+        if len(chain) > len(joints):
             raise _wrong(path, joint.line, "the joints form a circle")
-    if len(way) > MOST_JOINTS:
+    if len(chain) > MOST_JOINTS:
         raise _wrong(path, 0, f"there are more than {MOST_JOINTS} joints between base and tip")
     if base is None:
         _only(path, [link for link in links if link not in by_child], "base")
     elif at != base:
         raise _wrong(path, 0, f"the link {end!r} is not connected to {base!r}")
-    return _merged(path, way[::-1])
+    return _merged(path, chain[::-1])
 
 
-def _only(path: Path, found: list[str], key: str) -> str:
-    if not found:
+def _only(path: Path, links: list[str], key: str) -> str:
+    if not links:
         raise _wrong(path, 0, "the joints form a circle")
-    if len(found) > 1:
+    if len(links) > 1:
         words = (
             "the joints branch: the URDF has several ends" if key == "tip" else "the URDF has several roots"
         )
-        raise _wrong(path, 0, f"{words}, {', '.join(found)}", f"name one with `{key}:`")
-    return found[0]
+        raise _wrong(path, 0, f"{words}, {', '.join(links)}", f"name one with `{key}:`")
+    return links[0]
 
 
-def _merged(path: Path, way: list[_UrdfJoint]) -> Arm:
+def _merged(path: Path, chain: list[_UrdfJoint]) -> Arm:
     names, kinds, links = [], [], []
     at = Poses.identity()
-    for joint in way:
+    for joint in chain:
         at = at @ (joint.origin or Poses.identity())
         if joint.kind == "fixed":
             continue
@@ -128,7 +128,7 @@ def _parse(path: Path) -> tuple[list[_UrdfJoint], dict[str, int]]:
     stack: list[str] = []
     parser = expat.ParserCreate()
 
-    def begin(tag: str, words: dict[str, str]) -> None:
+    def start_element(tag: str, words: dict[str, str]) -> None:
         line = parser.CurrentLineNumber
         if not stack and tag != "robot":
             raise _wrong(path, line, f"<{tag}> is found where <robot> is expected")
@@ -147,7 +147,7 @@ def _parse(path: Path) -> tuple[list[_UrdfJoint], dict[str, int]]:
             _mesh(path, line, _word(path, line, tag, words, "filename"))
         stack.append(tag)
 
-    def end(tag: str) -> None:
+    def end_element(tag: str) -> None:
         stack.pop()
         if stack == ["robot"] and tag == "joint":
             joint = joints[-1]
@@ -158,7 +158,7 @@ def _parse(path: Path) -> tuple[list[_UrdfJoint], dict[str, int]]:
     def doctype(*_: object) -> None:
         raise _wrong(path, parser.CurrentLineNumber, "a DOCTYPE is not allowed")
 
-    parser.StartElementHandler, parser.EndElementHandler = begin, end
+    parser.StartElementHandler, parser.EndElementHandler = start_element, end_element
     parser.StartDoctypeDeclHandler = doctype
     try:
         parser.Parse(raw, True)
@@ -214,15 +214,15 @@ def _mesh(path: Path, line: int, name: str) -> None:
     if not mesh.resolve().is_relative_to(path.parent.resolve()):
         raise _wrong(path, line, f"mesh {name!r} is outside the URDF's folder")
     try:
-        found = mesh.is_file()
+        exists = mesh.is_file()
     except OSError:
-        found = False
-    if not found:
+        exists = False
+    if not exists:
         raise missing
 
 
 def _snapped(rotation: Floats) -> Floats:
-    """Quarter turns written with nine digits or more are meant: made of zeros and ones."""
+    """Quarter turns written with nine digits or more are meant: they consist of zeros and ones."""
     near = np.round(rotation)
     return near if np.abs(rotation - near).max() < 1e-9 else rotation
 

@@ -169,7 +169,7 @@ def _unit_word(given: YamlSection, parameter: WrittenParameter) -> str:
 
 
 def _same(given: YamlSection, parameter: WrittenParameter, rounding: float = VALUE_DIGITS) -> bool:
-    """Whether the file says of a parameter what is meant, within a relative rounding."""
+    """Whether the file states of a parameter what is meant, within a relative rounding."""
     read = WrittenParameter.of(
         parameter.name, parameter.unit, parameter_value(given.section(parameter.name), parameter.unit)
     )
@@ -314,9 +314,9 @@ def _reads(entry: EffectEntry, effect: WrittenEffect) -> bool:
 
 
 def _untouched(section: YamlSection, effect: WrittenEffect | None) -> tuple[dict[str, Tree], list[Tree]]:
-    """What an entry holds beside the parameters of ``effect``."""
+    """What an entry contains beside the parameters of ``effect``."""
     written = {parameter.name for parameter in effect.parameters} if effect else set()
-    others = {key: held for key, held in tree(section.node) if key != "parameters"}
+    others = {key: value for key, value in tree(section.node) if key != "parameters"}
     return others, [pair for pair in tree(section.section("parameters", {}).node) if pair[0] not in written]
 
 

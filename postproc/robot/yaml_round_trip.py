@@ -1,6 +1,6 @@
 """YAML files with other values, by ruamel.yaml's round trip: comments, order, quotes and numbers stay as written.
 
-ruamel.yaml lays some lines out again (blanks in braces, a value below its key).  Where such a line holds what it held,
+ruamel.yaml lays some lines out again (blanks in braces, a value below its key).  Where such a line has its old content,
 the old file's is put back.
 """
 
@@ -57,16 +57,16 @@ _Representer.add_representer(Number, _Representer.number)
 
 def in_braces(values: Mapping[str, object]) -> CommentedMap:
     """A mapping on one line."""
-    made = CommentedMap(values)
-    made.fa.set_flow_style()
-    return made
+    mapping = CommentedMap(values)
+    mapping.fa.set_flow_style()
+    return mapping
 
 
 def in_brackets(values: Iterable[object]) -> CommentedSeq:
     """A list on one line."""
-    made = CommentedSeq(values)
-    made.fa.set_flow_style()
-    return made
+    sequence = CommentedSeq(values)
+    sequence.fa.set_flow_style()
+    return sequence
 
 
 def extend(parent: CommentedMap, key: str, more: CommentedMap | CommentedSeq, gap: bool = False) -> None:
@@ -75,14 +75,14 @@ def extend(parent: CommentedMap, key: str, more: CommentedMap | CommentedSeq, ga
 
     Comment lines that follow the block follow what is new.
     """
-    held = parent.get(key)
+    existing = parent.get(key)
     if key not in parent:
         _append(parent, key, more, gap=True)
-    elif not isinstance(held, type(more)) or not held:
+    elif not isinstance(existing, type(more)) or not existing:
         parent[key] = more
     else:
         for name, value in more.items() if isinstance(more, CommentedMap) else enumerate(more):
-            _append(held, name, value, gap)
+            _append(existing, name, value, gap)
 
 
 def put(parent: CommentedMap, key: str, value: object) -> None:
@@ -106,7 +106,7 @@ def _append(block: CommentedMap | CommentedSeq, key: object, value: object, gap:
 
 
 def _cut_comment(block: CommentedMap | CommentedSeq, gap: bool) -> str:
-    """Take away, and return, the comment lines below a block; leave an empty line there for a ``gap``."""
+    """Remove, and return, the comment lines below a block; keep an empty line there for a ``gap``."""
     owner, last, slot = _end(block)
     token = owner.ca.items.get(last, [None] * 4)[slot]
     text = token.value if token else ""
@@ -135,8 +135,8 @@ def _set_comment(owner: Any, key: Any, slot: int, text: str | None) -> None:
 def edited(raw: bytes, path: Path, edit: Callable[[CommentedMap], None]) -> bytes:
     """The bytes ``raw`` of a YAML file after ``edit`` of its top mapping.
 
-    Lines that hold what they held are byte for byte those of ``raw``, unless the indentation of the file leaves no way
-    to do so.  Raises Refusal ROB002 where ruamel.yaml does not read it.
+    Lines with their old content are byte for byte those of ``raw``, unless the indentation of the file does not
+    allow it.  Raises Refusal ROB002 where ruamel.yaml does not read it.
     """
     text = raw.decode("utf-8-sig")
     newline = "\r\n" if "\r\n" in text[: text.find("\n") + 1] else "\n"
@@ -188,7 +188,7 @@ def _merged(old: list[str], plain: list[str], new: list[str]) -> list[str]:
     below = {i + 1: j + 1 for i, j in place.items()}
     # of the first line that is replaced, and after the last one
     starts, stops = {0: 0} | below | place, place | below | {len(plain): len(old)}
-    found: list[str] = []
+    lines: list[str] = []
     done = 0
     for kind, a, a_stop, b, b_stop in _matcher(plain, new).get_opcodes():
         if kind == "equal":
@@ -200,9 +200,9 @@ def _merged(old: list[str], plain: list[str], new: list[str]) -> list[str]:
         start = (stops if a == a_stop else starts)[a]
         if start < done:
             return new
-        found += old[done:start] + new[b:b_stop]
+        lines += old[done:start] + new[b:b_stop]
         done = stops[a_stop]
-    return found + old[done:]
+    return lines + old[done:]
 
 
 def _matcher(lines: list[str], others: list[str]) -> SequenceMatcher[str]:

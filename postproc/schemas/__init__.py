@@ -1,6 +1,6 @@
 """JSON Schemas (draft 2020-12) of the files that people write, for their editors, and of the results, for scripts.
 
-Of files: names of keys, units, choices, effects and parameters are those of the readers' own tables.  A schema says
+Of files: names of keys, units, choices, effects and parameters are those of the readers' own tables.  A schema states
 what one key may hold; what goes together (limits that rise, joints as many as the geometry has) only the reader checks.
 """
 
@@ -47,5 +47,5 @@ RESULT_SCHEMAS: dict[str, Callable[[], Schema]] = {
 
 def schema_of(name: str) -> Schema:
     """The schema of a kind of file or result: one of ``SCHEMAS`` or ``RESULT_SCHEMAS``."""
-    made = {**SCHEMAS, **RESULT_SCHEMAS}[name]()
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}
+    schema = {**SCHEMAS, **RESULT_SCHEMAS}[name]()
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}

@@ -101,7 +101,7 @@ def spread(about: str, nullable: bool = False, **more: Schema) -> Schema:
 
 
 def result(command: str, about: str, properties: Mapping[str, Schema]) -> Schema:
-    """The schema of what a command gives with ``--json``: its result, or what is left of it where it failed."""
+    """The schema of what a command gives with ``--json``: its result, or the rest of it where it failed."""
     envelope = {
         "schema_version": {**integer("version of the keys"), "const": SCHEMA_VERSION},
         "version": word("version of compensate"),

@@ -213,7 +213,7 @@ def _effect(name: str) -> Schema:
         {
             "effect": {"const": name},
             "options": mapping(OPTIONS.get(name, {}), NEEDED.get(name, ())),
-            "parameters": mapping({}, patterns={at: _value(found) for at, found in units.items()}),
+            "parameters": mapping({}, patterns={at: _value(allowed) for at, allowed in units.items()}),
         },
         ["effect", *(["options"] if name in NEEDED else [])],
     )

@@ -14,7 +14,7 @@ from postproc.toolpath.columns import MotionColumns, column, not_given
 
 
 class ArcFrame(IntEnum):
-    """To what the orientation on an arc refers (KRL's $CIRC_TYPE)."""
+    """To what the orientation on an arc refers."""
 
     BASE = 0  # to the base, as on a straight line
     PATH = 1  # to the frame of the path, which turns with the tangent
@@ -34,7 +34,7 @@ class Arcs(MotionColumns):
     ``centre`` (N, 3) [m]: c, a point of the arc's axis.
     ``normal`` (N, 3): n, unit vector of the arc's axis.
     ``sweep`` (N,) [rad]: s > 0, counter-clockwise seen from the tip of the normal.
-    ``plane_free`` (N,): the text gives the arc by three points, which may be in any plane but leave no advance along
+    ``plane_free`` (N,): the text gives the arc by three points, which may be in any plane but allow no advance along
     the normal; False: the program selects its plane, its normal is kept and an advance is possible.
     ``frame`` (N,): ArcFrame, to what the orientation refers.
     """

@@ -24,7 +24,7 @@ class Column:
     default: float | None
 
     def fill(self, values: NDArray[Any], count: int) -> NDArray[Any]:
-        """``values`` (N, ...) read-only, of ``count`` rows; where they are the same, one is kept for all.
+        """``values`` (N, ...) read-only, of ``count`` rows; where they are the same, one is stored for all.
 
         Raises ValueError where it has another number of rows or another shape: a defect of the program.
         """

@@ -32,8 +32,8 @@ class Configuration:
 
     def __getitem__(self, name: str) -> Ints:
         """(N,) the number of this name, -1 where it is not stated."""
-        found = self.numbers.get(name)
-        return np.broadcast_to(np.int32(-1), self.count) if found is None else found
+        column = self.numbers.get(name)
+        return np.broadcast_to(np.int32(-1), self.count) if column is None else column
 
     @cached_property
     def stated(self) -> Bools:

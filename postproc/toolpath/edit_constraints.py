@@ -28,8 +28,8 @@ class EditConstraints(MotionColumns):
     outside and only the position can be corrected.
     ``exact_stays``: what is inserted before an end point that is passed exactly is passed exactly as well (G61);
     without, it is approximated.
-    ``ptp_may_change_configuration``: a point-to-point motion may lead into another configuration of the robot (KRL's
-    S); without, no motion does.
+    ``ptp_may_change_configuration``: a point-to-point motion may lead into another configuration of the robot;
+    without, no motion does.
     """
 
     refused: Mapping[int, Finding] = field(default_factory=dict)

@@ -21,10 +21,10 @@ class OrientationPath(IntEnum):
 
 
 class OrientationMode(IntEnum):
-    """How the tool turns on a path motion (KRL's $ORI_TYPE)."""
+    """How the tool turns on a path motion."""
 
     VAR = 0  # evenly from its orientation at the start to that of the target
-    CONSTANT = 1  # not at all: what the target says of it has no effect
+    CONSTANT = 1  # not at all: what the target states of it has no effect
     JOINT = (
         2  # as the wrist axes, each of which turns evenly from its angle at the start to that at the target
     )
@@ -33,7 +33,7 @@ class OrientationMode(IntEnum):
 
 @dataclass(frozen=True)
 class OrientationControl(MotionColumns):
-    """The orientation of N motions between their targets, and what the text leaves open of it.
+    """The orientation of N motions between their targets, and what the text does not determine of it.
 
     ``mode`` (N,): OrientationMode of path motions.
     ``path`` (N,): OrientationPath.
@@ -42,7 +42,7 @@ class OrientationControl(MotionColumns):
 
         R(t) = Rz(C(t)) Ry(B(t)) Rx(A(t)),  A(t) = A_from + t (A_to - A_from), likewise B and C.
 
-    ``redundant_axis`` (N, 3): unit vector in tool axes about which the text does not say how the tool is turned (tool
+    ``redundant_axis`` (N, 3): unit vector in tool axes about which the text does not state how the tool is turned (tool
     vectors, two rotary axes); NaN where it gives the whole orientation.
     ``programmed`` (N, 3, 3): the rotations of the text, where those of the toolpath are what the controller runs
     instead; None where they are the same.

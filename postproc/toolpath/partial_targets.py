@@ -12,11 +12,11 @@ from postproc.toolpath.columns import MotionColumns, column, not_given
 
 @dataclass(frozen=True)
 class PartialTargets(MotionColumns):
-    """The targets among N that follow a motion to axis angles and leave out coordinates, which are those where that one
+    """The targets among N that follow a motion to axis angles and omit coordinates, which are those where that one
     ends.
 
-    ``inherits_from_row`` (N,): the row of that motion, whose end gives what is left out; -1 for all other targets.
-    ``coordinates`` (N, 6) [m, rad]: X, Y, Z, A, B, C in the programmed base as stated, NaN where left out.
+    ``inherits_from_row`` (N,): the row of that motion, whose end gives what is omitted; -1 for all other targets.
+    ``coordinates`` (N, 6) [m, rad]: X, Y, Z, A, B, C in the programmed base as stated, NaN where omitted.
     """
 
     inherits_from_row: Ints = field(default_factory=not_given, metadata=column(dtype=np.int32, default=-1))

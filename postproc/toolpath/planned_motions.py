@@ -73,7 +73,7 @@ class Plan:
 
     @staticmethod
     def of(path: Toolpath) -> Plan:
-        """The plan that leaves everything as it is."""
+        """The plan that changes nothing."""
         n = len(path)
         return Plan(
             np.arange(n),

@@ -29,7 +29,7 @@ COMPUTED, LOST = np.inf, -np.inf
 
 
 class Kind(IntEnum):
-    """What a motion statement does.  PTP and AXIS are air moves whatever the force."""
+    """What a motion statement does.  Point-to-point motions (PTP, AXIS) are air moves whatever the force."""
 
     PTP = 0  # point to point, to a Cartesian target
     AXIS = 1  # point to point, to axis angles
@@ -43,7 +43,7 @@ class Kind(IntEnum):
 class FrameRef:
     """A base or tool frame as the program names it.
 
-    ``pose`` is the frame where the program itself says it (in the world for a base, on the flange for
+    ``pose`` is the frame where the program itself states it (in the world for a base, on the flange for
     a tool); None where only the controller knows it, that is entry ``number`` of BASE_DATA / TOOL_DATA.
     ``line`` is where it was set, for messages.
     """
@@ -78,8 +78,8 @@ class Toolpath(MotionColumns):
     ``inverse_time_feed`` (N,): the text gives the time that the motion takes, its feed follows from its length (G93).
     ``base``, ``tool`` (N,): index into ``frames``, -1 where it is not known.
     ``line`` (N,): from 1.
-    ``approximation`` (N,) [m]: the controller may leave the path that far before the end point; 0 where it stops or
-    passes exactly, NaN where the distance is not known.
+    ``approximation`` (N,) [m]: the controller may depart from the path that far before the end point; 0 where it stops
+    or passes exactly, NaN where the distance is not known.
     ``stops`` (N,): the controller comes to rest at the end point: it is not approximated (``approximation`` is 0), and
     is no inner point of a spline block; without it wherever ``approximation`` is 0.
     ``executes`` (N,): the motion follows the one before it; False for motions of which it is not known whether, or

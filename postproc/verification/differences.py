@@ -1,4 +1,5 @@
-"""What two programs differ in beside their places: stops, ways back, points that are missing, frames, feeds, air."""
+"""What two programs differ in beside their places: stops, backward motions, points that are missing, frames, feeds,
+air."""
 
 from __future__ import annotations
 
@@ -109,26 +110,26 @@ def on_cuts(simulator: Simulator, run: CompensationProblem, simulation: Simulati
     """What the motions on the cuts differ in from those of the original at their places."""
     original, samples = simulator.original, simulation.samples
     motions = ComparedMotions.of(samples)
-    # a motion from one place to another stands for what lies between: in its middle, but short ones at a vertex
+    # a motion from one place to another represents what lies between: in its middle, but short ones at a vertex
     owners = [samples.place.row[at] for at in (motions.middle, motions.start, motions.end)]
     owners += [np.minimum(owners[1] + 1, len(original.toolpath) - 1)]
-    found: list[Difference] = []
+    differences: list[Difference] = []
     for what, same in _TRAITS:
         wrong = np.ones(len(motions.row), bool)
         for owner in owners:
-            left = np.flatnonzero(wrong)
-            wrong[left] = ~same(original, run, owner[left], motions.row[left])
-        found += [Difference(int(row), True, what) for row in motions.row[wrong]]
-    found += _other_external(simulator, run, samples, motions)
+            remaining = np.flatnonzero(wrong)
+            wrong[remaining] = ~same(original, run, owner[remaining], motions.row[remaining])
+        differences += [Difference(int(row), True, what) for row in motions.row[wrong]]
+    differences += _other_external(simulator, run, samples, motions)
     for what, same in (*_TRAITS, _EXTERNAL):
         wrong = ~same(original, run, simulation.point_rows, simulation.points)
-        found += [Difference(int(row), True, what) for row in simulation.points[wrong]]
-    found += _new_stops(simulator, run, samples, motions)
-    found += [
+        differences += [Difference(int(row), True, what) for row in simulation.points[wrong]]
+    differences += _new_stops(simulator, run, samples, motions)
+    differences += [
         Difference(int(row), True, "the motion belongs to no motion of the original")
         for row in simulation.added
     ]
-    return found
+    return differences
 
 
 def _new_stops(
@@ -161,14 +162,14 @@ def _missing(simulator: Simulator, samples: PathSamples) -> Ints:
 def ending(simulator: Simulator, samples: PathSamples) -> Ints:
     """(N,) the row of the program that ends where a motion of the original ends: on a cut to which none was added the
     one of the same number, else that which ends nearest to it; -1 off the cuts."""
-    rows, found, _, _ = _nearest_ends(simulator, samples)
+    rows, nearest, _, _ = _nearest_ends(simulator, samples)
     cuts, motions = simulator.pairing.stretches, ComparedMotions.of(samples)
     stretch = np.repeat(np.arange(cuts.length.sum()), (cuts.stop - cuts.start)[cuts.length])
     own = np.searchsorted(motions.stretch, np.arange(cuts.length.sum() + 1))
     same = (np.diff(own) == (cuts.stop - cuts.start)[cuts.length])[stretch]
     number = own[stretch] + np.arange(len(rows)) - np.searchsorted(stretch, stretch)
     ends = np.full(len(simulator.original.toolpath), -1)
-    ends[rows] = np.where(same, motions.row[np.minimum(number, len(motions.row) - 1)], found)
+    ends[rows] = np.where(same, motions.row[np.minimum(number, len(motions.row) - 1)], nearest)
     return ends
 
 
@@ -189,10 +190,10 @@ def _nearest_ends(simulator: Simulator, samples: PathSamples) -> tuple[Ints, Int
     around = np.stack([order[np.maximum(at - 1, 0)], order[np.minimum(at, len(ends) - 1)]])
     away = np.abs(ends[around] - wanted)
     nearer = np.argmin(away, axis=0)
-    found, numbers = around[nearer, np.arange(len(last))], np.arange(len(last))
+    nearest, numbers = around[nearer, np.arange(len(last))], np.arange(len(last))
     before = np.abs(np.diff(wanted, prepend=wanted[0] - far))
     apart = np.minimum(before, np.append(before[1:], far))
-    return grid.row[last], samples.motion[end[found]], away[nearer, numbers], apart
+    return grid.row[last], samples.motion[end[nearest]], away[nearer, numbers], apart
 
 
 def in_air(simulator: Simulator, run: CompensationProblem, simulation: Simulation) -> list[Difference]:
@@ -207,12 +208,14 @@ def in_air(simulator: Simulator, run: CompensationProblem, simulation: Simulatio
         return []
     cuts = pairing.stretches
     path, other = original.toolpath, run.toolpath
-    found = []
+    differences = []
     for what, same in (*_TRAITS, _EXTERNAL):
-        found += [Difference(int(row), True, what) for row in run_rows[~same(original, run, rows, run_rows)]]
+        differences += [
+            Difference(int(row), True, what) for row in run_rows[~same(original, run, rows, run_rows)]
+        ]
     wrong = (stops(path)[rows] != stops(other)[run_rows]) & np.isin(path.kind[rows], (Kind.LIN, Kind.CIRC))
     what = "the air move stops where the original flows, or flows where it stops"
-    found += [Difference(int(row), True, what) for row in run_rows[wrong]]
+    differences += [Difference(int(row), True, what) for row in run_rows[wrong]]
     wrong = ~_same_target(original, run, rows, run_rows)
     if not original.process:
         wrong &= ~(path.known[rows] & ~path.on_axes[rows])  # these are corrected in air as well
@@ -220,7 +223,7 @@ def in_air(simulator: Simulator, run: CompensationProblem, simulation: Simulatio
     moved = np.isin(rows + 1, cuts.start) & ~led & path.known[rows]
     one, two = original.wanted[rows].position, run.wanted[run_rows].position
     wrong &= ~(moved & (lengths(two - one) <= original.max_correction))
-    return found + [
+    return differences + [
         Difference(int(row), True, "the air move has another end than in the original")
         for row in run_rows[wrong]
     ]
@@ -245,7 +248,7 @@ def _same_target(
 
 def _same_kind(original: CompensationProblem, run: CompensationProblem, rows: Ints, run_rows: Ints) -> Bools:
     one, two = original.toolpath, run.toolpath
-    path = (Kind.LIN, Kind.CIRC)  # an arc may be divided into straight motions, and the other way round
+    path = (Kind.LIN, Kind.CIRC)  # an arc may be divided into straight motions, and vice versa
     kind, other = one.kind[rows], two.kind[run_rows]
     return np.asarray((kind == other) | (np.isin(kind, path) & np.isin(other, path)))
 

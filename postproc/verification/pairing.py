@@ -1,6 +1,6 @@
 """Which motions of two programs belong together: air moves one by one, cuts as a whole, in their order.
 
-Nothing but air moves tells where a cut of the second program ends: their targets are those of the original, except of
+Nothing but air moves shows where a cut of the second program ends: their targets are those of the original, except of
 the last one before a cut, which may lead to where the cut starts corrected.
 """
 
@@ -61,8 +61,8 @@ class Stretches:
 
 @dataclass(frozen=True, eq=False)
 class Pairing:
-    """K stretches of the original and what stands for them, rows ``start`` to before ``stop`` (K,) of the second
-    program; air, run_air (A,): rows of both that stand for themselves."""
+    """K stretches of the original and their counterparts, rows ``start`` to before ``stop`` (K,) of the second
+    program; air, run_air (A,): rows of both that correspond one to one."""
 
     stretches: Stretches
     start: Ints
@@ -127,7 +127,7 @@ def _extras(
     shift: int,
     extra: int,
 ) -> Ints:
-    """(K,) how many motions are added up to the end of each of the stretches ``inside`` (K,) one another behind.
+    """(K,) how many motions are added up to the end of each of the stretches ``inside`` (K,), one after another.
 
     For each air move between two of them: the rows of the second program that lead where it leads, and of these
     the choice, in their order, that leads nearest.
@@ -136,37 +136,38 @@ def _extras(
     for here, following in pairwise(inside.tolist()):
         rows = np.arange(stretches.stop[here], stretches.start[following])
         off = _away(original, run, rows, int(stretches.stop[here]), shift, extra)
-        found: dict[int, tuple[float, tuple[int, ...]]] = {}
+        best: dict[int, tuple[float, tuple[int, ...]]] = {}
         for more in np.flatnonzero(np.isfinite(off)).tolist():
             earlier = [
                 (cost + off[more], (*path, more)) for less, (cost, path) in before.items() if less <= more
             ]
             if earlier:
-                found[more] = min(earlier)
-        if not found:
+                best[more] = min(earlier)
+        if not best:
             line = int(original.toolpath.line[min(stretches.stop[here], len(original.toolpath) - 1)])
             raise Different("no motion of the second program leads to where this one leads", line)
-        before = found
+        before = best
     _, path = min(before.values())
     return np.array([*path, extra])
 
 
 def _away(
-    original: CompensationProblem, run: CompensationProblem, rows: Ints, behind: int, shift: int, extra: int
+    original: CompensationProblem, run: CompensationProblem, rows: Ints, stop: int, shift: int, extra: int
 ) -> Floats:
-    """(extra + 1,) [m] how far the targets of the air moves ``rows`` are from those of the rows of ``run`` that stand
-    for them with so many motions added before; infinite where they are not the same.  The last of them leads to a cut
-    and may be moved.  Where two stretches meet without a move in air, the last point of the one before has to serve."""
+    """(extra + 1,) [m] how far the targets of the air moves ``rows`` are from those of the rows of ``run`` that
+    correspond to them with so many motions added before; infinite where they are not the same.  The last of them leads
+    to a cut and may be moved.  Where two stretches meet without a move in air, the last point of the one before has to
+    serve."""
     more = np.arange(extra + 1)
     total = np.zeros(extra + 1)
-    probes, loose = (rows, rows[-1:]) if len(rows) else (np.array([behind - 1]), np.array([behind - 1]))
+    probes, loose = (rows, rows[-1:]) if len(rows) else (np.array([stop - 1]), np.array([stop - 1]))
     for row in probes:
-        left = more[np.isfinite(total)]
-        at = row + shift + left
+        feasible = more[np.isfinite(total)]
+        at = row + shift + feasible
         distance = _apart(original, run, np.full(len(at), row), at)
         limit = original.max_correction if row in loose else SAME
         other = ~_alike(original, run, np.full(len(at), row), at)
-        total[left] += np.where(distance <= limit, distance + _OTHER_MOTION * other, np.inf)
+        total[feasible] += np.where(distance <= limit, distance + _OTHER_MOTION * other, np.inf)
     return total
 
 

@@ -62,7 +62,7 @@ class PathGrid:
         arc = np.repeat(own, parts + 1) + share * np.repeat(length, parts + 1)
         v, tangent, goals = (np.empty((len(row), 3)) for _ in range(3))
 
-        def made(part: slice) -> None:
+        def fill(part: slice) -> None:
             there = path.at(row[part], share[part])
             wrench = original.force.along(row[part], share[part])
             real = original.simulated(row[part], there, wrench, share=share[part])
@@ -70,7 +70,7 @@ class PathGrid:
             goals[part], v[part] = goal, goal - np.nan_to_num(real.pose.position - there.position)
             tangent[part] = path.tangent(row[part], share[part])
 
-        each_block(made, len(row))
+        each_block(fill, len(row))
         gap = np.append(row[1:] != row[:-1], True)[: len(row)]
         farthest = float(lengths(goals - v).max(initial=0.0))
         return PathGrid(original, path, first, row, share, arc, v, tangent, gap, goals, farthest)
@@ -78,9 +78,9 @@ class PathGrid:
     @cached_property
     def on_the_spot(self) -> Bools:
         """(N,) motions on the cuts that only turn the tool."""
-        found = np.zeros(len(self.original.toolpath), bool)
-        found[self.row] = self.original.desired_path.length[self.row] < SPOT
-        return found
+        spot = np.zeros(len(self.original.toolpath), bool)
+        spot[self.row] = self.original.desired_path.length[self.row] < SPOT
+        return spot
 
     def place(self, interval: Ints, part: Floats) -> tuple[Ints, Floats]:
         """Row (S,) and share (S,) at the parts (S,) of intervals (S,); of a vertex the end of the motion before it."""

@@ -1,11 +1,12 @@
 """The path as a controller runs it: approximated vertices are passed on a parabola.
 
-The path leaves the polygon the distance d before a vertex and joins it d behind.  With u from 0 to 1 in between it is
+The path departs from the polygon the distance d before a vertex and joins it d after.  In between, with u from 0 to 1,
+it is
 
     (1 - u) A + u B
 
 A the place (1 - u) d before the vertex on the motion that ends there, B the one u d after it: of straight motions the
-quadratic Bezier curve with the vertex in its middle.  Orientations go over in the same way.  d is the approximation
+quadratic Bezier curve with the vertex in its middle.  Orientations change likewise.  d is the approximation
 distance, and at most half of either motion.
 """
 
@@ -49,28 +50,28 @@ class RunPath:
 
     def at(self, rows: Ints, share: Floats) -> Poses:
         """Poses (K) at the shares (K,) of the motions ``rows`` (K,)."""
-        found = self.task.desired_path.at(rows, share)
+        poses = self.task.desired_path.at(rows, share)
         for some, vertex, u in self._near(rows, share):
             before, after = self._both(vertex, u)
             weight = u[:, None]
             over = turn_between(before.rotation, after.rotation)
-            found.rotation[some] = product(rotation_from_vector(weight * over), before.rotation)
-            found.position[some] = (1 - weight) * before.position + weight * after.position
-        return found
+            poses.rotation[some] = product(rotation_from_vector(weight * over), before.rotation)
+            poses.position[some] = (1 - weight) * before.position + weight * after.position
+        return poses
 
     def tangent(self, rows: Ints, share: Floats) -> Floats:
         """(K, 3) unit vectors along the path at the shares (K,) of ``rows`` (K,); zero where a motion only turns the
         tool."""
         desired_path, length = self.task.desired_path, self.task.desired_path.length
-        found = desired_path.tangent(rows, share)
+        tangents = desired_path.tangent(rows, share)
         for some, vertex, u in self._near(rows, share):
             before, after = self._both(vertex, u)
             reach, weight = self.reach[vertex], u[:, None]
             one = desired_path.tangent(vertex - 1, 1 - reach * (1 - u) / length[vertex - 1])
             two = desired_path.tangent(vertex, reach * u / length[vertex])
             along = (after.position - before.position) / reach[:, None] + (1 - weight) * one + weight * two
-            found[some] = along / np.maximum(lengths(along), _NO_LENGTH)[:, None]
-        return found
+            tangents[some] = along / np.maximum(lengths(along), _NO_LENGTH)[:, None]
+        return tangents
 
     def _near(self, rows: Ints, share: Floats) -> Iterator[tuple[Ints, Ints, Floats]]:
         """Which of ``rows`` (K,) at the shares (K,) are on the parabola where they start, and then which on the one
@@ -83,7 +84,7 @@ class RunPath:
                 yield some, vertex[some], 0.5 + 0.5 * distance[some] / self.reach[vertex[some]]
 
     def _both(self, vertex: Ints, u: Floats) -> tuple[Poses, Poses]:
-        """A and B at the vertices where motions (K,) begin."""
+        """A and B at the vertices where motions (K,) start."""
         desired_path, reach = self.task.desired_path, self.reach[vertex]
         before = desired_path.at(vertex - 1, 1 - reach * (1 - u) / desired_path.length[vertex - 1])
         return before, desired_path.at(vertex, reach * u / desired_path.length[vertex])

@@ -57,7 +57,7 @@ class PathSamples:
 
     @cached_property
     def weight(self) -> Floats:
-        """(S,) [m] of the program's path that each sample stands for."""
+        """(S,) [m] of the program's path that each sample represents."""
         half = 0.5 * np.append(self.distance_along, 0.0)
         return half[:-1] + half[1:]
 
@@ -81,7 +81,7 @@ class Simulation:
     [m]: the largest distance of an end point of the original from the path of the tool; approaches (K,): rows that lead
     from where a cut starts in the original to where it starts corrected, or back, in air; approach_length [m]; points
     (P,): rows of the program whose end point alone is looked at, point_rows (P,) those of the original, point_error
-    (P,) [m] and point_turn (P,) [rad] theirs; added (A,): rows before such points that stand for nothing; unknown:
+    (P,) [m] and point_turn (P,) [rad] theirs; added (A,): rows before such points without a counterpart; unknown:
     vertices that are passed at a distance that is not known, taken as they are programmed; skipped: motions under force
     that cannot be simulated.
     """
@@ -136,17 +136,17 @@ class Simulator:
 
     def run(self, run: CompensationProblem, start: Ints, stop: Ints, step: float = STEP) -> Simulation:
         """``run`` with the rows ``start`` to before ``stop`` (K,) in the place of each stretch."""
-        cuts, way = self.pairing.stretches, self.pairing.stretches.length
+        cuts, has_length = self.pairing.stretches, self.pairing.stretches.length
         path = self.path if run is self.original else RunPath.of(run)
         first, last = start.copy(), stop.copy()
         added = (stop - start) > (cuts.stop - cuts.start)
         for number in np.flatnonzero(added):
             first[number] += self._leads(run, int(start[number]), int(cuts.start[number]))
-        for number in np.flatnonzero(added & (stop - first > cuts.stop - cuts.start) & way):
+        for number in np.flatnonzero(added & (stop - first > cuts.stop - cuts.start) & has_length):
             last[number] -= self._leads_back(run, int(stop[number]) - 1, int(cuts.stop[number]) - 1)
         outside = np.concatenate([_rows(start, first), _rows(last, stop)])
         points, wanted, error, turn = self._points(run, last)
-        samples, change, change_angle = self._dense(run, path, first[way], last[way], step)
+        samples, change, change_angle = self._dense(run, path, first[has_length], last[has_length], step)
         return Simulation(
             samples,
             change,
@@ -154,7 +154,7 @@ class Simulator:
             self._missed(samples),
             outside,
             float(run.desired_path.length[outside].sum()),
-            _rows(first[~way], (last - cuts.stop + cuts.start)[~way]),
+            _rows(first[~has_length], (last - cuts.stop + cuts.start)[~has_length]),
             points,
             wanted,
             error,
@@ -255,14 +255,14 @@ class Simulator:
         motion, where = rows[number], stretch[number]
         place = place_tool(self.grid, path, where, motion, share)
         before = np.append(0.0, np.where(number[1:] == number[:-1], share[:-1], 0.0))[: len(share)]
-        way = (share - before) * run.desired_path.length[motion]
+        distance = (share - before) * run.desired_path.length[motion]
         return PathSamples(
-            where, motion, share, place, end, (share == 0) & opens[number], end & closes[number], way
+            where, motion, share, place, end, (share == 0) & opens[number], end & closes[number], distance
         )
 
     def _missed(self, samples: PathSamples) -> float:
         """[m] the largest distance of an end point of the original from the path of the tool, near where it passes:
-        what is left out where a place leaps over a corner."""
+        what is skipped where a place leaps over a corner."""
         grid, place = self.grid, samples.place
         if not len(samples.motion) or not place.settled.all():
             return float("nan") if len(samples.motion) else 0.0
@@ -302,7 +302,7 @@ def _shares(
     """The samples of the motions ``rows`` (R,): their numbers among these, shares, and whether they are at ends.
 
     Each motion in ``parts`` (R,) even ones; of the parabolas on it at ``halves`` of their halves; of its
-    begin nothing, as it is the end of another, but where a stretch ``opens`` (R,).
+    start nothing, as it is the end of another, but where a stretch ``opens`` (R,).
     """
     number = np.repeat(np.arange(len(rows)), parts)
     share = (np.arange(len(number)) - np.repeat(sums(parts)[:-1], parts) + 1) / np.repeat(parts, parts)

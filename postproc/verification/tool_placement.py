@@ -1,4 +1,4 @@
-"""Force and place of a tool, found together.
+"""Force and place of a tool, solved together.
 
 The force on the tool belongs to the place on the wanted path at which the *deflected* tool is nearest to it, and it is
 that force which deflects the tool:
@@ -47,7 +47,7 @@ FLAT = 0.02
 class PlacedTool:
     """S commands of a program.  row, share (S,): place on the original; arc (S,) [m]: the same along its stretch; error
     (S, 3) [m]: tool minus the wanted path there, robot base axes; turn (S,) [rad]: by how much the tool is turned
-    against it, as far as that shows and the text can say it; force (S,) [N]; settled (S,): place and force agree."""
+    against it, as far as that shows and the text can state it; force (S,) [N]; settled (S,): place and force agree."""
 
     row: Ints
     share: Floats
@@ -63,10 +63,10 @@ def place_tool(grid: PathGrid, path: RunPath, stretch: Ints, motion: Ints, share
     the original's each of them runs, ascending, in the order of the path."""
     command = np.empty((len(motion), 3))
 
-    def sent(block: slice) -> None:
+    def fill_command(block: slice) -> None:
         command[block] = path.at(motion[block], share[block]).position
 
-    each_block(sent, len(motion))
+    each_block(fill_command, len(motion))
     interval, part = track_commands(grid, stretch, command)
     low, high = grid.first[stretch], grid.first[stretch + 1] - 2
     count = len(motion)
@@ -74,7 +74,7 @@ def place_tool(grid: PathGrid, path: RunPath, stretch: Ints, motion: Ints, share
     error, turn = np.empty((count, 3)), np.empty(count)
     force, settled = np.empty(count), np.empty(count, bool)
 
-    def found(block: slice) -> None:
+    def solve_block(block: slice) -> None:
         there = path.at(motion[block], share[block])
         here = _Solution(grid, path.task, motion[block], share[block], there, low[block], high[block])
         here.find(interval[block], part[block])
@@ -86,13 +86,13 @@ def place_tool(grid: PathGrid, path: RunPath, stretch: Ints, motion: Ints, share
         error[block], force[block] = here.error, here.force
         settled[block] = here.settled
 
-    each_block(found, count)
+    each_block(solve_block, count)
     return PlacedTool(row, at, arc, error, turn, force, settled)
 
 
 def judged(original: CompensationProblem, rows: Ints, rotation: Floats, turn: Floats) -> Floats:
     """(K, 3) [rad]: ``turn`` (K, 3) of tools at ``rotation`` (K, 3, 3), without what the text of ``rows`` (K,) cannot
-    say: a turn about the tool's own axis where that is free, all of it where the orientation comes from outside."""
+    state: a turn about the tool's own axis where that is free, all of it where the orientation comes from outside."""
     path = original.toolpath
     free = np.nan_to_num(path.orientation_control.redundant_axis[rows])
     if free.any():
@@ -120,7 +120,7 @@ class _Solution:
         self.error, self.turn = np.full((count, 3), np.nan), np.full((count, 3), np.nan)
         self.force, self.settled = np.full(count, np.nan), np.zeros(count, bool)
         self.q: Floats | None = None
-        self.bent = np.zeros((0, 0))
+        self.displacement = np.zeros((0, 0))
 
     def find(self, interval: Ints, part: Floats) -> None:
         """From places nearby: Newton's steps, and a bracket where these do not come to rest."""
@@ -137,22 +137,22 @@ class _Solution:
         self._bracket(active, interval[active])
 
     def turn_on_the_spot(self) -> None:
-        """Where a motion of the original only turns the tool, all of its path is one place: there the orientation tells
+        """Where a motion of the original only turns the tool, all of its path is one place: there the orientation shows
         how far it is gone."""
         grid = self.grid
         if not grid.on_the_spot.any():
             return
         row, share = grid.place(self.interval, self.part)
-        left = grid.original.desired_path.length[row] * np.stack([1 - share, share])
+        distance = grid.original.desired_path.length[row] * np.stack([1 - share, share])
         turning = np.full(len(row), -1)
         for candidate, near in (
-            (row + 1, left[0] < 100 * SPOT),
-            (row - 1, left[1] < 100 * SPOT),
+            (row + 1, distance[0] < 100 * SPOT),
+            (row - 1, distance[1] < 100 * SPOT),
             (row, True),
         ):
             inside = (candidate >= grid.row[self.low]) & (candidate <= grid.row[self.high])
-            found = inside & near & grid.on_the_spot[np.clip(candidate, 0, len(grid.on_the_spot) - 1)]
-            turning = np.where(found, candidate, turning)
+            matches = inside & near & grid.on_the_spot[np.clip(candidate, 0, len(grid.on_the_spot) - 1)]
+            turning = np.where(matches, candidate, turning)
         some = np.flatnonzero((turning >= 0) & self.settled)
         if not len(some):
             return
@@ -179,9 +179,9 @@ class _Solution:
         good = real.reachable & real.settled
         ahead = np.where(good, np.sum(error * tangent, axis=1), np.nan)
         at_end = (self.interval[active] == self.high[active]) & (self.part[active] >= 1) & (ahead > 0)
-        at_begin = (self.interval[active] == self.low[active]) & (self.part[active] <= 0) & (ahead < 0)
+        at_start = (self.interval[active] == self.low[active]) & (self.part[active] <= 0) & (ahead < 0)
         self.error[active], self.force[active] = error, lengths(wrench[:, :3])
-        self.settled[active] = done = good & ((np.abs(ahead) <= RESIDUAL) | at_end | at_begin)
+        self.settled[active] = done = good & ((np.abs(ahead) <= RESIDUAL) | at_end | at_start)
         if done.all():
             self.turn[active] = turn_between(goal.rotation, real.pose.rotation)
         elif done.any():
@@ -206,46 +206,50 @@ class _Solution:
         self.interval[active] = interval + forth - back
 
     def _real(self, active: Ints, wrench: Floats) -> Prediction:
-        """Where the tools of ``active`` are; what is found for the first time is begun with from then on."""
+        """Where the tools of ``active`` are; the first solution is the start of the next."""
         motion, share, command = self.motion[active], self.share[active], self.command[active]
         if self.q is None:  # asked for all
             real = self.task.simulated(motion, command, wrench, share=share)
-            self.q, self.bent = real.q.copy(), real.displacement.copy()
+            self.q, self.displacement = real.q.copy(), real.displacement.copy()
             return real
-        real = self.task.simulated(motion, command, wrench, self.bent[active], self.q[active], share)
-        self.bent[active] = real.displacement
+        real = self.task.simulated(motion, command, wrench, self.displacement[active], self.q[active], share)
+        self.displacement[active] = real.displacement
         return real
 
     def _bracket(self, active: Ints, interval: Ints) -> None:
-        """Between a place that the tool is ahead of and one that it is behind, as near as there are such: the secant
-        through both, of which the one that stays counts half (Illinois)."""
+        """Between a place that the tool is ahead of and one that it has not reached, as near as there are such: the
+        secant through both, of which the one that stays counts half (Illinois)."""
         at = interval.astype(float)
         below, above = at.copy(), at + 1
         one, two = np.full(len(at), np.nan), np.full(len(at), np.nan)
-        held = np.zeros(len(at), bool)
+        enclosed = np.zeros(len(at), bool)
         for wider in (0, 1, 2, 4, 8):
-            some = np.flatnonzero(~held)
+            some = np.flatnonzero(~enclosed)
             if not len(some):
                 break
             rows = active[some]
             below[some] = np.maximum(at[some] - wider, self.low[rows])
             above[some] = np.minimum(at[some] + 1 + wider, self.high[rows] + 1)
             one[some], two[some] = self._at(rows, below[some]), self._at(rows, above[some])
-            held[some] = (one[some] >= 0) & (two[some] <= 0)
-        active, below, above, one, two = (values[held] for values in (active, below, above, one, two))
+            enclosed[some] = (one[some] >= 0) & (two[some] <= 0)
+        active, below, above, one, two = (values[enclosed] for values in (active, below, above, one, two))
         side = np.zeros(len(active), np.int64)
         for _ in range(HALVINGS):
             if not len(active):
                 break
             middle = below + (above - below) * one / np.where(one == two, 1.0, one - two)
             ahead = self._at(active, middle)
-            left = ahead > 0
+            is_ahead = ahead > 0
             two, one = (
-                np.where(left & (side > 0), 0.5 * two, two),
-                np.where(~left & (side < 0), 0.5 * one, one),
+                np.where(is_ahead & (side > 0), 0.5 * two, two),
+                np.where(~is_ahead & (side < 0), 0.5 * one, one),
             )
-            below, above = np.where(left, middle, below), np.where(left, above, middle)
-            one, two, side = np.where(left, ahead, one), np.where(left, two, ahead), np.where(left, 1, -1)
+            below, above = np.where(is_ahead, middle, below), np.where(is_ahead, above, middle)
+            one, two, side = (
+                np.where(is_ahead, ahead, one),
+                np.where(is_ahead, two, ahead),
+                np.where(is_ahead, 1, -1),
+            )
             going = ~self.settled[active] & np.isfinite(ahead)
             active, below, above, one, two, side = (
                 values[going] for values in (active, below, above, one, two, side)

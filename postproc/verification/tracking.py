@@ -1,4 +1,4 @@
-"""Where on the grid of the wanted path each command is found, going on from the one before."""
+"""Where on the grid of the wanted path each command is, going on from the one before."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _BLOCK = 128
 
 
 def track_commands(grid: PathGrid, stretch: Ints, command: Floats) -> tuple[Ints, Floats]:
-    """Interval and part of it (S,) of the grid in which each command (S, 3) is found, going on from the one before;
+    """Interval and part of it (S,) of the grid in which each command (S, 3) is, going on from the one before;
     ``stretch`` (S,): that of the grid on which it is, ascending."""
     interval, part = np.empty(len(command), np.int64), np.empty(len(command))
     start = np.flatnonzero(np.append(True, stretch[1:] != stretch[:-1])[: len(stretch)])
@@ -46,11 +46,11 @@ class _Tracking:
         done, here = 0, float(self.arc[0])
         while done < len(command):
             block = slice(done, min(done + _BLOCK, len(command)))
-            found, share, here = self._found(command[block], step[block], here)
-            interval[done : done + len(found)], part[done : done + len(found)] = found, share
-            done += len(found)
+            placed, share, here = self._locate(command[block], step[block], here)
+            interval[done : done + len(placed)], part[done : done + len(placed)] = placed, share
+            done += len(placed)
 
-    def _found(self, command: Floats, step: Floats, here: float) -> tuple[Ints, Floats, float]:
+    def _locate(self, command: Floats, step: Floats, here: float) -> tuple[Ints, Floats, float]:
         """Of the commands (B, 3), or of the first of them whose path stays in view: of the intervals near the last
         place, ``here`` [m], where h changes from positive to negative, the one that the tool is nearest to."""
         start = np.searchsorted(self.arc, [here - 2 * self.reach, here + 2 * self.reach + step.sum()])
@@ -69,7 +69,7 @@ class _Tracking:
             for number in range(first[row], first[row + 1]):
                 if away[number] < nearest and back <= arc[number] <= ahead:
                     best, nearest = number, away[number]
-            if best < 0:  # nowhere square to it: the solution will tell
+            if best < 0:  # nowhere square to it: the solution will show
                 if row:
                     break
                 return self._node(command[:1], back, ahead)
@@ -78,15 +78,15 @@ class _Tracking:
         return some.interval[chosen], some.share[chosen], here
 
     def _candidates(self, command: Floats, low: int, high: int) -> _Candidates:
-        """Where, in the intervals ``low`` to ``high``, the tools of the commands may be found."""
+        """Where, in the intervals ``low`` to ``high``, the tools of the commands may be."""
         value = command @ self.tangent[low : high + 2].T - self.level[low : high + 2]
-        behind = value < 0
-        row, interval = np.nonzero(~behind[:, :-1] & behind[:, 1:])
+        is_behind = value < 0
+        row, interval = np.nonzero(~is_behind[:, :-1] & is_behind[:, 1:])
         one, two = value[row, interval], value[row, interval + 1]
         share, interval = one / (one - two), interval + low
         # before the start and after the end of the stretch these are the places
-        before = np.flatnonzero(behind[:, 0]) if low == 0 else np.zeros(0, np.int64)
-        beyond = np.flatnonzero(~behind[:, -1]) if high == self.last else np.zeros(0, np.int64)
+        before = np.flatnonzero(is_behind[:, 0]) if low == 0 else np.zeros(0, np.int64)
+        beyond = np.flatnonzero(~is_behind[:, -1]) if high == self.last else np.zeros(0, np.int64)
         row = np.concatenate([row, before, beyond])
         interval = np.concatenate(
             [interval, np.zeros(len(before), np.int64), np.full(len(beyond), self.last)]

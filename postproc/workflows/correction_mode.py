@@ -1,4 +1,4 @@
-"""What the cell asks to have corrected: the model for it, what touching off a base saw, and what is left out."""
+"""What the cell asks to have corrected: the model for it, what touching off a base saw, and what is excluded."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def _corrected_by_controller(term: EffectInstance, cell: Cell) -> bool:
 def temperature_rise(model: StiffnessModel, cell: Cell) -> float | None:
     """[K] by which the robot is warmer than at its calibration; None where that is not asked for.
 
-    Raises Refusal CEL011 where the robot file does not say at which temperature it was calibrated.
+    Raises Refusal CEL011 where the robot file does not state at which temperature it was calibrated.
     """
     if cell.correct == "process" or cell.temperature is None:
         return None
@@ -71,11 +71,11 @@ def temperature_rise(model: StiffnessModel, cell: Cell) -> float | None:
 
 
 def touch_off(task: CompensationProblem, cell: Cell) -> tuple[TouchedOff, list[Finding]]:
-    """What touching the cell's points sees of the bases of a program, and what there is to say of it.
+    """What touching the cell's points sees of the bases of a program, and the findings on it.
 
     The points of a base are touched without load, with the tool, orientation and configuration of the first cutting
     motion in it (the first path motion, where none cuts).  Raises Refusal CEL012 where it is not clear which base was
-    touched off or where external axes of the cell stood meanwhile, or a point cannot be touched.
+    touched off or where external axes of the cell were meanwhile, or a point cannot be touched.
     """
     path, track = task.toolpath, task.track
     if task.external is not None and task.external.constant is None:
@@ -131,10 +131,10 @@ def _points_by_frame(task: CompensationProblem, cell: Cell, used: Sequence[int])
                 f"{_bases([numbers[frame]])} has no touch points, and the program cuts in it (line {line})",
                 "every base in which a program cuts needs its own points",
             )
-    found = {frame: cell.touch_points[n] for frame, n in numbers.items() if n in cell.touch_points}
-    if not found:
+    points = {frame: cell.touch_points[n] for frame, n in numbers.items() if n in cell.touch_points}
+    if not points:
         raise _refused(cell, f"the program uses {_bases(numbers.values())}, none of which has touch points")
-    return found
+    return points
 
 
 def _bases(numbers: Iterable[int | None]) -> str:
@@ -176,12 +176,10 @@ def _touched_finding(task: CompensationProblem, touched: TouchedOff, frame: int)
     turn = float(np.linalg.norm(vector_from_rotation(touched.motion.rotation[frame])))
     count, number = int(own.sum()), path.frames[frame].number
     tool = path.frames[path.tool[row]].number
-    stands = (
-        "" if task.external is None or task.external.joint is None else ", with the external axis as there"
-    )
+    note = "" if task.external is None or task.external.joint is None else ", with the external axis as there"
     message = (
         f"base {'' if number is None else f'{number} '}is touched off at {count} point{'' if count == 1 else 's'}"
-        f" with {'the tool' if tool is None else f'tool {tool}'} and orientation of this line{stands}, without load: it"
+        f" with {'the tool' if tool is None else f'tool {tool}'} and orientation of this line{note}, without load: it"
         f" contains {np.linalg.norm(shift.mean(axis=0)) / MM:.3f} mm"
     )
     if count > 1:
@@ -194,7 +192,7 @@ def _touched_finding(task: CompensationProblem, touched: TouchedOff, frame: int)
     return Finding("COR032", message, task.file, int(path.line[row]))
 
 
-# what is left out
+# what is excluded
 
 
 def mode_findings(full: StiffnessModel, cell: Cell, file: str) -> list[Finding]:
@@ -203,24 +201,24 @@ def mode_findings(full: StiffnessModel, cell: Cell, file: str) -> list[Finding]:
     if cell.correct == "process":
         return _excluded_by_process(full, acting, cell, file)
     findings = []
-    left = [term for term in acting if _corrected_by_controller(term, cell)]
-    if left:
-        said = f"the controller corrects these, as the cell states: {_in_groups(left)}"
-        findings.append(Finding("COR030", said, file))
+    by_controller = [term for term in acting if _corrected_by_controller(term, cell)]
+    if by_controller:
+        message = f"the controller corrects these, as the cell states: {_in_groups(by_controller)}"
+        findings.append(Finding("COR030", message, file))
     thermal = [t for t in acting if isinstance(t.effect, ThermalGrowth)]
     by_temperature = [t for t in thermal if t.effect.described()["variable"] == "temperature"]
     path, line = str(cell.path), cell.temperature_line
     if cell.temperature is not None and not by_temperature:
-        said = (
+        message = (
             "temperature: the robot file has no thermal_growth by temperature, so the growth is not corrected"
         )
-        findings.append(Finding("COR031", said, path, line))
+        findings.append(Finding("COR031", message, path, line))
     if cell.temperature is None and by_temperature:
-        said = "thermal_growth of the robot file is not corrected: the cell states no temperature"
-        findings.append(Finding("COR031", said, path, help="add temperature: 24 (degC, of the robot)"))
+        message = "thermal_growth of the robot file is not corrected: the cell states no temperature"
+        findings.append(Finding("COR031", message, path, help="add temperature: 24 (degC, of the robot)"))
     if len(thermal) > len(by_temperature):
-        said = "thermal_growth by time is not corrected: the time of a run is not known"
-        findings.append(Finding("COR031", said, path))
+        message = "thermal_growth by time is not corrected: the time of a run is not known"
+        findings.append(Finding("COR031", message, path))
     return findings
 
 
@@ -242,8 +240,8 @@ def _excluded_by_process(
             )
         )
     if cell.temperature is not None:
-        said = "temperature: is not used with correct: process"
-        findings.append(Finding("COR030", said, str(cell.path), cell.temperature_line))
+        message = "temperature: is not used with correct: process"
+        findings.append(Finding("COR030", message, str(cell.path), cell.temperature_line))
     return findings
 
 

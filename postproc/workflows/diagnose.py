@@ -85,12 +85,12 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     own = model_unknowns(model)
     check_numbers(measured.readings, (), model)
     findings = [*measured.findings, *check_fit(campaign, model, own)]
-    found = diagnose(campaign, model, stage)
-    wild = gross_errors(found.final)
+    diagnosis = diagnose(campaign, model, stage)
+    wild = gross_errors(diagnosis.final)
     if wild:
         stage("once more without outliers")
-        kept = np.setdiff1d(np.arange(len(campaign)), [one.row for one in wild])
-        found = diagnose(Campaign(measured.readings.part(kept), campaign.stated_tool), model)
+        inliers = np.setdiff1d(np.arange(len(campaign)), [one.row for one in wild])
+        diagnosis = diagnose(Campaign(measured.readings.part(inliers), campaign.stated_tool), model)
         findings += [
             Finding(
                 "DIA002",
@@ -100,14 +100,14 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
             )
             for one in wild
         ]
-        campaign = found.final.campaign
+        campaign = diagnosis.final.campaign
     stage("leaving poses out")
     folds = min(FOLDS, campaign.poses)
-    heldout = held_out(found.stated, folds), held_out(found.final, folds)
+    residuals = held_out(diagnosis.stated, folds), held_out(diagnosis.final, folds)
     planned = None
-    if found.verdict.word == "ambiguous":
+    if diagnosis.verdict.word == "ambiguous":
         stage("looking for poses that settle it")
-        planned = _next_poses(measured, found)
+        planned = _next_poses(measured, diagnosis)
     result = Diagnosed(
         robot=measured.robot.name,
         robot_digest=measured.robot.digest,
@@ -115,9 +115,9 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
         data=tuple(
             (p.name, d) for p, d in zip(measured.readings.files, measured.readings.digests, strict=True)
         ),
-        diagnosis=found,
-        held_out_before=heldout[0],
-        held_out_after=heldout[1],
+        diagnosis=diagnosis,
+        held_out_before=residuals[0],
+        held_out_after=residuals[1],
         next_poses=planned,
         findings=tuple(findings),
         robot_file=None,
@@ -132,8 +132,8 @@ def gross_errors(final: Fit) -> tuple[Outlier, ...]:
     length = lengths(final.point.residual, final.plain_weights)
     if length.max(initial=0.0) < 0.5 * WILD * spread_of(length, final.noise.known):
         return ()
-    told, _ = outliers(final, np.ones(len(length), bool))
-    wild = tuple(one for one in told if one.sigmas > WILD)
+    detected, _ = outliers(final, np.ones(len(length), bool))
+    wild = tuple(one for one in detected if one.sigmas > WILD)
     at_pose = np.bincount(final.campaign.pose[[one.row for one in wild]]) if wild else np.zeros(1)
     # an accident strikes one reading, or one pose: where several poses are off as a whole, the arm was there
     by_accident = len(wild) <= FEW * len(length) and (at_pose > 1).sum() <= 1
@@ -144,7 +144,7 @@ def _spare_inputs(request: DiagnoseRequest) -> None:
     inputs = {place(path) for path in request.data}
     if request.robot and request.robot.endswith((".yaml", ".yml")):
         inputs.add(place(Path(request.robot)))
-    desired_path = (
+    outputs = (
         request.output,
         request.next_poses,
         request.json,
@@ -152,7 +152,7 @@ def _spare_inputs(request: DiagnoseRequest) -> None:
         request.picture,
         request.page,
     )
-    written = [path for path in desired_path if path is not None]
+    written = [path for path in outputs if path is not None]
     for path in written:
         if place(path) in inputs:
             raise Refusal(Finding("FIL007", "the output would replace an input", str(path)))
@@ -160,22 +160,22 @@ def _spare_inputs(request: DiagnoseRequest) -> None:
         raise Refusal(Finding("FIL007", "two results have the same name", str(written[0])))
 
 
-def _next_poses(measured: Measured, found: Diagnosis) -> NextPoses | None:
+def _next_poses(measured: Measured, diagnosis: Diagnosis) -> NextPoses | None:
     """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do."""
-    offer = _offer(measured, found.search.base)
-    pairs = [(first, other) for first, *others in found.verdict.alternatives for other in others[:TRIED]]
-    plans = [_discriminating_poses(measured, found, offer, one, other) for one, other in pairs]
+    offer = _offer(measured, diagnosis.search.base)
+    pairs = [(first, other) for first, *others in diagnosis.verdict.alternatives for other in others[:TRIED]]
+    plans = [_discriminating_poses(measured, diagnosis, offer, one, other) for one, other in pairs]
     return max((plan for plan in plans if plan), key=lambda plan: min(plan.separation), default=None)
 
 
 def _discriminating_poses(
-    measured: Measured, found: Diagnosis, offer: CandidateSetups, one: Candidate, other: Candidate
+    measured: Measured, diagnosis: Diagnosis, offer: CandidateSetups, one: Candidate, other: Candidate
 ) -> NextPoses | None:
-    base = found.search.base
+    base = diagnosis.search.base
     model, first = composed(base.model, [one])
     model, second = composed(model, [other])
-    # the first shows what was found of it; the second what its usual size makes
-    model = model.with_values(_values(found.search.final, first, one))
+    # the first has its fitted values; the second those of its usual size
+    model = model.with_values(_values(diagnosis.search.final, first, one))
     common = [u for u in base.unknowns if u.prior is None]
     try:
         poses = apart(model, first, second, common, offer, (NEXT,), candidates=CANDIDATES)
@@ -209,10 +209,12 @@ def _like(measured: Measured, planned: Readings) -> Readings:
 
 
 def _values(final: Fit, unknowns: Sequence[Unknown], candidate: Candidate) -> dict[tuple[int, str], float]:
-    """What the final fit found of a candidate's parameters, as values of a model in which they are ``unknowns``."""
+    """The fitted values of a candidate's parameters, as values of a model in which they are ``unknowns``."""
     wanted = (candidate.name, candidate.effect.described())
-    found = next((t.values for t in final.model.terms if (t.effect.name, t.effect.described()) == wanted), {})
-    return {u.key: found[u.parameter.name] for u in unknowns if u.parameter.name in found}
+    fitted = next(
+        (t.values for t in final.model.terms if (t.effect.name, t.effect.described()) == wanted), {}
+    )
+    return {u.key: fitted[u.parameter.name] for u in unknowns if u.parameter.name in fitted}
 
 
 def _offer(measured: Measured, base: Fit) -> CandidateSetups:
@@ -275,8 +277,8 @@ def _published(request: DiagnoseRequest, measured: Measured, result: Diagnosed, 
 
         stage("drawing")
         files[request.picture] = diagnosed_picture(result, request.picture.suffix.lower().lstrip("."))
-    told = [path for path in (request.json, request.page) if path is not None]
-    result = replace(result, outputs=tuple(str(path) for path in (*files, *told)))
+    reports = [path for path in (request.json, request.page) if path is not None]
+    result = replace(result, outputs=tuple(str(path) for path in (*files, *reports)))
     if request.json is not None:
         files[request.json] = json_bytes(result)
     if request.page is not None:

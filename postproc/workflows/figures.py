@@ -118,8 +118,8 @@ def _largest_rows(values: Floats, mask: Bools, count: int) -> Ints:
 
 def _transition_moves(task: CompensationProblem, division: Subdivision) -> tuple[TransitionMove, ...]:
     links = np.flatnonzero(division.transitions)
-    desired_path = subdivided_motions(task, division, links)
-    length = np.linalg.norm(desired_path.end.position - desired_path.start.position, axis=1) / MM
+    moves = subdivided_motions(task, division, links)
+    length = np.linalg.norm(moves.end.position - moves.start.position, axis=1) / MM
     lines = task.toolpath.line[division.source[links]]
     return tuple(TransitionMove(int(line), float(mm)) for line, mm in zip(lines, length, strict=True))
 

@@ -102,17 +102,17 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
     stage("fitting")
     after = fit(campaign, asked.model, asked.unknowns, every, request.robust, given=given)
     stage("looking for outliers")
-    found, rows = _outliers(after, request.drop_outliers)
-    if request.drop_outliers and found:
+    detected, rows = _outliers(after, request.drop_outliers)
+    if request.drop_outliers and detected:
         before = fit(campaign, model, (), rows, given=given)
         after = fit(campaign, asked.model, asked.unknowns, rows, request.robust, given=given)
     if not after.unknowns:
-        raise Refusal(_nothing_found(measured, after))
+        raise Refusal(_no_parameter_identified(measured, after))
     folds = min(request.folds, campaign.poses)
-    heldout: list[Floats | None] = [None, None]
+    residuals: list[Floats | None] = [None, None]
     if folds > 1:
         stage(f"leaving poses out ({folds}-fold)")
-        heldout = [
+        residuals = [
             held_out(before, folds),
             held_out(after, folds, lambda done, of: progress("leaving poses out", done, of)),
         ]
@@ -125,7 +125,7 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
     if request.validate:
         stage("validating")
         validation = _validated(request, measured, before, after)
-    findings += _result(measured, asked, after, found, request.drop_outliers, drawn, validation, heldout)
+    findings += _result(measured, asked, after, detected, request.drop_outliers, drawn, validation, residuals)
     result = Identified(
         robot=measured.robot.name,
         robot_file=measured.robot.path,
@@ -137,12 +137,12 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
         before=before,
         after=after,
         fixed=asked.fixed,
-        held_out_before=heldout[0],
-        held_out_after=heldout[1],
+        held_out_before=residuals[0],
+        held_out_after=residuals[1],
         folds=folds if folds > 1 else 0,
         validation=validation,
-        outliers=found,
-        outliers_left_out=request.drop_outliers,
+        outliers=detected,
+        outliers_excluded=request.drop_outliers,
         bootstrap=drawn,
         findings=tuple(findings),
         outputs=(),
@@ -217,24 +217,24 @@ def _spare(output: Path | None, robot: Path) -> None:
         raise Refusal(Finding("FIL007", "the output would replace the robot file of the run", str(output)))
 
 
-def _outliers(after: Fit, leave_out: bool) -> tuple[tuple[Outlier, ...], Bools]:
-    """All outliers, and the rows that count.  Where outliers are left out, those that they hid are looked for too."""
+def _outliers(after: Fit, exclude: bool) -> tuple[tuple[Outlier, ...], Bools]:
+    """All outliers, and the rows that count.  Where outliers are excluded, those that they hid are looked for too."""
     rows = np.ones(len(after.campaign), bool)
-    found: tuple[Outlier, ...] = ()
-    for _ in range(ROUNDS if leave_out else 1):
+    detected: tuple[Outlier, ...] = ()
+    for _ in range(ROUNDS if exclude else 1):
         new, _robust = outliers(after, rows)
         if not new:
             break
-        found += new
+        detected += new
         rest = rows.copy()
         rest[[outlier.row for outlier in new]] = False
-        if leave_out:
+        if exclude:
             rows = rest
             after = fit(after.campaign, after.start, after.asked, rows, given=after.point.given)
-    return tuple(sorted(found, key=lambda outlier: -outlier.sigmas)), rows
+    return tuple(sorted(detected, key=lambda outlier: -outlier.sigmas)), rows
 
 
-def _nothing_found(measured: Measured, after: Fit) -> Finding:
+def _no_parameter_identified(measured: Measured, after: Fit) -> Finding:
     reasons = "; ".join(f"{dropped.name}: {dropped.why}" for dropped in after.dropped[:SHOWN])
     return Finding(
         "IDN017",
@@ -259,34 +259,36 @@ def _result(
     measured: Measured,
     asked: FitRequest,
     after: Fit,
-    found: Sequence[Outlier],
-    left_out: bool,
+    detected: Sequence[Outlier],
+    excluded: bool,
     drawn: Bootstrap | None,
     validation: Validation | None,
-    heldout: Sequence[Floats | None],
+    residuals: Sequence[Floats | None],
 ) -> list[Finding]:
     """What needs review about a fit."""
     file = str(measured.readings.files[0])
-    told = []
-    for outlier in found[:SHOWN]:
+    findings = []
+    for outlier in detected[:SHOWN]:
         what = (
             f"the reading is {outlier.distance / MM:.3g} mm off ({outlier.sigmas:.0f} sigma): {outlier.what}"
         )
-        code = "IDN019" if left_out else "IDN018"
-        told.append(Finding(code, what, outlier.file, outlier.line))
-    if len(found) > SHOWN:
-        told.append(
+        code = "IDN019" if excluded else "IDN018"
+        findings.append(Finding(code, what, outlier.file, outlier.line))
+    if len(detected) > SHOWN:
+        findings.append(
             Finding(
-                "IDN019" if left_out else "IDN018", f"{len(found) - SHOWN} more readings are outliers", file
+                "IDN019" if excluded else "IDN018",
+                f"{len(detected) - SHOWN} more readings are outliers",
+                file,
             )
         )
     for dropped in after.dropped:
         frame_only = dropped.why.startswith("is observable only together") and not dropped.together
-        told.append(Finding("IDN021" if frame_only else "IDN020", f"{dropped.name}: {dropped.why}", file))
+        findings.append(Finding("IDN021" if frame_only else "IDN020", f"{dropped.name}: {dropped.why}", file))
     for estimate in after.estimates:
         unknown = estimate.unknown
         if estimate.at_bound:
-            told.append(
+            findings.append(
                 Finding(
                     "IDN022",
                     f"{unknown.name} is at its bound {estimate.value:g} {unknown.parameter.unit}",
@@ -294,7 +296,7 @@ def _result(
                 )
             )
         if unknown.prior is not None and abs(estimate.value - unknown.value) > PULLED * unknown.prior:
-            told.append(
+            findings.append(
                 Finding(
                     "IDN023",
                     f"{unknown.name}: the readings give {estimate.value:.4g}, the robot file states"
@@ -303,7 +305,7 @@ def _result(
                 )
             )
     if after.scatter_exceeded:
-        told.append(
+        findings.append(
             Finding(
                 "IDN024",
                 f"the residuals are {np.sqrt(after.factor):.1f} times the scatter, which is {after.noise.source};"
@@ -313,22 +315,22 @@ def _result(
         )
     names = [unknown.name for unknown in after.unknowns]
     for one, other, size in strong_correlations(names, after.covariance, STRONG)[:SHOWN]:
-        told.append(Finding("IDN025", f"{one} and {other} have the correlation {size:+.3f}", file))
+        findings.append(Finding("IDN025", f"{one} and {other} have the correlation {size:+.3f}", file))
     if drawn is not None:
         ratio = drawn.deviation / np.sqrt(np.diag(after.covariance))
         for name, r in zip(names, ratio.tolist(), strict=True):
             if r > WIDER:
-                told.append(
+                findings.append(
                     Finding(
                         "IDN026",
                         f"{name}: the interval is {r:.2f} times as wide by a bootstrap of {drawn.draws}",
                         file,
                     )
                 )
-    if heldout[0] is not None and heldout[1] is not None:
-        without, with_ = (np.sqrt(np.nanmean(h**2)) for h in (heldout[0], heldout[1]))
+    if residuals[0] is not None and residuals[1] is not None:
+        without, with_ = (np.sqrt(np.nanmean(h**2)) for h in (residuals[0], residuals[1]))
         if with_ > without:
-            told.append(
+            findings.append(
                 Finding(
                     "IDN027",
                     f"the held-out poses are {np.sqrt(3) * with_ / MM:.3g} mm off with the fitted values,"
@@ -337,11 +339,11 @@ def _result(
                 )
             )
     if validation is not None and validation.registered_anew:
-        told.append(
+        findings.append(
             Finding("IDN028", "the tracker is at another place", str(validation.campaign.readings.files[0]))
         )
     if after.weights.shared > 0:
-        told.append(
+        findings.append(
             Finding(
                 "IDN029",
                 f"the readings of a pose share an error of {after.shared_error / MM:.3g} mm in each coordinate",
@@ -350,21 +352,21 @@ def _result(
         )
     unstated = [u.name for u in asked.unknowns if u.prior is not None and u.stated and u.stated.level is None]
     if unstated:
-        told.append(
+        findings.append(
             Finding(
                 "IDN030", f"the robot file states no level for the intervals of {', '.join(unstated)}", file
             )
         )
     again = _counted_before(measured, asked)
     if again:
-        told.append(
+        findings.append(
             Finding(
                 "IDN031",
                 f"the intervals of {', '.join(again)} come from these readings",
                 str(measured.robot.path),
             )
         )
-    return told
+    return findings
 
 
 def _counted_before(measured: Measured, asked: FitRequest) -> list[str]:
@@ -391,8 +393,8 @@ def _published(request: IdentifyRequest, measured: Measured, result: Identified,
 
         stage("drawing")
         files[request.picture] = identified_picture(result, request.picture.suffix.lower().lstrip("."))
-    told = [path for path in (request.json, request.page) if path is not None]
-    result = replace(result, outputs=tuple(str(path) for path in (*files, *told)))
+    reports = [path for path in (request.json, request.page) if path is not None]
+    result = replace(result, outputs=tuple(str(path) for path in (*files, *reports)))
     if request.json is not None:
         files[request.json] = json_bytes(result)
     if request.page is not None:

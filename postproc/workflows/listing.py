@@ -12,7 +12,7 @@ from postproc.workflows.preparation import find_cell_beside, read_program
 
 
 def check(path: Path, cell: Path | None = None, config_dat: Path | None = None) -> Checked:
-    """Read a program only, with what the nearest cell, or ``cell``, says of its language."""
+    """Read a program only, with what the nearest cell, or ``cell``, states of its language."""
     known = find_cell_beside(path) if cell is None else load_cell(cell)
     _, program, _ = read_program(path, known, config_dat)
     return Checked(program)

@@ -71,12 +71,12 @@ def map_workspace(request: MapRequest, stage: Stage = silent) -> Mapped:
         )
     load = _load(request)
     stage("computing")
-    found = evaluate_workspace(model, _grid(request), load)
+    survey = evaluate_workspace(model, _grid(request), load)
     signs = {
         str(term.effect.described()["sign"]) for term in model.terms if "sign" in term.effect.described()
     }
     mapped = Mapped(
-        survey=found,
+        survey=survey,
         load=load,
         robot=robot.name,
         digest=robot.digest,
@@ -88,11 +88,11 @@ def map_workspace(request: MapRequest, stage: Stage = silent) -> Mapped:
         status=None if free else load.status,
     )
     findings = [
-        *_map_findings(found, mapped.status, request.picture is not None),
+        *_map_findings(survey, mapped.status, request.picture is not None),
         *model.plausibility_findings(),
     ]
     files: dict[Path, bytes] = {}
-    if found.mapped.any():
+    if survey.mapped.any():
         stage("drawing")
         if request.csv is not None:
             files[request.csv] = map_csv(mapped)
@@ -100,8 +100,8 @@ def map_workspace(request: MapRequest, stage: Stage = silent) -> Mapped:
             from postproc.report.picture import picture
 
             files[request.picture] = picture(mapped, request.picture.suffix[1:].lower())
-    told = {"result (JSON)": request.json, "page": request.page}
-    names = [*files, *(path for path in told.values() if path is not None)]
+    reports = {"result (JSON)": request.json, "page": request.page}
+    names = [*files, *(path for path in reports.values() if path is not None)]
     mapped = replace(
         mapped,
         findings=tuple(findings),
@@ -145,10 +145,10 @@ def _load(request: MapRequest) -> MapLoad:
     )
 
 
-def _map_findings(found: WorkspaceMap, status: int | None, drawn: bool) -> list[Finding]:
-    """What is to be said of a map as a whole."""
+def _map_findings(survey: WorkspaceMap, status: int | None, drawn: bool) -> list[Finding]:
+    """The findings on a map as a whole."""
     findings = []
-    cells, unsettled = len(found.q), int(found.unsettled.sum())
+    cells, unsettled = len(survey.q), int(survey.unsettled.sum())
     if status is None:
         findings.append(
             Finding(
@@ -157,17 +157,17 @@ def _map_findings(found: WorkspaceMap, status: int | None, drawn: bool) -> list[
                 " differ in configuration",
             )
         )
-    if not found.mapped.any():
-        beyond = int(found.in_reach.sum())
+    if not survey.mapped.any():
+        beyond = int(survey.in_reach.sum())
         help = f"{beyond} cells exceed only the axis limits: use --ignore-limits" if beyond else ""
         branch = "" if status is None else f" with S {status}"
         findings.append(Finding("MAP002", f"none of {cells} cells can be reached{branch}", help=help))
     elif unsettled:
         findings.append(Finding("MAP003", f"{unsettled} of {cells} cells have no equilibrium"))
-    elif not np.nanmax(found.size) > 0:
+    elif not np.nanmax(survey.size) > 0:
         findings.append(Finding("MAP005", "the deflection is zero everywhere"))
-    slices = found.grid.shape[2]
+    slices = survey.grid.shape[2]
     shown = len(slices_shown(slices))
-    if drawn and found.mapped.any() and min(found.grid.shape) > 1 and shown < slices:
+    if drawn and survey.mapped.any() and min(survey.grid.shape) > 1 and shown < slices:
         findings.append(Finding("MAP004", f"the picture shows {shown} of {slices} slices along z"))
     return findings

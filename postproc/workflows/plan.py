@@ -57,7 +57,7 @@ CUTS = 300
 CLEAR = 3.0
 """Standard deviations that distinguish two effects."""
 
-TOLD = 3
+LISTED = 3
 
 _WANTED = re.compile(r"(?:([\w.#]+)\s*=)?\s*([-+0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(%|[A-Za-z].*)?")
 
@@ -147,12 +147,12 @@ def _for_precision(
     counts = np.array([unknown.prior is None for unknown in unknowns]) | named
     criterion = request.criterion or ("test" if tests is not None else "minimax")
     task = DesignProblem(model, unknowns, offer, wanted, counts, criterion, before, tests)
-    found = designs(task, request.poses, SIZES, request.seed, CANDIDATES, stage)
+    design = designs(task, request.poses, SIZES, request.seed, CANDIDATES, stage)
     return Planned(
         robot=model.robot.name,
         digest=model.robot.digest,
         effects=request.effects,
-        model=found.model,
+        model=design.model,
         unknowns=unknowns,
         setups_offered=offer,
         seed=request.seed,
@@ -160,15 +160,15 @@ def _for_precision(
         wanted=wanted,
         wanted_source=source,
         poses=request.poses,
-        setups=found.chosen[request.poses].setups,
-        candidates=len(found.candidates),
-        chosen=found.chosen,
-        at_random=found.at_random,
-        before=found.before,
-        unobservable=found.unobservable,
-        excluded=found.left_out,
-        weakly_observable=found.weak,
-        findings=(*findings, *_findings(model.robot, found)),
+        setups=design.chosen[request.poses].setups,
+        candidates=len(design.candidates),
+        chosen=design.chosen,
+        at_random=design.at_random,
+        before=design.before,
+        unobservable=design.unobservable,
+        excluded=design.left_out,
+        weakly_observable=design.weak,
+        findings=(*findings, *_findings(model.robot, design)),
     )
 
 
@@ -194,14 +194,14 @@ def _discriminating_poses(
             raise Refusal(Finding("PLN006", message, str(model.robot.path)))
     common = tuple(unknown for unknown in unknowns if unknown.key not in keys[0] | keys[1])
     sizes = {min(FEWEST, request.poses), request.poses}
-    found = apart(model, first, second, common, offer, sizes, request.seed, CANDIDATES, stage)
-    setups = found.chosen[request.poses]
+    selection = apart(model, first, second, common, offer, sizes, request.seed, CANDIDATES, stage)
+    setups = selection.chosen[request.poses]
     wanted, named, source = _wanted(request, unknowns)
     counts = np.array([unknown.prior is None for unknown in unknowns]) | named
     task = DesignProblem(model, unknowns, offer, wanted, counts)
     findings = []
-    if min(found.separation[request.poses]) < CLEAR:
-        words = discrimination_words(request.discriminate, found.separation[request.poses])
+    if min(selection.separation[request.poses]) < CLEAR:
+        words = discrimination_words(request.discriminate, selection.separation[request.poses])
         findings.append(Finding("PLN010", words, str(model.robot.path)))
     return Planned(
         robot=model.robot.name,
@@ -216,24 +216,26 @@ def _discriminating_poses(
         wanted_source=source,
         poses=request.poses,
         setups=setups,
-        candidates=found.candidates,
+        candidates=selection.candidates,
         chosen={request.poses: predicted(task, model, setups)},
         rivals=request.discriminate,
-        separation=found.separation,
+        separation=selection.separation,
         findings=tuple(findings),
     )
 
 
-def _findings(robot: Robot, found: Designs) -> list[Finding]:
+def _findings(robot: Robot, design: Designs) -> list[Finding]:
     file, findings = str(robot.path), []
-    for lost in found.unobservable:
+    for lost in design.unobservable:
         findings.append(Finding("PLN011" if lost.imitated else "PLN007", f"{lost.name}: {lost.why}", file))
-    for lost in found.left_out:
+    for lost in design.left_out:
         findings.append(Finding("PLN011" if lost.imitated else "PLN008", f"{lost.name}: {lost.why}", file))
-    if found.weak:
-        told = "; ".join(f"{lost.name}: {lost.why}" for lost in found.weak[:TOLD])
-        more = f"; {len(found.weak) - TOLD} more parameters are similar" if len(found.weak) > TOLD else ""
-        findings.append(Finding("PLN009", told + more, file))
+    if design.weak:
+        weak = "; ".join(f"{lost.name}: {lost.why}" for lost in design.weak[:LISTED])
+        more = (
+            f"; {len(design.weak) - LISTED} more parameters are similar" if len(design.weak) > LISTED else ""
+        )
+        findings.append(Finding("PLN009", weak + more, file))
     return findings
 
 
@@ -306,11 +308,11 @@ def _wanted(request: PlanRequest, unknowns: Sequence[Unknown]) -> tuple[Floats, 
         wanted[i] = stated or SHARE * abs(unknown.value) or SIZE_SHARE * unknown.parameter.scale
     named = np.zeros(len(unknowns), bool)
     for text in sorted(request.wanted, key=lambda text: "=" in text):
-        found = _WANTED.fullmatch(text.strip())
-        number = None if found is None else finite_number(found[2])
-        if found is None or number is None or not number > 0:
+        match = _WANTED.fullmatch(text.strip())
+        number = None if match is None else finite_number(match[2])
+        if match is None or number is None or not number > 0:
             raise _no_wish(text, "it is not NAME=VALUE with % or a unit, as c2=1% or s0=20mm or 2%")
-        name, unit = found[1] or "", found[3] or ""
+        name, unit = match[1] or "", match[3] or ""
         rows = [i for i, unknown in enumerate(unknowns) if _is_named(unknown, name)]
         if not rows:
             names = [unknown.name for unknown in unknowns]

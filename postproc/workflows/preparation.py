@@ -100,7 +100,7 @@ def silent(_stage: str) -> None:
 def read_program(
     path: Path, cell: Cell | None = None, config_dat: Path | None = None
 ) -> tuple[Dialect, Program, ReadingSettings]:
-    """Read a program and what belongs to it, with what the cell says of its language.
+    """Read a program and what belongs to it, with what the cell states of its language.
 
     ``config_dat``: instead of the cell's.  Raises Refusal FIL001, FIL002, FIL003, YML004.
     """
@@ -157,7 +157,7 @@ def prepare(request: Request) -> Prepared:
 
 def _prepared(request: Request, inputs: Inputs) -> Prepared:
     if not request.program.is_file():
-        read_document(request.program)  # tells why
+        read_document(request.program)  # raises the reason
     cell = _cell(request)
     dialect, read, settings = read_program(request.program, cell, request.config_dat)
     beside = None if request.robot else cell.path.parent
@@ -177,7 +177,7 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     external = External.of(path, cell.external_axes, robot, cell.robot_base)
     frames = frames_of(cell, path, request.program, external)
     base, tool, start = frames.base_in_robot, frames.tool_in_flange, _start(cell, robot)
-    path, kept = as_run(path, base, tool, robot, start, str(request.program))
+    path, orientation_findings = as_run(path, base, tool, robot, start, str(request.program))
     force = wrenches(request.program, path, frames, cell, request.force, request.tare)
     _missing_points(program, force)
     _missing_orientation(request, path, force, cell)
@@ -211,12 +211,17 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     task = add_force_ramps(task, _ramp(cell, path, force))
     spacing = np.maximum(cell.min_segment, 1e-3 * cell.cycle_ms * np.nan_to_num(path.feed))
     task = add_lost_motion(task, start, spacing)
-    findings = [*_read_findings(program, path), *kept, *force.findings, *model.plausibility_findings()]
+    findings = [
+        *_read_findings(program, path),
+        *orientation_findings,
+        *force.findings,
+        *model.plausibility_findings(),
+    ]
     findings += mode_findings(full, cell, str(request.program))
     if cell.correct == "touched_off":
-        touched, told = touch_off(task, cell)
+        touched, touch_findings = touch_off(task, cell)
         task = replace(task, touched_off=touched)
-        findings += told
+        findings += touch_findings
     findings += follow_external_axes(path, cell.external_axes, robot, request.program)
     if force.any and not model.is_compliant:
         findings.append(
@@ -228,8 +233,8 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
 
 
 def _read_findings(program: Program, path: Toolpath) -> list[Finding]:
-    """The findings of the reader, but for the external axes: what they carry, the cell has said by now; and the motions
-    at which one of them is not known."""
+    """The findings of the reader, but for the external axes: what they carry, the cell has stated by now; and the
+    motions at which one of them is not known."""
     findings = [finding for finding in program.findings if finding.topic is not Topic.EXTERNAL_AXES]
     lost = [finding for finding in path.constraints.refused.values() if finding.code == "EXT004"]
     if lost:
@@ -239,8 +244,8 @@ def _read_findings(program: Program, path: Toolpath) -> list[Finding]:
 
 
 def _disagreeing(program: Path, path: Toolpath, track: AxisTrack) -> list[Finding]:
-    """What S and T state with a motion, and the axes that bring the robot there, disagree on (KIN007)."""
-    # A path motion keeps the branch that the robot is in, whatever its S says.
+    """Where the stated configuration of a motion and the axes that bring the robot there disagree (KIN007)."""
+    # A path motion keeps the branch that the robot is in, whatever its target states.
     elsewhere = ~status_matches(path, track) & path.known & np.isin(path.kind, (Kind.LIN, Kind.CIRC))
     findings = []
     for mask, message in (
@@ -255,7 +260,7 @@ def _disagreeing(program: Path, path: Toolpath, track: AxisTrack) -> list[Findin
 
 
 def _cell(request: Request) -> Cell:
-    """The cell file, or an empty cell where ``--robot`` says all that a program with its own frames needs."""
+    """The cell file, or an empty cell where ``--robot`` states all that a program with its own frames needs."""
     try:
         cell = load_cell(request.cell or find_cell(request.program))
     except Refusal as refusal:
@@ -307,21 +312,21 @@ def _conditions(
 
 
 def _ramp(cell: Cell, path: Toolpath, force: Wrenches) -> Floats:
-    """(N,) [m] path over which a force that steps inside a cut goes over: as the cell says, or the cutter's radius
+    """(N,) [m] path over which a force that steps inside a cut goes over: as the cell states, or the cutter's radius
     where the process or the cell's tool states it."""
     if cell.force_ramp is not None:
         return np.broadcast_to(cell.force_ramp, (len(path),))
-    radius = np.full(len(path.frames) + 1, np.nan)  # the last stands for an unknown tool
+    radius = np.full(len(path.frames) + 1, np.nan)  # the last is for an unknown tool
     for index, frame in enumerate(path.frames):
         tool = cell.tools.get(frame.number or 0)
         if tool is not None and tool.diameter is not None:
             radius[index] = 0.5 * tool.diameter
     if force.radius is None and np.isnan(radius).all():
         return np.broadcast_to(ASSUMED, (len(path),))
-    found = radius[path.tool]
+    ramp = radius[path.tool]
     if force.radius is not None:
-        found = np.where(np.isnan(force.radius), found, force.radius)
-    return np.where(np.isnan(found), ASSUMED, found)
+        ramp = np.where(np.isnan(force.radius), ramp, force.radius)
+    return np.where(np.isnan(ramp), ASSUMED, ramp)
 
 
 def _missing_points(program: Program, force: Wrenches) -> None:
@@ -345,7 +350,7 @@ def _missing_points(program: Program, force: Wrenches) -> None:
 
 
 def _other_carrier(request: Request, path: Toolpath, force: Wrenches, external: External | None) -> None:
-    """Refuse a motion under force that starts where a base on another positioner is: which way it goes on the part is
+    """Refuse a motion under force that starts where a base on another positioner is: which path it takes on the part is
     nothing that a program means."""
     if external is None:
         return
@@ -363,7 +368,7 @@ def _other_carrier(request: Request, path: Toolpath, force: Wrenches, external: 
 
 
 def _missing_orientation(request: Request, path: Toolpath, force: Wrenches, cell: Cell) -> None:
-    """Refuse cuts of a program that says positions only, in a cell that does not say how the tool stands."""
+    """Refuse cuts of a program that states positions only, in a cell that does not state how the tool is oriented."""
     lost = force.carries & ~path.constraints.orientation_programmed & np.isfinite(path.position).all(axis=1)
     lost &= ~np.isfinite(path.rotation[:, 0, 0]) & ~path.keeps_orientation
     if lost.any():

@@ -33,11 +33,7 @@ from postproc.report.corrections_csv import corrections_csv
 from postproc.report.diff import unified_diff
 from postproc.report.page import beside, program_page
 from postproc.report.page_data import page_data
-from postproc.report.report import (
-    Report,
-    in_order_of_place,
-    json_bytes,
-)
+from postproc.report.report import Report, in_order_of_place, json_bytes
 from postproc.toolpath import OrientationPath, Role, Toolpath
 from postproc.workflows.figures import report_of
 from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, silent
@@ -77,7 +73,7 @@ def predict(request: Request, stage: Stage = silent) -> Report:
 def compensate(request: Request, stage: Stage = silent) -> Report:
     """The main job: read, predict, correct, write, read back.
 
-    ``stage`` is told what is being done.  Raises Refusal, and has then written nothing.
+    ``stage`` is called with what is being done.  Raises Refusal, and has then written nothing.
     """
     ready = prepare(request)
     program = ready.program
@@ -95,9 +91,9 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         )
     stage("correcting")
     target = _target(request)
-    held: dict[int, Finding] = {}
+    excluded: dict[int, Finding] = {}
     while True:
-        task, result, division, edits = _corrected(request, ready, target.stem, held)
+        task, result, division, edits = _corrected(request, ready, target.stem, excluded)
         stage("writing, and reading back")
         ready = ready.without_text()
         release_free_memory()
@@ -117,7 +113,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         worse = cuts_not_improved(task, result, division, written.path_error, written.across_before)
         if not worse:
             break
-        held |= worse
+        excluded |= worse
         stage("correcting without the cuts that would be no better")
         ready = ready.with_text()
     program = ready.program
@@ -169,7 +165,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
 def _corrected(
     request: Request, ready: Prepared, stem: str, worse: Mapping[int, Finding]
 ) -> tuple[CompensationProblem, CorrectionResult, Subdivision, Edits]:
-    """The correction and its edits; what cannot be divided or written as planned stays, and the rest is made again.
+    """The correction and its edits; what cannot be divided or written as planned stays, and the rest is computed again.
     worse: rows whose cuts stay as they are, and why."""
     task, cell = ready.task, ready.cell
     if worse:
@@ -193,31 +189,31 @@ def _corrected(
         release_free_memory()
         division = subdivide(task, result, allowed)
         release_free_memory()
-        told, beyond = check_limits(task, division)
+        limit_findings, beyond = check_limits(task, division)
         release_free_memory()
-        division = replace(division, findings=(*division.findings, *told))
+        division = replace(division, findings=(*division.findings, *limit_findings))
         moved = EditedTargets((), {**beyond, **division.not_refined})
         if not moved.unwritten:
             moved = ready.dialect.edit_targets(ready.program, plan_motions(task, division), writing)
         known = task.toolpath.constraints.refused
-        held = {row: finding for row, finding in moved.unwritten.items() if row not in known}
+        unwritten = {row: finding for row, finding in moved.unwritten.items() if row not in known}
         if not moved.unwritten:
             edits = edit_program(ready.program, ready.dialect, moved.edits, ready.robot, stem)
             return task, result, division, edits
-        if not held:
+        if not unwritten:
             raise ValueError("motions that are not corrected are refused again")
-        task = replace(task, toolpath=task.toolpath.with_refused({**known, **held}))
+        task = replace(task, toolpath=task.toolpath.with_refused({**known, **unwritten}))
 
 
 def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """What is to be said of the corrected program as a whole."""
+    """The findings on the corrected program as a whole."""
     file, findings = str(request.program), []
     result, division = written.result, written.division
     path, tolerance = ready.task.toolpath, ready.cell.tolerance
     corrected = result.corrected
     if ready.task.process and not ready.wrenches.any:
-        said = "--force is not given" if request.force is None else "no motion has a force"
-        findings.append(Finding("COR010", f"{said}: nothing is corrected", file))
+        reason = "--force is not given" if request.force is None else "no motion has a force"
+        findings.append(Finding("COR010", f"{reason}: nothing is corrected", file))
     if division.inserted or len(division.lead_ins):
         changed = (division.role != Role.ORIGINAL) | (division.moved & ~corrected[division.source])
         findings.append(
@@ -230,8 +226,8 @@ def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list
         )
     findings += _corners(ready, written)
     if request.gain < 1.0:
-        said = f"{request.gain:.0%} of the correction is applied, as --gain requests"
-        findings.append(Finding("COR007", said, file))
+        share = f"{request.gain:.0%} of the correction is applied, as --gain requests"
+        findings.append(Finding("COR007", share, file))
     beyond = "" if request.gain == 1.0 else " beyond the share that --gain keeps"
     turns = corrected & path.constraints.orientation_programmed
     for off, limit, rows, unit, word in (
@@ -252,7 +248,7 @@ def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list
 
 
 def _not_turned(ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """Cutting motions whose text cannot say the orientation that would be needed: those that keep the one before
+    """Cutting motions whose text cannot state the orientation that would be needed: those that keep the one before
     (COR019), and those that have no words for it (COR021)."""
     path, division, limit = ready.task.toolpath, written.division, ready.cell.tolerance_angle
     motion = written.result.corrected & ready.task.carries & ~path.constraints.orientation_programmed
@@ -324,7 +320,7 @@ def _assumed(request: Request, ready: Prepared, written: WrittenProgram) -> list
 
 
 def _between(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """What is to be said of the path between the points."""
+    """The findings on the path between the points."""
     path, source, cell, findings = ready.task.toolpath, written.division.source, ready.cell, []
     beyond = "" if request.gain == 1.0 else " beyond the share that --gain keeps"
     for off, rows, limit, unit, what, word in (
@@ -363,24 +359,24 @@ def _inserted(division: Subdivision, count: int) -> str:
         (links, "transition move{} inserted where the correction steps"),
         (leads, "air move{} moved to the corrected start of the next cut"),
     ]
-    said = ", ".join(f"{n} " + words.format("" if n == 1 else "s") for n, words in parts if n)
+    counts = ", ".join(f"{n} " + words.format("" if n == 1 else "s") for n, words in parts if n)
     return (
-        f"the output has {said} (the first one here): {len(division) / max(count, 1):.3f} times the motions"
+        f"the output has {counts} (the first one here): {len(division) / max(count, 1):.3f} times the motions"
     )
 
 
 def _corners(ready: Prepared, written: WrittenProgram) -> list[Finding]:
     """Approximated corners of the output that differ from the path of the original by more than the tolerance: where
     the approximation is stated (COR017), and where it is not (COR015)."""
-    found, tolerance, findings = written.corners, ready.cell.tolerance, []
-    if ready.task.gain < 1.0:  # a share of the correction leaves corners where it leaves the rest
+    corners, tolerance, findings = written.corners, ready.cell.tolerance, []
+    if ready.task.gain < 1.0:  # a share of the correction moves corners as it moves the rest
         return []
-    for code, stated in (("COR017", ~found.unknown), ("COR015", found.unknown)):
-        above = stated & ~(found.difference <= tolerance)
+    for code, stated in (("COR017", ~corners.unknown), ("COR015", corners.unknown)):
+        above = stated & ~(corners.difference <= tolerance)
         if not above.any():
             continue
-        worst = int(np.argmax(np.where(above, np.nan_to_num(found.difference, posinf=np.inf), -1.0)))
-        off, distance = found.difference[worst] / MM, found.distance[worst] / MM
+        worst = int(np.argmax(np.where(above, np.nan_to_num(corners.difference, posinf=np.inf), -1.0)))
+        off, distance = corners.difference[worst] / MM, corners.distance[worst] / MM
         limit = f"tolerance {tolerance / MM:g} mm ({int(above.sum())} corners, the worst here)"
         message = f"a corner that the controller approximates from {distance:.2f} mm on differs"
         if code == "COR015":
@@ -393,7 +389,7 @@ def _corners(ready: Prepared, written: WrittenProgram) -> list[Finding]:
             "use a smaller approximation distance there, or state a longer force_ramp in the cell if"
             " the force changes more slowly"
         )
-        line = int(ready.task.toolpath.line[found.row[worst]])
+        line = int(ready.task.toolpath.line[corners.row[worst]])
         findings.append(Finding(code, message, ready.task.file, line, help=help))
     return findings
 
@@ -444,8 +440,8 @@ def _output_paths(program: Program, target: Path) -> list[Path]:
 
 def _not_over_inputs(ready: Prepared, outputs: Sequence[str]) -> None:
     cell = ready.cell
-    # a force may be a file, read in this run or not, or be said in numbers, which name none
-    named = (cell.path.parent / said for said in (cell.force, cell.process) if said)
+    # a force may be a file, read in this run or not, or be stated in numbers, which name none
+    named = (cell.path.parent / name for name in (cell.force, cell.process) if name)
     ready.inputs.refuse_outputs(map(Path, outputs), named)
     if len({place(Path(output)) for output in outputs}) < len(outputs):
         raise Refusal(Finding("FIL007", "two outputs have the same name", outputs[0]))

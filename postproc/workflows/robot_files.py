@@ -33,41 +33,43 @@ def new_robot_file(
     gap: Mapping[str, float],
     destination: Path,
 ) -> bytes:
-    """The bytes of ``destination``: the file of ``robot`` with what ``fitted`` found, read back by its writer.
+    """The bytes of ``destination``: the file of ``robot`` with the values of ``fitted``, read back by its writer.
 
-    A dimension of which the readings say no more than its prior did keeps what the file states of it.  ``effects``: as
+    A dimension of which the readings show no more than its prior did keeps what the file states of it.  ``effects``: as
     they were asked for or named; ``gap``: of it those keys count that provenance knows [mm].
     """
     deviation = np.sqrt(np.diag(fitted.covariance))
     campaign, today = fitted.campaign, datetime.now(UTC).date().isoformat()
     files = [path.name for path in campaign.readings.files]
     source = f"{command}: {', '.join(files)} ({len(campaign)} readings, {campaign.poses} poses), {today}"
-    told = [_observed_value(e.unknown, e.value, d) for e, d in zip(fitted.estimates, deviation, strict=True)]
-    estimates = [estimate for estimate, by in zip(fitted.estimates, told, strict=True) if by]
-    found = {estimate.unknown.key: estimate for estimate in estimates}
+    is_observed = [
+        _observed_value(e.unknown, e.value, d) for e, d in zip(fitted.estimates, deviation, strict=True)
+    ]
+    estimates = [estimate for estimate, by in zip(fitted.estimates, is_observed, strict=True) if by]
+    by_key = {estimate.unknown.key: estimate for estimate in estimates}
     written = []
     for index, term in enumerate(fitted.model.terms):
         parameters = []
         for parameter in term.effect.parameters:
             name, unit, stated = parameter.name, parameter.unit, term.stated.get(parameter.name)
-            estimate = found.get((index, name))
+            estimate = by_key.get((index, name))
             if estimate is not None:
                 parameters.append(WrittenParameter(name, estimate.value, unit, estimate.ci95, source=source))
             elif stated is not None:
                 parameters.append(WrittenParameter.of(name, unit, stated))
             elif term.values[name] != parameter.null:
                 # the others hold for this value
-                told_by = (
+                fixed_source = (
                     f"{source}; the readings do not show it, and the values beside it belong to this value"
                 )
-                parameters.append(WrittenParameter(name, term.values[name], unit, source=told_by))
+                parameters.append(WrittenParameter(name, term.values[name], unit, source=fixed_source))
         if parameters or term.line:
             options = effect_options(term, campaign.readings)
             written.append(WrittenEffect(term.effect.name, options, tuple(parameters), term.line))
     size = np.where(deviation > 0, deviation, 1.0)
     correlation = fitted.covariance / np.outer(size, size)
     np.fill_diagonal(correlation, 1.0)
-    correlation = correlation[np.ix_(told, told)]
+    correlation = correlation[np.ix_(is_observed, is_observed)]
     run = Identification(
         command=command,
         version=__version__,
@@ -94,7 +96,7 @@ def effect_options(term: EffectInstance, readings: Readings) -> dict[str, object
 
 
 def _observed_value(unknown: Unknown, value: float, deviation: float) -> bool:
-    """Whether readings say more of an unknown than its prior did."""
+    """Whether readings show more of an unknown than its prior did."""
     if unknown.prior is None:
         return True
     moved, stated = abs(value - unknown.value), unknown.stated

@@ -26,7 +26,7 @@ WORST = 10
 def verify(request: Request, compensated: Path, step: float = STEP, stage: Stage = silent) -> Verified:
     """The path error of ``request.program`` and of ``compensated``, both under the original's forces.
 
-    ``step`` [m]: distance of the first samples.  Raises Refusal, VER001 where the second is not made of the first.
+    ``step`` [m]: distance of the first samples.  Raises Refusal, VER001 where the second does not come from the first.
     """
     ready = prepare(request)
     stage("reading the compensated program")
@@ -52,7 +52,7 @@ def verify(request: Request, compensated: Path, step: float = STEP, stage: Stage
         *_figures(ready, other, after, compensated, judged=True),
         *_differences(simulator, ready, other, after, manners, request.program, compensated),
     ]
-    told = in_order_of_place(findings)
+    ordered = in_order_of_place(findings)
     done = Verified(
         str(request.program),
         str(compensated),
@@ -65,8 +65,8 @@ def verify(request: Request, compensated: Path, step: float = STEP, stage: Stage
         ready.cell.tolerance_angle,
         _path_comparison(simulator, ready, before, manners[0]),
         _path_comparison(simulator, other, after, manners[1]),
-        told,
-        exit_code(told, request.strict),
+        ordered,
+        exit_code(ordered, request.strict),
     )
     for inputs in (ready.inputs, other.inputs):
         inputs.refuse_outputs([] if request.json is None else [request.json])
@@ -130,16 +130,16 @@ def _worst(simulator: Simulator, ready: Prepared, simulation: Simulation) -> tup
     in_base = np.einsum(
         "nji,nj->ni", simulator.original.base[samples.place.row].rotation, samples.place.error
     )
-    found: dict[int, WorstError] = {}
+    worst: dict[int, WorstError] = {}
     for sample in np.argsort(-off, kind="stable"):
-        if len(found) == WORST or not simulation.converged:
+        if len(worst) == WORST or not simulation.converged:
             break
         motion = int(samples.motion[sample])
-        if motion not in found:
+        if motion not in worst:
             axis = "XYZ"[int(np.argmax(np.abs(in_base[sample])))]
             line, force = int(ready.task.toolpath.line[motion]), float(samples.place.force[sample])
-            found[motion] = WorstError(line, float(off[sample]) / MM, axis, force)
-    return tuple(found.values())
+            worst[motion] = WorstError(line, float(off[sample]) / MM, axis, force)
+    return tuple(worst.values())
 
 
 def _marks(other: Prepared, compensated: Path) -> list[Finding]:
@@ -151,45 +151,47 @@ def _marks(other: Prepared, compensated: Path) -> list[Finding]:
 def _figures(
     ready: Prepared, run: Prepared, simulation: Simulation, file: Path, judged: bool
 ) -> list[Finding]:
-    """What is to say of the figures of one program; ``judged``: its errors have to be within the tolerances."""
+    """The findings on the figures of one program; ``judged``: its errors have to be within the tolerances."""
     samples, line = simulation.samples, run.task.toolpath.line
-    found: list[Finding] = []
+    findings: list[Finding] = []
     if not simulation.converged:
         lost = np.concatenate(
             [samples.motion[~samples.place.settled], simulation.points[np.isnan(simulation.point_error)]]
         )
         message = "force and place on the path do not converge, or the robot cannot reach the place"
-        found.append(_first("VER007", f"{message}; no error is computed", file, line[np.unique(lost)]))
+        findings.append(_first("VER007", f"{message}; no error is computed", file, line[np.unique(lost)]))
     elif judged:
-        found += _above(ready, run, simulation, file)
+        findings += _above(ready, run, simulation, file)
     if judged and simulation.skipped:
         message = f"{simulation.skipped} motions under force cannot be simulated: their places are not known"
-        found.append(Finding("VER004", message, str(file)))
+        findings.append(Finding("VER004", message, str(file)))
     if judged and not len(samples.motion) + len(simulation.points):
-        found.append(Finding("VER004", "no motion under force is simulated: is --force missing?", str(file)))
-    return found
+        findings.append(
+            Finding("VER004", "no motion under force is simulated: is --force missing?", str(file))
+        )
+    return findings
 
 
 def _above(ready: Prepared, run: Prepared, simulation: Simulation, file: Path) -> list[Finding]:
     """Errors above the tolerances."""
-    samples, cell, found = simulation.samples, ready.cell, []
+    samples, cell, findings = simulation.samples, ready.cell, []
     line = run.task.toolpath.line
     motions = np.append(samples.motion, simulation.points)
     off = np.append(samples.distance, simulation.point_error)
     turns = np.append(samples.place.turn, simulation.point_turn)
     if len(off) and off.max() > cell.tolerance:
         far = f"the tool is {off.max() / MM:.4f} mm off the path", f"tolerance {cell.tolerance / MM:g} mm"
-        found.append(_worst_of(far, off, cell.tolerance, motions, line, file))
+        findings.append(_worst_of(far, off, cell.tolerance, motions, line, file))
     elif simulation.missed > cell.tolerance:
         message = f"a place of the path is {simulation.missed / MM:.4f} mm off the path of the tool"
-        found.append(Finding("VER003", f"{message}, tolerance {cell.tolerance / MM:g} mm", str(file)))
+        findings.append(Finding("VER003", f"{message}, tolerance {cell.tolerance / MM:g} mm", str(file)))
     if len(turns) and turns.max() > cell.tolerance_angle:
         far = (
             f"the tool is {turns.max() / DEG:.4f} deg off its orientation",
             f"tolerance {cell.tolerance_angle / DEG:g} deg",
         )
-        found.append(_worst_of(far, turns, cell.tolerance_angle, motions, line, file))
-    return found
+        findings.append(_worst_of(far, turns, cell.tolerance_angle, motions, line, file))
+    return findings
 
 
 def _worst_of(
@@ -210,7 +212,7 @@ def _differences(
     original: Path,
     compensated: Path,
 ) -> list[Finding]:
-    """What differs beside places; one finding for all motions of which the same is to say."""
+    """What differs beside places; one finding for all motions with the same difference."""
     differences = [*on_cuts(simulator, other.task, after), *in_air(simulator, other.task, after)]
     samples = after.samples
     # of a program that is beside its path none ends where it should
@@ -218,7 +220,7 @@ def _differences(
         differences += missing(simulator, after.samples)
     lines = {True: other.task.toolpath.line, False: ready.task.toolpath.line}
     files = {True: compensated, False: original}
-    found = _grouped(differences, lambda one: (one.what, one.run), lines, files)
+    findings = _grouped(differences, lambda one: (one.what, one.run), lines, files)
     for what, name in (
         ("the motion leads against the feed", "backwards"),
         ("the motion has no length", "idle"),
@@ -226,8 +228,8 @@ def _differences(
         before, now = (getattr(manner, name) for manner in manners)
         if len(now) > len(before):
             more = f"; the original has {len(before)} such motions" if len(before) else ""
-            found.append(_first("VER006", what + more, compensated, lines[True][now]))
-    return found
+            findings.append(_first("VER006", what + more, compensated, lines[True][now]))
+    return findings
 
 
 def _grouped(
@@ -248,6 +250,6 @@ def _grouped(
 
 
 def _first(code: str, message: str, file: Path, lines: Ints) -> Finding:
-    """A finding at the first of these lines, which tells how many there are."""
+    """A finding at the first of these lines, which states how many there are."""
     more = f" ({len(lines)} motions, to line {lines.max()})" if len(lines) > 1 else ""
     return Finding(code, message + more, str(file), int(lines.min()) if len(lines) else 0)
