@@ -179,6 +179,7 @@ def test_settings_of_printers_are_no_motions() -> None:
 
 
 BESIDE = sorted(set("ABCDEFHIJKLMPQRSTUVW"))
+WITHOUT_CODE = "IJKLPQR"
 """Letters of words beside X in a block; N and O number blocks and programs."""
 
 
@@ -214,17 +215,23 @@ def test_blocks_with_which_words_are_whole(name: str, whole: str) -> None:
 def test_expressions_in_which_words_are_refused(name: str) -> None:
     """Those that say where the motion goes; what is said of feeds and tools is no matter of its place."""
     home = "G0 X0 Y0 Z0 A0 B0 C0 T1\nG1 X1 F60"
-    path = beside(name, "\n".join(f"{home}\nX2 {letter}#1\nA0" for letter in BESIDE))
+    letters = [letter for letter in BESIDE if letter != "M"]
+    path = beside(name, "\n".join(f"{home}\nX2 {letter}#1\nA0" for letter in letters))
     codes = [
         path.constraints.refused[row].code if row in path.constraints.refused else ""
         for row in range(2, len(path))
     ]
-    first = {**dict.fromkeys("ABCIJKR", "GCO005"), **dict.fromkeys("UVW", "GCO016"), "T": "GCO015"}
-    behind = {**dict.fromkeys("BC", "GCO013"), **dict.fromkeys("UVW", "GCO002"), "T": "GCO015"}
-    assert dict(zip(BESIDE, codes[2::4], strict=True)) == {letter: first.get(letter, "") for letter in BESIDE}
-    assert dict(zip(BESIDE, codes[3::4], strict=True)) == {
-        letter: behind.get(letter, "") for letter in BESIDE
+    unused = dict.fromkeys(WITHOUT_CODE, "GCO001")
+    first = {**dict.fromkeys("ABC", "GCO005"), **unused, **dict.fromkeys("UVW", "GCO016"), "T": "GCO015"}
+    behind = {**dict.fromkeys("BC", "GCO013"), **dict.fromkeys("UVW" + WITHOUT_CODE, "GCO002"), "T": "GCO015"}
+    assert dict(zip(letters, codes[2::4], strict=True)) == {
+        letter: first.get(letter, "") for letter in letters
     }
+    assert dict(zip(letters, codes[3::4], strict=True)) == {
+        letter: behind.get(letter, "") for letter in letters
+    }
+    computed = beside(name, f"{home}\nX2 M#1\nX3").constraints.refused
+    assert [computed[row].code for row in sorted(computed)[-2:]] == ["GCO005", "GCO005"]
     assert (
         beside(name, "G2 X2 I.5 P#1").constraints.refused[2].code == "GCO005" if name == "linuxcnc" else True
     )

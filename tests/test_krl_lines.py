@@ -645,7 +645,7 @@ def test_what_a_statement_changes(line: str, changes: set[object], calls: str) -
         ("HALT f(1)", []),
         ("SPLINE WITH $X=f(1)", []), ('x="f(1)"', []), ("x=#f(1)", []), ("x='f(1)'", []), ("x=a.f(1)", []),
         ("DEF a(b:IN)", []),
-        ("x=5", []), ("FOR i=f(1) TO (3) STEP (f(2))", ["F"]), ("LIN f(1)", []), ("CASE f(1)", []),
+        ("x=5", []), ("FOR i=f(1) TO (3) STEP (f(2))", ["F"]), ("LIN f(1)", ["F"]), ("CASE f(1)", []),
         ("Z\xe4(f(1))", ["F"]),
     ],
 )  # fmt: skip

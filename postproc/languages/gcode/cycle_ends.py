@@ -27,7 +27,8 @@ def cycle_ends(given: BlockWords, events: Ints) -> CycleEnds:
     axis = np.array([2, 1, 0])[np.clip(given.modal.force[Group.PLANE], 0, 2)]
     absolute = given.modal.force[Group.DISTANCE] == 0
     back = given.modal.force[Group.RETURN]
-    plane, height = given.lengths(key("R")), np.stack([given.lengths(one) for one in AXES[:3]], axis=1)
+    plane, has_plane = given.lengths(key("R")), given.has(key("R"))
+    height = np.stack([given.lengths(one) for one in AXES[:3]], axis=1)
     hows = np.stack([given.how(one) for one in AXES[:3]], axis=1)
     # Where the last coordinate of each axis is that a motion other than a cycle states.
     placed = (given.motion & ~given.machine & ~cycle & absolute)[:, None] & np.isin(
@@ -44,7 +45,7 @@ def cycle_ends(given: BlockWords, events: Ints) -> CycleEnds:
         elif frame[row] != frame[last]:
             at_r, before = np.nan, np.nan
         last = row
-        if not np.isnan(plane[row]):
+        if has_plane[row]:  # one that is computed is not known
             at_r = plane[row] if absolute[row] else np.nan
         elif not absolute[row]:
             at_r = np.nan

@@ -15,6 +15,7 @@ from postproc.languages.gcode.source import Source
 from postproc.languages.gcode.words import key
 
 _GOTO = re.compile(r"(?:GOTO[BFC]?|REPEATB?)\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
+_CODE = re.compile(r"(?<![A-Z_])[GM][ \t]*[\d#\[]", re.I)
 _ZEROS = re.compile(r"^N?0*(?=\d)")
 CALLS = (72, 97, 98, 198)
 """M72 of LinuxCNC brings back modes that M70 has saved."""
@@ -70,8 +71,9 @@ def follow(source: Source, control: Control, once: Ints) -> ExecutionFlow:
     m = source.column(key("M"))
     forget[m.block[np.isin(m.value, CALLS)] + 1] = True
     forget[1:] |= (once & (1 << Once.CALL)) != 0
-    if "unknown" in source.noted:  # what is not read may select anything
-        forget[source.noted["unknown"] + 1] = True
+    # text that is not understood may select anything by a code in it
+    coded = [note.block for note in source.notes if note.kind == "unknown" and _CODE.search(note.text)]
+    forget[np.array(coded, np.intp) + 1] = True
     if control.calls:
         forget[1:] |= source.mask(*control.calls) & ~source.mask(key("G"), key("M"))
     edge = np.zeros(n + 1, np.int32)

@@ -49,7 +49,8 @@ def spoiled(given: BlockWords) -> Spoiled:
             elif stated and np.isnan(level):
                 events.append((block, None))
     for note in given.source.notes:
-        if note.kind == "assign" and _is_offset(note.text):
+        assigned = note.kind == "assign" and _is_offset(note.text)
+        if assigned or (note.kind == "unknown" and note.text.startswith("#")):
             events.append((note.block, None))
     if not events:
         no = everywhere(False, n)

@@ -183,7 +183,11 @@ class _Taken:
             return self.assigned(name, place, assigned.end())
         if name.startswith(b"$"):
             if assigned is None:
-                self.note("unknown", text[place:].strip())
+                rest = text[place:].strip()
+                if name.startswith(b"$P_UIFR"):
+                    self.note("base", b"<" + rest)
+                else:
+                    self.note("unknown", rest)
                 return len(text)
             close = assigned_end(text, assigned.end())
             self.note("base" if name.startswith(b"$P_UIFR") else "assign", b"<" + text[place:close].strip())

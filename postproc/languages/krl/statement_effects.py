@@ -58,6 +58,7 @@ _FUNCTION = re.compile(rb"(?<![A-Za-z0-9_$#.'])(" + NAME + rb")[ \t]*\(")
 _WORDS = frozenset(
     b"AND OR NOT EXOR B_AND B_OR B_NOT B_EXOR IF THEN WHILE UNTIL FOR TO STEP SWITCH CASE WAIT SEC RETURN".split()
 )
+_IN_MOTIONS = frozenset([b"CA", b"WITH", b"BAS"])
 _CALLING = frozenset(["assignment", "call", "foreign", "open", "close", "return", "motion"])
 """Kinds of statement whose expressions may call functions, besides WAIT."""
 
@@ -111,7 +112,11 @@ def functions_of(statement: Statement) -> tuple[bytes, ...]:
         return ()
     said = statement.strings
     code = said.arguments if isinstance(said, Call) else statement.code
-    return _functions(code) if b"(" in code else ()
+    if b"(" not in code:
+        return ()
+    if statement.kind == "motion":
+        return tuple(name for name in _functions(code[len(statement.word) :]) if name not in _IN_MOTIONS)
+    return _functions(code)
 
 
 @kept
