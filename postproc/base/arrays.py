@@ -99,12 +99,12 @@ class FewRows:
     def __getitem__(self, rows: Any) -> Floats:
         """As of an array, by rows: numbers from 0, a mask or a slice."""
         chosen = numbers(rows, len(self))
-        found = np.full((*chosen.shape, self.shape[1]), np.nan)
+        values = np.full((*chosen.shape, self.shape[1]), np.nan)
         if len(self.rows):
             at = np.minimum(np.searchsorted(self.rows, chosen), len(self.rows) - 1)
             known = self.rows[at] == chosen
-            found[known] = self.values[at[known]]
-        return found
+            values[known] = self.values[at[known]]
+        return values
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.asarray(self[:], dtype)
@@ -113,8 +113,8 @@ class FewRows:
 class LazyRows:
     """An array (N, ...) of which parts are made where they are asked for; read-only, and indexed by rows only."""
 
-    def __init__(self, count: int, made: Callable[[Ints], Floats]) -> None:
-        self._count, self._made = count, made
+    def __init__(self, count: int, build: Callable[[Ints], Floats]) -> None:
+        self._count, self._made = count, build
 
     def __len__(self) -> int:
         return self._count

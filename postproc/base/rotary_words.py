@@ -39,20 +39,20 @@ def angles_of(rotation: Floats, near: Floats) -> Floats:
 
     A pair is told from the whole rotation, which is regular at the pole: R i = R_o i for the inner axis i.
     """
-    columns, found = used(near), np.array(near)
+    columns, angles = used(near), np.array(near)
     if len(columns) == 3:
-        found[:] = abc_from_rotation(rotation, near[:, ::-1])[:, ::-1]
+        angles[:] = abc_from_rotation(rotation, near[:, ::-1])[:, ::-1]
     elif len(columns) == 2:
         outer, inner = columns
         o, i = np.eye(3)[[outer, inner]]
         axis = rotation @ i
-        found[:, outer] = np.arctan2(axis @ np.cross(o, i), axis @ i)
-        found[:, inner] = _inner(rotation[:, :, 2], found[:, outer], outer, inner)
+        angles[:, outer] = np.arctan2(axis @ np.cross(o, i), axis @ i)
+        angles[:, inner] = _inner(rotation[:, :, 2], angles[:, outer], outer, inner)
     elif columns == (2,):
-        found[:, 2] = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+        angles[:, 2] = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
     elif columns:
-        found[:, columns[0]] = _inner(rotation[:, :, 2], np.zeros(len(near)), 2, columns[0])
-    return np.asarray(near + wrapped(found - near))
+        angles[:, columns[0]] = _inner(rotation[:, :, 2], np.zeros(len(near)), 2, columns[0])
+    return np.asarray(near + wrapped(angles - near))
 
 
 def _inner(tool: Floats, angle: Floats, outer: int, inner: int) -> Floats:
@@ -84,11 +84,11 @@ def pointing(tool: Floats, near: Floats) -> Floats:
     size, bound = np.abs(change), np.maximum(SWING, np.abs(across) / STEEP)
     back = RETURN * bound * bound * np.abs(lean) / np.maximum(np.abs(across), _TINY)
     change = np.sign(change) * np.minimum(np.minimum(size, bound), back)
-    found = np.array(near)
-    found[:, outer] = near[:, outer] + change
-    found[:, inner] = _inner(tool, found[:, outer], outer, inner)
-    found[:, inner] = near[:, inner] + wrapped(found[:, inner] - near[:, inner])
-    return found
+    angles = np.array(near)
+    angles[:, outer] = near[:, outer] + change
+    angles[:, inner] = _inner(tool, angles[:, outer], outer, inner)
+    angles[:, inner] = near[:, inner] + wrapped(angles[:, inner] - near[:, inner])
+    return angles
 
 
 def reproduced(rotation: Floats, angles: Floats) -> Bools:

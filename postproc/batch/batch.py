@@ -70,19 +70,19 @@ def run_batch(request: BatchRequest, watch: Watch | None = None) -> Batched:
     def stages(number: int, stage: str) -> None:
         watch.stage(names[number], stage)
 
-    found: dict[int, Outcome] = {}
+    by_number: dict[int, Outcome] = {}
     if request.dask is not None:
         running = run_on_cluster(tasks, request.dask, stages)
     else:
         running = run_here(tasks, request.workers or cores(), stages)
     with closing(running) as done:
         for number, outcome in done:
-            found[number] = outcome
+            by_number[number] = outcome
             watch.ended(outcome)
             if request.fail_fast and outcome.exit == 1:
                 break
     outcomes = tuple(
-        found.get(number) or not_run(job.name, str(job.request.program))
+        by_number.get(number) or not_run(job.name, str(job.request.program))
         for number, job in enumerate(jobs.jobs)
     )
     skipped = tuple(str(path) for path in jobs.passed_over)

@@ -94,10 +94,10 @@ def _check(client: Any, address: str) -> None:
     except TimeoutError:
         raise _unusable(f"the cluster at {address} has no workers") from None
     try:
-        found = client.run(code_digest)
+        digests = client.run(code_digest)
     except Exception as error:  # whatever keeps a worker from importing this package
         raise _unusable(f"a worker cannot run this package: {_line(error)}") from None
-    others = sorted(worker for worker, digest in found.items() if digest != code_digest())
+    others = sorted(worker for worker, digest in digests.items() if digest != code_digest())
     if others:
         raise _unusable(
             f"some workers have another version of this package, of Python or of numpy: {', '.join(others)}"

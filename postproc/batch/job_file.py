@@ -51,7 +51,9 @@ class Jobs:
     passed_over: tuple[Path, ...] = ()
 
 
-def jobs_of(words: Sequence[str], said: Said, output: Path | None = None, outside: bool = False) -> Jobs:
+def jobs_of(
+    words: Sequence[str], command_options: Said, output: Path | None = None, outside: bool = False
+) -> Jobs:
     """The jobs of the words of a command line: one job file; or folders, files and patterns.
 
     ``said`` and ``output`` come from the command line too and win over the job file.  ``outside``: the job file may
@@ -66,24 +68,24 @@ def jobs_of(words: Sequence[str], said: Said, output: Path | None = None, outsid
             )
         )
     if files:
-        return _of_file(Path(os.path.abspath(files[0])), said, output, outside)
-    found = [find_programs(word, Path.cwd()) for word in words]
-    for word, one in zip(words, found, strict=True):
+        return _of_file(Path(os.path.abspath(files[0])), command_options, output, outside)
+    matches = [find_programs(word, Path.cwd()) for word in words]
+    for word, one in zip(words, matches, strict=True):
         if not one.programs:
             raise Refusal(one.nothing(word))
-    base = Path(os.path.commonpath([one.anchor for one in found]))
+    base = Path(os.path.commonpath([one.anchor for one in matches]))
     root = base / FOLDER if output is None else Path(os.path.abspath(output))
     if output is None and not is_inside(root, base):
         raise Refusal(Finding("BAT003", f"{root} leads out of {base}", help=LED_AWAY))
-    programs = _not_below(root, base, [path for one in found for path in one.programs])
+    programs = _not_below(root, base, [path for one in matches for path in one.programs])
     if not programs:
         raise Refusal(Finding("BAT001", "the folder contains only results of an earlier run", str(root)))
-    jobs = tuple(_job(program, base, root, said, None) for program in programs)
+    jobs = tuple(_job(program, base, root, command_options, None) for program in programs)
     _check(jobs)
-    return Jobs(root, jobs, tuple(path for one in found for path in one.passed_over))
+    return Jobs(root, jobs, tuple(path for one in matches for path in one.passed_over))
 
 
-def _of_file(path: Path, said: Said, output: Path | None, outside: bool) -> Jobs:
+def _of_file(path: Path, command_options: Said, output: Path | None, outside: bool) -> Jobs:
     top = _loaded(path)
     top.only(*JOB_KEYS, *_former_in(top))
     base = path.parent
@@ -96,7 +98,7 @@ def _of_file(path: Path, said: Said, output: Path | None, outside: bool) -> Jobs
     if not (output or outside or is_inside(root, base)):
         raise _outside(top, "output", root, base)
     general = _options(top)
-    found, programs = [], {}
+    matches, programs = [], {}
     for word, place in _words(top, "programs"):
         one = find_programs(word, base)
         for program in one.programs:
@@ -107,27 +109,29 @@ def _of_file(path: Path, said: Said, output: Path | None, outside: bool) -> Jobs
                 raise Refusal(place("BAT003", f"{one.anchor} is outside of {base}", OUTSIDE))
             missing = one.nothing(word)
             raise Refusal(place(missing.code, missing.message, missing.help))
-        found.append(one)
+        matches.append(one)
         programs.update(dict.fromkeys(one.programs))
     for word, _ in _words(top, "exclude") if "exclude" in top else ():
         for program in find_programs(word, base).programs:
             programs.pop(program, None)
-    kept = _not_below(root, base, list(programs))
-    if not kept:
+    selected = _not_below(root, base, list(programs))
+    if not selected:
         raise top.error("BAT001", "no program remains: all matches are excluded, or are results", "programs")
-    special = _overrides(top, base, kept)
+    special = _overrides(top, base, selected)
     jobs = []
-    for program in kept:
+    for program in selected:
         own: dict[str, object] = {}
         for options in special.get(program, ()):
             own.update(options)
         where = own.pop("output", None)
-        job = _job(program, base, root, {**general, **own, **said}, None if where is None else str(where))
+        job = _job(
+            program, base, root, {**general, **own, **command_options}, None if where is None else str(where)
+        )
         if where is not None and not (outside or is_inside(job.target, base) or is_inside(job.target, root)):
             raise _outside(top, "overrides", job.target, base)
         jobs.append(job)
     _check(jobs, str(path))
-    return Jobs(root, tuple(jobs), tuple(path for one in found for path in one.passed_over))
+    return Jobs(root, tuple(jobs), tuple(path for one in matches for path in one.passed_over))
 
 
 LED_AWAY = "the folder of the results is a symbolic link; remove it, or name its target as the output"
@@ -261,13 +265,13 @@ def _word(section: YamlSection, key: str) -> str:
 
 
 def _options(section: YamlSection) -> Said:
-    found = {key: read(section, key) for key, read in PROGRAM_KEYS.items() if key in section}
+    options = {key: read(section, key) for key, read in PROGRAM_KEYS.items() if key in section}
     for former in _former_in(section):
         key = FORMER_KEYS[former]
         if key in section:
             raise section.error("YML004", f"is the former name of {key!r}, which is given too", former)
-        found[key] = PROGRAM_KEYS[key](section, former)
-    return found
+        options[key] = PROGRAM_KEYS[key](section, former)
+    return options
 
 
 def _former_in(section: YamlSection) -> list[str]:

@@ -110,10 +110,10 @@ class _Worker:
     def answer(self) -> Outcome | str | None:
         """What the process says next: a stage, or an outcome; None if it is gone."""
         try:
-            said: Outcome | str = self.pipe.recv()
+            message: Outcome | str = self.pipe.recv()
         except (EOFError, OSError):
             return None
-        return said
+        return message
 
     def ending(self) -> str:
         self.process.join()

@@ -165,12 +165,12 @@ def _positive(section: YamlSection, key: str, default: float, unit: str) -> floa
 def _numbered(top: YamlSection, key: str) -> list[tuple[int, YamlSection]]:
     """The sections under ``key`` by number, which counts from 1."""
     parent = top.section(key, None)
-    found = []
+    sections = []
     for name in parent:
         if not _NUMBER.match(name):
             raise parent.error("YML004", "is not a number from 1", name, f"{key} are numbered: 1, 2, ...")
-        found.append((int(name), parent.section(name)))
-    return found
+        sections.append((int(name), parent.section(name)))
+    return sections
 
 
 def _frame(section: YamlSection, *more: str) -> Poses:
@@ -250,14 +250,14 @@ def _touch_points(top: YamlSection, correct: str) -> dict[int | None, Floats]:
     if top.is_list("touch_points"):
         return {None: _places(top, "touch_points")}
     numbered = top.section("touch_points")
-    found: dict[int | None, Floats] = {}
+    places: dict[int | None, Floats] = {}
     for name in numbered:
         if not _NUMBER.match(name):
             raise numbered.error("YML004", "is not a number from 1", name, "bases are numbered: 1, 2, ...")
-        found[int(name)] = _places(numbered, name)
-    if not found:
+        places[int(name)] = _places(numbered, name)
+    if not places:
         raise top.error("YML003", "contains no touch point", "touch_points")
-    return found
+    return places
 
 
 def _places(section: YamlSection, key: str) -> Floats:

@@ -133,7 +133,7 @@ def batch(
         force = os.path.abspath(force)
     if robot is not None and robot.lower().endswith((".yaml", ".yml")):
         robot = os.path.abspath(robot)
-    said = {
+    options = {
         "force": force,
         "robot": robot,
         "cell": None if cell is None else Path(os.path.abspath(cell)),
@@ -149,7 +149,7 @@ def batch(
     out = Out(json_to, quiet, verbose)
     request = BatchRequest(
         words=jobs,
-        options={key: value for key, value in said.items() if value is not None},
+        options={key: value for key, value in options.items() if value is not None},
         output=output,
         workers=workers,
         dask=dask,

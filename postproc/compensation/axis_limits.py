@@ -35,10 +35,10 @@ def check_limits(
     rows = np.flatnonzero(division.moved & (task.track.status[division.source] >= 0))
     if not len(rows):
         return [], {}
-    found = _LimitFindings(task, division)
+    collector = _LimitFindings(task, division)
     for block in in_blocks(lambda part: _looked(task, division, rows, part), len(rows)):
-        found.put(block)
-    return found.findings(), found.held
+        collector.put(block)
+    return collector.findings(), collector.held
 
 
 class _LimitBlock(NamedTuple):
@@ -127,16 +127,16 @@ class _LimitFindings:
         self.fastest.append((float(block.share[k, axis]), int(block.rows[k]), axis))
 
     def findings(self) -> list[Finding]:
-        robot, told = self.task.model.robot, []
+        robot, findings = self.task.model.robot, []
         if self.near:
-            left, motion, axis = min(self.nearest)
+            margin, motion, axis = min(self.nearest)
             joint = robot.joints[axis]
             unit, word = (DEG, "deg") if joint.kind == "revolute" else (MM, "mm")
-            message = f"the correction moves {joint.name} to {left / unit:.2f} {word} from its limit"
-            told.append(self._finding("KIN008", motion, message, self.near))
+            message = f"the correction moves {joint.name} to {margin / unit:.2f} {word} from its limit"
+            findings.append(self._finding("KIN008", motion, message, self.near))
         if self.singular:
             message = f"the corrected pose is close to a singularity ({singular_words(robot)})"
-            told.append(self._finding("KIN003", self.first[0], message, self.singular))
+            findings.append(self._finding("KIN003", self.first[0], message, self.singular))
         if self.over:
             share, motion, axis = max(self.fastest, key=lambda one: one[0])
             joint, speed = robot.joints[axis], robot.speeds[axis]
@@ -145,8 +145,8 @@ class _LimitFindings:
                 f"{joint.name} needs {share * speed / unit:.1f} {word} at the programmed feed,"
                 f" its speed limit is {speed / unit:g} {word}"
             )
-            told.append(self._finding("KIN009", motion, message, self.over))
-        return told
+            findings.append(self._finding("KIN009", motion, message, self.over))
+        return findings
 
     def _finding(self, code: str, motion: int, message: str, count: int) -> Finding:
         more = "" if count == 1 else f" ({count} motions)"

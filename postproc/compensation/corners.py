@@ -60,22 +60,22 @@ def compare_corners(task: CompensationProblem, result: CorrectionResult, divisio
         )
         return _differences(task, *sides, distance[part], _original(task, row[part], distance[part]))
 
-    found = [np.empty(0), *in_blocks(of_original, len(row), rows=256)]
-    bent, inner, free = _inserted(task, result, division)
+    differences = [np.empty(0), *in_blocks(of_original, len(row), rows=256)]
+    inserted, inner, free = _inserted(task, result, division)
 
     def of_inserted(part: slice) -> Floats:
         sides = (
-            subdivided_motions(task, division, bent[part]),
-            subdivided_motions(task, division, bent[part] + 1),
+            subdivided_motions(task, division, inserted[part]),
+            subdivided_motions(task, division, inserted[part] + 1),
         )
         return _differences(task, *sides, inner[part], _through(task, *sides, inner[part]))
 
-    found += in_blocks(of_inserted, len(bent), rows=256)
+    differences += in_blocks(of_inserted, len(inserted), rows=256)
     return Corners(
-        np.concatenate([row, division.source[bent]]),
+        np.concatenate([row, division.source[inserted]]),
         np.concatenate([distance, inner]),
         np.concatenate([unknown, free]),
-        np.concatenate(found),
+        np.concatenate(differences),
     )
 
 
@@ -171,11 +171,11 @@ def _differences(
     curve = _parabola(before, after, reach, SAMPLES)
 
     # the force belongs to the place of the wanted path that a command stands for
-    left = before.last - (before.last - before.first) * reach / long_back
-    joined = after.first + (after.last - after.first) * reach / long_ahead
+    exit_share = before.last - (before.last - before.first) * reach / long_back
+    entry_share = after.first + (after.last - after.first) * reach / long_ahead
     part, back = np.abs(2.0 * SAMPLES - 1.0), SAMPLES <= 0.5
     rows = np.where(back, before.rows[:, None], after.rows[:, None]).ravel()
-    ends = np.where(back, left[:, None], joined[:, None])
+    ends = np.where(back, exit_share[:, None], entry_share[:, None])
     meet = np.where(back, before.last[:, None], after.first[:, None])
     share = (meet + part * (ends - meet)).ravel()
     command = Poses(np.repeat(before.end.rotation, many, axis=0), curve.reshape(-1, 3))
@@ -205,8 +205,8 @@ def _through(
     reach = 2.0 * distance / np.maximum(task.desired_path.length[before.rows], 1e-12)
     low, high = np.maximum(before.last - reach, before.first), np.minimum(before.last + reach, after.last)
     share = low + np.linspace(0.0, 1.0, DRAWN + 1)[:, None] * (high - low)
-    found = task.desired_path.at(np.tile(before.rows, DRAWN + 1), share.ravel()).position
-    return np.swapaxes(found.reshape(DRAWN + 1, -1, 3), 0, 1)
+    points = task.desired_path.at(np.tile(before.rows, DRAWN + 1), share.ravel()).position
+    return np.swapaxes(points.reshape(DRAWN + 1, -1, 3), 0, 1)
 
 
 def _distance(points: Floats, drawn: Floats) -> Floats:

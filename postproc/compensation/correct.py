@@ -95,13 +95,13 @@ def correct(task: CompensationProblem) -> CorrectionResult:
     # What the force does, everywhere it can be predicted; the correction, where it may be made.
     seen = np.flatnonzero(scope & cartesian & (track.status >= 0) & track.reachable)
     may = on & ~spread_over_cuts(_in(why, n), cut)
-    found = _Findings(n)
+    corrections = _Findings(n)
     for block in in_blocks(lambda part: _correct_block(task, seen[part], may[seen[part]]), len(seen)):
-        found.put(block)
-    found.judged(task, why, findings)
-    keeps = found.tried & ~spread_over_cuts(_in(why, n), cut)
+        corrections.put(block)
+    corrections.judged(task, why, findings)
+    keeps = corrections.tried & ~spread_over_cuts(_in(why, n), cut)
 
-    shift, turn = task.gain * found.shift, task.gain * found.turn
+    shift, turn = task.gain * corrections.shift, task.gain * corrections.turn
     shift[~keeps], turn[~keeps] = 0.0, 0.0
     size = lengths(shift)
     _refuse(
@@ -118,24 +118,24 @@ def correct(task: CompensationProblem) -> CorrectionResult:
     state[off] = MotionOutcome.OFF
     state[keeps] = MotionOutcome.CORRECTED
     findings += uncorrected_findings(task.file, path, cut, why)
-    found.warn_sides(task, keeps, findings)
+    corrections.warn_sides(task, keeps, findings)
     _warn_singular(task, seen[forced[seen]], findings)
     moved = np.flatnonzero(keeps)
-    after, after_angle = found.before.copy(), found.before_angle.copy()
-    after[moved], after_angle[moved] = found.error[moved], found.angle[moved]
+    after, after_angle = corrections.before.copy(), corrections.before_angle.copy()
+    after[moved], after_angle[moved] = corrections.error[moved], corrections.angle[moved]
     result = CorrectionResult(
         state,
         cut,
         PoseRows(n, lambda rows: _moved(task.wanted[rows], shift[rows], turn[rows])),
         shift,
         turn,
-        found.deflection,
-        found.before,
-        found.before_angle,
+        corrections.deflection,
+        corrections.before,
+        corrections.before_angle,
         after,
         after_angle,
-        found.iterations,
-        found.history,
+        corrections.iterations,
+        corrections.history,
         tuple(findings),
     )
     # What the mirror found holds for the whole correction, and where it corrects all that shows.
@@ -199,12 +199,12 @@ def _correct_block(task: CompensationProblem, rows: Ints, may: Bools) -> _Correc
     wanted, wrench = task.wanted[rows], task.wrench[rows]
     goal = task.goal(rows, wanted)
     q = task.track.q[rows]
-    start, bent = task.start_command(rows, wanted, wrench, goal, q if goal is wanted else None)
-    here = task.simulated(rows, wanted, wrench, bent, q)
+    start, displacement = task.start_command(rows, wanted, wrench, goal, q if goal is wanted else None)
+    here = task.simulated(rows, wanted, wrench, displacement, q)
     shift, turn = task.visible_errors(rows, here.pose, goal)
     shift[~here.settled], turn[~here.settled] = np.nan, np.nan
     tried, wanted = rows[may], wanted[may]
-    done = task.command(tried, wanted, wrench[may], goal[may], (start[may], bent[may]))
+    done = task.command(tried, wanted, wrench[may], goal[may], (start[may], displacement[may]))
     path, robot = task.toolpath, task.model.robot
     low, high = robot.limits.T
     crossed = path.configuration.stated[tried] & (path.kind[tried] == Kind.PTP)

@@ -91,11 +91,11 @@ class DivisibleMotions:
     def path_starts(self, chosen: Ints) -> Poses:
         """The commands (A) where the paths of the motions ``chosen`` (A,) begin: after a transition move or a lead-in,
         or where the motion before them ends."""
-        found = self.entry[self.rows[chosen]]
+        starts = self.entry[self.rows[chosen]]
         own = np.flatnonzero(self.needs_transition[chosen] | self.has_lead_in[chosen])
         if len(own):
-            found.put(own, self.starts[self.start_at[chosen[own]]])
-        return found
+            starts.put(own, self.starts[self.start_at[chosen[own]]])
+        return starts
 
     def least_segments(self) -> Ints:
         """(I,) segments that an interval has at least."""
@@ -124,9 +124,9 @@ class DivisibleMotions:
         def largest(part: slice) -> Floats:
             segments, owner = self.segments(chosen[part], count[part])
             size = self._allowed(*path_errors(self.task, segments))
-            found = np.zeros(len(count[part]))
-            np.maximum.at(found, owner, size)
-            return found
+            errors = np.zeros(len(count[part]))
+            np.maximum.at(errors, owner, size)
+            return errors
 
         return np.concatenate([np.empty(0), *in_blocks(largest, len(chosen), motions_per_block(count))])
 
@@ -163,14 +163,16 @@ class DivisibleMotions:
         later = np.flatnonzero(number > 0)
         start.put(later, end[later - 1])
         segments = PathSegments.straight(at, first, last, start, end)
-        bent = np.flatnonzero(self.task.desired_path.arc[at])
-        if len(bent):
-            via = self.commands(at[bent], 0.5 * (first + last)[bent])
-            normal = arc_normals(self.task, at[bent])
-            arcs = PathSegments.round(at[bent], first[bent], last[bent], start[bent], via, end[bent], normal)
+        curved = np.flatnonzero(self.task.desired_path.arc[at])
+        if len(curved):
+            via = self.commands(at[curved], 0.5 * (first + last)[curved])
+            normal = arc_normals(self.task, at[curved])
+            arcs = PathSegments.round(
+                at[curved], first[curved], last[curved], start[curved], via, end[curved], normal
+            )
             for name in ("centre", "normal", "sweep"):
                 values = getattr(segments, name).copy()
-                values[bent] = getattr(arcs, name)
+                values[curved] = getattr(arcs, name)
                 segments = replace(segments, **{name: values})
         return segments, owner
 

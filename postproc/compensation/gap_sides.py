@@ -112,7 +112,7 @@ class Reversals:
         """Of ``shares`` (S, n) of dead bands at stations at ``position`` (S,) [m], ``anew`` (S,) where nothing is known
         of how the motors came: a side holds until the band is crossed the other way, and what comes first holds from
         the start.  ``spacing`` (N,) [m]: no change is shorter, and none starts or ends so near to a target."""
-        found: list[tuple[Floats, ...]] = []
+        by_axis: list[tuple[Floats, ...]] = []
         start = np.zeros(shares.shape[1])
         again = np.maximum.accumulate(np.where(anew, np.arange(len(anew)), -1))
         for axis, share in enumerate(shares.T):
@@ -136,20 +136,20 @@ class Reversals:
             row, _ = line.place(reached)
             until = np.where(until > since, until, line.start[row] + line.length[row])
             until = np.minimum(until, np.maximum(np.append(since[1:], np.inf), since))
-            found.append((np.full(len(since), axis), since, until, old, -old))
-        whole = [np.concatenate(parts) for parts in zip(*found, strict=True)]
+            by_axis.append((np.full(len(since), axis), since, until, old, -old))
+        whole = [np.concatenate(parts) for parts in zip(*by_axis, strict=True)]
         return Reversals(line, start, whole[0].astype(np.int64), *whole[1:])
 
     def at(self, rows: Ints, along: Floats | None = None) -> Floats:
         """(K, n) at the shares ``along`` (K,) of the paths of the motions ``rows`` (K,), at their ends without."""
         position = self.line.position(rows, 1.0 if along is None else along)
-        found = np.tile(self.first, (len(rows), 1))
+        values = np.tile(self.first, (len(rows), 1))
         for axis in np.unique(self.axis).tolist():
             own = self.axis == axis
             knots = np.stack([self.since[own], self.until[own]], axis=1).ravel()
             sides = np.stack([self.old[own], self.new[own]], axis=1).ravel()
-            found[:, axis] = np.interp(position, knots, sides)
-        return found
+            values[:, axis] = np.interp(position, knots, sides)
+        return values
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,9 +47,9 @@ def _with_companions(motions: DivisibleMotions, at: Ints, share: Floats) -> tupl
     reach = np.where(blend == 0, 0.0 if path.constraints.exact_stays else np.inf, np.nan_to_num(blend))
     last = np.append(at[1:] != at[:-1], True)
     first = np.append(True, last[:-1])
-    behind = (np.where(last, 1.0, np.append(share[1:], 1.0)) - share) * length
+    after = (np.where(last, 1.0, np.append(share[1:], 1.0)) - share) * length
     before = (share - np.where(first, 0.0, np.append(0.0, share[:-1]))) * length
-    reach = np.minimum(reach, 0.5 * np.minimum(before, behind))
+    reach = np.minimum(reach, 0.5 * np.minimum(before, after))
 
     def kink(part: slice) -> Floats:
         shifts = []
@@ -70,7 +70,7 @@ def _with_companions(motions: DivisibleMotions, at: Ints, share: Floats) -> tupl
         np.nan_to_num(path.approximation[np.maximum(rows - 1, 0)]),
     )
     room = np.maximum(spacing, np.where(last, 2.0 * corner[0], 0.0))
-    sides = [off & (behind >= spacing + room)]
+    sides = [off & (after >= spacing + room)]
     room = np.where(
         first, np.maximum(spacing, 2.0 * corner[1]), 2.0 * spacing
     )  # the one before may have its own

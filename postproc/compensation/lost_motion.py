@@ -62,8 +62,8 @@ def add_lost_motion(task: CompensationProblem, start: Floats | None, spacing: Fl
     ``spacing`` (N,) [m]: no motion is to be shorter, and so no change of side."""
     if not task.model.by_direction or not len(task.toolpath):
         return task
-    desired_path = _AxisPaths(task)
-    stations = desired_path.first(start)
+    axis_paths = _AxisPaths(task)
+    stations = axis_paths.first(start)
     for _ in range(ROUNDS):
         coarse = stations.turning()
         if not len(coarse) or len(stations.row) + (PARTS - 1) * len(coarse) > 3 * len(task.toolpath) + MOST:
@@ -75,7 +75,7 @@ def add_lost_motion(task: CompensationProblem, start: Floats | None, spacing: Fl
     # where a change of side starts and ends there is a station
     row, along = line.place(np.concatenate([turns.since, turns.until]))
     inside = task.desired_path.traceable[row] & (along > 0.0) & (along < 1.0)
-    stations = stations.joined(desired_path.made(row[inside], along[inside]))
+    stations = stations.joined(axis_paths.made(row[inside], along[inside]))
     lost = LostMotion(
         stations.programmed,
         turns,
@@ -110,10 +110,10 @@ def dead_band(task: CompensationProblem) -> Floats:
     back = np.abs(np.linalg.pinv(columns[:, :, programmed], rcond=1e-6))
     rounding = np.zeros_like(lever)
     rounding[:, programmed] = np.einsum("nij,nj->ni", back, digits)
-    band, found = np.maximum(shows, rounding), np.empty((n, joints))
+    band, bands = np.maximum(shows, rounding), np.empty((n, joints))
     for joint in range(joints):
-        found[:, joint] = np.interp(np.arange(n), rows, band[:, joint])
-    return found
+        bands[:, joint] = np.interp(np.arange(n), rows, band[:, joint])
+    return bands
 
 
 def position_digit(position: Floats) -> float:
@@ -162,10 +162,14 @@ class _AxisPaths:
         along = np.concatenate(
             [np.ones(len(rows)), number / np.repeat(count, count - 1), np.zeros(len(sets_in))]
         )
-        found = self.made(row, along)
-        begin = np.empty((0, q.shape[1])) if start is None or not np.isfinite(start).all() else start[None]
-        before = _Samples(self, np.full(len(begin), -1), np.ones(len(begin)), begin, begin)
-        return before.joined(found)
+        samples = self.made(row, along)
+        start_axes = (
+            np.empty((0, q.shape[1])) if start is None or not np.isfinite(start).all() else start[None]
+        )
+        before = _Samples(
+            self, np.full(len(start_axes), -1), np.ones(len(start_axes)), start_axes, start_axes
+        )
+        return before.joined(samples)
 
     def made(self, row: Ints, along: Floats) -> _Samples:
         """Stations at the shares ``along`` (S,) of the ways of ``row`` (S,), without those that are out of reach."""
@@ -191,8 +195,8 @@ class _AxisPaths:
             if (placed := task.robot_from_path(at, part)) is not None:
                 flange = placed @ flange
             near = q[at - 1] + part[:, None] * (q[at] - q[at - 1])
-            found = inverse(task.model.robot.nominal, flange, task.track.status[at], near)
-            axes[inner] = np.where(found.reachable[:, None], found.q, np.nan)
+            solution = inverse(task.model.robot.nominal, flange, task.track.status[at], near)
+            axes[inner] = np.where(solution.reachable[:, None], solution.q, np.nan)
         return axes
 
     def _aim(self, row: Ints, along: Floats, axes: Floats) -> Floats:
@@ -270,13 +274,13 @@ class _Samples:
         """(S,) parts of paths in which a parabola through three stations turns round by more than half a dead band."""
         band, aim = self.within.gap[:, lossy], self.aim[:, lossy]
         step = np.diff(aim, axis=0, prepend=aim[:1])
-        found = np.zeros(len(step), bool)
+        bulges = np.zeros(len(step), bool)
         inside = np.flatnonzero(self.row[1:-1] == self.row[2:]) + 1
         bend = np.abs(step[inside + 1] - step[inside])
         for one in (inside, inside + 1):
             turned = np.any((np.abs(step[one]) < bend) & (bend > 0.5 * band[one]), axis=1)
-            found[one[turned]] = True
-        return found
+            bulges[one[turned]] = True
+        return bulges
 
     def _span(self, chosen: Ints) -> Floats:
         """(A,) share of its path between each station and the one before it."""

@@ -20,7 +20,7 @@ def interpolate_orientation(
     rows: Ints,
     first: Floats,
     last: Floats,
-    begin: Floats,
+    start: Floats,
     end: Floats,
     share: Floats,
     into: Floats,
@@ -37,17 +37,19 @@ def interpolate_orientation(
     at = np.flatnonzero(law == OrientationPath.ROTARY_AXES)
     if len(at):
         words = _Words.of(path, base, wanted, rows[at])
-        one, two = words.inside(begin[at]), words.inside(end[at])
-        start = rotary_words.angles_of(one, path.orientation_control.rotary_at(rows[at], first[at]))
-        stop = rotary_words.angles_of(two, path.orientation_control.rotary_at(rows[at], last[at]))
+        one, two = words.inside(start[at]), words.inside(end[at])
+        start_angles = rotary_words.angles_of(one, path.orientation_control.rotary_at(rows[at], first[at]))
+        stop_angles = rotary_words.angles_of(two, path.orientation_control.rotary_at(rows[at], last[at]))
         # What the words do not say (another base or tool before) turns evenly.
-        said = rotary_words.reproduced(one, start) & rotary_words.reproduced(two, stop)
-        here = words.outside(rotary_words.rotation_of(start + share[at][:, None] * (stop - start)))
-        into[at[said]] = here[said]
+        expressible = rotary_words.reproduced(one, start_angles) & rotary_words.reproduced(two, stop_angles)
+        here = words.outside(
+            rotary_words.rotation_of(start_angles + share[at][:, None] * (stop_angles - start_angles))
+        )
+        into[at[expressible]] = here[expressible]
     at = np.flatnonzero(law == OrientationPath.GREAT_CIRCLE)
     if len(at):
         here, known = _on_great_circle(
-            begin[at], end[at], path.orientation_control.redundant_axis[rows[at]], share[at]
+            start[at], end[at], path.orientation_control.redundant_axis[rows[at]], share[at]
         )
         into[at[known]] = here[known]
 
@@ -65,9 +67,9 @@ def _on_great_circle(start: Floats, end: Floats, tool: Floats, share: Floats) ->
     vector = axis * (angle / np.where(sine > 0, sine, 1.0))[:, None]
     vector, tool = (np.where(known[:, None], part, 0.0) for part in (vector, tool))
     # the spin: what is left of R(1) after the great circle turns about the tool
-    left = product(np.swapaxes(product(rotation_from_vector(vector), start), 1, 2), end)
-    odd = np.stack([left[:, k, j] - left[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))], axis=-1)
-    trace = np.trace(left, axis1=1, axis2=2)
+    remaining = product(np.swapaxes(product(rotation_from_vector(vector), start), 1, 2), end)
+    odd = np.stack([remaining[:, k, j] - remaining[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))], axis=-1)
+    trace = np.trace(remaining, axis1=1, axis2=2)
     spin = np.arctan2(0.5 * np.sum(odd * tool, axis=1), 0.5 * (trace - 1.0))
     path = rotation_from_vector(share[:, None] * vector)
     turn = rotation_from_vector((share * spin)[:, None] * tool)
@@ -131,25 +133,25 @@ def spread(path: Toolpath, rows: Ints, low: Floats, high: Floats, part: Floats) 
 
     Evenly; where a pair of axes turns evenly in u = asinh(lean / POLE), because the outer one turns with 1 / lean.
     """
-    found = low + part * (high - low)
+    shares = low + part * (high - low)
     at, (start, stop) = _leans(path, rows, low, high)
     if len(at):
         one, two = np.arcsinh(start / POLE), np.arcsinh(stop / POLE)
         lean = POLE * np.sinh(one + part[at] * (two - one))
-        found[at] = low[at] + (high[at] - low[at]) * (lean - start) / (stop - start)
-    return np.where(part == 1.0, high, found)
+        shares[at] = low[at] + (high[at] - low[at]) * (lean - start) / (stop - start)
+    return np.where(part == 1.0, high, shares)
 
 
 def shortest(path: Toolpath, rows: Ints, low: Floats, high: Floats) -> Floats:
     """(K,) by which factor the shortest of many segments of ``spread``, from the shares ``low`` to ``high`` (K,) of
     motions ``rows`` (K,), is shorter than an even one."""
-    found = np.ones(len(rows))
+    factor = np.ones(len(rows))
     at, (start, stop) = _leans(path, rows, low, high)
     if len(at):
         one, two = np.arcsinh(start / POLE), np.arcsinh(stop / POLE)
         nearest = np.where(start * stop < 0, 0.0, np.minimum(np.abs(one), np.abs(two)))
-        found[at] = np.minimum(1.0, np.cosh(nearest) * POLE * (two - one) / (stop - start))
-    return found
+        factor[at] = np.minimum(1.0, np.cosh(nearest) * POLE * (two - one) / (stop - start))
+    return factor
 
 
 def _leans(path: Toolpath, rows: Ints, low: Floats, high: Floats) -> tuple[Ints, tuple[Floats, Floats]]:

@@ -39,14 +39,14 @@ def along_and_across(task: CompensationProblem, result: CorrectionResult) -> tup
     """(N,) [m] predicted errors before the correction at the end points, along and across the feed; NaN where nothing
     is predicted."""
     rows = np.flatnonzero(np.isfinite(result.deflection[:, 0]))
-    found = np.full((2, len(result.state)), np.nan, np.float32)
+    errors = np.full((2, len(result.state)), np.nan, np.float32)
 
     def parted(part: slice) -> None:
-        found[:, rows[part]] = across_feed(task, rows[part], result.deflection[rows[part]])
+        errors[:, rows[part]] = across_feed(task, rows[part], result.deflection[rows[part]])
 
     for _ in in_blocks(parted, len(rows)):
         pass
-    return found[0], found[1]
+    return errors[0], errors[1]
 
 
 def cuts_not_improved(
@@ -68,9 +68,9 @@ def cuts_not_improved(
     cuts, place = np.unique(result.cut[rows], return_inverse=True)
 
     def largest(values: Floats, at: Ints) -> Floats:
-        found = np.zeros(len(cuts))
-        np.fmax.at(found, at, values)
-        return found
+        maxima = np.zeros(len(cuts))
+        np.fmax.at(maxima, at, values)
+        return maxima
 
     def mean_square(values: Floats) -> Floats:
         return np.bincount(place, np.nan_to_num(values) ** 2, len(cuts)) / np.bincount(place)
@@ -90,7 +90,7 @@ def cuts_not_improved(
             first, largest(_before_between(task, some), np.searchsorted(cuts, result.cut[some]))
         )
     worse = (after > first + ROUNDING) | (square[0] > square[1] - WORTH**2) | turned
-    found = {}
+    findings = {}
     for k in np.flatnonzero(worse).tolist():
         row = int(rows[np.argmax(place == k)])
         what = (
@@ -100,14 +100,14 @@ def cuts_not_improved(
             f" and {first[k] / MM:.4f} without the correction"
         )
         line = int(task.toolpath.line[row])
-        found[row] = Finding(
+        findings[row] = Finding(
             "COR016",
             what,
             task.file,
             line,
             help="allow inserted motions (no --no-insert), raise max_growth, or loosen the tolerance",
         )
-    return found
+    return findings
 
 
 def _before_between(task: CompensationProblem, rows: Ints) -> Floats:
@@ -116,10 +116,10 @@ def _before_between(task: CompensationProblem, rows: Ints) -> Floats:
     def looked(part: slice) -> Floats:
         some = rows[part]
         known = task.desired_path.traceable[some]
-        found = np.zeros(len(some))
+        errors = np.zeros(len(some))
         at = some[known]
-        found[known], _ = path_errors(task, programmed(task, at))
-        return found
+        errors[known], _ = path_errors(task, programmed(task, at))
+        return errors
 
     return np.concatenate([np.empty(0), *in_blocks(looked, len(rows))])
 

@@ -85,23 +85,23 @@ class PathSegments:
 
     def at(self, share: Floats, along: Bools | None = None) -> Poses:
         """Commands (K) at the shares (K,) of the segments; ``along`` (K,): arcs with which the tool turns."""
-        found = interpolate_poses(self.start, self.end, share)
-        bent = np.flatnonzero(np.isfinite(self.sweep))
-        turns = bent[:0] if along is None else bent[along[bent]]
+        commands = interpolate_poses(self.start, self.end, share)
+        arcs = np.flatnonzero(np.isfinite(self.sweep))
+        turns = arcs[:0] if along is None else arcs[along[arcs]]
         if len(turns):
             start, end = self.start.rotation[turns], self.end.rotation[turns]
             arc = self.sweep[turns, None] * self.normal[turns]
-            found.rotation[turns] = turning(start, turn_beside(start, end, arc), arc, share[turns])
-        if len(bent):
-            found.position[bent] = on_arc(
-                self.start.position[bent],
-                self.end.position[bent],
-                self.centre[bent],
-                self.normal[bent],
-                self.sweep[bent],
-                share[bent],
+            commands.rotation[turns] = turning(start, turn_beside(start, end, arc), arc, share[turns])
+        if len(arcs):
+            commands.position[arcs] = on_arc(
+                self.start.position[arcs],
+                self.end.position[arcs],
+                self.centre[arcs],
+                self.normal[arcs],
+                self.sweep[arcs],
+                share[arcs],
             )
-        return found
+        return commands
 
 
 def programmed(task: CompensationProblem, rows: Ints) -> PathSegments:
@@ -117,7 +117,7 @@ def programmed(task: CompensationProblem, rows: Ints) -> PathSegments:
 def path_errors(
     task: CompensationProblem,
     segments: PathSegments,
-    from_begin: Bools | None = None,
+    from_start: Bools | None = None,
     left: float = 0.0,
     shown: bool = False,
 ) -> tuple[Floats, Floats]:
@@ -145,8 +145,8 @@ def path_errors(
             )
             off[chosen] = np.maximum(off[chosen], here[0])
             angle[chosen] = np.maximum(angle[chosen], here[1])
-    if from_begin is not None and from_begin.any():
-        chosen = np.flatnonzero(from_begin)
+    if from_start is not None and from_start.any():
+        chosen = np.flatnonzero(from_start)
         here = _errors(task, segments[chosen], 0.0, left, shown)
         off[chosen], angle[chosen] = np.maximum(off[chosen], here[0]), np.maximum(angle[chosen], here[1])
     return off, angle
@@ -159,7 +159,11 @@ def path_errors_at(task: CompensationProblem, segments: PathSegments, share: Flo
 
 
 def _errors(
-    task: CompensationProblem, segments: PathSegments, share: float | Floats, left: float, shown: bool
+    task: CompensationProblem,
+    segments: PathSegments,
+    share: float | Floats,
+    uncorrected_share: float,
+    shown: bool,
 ) -> tuple[Floats, Floats]:
     """As ``path_errors``, at one share of each segment."""
     rows = segments.rows
@@ -172,10 +176,10 @@ def _errors(
     real = task.simulated(rows, command, wrench, share=along, corrected=True)
     goal = task.goal(rows, wanted, along)
     shift, turn = _beside(task, rows, along, real.pose, wanted, goal, shown)
-    if left:
+    if uncorrected_share:
         without = task.simulated(rows, wanted, wrench, share=along).pose
         parts = _beside(task, rows, along, without, wanted, goal, shown)
-        shift, turn = shift - left * parts[0], turn - left * parts[1]
+        shift, turn = shift - uncorrected_share * parts[0], turn - uncorrected_share * parts[1]
     if not shown:
         turn = task.correctable(rows, along, command, turn)
     good = real.reachable & real.settled

@@ -153,14 +153,14 @@ class CompensationProblem:
         share: Floats | None = None,
     ) -> Prediction:
         placed = self.robot_from_path(rows, share)
-        found = predict(
+        prediction = predict(
             self.model,
             command if placed is None else placed @ command,
             self._load_case(rows, rotate_wrench(placed, wrench), given, share),
             start,
             q,
         )
-        return found if placed is None else replace(found, pose=placed.inverse() @ found.pose)
+        return prediction if placed is None else replace(prediction, pose=placed.inverse() @ prediction.pose)
 
     def goal(self, rows: Ints, wanted: Poses, share: Floats | None = None) -> Poses:
         """Where the tool is to be in motions ``rows`` (K,), at ``share`` (K,) of their paths or at their ends: the
@@ -225,15 +225,15 @@ class CompensationProblem:
         place = np.ones(len(at)) if share is None else share[pairs]
         here, placed = done.command.rotation[pairs], self.robot_from_path(at, place)
         if placed is None:
-            said = self.expressible_orientations(at, place, here)
+            expressible = self.expressible_orientations(at, place, here)
         else:
-            said = product(
+            expressible = product(
                 placed.rotation,
                 self.expressible_orientations(at, place, product(placed.inverse().rotation, here)),
             )
         again = mirror(
             self.model,
-            Poses(said, done.command.position[pairs]),
+            Poses(expressible, done.command.position[pairs]),
             goal[pairs],
             self._load_case(at, wrench[pairs], self._to_be(at, place), place),
             np.zeros((len(at), 3, 3)),
@@ -254,11 +254,11 @@ class CompensationProblem:
         pairs = orientations.pairs(self.toolpath, rows)
         if not len(pairs):
             return rotation
-        found, at = rotation.copy(), rows[pairs]
-        found[pairs] = orientations.nearest_expressible(
+        nearest, at = rotation.copy(), rows[pairs]
+        nearest[pairs] = orientations.nearest_expressible(
             self.toolpath, self.base, self.wanted, at, share[pairs], rotation[pairs]
         )
-        return found
+        return nearest
 
     def correctable(self, rows: Ints, share: Floats, command: Poses, turn: Floats) -> Floats:
         """(K, 3) [rad] of ``turn`` (K, 3), by which the tool is off at ``command`` (K), what other words at the shares
@@ -266,13 +266,13 @@ class CompensationProblem:
         pairs = orientations.pairs(self.toolpath, rows)
         if not len(pairs):
             return turn
-        found, at = turn.copy(), rows[pairs]
+        correctable, at = turn.copy(), rows[pairs]
         here, tool = command.rotation[pairs], self.toolpath.orientation_control.redundant_axis[at]
         better = self.expressible_orientations(
             at, share[pairs], product(rotation_from_vector(-turn[pairs]), here)
         )
-        found[pairs] = np.cross(turned(better, tool), turned(here, tool))
-        return found
+        correctable[pairs] = np.cross(turned(better, tool), turned(here, tool))
+        return correctable
 
     def start_command(
         self,
@@ -289,7 +289,7 @@ class CompensationProblem:
         placed = self.robot_from_path(rows, share)
         if placed is not None:
             wanted, goal = placed @ wanted, placed @ goal
-        command, bent = initial_guess(
+        command, displacement = initial_guess(
             self.model,
             wanted,
             goal,
@@ -297,7 +297,7 @@ class CompensationProblem:
             self.max_correction,
             q,
         )
-        return (command if placed is None else placed.inverse() @ command), bent
+        return (command if placed is None else placed.inverse() @ command), displacement
 
     def turn_freely(self, rows: Ints) -> bool:
         """Whether the texts of all motions ``rows`` (K,) can express any orientation."""

@@ -52,12 +52,14 @@ def refine(motions: DivisibleMotions) -> None:
     ratio = np.zeros(len(rows))
     motions.count, active = least.copy(), np.flatnonzero(~_even_motions(motions))
     while len(active):
-        found = motions.largest_errors(active, motions.count[active])
-        motions.error[active] = np.where(motions.count[active] == least[active], found, motions.error[active])
-        good = found <= 1.0
+        errors = motions.largest_errors(active, motions.count[active])
+        motions.error[active] = np.where(
+            motions.count[active] == least[active], errors, motions.error[active]
+        )
+        good = errors <= 1.0
         won, lost = active[good], active[~good]
         holds[won] = motions.count[won]
-        fails[lost], ratio[lost] = motions.count[lost], found[~good]
+        fails[lost], ratio[lost] = motions.count[lost], errors[~good]
         going = np.where(holds[active] > 0, holds[active] - fails[active] > 1, fails[active] < most[active])
         motions.count[active] = np.where(holds[active] > 0, holds[active], most[active])
         active = active[going]
@@ -83,10 +85,10 @@ def _even_motions(motions: DivisibleMotions) -> Bools:
             alike &= lengths(change[rows] - change[before]) <= STEP * most
         return alike & (np.abs(task.track.q[rows] - task.track.q[before]) <= LITTLE).all(axis=1)
 
-    found = np.concatenate([np.empty(0, bool), *in_blocks(even, len(motions.rows))]) | motions.spline
+    is_even = np.concatenate([np.empty(0, bool), *in_blocks(even, len(motions.rows))]) | motions.spline
     if task.force.ramps is not None:
-        found[np.isin(motions.rows, task.force.ramps.row)] = False
-    return found if len(motions.owner) == len(motions.rows) else found[motions.owner]
+        is_even[np.isin(motions.rows, task.force.ramps.row)] = False
+    return is_even if len(motions.owner) == len(motions.rows) else is_even[motions.owner]
 
 
 def enforce_budget(motions: DivisibleMotions) -> None:
@@ -127,19 +129,19 @@ def enforce_budget(motions: DivisibleMotions) -> None:
     )
 
 
-def _join_intervals(motions: DivisibleMotions, desired_path: Bools) -> None:
+def _join_intervals(motions: DivisibleMotions, chosen: Bools) -> None:
     """Makes ``desired_path`` (R,) one interval each."""
-    kept = ~desired_path[motions.owner] | (motions.low == 0.0)
+    retained = ~chosen[motions.owner] | (motions.low == 0.0)
     motions.owner, motions.low, motions.high = (
-        motions.owner[kept],
-        motions.low[kept],
-        motions.high[kept].copy(),
+        motions.owner[retained],
+        motions.low[retained],
+        motions.high[retained].copy(),
     )
-    joined = desired_path[motions.owner] & (motions.high < 1.0)
+    joined = chosen[motions.owner] & (motions.high < 1.0)
     motions.high[joined] = 1.0
     motions.least = motions.least_segments()
-    motions.count = np.where(joined, motions.least, motions.count[kept])
-    motions.error = np.where(joined, motions.split_error[motions.owner], motions.error[kept])
+    motions.count = np.where(joined, motions.least, motions.count[retained])
+    motions.error = np.where(joined, motions.split_error[motions.owner], motions.error[retained])
 
 
 def allocate(wanted: Ints, need: Floats, spare: int) -> Ints:

@@ -107,7 +107,7 @@ class TouchedOff:
     def sensitivity(self, touched: Floats, frame: Ints, place: Floats) -> Floats:
         """d(goal)/d(figure) (K, 3, P) at ``place`` (K, 3) in the frames (K,), of d(touched place)/d(figure)
         (T, 3, P): central differences of the fit."""
-        found = np.zeros((len(place), 3, touched.shape[2]))
+        derivatives = np.zeros((len(place), 3, touched.shape[2]))
         for index in np.unique(frame[self.known[frame]]):
             own, rows = self.frame == index, frame == index
             before, after = self.wanted.position[own], self.real.pose.position[own]
@@ -119,5 +119,5 @@ class TouchedOff:
                 step = STEP / size
                 ends = [rigid_motion(before, after + sign * step * moves) for sign in (1.0, -1.0)]
                 high, low = (place[rows] @ end.rotation.T + end.position for end in ends)
-                found[rows, :, column] = (high - low) / (2 * step)
-        return found
+                derivatives[rows, :, column] = (high - low) / (2 * step)
+        return derivatives

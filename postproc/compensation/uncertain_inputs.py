@@ -118,11 +118,11 @@ def input_uncertainties(
 def _vector_entries(vector: ForceVectorInterval) -> list[UncertainInput]:
     """The turns and components of the force that have an interval."""
     turn = vector.direction / COVERAGE
-    found = [UncertainInput(DIRECTION, -1, name, 0.0, -np.inf, np.inf, turn) for name in TURNS if turn > 0]
+    entries = [UncertainInput(DIRECTION, -1, name, 0.0, -np.inf, np.inf, turn) for name in TURNS if turn > 0]
     if vector.components is not None:
         each = (vector.components / COVERAGE).tolist()
-        found += [
+        entries += [
             UncertainInput(name, -1, name, 0.0, -np.inf, np.inf, size)
             for name, size in zip(COMPONENTS, each, strict=True)
         ]
-    return found
+    return entries

@@ -38,14 +38,14 @@ def squares_of(fitted: Fit, weights: Weighting, variance: float) -> float:
     """Squares that a fit leaves, of readings [their variance by ``weights``, wild ones cut] and of priors; ``variance``
     of the readings as they are seen to scatter."""
     level = np.sqrt(variance)
-    left = np.minimum(np.abs(weights(fitted.point.residual)), WILD * level)
+    residual = np.minimum(np.abs(weights(fitted.point.residual)), WILD * level)
     values = fitted.point.values(fitted.unknowns)
     priors = sum(
         (level * (u.value - value) / u.prior) ** 2
         for u, value in zip(fitted.unknowns, values.tolist(), strict=True)
         if u.prior is not None
     )
-    return float(left @ left) + float(priors)
+    return float(residual @ residual) + float(priors)
 
 
 def find_alternatives(
@@ -56,14 +56,14 @@ def find_alternatives(
     given, chosen = linear.problem, [linear.candidates[g] for g in last.groups]
     variance = scatter(given, last)
     here = squares_of(fitted, fitted.weights, variance)
-    found: list[Alternative] = []
+    alternatives: list[Alternative] = []
     for group in last.groups:
         mine = linear.candidates[group]
         rest = explained(given, tuple(g for g in last.groups if g != group))
-        gain, left = rest.squares - last.squares, residual_of(given, rest)
+        gain, residual = rest.squares - last.squares, residual_of(given, rest)
 
-        def paid(columns: Floats, rest: Explained = rest, left: Floats = left) -> float:
-            return complexity_penalty(beside(given, rest, columns), left, variance)
+        def paid(columns: Floats, rest: Explained = rest, residual: Floats = residual) -> float:
+            return complexity_penalty(beside(given, rest, columns), residual, variance)
 
         def scaled(g: int) -> Floats:
             return given.matrix[:, given.places[g]] * given.size[given.places[g]]
@@ -90,8 +90,8 @@ def find_alternatives(
                 there = with_effects(campaign, base, [rival.candidate if c is mine else c for c in chosen])
                 worse = float(squares_of(there, fitted.weights, variance) - here) / variance
                 of_mine[k] = replace(rival, worse=worse, fitted=True)
-        found += of_mine
-    return tuple(sorted(found, key=lambda rival: rival.margin))
+        alternatives += of_mine
+    return tuple(sorted(alternatives, key=lambda rival: rival.margin))
 
 
 def _instead(

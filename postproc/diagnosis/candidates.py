@@ -100,7 +100,7 @@ class Candidate:
 
 def candidates(campaign: Campaign, model: StiffnessModel, given: Nuisances) -> tuple[Candidate, ...]:
     """All that ``model`` may lack, with what it would move in ``campaign``; also what would move nothing there."""
-    found: list[Candidate] = []
+    entries: list[Candidate] = []
     for name, effect in EFFECTS.items():
         if name == "base_offset" and campaign.tracked:
             continue  # the registration itself
@@ -109,12 +109,12 @@ def candidates(campaign: Campaign, model: StiffnessModel, given: Nuisances) -> t
             lacking = [
                 u for u in unknowns_of(model, term) if u.stated is None and u.value == u.parameter.null
             ]
-            found += _by_joint(campaign, model, given, [u for u in lacking if not u.fixed])
+            entries += _by_joint(campaign, model, given, [u for u in lacking if not u.fixed])
         for wider in () if known else _widened(model, effect):
-            found += _by_joint(
+            entries += _by_joint(
                 campaign, wider, given, [u for u in unknowns_of(wider, len(model.terms)) if not u.fixed]
             )
-    return tuple(found)
+    return tuple(entries)
 
 
 def _widened(model: StiffnessModel, effect: type[Effect]) -> list[StiffnessModel]:
@@ -136,24 +136,28 @@ def _by_joint(
     sized = model.with_values({u.key: u.parameter.null + u.parameter.scale for u in unknowns})
     there = campaign.predicted(sized, here.displacement)
     still = np.asarray(~moves.any(axis=(0, 1)))
-    bent = _is_nonlinear(campaign.residual(here, given) - campaign.residual(there, given), moves.sum(axis=2))
-    if still.any() and bent:
+    nonlinear = _is_nonlinear(
+        campaign.residual(here, given) - campaign.residual(there, given), moves.sum(axis=2)
+    )
+    if still.any() and nonlinear:
         # a parameter may show only where others have a size: a length where the spring has a stiffness
         moves[:, :, still] = np.nan_to_num(columns(campaign, sized, unknowns, there, given))[:, :, still]
-    asleep = frozenset(
-        u.parameter.name for u, rests in zip(unknowns, still.tolist(), strict=True) if rests and bent
+    dormant = frozenset(
+        u.parameter.name for u, rests in zip(unknowns, still.tolist(), strict=True) if rests and nonlinear
     )
     named = dict.fromkeys(u.parameter.joint for u in unknowns)
     if not effect.apart:
-        whole = Candidate(effect, "", model, tuple(unknowns), moves, bent, dormant_parameters=asleep)
+        whole = Candidate(effect, "", model, tuple(unknowns), moves, nonlinear, dormant_parameters=dormant)
         return _in_steps(whole, [j for j in named if j])
-    found = []
+    entries = []
     # a whole arm may be off at once, as a geometry that was never calibrated
     for joint in [*named, EVERY] if effect.whole and len(named) > 1 else named:
         own = [i for i, u in enumerate(unknowns) if joint in (EVERY, u.parameter.joint)]
         mine = tuple(unknowns[i] for i in own)
-        found.append(Candidate(effect, joint, model, mine, moves[:, :, own], bent, dormant_parameters=asleep))
-    return found
+        entries.append(
+            Candidate(effect, joint, model, mine, moves[:, :, own], nonlinear, dormant_parameters=dormant)
+        )
+    return entries
 
 
 def _is_nonlinear(does: Floats, foreseen: Floats) -> bool:
@@ -164,16 +168,16 @@ def _is_nonlinear(does: Floats, foreseen: Floats) -> bool:
 
 def _in_steps(whole: Candidate, joints: Sequence[str]) -> list[Candidate]:
     """The candidate with the parameters of its joints up to each one that adds something, and the whole."""
-    found: list[Candidate] = []
+    steps: list[Candidate] = []
     for last in range(len(joints) - 1):
         own = [i for i, u in enumerate(whole.unknowns) if u.parameter.joint in joints[: last + 1]]
         if not whole.columns[:, :, own].any():
             continue
         some = tuple(whole.unknowns[i] for i in own)
-        found.append(
+        steps.append(
             replace(whole, unknowns=some, columns=whole.columns[:, :, own], up_to_joint=joints[last])
         )
-    return [*found, whole]
+    return [*steps, whole]
 
 
 def is_visible(candidate: Candidate, weights: Weighting) -> bool:
@@ -182,5 +186,5 @@ def is_visible(candidate: Candidate, weights: Weighting) -> bool:
     return bool((size > candidate.least).any())
 
 
-def names_of(found: Sequence[Candidate]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(candidate.name for candidate in found))
+def names_of(choices: Sequence[Candidate]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(candidate.name for candidate in choices))

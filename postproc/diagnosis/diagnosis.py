@@ -55,23 +55,25 @@ def diagnose(
     stage("fitting the model's own parameters")
     base = fit(campaign, model, model_unknowns(model), every, given=stated.point.given)
     stage("looking for what is missing")
-    found = search(campaign, base)
-    verdict = judge(found)
+    result = search(campaign, base)
+    verdict = judge(result)
     rejected = list(verdict.rejected)
     for _ in range(AGAIN):
         # of what has no form that is known others would only be imitations
         if not verdict.rejected or any(why == OTHER_COURSE for _, why in verdict.rejected):
             break
-        found = search(campaign, base, [candidate.key for candidate, _ in rejected])
-        verdict = judge(found)
+        result = search(campaign, base, [candidate.key for candidate, _ in rejected])
+        verdict = judge(result)
         rejected += verdict.rejected
     if verdict.word == "nothing_missing" and any(why == BEYOND_TELLING for _, why in rejected):
         verdict = replace(verdict, word="unknown")
     names = [named.candidate for named in verdict.named]
-    final = found.base
+    final = result.base
     if names and verdict.word != "ambiguous":
-        final = found.final if len(names) == len(found.chosen) else with_effects(campaign, found.base, names)
+        final = (
+            result.final if len(names) == len(result.chosen) else with_effects(campaign, result.base, names)
+        )
     # of a model that lacks something its own parameters stand for that
     moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
     verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
-    return Diagnosis(stated, residual_patterns(stated, found.final), found, verdict, final)
+    return Diagnosis(stated, residual_patterns(stated, result.final), result, verdict, final)

@@ -64,14 +64,14 @@ def evaluate_at_size(
     x = np.clip(np.ones(len(unknowns)), low, high)
     near = point.predicted.displacement
     there, does = taken(x, near if near.shape[1] == model.chain.size else None)
-    left = target - outside(does[:, :, None])[:, 0]
+    remaining = target - outside(does[:, :, None])[:, 0]
     for _ in range(STEPS):
         there = with_columns(campaign, there, unknowns)
         matrix = outside(np.nan_to_num(there.taken[0]))
         damping = DAMPING * np.diag(np.linalg.norm(matrix, axis=0) + 1e-9)
-        tall, aim = np.concatenate([matrix, damping]), np.concatenate([left, np.zeros(len(x))])
+        tall, aim = np.concatenate([matrix, damping]), np.concatenate([remaining, np.zeros(len(x))])
         bounds = np.minimum(low - x, 0.0), np.maximum(high - x, 1e-300)
-        step, before = lsq_linear(tall, aim, bounds, "bvls").x, left @ left
+        step, before = lsq_linear(tall, aim, bounds, "bvls").x, remaining @ remaining
         for _ in range(6):
             trial = np.clip(x + step, low, high)
             moved, did = taken(trial, there.predicted.displacement)
@@ -81,12 +81,14 @@ def evaluate_at_size(
             step = 0.3 * step
         else:
             break
-        x, there, does, left = trial, moved, did, rest
-        if before - left @ left < SAME * before:
+        x, there, does, remaining = trial, moved, did, rest
+        if before - remaining @ remaining < SAME * before:
             break
     if there.columns is None:
         there = with_columns(campaign, there, unknowns)
-    return NonlinearColumns(null + x * scale, whole(np.nan_to_num(there.taken[0]), does, x), target, left)
+    return NonlinearColumns(
+        null + x * scale, whole(np.nan_to_num(there.taken[0]), does, x), target, remaining
+    )
 
 
 def whole(columns: Floats, does: Floats, values: Floats) -> Floats:

@@ -50,18 +50,18 @@ def residual_patterns(
     from scipy.stats import f
 
     campaign, weights = fitted.campaign, (against or fitted).weights
-    left = weights(np.nan_to_num(fitted.point.residual))
+    residual = weights(np.nan_to_num(fitted.point.residual))
     taken = np.nan_to_num(np.concatenate([weights(part) for part in fitted.point.taken], axis=1))
     explained_by_fit = basis_of(taken)
-    left = outside(explained_by_fit, left[:, None])[:, 0]
-    squares, rows = float(left @ left), weights.counts
+    residual = outside(explained_by_fit, residual[:, None])[:, 0]
+    squares, rows = float(residual @ residual), weights.counts
     if squares <= 0:
         return ()
     width = fitted.point.residual.shape[1]
     # a residual is smaller than the scatter by what the fit took up
     lever = 1.0 - explained_by_fit.shape[1] / rows
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (FLIPS, campaign.poses))
-    found = []
+    clear_patterns = []
     tried = list(patterns(fitted, campaign))
     for variable, values, turns, unit in tried:
         part, parts = _parts(values, max(2, min(BINS, campaign.poses // POSES)))
@@ -71,7 +71,7 @@ def residual_patterns(
         rank = basis.shape[1]
         if rank == 0 or rows - rank < 3:
             continue
-        of_reading = (basis * left[:, None]).reshape(len(campaign), width, rank).sum(axis=1)
+        of_reading = (basis * residual[:, None]).reshape(len(campaign), width, rank).sum(axis=1)
         of_pose = np.zeros((campaign.poses, rank))
         np.add.at(of_pose, campaign.pose, of_reading)
         explained = float((of_pose.sum(axis=0) ** 2).sum())
@@ -84,8 +84,8 @@ def residual_patterns(
             words = _words(fitted.point.residual[:, :3], part, parts, unit)
             if variable in ("order", "time") and _goes_with_poses(values, campaign.readings.q):
                 words += "; but the poses were taken in such an order: measure again in random order"
-            found.append(ResidualPattern(variable, words, float(share)))
-    return tuple(sorted(found, key=lambda one: -one.share)[:SHOWN])
+            clear_patterns.append(ResidualPattern(variable, words, float(share)))
+    return tuple(sorted(clear_patterns, key=lambda one: -one.share)[:SHOWN])
 
 
 def _clear(columns: Floats) -> Floats:
@@ -185,5 +185,5 @@ def _goes_with_poses(values: Floats, q: Floats) -> bool:
     matrix = np.column_stack([np.ones(len(q)), scaled, scaled**2])
     if len(q) < 3 * matrix.shape[1]:
         return False
-    left = values - matrix @ np.linalg.lstsq(matrix, values, rcond=None)[0]
-    return bool(left @ left < 0.5 * ((values - values.mean()) ** 2).sum())
+    residual = values - matrix @ np.linalg.lstsq(matrix, values, rcond=None)[0]
+    return bool(residual @ residual < 0.5 * ((values - values.mean()) ** 2).sum())

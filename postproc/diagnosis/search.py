@@ -52,18 +52,18 @@ def model_unknowns(model: StiffnessModel) -> tuple[Unknown, ...]:
     Each has a prior as wide as ``LOOSE`` of its value and ``BESIDE`` of the largest of its kind in the effect; none
     where all of a kind are stated as zero.  Dimensions of hardware keep the interval of the robot file.
     """
-    found: list[Unknown] = []
+    unknowns: list[Unknown] = []
     for term in range(len(model.terms)):
         own = [u for u in unknowns_of(model, term) if u.stated is not None and not u.fixed]
         for unknown in own:
             parameter = unknown.parameter
             if parameter.hardware:
-                found.append(unknown)
+                unknowns.append(unknown)
                 continue
             like = [abs(u.value - u.parameter.null) for u in own if u.parameter.unit == parameter.unit]
             wide = LOOSE * abs(unknown.value - parameter.null) + BESIDE * max(like)
-            found.append(replace(unknown, prior=wide or None))
-    return tuple(found)
+            unknowns.append(replace(unknown, prior=wide or None))
+    return tuple(unknowns)
 
 
 def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
@@ -83,8 +83,8 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
             shown = list(linear.candidates)
         before = {c.key for c in chosen}
         start = [i for i, c in enumerate(linear.candidates) if c.key in before]
-        found = selected(linear.problem, range(len(linear.candidates)), start)
-        now = tuple(linear.candidates[g] for g in found.groups)
+        selection = selected(linear.problem, range(len(linear.candidates)), start)
+        now = tuple(linear.candidates[g] for g in selection.groups)
         keys = frozenset(c.key for c in now)
         if keys == before or keys in tried or len(tried) >= PASSES:
             last = explained(linear.problem, start)
@@ -106,7 +106,7 @@ def drop_confounded(base: Fit, weights: Weighting, every: Sequence[Candidate]) -
     """The candidates without those parameters that, in their usual size, do nothing to be seen but what parameters of
     the robot file, or tracker and targets, do as well: a gain of the force is a softer arm."""
     basis = basis_of(np.nan_to_num(np.concatenate([weights(part) for part in base.point.taken], axis=1)))
-    found = []
+    remaining = []
     for c in every:
         columns = np.nan_to_num(weights(c.columns))
         size = np.linalg.norm(columns, axis=0)
@@ -120,8 +120,8 @@ def drop_confounded(base: Fit, weights: Weighting, every: Sequence[Candidate]) -
                 unknowns=tuple(u for u, alone in zip(c.unknowns, own.tolist(), strict=True) if alone),
                 columns=c.columns[:, :, own],
             )
-        found.append(c if own.any() else replace(c, columns=np.zeros_like(c.columns)))
-    return found
+        remaining.append(c if own.any() else replace(c, columns=np.zeros_like(c.columns)))
+    return remaining
 
 
 def _confirmed(
@@ -190,12 +190,12 @@ def _linear(
         for c in looked
     )
     # so that with what was found of each nothing else is left than by the fit
-    found = [c.columns @ in_scales(fitted, c.only) for c in looked if c.only]
-    residual = tall(sum(found, fitted.point.residual), prior @ (away / scales(base.unknowns)))
+    contributions = [c.columns @ in_scales(fitted, c.only) for c in looked if c.only]
+    residual = tall(sum(contributions, fitted.point.residual), prior @ (away / scales(base.unknowns)))
     columns = tuple(readings(c.columns) for c in looked)
     groups = [(own, _reach(c)) for own, c in zip(columns, looked, strict=True)]
-    made = problem(residual, basis, groups, weights.counts + len(prior), base.noise.known)
-    return Linear(looked, made, residual, common, columns, len(prior), weights)
+    linear_problem = problem(residual, basis, groups, weights.counts + len(prior), base.noise.known)
+    return Linear(looked, linear_problem, residual, common, columns, len(prior), weights)
 
 
 def _as_grown(campaign: Campaign, fitted: Fit, candidate: Candidate, beyond: Outside) -> Candidate:

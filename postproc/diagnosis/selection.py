@@ -79,8 +79,8 @@ def basis_of(common: Floats) -> Floats:
 
 def outside(basis: Floats, columns: Floats) -> Floats:
     """(n, p) ``columns`` (n, p) without what lies in ``basis`` (n, r)."""
-    left = columns - basis @ (basis.T @ columns)
-    return np.asarray(left - basis @ (basis.T @ left))
+    remaining = columns - basis @ (basis.T @ columns)
+    return np.asarray(remaining - basis @ (basis.T @ remaining))
 
 
 def problem(
@@ -98,9 +98,11 @@ def problem(
     places = tuple(
         np.arange(end - columns.shape[1], end) for end, (columns, _) in zip(ends, groups, strict=True)
     )
-    left = outside(basis, residual[:, None])[:, 0]
+    remaining = outside(basis, residual[:, None])[:, 0]
     rank = basis.shape[1] + len(residual) - rows
-    return Problem(left, outside(basis, columns / size), places, reach * size[:, None], size, rank, known)
+    return Problem(
+        remaining, outside(basis, columns / size), places, reach * size[:, None], size, rank, known
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +149,7 @@ def beside(given: Problem, rest: Explained, columns: Floats) -> Floats:
     return outside(basis_of(given.matrix[:, rest.columns]), columns) if len(rest.columns) else columns
 
 
-def complexity_penalty(columns: Floats, left: Floats, variance: float) -> float:
+def complexity_penalty(columns: Floats, residual: Floats, variance: float) -> float:
     """What an effect has to pay for the parameters that it fits: by how much -2 ln(likelihood) falls more in the fit
     than it does on the average over all that its parameters might have been.  ``columns`` (n, p) per scale, ``left``
     (n,): outside of what is explained anyway.
@@ -164,7 +166,7 @@ def complexity_penalty(columns: Floats, left: Floats, variance: float) -> float:
     if not on.any():
         return 0.0
     information = value[on]
-    gradient = (vector[:, on].T @ (columns.T @ left)) / variance
+    gradient = (vector[:, on].T @ (columns.T @ residual)) / variance
     # from sizes that nobody would see to those that nobody could miss
     u = np.geomspace(
         1e-3 / np.sqrt(information.max()), 1e3 * (1.0 + np.abs(gradient / information).max()), 200
@@ -181,11 +183,11 @@ def residual_of(given: Problem, last: Explained) -> Floats:
 
 def clipped_squares(given: Problem, last: Explained) -> float:
     """The squares left, wild readings clipped, as large as those of normal ones would be."""
-    left = residual_of(given, last)
-    rows = np.abs(left[left != 0])
+    residual = residual_of(given, last)
+    rows = np.abs(residual[residual != 0])
     # the median tells the level at which readings are wild
     level = float(np.median(rows)) / 0.6745 if len(rows) else 0.0
-    clipped = np.clip(left, -CLIP * level, CLIP * level)
+    clipped = np.clip(residual, -CLIP * level, CLIP * level)
     return min(last.squares, float(clipped @ clipped) / CLIPPED)
 
 

@@ -118,13 +118,13 @@ class Disagreement:
     def directions(self, information: Floats) -> Floats:
         """(p, k) directions in which a setup lowers the score of ``information`` (p, p): see ``Criterion``."""
         size = self.separations(information) + NOTHING
-        found = []
+        columns = []
         for (shows, fits), weight in zip(self.pairs, size.min() / size, strict=True):
-            left = np.zeros((len(information), len(shows)))
-            left[shows, range(len(shows))] = weight / np.sqrt(len(shows))
-            left[fits] = -(weight / np.sqrt(len(shows))) * self._left(information, shows, fits)[1]
-            found.append(left)
-        return np.concatenate(found, axis=1)
+            direction = np.zeros((len(information), len(shows)))
+            direction[shows, range(len(shows))] = weight / np.sqrt(len(shows))
+            direction[fits] = -(weight / np.sqrt(len(shows))) * self._left(information, shows, fits)[1]
+            columns.append(direction)
+        return np.concatenate(columns, axis=1)
 
     @staticmethod
     def _left(information: Floats, shows: Ints, fits: Ints) -> tuple[Floats, Floats]:
@@ -132,5 +132,5 @@ class Disagreement:
         own = information[..., shows, :][..., shows]
         cross = information[..., fits, :][..., shows]
         fitted = np.linalg.solve(information[..., fits, :][..., fits], cross)
-        left = np.diagonal(own, axis1=-2, axis2=-1) - (cross * fitted).sum(axis=-2)
-        return np.maximum(left, 0.0).mean(axis=-1), np.asarray(fitted)
+        remaining = np.diagonal(own, axis1=-2, axis2=-1) - (cross * fitted).sum(axis=-2)
+        return np.maximum(remaining, 0.0).mean(axis=-1), np.asarray(fitted)

@@ -139,15 +139,15 @@ def apart(
     def chosen_from(pool: Pool, begun: Choice) -> Choice:
         parts = np.split(pool.shown.columns, np.cumsum(widths), axis=2)
         alternatives = CompetingModel(parts[0], parts[2]), CompetingModel(parts[1], parts[3])
-        found: dict[int, Sequence[int]] = {}
+        by_size: dict[int, Sequence[int]] = {}
         last: Sequence[int] = ()
         for size in sorted(sizes):
             done = discriminating(
                 *alternatives, parts[4], pool.setups.q, spacing, size, begun.get(size, last)
             )
-            found[size] = last = done.setups
+            by_size[size] = last = done.setups
             separation[size] = done.separation
-        return found
+        return by_size
 
     stage("computing what poses show")
     start = rested(model, setups, evaluated)

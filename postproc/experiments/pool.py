@@ -69,11 +69,11 @@ def rested(model: StiffnessModel, setups: Setups, evaluated: Evaluated) -> Pool:
     return pool
 
 
-def enough(model: StiffnessModel, offer: CandidateSetups, wanted: int, found: int) -> None:
+def enough(model: StiffnessModel, offer: CandidateSetups, wanted: int, count: int) -> None:
     """Raises Refusal PLN004 where fewer distinct poses than wanted were found."""
-    if found < wanted:
+    if count < wanted:
         message = (
-            f"{found} poses differ by {offer.spacing / DEG:g} deg in one axis at least, and"
+            f"{count} poses differ by {offer.spacing / DEG:g} deg in one axis at least, and"
             f" {wanted} are requested"
         )
         raise Refusal(Finding("PLN004", message, str(model.robot.path)))

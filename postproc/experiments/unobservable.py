@@ -83,5 +83,5 @@ def _torques(model: StiffnessModel, offer: CandidateSetups, setups: Setups, join
 def _size(model: StiffnessModel, unknown: Unknown, readings: Readings) -> float:
     """[m] by which a parameter of its usual size moves all readings together."""
     campaign = Campaign(readings)
-    found = columns(campaign, model, [unknown], campaign.predicted(model), campaign.start())
-    return float(np.linalg.norm(np.nan_to_num(found)))
+    derivative = columns(campaign, model, [unknown], campaign.predicted(model), campaign.start())
+    return float(np.linalg.norm(np.nan_to_num(derivative)))

@@ -177,13 +177,13 @@ class Campaign:
         """(R, 3) [m], or (R, 6) [m, rad] where rotations are measured: measured minus expected, in the axes of the
         readings; NaN where nothing was measured or the model has no rest."""
         position, rotation = self.expected(seen, given)
-        left = self.readings.value - position
+        difference = self.readings.value - position
         if rotation is None or self.readings.rotation is None:
-            return left
-        away = np.full_like(left, np.nan)
+            return difference
+        away = np.full_like(difference, np.nan)
         known = np.isfinite(self.readings.rotation).all(axis=(1, 2)) & np.isfinite(position).all(axis=1)
         away[known] = vector_from_rotation(self.readings.rotation[known] @ np.swapaxes(rotation[known], 1, 2))
-        return np.concatenate([left, away], axis=1)
+        return np.concatenate([difference, away], axis=1)
 
     def in_base(self, residual: Floats, given: Nuisances) -> Floats:
         """(R, 3 or 6) [m, rad] of a ``residual`` (R, 3 or 6) in axes of the robot base.  A coordinate that was not
@@ -230,7 +230,7 @@ class Campaign:
 
     def nuisance_columns(self, seen: PredictedReadings, given: Nuisances) -> Floats:
         """(R, 3 or 6, U) derivative of ``expected`` by the steps of ``moved``."""
-        found = np.zeros((len(self), 6, len(self.nuisance_names)))
+        derivatives = np.zeros((len(self), 6, len(self.nuisance_names)))
         points = self.points(seen, given.places, self.at)
         axes = given.frames.rotation[self.readings.session]
         for block, (kind, k) in enumerate(self._blocks()):
@@ -238,18 +238,18 @@ class Campaign:
             if kind in ("shift", "turn"):
                 of = self.readings.session == k
                 if kind == "shift":
-                    found[of, :3, columns] = axes[of]
+                    derivatives[of, :3, columns] = axes[of]
                 else:
-                    found[of, :3, columns] = -axes[of] @ skew(points[of])
-                    found[of, 3:, columns] = axes[of]
+                    derivatives[of, :3, columns] = -axes[of] @ skew(points[of])
+                    derivatives[of, 3:, columns] = axes[of]
                 continue
             of = self.readings.target == k
             rotation = seen.rotation[self.at[of]]
             if self.still is not None:
                 rotation = rotation - seen.rotation[self.still[of]]
             rows = slice(0, 3) if kind == "place" else slice(3, 6)
-            found[of, rows, columns] = axes[of] @ rotation if self.tracked else rotation
-        return found if self.posed else found[:, :3]
+            derivatives[of, rows, columns] = axes[of] @ rotation if self.tracked else rotation
+        return derivatives if self.posed else derivatives[:, :3]
 
     def columns(
         self, model: StiffnessModel, seen: PredictedReadings, given: Nuisances, moved: Floats
@@ -261,7 +261,7 @@ class Campaign:
         # a target is on the body, which does not move with what the spindle gives
         on = np.array([self.at_tip or not name.startswith("spindle.") for name in chain.names])
         j = jacobian(state.swept)
-        found = np.zeros((len(self), 6 if self.posed else 3, moved.shape[2]))
+        derivatives = np.zeros((len(self), 6 if self.posed else 3, moved.shape[2]))
         turn, tip = j[:, 3:] @ moved, (j[:, :3] * on) @ moved
         origin = seen.tip if self.at_tip else seen.body
 
@@ -271,23 +271,23 @@ class Campaign:
 
         for target in range(len(self.targets)):
             rows = np.flatnonzero(self.readings.target == target)
-            found[rows, :3] = at(self.at[rows], target)
+            derivatives[rows, :3] = at(self.at[rows], target)
             if self.still is not None:
-                found[rows, :3] -= at(self.still[rows], target)
+                derivatives[rows, :3] -= at(self.still[rows], target)
         if self.posed:
-            found[:, 3:] = turn[self.at]
+            derivatives[:, 3:] = turn[self.at]
             if self.still is not None:
                 relative = seen.rotation[self.at] @ np.swapaxes(seen.rotation[self.still], 1, 2)
-                found[:, 3:] -= relative @ turn[self.still]
+                derivatives[:, 3:] -= relative @ turn[self.still]
         if self.tracked:
             axes = given.frames.rotation[self.readings.session]
-            for half in range(0, found.shape[1], 3):
-                found[:, half : half + 3] = axes @ found[:, half : half + 3]
+            for half in range(0, derivatives.shape[1], 3):
+                derivatives[:, half : half + 3] = axes @ derivatives[:, half : half + 3]
         lost = ~seen.converged[self.at]
         if self.still is not None:
             lost |= ~seen.converged[self.still]
-        found[lost] = np.nan
-        return found
+        derivatives[lost] = np.nan
+        return derivatives
 
     def moved(self, given: Nuisances, step: Floats) -> Nuisances:
         """The nuisances after a step (U,) [m, rad]: frames T (exp(turn) p + shift), targets c + place and

@@ -90,13 +90,13 @@ class Fit:
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
         deviation = np.sqrt(np.diag(self.covariance))
-        found = []
+        estimates = []
         values = self.point.values(self.unknowns)
         for unknown, value, wide in zip(self.unknowns, values.tolist(), deviation.tolist(), strict=True):
             p = unknown.parameter
             edge = min(value - p.lower, p.upper - value) < AT_BOUND * p.scale
-            found.append(Estimate(unknown, value, self.quantile * wide, edge))
-        return tuple(found)
+            estimates.append(Estimate(unknown, value, self.quantile * wide, edge))
+        return tuple(estimates)
 
 
 def fit(
@@ -132,41 +132,45 @@ def fit(
     weights = plain = weighting(campaign, noise, point.residual).times(rows.astype(float))
     _enough(campaign, weights, unknowns)
     point = _influential(campaign, point, unknowns)
-    begin = point
+    start_point = point
     free, dropped = list(unknowns), list[Dropped]()
     factor, again = 1.0, PRIOR_ROUNDS if any(u.prior is not None for u in unknowns) else 0
     while True:
         point = descended(campaign, point, free, plain, factor=factor)
-        told = _with_turns(campaign, point, noise, plain)
+        updated = _with_turns(campaign, point, noise, plain)
         together = np.concatenate(point.taken, axis=2)
-        told = replace(told, shared=shared_error(point.residual, told, together, noise.known))
-        if told.shared != plain.shared or told.weight is not plain.weight:
-            plain, point = told, descended(campaign, point, free, told, factor=factor)
+        updated = replace(updated, shared=shared_error(point.residual, updated, together, noise.known))
+        if updated.shared != plain.shared or updated.weight is not plain.weight:
+            plain, point = updated, descended(campaign, point, free, updated, factor=factor)
         weights = plain
         if robust:
             point, weights = _robust(campaign, point, free, plain, rows, factor, noise.known)
         if not point.settled:
             point = with_columns(campaign, point, free)
-        found, before = _insight(campaign, point, free, weights, factor), factor
-        factor, exceeded, freedom, quantile = _variance(campaign, point, free, weights, plain, noise, found)
+        analysis, before = _insight(campaign, point, free, weights, factor), factor
+        factor, exceeded, freedom, quantile = _variance(
+            campaign, point, free, weights, plain, noise, analysis
+        )
         if again and abs(np.log(factor / before)) > SAME_FACTOR:
             again -= 1
             continue
-        found = _insight(campaign, point, free, weights, factor)
-        if not found.dropped:
+        analysis = _insight(campaign, point, free, weights, factor)
+        if not analysis.dropped:
             break
-        dropped += found.dropped
-        gone = [free[i] for i in range(len(free)) if i not in found.kept]
-        free = [free[i] for i in found.kept]
-        kept, values = list(found.kept), {u.key: u.value for u in gone}
+        dropped += analysis.dropped
+        gone = [free[i] for i in range(len(free)) if i not in analysis.kept]
+        free = [free[i] for i in analysis.kept]
+        observable, values = list(analysis.kept), {u.key: u.value for u in gone}
         if all(point.model.terms[t].values[name] == value for (t, name), value in values.items()):
-            point = replace(point, columns=point.taken[0][:, :, kept])
+            point = replace(point, columns=point.taken[0][:, :, observable])
         else:
-            point = at(campaign, point.model.with_values(values), point.given, begin.predicted.displacement)
+            point = at(
+                campaign, point.model.with_values(values), point.given, start_point.predicted.displacement
+            )
     scale = scales(free)
     return Fit(
         campaign, start, tuple(unknowns), noise, weights, plain, point, tuple(free), tuple(dropped),
-        found.covariance * np.outer(scale, scale), found.condition, factor, exceeded, freedom, quantile,
+        analysis.covariance * np.outer(scale, scale), analysis.condition, factor, exceeded, freedom, quantile,
     )  # fmt: skip
 
 
@@ -197,10 +201,10 @@ def _influential(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) 
     point = with_columns(campaign, point, unknowns)
     moves = np.abs(np.nan_to_num(point.taken[0])).max(axis=(0, 1), initial=0.0) > 0
     moving = {u.term for u, moved in zip(unknowns, moves, strict=True) if moved}
-    asleep = {
+    dormant = {
         u.key: u.parameter.scale for u in unknowns if u.term not in moving and u.value == u.parameter.null
     }
-    return at(campaign, point.model.with_values(asleep), point.given) if asleep else point
+    return at(campaign, point.model.with_values(dormant), point.given) if dormant else point
 
 
 def _robust(
@@ -274,7 +278,7 @@ def _variance(
     weights: Weighting,
     plain: Weighting,
     noise: Noise,
-    found: Identifiability,
+    analysis: Identifiability,
 ) -> tuple[float, bool, int, float]:
     """Variance of the readings over the assumed one, whether that is clearly more, degrees of freedom, and the 97.5 %
     quantile that goes with them.
@@ -288,10 +292,10 @@ def _variance(
     counts = plain.weight > 0
     share = np.where(counts, weights.weight / np.where(counts, plain.weight, 1.0), 0.0) ** 2
     columns, nuisance = point.taken
-    q = basis(np.nan_to_num(weights(np.concatenate([columns[:, :, list(found.kept)], nuisance], axis=2))))
-    left = weights(point.residual)
-    left = (left - q @ (q.T @ left)) * np.sqrt(share).reshape(-1)
-    squares = float(left @ left)
+    q = basis(np.nan_to_num(weights(np.concatenate([columns[:, :, list(analysis.kept)], nuisance], axis=2))))
+    residual = weights(point.residual)
+    residual = (residual - q @ (q.T @ residual)) * np.sqrt(share).reshape(-1)
+    squares = float(residual @ residual)
     freedom = max(0, round(share.sum()) - q.shape[1])
     if freedom == 0:
         return 1.0, False, 0, float(norm.ppf(0.975))

@@ -107,11 +107,11 @@ def descended(
 
     def residuals(candidate: Point) -> tuple[Floats, int]:
         x = candidate.values(unknowns) / scale
-        left = np.concatenate([weights(candidate.residual), prior @ (wanted - x)])
+        weighted = np.concatenate([weights(candidate.residual), prior @ (wanted - x)])
         lost = (weights.weight > 0) & ~np.isfinite(candidate.residual)
-        return left, int(lost.sum())
+        return weighted, int(lost.sum())
 
-    left, lost = residuals(point)
+    residual, lost = residuals(point)
     fresh, careful = point.columns is not None, 0.0
     for _ in range(max_steps):
         if not fresh:
@@ -128,7 +128,9 @@ def descended(
         length[~awake] = 1.0
         # many rows to as many as there are columns, which say the same
         damping = np.maximum(np.repeat([DAMPING, LOOSE], [len(x), len(loose)]), careful)
-        tall = np.block([[matrix / length, left[:, None]], [np.diag(damping), np.zeros((len(length), 1))]])
+        tall = np.block(
+            [[matrix / length, residual[:, None]], [np.diag(damping), np.zeros((len(length), 1))]]
+        )
         reduced = np.asarray(np.linalg.qr(tall, mode="r"))
         system, right = reduced[:-1, :-1], reduced[:-1, -1]
         low, high = np.concatenate([lower - x, -loose]) * length, np.concatenate([upper - x, loose]) * length
@@ -136,24 +138,24 @@ def descended(
         if np.any(whole < low) or np.any(whole > high):
             whole = lsq_linear(system, right, (np.minimum(low, 0.0), np.maximum(high, 0.0)), "bvls").x
         whole = whole / length
-        share, moved, after, gone = 1.0, point, left, lost
+        share, moved, after, gone = 1.0, point, residual, lost
         for _ in range(12):
             moved = _stepped(campaign, point, unknowns, share * whole, scale)
             after, gone = residuals(moved)
-            if gone <= lost and after @ after <= left @ left * (1 + 1e-12):
+            if gone <= lost and after @ after <= residual @ residual * (1 + 1e-12):
                 break
             share *= 0.5
         else:
             return replace(point, settled=True)
         foreseen = matrix @ (share * whole)
         size = float(np.linalg.norm(foreseen))
-        astray = float(np.linalg.norm(left - foreseen - after))
+        astray = float(np.linalg.norm(residual - foreseen - after))
         fresh = keep_columns or (share == 1.0 and astray < STRAIGHT * size and bool(awake[: len(x)].all()))
         # a step that went astray went too far along what is hardly seen (Levenberg)
-        bent = share < 1.0 or astray > BENT * size
-        careful = min(max(30.0 * careful, CAREFUL), 0.1) if bent else careful / 10.0
+        curved = share < 1.0 or astray > BENT * size
+        careful = min(max(30.0 * careful, CAREFUL), 0.1) if curved else careful / 10.0
         scatter = np.sqrt(after @ after / max(1, len(after) - len(length)))
-        point, left, lost = moved, after, gone
+        point, residual, lost = moved, after, gone
         if share == 1.0 and (size < CLOSE * scatter or size <= 1e-9):
             return replace(point, settled=True)
     return point

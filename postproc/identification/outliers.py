@@ -43,13 +43,13 @@ def outliers(fitted: Fit, rows: Bools) -> tuple[tuple[Outlier, ...], Fit]:
     campaign = fitted.campaign
     robust = fit(campaign, fitted.start, fitted.asked, rows, robust=True, given=fitted.point.given)
     length, level, limit = _lengths(robust, rows)
-    found = []
+    entries = []
     for row in np.flatnonzero(rows & (length > limit)):
         file, line = campaign.readings.where(int(row))
         distance = float(np.linalg.norm(np.nan_to_num(robust.point.residual[row, :3])))
         what = _explained(robust, int(row), limit)
-        found.append(Outlier(int(row), file, line, distance, float(length[row] / level), what))
-    return tuple(sorted(found, key=lambda o: -o.sigmas)), robust
+        entries.append(Outlier(int(row), file, line, distance, float(length[row] / level), what))
+    return tuple(sorted(entries, key=lambda o: -o.sigmas)), robust
 
 
 def _limit(count: int) -> float:

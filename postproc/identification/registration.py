@@ -59,14 +59,14 @@ def _descended(
     """Gauss-Newton on positions: the nuisances, and the mean square that is left [m2]."""
     last, before = np.inf, given
     for _ in range(steps):
-        left = campaign.residual(seen, given)[rows, :3]
-        size = float(np.mean(left**2))
+        residual = campaign.residual(seen, given)[rows, :3]
+        size = float(np.mean(residual**2))
         if not size < last * (1 - 1e-9):
             return before, last
         last, before = size, given
         columns = campaign.nuisance_columns(seen, given)[rows, :3]
-        matrix = columns.reshape(left.size, -1)
-        step = np.linalg.lstsq(matrix.T @ matrix, matrix.T @ left.reshape(-1), rcond=1e-13)[0]
+        matrix = columns.reshape(residual.size, -1)
+        step = np.linalg.lstsq(matrix.T @ matrix, matrix.T @ residual.reshape(-1), rcond=1e-13)[0]
         given = campaign.moved(given, np.asarray(step, float))
     return given, last
 
@@ -91,10 +91,10 @@ def _turned_targets(
 
 def _cube_turns() -> list[Floats]:
     """The 24 rotations of a cube."""
-    found = []
+    turns = []
     for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)):
         for sign in np.ndindex(2, 2):
             turn = np.eye(3)[list(order)] * (1.0 - 2.0 * np.array([*sign, 0]))[:, None]
             turn[2] *= np.linalg.det(turn)
-            found.append(turn)
-    return found
+            turns.append(turn)
+    return turns

@@ -165,10 +165,10 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
     if len(campaign) > ENOUGH:
         some = np.linspace(0, len(campaign) - 1, ENOUGH).round().astype(int)
         campaign = Campaign(campaign.readings.part(some), campaign.stated_tool)
-    left, signal = _remaining_share(campaign, model, unknowns)
+    remaining, signal = _remaining_share(campaign, model, unknowns)
     if campaign.readings.deflection:
         _check_scale(campaign, model)
-    if not _badly(campaign, left, signal, TRIED):
+    if not _badly(campaign, remaining, signal, TRIED):
         return ()
     some = np.unique(np.linspace(0, len(campaign) - 1, LOOKED_AT).round().astype(int))
     if len(campaign) <= LOOKED_AT:
@@ -191,12 +191,12 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
                 help="correct the file if the change is right; it is never changed silently",
             )
         )
-    left, _ = _remaining_share(campaign, model, unknowns, True)
-    if not _badly(campaign, left, signal, POOR):
+    remaining, _ = _remaining_share(campaign, model, unknowns, True)
+    if not _badly(campaign, remaining, signal, POOR):
         return ()
-    what = f"{left / MM:.3g} mm remain, root mean square"
+    what = f"{remaining / MM:.3g} mm remain, root mean square"
     if campaign.readings.deflection:
-        what = f"{100 * left / signal:.0f} % of the deflections remain"
+        what = f"{100 * remaining / signal:.0f} % of the deflections remain"
     return (
         Finding(
             "IDN015",
@@ -234,10 +234,10 @@ def _check_scale(campaign: Campaign, model: StiffnessModel) -> None:
             )
 
 
-def _badly(campaign: Campaign, left: float, signal: float, share: float) -> bool:
-    if left < SCATTER * noise_of(campaign.readings).rms:
+def _badly(campaign: Campaign, remaining: float, signal: float, share: float) -> bool:
+    if remaining < SCATTER * noise_of(campaign.readings).rms:
         return False
-    return left > (share * signal if campaign.readings.deflection else FAR)
+    return remaining > (share * signal if campaign.readings.deflection else FAR)
 
 
 def _remaining_share(

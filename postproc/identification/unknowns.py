@@ -50,7 +50,7 @@ def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False)
     Raises Refusal IDN001 for a name that is not known.
     """
     unknowns: dict[str, Unknown] = {}
-    held: dict[str, None] = {}
+    fixed: dict[str, None] = {}
     for word in words:
         effect, _, single = word.partition(".")
         if effect not in EFFECTS:
@@ -67,10 +67,10 @@ def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False)
             for unknown in unknowns_of(model, index, priors):
                 if single in ("", unknown.parameter.name):
                     if unknown.fixed and not single:
-                        held[unknown.name] = None
+                        fixed[unknown.name] = None
                     else:
                         unknowns[unknown.name] = unknown
-    return FitRequest(model, tuple(unknowns.values()), tuple(held))
+    return FitRequest(model, tuple(unknowns.values()), tuple(fixed))
 
 
 def unknowns_of(model: StiffnessModel, term: int, priors: bool = False) -> tuple[Unknown, ...]:
@@ -81,16 +81,16 @@ def unknowns_of(model: StiffnessModel, term: int, priors: bool = False) -> tuple
     """
     of, label = model.terms[term], model.label(term)
     built = any(parameter.hardware and parameter.name in of.stated for parameter in of.effect.parameters)
-    found = []
+    unknowns = []
     for parameter in of.effect.parameters:
         stated = of.stated.get(parameter.name)
         prior = None
         if stated is not None and stated.interval and (priors or parameter.hardware):
             prior = stated.deviation
-        held = parameter.hardware and built and prior is None
+        fixed = parameter.hardware and built and prior is None
         value = of.values[parameter.name]
-        found.append(Unknown(f"{label}.{parameter.name}", term, parameter, value, stated, prior, held))
-    return tuple(found)
+        unknowns.append(Unknown(f"{label}.{parameter.name}", term, parameter, value, stated, prior, fixed))
+    return tuple(unknowns)
 
 
 def with_mechanism(model: StiffnessModel, kind: type[Effect]) -> StiffnessModel:

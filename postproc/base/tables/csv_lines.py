@@ -37,8 +37,8 @@ class CsvLines:
 
     def end(self, start: int) -> tuple[int, int]:
         """Where the line that starts at ``start`` ends, and where the next one starts."""
-        found = _LINE_END.search(self.raw, start)
-        return found.span() if found else (len(self.raw), len(self.raw) + 1)
+        match = _LINE_END.search(self.raw, start)
+        return match.span() if match else (len(self.raw), len(self.raw) + 1)
 
     def text(self, start: int, stop: int) -> str:
         return self.raw[start:stop].decode(self.encoding)
