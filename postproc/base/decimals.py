@@ -54,7 +54,7 @@ def plain_decimals(
     """Values and decimals (K,) of literals near each other, and which of them (K,) are digits with a sign and a
     ``point``. raw (B,): bytes of the text; start, stop (K,): offsets.
 
-    Their letters are held in words of eight, the last one in the highest byte, and read all at once.
+    Their letters are packed in words of eight, the last one in the highest byte, and read all at once.
     """
     if not len(start):
         return np.empty(0), np.empty(0, np.int64), np.empty(0, bool)

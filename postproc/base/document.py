@@ -2,7 +2,7 @@
 
 A source is never rebuilt: a change is a list of edits (span, text) that are spliced into the
 bytes.  What no edit covers is copied, so the result is lossless by construction.  Millions of
-edits are held as arrays, and spliced and taken out again in blocks.
+edits are stored as arrays, and spliced and taken out again in blocks.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Edit:
 
 @dataclass(frozen=True)
 class Document:
-    """The raw bytes of one file, and where its lines begin."""
+    """The raw bytes of one file, and where its lines start."""
 
     path: Path
     raw: bytes
@@ -345,7 +345,7 @@ def _covered(start: NDArray[Any], stop: NDArray[Any], size: int) -> NDArray[np.b
 def undone(written: bytes, original: bytes, edits: Iterable[Edit]) -> bool:
     """Whether ``written`` is ``original`` in every byte that no edit covers, and each edit's text in its place.
 
-    Goes by the written bytes, on another way than ``apply``: it says for every byte where it must have come from,
+    Goes by the written bytes, independently of ``apply``: computes for every byte where it must have come from,
     and compares.
     """
     all_edits = Edits.joined(edits)
@@ -359,7 +359,7 @@ def undone(written: bytes, original: bytes, edits: Iterable[Edit]) -> bool:
         if not np.array_equal(new[here : here + block_start - at], old[at:block_start]):
             return False
         lengths = np.diff(all_edits.ends[low : high + 1])
-        # How far after its place in the original each edit, and what follows it, stands.
+        # How far after its place in the original each edit, and what follows it, lies.
         shift = here - at + sums(lengths - (stop - start))
         if block_end + int(shift[-1]) > len(written):
             return False

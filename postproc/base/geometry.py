@@ -56,7 +56,7 @@ class Poses:
         return len(self.position)
 
     def shared(self, rows: Any) -> Poses:
-        """``self[rows]``; one pose where all N are held as one that is broadcast."""
+        """``self[rows]``; one pose where all N are one that is broadcast."""
         same = len(self.position) and is_shared(self.position) and is_shared(self.rotation)
         return self[0] if same else self[rows]
 
@@ -78,17 +78,17 @@ UNKNOWN = Poses(np.full((3, 3), np.nan), np.full(3, np.nan))
 
 @dataclass(frozen=True, eq=False)
 class PoseRows:
-    """``count`` poses that are made where they are asked for: ``made`` gives those of rows (K,).
+    """``count`` poses that are computed where they are asked for: ``build`` gives those of rows (K,).
 
     A pose takes 96 bytes; of a million motions few are needed at a time.
     """
 
     count: int
-    made: Callable[[Ints], Poses]
+    build: Callable[[Ints], Poses]
 
     def __getitem__(self, rows: Any) -> Poses:
         """As of ``Poses``: by numbers of rows, a mask, or a slice."""
-        return self.made(numbers(rows, self.count))
+        return self.build(numbers(rows, self.count))
 
     def __len__(self) -> int:
         return self.count
@@ -98,16 +98,16 @@ class PoseRows:
         again and again."""
         last = threading.local()
 
-        def made(rows: Ints) -> Poses:
+        def build(rows: Ints) -> Poses:
             if getattr(last, "rows", None) is not rows:
-                poses = self.made(rows)
+                poses = self.build(rows)
                 for array in (poses.rotation, poses.position):
                     array.setflags(write=False)
                 last.rows, last.poses = rows, poses
             last_poses: Poses = last.poses
             return last_poses
 
-        return PoseRows(self.count, made)
+        return PoseRows(self.count, build)
 
     @property
     def position(self) -> Floats:
@@ -299,7 +299,7 @@ def on_arc(
     """Points (K, 3) [m] at the shares (K,) of arcs from ``start`` to ``end`` (K, 3) [m] about ``centre`` (K, 3) [m].
 
     p(t) = c + R(n, t sweep) (s - c) + t (e - c - R(n, sweep) (s - c)): counter-clockwise about the unit vector n =
-    ``normal`` (K, 3) by ``sweep`` (K,) [rad], with what is left to the end (the advance of a helix, radii that differ
+    ``normal`` (K, 3) by ``sweep`` (K,) [rad], with what remains to the end (the advance of a helix, radii that differ
     in the last digit) in proportion.
     """
     radius = start - centre
@@ -324,9 +324,9 @@ def arc_through(start: Floats, via: Floats, end: Floats) -> tuple[Floats, Floats
 
 
 def arc_in_plane(start: Floats, via: Floats, end: Floats, normal: Floats) -> tuple[Floats, Floats, Floats]:
-    """Centre (K, 3) [m], normal (K, 3) and sweep (K,) [rad] as of ``arc_through``, through ``begin``, ``via``, ``end``
+    """Centre (K, 3) [m], normal (K, 3) and sweep (K,) [rad] as of ``arc_through``, through ``start``, ``via``, ``end``
     (K, 3) [m], of arcs counter-clockwise about ``normal`` (K, 3): the circle of the points as they are seen along it;
-    the centre lies at the height of ``begin``.  NaN where the points lie on a line or run clockwise."""
+    the centre lies at the height of ``start``.  NaN where the points lie on a line or run clockwise."""
     first, second = via - start, end - start
     first = first - np.sum(first * normal, axis=-1, keepdims=True) * normal
     second = second - np.sum(second * normal, axis=-1, keepdims=True) * normal

@@ -12,7 +12,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import note
 
 MAX_BYTES = 1_000_000_000
-"""Sixteen million motions; offsets in a program are held in 32 bits."""
+"""Sixteen million motions; offsets in a program have 32 bits."""
 
 MAX_LINE = 1_000_000
 """Bytes: no controller and no table has lines of a hundredth of it, and in memory a line is many times its length."""

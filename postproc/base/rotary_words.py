@@ -35,9 +35,9 @@ def rotation_of(angles: Floats) -> Floats:
 
 
 def angles_of(rotation: Floats, near: Floats) -> Floats:
-    """A, B, C (n, 3) [rad] of rotations (n, 3, 3) that words can say, those nearest to ``near`` (n, 3).
+    """A, B, C (n, 3) [rad] of rotations (n, 3, 3) that words can express, those nearest to ``near`` (n, 3).
 
-    A pair is told from the whole rotation, which is regular at the pole: R i = R_o i for the inner axis i.
+    A pair is computed from the whole rotation, which is regular at the pole: R i = R_o i for the inner axis i.
     """
     columns, angles = used(near), np.array(near)
     if len(columns) == 3:
@@ -70,7 +70,7 @@ def pointing(tool: Floats, near: Floats) -> Floats:
     With p what the direction lies across the plane of the inner axis and s what it leans in it, the outer axis would
     turn by x = atan(p / s).  It turns by min(x, b, RETURN b^2 s / p), b = max(SWING, p / STEEP): all of it
     away from the pole, no more than b near it, and back to its place, continuously, at the pole itself, where it can
-    not turn the tool.  What is then left across is not said by the words.
+    not turn the tool.  What then remains across is not expressed by the words.
     """
     outer, inner = used(near)
     o, i = np.eye(3)[[outer, inner]]
@@ -92,7 +92,7 @@ def pointing(tool: Floats, near: Floats) -> Floats:
 
 
 def reproduced(rotation: Floats, angles: Floats) -> Bools:
-    """(n,) the words (n, 3) say the rotations (n, 3, 3)."""
+    """(n,) the words (n, 3) express the rotations (n, 3, 3)."""
     return np.asarray(np.abs(rotation_of(angles) - rotation).max(axis=(1, 2)) < 1e-7)
 
 

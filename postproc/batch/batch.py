@@ -12,7 +12,7 @@ from postproc.base.batches import cores
 from postproc.batch.cluster import run_on_cluster
 from postproc.batch.files_read import code_digest
 from postproc.batch.item import BatchItem
-from postproc.batch.job_file import Jobs, Said, jobs_of
+from postproc.batch.job_file import Jobs, OptionValues, jobs_of
 from postproc.batch.locking import locked
 from postproc.batch.processes import run_here
 from postproc.batch.records import lock_path
@@ -25,13 +25,13 @@ from postproc.report.batched_page import batch_page
 class BatchRequest:
     """What the user asked for.
 
-    words: one job file, or folders, files and patterns; said: fields of a ``Request`` that were said for all
+    words: one job file, or folders, files and patterns; options: fields of a ``Request`` that are set for all
     programs, and win over a job file; workers: processes, all cores by default; dask: address of a scheduler instead;
     rerun: also what is unchanged.
     """
 
     words: tuple[str, ...]
-    options: Said = field(default_factory=dict)
+    options: OptionValues = field(default_factory=dict)
     output: Path | None = None
     workers: int | None = None
     dask: str | None = None

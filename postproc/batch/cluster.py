@@ -29,7 +29,7 @@ def run_on_cluster(
     """Do the tasks on the cluster whose scheduler is at ``address``; yields (number, outcome) as they are done.
 
     The scheduler gives the tasks of a worker that died to another one.  Where it is lost itself, or all of its workers
-    for longer than ``PATIENCE``, the tasks that are left fail.  Raises Refusal BAT006, before anything is done, where
+    for longer than ``PATIENCE``, the remaining tasks fail.  Raises Refusal BAT006, before anything is done, where
     the cluster is not there, has no workers, or workers of another version.
     """
     if not _ADDRESS.fullmatch(address):  # the client would wait for it, and end in a traceback
@@ -109,9 +109,7 @@ def _distributed() -> Any:
         import distributed
     except ImportError:
         raise _unusable("the package dask.distributed is not installed", EXTRA) from None
-    logging.getLogger("distributed.client").setLevel(
-        logging.CRITICAL
-    )  # what it has to say is said here, in words
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # its message is given here, in words
     return distributed
 
 

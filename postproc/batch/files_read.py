@@ -1,6 +1,7 @@
-"""Which files a piece of work reads, and what was in them: seen where Python opens them, not foretold.
+"""Which files a piece of work reads, and what was in them: recorded where Python opens them, not predicted.
 
-A list of inputs kept by hand forgets the file that a later version reads, and a result would then pass for unchanged.
+A list of inputs maintained by hand forgets the file that a later version reads, and a result would then pass for
+unchanged.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def digest_of(path: Path | str) -> str:
 def readings() -> Iterator[dict[str, str]]:
     """Path -> digest of every file that this thread opens to read inside of the ``with``, as it was then.
 
-    The files of Python and of this package are left out; ``code_digest`` stands for them.
+    The files of Python and of this package are left out; ``code_digest`` covers them.
     """
     _install()
     seen: dict[str, str] = {}

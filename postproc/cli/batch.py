@@ -208,15 +208,15 @@ def _watched(out: Out) -> Iterator[Watch | None]:
 
         def stage(self, name: str, stage: str) -> None:
             self.at[name] = stage
-            self._tell()
+            self._show()
 
         def ended(self, outcome: Outcome) -> None:
             self.at.pop(outcome.name, None)
             self.motions += int(outcome.result.get("motions", 0)) if outcome.state == "done" else 0
             progress.advance(self.task)
-            self._tell()
+            self._show()
 
-        def _tell(self) -> None:
+        def _show(self) -> None:
             words = ", ".join(f"{escape(sanitize(name))}: {stage}" for name, stage in self.at.items())
             rate = self.motions / max(time.monotonic() - self.began, 1e-3)
             progress.update(

@@ -30,7 +30,7 @@ def check_limits(
 ) -> tuple[list[Finding], dict[int, Finding]]:
     """What is to be reported of the motions of ``division``; and the rows that cannot be corrected, with the reason.
 
-    Told is what the correction adds: what the program as it is does too is no news.
+    Reported is only what the correction adds, not what the uncorrected program does too.
     """
     rows = np.flatnonzero(division.moved & (task.track.status[division.source] >= 0))
     if not len(rows):
@@ -38,12 +38,12 @@ def check_limits(
     collector = _LimitFindings(task, division)
     for block in in_blocks(lambda part: _looked(task, division, rows, part), len(rows)):
         collector.put(block)
-    return collector.findings(), collector.held
+    return collector.findings(), collector.uncorrectable
 
 
 class _LimitBlock(NamedTuple):
     """What is found of the motions ``rows`` (K,) of a division.  beyond (K,): an axis is, the number of which is axis
-    (K,); near (K, n) [rad, m]: what is left to a limit that the correction brings an axis close to, infinite elsewhere;
+    (K,); near (K, n) [rad, m]: the distance to a limit that the correction brings an axis close to, infinite elsewhere;
     singular (K,): newly so; share (K, n): of the speed that an axis can have."""
 
     rows: Ints
@@ -85,7 +85,7 @@ def _looked(task: CompensationProblem, division: Subdivision, rows: Ints, part: 
 def _shares(
     task: CompensationProblem, division: Subdivision, motions: Ints, place: Floats, q: Floats
 ) -> Floats:
-    """(K, n) speeds that the axes ``q`` (K, n) need on the way from the command before, at the programmed feed, over
+    """(K, n) speeds that the axes ``q`` (K, n) need on the path from the command before, at the programmed feed, over
     those that they can have; 0 where that is not known.  ``place`` (K, 3) [m] of the commands."""
     speeds, share = task.model.robot.speeds, np.zeros(q.shape)
     if not np.isfinite(speeds).any():
@@ -104,9 +104,9 @@ class _LimitFindings:
 
     def __init__(self, task: CompensationProblem, division: Subdivision) -> None:
         self.task, self.division = task, division
-        self.held: dict[int, Finding] = {}
+        self.uncorrectable: dict[int, Finding] = {}
         self.near, self.singular, self.over = 0, 0, 0
-        # of each block: what is left to a limit and the share of a speed, with motion and axis
+        # of each block: the distance to a limit and the share of a speed, with motion and axis
         self.nearest: list[tuple[float, int, int]] = []
         self.fastest: list[tuple[float, int, int]] = []
         self.first: list[int] = []
@@ -116,7 +116,7 @@ class _LimitFindings:
         for k in np.flatnonzero(block.beyond).tolist():
             message = f"an inserted motion moves {joints[int(block.axis[k])].name} beyond its limit"
             row = int(source[block.rows[k]])
-            self.held[row] = _at(self.task, row, "COR008", message)
+            self.uncorrectable[row] = _at(self.task, row, "COR008", message)
         k, axis = divmod(int(np.argmin(block.near)), block.near.shape[1])
         self.near += int(np.isfinite(block.near).any(axis=1).sum())
         self.nearest.append((float(block.near[k, axis]), int(block.rows[k]), axis))

@@ -23,16 +23,16 @@ from postproc.compensation.subdivision import Subdivision, subdivided_motions
 from postproc.toolpath import Role
 
 SAMPLES = np.linspace(0.0, 1.0, 9)
-"""Where the output's corner is looked at."""
+"""Where the output's corner is evaluated."""
 
 DRAWN = 24
 """Straight segments by which the original's parabola is drawn: off by less than a thousandth of what it rounds off."""
 
 LITTLE = 0.1
-"""Share of the tolerance: corners that round off less are not looked at."""
+"""Share of the tolerance: corners that round off less are not evaluated."""
 
 MOST = 2000
-"""Corners looked at: those that round off most."""
+"""Corners evaluated: those that round off most."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ def _differences(
     reach = np.minimum(distance, 0.5 * np.minimum(long_back, long_ahead))
     curve = _parabola(before, after, reach, SAMPLES)
 
-    # the force belongs to the place of the wanted path that a command stands for
+    # the force belongs to the place of the wanted path that a command is made for
     exit_share = before.last - (before.last - before.first) * reach / long_back
     entry_share = after.first + (after.last - after.first) * reach / long_ahead
     part, back = np.abs(2.0 * SAMPLES - 1.0), SAMPLES <= 0.5

@@ -29,8 +29,8 @@ from postproc.toolpath import Kind
 class MotionOutcome(IntEnum):
     AIR = 0  # nothing to correct
     CORRECTED = 1
-    UNCORRECTED = 2  # could not be corrected, told
-    OFF = 3  # left alone on the program's own word (COMPENSATE OFF)
+    UNCORRECTED = 2  # could not be corrected, reported
+    OFF = 3  # switched off by the program (COMPENSATE OFF)
     LEAD_IN = 4  # in air, and ends where the cut after it starts corrected
 
 
@@ -72,14 +72,14 @@ class CorrectionResult:
 def correct(task: CompensationProblem) -> CorrectionResult:
     """Correct every motion that can be.
 
-    Raises Refusal: a cutting pose out of reach (KIN001), a configuration that nothing says (KIN004), a correction
+    Raises Refusal: a cutting pose out of reach (KIN001), a configuration that nothing states (KIN004), a correction
     larger than the cell allows (COR002).
     """
     path, track, n = task.toolpath, task.track, len(task.toolpath)
     cartesian = path.known & ~path.on_axes
     forced = task.carries
     scope = forced if task.process else forced | cartesian
-    # In air every motion stands for itself; a cut stands and falls as a whole.
+    # In air every motion is corrected by itself; a cut is corrected as a whole or not at all.
     cut = (
         number_cuts(scope, path.executes)
         if task.process
@@ -281,7 +281,7 @@ class _Findings:
             _note(task, why, findings, rows[~_in(why, len(self.before))[rows]], code, words[code])
 
     def warn_sides(self, task: CompensationProblem, keeps: Bools, findings: list[Finding]) -> None:
-        """S and T stand verbatim in the text: they must still be those of the corrected pose."""
+        """S and T are verbatim in the text: they must still be those of the corrected pose."""
         crossed = np.array([row for row in self.crossed if keeps[row]], np.int64)
         if len(crossed):
             message = (
@@ -354,7 +354,7 @@ def _note(
     code: str,
     message: str,
 ) -> None:
-    """Say it once for all ``rows``, and remember it for each."""
+    """Report it once for all ``rows``, and remember it for each."""
     if len(rows):
         why.update(dict.fromkeys(rows.tolist(), _at(task, int(rows[0]), code, message)))
         findings.append(_at(task, int(rows[0]), code, message + _further_findings(task, rows)))

@@ -31,7 +31,7 @@ def spread_over_cuts(blocked: Bools, cut: Ints) -> Bools:
 
 
 def feed_motions(toolpath: Toolpath) -> Bools:
-    """(N,) what ``COMPENSATE OFF`` / ``COMPENSATE ON`` comments say; a motion before the first of them is on."""
+    """(N,) what ``COMPENSATE OFF`` / ``COMPENSATE ON`` comments state; a motion before the first of them is on."""
     on = np.ones(len(toolpath), bool)
     for note in toolpath.annotations:
         if match := _SWITCH.match(note.text.strip()):

@@ -38,7 +38,7 @@ class DesiredPath:
     """N motions.  start, end: TCP poses, NaN where unknown; sweep (N,) of arcs, NaN elsewhere; traceable (N,): LIN and
     CIRC whose path is known from start to end; length (N,) [m], 0 where it is not; angle (N,) [rad]: between the
     orientations at start and end, infinite where the tool turns otherwise than evenly about one axis, NaN where it is
-    not known; half_turns: which way they turn."""
+    not known; half_turns: in which sense they turn."""
 
     path: Toolpath
     start: PoseRows
@@ -104,7 +104,8 @@ class DesiredPath:
         return centre, turned(base.rotation, self.path.arcs.normal[rows]), self.path.arcs.sweep[rows]
 
     def at(self, rows: Ints, share: Floats) -> Poses:
-        """Poses (K) at the shares (K,) of the ways of ``rows`` (K,): straight or round, turning as the program says."""
+        """Poses (K) at the shares (K,) of the paths of ``rows`` (K,): straight or round, turning as the program
+        states."""
         start, end = self.start[rows], self.end[rows]
         poses = interpolate_poses(start, end, share)
         self._turn(rows, start, end, share, poses)
@@ -117,7 +118,7 @@ class DesiredPath:
         return poses
 
     def _turn(self, rows: Ints, start: Poses, end: Poses, share: Floats, poses: Poses) -> None:
-        """Puts the orientations of the motions that do not turn the short way into ``found`` (K)."""
+        """Puts the orientations of the motions that do not turn in the shorter sense into ``poses`` (K)."""
         half = self.half_turns.rows
         if not len(half) and not self._along:
             return
@@ -136,8 +137,8 @@ class DesiredPath:
     def turn(
         self, rows: Ints, first: Floats, last: Floats, start: Poses, end: Poses, share: Floats, poses: Poses
     ) -> None:
-        """Turns ``found`` (K), at the shares (K,) between ``start`` and ``end`` (K), as the controller does on a part,
-        ``first`` to ``last`` (K,), of the ways of ``rows`` (K,) (``OrientationPath``)."""
+        """Turns ``poses`` (K), at the shares (K,) between ``start`` and ``end`` (K), as the controller does on a part,
+        ``first`` to ``last`` (K,), of the paths of ``rows`` (K,) (``OrientationPath``)."""
         interpolate_orientation(
             self.path,
             self.base,
@@ -152,7 +153,7 @@ class DesiredPath:
         )
 
     def tangent(self, rows: Ints, share: Floats) -> Floats:
-        """(K, 3) unit vectors along the ways of ``rows`` (K,) at the shares (K,); zero where a motion only turns the
+        """(K, 3) unit vectors along the paths of ``rows`` (K,) at the shares (K,); zero where a motion only turns the
         tool."""
         step = self.end[rows].position - self.start[rows].position
         arcs = np.flatnonzero(np.isfinite(self.sweep[rows]))
@@ -172,7 +173,7 @@ def start_poses(
     """Where each motion starts (N): the end pose of the one before it, with the tool of its own; NaN for the first one
     and after a motion to an unknown place.  ``external``: in whose path axes ``end`` is, each in those of its own."""
 
-    def made(rows: Ints) -> Poses:
+    def build(rows: Ints) -> Poses:
         before = np.maximum(rows - 1, 0)
         poses = end[before].copy()
         other = np.flatnonzero((path.tool[rows] != path.tool[before]) & path.known[before])
@@ -190,7 +191,7 @@ def start_poses(
         poses.put(rows == 0, UNKNOWN)
         return poses
 
-    return PoseRows(len(path), made)
+    return PoseRows(len(path), build)
 
 
 def interpolate_poses(start: Poses, end: Poses, share: Floats) -> Poses:

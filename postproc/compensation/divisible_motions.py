@@ -24,7 +24,7 @@ ROOM = 0.7
 tool that is early or late where the force changes."""
 
 STEP = 0.1
-"""Share of the tolerance by which the correction may step, or change on a way, without a look at what that does."""
+"""Share of the tolerance by which the correction may step, or change on a path, without a check of what that does."""
 
 WIDEST = 300 * DEG
 """An arc that turns further is divided: the moved end of a nearly full circle could lie on the wrong side."""
@@ -89,7 +89,7 @@ class DivisibleMotions:
         self.error: Floats = np.zeros(count)
 
     def path_starts(self, chosen: Ints) -> Poses:
-        """The commands (A) where the paths of the motions ``chosen`` (A,) begin: after a transition move or a lead-in,
+        """The commands (A) where the paths of the motions ``chosen`` (A,) start: after a transition move or a lead-in,
         or where the motion before them ends."""
         starts = self.entry[self.rows[chosen]]
         own = np.flatnonzero(self.needs_transition[chosen] | self.has_lead_in[chosen])
@@ -102,7 +102,7 @@ class DivisibleMotions:
         rows, part = self.rows[self.owner], self.high - self.low
         sweep = np.nan_to_num(self.task.desired_path.sweep[rows]) * part
         least = np.where(sweep > WIDEST, np.ceil(sweep / np.pi), 1).astype(np.int32)
-        # of a half turn the corrected ends could be nearer the other way round
+        # of a half turn the corrected ends could be nearer in the other sense
         half = np.isin(rows, self.task.track.half_turns.rows) & (part == 1.0)
         return np.where(half, np.maximum(least, 2), least)
 

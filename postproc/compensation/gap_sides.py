@@ -13,7 +13,7 @@ CROSSED = 1.0 - 1e-9
 """Share of a gap or a band that counts as all of it."""
 
 NO_LENGTH = 1.0
-"""[m] Stands for the length of a jump, or of a turn on the spot."""
+"""[m] Counts as the length of a jump, or of a turn on the spot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class GapSides:
         motor = self.motor[first] + part * (self.motor[last] - self.motor[first])
         gap = self.gap if self.gap.ndim == 1 else self.gap[last]
         joint = np.clip(self.joint[first], motor - 0.5 * gap, motor + 0.5 * gap)
-        whole = (part == 1.0)[:, 0]  # there it may also have begun again
+        whole = (part == 1.0)[:, 0]  # there it may also have started again
         motor[whole], joint[whole] = self.motor[last[whole]], self.joint[last[whole]]
         known = np.floor(0.5 * self.key[last]) == rows
         return np.where(known[:, None], operator.share(motor, joint, gap), 0.0)
@@ -110,8 +110,8 @@ class Reversals:
     @staticmethod
     def of(line: MotorPath, position: Floats, shares: Floats, anew: Bools, spacing: Floats) -> Reversals:
         """Of ``shares`` (S, n) of dead bands at stations at ``position`` (S,) [m], ``anew`` (S,) where nothing is known
-        of how the motors came: a side holds until the band is crossed the other way, and what comes first holds from
-        the start.  ``spacing`` (N,) [m]: no change is shorter, and none starts or ends so near to a target."""
+        of how the motors came: a side holds until the band is crossed in the other sense, and what comes first holds
+        from the start.  ``spacing`` (N,) [m]: no change is shorter, and none starts or ends so near to a target."""
         by_axis: list[tuple[Floats, ...]] = []
         start = np.zeros(shares.shape[1])
         again = np.maximum.accumulate(np.where(anew, np.arange(len(anew)), -1))
@@ -156,7 +156,7 @@ class Reversals:
 class LostMotion:
     """The play of n axes at stations (S) of a program.
 
-    programmed: as the program runs as it stands.  wanted: the sides that corrections are made for.  A joint that is to
+    programmed: as the uncorrected program runs.  wanted: the sides that corrections are made for.  A joint that is to
     turn round wants its motor on the other side of the gap at once, so they follow the sense of the joint's own motion,
     but for what is less than a dead band.
     row, share (S,): the stations; axes (S, n): programmed; aim (S, n): where the motors of a correction go, but for the

@@ -19,7 +19,7 @@ from postproc.model import NOTHING, StiffnessModel
 def _changed_wrench(entry: UncertainInput, value: float, wrench: Floats, axes: Floats | None) -> Floats:
     """The wrenches (N, 6) with one figure of the force at ``value``; ``axes`` (N, 3, 3): of the programmed base.
 
-    A turn leaves the moment, which acts at the tool centre point, as it is.  Where no wrench acts none is added.
+    A turn does not change the moment, which acts at the tool centre point.  Where no wrench acts none is added.
     """
     if entry.parameter == FORCE:
         return value * wrench
@@ -59,7 +59,7 @@ def sensitivities(
     start: Floats | None = None,
     axes: Floats | None = None,
 ) -> Floats:
-    """d(tool position)/d(figure) (N, 3, P) [m per SI unit] with the motors held at ``q`` (N, n) under ``wrench``
+    """d(tool position)/d(figure) (N, 3, P) [m per SI unit] with the motors fixed at ``q`` (N, n) under ``wrench``
     (N, 6); ``start`` as of the equilibrium; ``axes`` (N, 3, 3) of the programmed base, for directions and components of
     the force.
 

@@ -18,7 +18,7 @@ ROUNDED = 0.5
 
 
 def split_at_knots(motions: DivisibleMotions) -> None:
-    """Ways on which a ramp of the force ends are parted there, where one straight or round way would leave the
+    """Paths on which a ramp of the force ends are divided there, where one straight or round path would exceed the
     tolerance."""
     row, share = _knots(motions)
     if not len(row):
@@ -85,7 +85,7 @@ def _with_companions(motions: DivisibleMotions, at: Ints, share: Floats) -> tupl
 
 
 def _split_intervals(motions: DivisibleMotions, at: Ints, share: Floats) -> None:
-    """Intervals of the ways ``at`` (K,) that end at the shares (K,), both ascending; of all others one."""
+    """Intervals of the paths ``at`` (K,) that end at the shares (K,), both ascending; of all others one."""
     number = np.arange(len(motions.rows))
     owner = np.concatenate([number, at])
     low = np.concatenate([np.zeros(len(motions.rows)), share])

@@ -1,8 +1,8 @@
 """The lost motion of a program: where its axes turn round, and on which side of its gap each of them then lies.
 
 A joint lags after its motor by half the gap (see ``effects.play``).  For a joint that is to follow y the motor has to
-be at y + (g/2) sign(dy): at a reversal it crosses the whole gap while the joint stands.  Motions of y of less than a
-dead band are none, or the third decimal of a straight line would throw the motor to and fro.  The band is ``ROOM`` of
+be at y + (g/2) sign(dy): at a reversal it crosses the whole gap while the joint is at rest.  Motions of y of less than
+a dead band are none, or the third decimal of a straight line would throw the motor to and fro.  The band is ``ROOM`` of
 the tolerance at the tool, or what the last digit of the program moves the axis by, whichever is larger, and never more
 than the gap.  By so much the tool is off where an axis has just turned round.
 """
@@ -25,7 +25,7 @@ ROOM = 0.25
 """Share of the tolerance that the dead band of a reversal may take at the tool."""
 
 SPACING, TURN, ARC = 25 * MM, 5 * DEG, 15 * DEG
-"""Of stations on a way: along it, by axes, by the angle of an arc."""
+"""Of stations on a path: along it, by axes, by the angle of an arc."""
 
 SHORT = 2 * MM
 """A motion that is shorter, and turns its axes by less than ``LITTLE``, is monotone to less than a dead band."""
@@ -36,7 +36,7 @@ FINE = 0.2 * MM
 """How exactly the place of a reversal is found."""
 
 CHANGE = 0.02
-"""A share of the side that changes by less between two stations is no reversal to be looked at."""
+"""A share of the side that changes by less between two stations is no reversal to be evaluated."""
 
 COARSE = 0.1
 """As much, where a motor crosses its gap: in between it is taken to go evenly."""
@@ -54,7 +54,7 @@ ANGLE_DIGIT = 1e-3 * DEG
 """Last digit of a program's angles."""
 
 UNKNOWN_GAP = 1e-6
-"""[rad, m] Stands for the gap of an axis that has none: its side is the sense in which it came."""
+"""[rad, m] Gap of an axis that has none: its side is the sense in which it came."""
 
 
 def add_lost_motion(task: CompensationProblem, start: Floats | None, spacing: Floats) -> CompensationProblem:
@@ -75,7 +75,7 @@ def add_lost_motion(task: CompensationProblem, start: Floats | None, spacing: Fl
     # where a change of side starts and ends there is a station
     row, along = line.place(np.concatenate([turns.since, turns.until]))
     inside = task.desired_path.traceable[row] & (along > 0.0) & (along < 1.0)
-    stations = stations.joined(axis_paths.made(row[inside], along[inside]))
+    stations = stations.joined(axis_paths.sample(row[inside], along[inside]))
     lost = LostMotion(
         stations.programmed,
         turns,
@@ -162,7 +162,7 @@ class _AxisPaths:
         along = np.concatenate(
             [np.ones(len(rows)), number / np.repeat(count, count - 1), np.zeros(len(sets_in))]
         )
-        samples = self.made(row, along)
+        samples = self.sample(row, along)
         start_axes = (
             np.empty((0, q.shape[1])) if start is None or not np.isfinite(start).all() else start[None]
         )
@@ -171,21 +171,22 @@ class _AxisPaths:
         )
         return before.joined(samples)
 
-    def made(self, row: Ints, along: Floats) -> _Samples:
-        """Stations at the shares ``along`` (S,) of the ways of ``row`` (S,), without those that are out of reach."""
+    def sample(self, row: Ints, along: Floats) -> _Samples:
+        """Stations at the shares ``along`` (S,) of the paths of ``row`` (S,), without those that are out of reach."""
         axes = np.empty((len(row), self.gap.size))
         aim = np.empty_like(axes)
 
-        def made(part: slice) -> None:
+        def compute(part: slice) -> None:
             axes[part] = self._axes(row[part], along[part])
             aim[part] = self._aim(row[part], along[part], axes[part])
 
-        each_block(made, len(row))
+        each_block(compute, len(row))
         good = np.isfinite(axes).all(axis=1) & np.isfinite(aim).all(axis=1)
         return _Samples(self, row[good], along[good], axes[good], aim[good])
 
     def _axes(self, row: Ints, along: Floats) -> Floats:
-        """(S, n) axes at the shares ``along`` (S,) of the ways of ``row`` (S,), as the controller interpolates them."""
+        """(S, n) axes at the shares ``along`` (S,) of the paths of ``row`` (S,), as the controller interpolates
+        them."""
         task, q = self.task, self.task.track.q
         axes = np.where((along == 1.0)[:, None], q[row], q[np.maximum(row - 1, 0)])
         inner = np.flatnonzero((along > 0.0) & (along < 1.0))
@@ -219,7 +220,7 @@ class _Samples:
     """row, share (S,): places on the paths of motions, in order (row -1: before the first one); axes, aim (S, n): as of
     ``LostMotion``."""
 
-    ways: _AxisPaths
+    axis_paths: _AxisPaths
     row: Ints
     share: Floats
     axes: Floats
@@ -232,28 +233,28 @@ class _Samples:
     @cached_property
     def anew(self) -> Bools:
         """(S,) it is not known how the axes came here: an unknown place before it, or a motion that may not run."""
-        step, runs = np.diff(self.row, prepend=-2), self.ways.task.toolpath.executes
+        step, runs = np.diff(self.row, prepend=-2), self.axis_paths.task.toolpath.executes
         return np.asarray((step > 1) | ((step > 0) & (self.row >= 0) & ~runs[self.row]))
 
     @cached_property
     def moved(self) -> Bools:
         """(S,) of motions that are to be corrected."""
-        return self.ways.moved[self.row] & (self.row >= 0)
+        return self.axis_paths.moved[self.row] & (self.row >= 0)
 
     @cached_property
     def programmed(self) -> GapSides:
-        return GapSides.of(self.key, self.axes, self.ways.gap, self.anew)
+        return GapSides.of(self.key, self.axes, self.axis_paths.gap, self.anew)
 
     @cached_property
     def within(self) -> GapSides:
         """The play of the dead bands."""
         # a correction sets out from where the joint really lies
         joint = np.where(self.moved[:, None], self.aim, self.programmed.joint)
-        return GapSides.of(self.key, joint, self.ways.band[np.maximum(self.row, 0)], self.anew)
+        return GapSides.of(self.key, joint, self.axis_paths.band[np.maximum(self.row, 0)], self.anew)
 
     def turning(self) -> Ints:
-        """Stations that end a part of a way in which an axis turns round, and that is long."""
-        lossy, desired_path = self.ways.lossy, self.ways.task.desired_path
+        """Stations that end a part of a path in which an axis turns round, and that is long."""
+        lossy, desired_path = self.axis_paths.lossy, self.axis_paths.task.desired_path
 
         def changes(sides: GapSides, least: float) -> Bools:
             side = sides.shares[:, lossy]
@@ -292,10 +293,10 @@ class _Samples:
         """With more stations before each of ``chosen``."""
         part = np.arange(1, PARTS) / PARTS
         added = self.share[chosen, None] - self._span(chosen)[:, None] * part
-        return self.joined(self.ways.made(np.repeat(self.row[chosen], PARTS - 1), added.ravel()))
+        return self.joined(self.axis_paths.sample(np.repeat(self.row[chosen], PARTS - 1), added.ravel()))
 
     def joined(self, other: _Samples) -> _Samples:
         row, share = np.concatenate([self.row, other.row]), np.concatenate([self.share, other.share])
         axes, aim = np.concatenate([self.axes, other.axes]), np.concatenate([self.aim, other.aim])
         order = np.argsort(2.0 * row + share, kind="stable")
-        return _Samples(self.ways, row[order], share[order], axes[order], aim[order])
+        return _Samples(self.axis_paths, row[order], share[order], axes[order], aim[order])

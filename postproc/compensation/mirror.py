@@ -1,4 +1,4 @@
-"""Mirror correction: move each command the other way until the predicted tool lies where it is wanted.
+"""Mirror correction: move each command in the opposite direction until the predicted tool lies where it is wanted.
 
     x_cmd <- x_cmd (-) (x_real(x_cmd) (-) x_goal)      on SE(3), position and orientation apart
 
@@ -20,13 +20,13 @@ from postproc.model import StiffnessModel
 from postproc.robot.inverse import Inverse, inverse
 
 POSITION_TOLERANCE = 1e-8
-"""[m] predicted error at which a motion is done: far below what any program's digits can say."""
+"""[m] predicted error at which a motion is done: far below what any program's digits can express."""
 
 ANGLE_TOLERANCE = 1e-8
 """[rad]"""
 
 REST = 2e-10
-"""[rad, m] What may be left of the way to an equilibrium: less than a nanometre at the tool."""
+"""[rad, m] What may remain of the displacement to an equilibrium: less than a nanometre at the tool."""
 
 MAX_ITERATIONS = 20
 
@@ -193,7 +193,7 @@ def pose_error(real: Poses, goal: Poses) -> tuple[Floats, Floats]:
 
 
 def interpolate_pose(wanted: Poses, command: Poses, gain: float | Floats) -> Poses:
-    """The share ``gain`` (0..1; one for all, or (N, 1)) of the way from ``wanted`` to ``command``."""
+    """The share ``gain`` (0..1; one for all, or (N, 1)) of the displacement from ``wanted`` to ``command``."""
     if isinstance(gain, float) and gain == 1.0:
         return command
     shift, turn = pose_error(command, wanted)

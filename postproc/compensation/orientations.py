@@ -1,4 +1,4 @@
-"""How the orientation runs between two commands, and which orientations the words of a program can say."""
+"""How the orientation runs between two commands, and which orientations the words of a program can express."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def interpolate_orientation(
     share: Floats,
     into: Floats,
 ) -> None:
-    """Puts into ``into`` (K, 3, 3) the orientations at the shares (K,) between ``begin`` and ``end`` (K, 3, 3) where
+    """Puts into ``into`` (K, 3, 3) the orientations at the shares (K,) between ``start`` and ``end`` (K, 3, 3) where
     they run otherwise than evenly about one axis.
 
     ``first``, ``last`` (K,): where start and end lie, as shares of the paths of the motions ``rows`` (K,).  ``base``,
@@ -40,7 +40,7 @@ def interpolate_orientation(
         one, two = words.inside(start[at]), words.inside(end[at])
         start_angles = rotary_words.angles_of(one, path.orientation_control.rotary_at(rows[at], first[at]))
         stop_angles = rotary_words.angles_of(two, path.orientation_control.rotary_at(rows[at], last[at]))
-        # What the words do not say (another base or tool before) turns evenly.
+        # What the words do not express (another base or tool before) turns evenly.
         expressible = rotary_words.reproduced(one, start_angles) & rotary_words.reproduced(two, stop_angles)
         here = words.outside(
             rotary_words.rotation_of(start_angles + share[at][:, None] * (stop_angles - start_angles))
@@ -55,9 +55,10 @@ def interpolate_orientation(
 
 
 def _on_great_circle(start: Floats, end: Floats, tool: Floats, share: Floats) -> tuple[Floats, Floats]:
-    """R(t) = G(t) R(0) S(t): G turns the direction of ``tool`` (K, 3, in tool axes) the shortest way, S about the tool.
+    """R(t) = G(t) R(0) S(t): G turns the direction of ``tool`` (K, 3, in tool axes) along the shortest path, S about
+    the tool.
 
-    Gives (K, 3, 3), and (K,) where there is one such way.
+    Gives (K, 3, 3), and (K,) where there is one such path.
     """
     one, two = turned(start, tool), turned(end, tool)
     axis = np.cross(one, two)
@@ -66,7 +67,7 @@ def _on_great_circle(start: Floats, end: Floats, tool: Floats, share: Floats) ->
     known = np.isfinite(angle) & (angle < np.pi - _OPPOSITE)
     vector = axis * (angle / np.where(sine > 0, sine, 1.0))[:, None]
     vector, tool = (np.where(known[:, None], part, 0.0) for part in (vector, tool))
-    # the spin: what is left of R(1) after the great circle turns about the tool
+    # the spin: what remains of R(1) after the great circle turns about the tool
     remaining = product(np.swapaxes(product(rotation_from_vector(vector), start), 1, 2), end)
     odd = np.stack([remaining[:, k, j] - remaining[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))], axis=-1)
     trace = np.trace(remaining, axis1=1, axis2=2)
@@ -77,7 +78,7 @@ def _on_great_circle(start: Floats, end: Floats, tool: Floats, share: Floats) ->
 
 
 class _Words:
-    """K motions: words say R(words) between the base and the tool as it is at A = B = C = 0."""
+    """K motions: words express R(words) between the base and the tool as it is at A = B = C = 0."""
 
     def __init__(self, base: Floats, tool: Floats) -> None:
         self._base, self._tool = base, tool
@@ -91,7 +92,7 @@ class _Words:
         return _Words(frame, product(back, wanted[rows].rotation))
 
     def inside(self, rotation: Floats) -> Floats:
-        """What the words have to say (K, 3, 3) of orientations in the robot base."""
+        """What the words have to express (K, 3, 3) of orientations in the robot base."""
         return product(product(np.swapaxes(self._base, 1, 2), rotation), np.swapaxes(self._tool, 1, 2))
 
     def outside(self, rotation: Floats) -> Floats:
@@ -114,8 +115,9 @@ def pairs(path: Toolpath, rows: Ints) -> Ints:
 def nearest_expressible(
     path: Toolpath, base: Poses, wanted: Placed, rows: Ints, share: Floats, rotation: Floats
 ) -> Floats:
-    """(K, 3, 3) orientations that the pair of axes of motions ``rows`` (K,) says near its place at the shares (K,) of
-    their paths, with the tool along that of ``rotation`` (K, 3, 3) as far as they can: ``rotary_words.pointing``."""
+    """(K, 3, 3) orientations that the pair of axes of motions ``rows`` (K,) expresses near its place at the shares
+    (K,) of their paths, with the tool along that of ``rotation`` (K, 3, 3) as far as they can:
+    ``rotary_words.pointing``."""
     words = _Words.of(path, base, wanted, rows)
     tool = words.inside(rotation)[:, :, 2]
     return words.outside(
@@ -128,7 +130,7 @@ POLE = np.radians(1.0)
 
 
 def spread(path: Toolpath, rows: Ints, low: Floats, high: Floats, part: Floats) -> Floats:
-    """(K,) shares of the ways of ``rows`` (K,): the parts ``part`` (K,), 0 to 1, of what lies between the shares
+    """(K,) shares of the paths of ``rows`` (K,): the parts ``part`` (K,), 0 to 1, of what lies between the shares
     ``low`` and ``high`` (K,).
 
     Evenly; where a pair of axes turns evenly in u = asinh(lean / POLE), because the outer one turns with 1 / lean.

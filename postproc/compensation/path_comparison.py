@@ -113,7 +113,7 @@ def cuts_not_improved(
 def _before_between(task: CompensationProblem, rows: Ints) -> Floats:
     """(K,) [m] largest error across the feed inside of the motions ``rows`` (K,) as they are programmed."""
 
-    def looked(part: slice) -> Floats:
+    def compare(part: slice) -> Floats:
         some = rows[part]
         known = task.desired_path.traceable[some]
         errors = np.zeros(len(some))
@@ -121,7 +121,7 @@ def _before_between(task: CompensationProblem, rows: Ints) -> Floats:
         errors[known], _ = path_errors(task, programmed(task, at))
         return errors
 
-    return np.concatenate([np.empty(0), *in_blocks(looked, len(rows))])
+    return np.concatenate([np.empty(0), *in_blocks(compare, len(rows))])
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ def evaluate_transitions(
     source, desired_path = division.source, task.desired_path
     chosen = np.flatnonzero(result.corrected[source] & desired_path.traceable[source] & ~division.transitions)
 
-    def looked(part: slice) -> tuple[float, int, float, int]:
+    def compare(part: slice) -> tuple[float, int, float, int]:
         segments = subdivided_motions(task, division, chosen[part])
         if not len(segments):
             return 0.0, 0, np.nan, 0
@@ -170,7 +170,7 @@ def evaluate_transitions(
             int((moves & (ahead < 0)).sum()),
         )
 
-    parts = list(in_blocks(looked, len(chosen)))
+    parts = list(in_blocks(compare, len(chosen)))
     if not parts:
         return Transitions(0.0, 0, np.nan, 0, 0, len(division.lead_ins))
     rate, row, _, _ = max(parts)

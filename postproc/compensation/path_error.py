@@ -23,13 +23,13 @@ from postproc.compensation.mirror import pose_error
 from postproc.compensation.problem import CompensationProblem
 
 SHARES = (0.25, 0.5, 0.75)
-"""Where the path between two points is looked at; an error that grows from both of them is largest in the middle."""
+"""Where the path between two points is evaluated; an error that grows from both of them is largest in the middle."""
 
 ON_RAMPS = (0.125, 0.375, 0.625, 0.875)
 """And where besides on motions on which a ramp of the force lies: there it is largest anywhere."""
 
 SHORT, LITTLE = 30 * MM, 3 * DEG
-"""Of a segment that is shorter and turns by less the middle tells enough."""
+"""Of a segment that is shorter and turns by less the middle is enough."""
 
 TURNED = 0.02
 """Share of the tolerance: a turn of the wanted orientation, where the tool is early or late, that is not looked at."""
@@ -37,10 +37,10 @@ TURNED = 0.02
 
 @dataclass(frozen=True)
 class PathSegments:
-    """K segments of ways, as a controller makes them.
+    """K segments of paths, as a controller makes them.
 
     rows (K,): the motion each belongs to; first, last (K,): the shares of its path where the segment starts and ends;
-    begin, end: TCP commands in the robot base; centre, normal (K, 3), sweep (K,): of arcs, NaN for straight segments.
+    start, end: TCP commands in the robot base; centre, normal (K, 3), sweep (K,): of arcs, NaN for straight segments.
     """
 
     rows: Ints
@@ -63,7 +63,7 @@ class PathSegments:
         rows: Ints, first: Floats, last: Floats, start: Poses, via: Poses, end: Poses, normal: Floats
     ) -> PathSegments:
         """Arcs through ``via``, of motions ``rows`` (K,) from the shares ``first`` to ``last`` (K,); about ``normal``
-        (K, 3), with what is left along it in proportion, or where that is NaN in the plane of the three points."""
+        (K, 3), with what remains along it in proportion, or where that is NaN in the plane of the three points."""
         points = start.position, via.position, end.position
         axis = np.where(np.isnan(normal), arc_through(*points)[1], normal)
         return PathSegments(rows, first, last, start, end, *arc_in_plane(*points, axis))
@@ -118,16 +118,16 @@ def path_errors(
     task: CompensationProblem,
     segments: PathSegments,
     from_start: Bools | None = None,
-    left: float = 0.0,
+    uncorrected_share: float = 0.0,
     shown: bool = False,
 ) -> tuple[Floats, Floats]:
     """Largest distance (K,) [m] of the predicted tool from the wanted path, and largest angle (K,) [rad] from the
     wanted orientation, inside of each segment; infinite where the robot cannot be there.
 
-    Along the way the tool may be early or late: only what it is off the path counts.  ``from_begin`` (K,): segments
-    that are looked at where they start as well (another ended there in its own place).  ``left``: the share of the
-    error without a correction that is meant to stay, and is none.  ``shown``: all of the angle that shows on the part;
-    else only what further points would take away.
+    Along the path the tool may be early or late: only what it is off the path counts.  ``from_start`` (K,): segments
+    that are evaluated where they start as well (another ended there in its own place).  ``uncorrected_share``: the
+    share of the error without a correction that is meant to stay, and is none.  ``shown``: all of the angle that shows
+    on the part; else only what further points would take away.
     """
     length = lengths(segments.end.position - segments.start.position)
     _, turn = pose_error(segments.end, segments.start)
@@ -141,13 +141,17 @@ def path_errors(
         chosen = np.flatnonzero(ramped | (long & (share in SHARES)) | (share == 0.5))
         if len(chosen):
             here = _errors(
-                task, segments if len(chosen) == len(segments) else segments[chosen], share, left, shown
+                task,
+                segments if len(chosen) == len(segments) else segments[chosen],
+                share,
+                uncorrected_share,
+                shown,
             )
             off[chosen] = np.maximum(off[chosen], here[0])
             angle[chosen] = np.maximum(angle[chosen], here[1])
     if from_start is not None and from_start.any():
         chosen = np.flatnonzero(from_start)
-        here = _errors(task, segments[chosen], 0.0, left, shown)
+        here = _errors(task, segments[chosen], 0.0, uncorrected_share, shown)
         off[chosen], angle[chosen] = np.maximum(off[chosen], here[0]), np.maximum(angle[chosen], here[1])
     return off, angle
 
@@ -194,7 +198,7 @@ def _beside(
     against what is wanted at the place of it that they are nearest to.
 
     A tool that is early by ds where the wanted orientation R(s) turns is compared with R(s + ds), not against ``goal``
-    (K), which belongs to ``wanted`` (K) at the shares (K,) of the ways of ``rows`` (K,).
+    (K), which belongs to ``wanted`` (K) at the shares (K,) of the paths of ``rows`` (K,).
     """
     desired_path, tangent = task.desired_path, task.desired_path.tangent(rows, share)
     ahead = np.sum((real.position - goal.position) * tangent, axis=1)

@@ -32,7 +32,7 @@ class CompensationProblem:
 
     wanted (N): TCP targets; base, tool (N): the programmed base in the robot base, the TCP on the flange; force: the
     wrench along the path of each motion; conditions (N): what else is known, at their ends and as they are programmed;
-    ``process``: correct what the force does and leave what the robot does without it (a base that was touched off
+    ``process``: correct what the force does and not what the robot does without it (a base that was touched off
     contains that, but for the lost motion of its gears: no base can lie on both sides of a gap); else everything is
     corrected, but for the rigid motion that ``touched_off`` bases contain.  ``max_correction``, ``tolerance`` [m],
     ``tolerance_angle`` [rad].  ``ramp`` [m]: over which a force that steps inside a cut goes over at least.
@@ -100,7 +100,7 @@ class CompensationProblem:
 
     def given(self, rows: Ints, share: Floats | None = None, corrected: bool = False) -> Conditions:
         """What else is known of motions ``rows`` (K,) at ``share`` (K,) of their paths, their ends without: as the
-        program runs as it stands, or ``corrected``."""
+        program runs uncorrected, or ``corrected``."""
         if self.lost_motion is None or (share is None and not corrected):
             return self.conditions.part(rows)
         return self._on(self._sides if corrected else self.lost_motion.programmed, rows, share)
@@ -219,8 +219,8 @@ class CompensationProblem:
     def _in_words(
         self, rows: Ints, goal: Poses, wrench: Floats, share: Floats | None, done: Correction, pairs: Ints
     ) -> Correction:
-        """``done`` with the orientations that two rotary axes can say in its rows ``pairs`` (P,), and the places that
-        go with them; all in the robot's own base."""
+        """``done`` with the orientations that two rotary axes can express in its rows ``pairs`` (P,), and the places
+        that go with them; all in the robot's own base."""
         at = rows[pairs]
         place = np.ones(len(at)) if share is None else share[pairs]
         here, placed = done.command.rotation[pairs], self.robot_from_path(at, place)
@@ -249,8 +249,8 @@ class CompensationProblem:
         return replace(done, command=command, iterations=iterations, **parts)
 
     def expressible_orientations(self, rows: Ints, share: Floats, rotation: Floats) -> Floats:
-        """(K, 3, 3) orientations nearest to ``rotation`` (K, 3, 3) that the words of motions ``rows`` (K,) say at the
-        shares (K,) of their paths, without a swing of an axis that hardly turns the tool."""
+        """(K, 3, 3) orientations nearest to ``rotation`` (K, 3, 3) that the words of motions ``rows`` (K,) express at
+        the shares (K,) of their paths, without a swing of an axis that hardly turns the tool."""
         pairs = orientations.pairs(self.toolpath, rows)
         if not len(pairs):
             return rotation
@@ -262,7 +262,7 @@ class CompensationProblem:
 
     def correctable(self, rows: Ints, share: Floats, command: Poses, turn: Floats) -> Floats:
         """(K, 3) [rad] of ``turn`` (K, 3), by which the tool is off at ``command`` (K), what other words at the shares
-        (K,) of the ways of ``rows`` (K,) would make up for: near the pole of two rotary axes not all of it."""
+        (K,) of the paths of ``rows`` (K,) would make up for: near the pole of two rotary axes not all of it."""
         pairs = orientations.pairs(self.toolpath, rows)
         if not len(pairs):
             return turn

@@ -47,7 +47,7 @@ def add_force_ramps(task: CompensationProblem, ramp: Floats | float) -> Compensa
 
 
 def correction_steps(task: CompensationProblem, rows: Ints) -> Floats:
-    """(K, 3) [m] by how much the correction would step where the motions ``rows`` (K,) begin: that under the force with
+    """(K, 3) [m] by how much the correction would step where the motions ``rows`` (K,) start: that under the force with
     which they start, less that under the force with which the motion before them ends."""
     steps = np.empty((len(rows), 3))
 

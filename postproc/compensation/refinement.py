@@ -17,7 +17,7 @@ from postproc.compensation.divisible_motions import (
 from postproc.compensation.orientations import shortest
 
 LITTLE = 3 * DEG
-"""Axes that turn by less leave a robot's compliance as it is: what changes with its square is a thousandth."""
+"""Axes that turn by less do not change a robot's compliance: what changes with its square is a thousandth."""
 
 _ORDER = {False: 2.0, True: 3.0}
 """The error between points of a straight segment falls with the square of its length, that of an arc through three
@@ -30,7 +30,7 @@ def refine(motions: DivisibleMotions) -> None:
     desired_path, rows = motions.task.desired_path, motions.rows[motions.owner]
     arc = desired_path.arc[rows]
     motions.least = least = motions.least_segments()
-    # A way that starts beside its place stays beside it, in however many segments.
+    # A path that starts beside its place stays beside it, in however many segments.
     entered = motions.needs_transition | motions.has_lead_in | (motions.step <= ROOM)
     cutting = motions.task.carries[rows]
     can = motions.free[rows] & (entered[motions.owner] | ~cutting)
@@ -70,8 +70,8 @@ def refine(motions: DivisibleMotions) -> None:
 
 
 def _even_motions(motions: DivisibleMotions) -> Bools:
-    """(I,) straight ways on which the correction hardly changes and the axes hardly turn: it lies on a line from
-    begin to end, and between them nothing is off by more than a part of that change."""
+    """(I,) straight paths on which the correction hardly changes and the axes hardly turn: it lies on a line from
+    start to end, and between them nothing is off by more than a part of that change."""
     task, full, path = motions.task, motions.full, motions.task.toolpath
 
     def even(part: slice) -> Bools:
@@ -112,7 +112,7 @@ def enforce_budget(motions: DivisibleMotions) -> None:
     points = motions.count - motions.least
     gets = allocate(points, motions.error, most - int(cost[paid].sum()))
     motions.count = motions.least + gets
-    # of each way what is still wrong on it
+    # of each path the error that remains on it
     np.maximum.at(need, motions.owner[gets < points], motions.error[gets < points])
     short = ~paid
     short[motions.owner[gets < points]] = True
@@ -130,7 +130,7 @@ def enforce_budget(motions: DivisibleMotions) -> None:
 
 
 def _join_intervals(motions: DivisibleMotions, chosen: Bools) -> None:
-    """Makes ``desired_path`` (R,) one interval each."""
+    """Makes the paths ``chosen`` (R,) one interval each."""
     retained = ~chosen[motions.owner] | (motions.low == 0.0)
     motions.owner, motions.low, motions.high = (
         motions.owner[retained],

@@ -1,5 +1,5 @@
 """What is inserted so that the path between corrected points is right too: transition moves where the correction steps,
-and points where a straight or round path between two of them would leave the tolerance."""
+and points where a straight or round path between two of them would exceed the tolerance."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""What touching off a base with the robot itself sees: a rigid motion of the part, and nothing of what it leaves over.
+"""What touching off a base with the robot itself measures: a rigid motion of the part, and nothing of what remains.
 
 A probe that the robot brings to places p_k of the part touches them where the robot really is, p_k + e_k, while the
 controller reads p_k; e_k is the error of the unloaded robot there.  The base that is set from these readings therefore
 lies beside the part by the rigid motion M that fits p_k -> p_k + e_k best, and the tool is to be at M x where the
-program says x.
+program states x.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class TouchedOff:
         tool: Poses,
         frames: int,
     ) -> TouchedOff:
-        """Of ``frames`` frames, touched as the class says: place k (K,) is in ``frame`` (K,) and is the target of
+        """Of ``frames`` frames, touched as the class describes: place k (K,) is in ``frame`` (K,) and is the target of
         motion ``row`` (K,).  Conditions of N motions; each place is touched without a sense of approach."""
         given = conditions.part(row)
         if model.by_direction:

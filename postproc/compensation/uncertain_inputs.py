@@ -70,7 +70,7 @@ def input_uncertainties(
 
     ``force_ci95``: share of the force, 95 %; without it, and without components in ``vector``, a force that acts
     (``forced``) has no interval.  The model's
-    covariance stands for what the robot file says of its parameters; others are taken as independent.  Raises
+    covariance replaces what the robot file states of its parameters; others are taken as independent.  Raises
     ValueError where it has a name that the model does not have.
     """
     names, block = model.covariance or ((), np.zeros((0, 0)))

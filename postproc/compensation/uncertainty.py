@@ -6,9 +6,9 @@ A command is fixed and the true parameters differ by dp from those of the model:
 
 by central differences of the solved equilibrium (``input_sensitivities``), and its covariance is S C S^T (GUM, JCGM
 100:2008, eq. 13; ``uncertainty_propagation``).  This is as true of the deflection before as of the residual after a
-correction: what the model does not know of the robot, the correction leaves in.  A parameter is one and the same in all
-motions, so these errors do not average out over a program; nor does the force's, which is taken as one scale common to
-all motions, or to all of an operation, as two turns common to all motions and as one force added to all.
+correction: what the model does not know of the robot, the correction does not remove.  A parameter is one and the same
+in all motions, so these errors do not average out over a program; nor does the force's, which is taken as one scale
+common to all motions, or to all of an operation, as two turns common to all motions and as one force added to all.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Uncertainty:
 
     @property
     def unknown(self) -> bool:
-        """Whether the intervals say nothing of the whole: there are none, or a tenth of what has none does more than
+        """Whether the intervals do not cover the whole: there are none, or a tenth of what has none does more than
         all of them."""
         return bool(np.isnan(self.before)) or any(
             length > self.before for _, length in self.effect_of_10_percent
@@ -96,7 +96,7 @@ def evaluate_uncertainty(
     forced = bool(task.wrench[rows].any())
     force = ForceUncertainty.of(task, rows, force_ci95)
     known = input_uncertainties(task.model, force.largest, forced, vector)
-    if force.partly:
+    if force.incomplete:
         lost = input_uncertainties(task.model, None, True).without_interval
         known = replace(known, without_interval=(*known.without_interval, lost[-1]))
     tenth = tuple((entry.name, np.nan) for entry in known.without_interval)
@@ -156,12 +156,12 @@ def _by_name(entries: Sequence[UncertainInput], share: Floats) -> tuple[tuple[st
 @dataclass(frozen=True)
 class ForceUncertainty:
     """The interval of the force as a share of it: ``largest`` of all motions, None where none has one; ``scale`` (N,):
-    that of each motion over the largest, 0 where not known; ``partly``: it is not known of some that carry force;
+    that of each motion over the largest, 0 where not known; ``incomplete``: it is not known of some that carry force;
     ``differs``: it is not the same in all that do."""
 
     largest: float | None
     scale: Floats
-    partly: bool
+    incomplete: bool
     differs: bool
 
     @staticmethod

@@ -73,7 +73,7 @@ def expanded_uncertainty_of_largest(error: Floats, sensitivity: Floats, covarian
     in 95 % of all cases at most; S = ``sensitivity`` (M, 3, P), dp of ``covariance`` (P, P).  After a correction, where
     the predicted error is next to nothing, their sum is what the largest error stays below with 95 %.
 
-    ``DRAWS`` sets dp, always the same ones, each principal axis sampled evenly (Latin hypercube): few tell a quantile
+    ``DRAWS`` sets dp, always the same ones, each principal axis sampled evenly (Latin hypercube): few give a quantile
     that one or two axes dominate.  They go through the ``MOST`` motions that have the largest error most often in the
     first ``FIRST``.
     """

@@ -35,8 +35,8 @@ WILD = 5.0
 
 
 def squares_of(fitted: Fit, weights: Weighting, variance: float) -> float:
-    """Squares that a fit leaves, of readings [their variance by ``weights``, wild ones cut] and of priors; ``variance``
-    of the readings as they are seen to scatter."""
+    """Squares that remain after a fit, of readings [their variance by ``weights``, outliers cut] and of priors;
+    ``variance`` of the readings as they scatter."""
     level = np.sqrt(variance)
     residual = np.minimum(np.abs(weights(fitted.point.residual)), WILD * level)
     values = fitted.point.values(fitted.unknowns)
@@ -98,7 +98,7 @@ def _instead(
     campaign: Campaign, fitted: Fit, linear: Linear, rest: Explained, mine: Candidate, other: Candidate
 ) -> tuple[Candidate, float, Floats]:
     """``other``, that is not linear in its size, as large as explains the most in the place of ``mine`` beside
-    ``rest``; the squares that are left then, and its columns outside of what is explained anyway."""
+    ``rest``; the squares that then remain, and its columns outside of what is explained anyway."""
     without = point_without(campaign, fitted, [mine])
     model, unknowns = composed(without.model, [other])
     basis = basis_of(linear.common)
@@ -111,6 +111,6 @@ def _instead(
     large = evaluate_at_size(
         campaign, without, model, unknowns, lambda columns: outside(beyond, readings(columns))
     )
-    gain = float(large.target @ large.target - large.left @ large.left)
+    gain = float(large.target @ large.target - large.remaining @ large.remaining)
     alternative = replace(other, columns=large.columns, start=tuple(large.values.tolist()))
     return alternative, rest.squares - gain, outside(basis, readings(large.columns))

@@ -33,10 +33,10 @@ STRAIGHT = 0.05
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect on one joint ("" where it has none, or ``EVERY``) that the model may lack.
+    """An effect on one joint ("" where it has none, or ``EVERY``) that may be missing in the model.
 
     ``unknowns``: its parameters in ``model``, the model with the effect added at its null; columns (R, 3 or 6, p) what
-    they move, per scale; ``nonlinear``: in its usual size it does not do what its columns at the null say;
+    they move, per scale; ``nonlinear``: in its usual size it does not do what its columns at the null predict;
     ``up_to_joint``: of an effect that is there on no joint alone, the last joint whose parameters it has; start (p,)
     [SI]: values that a fit may start with, () at the null; ``dormant_parameters``: names of parameters that move
     nothing where the others are at the null.
@@ -85,7 +85,7 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        """As people say it: effect, its options where they tell two forms apart, and joint."""
+        """In words: effect, its options where they distinguish two forms, and joint."""
         options, words = self.effect.described(), self.name
         if "harmonics" in options:
             words += f" (harmonic {str(options['harmonics']).strip('[]').replace('.0', '')})"
@@ -99,17 +99,18 @@ class Candidate:
 
 
 def candidates(campaign: Campaign, model: StiffnessModel, given: Nuisances) -> tuple[Candidate, ...]:
-    """All that ``model`` may lack, with what it would move in ``campaign``; also what would move nothing there."""
+    """All that may be missing in ``model``, with what it would move in ``campaign``; also what would move nothing
+    there."""
     entries: list[Candidate] = []
     for name, effect in EFFECTS.items():
         if name == "base_offset" and campaign.tracked:
             continue  # the registration itself
         known = [index for index, term in enumerate(model.terms) if term.effect.name == name]
         for term in known:
-            lacking = [
+            missing = [
                 u for u in unknowns_of(model, term) if u.stated is None and u.value == u.parameter.null
             ]
-            entries += _by_joint(campaign, model, given, [u for u in lacking if not u.fixed])
+            entries += _by_joint(campaign, model, given, [u for u in missing if not u.fixed])
         for wider in () if known else _widened(model, effect):
             entries += _by_joint(
                 campaign, wider, given, [u for u in unknowns_of(wider, len(model.terms)) if not u.fixed]

@@ -57,7 +57,7 @@ def _needed(search: Search, rank: int) -> float:
 
 
 def moved(search: Search, named: Named) -> Floats:
-    """(R, 3) [m] what the effect, as it was found, moves of each reading beyond what tracker and targets that stood
+    """(R, 3) [m] what the effect, as it was found, moves of each reading beyond what tracker and targets that were
     elsewhere would; axes of the robot base."""
     final = search.final
     nulls = {e.unknown.key: e.unknown.parameter.null for e in named.estimates}

@@ -16,7 +16,7 @@ from postproc.model import StiffnessModel
 STEPS = 8
 
 SAME = 1e-3
-"""Share of the squares left by which a step must gain to be followed by another."""
+"""Share of the remaining squares by which a step must gain to be followed by another."""
 
 DAMPING = 1e-3
 """Of a column's length."""
@@ -26,13 +26,13 @@ Outside = Callable[[Floats], Floats]
 
 
 class NonlinearColumns(NamedTuple):
-    """values (P,) [SI]; columns (R, 3 or 6, P) there, per scale; target (n,), left (n,): what there is to explain,
+    """values (P,) [SI]; columns (R, 3 or 6, P) there, per scale; target (n,), remaining (n,): what there is to explain,
     outside of what is explained anyway, without the effect and with it."""
 
     values: Floats
     columns: Floats
     target: Floats
-    left: Floats
+    remaining: Floats
 
 
 def evaluate_at_size(

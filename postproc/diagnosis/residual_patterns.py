@@ -26,8 +26,8 @@ FLIPS = 4000
 
 @dataclass(frozen=True)
 class ResidualPattern:
-    """A pattern: ``variable``, the ``pattern`` in words, and the ``share`` of the squares left that follow it (adjusted
-    for the freedom of the pattern)."""
+    """A pattern: ``variable``, the ``pattern`` in words, and the ``share`` of the remaining squares that follow it
+    (adjusted for the freedom of the pattern)."""
 
     variable: str
     pattern: str
@@ -37,15 +37,16 @@ class ResidualPattern:
 def residual_patterns(
     fitted: Fit, against: Fit | None = None, chance: float = CHANCE
 ) -> tuple[ResidualPattern, ...]:
-    """The clear patterns in what ``fitted`` leaves, largest first.
+    """The clear patterns in the residual of ``fitted``, largest first.
 
     Tried are a turn of each joint that depends on its own angle, torque or sense of approach, and a shift of the tool
     that depends on load, order, time, temperature or session; each as a step function in up to ``BINS`` parts, without
-    what the fit could have made of it.  ``chance``: probability that any is told although there is none.
+    what the fit could have made of it.  ``chance``: probability that any is reported although there is none.
 
-    What is chance is said by the scatter that ``against`` leaves, as far as that is a better model.  Without it only
-    the residuals themselves say it: readings of one pose may share errors, and a few may be wild, so the residuals of
-    each pose get a random sign (wild bootstrap by clusters; Cameron, Gelbach and Miller, Rev. Econ. Stat. 90 (2008)).
+    What is chance follows from the residual scatter of ``against``, as far as that is a better model.  Without it it
+    follows from the residuals alone: readings of one pose may share errors, and a few may be outliers, so the
+    residuals of each pose get a random sign (wild bootstrap by clusters; Cameron, Gelbach and Miller, Rev. Econ. Stat.
+    90 (2008)).
     """
     from scipy.stats import f
 
@@ -179,7 +180,8 @@ def _words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float])
 
 
 def _goes_with_poses(values: Floats, q: Floats) -> bool:
-    """Whether the joints tell most of ``values`` (R,): what depends on one cannot be distinguished from the other."""
+    """Whether the joints explain most of ``values`` (R,): what depends on one cannot be distinguished from the
+    other."""
     spread = np.where(np.ptp(q, axis=0) > 0, np.ptp(q, axis=0), 1.0)
     scaled = (q - q.mean(axis=0)) / spread
     matrix = np.column_stack([np.ones(len(q)), scaled, scaled**2])

@@ -29,7 +29,7 @@ from postproc.identification.unknowns import Unknown, unknowns_of
 from postproc.model import StiffnessModel
 
 PASSES = 4
-"""Of choosing and fitting, until the choice stands."""
+"""Of choosing and fitting, until the choice no longer changes."""
 
 LOOSE, BESIDE = 0.5, 0.05
 """Standard deviation of what a robot file states, as shares of the value and of the largest of its kind."""
@@ -89,7 +89,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
         if keys == before or keys in tried or len(tried) >= PASSES:
             last = explained(linear.problem, start)
             against = find_alternatives(campaign, base, fitted, linear, last)
-            better = next((r for r in against if r.fitted and not r.foil and r.margin < -1.0), None)
+            better = next((r for r in against if r.fitted and not r.is_decoy and r.margin < -1.0), None)
             done = Search(base, fitted, chosen, hidden, linear, last, against)
             if better is None or len(tried) >= PASSES:
                 return done
@@ -103,7 +103,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
 
 
 def drop_confounded(base: Fit, weights: Weighting, every: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates without those parameters that, in their usual size, do nothing to be seen but what parameters of
+    """The candidates without those parameters that, in their usual size, do nothing observable but what parameters of
     the robot file, or tracker and targets, do as well: a gain of the force is a softer arm."""
     basis = basis_of(np.nan_to_num(np.concatenate([weights(part) for part in base.point.taken], axis=1)))
     remaining = []
@@ -112,7 +112,7 @@ def drop_confounded(base: Fit, weights: Weighting, every: Sequence[Candidate]) -
         size = np.linalg.norm(columns, axis=0)
         own = np.linalg.norm(outside(basis, columns), axis=0) > np.maximum(IMITATED * size, c.least)
         if own.any():
-            # of those that only shape what another does nothing is said by themselves
+            # those that only shape what another does are not judged by themselves
             own |= np.array([u.parameter.name in c.dormant_parameters for u in c.unknowns])
         if own.any() and not own.all():
             c = replace(
@@ -165,8 +165,8 @@ def _linear(
     chosen: Sequence[Candidate],
     shown: Sequence[Candidate],
 ) -> Linear:
-    """The problem that the candidates' columns make of what ``fitted`` leaves without what was chosen; priors of the
-    model's own parameters count as rows."""
+    """The problem that the candidates' columns make of the residual of ``fitted`` without what was chosen; priors of
+    the model's own parameters count as rows."""
     own, nuisance = base.point.taken
     prior = prior_rows(base.unknowns) * np.sqrt(fitted.factor)
     prior = prior[prior.any(axis=1)]
@@ -189,7 +189,7 @@ def _linear(
         else c
         for c in looked
     )
-    # so that with what was found of each nothing else is left than by the fit
+    # so that with the value of each the same residual remains as of the fit
     contributions = [c.columns @ in_scales(fitted, c.only) for c in looked if c.only]
     residual = tall(sum(contributions, fitted.point.residual), prior @ (away / scales(base.unknowns)))
     columns = tuple(readings(c.columns) for c in looked)
@@ -199,7 +199,7 @@ def _linear(
 
 
 def _as_grown(campaign: Campaign, fitted: Fit, candidate: Candidate, beyond: Outside) -> Candidate:
-    """The candidate with its columns at the size that explains the most of what ``fitted`` leaves."""
+    """The candidate with its columns at the size that explains the most of the residual of ``fitted``."""
     model, unknowns = composed(fitted.model, [candidate])
     large = evaluate_at_size(campaign, fitted.point, model, unknowns, beyond)
     return replace(candidate, columns=large.columns, start=tuple(large.values.tolist()))

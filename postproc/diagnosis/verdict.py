@@ -1,4 +1,4 @@
-"""What may be said of a search: four gates before an effect is named."""
+"""The verdict on a search: four gates before an effect is named."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.diagnosis.candidates import EVERY, Candidate, names_of
-from postproc.diagnosis.decoys import FOILED
+from postproc.diagnosis.decoys import HAS_DECOYS
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search_result import Alternative, Search
 from postproc.diagnosis.selection import (
@@ -47,23 +47,23 @@ BUILT = 4.6
 describes: odds of 10 to 1."""
 
 UNUSUAL = 3.0
-"""Usual sizes from which on a parameter has to be told well to be believed."""
+"""Usual sizes from which on a parameter has to be determined well to be believed."""
 
-LACK = 3.0
-"""Standard deviations of its own by which the variance left must exceed the stated one to be a lack of fit."""
+EXCESS = 3.0
+"""Standard deviations of its own by which the remaining variance must exceed the stated one to be a lack of fit."""
 
 STRUCTURE = 0.001
-"""Probability that what is left shows a pattern by chance: one that follows a joint is no scatter, however small."""
+"""Probability that what remains shows a pattern by chance: one that follows a joint is no scatter, however small."""
 
 TOLERATED = 0.15
 """Share of the variance that heavier tails than normal may add."""
 
 EXPLAINS = 0.9
-"""Share of the variance beyond scatter that a name must take away where some is left."""
+"""Share of the variance beyond scatter that a name must take away where some remains."""
 
 
 OTHER_COURSE = "the readings follow another course than that of this effect"
-BEYOND_TELLING = "it would have to be unusually large, and the readings hardly determine its size"
+SIZE_UNDETERMINED = "it would have to be unusually large, and the readings hardly determine its size"
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Evidence:
 @dataclass(frozen=True)
 class Named:
     """A missing effect: its ``joints`` that clearly have it (() where it is of none), parameters with intervals;
-    ``held``: names of those that the readings do not tell, and the values (SI) that the others hold for."""
+    ``fixed``: names of those that the readings do not determine, and the values (SI) that the others are valid for."""
 
     candidate: Candidate
     joints: tuple[str, ...]
@@ -106,9 +106,9 @@ class Named:
 @dataclass(frozen=True)
 class Verdict:
     """``word`` of ``VERDICTS``.  named: where the verdict is named, partly_named or ambiguous; alternatives: sets of
-    candidates that explain the same; refitted: own parameters of the model that clearly moved; lack: variance left over
-    the stated one; conditional: nothing states the scatter, so a lack of fit cannot be seen; left: patterns in what
-    all that was chosen leaves."""
+    candidates that explain the same; refitted: own parameters of the model that clearly moved; reduced_chi2: remaining
+    variance over the stated one; conditional: nothing states the scatter, so a lack of fit cannot be detected;
+    remainder: patterns in what remains after all that was chosen."""
 
     word: str
     named: tuple[Named, ...]
@@ -135,18 +135,18 @@ def judge(search: Search) -> Verdict:
         elif not its.is_sufficient:
             rejected.append((candidate, "no gain on held-out readings"))
         elif is_implausible(estimates):
-            rejected.append((candidate, BEYOND_TELLING))
+            rejected.append((candidate, SIZE_UNDETERMINED))
         elif bounded and len(several) == 1:
             rejected.append((candidate, "its parameters would have to lie at their bounds"))
         else:
-            joints, fixed = _joints(candidate, estimates), _held(search.final, candidate, estimates)
+            joints, fixed = _joints(candidate, estimates), _fixed_values(search.final, candidate, estimates)
             named.append(Named(candidate, joints, estimates, its, fixed))
             aliases.append(several)
     chi2, unexplained = reduced_chi2_of(search, last)
     patterns = residual_patterns(search.final, chance=STRUCTURE)
     unexplained = unexplained or bool(patterns)
     bare, _ = reduced_chi2_of(search, explained(linear.problem, ()))
-    # two forms of one effect on one joint leave its name certain
+    # two forms of one effect on one joint do not make its name uncertain
     sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
     formless = any(why == OTHER_COURSE for _, why in rejected)
     enough = not linear.problem.known or chi2 - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)
@@ -174,8 +174,8 @@ def judge(search: Search) -> Verdict:
 
 
 def _is_observable(candidate: Candidate, estimates: Sequence[Estimate]) -> bool:
-    """Whether the readings tell all parameters of an effect that something else imitates, and that it is there."""
-    if candidate.name not in FOILED:
+    """Whether the readings determine all parameters of an effect that something else imitates, and that it is there."""
+    if candidate.name not in HAS_DECOYS:
         return True
     is_clear = {
         e.unknown.parameter.name: abs(e.value - e.unknown.parameter.null) > THERE * e.ci95 for e in estimates
@@ -184,7 +184,9 @@ def _is_observable(candidate: Candidate, estimates: Sequence[Estimate]) -> bool:
     return there and is_clear.keys() >= {p.name for p in candidate.effect.parameters if not p.hardware}
 
 
-def _held(final: Fit, candidate: Candidate, estimates: Sequence[Estimate]) -> tuple[tuple[str, float], ...]:
+def _fixed_values(
+    final: Fit, candidate: Candidate, estimates: Sequence[Estimate]
+) -> tuple[tuple[str, float], ...]:
     """Names and values (SI) of an effect's parameters that were not found, but are not at their null."""
     estimated = {e.unknown.parameter.name for e in estimates}
     term = next(
@@ -203,7 +205,7 @@ def _held(final: Fit, candidate: Candidate, estimates: Sequence[Estimate]) -> tu
 
 
 def reduced_chi2_of(search: Search, last: Explained) -> tuple[float, bool]:
-    """Variance left over the stated one, and whether that is clearly more; where nothing states it, never."""
+    """Remaining variance over the stated one, and whether that is clearly more; where nothing states it, never."""
     given = search.linear.problem
     freedom = max(1, given.freedom - last.rank)
     variance = clipped_squares(given, last) / freedom
@@ -211,7 +213,7 @@ def reduced_chi2_of(search: Search, last: Explained) -> tuple[float, bool]:
     repeats = search.base.noise.freedom if search.base.noise.source == "repeats" else 0
     if repeats:
         spread = np.sqrt(spread**2 + 2.0 / repeats)
-    return variance, given.known and variance > 1.0 + TOLERATED + LACK * spread
+    return variance, given.known and variance > 1.0 + TOLERATED + EXCESS * spread
 
 
 def _evidence(search: Search, last: Explained, group: int) -> Evidence:
@@ -238,34 +240,34 @@ def ambiguity_set(search: Search, group: int, seen: bool) -> tuple[Candidate, ..
     mine = search.linear.candidates[group]
     built = any(mechanism.kind == mine.name for mechanism in search.base.model.robot.mechanisms)
     against = _against(search, mine)
-    near = [r.candidate for r in against if r.margin < (-BUILT if built and seen and r.foil else MARGIN)]
+    near = [r.candidate for r in against if r.margin < (-BUILT if built and seen and r.is_decoy else MARGIN)]
     return (mine, *near)
 
 
 def is_implausible(estimates: Sequence[Estimate]) -> bool:
     """Whether all that was found is beyond plausible sizes, with intervals of more than half of it: past the load at
-    which a tooth changes sides, say, readings do not tell how wide its gap is."""
+    which a tooth changes sides, say, readings do not determine how wide its gap is."""
     sizes = [(abs(e.value - e.unknown.parameter.null), e.unknown.parameter.scale, e.ci95) for e in estimates]
     return bool(sizes) and all(size > UNUSUAL * scale and wide > 0.5 * size for size, scale, wide in sizes)
 
 
 def _of_another_course(search: Search, candidate: Candidate) -> bool:
     """Whether another course over the same joint or time, one that no effect has, clearly explains more."""
-    against = [r for r in search.rivals if r.of == candidate.key and r.foil and r.fitted]
+    against = [r for r in search.rivals if r.of == candidate.key and r.is_decoy and r.fitted]
     return any(r.margin < -MARGIN for r in against)
 
 
 def _against(search: Search, mine: Candidate) -> list[Alternative]:
     """What may be taken for ``mine``, nearest first; other courses where they are no mere variants of it."""
-    return [r for r in search.rivals if r.of == mine.key and (mine.name in FOILED or not r.foil)]
+    return [r for r in search.rivals if r.of == mine.key and (mine.name in HAS_DECOYS or not r.is_decoy)]
 
 
 def held_out_gain(search: Search, last: Explained, group: int, part: Ints | None) -> float:
     """Fall of -2 ln(likelihood) of readings left out, part by part, with the group; ``part`` (R,): the part of each
     reading, -1 in none; NaN without parts.
 
-    A reading is predicted with the uncertainty that the fit of the others leaves: where that has to extrapolate, it
-    says little.  Wild readings count up to 5 standard deviations.  A part that is more than half of all is never left
+    A reading is predicted with the uncertainty of the fit of the others: where that has to extrapolate, it
+    has little weight.  Outliers count up to 5 standard deviations.  A part that is more than half of all is never left
     out: a few poses measured later do not foretell a whole campaign.
     """
     if part is None:

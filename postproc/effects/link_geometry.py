@@ -1,4 +1,4 @@
-"""Link geometry: axes that do not lie where the robot's links say."""
+"""Link geometry: axes that do not lie where the robot's links state."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The play of a gear: its output stands still until the motor has crossed the gap, in the order of the path.
+"""The play of a gear: its output is at rest until the motor has crossed the gap, in the order of the path.
 
     y_k = min(max(y_{k-1}, x_k - g/2), x_k + g/2)          motor x, output y, gap g
 

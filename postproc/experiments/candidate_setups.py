@@ -23,10 +23,10 @@ STEP, STEP_SLIDING = 0.1 * DEG, 0.1 * MM
 """Axes are planned in whole steps: what a person types is what was planned."""
 
 SLIDING_DEG = 10.0 * MM / DEG
-"""[m/rad] A way of 10 mm of a sliding axis counts as one degree."""
+"""[m/rad] A travel of 10 mm of a sliding axis counts as one degree."""
 
 BATCH, TRIES = 8192, 40
-"""Random poses looked at together, and how often."""
+"""Random poses checked together, and how often."""
 
 ON_AXIS = 1.0 * MM
 """A reflector nearer than this to the flange's axis faces along it."""
@@ -104,7 +104,7 @@ def usable_limits(robot: Robot, stated: Mapping[str, tuple[float, float]]) -> Fl
     """(n, 2) [rad, m] between which axes are planned: those of the robot file less a margin, of an axis that turns
     further than once round one turn only, about zero; ``stated``: narrower ones, by the name of the joint.
 
-    Raises Refusal PLN001 where nothing is left.
+    Raises Refusal PLN001 where nothing remains.
     """
     limits = []
     for joint in robot.joints:

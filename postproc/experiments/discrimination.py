@@ -42,7 +42,7 @@ class CompetingModel:
 @dataclass(frozen=True)
 class Chosen:
     """setups: rows of the choice; separation: standard deviations by which it shows that the first is no case of the
-    second, and the other way round."""
+    second, and vice versa."""
 
     setups: tuple[int, ...]
     separation: tuple[float, float]
@@ -51,7 +51,7 @@ class Chosen:
 def rivalry(
     first: CompetingModel, second: CompetingModel, common: Floats, q: Floats, spacing: Floats
 ) -> tuple[CandidateSet, Disagreement]:
-    """The choices, and what is to be made large: ``common`` (C, r, U) is fitted by both; q (C, n), spacing (n,) as in
+    """The choices, and what is to be maximized: ``common`` (C, r, U) is fitted by both; q (C, n), spacing (n,) as in
     ``CandidateSet``."""
     fitted = np.concatenate([common, first.columns, second.columns], axis=2)
     length = np.linalg.norm(fitted, axis=(0, 1))
@@ -93,7 +93,7 @@ def discriminating(
 @dataclass(frozen=True)
 class Discrimination:
     """Poses that distinguish two effects, by their number, and the separations [standard deviations]: that the first is
-    no case of the second, and the other way round.  candidates: number of poses to choose from."""
+    no case of the second, and vice versa.  candidates: number of poses to choose from."""
 
     candidates: int
     chosen: dict[int, Setups]

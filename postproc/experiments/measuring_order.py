@@ -9,7 +9,7 @@ from postproc.base.arrays import Floats, Ints
 
 def measuring_order(q: Floats, spacing: Floats) -> Ints:
     """(C,) an order of poses q (C, n) in which the robot travels little: always on to the nearest, from the start that
-    makes the whole way shortest.  ``spacing`` (n,) [rad, m]: travels of the axes that take equally long."""
+    makes the total travel shortest.  ``spacing`` (n,) [rad, m]: travels of the axes that take equally long."""
     travel = np.abs((q[:, None] - q[None]) / spacing).max(axis=2)
     count = len(q)
     orders = np.zeros((count, count), np.int64)

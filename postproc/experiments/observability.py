@@ -20,7 +20,7 @@ from postproc.identification.unknowns import Unknown
 from postproc.model import StiffnessModel
 
 MOVES = 1e-9
-"""[m] An effect whose parameters move no reading further is asleep."""
+"""[m] An effect whose parameters move no reading further is dormant."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def _weights(offer: CandidateSetups, setups: Setups) -> Floats:
 def measured(
     model: StiffnessModel, unknowns: Sequence[Unknown], campaign: Campaign, sigma: float
 ) -> Observability:
-    """What readings that exist show: one setup of all.  ``sigma`` [m] where they say nothing of their own scatter."""
+    """What readings that exist show: one setup of all.  ``sigma`` [m] where they do not state their own scatter."""
     noise = noise_of(campaign.readings)
     if not noise.known:
         noise = replace(noise, sigma=np.full(len(campaign), sigma))
@@ -139,7 +139,7 @@ def judged(
     values = np.array([model.terms[u.term].values[u.parameter.name] for u in unknowns])
     analysis = identifiability(unknowns, columns, nuisance, names, prior_rows(unknowns), values)
     ci95 = np.full(len(unknowns), np.nan)
-    ci95[list(analysis.kept)] = COVERAGE * np.sqrt(np.diag(analysis.covariance))
+    ci95[list(analysis.observable)] = COVERAGE * np.sqrt(np.diag(analysis.covariance))
     return ci95 * scales(unknowns), analysis
 
 

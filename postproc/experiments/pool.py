@@ -24,7 +24,7 @@ NEARBY = 1200
 """Such poses together, about."""
 
 Stage = Callable[[str], None]
-"""Is told the name of each stage as it starts."""
+"""Receives the name of each stage as it starts."""
 
 Choice = Mapping[int, Sequence[int]]
 """Number of setups -> their rows in a pool."""
@@ -89,7 +89,7 @@ def refined(
     stage: Stage,
 ) -> tuple[Pool, Choice]:
     """The best choices, and the pool that they are of.  ``chosen_from``: the best choices out of a pool, never worse
-    than those begun with."""
+    than those at the start."""
     stage("choosing poses")
     pool, chosen = start, chosen_from(start, {})
     for share in SHARES if chosen else ():

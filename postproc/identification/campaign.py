@@ -28,7 +28,7 @@ ONE_POSE = 1e-6
 
 
 REST = 1e-14
-"""[rad, m] What may be left of the way to an equilibrium: differences of two loads are taken."""
+"""[rad, m] What may remain of the displacement to an equilibrium: differences of two loads are taken."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Campaign:
         self.place_known: Bools = np.array([name in readings.places for name in named] or [not free])
         # of a target the place is stated, of a tool the axes too
         self.turn_known: Bools = np.array([False for _ in named] or [not free])
-        # begun with on the flange where nothing is stated
+        # started on the flange where nothing is stated
         on_flange = [readings.places.get(name, np.zeros(3)) for name in named] or [self.tool.position]
         into_tool = self.tool.inverse()
         self.stated_places = np.array(

@@ -25,7 +25,7 @@ ROUNDING = 1e-3
 """Standard deviations below which residuals are no scatter, but rounding."""
 
 PRIOR_ROUNDS, SAME_FACTOR = 5, 0.1
-"""How often the variance of the readings is looked at again, because priors count against it, and the logarithm of its
+"""How often the variance of the readings is estimated again, because priors count against it, and the logarithm of its
 change from which on."""
 
 AT_BOUND = 1e-9
@@ -51,7 +51,7 @@ class Fit:
     """A campaign fitted.
 
     start, asked: the model to start with and the unknowns asked for; weights: as used, plain_weights: before a robust
-    fit changed them; point: the model found and what it leaves; unknowns (k,): found; dropped: asked for, and left as
+    fit changed them; point: the fitted model and its residual; unknowns (k,): found; dropped: asked for, and left as
     they were; covariance (k, k) [SI]; condition: see ``Insight``; factor: variance of the readings over what ``noise``
     says, scatter_exceeded if that is clearly more; freedom: of the residuals; quantile: half width of an interval over
     its deviation.
@@ -79,12 +79,12 @@ class Fit:
 
     @cached_property
     def residual(self) -> Floats:
-        """(R, 3) [m] what is left of each position, axes of the robot base."""
+        """(R, 3) [m] residual of each position, axes of the robot base."""
         return self.campaign.in_base(self.point.residual, self.point.given)[:, :3]
 
     @property
     def shared_error(self) -> float:
-        """[m] one sigma of what readings of one pose have in common in each coordinate; 0 where nothing is seen."""
+        """[m] one sigma of what readings of one pose have in common in each coordinate; 0 where nothing is detected."""
         return self.weights.shared * float(np.sqrt(self.factor))
 
     @cached_property
@@ -158,9 +158,9 @@ def fit(
         if not analysis.dropped:
             break
         dropped += analysis.dropped
-        gone = [free[i] for i in range(len(free)) if i not in analysis.kept]
-        free = [free[i] for i in analysis.kept]
-        observable, values = list(analysis.kept), {u.key: u.value for u in gone}
+        gone = [free[i] for i in range(len(free)) if i not in analysis.observable]
+        free = [free[i] for i in analysis.observable]
+        observable, values = list(analysis.observable), {u.key: u.value for u in gone}
         if all(point.model.terms[t].values[name] == value for (t, name), value in values.items()):
             point = replace(point, columns=point.taken[0][:, :, observable])
         else:
@@ -177,7 +177,7 @@ def fit(
 def _enough(campaign: Campaign, weights: Weighting, unknowns: Sequence[Unknown]) -> None:
     priors = sum(unknown.prior is not None for unknown in unknowns)
     wanted = len(unknowns) - priors + len(campaign.nuisance_names)
-    # a state that is read twice says no more about unknowns
+    # a state that is read twice gives no more information on unknowns
     rows = weights.weight.any(axis=1)
     state = campaign.at * len(campaign.targets) + campaign.readings.target
     _, first = np.unique(np.where(rows, state, -1), return_index=True)
@@ -216,7 +216,7 @@ def _robust(
     factor: float,
     known: bool,
 ) -> tuple[Point, Weighting]:
-    """Reweighted until the weights stand: those of Huber for the length of a reading's residual."""
+    """Reweighted until the weights no longer change: those of Huber for the length of a reading's residual."""
     plain = weights
     share = np.ones(len(rows))
     for _ in range(20):
@@ -247,7 +247,7 @@ def spread_of(length: Floats, known: bool) -> float:
 
 
 def _with_turns(campaign: Campaign, point: Point, noise: Noise, weights: Weighting) -> Weighting:
-    """Where no scatter of rotations is stated, they scatter as they are seen to, against the positions."""
+    """Where no scatter of rotations is stated, their scatter is estimated, relative to the positions."""
     if not campaign.posed or campaign.readings.sigma_turn is not None:
         return weights
     scaled = np.nan_to_num(point.residual) * weights.weight
@@ -292,7 +292,9 @@ def _variance(
     counts = plain.weight > 0
     share = np.where(counts, weights.weight / np.where(counts, plain.weight, 1.0), 0.0) ** 2
     columns, nuisance = point.taken
-    q = basis(np.nan_to_num(weights(np.concatenate([columns[:, :, list(analysis.kept)], nuisance], axis=2))))
+    q = basis(
+        np.nan_to_num(weights(np.concatenate([columns[:, :, list(analysis.observable)], nuisance], axis=2)))
+    )
     residual = weights(point.residual)
     residual = (residual - q @ (q.T @ residual)) * np.sqrt(share).reshape(-1)
     squares = float(residual @ residual)

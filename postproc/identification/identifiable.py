@@ -1,4 +1,4 @@
-"""What the readings can tell of the unknowns: rank, columns that must be left out, sums, correlations."""
+"""What the readings determine of the unknowns: rank, columns that must be left out, sums, correlations."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class Dropped:
 
 @dataclass(frozen=True)
 class Identifiability:
-    """kept: unknowns that can be found; dropped: the others; covariance (k, k) of the kept ones in units of their
-    ``scale``, for readings of unit variance; condition: of the kept columns, each made as long as the next."""
+    """observable: unknowns that the readings determine; dropped: the others; covariance (k, k) of the former in units
+    of their ``scale``, for readings of unit variance; condition: of their columns, scaled to one length."""
 
-    kept: tuple[int, ...]
+    observable: tuple[int, ...]
     dropped: tuple[Dropped, ...]
     covariance: Floats
     condition: float
@@ -56,10 +56,10 @@ def identifiability(
     values: Floats,
     factor: float = 1.0,
 ) -> Identifiability:
-    """What whitened ``columns`` (n, P) of the unknowns, per scale, and ``nuisance`` (n, U) tell.
+    """What whitened ``columns`` (n, P) of the unknowns, per scale, and ``nuisance`` (n, U) determine.
 
-    prior (P, P): rows of the priors; values (P,) [SI] at hand; factor: variance of the readings over the assumed one.
-    Columns are judged after what the nuisances explain is taken out, in their order: one that those before it can
+    prior (P, P): rows of the priors; values (P,) [SI] of the model; factor: variance of the readings over the assumed
+    one. Columns are judged after what the nuisances explain is taken out, in their order: one that those before it can
     imitate is left out.  Then the least certain is, as long as one states nothing: its 95 % interval is wider than its
     value, and than the stated one or, where none is stated, ``FAR`` times the parameter's usual size.
     """
@@ -124,7 +124,7 @@ def basis(columns: Floats) -> Floats:
 
 
 def _inverse(part: Floats) -> Floats:
-    """(A^T A)^-1 by the R of A's columns, each made of length one."""
+    """(A^T A)^-1 by the R of A's columns, each scaled to length one."""
     length = np.linalg.norm(part, axis=0)
     back = np.linalg.inv(np.linalg.qr(part / length, mode="r")) / length[:, None]
     return np.asarray(back @ back.T)
@@ -138,7 +138,7 @@ def _explained(
     nuisance: Floats,
     nuisance_names: Sequence[str],
 ) -> Dropped:
-    """Which of the kept columns and nuisances the column ``k`` is made of."""
+    """Which of the observable columns and nuisances the column ``k`` is made of."""
     padded = np.concatenate([nuisance, np.zeros((len(columns) - len(nuisance), nuisance.shape[1]))])
     others = np.concatenate([columns[:, list(observable)], padded], axis=1)
     length = np.linalg.norm(others, axis=0)

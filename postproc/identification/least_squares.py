@@ -20,13 +20,13 @@ CLOSE = 1e-3
 """A step that moves the prediction by less than this share of its scatter is the last."""
 
 STRAIGHT = 0.01
-"""Where a step's effect was foreseen to this share, the columns are kept."""
+"""Where a step's effect was foreseen to this share, the columns are reused."""
 
 DAMPING, LOOSE = 1e-5, 1e-7
 """Of a column's length: what no reading sees stays where it is, parameters rather than tracker and targets."""
 
 
-BENT, CAREFUL = 0.3, 1e-4
+CURVED, CAREFUL = 0.3, 1e-4
 """Share of a step's effect that may come otherwise than foreseen, and the damping that the next step starts with
 then."""
 
@@ -34,7 +34,7 @@ then."""
 @dataclass(frozen=True)
 class Point:
     """A model among the possible ones.  residual (R, 3 or 6) as ``Campaign.residual``; ``columns`` (R, 3 or 6, P) of
-    the unknowns and ``nuisance`` (R, 3 or 6, U), taken here or where the way was straight from."""
+    the unknowns and ``nuisance`` (R, 3 or 6, U), taken here or at a point from which the path was straight."""
 
     model: StiffnessModel
     given: Nuisances
@@ -126,7 +126,7 @@ def descended(
         # a column of nothing may grow with the others, however straight their path is
         awake = length > 0
         length[~awake] = 1.0
-        # many rows to as many as there are columns, which say the same
+        # many rows to as many as there are columns, with the same information
         damping = np.maximum(np.repeat([DAMPING, LOOSE], [len(x), len(loose)]), careful)
         tall = np.block(
             [[matrix / length, residual[:, None]], [np.diag(damping), np.zeros((len(length), 1))]]
@@ -151,8 +151,8 @@ def descended(
         size = float(np.linalg.norm(foreseen))
         astray = float(np.linalg.norm(residual - foreseen - after))
         fresh = keep_columns or (share == 1.0 and astray < STRAIGHT * size and bool(awake[: len(x)].all()))
-        # a step that went astray went too far along what is hardly seen (Levenberg)
-        curved = share < 1.0 or astray > BENT * size
+        # a step that went astray went too far along what is hardly observable (Levenberg)
+        curved = share < 1.0 or astray > CURVED * size
         careful = min(max(30.0 * careful, CAREFUL), 0.1) if curved else careful / 10.0
         scatter = np.sqrt(after @ after / max(1, len(after) - len(length)))
         point, residual, lost = moved, after, gone

@@ -12,7 +12,7 @@ from postproc.identification.campaign import Campaign, Nuisances, PredictedReadi
 
 MAX_STEPS = 60
 SAMPLE = 300
-"""Readings looked at while the tracker's turn is searched for."""
+"""Readings used while the tracker's turn is searched for."""
 
 FOLLOWED = 4
 """Starts that are followed after their first steps."""
@@ -56,7 +56,7 @@ def _size(tried: tuple[Nuisances, float]) -> float:
 def _descended(
     campaign: Campaign, seen: PredictedReadings, given: Nuisances, rows: Ints, steps: int
 ) -> tuple[Nuisances, float]:
-    """Gauss-Newton on positions: the nuisances, and the mean square that is left [m2]."""
+    """Gauss-Newton on positions: the nuisances, and the mean square that remains [m2]."""
     last, before = np.inf, given
     for _ in range(steps):
         residual = campaign.residual(seen, given)[rows, :3]
@@ -74,7 +74,7 @@ def _descended(
 def _turned_targets(
     campaign: Campaign, seen: PredictedReadings, given: Nuisances, usable: Bools
 ) -> Nuisances:
-    """The axes of targets whose turn is not stated: the mean of what each reading says."""
+    """The axes of targets whose turn is not stated: the mean over all readings."""
     readings, turns = campaign.readings, given.turns.copy()
     assert readings.rotation is not None
     rotation = seen.rotation[campaign.at]

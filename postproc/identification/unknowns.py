@@ -14,8 +14,8 @@ from postproc.robot.description import Value
 @dataclass(frozen=True)
 class Unknown:
     """A parameter to be found: ``name`` as effect.parameter; ``term``: its effect in the model; ``value`` (SI) to start
-    with; ``stated``: what the robot file says of it; ``prior``: its standard deviation there, where that counts as a
-    reading of ``value``; ``held``: a dimension that is taken as it stands."""
+    with; ``stated``: what the robot file states of it; ``prior``: its standard deviation there, where that counts as a
+    reading of ``value``; ``fixed``: a dimension that is taken as stated."""
 
     name: str
     term: int
@@ -32,8 +32,8 @@ class Unknown:
 
 @dataclass(frozen=True)
 class FitRequest:
-    """``model``: with all the effects asked for; ``unknowns``; ``held``: names of dimensions of hardware that no
-    interval is stated of, taken as they stand."""
+    """``model``: with all the effects asked for; ``unknowns``; ``fixed``: names of dimensions of hardware that no
+    interval is stated of, taken as stated."""
 
     model: StiffnessModel
     unknowns: tuple[Unknown, ...]
@@ -45,7 +45,7 @@ def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False)
 
     An effect that the model does not have is added at its null, with the dimensions of a mechanism of its kind where
     the robot file has one.  Dimensions of hardware, unless named by themselves, are taken from the robot file: with an
-    interval as a prior, without one as they stand.  ``priors``: every stated interval counts as a prior.
+    interval as a prior, without one as stated.  ``priors``: every stated interval counts as a prior.
 
     Raises Refusal IDN001 for a name that is not known.
     """

@@ -40,8 +40,8 @@ def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
 
     Each fold's fit starts from the one of all readings and keeps its columns: what is reported is to first order, as
     the residuals that leverages give (PRESS; Allen, Technometrics 16 (1974)).  Where the readings of the other folds
-    hardly tell a parameter, a fit of its own might run far away along it, which says more of the fold than of the
-    model.
+    hardly determine a parameter, a fit of its own might run far away along it, which describes more the fold than of
+    the model.
     """
     campaign = fitted.campaign
     fold = folds_of(campaign, folds)
@@ -64,7 +64,7 @@ def counted(fitted: Fit) -> Bools:
 @dataclass(frozen=True)
 class Validation:
     """Readings that were not fitted: ``before``, ``after`` (R, 3) [m] residuals of the models before and after, robot
-    base axes; ``registered_anew``: their tracker stood elsewhere."""
+    base axes; ``registered_anew``: their tracker was elsewhere."""
 
     campaign: Campaign
     before: Floats
@@ -73,9 +73,9 @@ class Validation:
 
 
 def validated(before: Fit, after: Fit, campaign: Campaign) -> Validation:
-    """What both fits say of readings ``campaign`` that neither has seen.
+    """What both fits predict of readings ``campaign`` that neither has used.
 
-    Targets are where the fit found them.  The tracker is where it stood for the fit, if it is the same session (or
+    Targets are where the fit found them.  The tracker is where it was for the fit, if it is the same session (or
     there is but one on either side) and that holds; else it is registered again from these readings.
     """
     anew, residuals = False, []

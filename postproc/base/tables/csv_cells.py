@@ -63,7 +63,7 @@ class CsvCells:
         return b"'" in self.raw
 
     def bounds(self, column: int, rows: slice) -> tuple[Ints, Ints]:
-        """Where the cells of a column begin and end, two (K,) offsets of ``rows``, without quotes and blanks; an empty
+        """Where the cells of a column start and end, two (K,) offsets of ``rows``, without quotes and blanks; an empty
         one for ``others``."""
         data = np.frombuffer(self.raw, np.uint8)
         cell_start = self.start[rows] if column == 0 else self.ends[rows, column - 1] + 1
@@ -164,7 +164,7 @@ def _spelled(data: NDArray[np.uint8], start: Ints, stop: Ints, comma: bool) -> t
 def find_cells(
     lines: CsvLines, offset: int, number: int, separator: str, columns: int, other: Other
 ) -> CsvCells:
-    """The cells of the lines from byte ``begin`` on, the first of which has this ``number``.
+    """The cells of the lines from byte ``offset`` on, the first of which has this ``number``.
 
     Raises what ``other`` raises.
     """
@@ -217,7 +217,7 @@ def find_cells(
 
 
 def _in_quotes(raw: bytes, start: Ints, stop: Ints) -> Bools:
-    """Which cells (K, C) begin and end with a quote."""
+    """Which cells (K, C) start and end with a quote."""
     data = np.frombuffer(raw, np.uint8)
     stop = stop - (data[stop - 1] == 0x0D)  # of the line's end
     first = data[np.minimum(start, len(data) - 1)]

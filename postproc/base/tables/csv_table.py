@@ -3,7 +3,7 @@
 A header row, then rows with as many cells.  Comma, semicolon or tab, whichever gives the header most cells;
 where it is not the comma, a decimal comma is understood.  Blank lines and lines that start with ``#`` are skipped,
 above the header also those that a spreadsheet has put in quotes.  An apostrophe before = + - @, by which a spreadsheet
-is told that a cell is no formula, is not part of the cell.
+is informed that a cell is no formula, is not part of the cell.
 """
 
 from __future__ import annotations
