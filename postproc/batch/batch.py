@@ -61,7 +61,7 @@ def run_batch(request: BatchRequest, watch: Watch | None = None) -> Batched:
     program is an outcome.
     """
     watch = watch or Watch()
-    began = time.monotonic()
+    start_time = time.monotonic()
     jobs = jobs_of(request.words, request.options, request.output, request.allow_outside)
     tasks = [BatchItem(job, code_digest(), request.rerun) for job in jobs.jobs]
     names = [job.name for job in jobs.jobs]
@@ -86,7 +86,7 @@ def run_batch(request: BatchRequest, watch: Watch | None = None) -> Batched:
         for number, job in enumerate(jobs.jobs)
     )
     skipped = tuple(str(path) for path in jobs.passed_over)
-    batched = Batched(jobs.root, outcomes, (), skipped, time.monotonic() - began)
+    batched = Batched(jobs.root, outcomes, (), skipped, time.monotonic() - start_time)
     return batched if request.options.get("dry_run") else _published(batched, request.json)
 
 

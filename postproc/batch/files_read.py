@@ -40,12 +40,12 @@ def readings() -> Iterator[dict[str, str]]:
     The files of Python and of this package are left out; ``code_digest`` covers them.
     """
     _install()
-    seen: dict[str, str] = {}
-    _mine.seen = seen
+    digests: dict[str, str] = {}
+    _mine.digests = digests
     try:
-        yield seen
+        yield digests
     finally:
-        _mine.seen = None
+        _mine.digests = None
 
 
 @functools.cache
@@ -73,18 +73,18 @@ def _install() -> None:
 def _opened(event: str, arguments: tuple[object, ...]) -> None:
     if event != "open":
         return
-    seen: dict[str, str] | None = getattr(_mine, "seen", None)
-    if seen is None:
+    digests: dict[str, str] | None = getattr(_mine, "digests", None)
+    if digests is None:
         return
-    _mine.seen = None  # what the digest itself opens does not count
+    _mine.digests = None  # what the digest itself opens does not count
     try:
         name, mode, flags = arguments
         if isinstance(name, str | bytes | os.PathLike) and _reads(mode, flags):
             path = os.path.abspath(os.fsdecode(name))
-            if path not in seen and not path.startswith(_others()) and not os.path.isdir(path):
-                seen[path] = digest_of(path)
+            if path not in digests and not path.startswith(_others()) and not os.path.isdir(path):
+                digests[path] = digest_of(path)
     finally:
-        _mine.seen = seen
+        _mine.digests = digests
 
 
 def _reads(mode: object, flags: object) -> bool:

@@ -200,7 +200,7 @@ def _watched(out: Out) -> Iterator[Watch | None]:
 
         def __init__(self) -> None:
             self.at: dict[str, str] = {}
-            self.motions, self.began = 0, time.monotonic()
+            self.motions, self.start_time = 0, time.monotonic()
             self.task = progress.add_task("", total=None, rate="")
 
         def started(self, jobs: Jobs) -> None:
@@ -218,7 +218,7 @@ def _watched(out: Out) -> Iterator[Watch | None]:
 
         def _show(self) -> None:
             words = ", ".join(f"{escape(sanitize(name))}: {stage}" for name, stage in self.at.items())
-            rate = self.motions / max(time.monotonic() - self.began, 1e-3)
+            rate = self.motions / max(time.monotonic() - self.start_time, 1e-3)
             progress.update(
                 self.task, description=words, rate=f"{rate:.0f} motions/s" if self.motions else ""
             )

@@ -40,7 +40,7 @@ class CorrectionResult:
     place minus the wanted one, 0 where nothing is corrected; turn (N, 3) [rad]: by how much they are
     meant to be turned, NaN after the writing; before, after (N,) [m] predicted position error, NaN where
     nothing is predicted, and before_angle, after_angle (N,) [rad]; deflection (N, 3) [m] before; iterations (N,);
-    history (K + 1, N) [m]; findings.  across_after (N,) [m]: the part of the error after across the feed, known behind
+    history (K + 1, N) [m]; findings.  across_after (N,) [m]: the part of the error after across the feed, known after
     the writing."""
 
     state: Ints
@@ -93,10 +93,12 @@ def correct(task: CompensationProblem) -> CorrectionResult:
         why.setdefault(int(row), _at(task, int(row), "COR004", "COMPENSATE is switched inside this cut"))
 
     # What the force does, everywhere it can be predicted; the correction, where it may be made.
-    seen = np.flatnonzero(scope & cartesian & (track.status >= 0) & track.reachable)
+    predictable = np.flatnonzero(scope & cartesian & (track.status >= 0) & track.reachable)
     may = on & ~spread_over_cuts(_in(why, n), cut)
     corrections = _Findings(n)
-    for block in in_blocks(lambda part: _correct_block(task, seen[part], may[seen[part]]), len(seen)):
+    for block in in_blocks(
+        lambda part: _correct_block(task, predictable[part], may[predictable[part]]), len(predictable)
+    ):
         corrections.put(block)
     corrections.judged(task, why, findings)
     keeps = corrections.tried & ~spread_over_cuts(_in(why, n), cut)
@@ -119,7 +121,7 @@ def correct(task: CompensationProblem) -> CorrectionResult:
     state[keeps] = MotionOutcome.CORRECTED
     findings += uncorrected_findings(task.file, path, cut, why)
     corrections.warn_sides(task, keeps, findings)
-    _warn_singular(task, seen[forced[seen]], findings)
+    _warn_singular(task, predictable[forced[predictable]], findings)
     moved = np.flatnonzero(keeps)
     after, after_angle = corrections.before.copy(), corrections.before_angle.copy()
     after[moved], after_angle[moved] = corrections.error[moved], corrections.angle[moved]

@@ -30,10 +30,10 @@ class GapSides:
     gap: Floats
 
     @staticmethod
-    def of(key: Floats, motor: Floats, gap: Floats, anew: Bools) -> GapSides:
-        """``key`` (S,) the place of each station, ``motor`` (S, n) [rad, m], ``gap`` (n,) [rad, m]; ``anew`` (S,): it
-        is not known how the motors came there."""
-        return GapSides(key, motor, operator.play_output(motor, gap, anew), gap)
+    def of(key: Floats, motor: Floats, gap: Floats, restart: Bools) -> GapSides:
+        """``key`` (S,) the place of each station, ``motor`` (S, n) [rad, m], ``gap`` (n,) [rad, m]; ``restart`` (S,):
+        it is not known how the motors came there."""
+        return GapSides(key, motor, operator.play_output(motor, gap, restart), gap)
 
     def at(self, rows: Ints, along: Floats | None = None) -> Floats:
         """(K, n) -1..1 by how much of half the gap each motor is ahead at the shares ``along`` (K,) of the paths of the
@@ -108,13 +108,14 @@ class Reversals:
     new: Floats
 
     @staticmethod
-    def of(line: MotorPath, position: Floats, shares: Floats, anew: Bools, spacing: Floats) -> Reversals:
-        """Of ``shares`` (S, n) of dead bands at stations at ``position`` (S,) [m], ``anew`` (S,) where nothing is known
-        of how the motors came: a side holds until the band is crossed in the other sense, and what comes first holds
-        from the start.  ``spacing`` (N,) [m]: no change is shorter, and none starts or ends so near to a target."""
+    def of(line: MotorPath, position: Floats, shares: Floats, restart: Bools, spacing: Floats) -> Reversals:
+        """Of ``shares`` (S, n) of dead bands at stations at ``position`` (S,) [m], ``restart`` (S,) where nothing is
+        known of how the motors came: a side holds until the band is crossed in the other sense, and what comes first
+        holds from the start.  ``spacing`` (N,) [m]: no change is shorter, and none starts or ends so near to a
+        target."""
         by_axis: list[tuple[Floats, ...]] = []
         start = np.zeros(shares.shape[1])
-        again = np.maximum.accumulate(np.where(anew, np.arange(len(anew)), -1))
+        again = np.maximum.accumulate(np.where(restart, np.arange(len(restart)), -1))
         for axis, share in enumerate(shares.T):
             crossed = np.abs(share) > CROSSED
             events = np.flatnonzero(crossed)
@@ -160,7 +161,7 @@ class LostMotion:
     turn round wants its motor on the other side of the gap at once, so they follow the sense of the joint's own motion,
     but for what is less than a dead band.
     row, share (S,): the stations; axes (S, n): programmed; aim (S, n): where the motors of a correction go, but for the
-    lost motion itself; moved (S,): a correction is made there; anew (S,): it is not known how the motors came there;
+    lost motion itself; moved (S,): a correction is made there; restart (S,): it is not known how the motors came there;
     gap (n,) [rad, m] lost by each axis, 0 where none is.
     """
 
@@ -171,7 +172,7 @@ class LostMotion:
     axes: Floats
     aim: Floats
     moved: Bools
-    anew: Bools
+    restart: Bools
     gap: Floats
 
     def run(self, gain: float) -> GapSides:
@@ -179,4 +180,4 @@ class LostMotion:
         wanted before they have crossed the gap."""
         ahead = self.aim + 0.5 * self.gap * self.wanted.at(self.row, self.share) - self.axes
         motor = self.axes + np.where(self.moved[:, None], gain * ahead, 0.0)
-        return GapSides.of(self.programmed.key, motor, self.programmed.gap, self.anew)
+        return GapSides.of(self.programmed.key, motor, self.programmed.gap, self.restart)

@@ -71,7 +71,7 @@ def add_lost_motion(task: CompensationProblem, start: Floats | None, spacing: Fl
         stations = stations.denser(coarse)
     line = MotorPath.of(task.desired_path.length)
     position = line.position(stations.row, stations.share)
-    turns = Reversals.of(line, position, stations.within.shares, stations.anew, spacing)
+    turns = Reversals.of(line, position, stations.within.shares, stations.restart, spacing)
     # where a change of side starts and ends there is a station
     row, along = line.place(np.concatenate([turns.since, turns.until]))
     inside = task.desired_path.traceable[row] & (along > 0.0) & (along < 1.0)
@@ -84,7 +84,7 @@ def add_lost_motion(task: CompensationProblem, start: Floats | None, spacing: Fl
         stations.axes,
         stations.aim,
         stations.moved,
-        stations.anew,
+        stations.restart,
         task.model.gaps,
     )
     direction = lost.programmed.at(np.arange(len(task.toolpath)))
@@ -231,7 +231,7 @@ class _Samples:
         return 2.0 * self.row + self.share
 
     @cached_property
-    def anew(self) -> Bools:
+    def restart(self) -> Bools:
         """(S,) it is not known how the axes came here: an unknown place before it, or a motion that may not run."""
         step, runs = np.diff(self.row, prepend=-2), self.axis_paths.task.toolpath.executes
         return np.asarray((step > 1) | ((step > 0) & (self.row >= 0) & ~runs[self.row]))
@@ -243,14 +243,14 @@ class _Samples:
 
     @cached_property
     def programmed(self) -> GapSides:
-        return GapSides.of(self.key, self.axes, self.axis_paths.gap, self.anew)
+        return GapSides.of(self.key, self.axes, self.axis_paths.gap, self.restart)
 
     @cached_property
     def within(self) -> GapSides:
         """The play of the dead bands."""
         # a correction sets out from where the joint really lies
         joint = np.where(self.moved[:, None], self.aim, self.programmed.joint)
-        return GapSides.of(self.key, joint, self.axis_paths.band[np.maximum(self.row, 0)], self.anew)
+        return GapSides.of(self.key, joint, self.axis_paths.band[np.maximum(self.row, 0)], self.restart)
 
     def turning(self) -> Ints:
         """Stations that end a part of a path in which an axis turns round, and that is long."""
@@ -266,7 +266,7 @@ class _Samples:
         turns[:-1] |= turns[1:].copy()  # the place itself may lie before that
         turns |= changes(self.programmed, COARSE)
         turns |= self._bulges(lossy)
-        turns &= ~self.anew & (self.row >= 0)
+        turns &= ~self.restart & (self.row >= 0)
         turns &= desired_path.traceable[self.row]
         some = np.flatnonzero(turns)
         return some[self._span(some) * desired_path.length[self.row[some]] > FINE]

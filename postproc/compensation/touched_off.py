@@ -97,8 +97,8 @@ class TouchedOff:
 
     def residual(self) -> Floats:
         """(T,) [m] how far each touched place is from where its base puts it."""
-        seen = self.motion[self.frame] @ self.wanted
-        return np.asarray(np.linalg.norm(self.real.pose.position - seen.position, axis=1))
+        fitted = self.motion[self.frame] @ self.wanted
+        return np.asarray(np.linalg.norm(self.real.pose.position - fitted.position, axis=1))
 
     def goal(self, frame: Ints, wanted: Poses) -> Poses:
         """Where the tool is to be (K) for poses ``wanted`` (K) in the frames (K,)."""

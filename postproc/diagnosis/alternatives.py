@@ -30,7 +30,7 @@ CLOSE, CLOSE_SHARE, RIVALS = 30.0, 0.05, 3
 """Alternatives are fitted where -2 ln(likelihood) is linearly worse by less than this, or than this share of the gain;
 so many at most."""
 
-WILD = 5.0
+OUTLIER_LIMIT = 5.0
 """Standard deviations that a reading counts with at most."""
 
 
@@ -38,7 +38,7 @@ def squares_of(fitted: Fit, weights: Weighting, variance: float) -> float:
     """Squares that remain after a fit, of readings [their variance by ``weights``, outliers cut] and of priors;
     ``variance`` of the readings as they scatter."""
     level = np.sqrt(variance)
-    residual = np.minimum(np.abs(weights(fitted.point.residual)), WILD * level)
+    residual = np.minimum(np.abs(weights(fitted.point.residual)), OUTLIER_LIMIT * level)
     values = fitted.point.values(fitted.unknowns)
     priors = sum(
         (level * (u.value - value) / u.prior) ** 2
@@ -84,14 +84,16 @@ def find_alternatives(
             if rest.squares - squares > 0.5 * gain:
                 worse = float(squares - last.squares) / variance
                 of_mine.append(Alternative(mine.key, instead, worse, paid(columns) - own, False))
-        of_mine.sort(key=lambda rival: rival.margin)
-        for k, rival in enumerate(of_mine[:RIVALS]):
-            if rival.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
-                there = with_effects(campaign, base, [rival.candidate if c is mine else c for c in chosen])
+        of_mine.sort(key=lambda alternative: alternative.margin)
+        for k, alternative in enumerate(of_mine[:RIVALS]):
+            if alternative.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
+                there = with_effects(
+                    campaign, base, [alternative.candidate if c is mine else c for c in chosen]
+                )
                 worse = float(squares_of(there, fitted.weights, variance) - here) / variance
-                of_mine[k] = replace(rival, worse=worse, fitted=True)
+                of_mine[k] = replace(alternative, worse=worse, fitted=True)
         alternatives += of_mine
-    return tuple(sorted(alternatives, key=lambda rival: rival.margin))
+    return tuple(sorted(alternatives, key=lambda alternative: alternative.margin))
 
 
 def _instead(

@@ -95,9 +95,9 @@ def smallest(search: Search) -> tuple[Smallest, ...]:
     for g, candidate in enumerate(linear.candidates):
         if g in last.groups:
             continue
-        seen = np.linalg.norm(outside[:, given.places[g]], axis=0)
-        size = np.linalg.norm(linear.columns[g], axis=0) * seen
-        on = seen > OUTSIDE
+        outside_share = np.linalg.norm(outside[:, given.places[g]], axis=0)
+        size = np.linalg.norm(linear.columns[g], axis=0) * outside_share
+        on = outside_share > OUTSIDE
         if not on.any():
             sizes.append(Smallest(candidate, np.inf, np.inf))
             continue

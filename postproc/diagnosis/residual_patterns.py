@@ -97,29 +97,29 @@ def _clear(columns: Floats) -> Floats:
     return np.asarray(u[:, s > max(1e-6 * s[0], 1e-6)])
 
 
-def _probability(seen: float, by_chance: Floats) -> float:
-    """That chance makes as much as ``seen``, of what it made: beyond the largest of that by the gamma distribution of
-    their mean and variance."""
+def _probability(observed: float, by_chance: Floats) -> float:
+    """That chance makes as much as ``observed``, of its own draws: beyond the largest of that by the gamma
+    distribution of their mean and variance."""
     from scipy.stats import gamma
 
-    count = int((by_chance >= seen).sum())
+    count = int((by_chance >= observed).sum())
     if count >= 10:
         return (count + 1) / (len(by_chance) + 1)
     mean, variance = float(by_chance.mean()), float(by_chance.var())
     if variance <= 0:
-        return 1.0 if seen <= mean else 0.0
-    return float(gamma.sf(seen, mean * mean / variance, scale=variance / mean))
+        return 1.0 if observed <= mean else 0.0
+    return float(gamma.sf(observed, mean * mean / variance, scale=variance / mean))
 
 
 def patterns(
     fitted: Fit, campaign: Campaign
 ) -> Iterator[tuple[str, Floats, Floats | None, tuple[str, float]]]:
     """Name, value (R,), what a turn of a joint does (R, 3), None for shifts, and unit of each variable."""
-    readings, seen = campaign.readings, fitted.point.predicted
+    readings, predicted = campaign.readings, fitted.point.predicted
     chain = fitted.model.chain
     coordinates = chain.placed(readings.q)
     swept = chain.evaluate(coordinates, campaign.tool)
-    points = campaign.points(seen, fitted.point.given.places, campaign.at)
+    points = campaign.points(predicted, fitted.point.given.places, campaign.at)
     torque = generalized_force(swept, swept.position, readings.wrench.T)
     loaded = bool(readings.wrench.any())
     for i, joint in enumerate(fitted.model.robot.joints):
@@ -148,7 +148,7 @@ def patterns(
 
 
 def _parts(values: Floats, count: int) -> tuple[Ints, Floats]:
-    """The part (R,) of ``count`` or less each value falls in, and where the parts begin and end (k, 2)."""
+    """The part (R,) of ``count`` or less each value falls in, and where the parts start and end (k, 2)."""
     distinct = np.unique(values)
     if len(distinct) <= count:
         return np.searchsorted(distinct, values), np.stack([distinct, distinct], axis=1)

@@ -180,22 +180,22 @@ def _linear(
 
     common = np.concatenate([tall(own, prior), readings(nuisance)], axis=1)
     basis = basis_of(common)
-    looked = _as_fitted(campaign, fitted, chosen, shown)
-    with_chosen = [readings(c.columns) for c in looked if c.only]
+    current = _as_fitted(campaign, fitted, chosen, shown)
+    with_chosen = [readings(c.columns) for c in current if c.only]
     beyond = basis_of(np.concatenate([common, *with_chosen], axis=1)) if with_chosen else basis
-    looked = tuple(
+    current = tuple(
         _as_grown(campaign, fitted, c, lambda columns: outside(beyond, readings(columns)))
         if c.nonlinear and not c.only and not (c.start and chosen)
         else c
-        for c in looked
+        for c in current
     )
     # so that with the value of each the same residual remains as of the fit
-    contributions = [c.columns @ in_scales(fitted, c.only) for c in looked if c.only]
+    contributions = [c.columns @ in_scales(fitted, c.only) for c in current if c.only]
     residual = tall(sum(contributions, fitted.point.residual), prior @ (away / scales(base.unknowns)))
-    columns = tuple(readings(c.columns) for c in looked)
-    groups = [(own, _reach(c)) for own, c in zip(columns, looked, strict=True)]
+    columns = tuple(readings(c.columns) for c in current)
+    groups = [(own, _reach(c)) for own, c in zip(columns, current, strict=True)]
     linear_problem = problem(residual, basis, groups, weights.counts + len(prior), base.noise.known)
-    return Linear(looked, linear_problem, residual, common, columns, len(prior), weights)
+    return Linear(current, linear_problem, residual, common, columns, len(prior), weights)
 
 
 def _as_grown(campaign: Campaign, fitted: Fit, candidate: Candidate, beyond: Outside) -> Candidate:
@@ -210,7 +210,7 @@ def _values(model: StiffnessModel, unknowns: Sequence[Unknown]) -> Floats:
 
 
 def _as_fitted(
-    campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate], looked: Sequence[Candidate]
+    campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate], current: Sequence[Candidate]
 ) -> tuple[Candidate, ...]:
     """The candidates, those chosen with their columns at the fit instead of at their null."""
     own, _ = fitted.point.taken
@@ -227,7 +227,7 @@ def _as_fitted(
             does = point_without(campaign, fitted, [candidate]).residual - fitted.point.residual
             columns = whole(columns, np.nan_to_num(does), values[at])
         there[candidate.key] = candidate.fitted(columns, [fitted.unknowns[i] for i in at])
-    return tuple(there.get(c.key, c) for c in looked)
+    return tuple(there.get(c.key, c) for c in current)
 
 
 def _reach(candidate: Candidate) -> Floats:

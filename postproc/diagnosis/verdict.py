@@ -31,7 +31,7 @@ FOLDS = 15
 SEEN = 1e-8
 """Share of a column's squares that readings must show to predict others."""
 
-WILD = 5.0
+OUTLIER_LIMIT = 5.0
 
 USUAL = 3.0
 """Times what was found of an effect that it is expected to be, of readings that were left out."""
@@ -234,13 +234,15 @@ def _evidence(search: Search, last: Explained, group: int) -> Evidence:
     return Evidence(gain, min(1.0, chance * among), heldout, regions, sessions, margin, alias)
 
 
-def ambiguity_set(search: Search, group: int, seen: bool) -> tuple[Candidate, ...]:
+def ambiguity_set(search: Search, group: int, observable: bool) -> tuple[Candidate, ...]:
     """The candidate, and what explains the same.  Hardware that the robot file describes is taken to be there where its
-    parameters are ``seen``, as long as what is no such thing explains no more."""
+    parameters are ``observable``, as long as what is no such thing explains no more."""
     mine = search.linear.candidates[group]
     built = any(mechanism.kind == mine.name for mechanism in search.base.model.robot.mechanisms)
     against = _against(search, mine)
-    near = [r.candidate for r in against if r.margin < (-BUILT if built and seen and r.is_decoy else MARGIN)]
+    near = [
+        r.candidate for r in against if r.margin < (-BUILT if built and observable and r.is_decoy else MARGIN)
+    ]
     return (mine, *near)
 
 
@@ -314,7 +316,7 @@ def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> floa
         x = root @ (root.T @ (aim - out.T @ target[part == k]))
         uncertainty = variance * (1.0 + ((out @ root) ** 2).sum(axis=1))
         away = (target[part == k] - out @ x) ** 2 / uncertainty
-        total += float((np.minimum(away, WILD**2) + np.log(uncertainty)).sum())
+        total += float((np.minimum(away, OUTLIER_LIMIT**2) + np.log(uncertainty)).sum())
     return total
 
 

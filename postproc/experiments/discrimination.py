@@ -77,15 +77,15 @@ def discriminating(
     q: Floats,
     spacing: Floats,
     count: int,
-    begun: Sequence[int] = (),
+    start_choice: Sequence[int] = (),
 ) -> Chosen:
     """The ``count`` setups that keep the two furthest apart, the smaller of both separations; ``common`` (C, r, U),
     ``q`` (C, n), ``spacing`` (n,) as of ``rivalry``.
 
-    ``begun``: a choice to start with.
+    ``start_choice``: a choice to start with.
     """
     choices, criterion = rivalry(first, second, common, q, spacing)
-    chosen, _ = exchanged(choices, criterion, grown(choices, criterion, begun, count))
+    chosen, _ = exchanged(choices, criterion, grown(choices, criterion, start_choice, count))
     one, two = np.sqrt(criterion.separations(choices.information(chosen))).tolist()
     return Chosen(tuple(chosen), (one, two))
 
@@ -136,14 +136,14 @@ def apart(
         columns = np.concatenate([*parts, fitted.columns, fitted.nuisance], axis=2)
         return pooled(some, Observability(columns, columns[:, :, :0], ()))
 
-    def chosen_from(pool: Pool, begun: Choice) -> Choice:
+    def chosen_from(pool: Pool, start_choice: Choice) -> Choice:
         parts = np.split(pool.shown.columns, np.cumsum(widths), axis=2)
         alternatives = CompetingModel(parts[0], parts[2]), CompetingModel(parts[1], parts[3])
         by_size: dict[int, Sequence[int]] = {}
         last: Sequence[int] = ()
         for size in sorted(sizes):
             done = discriminating(
-                *alternatives, parts[4], pool.setups.q, spacing, size, begun.get(size, last)
+                *alternatives, parts[4], pool.setups.q, spacing, size, start_choice.get(size, last)
             )
             by_size[size] = last = done.setups
             separation[size] = done.separation

@@ -51,10 +51,10 @@ def observability(
 ) -> Observability:
     """What ``setups`` show under ``model``; NaN where it has no equilibrium."""
     campaign = Campaign(readings_of(model, offer, setups))
-    seen, given = campaign.predicted(model), _placed(campaign, offer)
+    predicted, given = campaign.predicted(model), _placed(campaign, offer)
     weight = _weights(offer, setups)[:, :, None]
-    derivatives = columns(campaign, model, unknowns, seen, given)
-    nuisance = campaign.nuisance_columns(seen, given)
+    derivatives = columns(campaign, model, unknowns, predicted, given)
+    nuisance = campaign.nuisance_columns(predicted, given)
     return Observability(
         derivatives.reshape(*weight.shape[:2], len(unknowns)) * weight,
         nuisance.reshape(*weight.shape[:2], len(campaign.nuisance_names)) * weight,
@@ -90,12 +90,12 @@ def measured(
     noise = noise_of(campaign.readings)
     if not noise.known:
         noise = replace(noise, sigma=np.full(len(campaign), sigma))
-    seen = campaign.predicted(model)
-    given = registered(campaign, seen, np.ones(len(campaign), bool))
-    weights = weighting(campaign, noise, campaign.residual(seen, given))
-    derivatives = weights(columns(campaign, model, unknowns, seen, given))
+    predicted = campaign.predicted(model)
+    given = registered(campaign, predicted, np.ones(len(campaign), bool))
+    weights = weighting(campaign, noise, campaign.residual(predicted, given))
+    derivatives = weights(columns(campaign, model, unknowns, predicted, given))
     return Observability(
-        derivatives[None], weights(campaign.nuisance_columns(seen, given))[None], campaign.nuisance_names
+        derivatives[None], weights(campaign.nuisance_columns(predicted, given))[None], campaign.nuisance_names
     )
 
 

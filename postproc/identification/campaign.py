@@ -147,23 +147,23 @@ class Campaign:
             rest.pose.rotation, rest.mount, rest.pose.position, rest.displacement, rest.converged
         )
 
-    def points(self, seen: PredictedReadings, places: Floats, at: Ints) -> Floats:
+    def points(self, predicted: PredictedReadings, places: Floats, at: Ints) -> Floats:
         """(R, 3) [m] what each reading would see in states ``at`` (R,), robot base, with the targets at ``places`` (T,
         3) [m] on the flange."""
-        origin = seen.tip if self.at_tip else seen.body
+        origin = predicted.tip if self.at_tip else predicted.body
         place = places[self.readings.target]
-        return np.asarray(origin[at] + (seen.rotation[at] @ place[:, :, None])[:, :, 0])
+        return np.asarray(origin[at] + (predicted.rotation[at] @ place[:, :, None])[:, :, 0])
 
-    def expected(self, seen: PredictedReadings, given: Nuisances) -> tuple[Floats, Floats | None]:
+    def expected(self, predicted: PredictedReadings, given: Nuisances) -> tuple[Floats, Floats | None]:
         """(R, 3) [m], and rotations (R, 3, 3) where they are measured, in the axes of the readings; NaN where the model
         has no rest."""
-        points = self.points(seen, given.places, self.at)
-        lost = ~seen.converged[self.at]
-        rotation = seen.rotation[self.at]
+        points = self.points(predicted, given.places, self.at)
+        lost = ~predicted.converged[self.at]
+        rotation = predicted.rotation[self.at]
         if self.still is not None:
-            points = points - self.points(seen, given.places, self.still)
-            lost = lost | ~seen.converged[self.still]
-            rotation = rotation @ np.swapaxes(seen.rotation[self.still], 1, 2)
+            points = points - self.points(predicted, given.places, self.still)
+            lost = lost | ~predicted.converged[self.still]
+            rotation = rotation @ np.swapaxes(predicted.rotation[self.still], 1, 2)
         else:
             rotation = rotation @ given.turns[self.readings.target]
         points = np.where(lost[:, None], np.nan, points)
@@ -173,10 +173,10 @@ class Campaign:
             rotation = frame.rotation @ rotation
         return points, rotation if self.posed else None
 
-    def residual(self, seen: PredictedReadings, given: Nuisances) -> Floats:
+    def residual(self, predicted: PredictedReadings, given: Nuisances) -> Floats:
         """(R, 3) [m], or (R, 6) [m, rad] where rotations are measured: measured minus expected, in the axes of the
         readings; NaN where nothing was measured or the model has no rest."""
-        position, rotation = self.expected(seen, given)
+        position, rotation = self.expected(predicted, given)
         difference = self.readings.value - position
         if rotation is None or self.readings.rotation is None:
             return difference
@@ -187,7 +187,7 @@ class Campaign:
 
     def in_base(self, residual: Floats, given: Nuisances) -> Floats:
         """(R, 3 or 6) [m, rad] of a ``residual`` (R, 3 or 6) in axes of the robot base.  A coordinate that was not
-        measured counts as none left; a place or turn of which nothing is known stays NaN."""
+        measured counts as none; a place or turn of which nothing is known stays NaN."""
         if not self.tracked:
             return residual
         back = np.swapaxes(given.frames.rotation, 1, 2)[self.readings.session]
@@ -228,10 +228,10 @@ class Campaign:
             names += [f"{what}{f' {of}' if of else ''}.{axis}" for axis in axes]
         return names
 
-    def nuisance_columns(self, seen: PredictedReadings, given: Nuisances) -> Floats:
+    def nuisance_columns(self, predicted: PredictedReadings, given: Nuisances) -> Floats:
         """(R, 3 or 6, U) derivative of ``expected`` by the steps of ``moved``."""
         derivatives = np.zeros((len(self), 6, len(self.nuisance_names)))
-        points = self.points(seen, given.places, self.at)
+        points = self.points(predicted, given.places, self.at)
         axes = given.frames.rotation[self.readings.session]
         for block, (kind, k) in enumerate(self._blocks()):
             columns = slice(3 * block, 3 * block + 3)
@@ -244,29 +244,29 @@ class Campaign:
                     derivatives[of, 3:, columns] = axes[of]
                 continue
             of = self.readings.target == k
-            rotation = seen.rotation[self.at[of]]
+            rotation = predicted.rotation[self.at[of]]
             if self.still is not None:
-                rotation = rotation - seen.rotation[self.still[of]]
+                rotation = rotation - predicted.rotation[self.still[of]]
             rows = slice(0, 3) if kind == "place" else slice(3, 6)
             derivatives[of, rows, columns] = axes[of] @ rotation if self.tracked else rotation
         return derivatives if self.posed else derivatives[:, :3]
 
     def columns(
-        self, model: StiffnessModel, seen: PredictedReadings, given: Nuisances, moved: Floats
+        self, model: StiffnessModel, predicted: PredictedReadings, given: Nuisances, moved: Floats
     ) -> Floats:
         """(R, 3 or 6, P) what moves in ``expected`` where the coordinates of the states move by ``moved`` (S, m, P);
         NaN where the model has no rest."""
-        state = model.state(self.q, self.wrench, self.tool, self.conditions, seen.displacement)
+        state = model.state(self.q, self.wrench, self.tool, self.conditions, predicted.displacement)
         chain = model.chain
         # a target is on the body, which does not move with what the spindle gives
         on = np.array([self.at_tip or not name.startswith("spindle.") for name in chain.names])
         j = jacobian(state.swept)
         derivatives = np.zeros((len(self), 6 if self.posed else 3, moved.shape[2]))
         turn, tip = j[:, 3:] @ moved, (j[:, :3] * on) @ moved
-        origin = seen.tip if self.at_tip else seen.body
+        origin = predicted.tip if self.at_tip else predicted.body
 
         def at(states: Ints, target: int) -> Floats:
-            lever = origin[states] + seen.rotation[states] @ given.places[target] - seen.tip[states]
+            lever = origin[states] + predicted.rotation[states] @ given.places[target] - predicted.tip[states]
             return np.asarray(tip[states] - np.cross(lever[:, :, None], turn[states], axis=1))
 
         for target in range(len(self.targets)):
@@ -277,15 +277,15 @@ class Campaign:
         if self.posed:
             derivatives[:, 3:] = turn[self.at]
             if self.still is not None:
-                relative = seen.rotation[self.at] @ np.swapaxes(seen.rotation[self.still], 1, 2)
+                relative = predicted.rotation[self.at] @ np.swapaxes(predicted.rotation[self.still], 1, 2)
                 derivatives[:, 3:] -= relative @ turn[self.still]
         if self.tracked:
             axes = given.frames.rotation[self.readings.session]
             for half in range(0, derivatives.shape[1], 3):
                 derivatives[:, half : half + 3] = axes @ derivatives[:, half : half + 3]
-        lost = ~seen.converged[self.at]
+        lost = ~predicted.converged[self.at]
         if self.still is not None:
-            lost |= ~seen.converged[self.still]
+            lost |= ~predicted.converged[self.still]
         derivatives[lost] = np.nan
         return derivatives
 

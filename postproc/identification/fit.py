@@ -51,10 +51,10 @@ class Fit:
     """A campaign fitted.
 
     start, asked: the model to start with and the unknowns asked for; weights: as used, plain_weights: before a robust
-    fit changed them; point: the fitted model and its residual; unknowns (k,): found; dropped: asked for, and left as
-    they were; covariance (k, k) [SI]; condition: see ``Insight``; factor: variance of the readings over what ``noise``
-    says, scatter_exceeded if that is clearly more; freedom: of the residuals; quantile: half width of an interval over
-    its deviation.
+    fit changed them; point: the fitted model and its residual; unknowns (k,): found; dropped: asked for, and unchanged;
+    covariance (k, k) [SI]; condition: see ``Insight``; factor: variance of the readings over what ``noise``
+    states, scatter_exceeded if that is clearly more; freedom: of the residuals; quantile: half width of an interval
+    over its deviation.
     """
 
     campaign: Campaign

@@ -59,8 +59,8 @@ class Point:
 
 def at(campaign: Campaign, model: StiffnessModel, given: Nuisances, start: Floats | None = None) -> Point:
     """The point of ``model`` with nuisances ``given``; ``start`` (S, m) [rad, m]: displacements nearby."""
-    seen = campaign.predicted(model, start)
-    return Point(model, given, seen, campaign.residual(seen, given))
+    predicted = campaign.predicted(model, start)
+    return Point(model, given, predicted, campaign.residual(predicted, given))
 
 
 def with_columns(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Point:

@@ -78,7 +78,7 @@ def validated(before: Fit, after: Fit, campaign: Campaign) -> Validation:
     Targets are where the fit found them.  The tracker is where it was for the fit, if it is the same session (or
     there is but one on either side) and that holds; else it is registered again from these readings.
     """
-    anew, residuals = False, []
+    refitted, residuals = False, []
     for fitted in (before, after):
         known = campaign.knowing(fitted.campaign, fitted.point.given)
         point = at(known, fitted.model, known.start())
@@ -89,11 +89,11 @@ def validated(before: Fit, after: Fit, campaign: Campaign) -> Validation:
                 np.nanmean(known.residual(point.predicted, g)[:, :3] ** 2) for g in (given, same_station)
             )
             if there <= OTHER_STATION**2 * own:
-                given, anew = same_station, anew or others
+                given, refitted = same_station, refitted or others
             else:
-                anew = True
+                refitted = True
         residuals.append(known.in_base(known.residual(point.predicted, given), given)[:, :3])
-    return Validation(campaign, residuals[0], residuals[1], anew)
+    return Validation(campaign, residuals[0], residuals[1], refitted)
 
 
 def _stations(fitted: Fit, campaign: Campaign, given: Nuisances) -> tuple[Nuisances, bool]:
