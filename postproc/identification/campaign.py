@@ -187,7 +187,7 @@ class Campaign:
 
     def in_base(self, residual: Floats, given: Nuisances) -> Floats:
         """(R, 3 or 6) [m, rad] of a ``residual`` (R, 3 or 6) in axes of the robot base.  A coordinate that was not
-        measured counts as none; a place or turn of which nothing is known stays NaN."""
+        measured counts as zero; a place or turn of which nothing is known stays NaN."""
         if not self.tracked:
             return residual
         back = np.swapaxes(given.frames.rotation, 1, 2)[self.readings.session]
