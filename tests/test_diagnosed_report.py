@@ -643,7 +643,7 @@ def test_what_is_said_of_the_unknown(spring, stale):
 def test_what_the_readings_follow_instead(spring):
     found = spring.diagnosis.search
     (named,) = spring.verdict.named
-    (foil,) = (rival for rival in found.rivals if rival.foil)
+    (foil,) = (rival for rival in found.rivals if rival.is_decoy)
     model, q = found.base.model, found.base.campaign.readings.q
 
     def text(effect, joint, worse):

@@ -123,12 +123,12 @@ def test_an_effect_is_looked_at_as_large_as_it_is(times):
         campaign, point, asked.model, asked.unknowns, lambda c: c.reshape(-1, c.shape[2]) / SIGMA
     )
     assert large.values[0] == pytest.approx(value, rel=0.1)
-    assert np.mean(large.left**2) == pytest.approx(1.0, abs=0.2)
-    assert np.mean(large.target**2) > np.mean(large.left**2) + 0.1
+    assert np.mean(large.remaining**2) == pytest.approx(1.0, abs=0.2)
+    assert np.mean(large.target**2) > np.mean(large.remaining**2) + 0.1
     (column,) = np.moveaxis(large.columns, 2, 0)
     np.testing.assert_allclose(
         column * large.values[0] / unknown.parameter.scale,
-        (large.target - large.left).reshape(-1, 3) * SIGMA,
+        (large.target - large.remaining).reshape(-1, 3) * SIGMA,
         atol=1e-9,
     )
 
@@ -191,7 +191,7 @@ def test_hardware_of_the_file_is_doubted_only_where_something_else_explains_more
     plain = StiffnessModel.from_robot(load_robot(SAMPLES / "kr270_missing_compensator" / "kr270_plain.yaml"))
     found = search(campaign, fitted(campaign, plain))
     (group,) = found.explained.groups
-    foil = next(rival for rival in found.rivals if rival.foil)
+    foil = next(rival for rival in found.rivals if rival.is_decoy)
 
     def sets(worse, seen):
         other = replace(found, rivals=(replace(foil, worse=worse, more=0.0),))

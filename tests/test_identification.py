@@ -666,7 +666,7 @@ def test_the_covariance_is_that_of_the_parameters_among_all_unknowns():
     information = both.T @ both
     information[:4, :4] += prior**2
     np.testing.assert_allclose(result.covariance, np.linalg.inv(information)[:4, :4], rtol=1e-9, atol=1e-14)
-    assert result.kept == (0, 1, 2, 3)
+    assert result.observable == (0, 1, 2, 3)
 
 
 def test_insight_does_not_depend_on_units():
@@ -683,7 +683,7 @@ def test_insight_does_not_depend_on_units():
         for u, b in zip(unknowns, by, strict=True)
     ]
     other = told(scaled, found * by, nuisance * [1e3, 1e-4])
-    assert other.kept == one.kept == (0, 1, 2, 3)
+    assert other.observable == one.observable == (0, 1, 2, 3)
     assert other.condition == pytest.approx(one.condition, rel=1e-6)
     np.testing.assert_allclose(other.covariance * np.outer(by[:4], by[:4]), one.covariance, rtol=1e-6)
     assert [d.why for d in other.dropped] == [d.why for d in one.dropped]
@@ -693,7 +693,7 @@ def test_insight_does_not_depend_on_units():
     assert weights == pytest.approx(expected, rel=1e-6)
     assert dict(other.dropped[0].together) == pytest.approx(weights, rel=1e-6)
     louder = told(unknowns, 7.0 * found, 7.0 * nuisance)
-    assert louder.kept == one.kept
+    assert louder.observable == one.observable
     assert louder.condition == pytest.approx(one.condition, rel=1e-9)
     np.testing.assert_allclose(49.0 * louder.covariance, one.covariance, rtol=1e-9)
 
@@ -716,11 +716,11 @@ def test_what_a_registration_does_as_well_is_told_so():
     unknowns, found, nuisance = problem(rng)
     found[:, 2] = nuisance @ [1.0, -2.0]
     result = told(unknowns, found, nuisance)
-    assert result.kept == (0, 1, 3)
+    assert result.observable == (0, 1, 3)
     assert [(d.name, d.why, d.together) for d in result.dropped] == [
         (unknowns[2].name, "is observable only together with the registration", ())
     ]
     # known before, it is not: a prior is a reading that the registration does not move
     result = told(unknowns, found, nuisance, np.diag([0.0, 0.0, 0.01, 0.0]))
-    assert result.kept == (0, 1, 2, 3)
+    assert result.observable == (0, 1, 2, 3)
     assert result.covariance[2, 2] == pytest.approx(1e4)

@@ -127,4 +127,4 @@ def test_a_stated_value_close_to_its_null_does_not_make_a_good_interval_too_weak
     column = np.full((1, 1), 1.96 * parameter.scale / 4e-6)
     nothing = np.zeros((1, 0))
     found = identifiability([unknown], column, nothing, [], np.zeros((1, 1)), np.array([1e-6]))
-    assert (found.kept, found.dropped) == ((0,), ())
+    assert (found.observable, found.dropped) == ((0,), ())

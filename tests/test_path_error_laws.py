@@ -91,7 +91,7 @@ def test_a_share_of_the_error_that_is_meant_to_stay_is_none(left, process):
     )
     # on the wanted way itself, all of it is meant to stay
     wanted = straight(job, [0.01, 0.2], [0.0, 0.0])
-    still = path_errors(job, wanted, left=left)
+    still = path_errors(job, wanted, uncorrected_share=left)
     bare = path_errors(job, wanted)
     for part, whole in zip(still, bare, strict=True):
         np.testing.assert_allclose(part, (1 - left) * whole, atol=1e-9)

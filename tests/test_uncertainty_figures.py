@@ -339,7 +339,7 @@ def test_what_is_known_of_the_force(each, stated, largest, scale, partly, differ
     found = ForceUncertainty.of(task, np.array([1, 2, 3, 4]), stated)
     assert found.largest == largest
     np.testing.assert_allclose(found.scale, scale)
-    assert (found.partly, found.differs) == (partly, differs)
+    assert (found.incomplete, found.differs) == (partly, differs)
 
 
 def test_a_force_that_is_known_in_part_is_named_beside_what_else_is_not():

@@ -27,10 +27,10 @@ class ArrayStore:
             return array
         if self._used + size > len(self._block):
             self._block, self._used = np.empty(max(self.SIZE, size), np.uint8), 0
-        kept = self._block[self._used : self._used + size].view(kind).reshape(array.shape)
-        kept[...] = array
+        copy = self._block[self._used : self._used + size].view(kind).reshape(array.shape)
+        copy[...] = array
         self._used += -(-size // 8) * 8
-        return kept
+        return copy
 
 
 class GrowingColumns:
@@ -41,10 +41,10 @@ class GrowingColumns:
 
     def add(self, *columns: NDArray[Any]) -> None:
         """Append ``columns`` (K,) to those that are here, one to each."""
-        for held, values, kind in zip(self._bytes, columns, self._types, strict=True):
-            held += np.ascontiguousarray(values, kind).data
+        for buffer, values, kind in zip(self._bytes, columns, self._types, strict=True):
+            buffer += np.ascontiguousarray(values, kind).data
 
     def done(self) -> Iterator[NDArray[Any]]:
         """The columns (N,) as they are now."""
-        for held, kind in zip(self._bytes, self._types, strict=True):
-            yield np.frombuffer(held, kind)
+        for buffer, kind in zip(self._bytes, self._types, strict=True):
+            yield np.frombuffer(buffer, kind)

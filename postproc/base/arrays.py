@@ -14,8 +14,8 @@ Bools = NDArray[np.bool_]
 
 
 def frozen(values: ArrayLike, shape: tuple[int, ...] | None = None, dtype: Any = np.float64) -> NDArray[Any]:
-    """A read-only, C-ordered copy of ``values``; -1 in ``shape`` stands for any length.  What is read-only already and
-    owns its data, or is one row that stands for all, is taken as it is.
+    """A read-only, C-ordered copy of ``values``; -1 in ``shape`` means any length.  What is read-only already and
+    owns its data, or is one row that represents all, is taken as it is.
 
     Raises ValueError when the shape is another one: a defect of the program, never of its input.
     """
@@ -44,17 +44,17 @@ def _is_frozen(values: ArrayLike, dtype: Any) -> TypeGuard[NDArray[Any]]:
 
 
 def is_shared(array: NDArray[Any]) -> bool:
-    """Whether one row in memory stands for all rows of ``array`` (N, ...), as ``shared`` and ``np.broadcast_to`` make
+    """Whether one row in memory represents all rows of ``array`` (N, ...), as ``shared`` and ``np.broadcast_to`` make
     it."""
     return not array.strides[0]
 
 
 def shared(array: NDArray[Any]) -> NDArray[Any]:
-    """``array`` (N, ...), or where its rows are all the same one of them that stands for all, of the same shape;
+    """``array`` (N, ...), or where its rows are all the same one of them that represents all, of the same shape;
     read-only."""
     if len(array) < 2 or is_shared(array):
         return array
-    for rows in (slice(0, 64), slice(None)):  # a look at the first tells most
+    for rows in (slice(0, 64), slice(None)):  # the first rows decide most cases
         part = array[rows]
         if not ((part == array[0]) | ((part != part) & (array[0] != array[0]))).all():
             return array
@@ -70,14 +70,14 @@ def numbers(rows: Any, count: int) -> Ints:
 
 
 def sums(lengths: NDArray[Any], kind: type[np.signedinteger] = np.int64) -> Ints:
-    """(K + 1,) where parts of these lengths (K,) begin, and the last one ends."""
+    """(K + 1,) where parts of these lengths (K,) start, and the last one ends."""
     ends = np.zeros(len(lengths) + 1, dtype=kind)
     np.cumsum(lengths, out=ends[1:])
     return ends
 
 
 class FewRows:
-    """(N, k) numbers of which only few rows are known, kept alone; NaN in all others.  Read-only.
+    """(N, k) numbers of which only few rows are known, stored alone; NaN in all others.  Read-only.
 
     rows (R,): which are known, ascending; values (R, k).
     """
@@ -99,26 +99,26 @@ class FewRows:
     def __getitem__(self, rows: Any) -> Floats:
         """As of an array, by rows: numbers from 0, a mask or a slice."""
         chosen = numbers(rows, len(self))
-        found = np.full((*chosen.shape, self.shape[1]), np.nan)
+        values = np.full((*chosen.shape, self.shape[1]), np.nan)
         if len(self.rows):
             at = np.minimum(np.searchsorted(self.rows, chosen), len(self.rows) - 1)
             known = self.rows[at] == chosen
-            found[known] = self.values[at[known]]
-        return found
+            values[known] = self.values[at[known]]
+        return values
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         return np.asarray(self[:], dtype)
 
 
 class LazyRows:
-    """An array (N, ...) of which parts are made where they are asked for; read-only, and indexed by rows only."""
+    """An array (N, ...) of which parts are computed where they are asked for; read-only, and indexed by rows only."""
 
-    def __init__(self, count: int, made: Callable[[Ints], Floats]) -> None:
-        self._count, self._made = count, made
+    def __init__(self, count: int, build: Callable[[Ints], Floats]) -> None:
+        self._count, self._build = count, build
 
     def __len__(self) -> int:
         return self._count
 
     def __getitem__(self, rows: Any) -> Floats:
         """As of an array, by rows: numbers from 0, a mask or a slice."""
-        return self._made(numbers(rows, self._count))
+        return self._build(numbers(rows, self._count))

@@ -48,7 +48,7 @@ def in_blocks(work: Callable[[slice], T], count: int, rows: int = 0) -> Iterator
     """``work`` of every block of ``count`` rows, in their order.
 
     Few blocks are ahead of the one that is asked for.  Inside of another block all is done where it is asked for.
-    What ``work`` raises is raised here; blocks that have not begun are then given up.
+    What ``work`` raises is raised here; blocks that have not started are then given up.
     """
     parts, workers = blocks(count, rows), threads()
     if len(parts) < 2 or workers < 2 or getattr(_inside, "block", False):

@@ -54,7 +54,7 @@ def plain_decimals(
     """Values and decimals (K,) of literals near each other, and which of them (K,) are digits with a sign and a
     ``point``. raw (B,): bytes of the text; start, stop (K,): offsets.
 
-    Their letters are held in words of eight, the last one in the highest byte, and read all at once.
+    Their letters are packed in words of eight, the last one in the highest byte, and read all at once.
     """
     if not len(start):
         return np.empty(0), np.empty(0, np.int64), np.empty(0, bool)
@@ -69,18 +69,18 @@ def plain_decimals(
     value, decimals = np.zeros(len(start)), np.zeros(len(start), np.int64)
     dotted, size = np.zeros(len(start), np.uint8), 1.0
     eight = np.uint64(point[0] * 0x0101010101010101)
-    for behind in range(0, int(length[plain].max(initial=0)), 8):  # letters after those of the word
-        at = np.asarray(stop - (low + behind) + 8, np.int64)
+    for after in range(0, int(length[plain].max(initial=0)), 8):  # letters after those of the word
+        at = np.asarray(stop - (low + after) + 8, np.int64)
         shift = (at.astype(np.uint64) & 7) << 3
         word = (words.take(at >> 3) >> shift) | (words.take((at >> 3) + 1) << (64 - shift))
-        missing = np.clip(8 - (length - behind), 0, 8).astype(np.uint64) << 3
+        missing = np.clip(8 - (length - after), 0, 8).astype(np.uint64) << 3
         word = ((word ^ _ZEROS) >> missing << missing) ^ _ZEROS
         points = _bytes_that_are_zero(word ^ eight)
         word ^= (points >> 7) * np.uint64(point[0] ^ ord("0"))
         word ^= _ZEROS
         plain &= ((word + _ABOVE_NINE) | word) & _HIGHEST == 0
         dotted += np.bitwise_count(points)
-        decimals += np.where(points > 0, behind + 7 - (np.bitwise_count(points - 1) >> 3), 0)
+        decimals += np.where(points > 0, after + 7 - (np.bitwise_count(points - 1) >> 3), 0)
         word = (word * 10 + (word >> 8)) & 0x00FF00FF00FF00FF
         word = (word * 100 + (word >> 16)) & 0x0000FFFF0000FFFF
         word = (word * 10000 + (word >> 32)) & 0xFFFFFFFF

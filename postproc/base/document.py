@@ -2,7 +2,7 @@
 
 A source is never rebuilt: a change is a list of edits (span, text) that are spliced into the
 bytes.  What no edit covers is copied, so the result is lossless by construction.  Millions of
-edits are held as arrays, and spliced and taken out again in blocks.
+edits are stored as arrays, and spliced and taken out again in blocks.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Edit:
 
 @dataclass(frozen=True)
 class Document:
-    """The raw bytes of one file, and where its lines begin."""
+    """The raw bytes of one file, and where its lines start."""
 
     path: Path
     raw: bytes
@@ -62,8 +62,8 @@ class Document:
         letters, kind = np.frombuffer(self.raw, np.uint8), offset_type(len(self.raw))
         parts = [np.zeros(1, kind)]
         for at in range(0, len(letters), BLOCK):
-            found = np.flatnonzero(letters[at : at + BLOCK] == _LF)
-            parts.append((found + (at + 1)).astype(kind))
+            line_feeds = np.flatnonzero(letters[at : at + BLOCK] == _LF)
+            parts.append((line_feeds + (at + 1)).astype(kind))
         return np.concatenate(parts)
 
     @cached_property
@@ -141,14 +141,14 @@ class Edits(Sequence[Edit]):
         # Of what is there in parts, only one column is there as a whole as well.
         columns = _in_columns(chain((first, second), rest))
         del first, second
-        found = Edits.__new__(Edits)
-        found.texts = b"".join([column.data for column in columns.pop()])
-        found.ends = sums(np.concatenate(columns.pop()), offset_type(len(found.texts)))
-        found.stop = np.concatenate(columns.pop())
-        found.start = np.concatenate(columns.pop())
-        found.file = np.concatenate(columns.pop())
-        found._arrange()
-        return found
+        edits = Edits.__new__(Edits)
+        edits.texts = b"".join([column.data for column in columns.pop()])
+        edits.ends = sums(np.concatenate(columns.pop()), offset_type(len(edits.texts)))
+        edits.stop = np.concatenate(columns.pop())
+        edits.start = np.concatenate(columns.pop())
+        edits.file = np.concatenate(columns.pop())
+        edits._arrange()
+        return edits
 
     def of(self, file: int) -> Edits:
         """The edits of one document."""
@@ -205,8 +205,8 @@ def _in_columns(parts: Iterable[Iterable[Edit]]) -> list[list[NDArray[Any]]]:
                 continue
             spans.append((own[0].span, own[-1].span))
             arrays = own.file, own.start, own.stop, np.diff(own.ends), np.frombuffer(own.texts, np.uint8)
-            for column, kept, array in zip(columns, store, arrays, strict=True):
-                column.append(kept.keep(array))
+            for column, storage, array in zip(columns, store, arrays, strict=True):
+                column.append(storage.keep(array))
     order = sorted(range(len(spans)), key=spans.__getitem__)
     if all(spans[a][1] < spans[b][0] for a, b in pairwise(order)):
         return [[column[k] for k in order] for column in columns]
@@ -214,9 +214,9 @@ def _in_columns(parts: Iterable[Iterable[Edit]]) -> list[list[NDArray[Any]]]:
 
 
 def _as_arrays(edits: Iterable[Edit]) -> Edits:
-    found = list(edits)
-    spans = np.array([(e.span.file, e.span.start, e.span.stop) for e in found], dtype=np.int64).reshape(-1, 3)
-    texts = [edit.text for edit in found]
+    items = list(edits)
+    spans = np.array([(e.span.file, e.span.start, e.span.stop) for e in items], dtype=np.int64).reshape(-1, 3)
+    texts = [edit.text for edit in items]
     ends = sums(np.array([len(text) for text in texts], dtype=np.int64))
     return Edits(spans[:, 0], spans[:, 1], spans[:, 2], b"".join(texts), ends)
 
@@ -272,22 +272,26 @@ def apply(document: Document, edits: Iterable[Edit]) -> bytes:
     Edits at one place are written in the order given.  Raises ValueError on an overlap or a span
     outside of the document: a defect of the program, never of its input.
     """
-    found, raw = Edits.joined(edits), document.raw
-    if len(found) and found.file[0] != found.file[-1]:
+    all_edits, raw = Edits.joined(edits), document.raw
+    if len(all_edits) and all_edits.file[0] != all_edits.file[-1]:
         raise ValueError("the edits belong to several documents")
-    wrong = _disorder(found, len(raw))
+    wrong = _disorder(all_edits, len(raw))
     if wrong >= 0:
-        raise ValueError(f"edits overlap or leave the document at byte {int(found.start[wrong])}")
-    growth = int(found.ends[-1]) - int(found.stop.sum(dtype=np.int64) - found.start.sum(dtype=np.int64))
+        raise ValueError(f"edits overlap or leave the document at byte {int(all_edits.start[wrong])}")
+    growth = int(all_edits.ends[-1]) - int(
+        all_edits.stop.sum(dtype=np.int64) - all_edits.start.sum(dtype=np.int64)
+    )
     written, at = _sized(len(raw) + growth), 0
-    for low, high in _blocks(found):
-        begin, end = int(found.start[low]), int(found.stop[high - 1])
-        written.write(memoryview(raw)[at:begin])
-        texts = np.frombuffer(found.texts, np.uint8)[found.ends[low] : found.ends[high]]
-        lengths = np.diff(found.ends[low : high + 1])
-        start, stop = found.start[low:high] - begin, found.stop[low:high] - begin
-        written.write(_spliced(np.frombuffer(raw, np.uint8)[begin:end], start, stop, texts, lengths).data)
-        at = end
+    for low, high in _blocks(all_edits):
+        block_start, block_end = int(all_edits.start[low]), int(all_edits.stop[high - 1])
+        written.write(memoryview(raw)[at:block_start])
+        texts = np.frombuffer(all_edits.texts, np.uint8)[all_edits.ends[low] : all_edits.ends[high]]
+        lengths = np.diff(all_edits.ends[low : high + 1])
+        start, stop = all_edits.start[low:high] - block_start, all_edits.stop[low:high] - block_start
+        written.write(
+            _spliced(np.frombuffer(raw, np.uint8)[block_start:block_end], start, stop, texts, lengths).data
+        )
+        at = block_end
     written.write(memoryview(raw)[at:])
     return written.getvalue()
 
@@ -320,12 +324,12 @@ def _spliced(
     lengths: NDArray[Any],
 ) -> NDArray[np.uint8]:
     """Bytes with texts of ``lengths`` (K,) in the place of the spans."""
-    kept = raw[~_covered(start, stop, len(raw))]
-    begin = start + sums(lengths - (stop - start))[:-1]
-    result = np.empty(len(kept) + len(texts), np.uint8)
-    is_text = _covered(begin, begin + lengths, len(result))
+    remaining = raw[~_covered(start, stop, len(raw))]
+    text_start = start + sums(lengths - (stop - start))[:-1]
+    result = np.empty(len(remaining) + len(texts), np.uint8)
+    is_text = _covered(text_start, text_start + lengths, len(result))
     result[is_text] = texts
-    result[~is_text] = kept
+    result[~is_text] = remaining
     return result
 
 
@@ -341,30 +345,30 @@ def _covered(start: NDArray[Any], stop: NDArray[Any], size: int) -> NDArray[np.b
 def undone(written: bytes, original: bytes, edits: Iterable[Edit]) -> bool:
     """Whether ``written`` is ``original`` in every byte that no edit covers, and each edit's text in its place.
 
-    Goes by the written bytes, on another way than ``apply``: it says for every byte where it must have come from,
+    Goes by the written bytes, independently of ``apply``: computes for every byte where it must have come from,
     and compares.
     """
-    found = Edits.joined(edits)
-    if _disorder(found, len(original)) >= 0:
+    all_edits = Edits.joined(edits)
+    if _disorder(all_edits, len(original)) >= 0:
         return False
-    new, old, texts = (np.frombuffer(part, np.uint8) for part in (written, original, found.texts))
+    new, old, texts = (np.frombuffer(part, np.uint8) for part in (written, original, all_edits.texts))
     at = here = 0  # how far the original, and the written bytes, were compared
-    for low, high in _blocks(found):
-        start, stop = found.start[low:high].astype(np.int64), found.stop[low:high].astype(np.int64)
-        begin, end = int(start[0]), int(stop[-1])
-        if not np.array_equal(new[here : here + begin - at], old[at:begin]):
+    for low, high in _blocks(all_edits):
+        start, stop = all_edits.start[low:high].astype(np.int64), all_edits.stop[low:high].astype(np.int64)
+        block_start, block_end = int(start[0]), int(stop[-1])
+        if not np.array_equal(new[here : here + block_start - at], old[at:block_start]):
             return False
-        lengths = np.diff(found.ends[low : high + 1])
-        # How far after its place in the original each edit, and what follows it, stands.
+        lengths = np.diff(all_edits.ends[low : high + 1])
+        # How far after its place in the original each edit, and what follows it, lies.
         shift = here - at + sums(lengths - (stop - start))
-        if end + int(shift[-1]) > len(written):
+        if block_end + int(shift[-1]) > len(written):
             return False
         between = _offsets(stop[:-1], start[1:] - stop[:-1])
         moves = np.repeat(shift[1:-1], start[1:] - stop[:-1])
         if not np.array_equal(new[between + moves], old[between]):
             return False
-        said = _offsets(start + shift[:-1], lengths)
-        if not np.array_equal(new[said], texts[found.ends[low] : found.ends[high]]):
+        text_offsets = _offsets(start + shift[:-1], lengths)
+        if not np.array_equal(new[text_offsets], texts[all_edits.ends[low] : all_edits.ends[high]]):
             return False
-        at, here = end, end + int(shift[-1])
+        at, here = block_end, block_end + int(shift[-1])
     return np.array_equal(new[here:], old[at:])

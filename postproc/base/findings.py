@@ -22,7 +22,7 @@ class Topic(StrEnum):
     NONE = ""
     HOME = "home"  # the motion goes to the controller's home position
     UNDECLARED_POINT = "undeclared point"  # the file that declares the point is not there
-    EXTERNAL_AXES = "external axes"  # they move, and the program alone does not say what they carry
+    EXTERNAL_AXES = "external axes"  # they move, and the program alone does not state what they carry
 
 
 class Code(NamedTuple):
@@ -103,7 +103,7 @@ class Finding:
 
 
 class Refusal(Exception):
-    """The work cannot be done; it carries the findings that say why."""
+    """The work cannot be done; it carries the findings that state why."""
 
     def __init__(self, *findings: Finding) -> None:
         super().__init__("; ".join(str(finding) for finding in findings))

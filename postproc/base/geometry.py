@@ -56,7 +56,7 @@ class Poses:
         return len(self.position)
 
     def shared(self, rows: Any) -> Poses:
-        """``self[rows]``; one pose where all N are held as one that is broadcast."""
+        """``self[rows]``; one pose where all N are one that is broadcast."""
         same = len(self.position) and is_shared(self.position) and is_shared(self.rotation)
         return self[0] if same else self[rows]
 
@@ -78,17 +78,17 @@ UNKNOWN = Poses(np.full((3, 3), np.nan), np.full(3, np.nan))
 
 @dataclass(frozen=True, eq=False)
 class PoseRows:
-    """``count`` poses that are made where they are asked for: ``made`` gives those of rows (K,).
+    """``count`` poses that are computed where they are asked for: ``build`` gives those of rows (K,).
 
     A pose takes 96 bytes; of a million motions few are needed at a time.
     """
 
     count: int
-    made: Callable[[Ints], Poses]
+    build: Callable[[Ints], Poses]
 
     def __getitem__(self, rows: Any) -> Poses:
         """As of ``Poses``: by numbers of rows, a mask, or a slice."""
-        return self.made(numbers(rows, self.count))
+        return self.build(numbers(rows, self.count))
 
     def __len__(self) -> int:
         return self.count
@@ -98,16 +98,16 @@ class PoseRows:
         again and again."""
         last = threading.local()
 
-        def made(rows: Ints) -> Poses:
+        def build(rows: Ints) -> Poses:
             if getattr(last, "rows", None) is not rows:
-                poses = self.made(rows)
+                poses = self.build(rows)
                 for array in (poses.rotation, poses.position):
                     array.setflags(write=False)
                 last.rows, last.poses = rows, poses
-            found: Poses = last.poses
-            return found
+            last_poses: Poses = last.poses
+            return last_poses
 
-        return PoseRows(self.count, made)
+        return PoseRows(self.count, build)
 
     @property
     def position(self) -> Floats:
@@ -129,10 +129,10 @@ def product(one: Floats, other: Floats) -> Floats:
     of matrices where one of them is the same for all."""
     if one.ndim == 3 == other.ndim and len(one) == len(other):
         a, b = _components(one), _components(other)
-        found = a[:, 0, None] * b[None, 0]
-        found += a[:, 1, None] * b[None, 1]
-        found += a[:, 2, None] * b[None, 2]
-        return _rows(found)
+        rotations = a[:, 0, None] * b[None, 0]
+        rotations += a[:, 1, None] * b[None, 1]
+        rotations += a[:, 2, None] * b[None, 2]
+        return _rows(rotations)
     if other.ndim == 2 < one.ndim:
         return (one.reshape(-1, 3) @ other).reshape(one.shape)
     if one.ndim == 2 and other.ndim == 3:
@@ -219,14 +219,14 @@ def rotation_from_vector(vector: ArrayLike) -> Floats:
         first = np.where(small, 1 - angle2 / 6, np.sin(safe) / safe)
         second = np.where(small, 0.5 - angle2 / 24, (1 - np.cos(safe)) / (safe * safe))
     # 1 + first [v]x + second [v]x [v]x, and [v]x [v]x = v v^T - |v|^2
-    found, rest = np.empty((3, 3, len(x))), 1 - second * angle2
+    rotations, rest = np.empty((3, 3, len(x))), 1 - second * angle2
     even, odd = second * own, first * own
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        np.add(rest, even[i] * own[i], out=found[i, i])
+        np.add(rest, even[i] * own[i], out=rotations[i, i])
         both = even[i] * own[j]
-        np.subtract(both, odd[k], out=found[i, j])
-        np.add(both, odd[k], out=found[j, i])
-    return _rows(found).reshape(*v.shape, 3)
+        np.subtract(both, odd[k], out=rotations[i, j])
+        np.add(both, odd[k], out=rotations[j, i])
+    return _rows(rotations).reshape(*v.shape, 3)
 
 
 def turn_between(start: Floats, end: Floats) -> Floats:
@@ -299,7 +299,7 @@ def on_arc(
     """Points (K, 3) [m] at the shares (K,) of arcs from ``start`` to ``end`` (K, 3) [m] about ``centre`` (K, 3) [m].
 
     p(t) = c + R(n, t sweep) (s - c) + t (e - c - R(n, sweep) (s - c)): counter-clockwise about the unit vector n =
-    ``normal`` (K, 3) by ``sweep`` (K,) [rad], with what is left to the end (the advance of a helix, radii that differ
+    ``normal`` (K, 3) by ``sweep`` (K,) [rad], with what remains to the end (the advance of a helix, radii that differ
     in the last digit) in proportion.
     """
     radius = start - centre
@@ -323,11 +323,11 @@ def arc_through(start: Floats, via: Floats, end: Floats) -> tuple[Floats, Floats
     return arc_in_plane(start, via, end, normal)
 
 
-def arc_in_plane(begin: Floats, via: Floats, end: Floats, normal: Floats) -> tuple[Floats, Floats, Floats]:
-    """Centre (K, 3) [m], normal (K, 3) and sweep (K,) [rad] as of ``arc_through``, through ``begin``, ``via``, ``end``
+def arc_in_plane(start: Floats, via: Floats, end: Floats, normal: Floats) -> tuple[Floats, Floats, Floats]:
+    """Centre (K, 3) [m], normal (K, 3) and sweep (K,) [rad] as of ``arc_through``, through ``start``, ``via``, ``end``
     (K, 3) [m], of arcs counter-clockwise about ``normal`` (K, 3): the circle of the points as they are seen along it;
-    the centre lies at the height of ``begin``.  NaN where the points lie on a line or run clockwise."""
-    first, second = via - begin, end - begin
+    the centre lies at the height of ``start``.  NaN where the points lie on a line or run clockwise."""
+    first, second = via - start, end - start
     first = first - np.sum(first * normal, axis=-1, keepdims=True) * normal
     second = second - np.sum(second * normal, axis=-1, keepdims=True) * normal
     area = np.sum(np.cross(first, second) * normal, axis=-1)
@@ -335,7 +335,10 @@ def arc_in_plane(begin: Floats, via: Floats, end: Floats, normal: Floats) -> tup
     with np.errstate(invalid="ignore", divide="ignore"):
         offset = np.cross(a2[:, None] * second - b2[:, None] * first, normal) / (2 * area[:, None])
         turns = area > 1e-12 * np.sqrt(a2 * b2)
-        centre = np.where(turns[:, None], begin + offset, np.nan)
-        start, stop = begin - centre, begin + second - centre
-        angle = np.arctan2(np.sum(np.cross(start, stop) * normal, axis=-1), np.sum(start * stop, axis=-1))
+        centre = np.where(turns[:, None], start + offset, np.nan)
+        from_centre, end_from_centre = start - centre, start + second - centre
+        angle = np.arctan2(
+            np.sum(np.cross(from_centre, end_from_centre) * normal, axis=-1),
+            np.sum(from_centre * end_from_centre, axis=-1),
+        )
     return centre, np.where(turns[:, None], normal, np.nan), np.mod(angle, 2 * np.pi)

@@ -1,7 +1,7 @@
 """The files that a run has read: what was in each of them, and whether it still is.
 
-Whatever reads a file does so by ``postproc.base.read_files``, and that notes it here: no list of inputs is kept by
-hand, which would forget the file that a later version reads.
+Whatever reads a file does so by ``postproc.base.read_files``, and that notes it here: no list of inputs is maintained
+by hand, which would forget the file that a later version reads.
 """
 
 from __future__ import annotations

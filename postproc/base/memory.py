@@ -22,7 +22,7 @@ def release_free_memory() -> None:
 
 def use_mmap_for_large_arrays() -> None:
     """From now on arrays of more than ``LARGE`` bytes lie apart, and go back to the system as soon as they are free;
-    those of blocks lie together, and what is free of them stays at hand: to fetch a page again takes as long as to
+    those of blocks lie together, and what is free of them stays available: to fetch a page again takes as long as to
     compute what it holds."""
     m_trim_threshold, m_top_pad, m_mmap_threshold, m_arena_max = -1, -2, -3, -8
     _allocator("mallopt", m_mmap_threshold, LARGE)

@@ -12,7 +12,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import note
 
 MAX_BYTES = 1_000_000_000
-"""Sixteen million motions; offsets in a program are held in 32 bits."""
+"""Sixteen million motions; offsets in a program have 32 bits."""
 
 MAX_LINE = 1_000_000
 """Bytes: no controller and no table has lines of a hundredth of it, and in memory a line is many times its length."""
@@ -67,20 +67,20 @@ def _read(path: Path, largest: int | None, take: Callable[[BinaryIO], bytes]) ->
 
 def _text(stream: BinaryIO, path: Path, code: str, ends: tuple[bytes, ...]) -> bytes:
     text = io.BytesIO()  # gives its bytes without a copy
-    begun = 0  # bytes of the line that a block starts in the midst of
+    line_bytes = 0  # bytes of the line that a block starts in the midst of
     while block := stream.read(MAX_LINE):
         nul = block.find(b"\0")
         if nul >= 0:
             message = f"byte {text.tell() + nul} is NUL: the file is not plain text"
             raise Refusal(Finding("FIL003", message, str(path), help="save it as plain text (UTF-8)"))
-        found = [(block.find(end), block.rfind(end)) for end in ends if end in block]
-        begun += min((first for first, _ in found), default=len(block))
-        if begun > MAX_LINE:
+        line_ends = [(block.find(end), block.rfind(end)) for end in ends if end in block]
+        line_bytes += min((first for first, _ in line_ends), default=len(block))
+        if line_bytes > MAX_LINE:
             number = _line(text.getvalue(), ends)
             message = f"the line has more than {MAX_LINE} bytes: the file is not plain text"
             raise Refusal(Finding(code, message, str(path), number))
-        if found:
-            begun = len(block) - 1 - max(last for _, last in found)
+        if line_ends:
+            line_bytes = len(block) - 1 - max(last for _, last in line_ends)
         text.write(block)
     return text.getvalue()
 

@@ -35,24 +35,24 @@ def rotation_of(angles: Floats) -> Floats:
 
 
 def angles_of(rotation: Floats, near: Floats) -> Floats:
-    """A, B, C (n, 3) [rad] of rotations (n, 3, 3) that words can say, those nearest to ``near`` (n, 3).
+    """A, B, C (n, 3) [rad] of rotations (n, 3, 3) that words can express, those nearest to ``near`` (n, 3).
 
-    A pair is told from the whole rotation, which is regular at the pole: R i = R_o i for the inner axis i.
+    A pair is computed from the whole rotation, which is regular at the pole: R i = R_o i for the inner axis i.
     """
-    columns, found = used(near), np.array(near)
+    columns, angles = used(near), np.array(near)
     if len(columns) == 3:
-        found[:] = abc_from_rotation(rotation, near[:, ::-1])[:, ::-1]
+        angles[:] = abc_from_rotation(rotation, near[:, ::-1])[:, ::-1]
     elif len(columns) == 2:
         outer, inner = columns
         o, i = np.eye(3)[[outer, inner]]
         axis = rotation @ i
-        found[:, outer] = np.arctan2(axis @ np.cross(o, i), axis @ i)
-        found[:, inner] = _inner(rotation[:, :, 2], found[:, outer], outer, inner)
+        angles[:, outer] = np.arctan2(axis @ np.cross(o, i), axis @ i)
+        angles[:, inner] = _inner(rotation[:, :, 2], angles[:, outer], outer, inner)
     elif columns == (2,):
-        found[:, 2] = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
+        angles[:, 2] = np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])
     elif columns:
-        found[:, columns[0]] = _inner(rotation[:, :, 2], np.zeros(len(near)), 2, columns[0])
-    return np.asarray(near + wrapped(found - near))
+        angles[:, columns[0]] = _inner(rotation[:, :, 2], np.zeros(len(near)), 2, columns[0])
+    return np.asarray(near + wrapped(angles - near))
 
 
 def _inner(tool: Floats, angle: Floats, outer: int, inner: int) -> Floats:
@@ -70,7 +70,7 @@ def pointing(tool: Floats, near: Floats) -> Floats:
     With p what the direction lies across the plane of the inner axis and s what it leans in it, the outer axis would
     turn by x = atan(p / s).  It turns by min(x, b, RETURN b^2 s / p), b = max(SWING, p / STEEP): all of it
     away from the pole, no more than b near it, and back to its place, continuously, at the pole itself, where it can
-    not turn the tool.  What is then left across is not said by the words.
+    not turn the tool.  What then remains across is not expressed by the words.
     """
     outer, inner = used(near)
     o, i = np.eye(3)[[outer, inner]]
@@ -84,15 +84,15 @@ def pointing(tool: Floats, near: Floats) -> Floats:
     size, bound = np.abs(change), np.maximum(SWING, np.abs(across) / STEEP)
     back = RETURN * bound * bound * np.abs(lean) / np.maximum(np.abs(across), _TINY)
     change = np.sign(change) * np.minimum(np.minimum(size, bound), back)
-    found = np.array(near)
-    found[:, outer] = near[:, outer] + change
-    found[:, inner] = _inner(tool, found[:, outer], outer, inner)
-    found[:, inner] = near[:, inner] + wrapped(found[:, inner] - near[:, inner])
-    return found
+    angles = np.array(near)
+    angles[:, outer] = near[:, outer] + change
+    angles[:, inner] = _inner(tool, angles[:, outer], outer, inner)
+    angles[:, inner] = near[:, inner] + wrapped(angles[:, inner] - near[:, inner])
+    return angles
 
 
 def reproduced(rotation: Floats, angles: Floats) -> Bools:
-    """(n,) the words (n, 3) say the rotations (n, 3, 3)."""
+    """(n,) the words (n, 3) express the rotations (n, 3, 3)."""
     return np.asarray(np.abs(rotation_of(angles) - rotation).max(axis=(1, 2)) < 1e-7)
 
 

@@ -1,4 +1,4 @@
-"""Texts of programs, robots and files as they are shown: they drive no terminal, and are read as they stand."""
+"""Texts of programs, robots and files as they are shown: they drive no terminal, and are read unchanged."""
 
 from __future__ import annotations
 

@@ -152,12 +152,12 @@ class YamlSection:
             return []
         if not isinstance(node, yaml.SequenceNode):
             raise self.error("YML004", "must be a list", key)
-        found = []
+        entries = []
         for index, item in enumerate(node.value):
             if not isinstance(item, yaml.MappingNode):
                 raise self.error("YML004", f"entry {index + 1} must contain keys and values", key)
-            found.append(YamlSection(item, self.file, f"{self._path(key)}[{index + 1}]"))
-        return found
+            entries.append(YamlSection(item, self.file, f"{self._path(key)}[{index + 1}]"))
+        return entries
 
     def number(
         self,
@@ -194,12 +194,12 @@ class YamlSection:
         items = node.value if isinstance(node, yaml.SequenceNode) else []
         if not items:
             raise self.error("YML004", f"must be a list of lists of {width} numbers", key)
-        found = []
+        rows = []
         for index, item in enumerate(items):
             if not isinstance(item, yaml.SequenceNode) or len(item.value) != width:
                 raise self.error("YML004", f"entry {index + 1} must be a list of {width} numbers", key)
-            found.append([self._as_number(value, key, unit) for value in item.value])
-        return found
+            rows.append([self._as_number(value, key, unit) for value in item.value])
+        return rows
 
     def text(self, key: str, default: object = _REQUIRED, choices: Sequence[str] = ()) -> str:
         node = self._get(key, default)

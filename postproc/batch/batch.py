@@ -12,7 +12,7 @@ from postproc.base.batches import cores
 from postproc.batch.cluster import run_on_cluster
 from postproc.batch.files_read import code_digest
 from postproc.batch.item import BatchItem
-from postproc.batch.job_file import Jobs, Said, jobs_of
+from postproc.batch.job_file import Jobs, OptionValues, jobs_of
 from postproc.batch.locking import locked
 from postproc.batch.processes import run_here
 from postproc.batch.records import lock_path
@@ -25,13 +25,13 @@ from postproc.report.batched_page import batch_page
 class BatchRequest:
     """What the user asked for.
 
-    words: one job file, or folders, files and patterns; said: fields of a ``Request`` that were said for all
+    words: one job file, or folders, files and patterns; options: fields of a ``Request`` that are set for all
     programs, and win over a job file; workers: processes, all cores by default; dask: address of a scheduler instead;
     rerun: also what is unchanged.
     """
 
     words: tuple[str, ...]
-    options: Said = field(default_factory=dict)
+    options: OptionValues = field(default_factory=dict)
     output: Path | None = None
     workers: int | None = None
     dask: str | None = None
@@ -61,7 +61,7 @@ def run_batch(request: BatchRequest, watch: Watch | None = None) -> Batched:
     program is an outcome.
     """
     watch = watch or Watch()
-    began = time.monotonic()
+    start_time = time.monotonic()
     jobs = jobs_of(request.words, request.options, request.output, request.allow_outside)
     tasks = [BatchItem(job, code_digest(), request.rerun) for job in jobs.jobs]
     names = [job.name for job in jobs.jobs]
@@ -70,23 +70,23 @@ def run_batch(request: BatchRequest, watch: Watch | None = None) -> Batched:
     def stages(number: int, stage: str) -> None:
         watch.stage(names[number], stage)
 
-    found: dict[int, Outcome] = {}
+    by_number: dict[int, Outcome] = {}
     if request.dask is not None:
         running = run_on_cluster(tasks, request.dask, stages)
     else:
         running = run_here(tasks, request.workers or cores(), stages)
     with closing(running) as done:
         for number, outcome in done:
-            found[number] = outcome
+            by_number[number] = outcome
             watch.ended(outcome)
             if request.fail_fast and outcome.exit == 1:
                 break
     outcomes = tuple(
-        found.get(number) or not_run(job.name, str(job.request.program))
+        by_number.get(number) or not_run(job.name, str(job.request.program))
         for number, job in enumerate(jobs.jobs)
     )
     skipped = tuple(str(path) for path in jobs.passed_over)
-    batched = Batched(jobs.root, outcomes, (), skipped, time.monotonic() - began)
+    batched = Batched(jobs.root, outcomes, (), skipped, time.monotonic() - start_time)
     return batched if request.options.get("dry_run") else _published(batched, request.json)
 
 

@@ -29,7 +29,7 @@ def run_on_cluster(
     """Do the tasks on the cluster whose scheduler is at ``address``; yields (number, outcome) as they are done.
 
     The scheduler gives the tasks of a worker that died to another one.  Where it is lost itself, or all of its workers
-    for longer than ``PATIENCE``, the tasks that are left fail.  Raises Refusal BAT006, before anything is done, where
+    for longer than ``PATIENCE``, the remaining tasks fail.  Raises Refusal BAT006, before anything is done, where
     the cluster is not there, has no workers, or workers of another version.
     """
     if not _ADDRESS.fullmatch(address):  # the client would wait for it, and end in a traceback
@@ -94,10 +94,10 @@ def _check(client: Any, address: str) -> None:
     except TimeoutError:
         raise _unusable(f"the cluster at {address} has no workers") from None
     try:
-        found = client.run(code_digest)
+        digests = client.run(code_digest)
     except Exception as error:  # whatever keeps a worker from importing this package
         raise _unusable(f"a worker cannot run this package: {_line(error)}") from None
-    others = sorted(worker for worker, digest in found.items() if digest != code_digest())
+    others = sorted(worker for worker, digest in digests.items() if digest != code_digest())
     if others:
         raise _unusable(
             f"some workers have another version of this package, of Python or of numpy: {', '.join(others)}"
@@ -109,9 +109,7 @@ def _distributed() -> Any:
         import distributed
     except ImportError:
         raise _unusable("the package dask.distributed is not installed", EXTRA) from None
-    logging.getLogger("distributed.client").setLevel(
-        logging.CRITICAL
-    )  # what it has to say is said here, in words
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # its message is given here, in words
     return distributed
 
 

@@ -1,6 +1,7 @@
-"""Which files a piece of work reads, and what was in them: seen where Python opens them, not foretold.
+"""Which files a piece of work reads, and what was in them: recorded where Python opens them, not predicted.
 
-A list of inputs kept by hand forgets the file that a later version reads, and a result would then pass for unchanged.
+A list of inputs maintained by hand forgets the file that a later version reads, and a result would then pass for
+unchanged.
 """
 
 from __future__ import annotations
@@ -36,15 +37,15 @@ def digest_of(path: Path | str) -> str:
 def readings() -> Iterator[dict[str, str]]:
     """Path -> digest of every file that this thread opens to read inside of the ``with``, as it was then.
 
-    The files of Python and of this package are left out; ``code_digest`` stands for them.
+    The files of Python and of this package are left out; ``code_digest`` covers them.
     """
     _install()
-    seen: dict[str, str] = {}
-    _mine.seen = seen
+    digests: dict[str, str] = {}
+    _mine.digests = digests
     try:
-        yield seen
+        yield digests
     finally:
-        _mine.seen = None
+        _mine.digests = None
 
 
 @functools.cache
@@ -72,18 +73,18 @@ def _install() -> None:
 def _opened(event: str, arguments: tuple[object, ...]) -> None:
     if event != "open":
         return
-    seen: dict[str, str] | None = getattr(_mine, "seen", None)
-    if seen is None:
+    digests: dict[str, str] | None = getattr(_mine, "digests", None)
+    if digests is None:
         return
-    _mine.seen = None  # what the digest itself opens does not count
+    _mine.digests = None  # what the digest itself opens does not count
     try:
         name, mode, flags = arguments
         if isinstance(name, str | bytes | os.PathLike) and _reads(mode, flags):
             path = os.path.abspath(os.fsdecode(name))
-            if path not in seen and not path.startswith(_others()) and not os.path.isdir(path):
-                seen[path] = digest_of(path)
+            if path not in digests and not path.startswith(_others()) and not os.path.isdir(path):
+                digests[path] = digest_of(path)
     finally:
-        _mine.seen = seen
+        _mine.digests = digests
 
 
 def _reads(mode: object, flags: object) -> bool:

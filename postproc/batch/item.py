@@ -29,22 +29,22 @@ class BatchItem:
 
 def run_item(task: BatchItem, report_stage: ReportStage = lambda stage: None) -> Outcome:
     """Do a job.  ``report_stage`` is called with each stage."""
-    began = time.monotonic()
+    start_time = time.monotonic()
     job = task.job
     try:
         if task.code != code_digest():
             message = "this worker runs another version of this package, of Python or of numpy"
             raise Refusal(Finding("BAT006", message, job.name))
         if job.request.dry_run:
-            return _outcome(job, DONE, _compensated(job, report_stage), began)
+            return _outcome(job, DONE, _compensated(job, report_stage), start_time)
         with locked(lock_path(job.target), lambda: report_stage("waiting for another batch")):
-            return _run_once(task, report_stage, began)
+            return _run_once(task, report_stage, start_time)
     except Refusal as refusal:
-        return failed(job, *refusal.findings, seconds=time.monotonic() - began)
+        return failed(job, *refusal.findings, seconds=time.monotonic() - start_time)
     except Exception as error:
         message = f"{type(error).__name__}: {error}"
         finding = Finding("BAT004", message, str(job.request.program), help=traceback.format_exc())
-        return failed(job, finding, seconds=time.monotonic() - began)
+        return failed(job, finding, seconds=time.monotonic() - start_time)
 
 
 def failed(job: Job, *findings: Finding, seconds: float = 0.0) -> Outcome:
@@ -55,18 +55,18 @@ def failed(job: Job, *findings: Finding, seconds: float = 0.0) -> Outcome:
     return Outcome(job.name, FAILED, failure("program", program, findings), seconds)
 
 
-def _run_once(task: BatchItem, report_stage: ReportStage, began: float) -> Outcome:
+def _run_once(task: BatchItem, report_stage: ReportStage, start_time: float) -> Outcome:
     job = task.job
     before = load_record(job)
     sweep(job, () if before is None else before.outputs)
     if before is not None and not task.rerun and before.holds(job):
-        return _outcome(job, UNCHANGED, before.result, began)
+        return _outcome(job, UNCHANGED, before.result, start_time)
     with readings() as inputs:
         result = _compensated(job, report_stage)
     record = Record.of(job, inputs, result)
     if record is not None:
         save_record(job, record)
-    return _outcome(job, DONE, result, began)
+    return _outcome(job, DONE, result, start_time)
 
 
 def _compensated(job: Job, report_stage: ReportStage) -> dict[str, object]:
@@ -75,5 +75,5 @@ def _compensated(job: Job, report_stage: ReportStage) -> dict[str, object]:
     return compensate(job.request, report_stage).as_json()
 
 
-def _outcome(job: Job, state: str, result: dict[str, object], began: float) -> Outcome:
-    return Outcome(job.name, state, result, time.monotonic() - began)
+def _outcome(job: Job, state: str, result: dict[str, object], start_time: float) -> Outcome:
+    return Outcome(job.name, state, result, time.monotonic() - start_time)

@@ -1,6 +1,6 @@
 """What a batch is to do: a job file, a folder or patterns, as checked jobs.
 
-All that can be known to be wrong before the first program is read is told here, and then nothing has started.
+All that can be known to be wrong before the first program is read is reported here, and then nothing has started.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ JOB_FILE = (".yaml", ".yml")
 FOLDER = "compensated"
 """Where results go that no ``output`` names, below the folder of the batch."""
 
-Said = Mapping[str, object]
-"""Options that were said: names and values of fields of a Request."""
+OptionValues = Mapping[str, object]
+"""Options that are set: names and values of fields of a Request."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,14 @@ class Jobs:
     passed_over: tuple[Path, ...] = ()
 
 
-def jobs_of(words: Sequence[str], said: Said, output: Path | None = None, outside: bool = False) -> Jobs:
+def jobs_of(
+    words: Sequence[str], command_options: OptionValues, output: Path | None = None, outside: bool = False
+) -> Jobs:
     """The jobs of the words of a command line: one job file; or folders, files and patterns.
 
-    ``said`` and ``output`` come from the command line too and win over the job file.  ``outside``: the job file may
-    name programs and outputs beyond its folder.  Raises Refusal: YML... for the job file, BAT001 (nothing matched),
-    BAT002 (two programs, one output), BAT003 (outside, also by a link), FIL007, CEL003, FRC002.
+    ``command_options`` and ``output`` come from the command line too and win over the job file.  ``outside``: the job
+    file may name programs and outputs beyond its folder.  Raises Refusal: YML... for the job file, BAT001 (nothing
+    matched), BAT002 (two programs, one output), BAT003 (outside, also by a link), FIL007, CEL003, FRC002.
     """
     files = [word for word in words if word.lower().endswith(JOB_FILE)]
     if files and len(words) > 1:
@@ -66,24 +68,24 @@ def jobs_of(words: Sequence[str], said: Said, output: Path | None = None, outsid
             )
         )
     if files:
-        return _of_file(Path(os.path.abspath(files[0])), said, output, outside)
-    found = [find_programs(word, Path.cwd()) for word in words]
-    for word, one in zip(words, found, strict=True):
+        return _of_file(Path(os.path.abspath(files[0])), command_options, output, outside)
+    matches = [find_programs(word, Path.cwd()) for word in words]
+    for word, one in zip(words, matches, strict=True):
         if not one.programs:
             raise Refusal(one.nothing(word))
-    base = Path(os.path.commonpath([one.anchor for one in found]))
+    base = Path(os.path.commonpath([one.anchor for one in matches]))
     root = base / FOLDER if output is None else Path(os.path.abspath(output))
     if output is None and not is_inside(root, base):
-        raise Refusal(Finding("BAT003", f"{root} leads out of {base}", help=LED_AWAY))
-    programs = _not_below(root, base, [path for one in found for path in one.programs])
+        raise Refusal(Finding("BAT003", f"{root} leads out of {base}", help=RESULTS_ARE_LINK))
+    programs = _not_below(root, base, [path for one in matches for path in one.programs])
     if not programs:
         raise Refusal(Finding("BAT001", "the folder contains only results of an earlier run", str(root)))
-    jobs = tuple(_job(program, base, root, said, None) for program in programs)
+    jobs = tuple(_job(program, base, root, command_options, None) for program in programs)
     _check(jobs)
-    return Jobs(root, jobs, tuple(path for one in found for path in one.passed_over))
+    return Jobs(root, jobs, tuple(path for one in matches for path in one.passed_over))
 
 
-def _of_file(path: Path, said: Said, output: Path | None, outside: bool) -> Jobs:
+def _of_file(path: Path, command_options: OptionValues, output: Path | None, outside: bool) -> Jobs:
     top = _loaded(path)
     top.only(*JOB_KEYS, *_former_in(top))
     base = path.parent
@@ -96,7 +98,7 @@ def _of_file(path: Path, said: Said, output: Path | None, outside: bool) -> Jobs
     if not (output or outside or is_inside(root, base)):
         raise _outside(top, "output", root, base)
     general = _options(top)
-    found, programs = [], {}
+    matches, programs = [], {}
     for word, place in _words(top, "programs"):
         one = find_programs(word, base)
         for program in one.programs:
@@ -107,30 +109,32 @@ def _of_file(path: Path, said: Said, output: Path | None, outside: bool) -> Jobs
                 raise Refusal(place("BAT003", f"{one.anchor} is outside of {base}", OUTSIDE))
             missing = one.nothing(word)
             raise Refusal(place(missing.code, missing.message, missing.help))
-        found.append(one)
+        matches.append(one)
         programs.update(dict.fromkeys(one.programs))
     for word, _ in _words(top, "exclude") if "exclude" in top else ():
         for program in find_programs(word, base).programs:
             programs.pop(program, None)
-    kept = _not_below(root, base, list(programs))
-    if not kept:
+    selected = _not_below(root, base, list(programs))
+    if not selected:
         raise top.error("BAT001", "no program remains: all matches are excluded, or are results", "programs")
-    special = _overrides(top, base, kept)
+    special = _overrides(top, base, selected)
     jobs = []
-    for program in kept:
+    for program in selected:
         own: dict[str, object] = {}
         for options in special.get(program, ()):
             own.update(options)
         where = own.pop("output", None)
-        job = _job(program, base, root, {**general, **own, **said}, None if where is None else str(where))
+        job = _job(
+            program, base, root, {**general, **own, **command_options}, None if where is None else str(where)
+        )
         if where is not None and not (outside or is_inside(job.target, base) or is_inside(job.target, root)):
             raise _outside(top, "overrides", job.target, base)
         jobs.append(job)
     _check(jobs, str(path))
-    return Jobs(root, tuple(jobs), tuple(path for one in found for path in one.passed_over))
+    return Jobs(root, tuple(jobs), tuple(path for one in matches for path in one.passed_over))
 
 
-LED_AWAY = "the folder of the results is a symbolic link; remove it, or name its target as the output"
+RESULTS_ARE_LINK = "the folder of the results is a symbolic link; remove it, or name its target as the output"
 
 OUTSIDE = "programs and outputs of a job file must be in its folder or below; --allow-outside permits others"
 
@@ -154,10 +158,10 @@ def _loaded(path: Path) -> YamlSection:
 _STAR = re.compile(r"(?:^|[\s\[{,])\*")
 
 
-def _overrides(top: YamlSection, base: Path, programs: Sequence[Path]) -> dict[Path, list[Said]]:
-    """What ``overrides:`` says of each program, in the order of the file: a later one wins."""
+def _overrides(top: YamlSection, base: Path, programs: Sequence[Path]) -> dict[Path, list[OptionValues]]:
+    """What ``overrides:`` states of each program, in the order of the file: a later one wins."""
     parent = top.section("overrides", None)
-    special: dict[Path, list[Said]] = {}
+    special: dict[Path, list[OptionValues]] = {}
     for pattern in parent:
         section = parent.section(pattern)
         section.only("output", *PROGRAM_KEYS, *_former_in(section))
@@ -181,13 +185,13 @@ def _not_below(root: Path, base: Path, programs: Sequence[Path]) -> list[Path]:
     return [path for path in dict.fromkeys(programs) if not (results and path.is_relative_to(root))]
 
 
-def _job(program: Path, base: Path, root: Path, options: Said, where: str | None) -> Job:
+def _job(program: Path, base: Path, root: Path, options: OptionValues, where: str | None) -> Job:
     """``where``: a file, or a folder (no suffix, or a slash at its end), below ``root``; without it the program lies
     there as it does below ``base``."""
     name = Path(os.path.relpath(program, base))
     target = root / (program.name if ".." in name.parts else name)
     if where is None and not is_inside(target.parent, root):
-        raise Refusal(Finding("BAT003", f"{target.parent} leads out of {root}", help=LED_AWAY))
+        raise Refusal(Finding("BAT003", f"{target.parent} leads out of {root}", help=RESULTS_ARE_LINK))
     if where is not None:
         target = Path(os.path.abspath(root / where))
         if where.endswith(("/", "\\")) or target.is_dir() or (program.suffix and not target.suffix):
@@ -206,7 +210,7 @@ def _check(jobs: Sequence[Job], file: str = "") -> None:
             findings.append(
                 Finding("FIL007", f"{job.name}: its output {job.target} is a program of this batch", file)
             )
-        # Reports and companions carry the stem; a controller's file system does not tell a from A.
+        # Reports and companions carry the stem; a controller's file system does not distinguish a from A.
         key = (os.path.realpath(job.target.parent), job.target.stem.casefold())
         first = taken.setdefault(key, job)
         if first is not job:
@@ -260,14 +264,14 @@ def _word(section: YamlSection, key: str) -> str:
     return word
 
 
-def _options(section: YamlSection) -> Said:
-    found = {key: read(section, key) for key, read in PROGRAM_KEYS.items() if key in section}
+def _options(section: YamlSection) -> OptionValues:
+    options = {key: read(section, key) for key, read in PROGRAM_KEYS.items() if key in section}
     for former in _former_in(section):
         key = FORMER_KEYS[former]
         if key in section:
             raise section.error("YML004", f"is the former name of {key!r}, which is given too", former)
-        found[key] = PROGRAM_KEYS[key](section, former)
-    return found
+        options[key] = PROGRAM_KEYS[key](section, former)
+    return options
 
 
 def _former_in(section: YamlSection) -> list[str]:
@@ -335,7 +339,7 @@ PROGRAM_KEYS: dict[str, Callable[[YamlSection, str], object]] = {
     "strict": _flag,
     "allow_compensated": _flag,
 }
-"""What may be said of all programs and of single ones: key, which is a field of a Request -> its reader."""
+"""What may be set for all programs and for single ones: key, which is a field of a Request -> its reader."""
 
 FORMER_KEYS = {former: key for former, key in FORMER_OPTIONS.items() if key in PROGRAM_KEYS}
 """Former name of a key -> the key."""

@@ -19,7 +19,7 @@ RACES = 1000
 def locked(path: Path, waits: Callable[[], None] = lambda: None) -> Iterator[None]:
     """Hold the lock file ``path``; while another process has it, wait, and call ``waits`` once.
 
-    The file is there only while somebody holds it or was killed with it; left behind, it is free to take.  Raises
+    The file exists only while a process has locked it or was killed with it; an orphaned one is free to take.  Raises
     Refusal FIL004 where the folder takes no file, or its file system no locks.
     """
     try:
@@ -61,7 +61,7 @@ def _acquired(path: Path, waits: Callable[[], None]) -> int:
                 waits()
                 waits = _silent
                 fcntl.flock(handle, fcntl.LOCK_EX)
-            # Who held it took its name away: a lock on a file without a name keeps nobody out.
+            # The former owner removed its name: a lock on a file without a name keeps nobody out.
             with contextlib.suppress(FileNotFoundError):
                 if os.path.samestat(os.fstat(handle), os.stat(path)):
                     return handle

@@ -27,7 +27,7 @@ SERIAL = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_
 """One thread a process: matrices are small here, and processes beside each other already use all cores."""
 
 Stages = Callable[[int, str], None]
-"""Is told the number of a task and the name of the stage that it is at."""
+"""Receives the number of a task and the name of the stage that it is at."""
 
 _SPAWN = multiprocessing.get_context("spawn")
 
@@ -37,7 +37,7 @@ def run_here(
 ) -> Generator[tuple[int, Outcome], None, None]:
     """Do the tasks in ``workers`` processes; yields (number, outcome) as they are done.
 
-    Large programs begin first, so that none of them is alone at the end.  Closed early, what is in work is given up.
+    Large programs start first, so that none of them is alone at the end.  Closed early, what is in work is given up.
     """
     for name in SERIAL:
         os.environ.setdefault(name, "1")
@@ -95,7 +95,7 @@ class _Worker:
     def __init__(self) -> None:
         self.pipe, other = _SPAWN.Pipe()
         self.process: BaseProcess = _SPAWN.Process(target=_serve, args=(other,), daemon=True)
-        with _interrupt_held():
+        with _block_interrupt():
             self.process.start()
         other.close()
         self.number: int | None = None
@@ -108,12 +108,12 @@ class _Worker:
             self.pipe.send(tasks[number])
 
     def answer(self) -> Outcome | str | None:
-        """What the process says next: a stage, or an outcome; None if it is gone."""
+        """What the process sends next: a stage, or an outcome; None if it is gone."""
         try:
-            said: Outcome | str = self.pipe.recv()
+            message: Outcome | str = self.pipe.recv()
         except (EOFError, OSError):
             return None
-        return said
+        return message
 
     def ending(self) -> str:
         self.process.join()
@@ -121,7 +121,7 @@ class _Worker:
         return signal.Signals(-code).name if code < 0 else f"code {code}"
 
     def end(self) -> None:
-        """Idle ones see the end of their pipe; one at work is told to leave, and takes its half-written files along."""
+        """Idle ones see the end of their pipe; one at work is terminated, and removes its half-written files."""
         self.pipe.close()
         if self.number is not None:
             self.process.terminate()
@@ -129,7 +129,7 @@ class _Worker:
 
 
 @contextlib.contextmanager
-def _interrupt_held() -> Iterator[None]:
+def _block_interrupt() -> Iterator[None]:
     """Ctrl-C waits: a process started meanwhile inherits that, and is not interrupted before it can ignore it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
@@ -146,7 +146,7 @@ def _serve(pipe: Connection) -> None:
     """The life of a worker process."""
     # a Ctrl-C is the business of the process that started it all
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _leave)
+    signal.signal(signal.SIGTERM, _exit_on_signal)
     threading.Thread(target=_follow, daemon=True).start()
     with contextlib.closing(pipe):
         while True:
@@ -168,5 +168,5 @@ def _follow() -> None:
         os._exit(1)
 
 
-def _leave(_number: int, _frame: FrameType | None) -> None:
+def _exit_on_signal(_number: int, _frame: FrameType | None) -> None:
     sys.exit(128 + signal.SIGTERM)

@@ -20,7 +20,7 @@ _MAGIC = frozenset("*?[")
 
 
 @dataclass(frozen=True)
-class Found:
+class ProgramMatches:
     """What a word names.  ``anchor``: the folder below which it was looked for; ``passed_over``: files that match and
     are of no known language, nor belong to a program.  Paths are absolute and in order."""
 
@@ -45,14 +45,14 @@ def is_inside(path: Path, folder: Path) -> bool:
     return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
 
 
-def find_programs(word: str, folder: Path) -> Found:
+def find_programs(word: str, folder: Path) -> ProgramMatches:
     """The programs that ``word`` names, relative to ``folder``.
 
     A file counts whatever it holds; of a folder or a pattern those that a dialect claims.
     """
     path = Path(os.path.abspath(folder / word))
     if path.is_file():
-        return Found(path.parent, (path,))
+        return ProgramMatches(path.parent, (path,))
     if path.is_dir():
         return _claimed(path, [entry for entry in path.iterdir() if not entry.name.startswith(".")])
     fixed = next((i for i, part in enumerate(path.parts) if _MAGIC & set(part)), len(path.parts) - 1)
@@ -70,14 +70,16 @@ def _hidden(match: Path, pattern: tuple[str, ...]) -> bool:
     return any(part.startswith(".") or part == RESULTS for part in parts) or match.name.startswith(".")
 
 
-def _claimed(anchor: Path, paths: list[Path]) -> Found:
+def _claimed(anchor: Path, paths: list[Path]) -> ProgramMatches:
     programs: list[Path] = []
     others: list[Path] = []
     for path in sorted(paths):
         if path.is_file():
             (programs if _is_program(path) else others).append(path)
     known = {path.with_suffix("") for path in programs}
-    return Found(anchor, tuple(programs), tuple(path for path in others if not _belongs(path, known)))
+    return ProgramMatches(
+        anchor, tuple(programs), tuple(path for path in others if not _belongs(path, known))
+    )
 
 
 def _belongs(path: Path, programs: set[Path]) -> bool:

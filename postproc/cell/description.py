@@ -60,8 +60,8 @@ class Cell:
     tolerance, max_correction, min_segment [m]; tolerance_angle [rad].  ``force`` is the text of the key, a path
     in it is relative to the cell file; ``force_line`` is where it is.  ``force_ci95``: half width of the 95 %
     interval of all forces, as a share of them; None where nothing is stated.  ``dialect``: name of the programs'
-    language, where their names and contents do not tell it; ``config_dat``: the controller's $config.dat, relative to
-    the cell file.  ``force_vector``: intervals of the forces besides their scale; ``force_ramp`` [m]: the path over
+    language, where their names and contents do not identify it; ``config_dat``: the controller's $config.dat, relative
+    to the cell file.  ``force_vector``: intervals of the forces besides their scale; ``force_ramp`` [m]: the path over
     which a force changes, None where it is not stated.  ``correct``: one of ``MODES``; ``touch_points``: number of a
     base -> (K, 3) [m] places in it at which it was touched off, None for the one base that a program uses;
     ``touch_line`` is where they are.  ``temperature`` [degC] of the robot.

@@ -1,6 +1,6 @@
 """The cell file ``cell.yaml``, read and checked.
 
-The file speaks mm and deg; what is made of it is SI and radians.
+The file is in mm and deg; what is read is in SI units and radians.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from postproc.robot.read_external_axes import read_external
 NAME = "cell.yaml"
 
 SAME_PLACE = 1.0 * MM
-"""Touch points that are nearer to each other than this say nothing of a direction."""
+"""Touch points that are nearer to each other than this do not determine a direction."""
 ON_A_LINE = 0.01
 """Touch points lie on a line where their extent across it is less than this share of that along it."""
 
@@ -165,12 +165,12 @@ def _positive(section: YamlSection, key: str, default: float, unit: str) -> floa
 def _numbered(top: YamlSection, key: str) -> list[tuple[int, YamlSection]]:
     """The sections under ``key`` by number, which counts from 1."""
     parent = top.section(key, None)
-    found = []
+    sections = []
     for name in parent:
         if not _NUMBER.match(name):
             raise parent.error("YML004", "is not a number from 1", name, f"{key} are numbered: 1, 2, ...")
-        found.append((int(name), parent.section(name)))
-    return found
+        sections.append((int(name), parent.section(name)))
+    return sections
 
 
 def _frame(section: YamlSection, *more: str) -> Poses:
@@ -235,7 +235,7 @@ def _force_interval(top: YamlSection) -> tuple[float | None, ForceVectorInterval
 
 
 def _touch_points(top: YamlSection, correct: str) -> dict[int | None, Floats]:
-    """The places at which bases were touched off, by the number of the base; None stands for the only one."""
+    """The places at which bases were touched off, by the number of the base; None is the only one."""
     if (correct == "touched_off") != ("touch_points" in top):
         if correct == "touched_off":
             raise top.error(
@@ -250,14 +250,14 @@ def _touch_points(top: YamlSection, correct: str) -> dict[int | None, Floats]:
     if top.is_list("touch_points"):
         return {None: _places(top, "touch_points")}
     numbered = top.section("touch_points")
-    found: dict[int | None, Floats] = {}
+    places: dict[int | None, Floats] = {}
     for name in numbered:
         if not _NUMBER.match(name):
             raise numbered.error("YML004", "is not a number from 1", name, "bases are numbered: 1, 2, ...")
-        found[int(name)] = _places(numbered, name)
-    if not found:
+        places[int(name)] = _places(numbered, name)
+    if not places:
         raise top.error("YML003", "contains no touch point", "touch_points")
-    return found
+    return places
 
 
 def _places(section: YamlSection, key: str) -> Floats:
@@ -307,7 +307,7 @@ def _axis(section: YamlSection) -> Floats:
         largest = np.max(np.abs(vector))
         if largest == 0:
             raise section.error("YML004", "has no direction", "axis")
-        vector /= largest  # squares of very large or small numbers leave the range
+        vector /= largest  # squares of very large or small numbers overflow or underflow
         return frozen(vector / np.linalg.norm(vector), (3,))
     word = section.text("axis", "+z").strip().lower()
     if word not in AXES:

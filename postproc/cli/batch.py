@@ -133,7 +133,7 @@ def batch(
         force = os.path.abspath(force)
     if robot is not None and robot.lower().endswith((".yaml", ".yml")):
         robot = os.path.abspath(robot)
-    said = {
+    options = {
         "force": force,
         "robot": robot,
         "cell": None if cell is None else Path(os.path.abspath(cell)),
@@ -149,7 +149,7 @@ def batch(
     out = Out(json_to, quiet, verbose)
     request = BatchRequest(
         words=jobs,
-        options={key: value for key, value in said.items() if value is not None},
+        options={key: value for key, value in options.items() if value is not None},
         output=output,
         workers=workers,
         dask=dask,
@@ -200,7 +200,7 @@ def _watched(out: Out) -> Iterator[Watch | None]:
 
         def __init__(self) -> None:
             self.at: dict[str, str] = {}
-            self.motions, self.began = 0, time.monotonic()
+            self.motions, self.start_time = 0, time.monotonic()
             self.task = progress.add_task("", total=None, rate="")
 
         def started(self, jobs: Jobs) -> None:
@@ -208,17 +208,17 @@ def _watched(out: Out) -> Iterator[Watch | None]:
 
         def stage(self, name: str, stage: str) -> None:
             self.at[name] = stage
-            self._tell()
+            self._show()
 
         def ended(self, outcome: Outcome) -> None:
             self.at.pop(outcome.name, None)
             self.motions += int(outcome.result.get("motions", 0)) if outcome.state == "done" else 0
             progress.advance(self.task)
-            self._tell()
+            self._show()
 
-        def _tell(self) -> None:
+        def _show(self) -> None:
             words = ", ".join(f"{escape(sanitize(name))}: {stage}" for name, stage in self.at.items())
-            rate = self.motions / max(time.monotonic() - self.began, 1e-3)
+            rate = self.motions / max(time.monotonic() - self.start_time, 1e-3)
             progress.update(
                 self.task, description=words, rate=f"{rate:.0f} motions/s" if self.motions else ""
             )

@@ -267,7 +267,7 @@ def page_option(command: _Command) -> _Command:
 
 
 def residual_options(command: _Command) -> _Command:
-    """What is left of every reading as a table, and how warnings count."""
+    """The residual of every reading as a table, and how warnings count."""
     for decorate in reversed(
         (
             click.option(
@@ -345,7 +345,7 @@ class Out:
 
     @contextlib.contextmanager
     def stages(self) -> Iterator[Callable[[str], None]]:
-        """A function that names the stage at hand; shown on a terminal once the work takes over a second."""
+        """A function that names the current stage; shown on a terminal once the work takes over a second."""
         if self.quiet or not sys.stderr.isatty():
             yield lambda name: None
             return

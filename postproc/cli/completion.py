@@ -35,7 +35,7 @@ class Commands(click.Group):
             raise click.UsageError(f"No such option {error.option_name!r}.{hint}", error.ctx) from None
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-        """Commands, and files: a program may stand in place of a command."""
+        """Commands, and files: a program may be in the place of a command."""
         items = super().shell_complete(ctx, incomplete)
         if incomplete.startswith("-"):
             return items + self.commands["program"].shell_complete(ctx, incomplete)

@@ -28,15 +28,15 @@ def _targets(
     context: click.Context, option: click.Parameter, texts: tuple[str, ...]
 ) -> tuple[tuple[str, Numbers], ...]:
     """``NAME=x,y,z``, each name once."""
-    found: dict[str, Numbers] = {}
+    places: dict[str, Numbers] = {}
     for text in texts:
         name, equals, place = (part.strip() for part in text.partition("="))
         if not equals or not name or any(sign in name for sign in ',;"#:'):
             raise click.BadParameter(f"{text[:40]!r} is not NAME=x,y,z")
-        if name.casefold() in map(str.casefold, found):
+        if name.casefold() in map(str.casefold, places):
             raise click.BadParameter(f"{name!r} occurs twice")
-        found[name] = numbers((3,), "x,y,z")(context, option, place)
-    return tuple(found.items())
+        places[name] = numbers((3,), "x,y,z")(context, option, place)
+    return tuple(places.items())
 
 
 def _place(context: click.Context, option: click.Parameter, text: str | None) -> Numbers | None:
@@ -65,15 +65,15 @@ def _limits(
     _context: click.Context, _option: click.Parameter, texts: tuple[str, ...]
 ) -> tuple[tuple[str, Range], ...]:
     """``A2=-140:-20``, each joint once."""
-    found: dict[str, Range] = {}
+    ranges: dict[str, Range] = {}
     for text in texts:
         name, equals, ends = (part.strip() for part in text.partition("="))
         if not equals or not name:
             raise click.BadParameter(f"{text[:40]!r} is not JOINT=a:b")
-        if name.casefold() in map(str.casefold, found):
+        if name.casefold() in map(str.casefold, ranges):
             raise click.BadParameter(f"{name!r} occurs twice")
-        found[name] = _ends(ends)
-    return tuple(found.items())
+        ranges[name] = _ends(ends)
+    return tuple(ranges.items())
 
 
 def _pair(context: click.Context, option: click.Parameter, text: str | None) -> tuple[str, ...] | None:

@@ -15,7 +15,7 @@ SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP"
 
 
 class Stopped(SystemExit):
-    """A signal ends the run; ``code``: 128 + its number, as a shell expects; ``words``: what is said of it."""
+    """A signal ends the run; ``code``: 128 + its number, as a shell expects; ``words``: what is reported of it."""
 
     words = "interrupted"
 

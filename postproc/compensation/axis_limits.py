@@ -30,20 +30,20 @@ def check_limits(
 ) -> tuple[list[Finding], dict[int, Finding]]:
     """What is to be reported of the motions of ``division``; and the rows that cannot be corrected, with the reason.
 
-    Told is what the correction adds: what the program as it is does too is no news.
+    Reported is only what the correction adds, not what the uncorrected program does too.
     """
     rows = np.flatnonzero(division.moved & (task.track.status[division.source] >= 0))
     if not len(rows):
         return [], {}
-    found = _LimitFindings(task, division)
+    collector = _LimitFindings(task, division)
     for block in in_blocks(lambda part: _looked(task, division, rows, part), len(rows)):
-        found.put(block)
-    return found.findings(), found.held
+        collector.put(block)
+    return collector.findings(), collector.uncorrectable
 
 
 class _LimitBlock(NamedTuple):
     """What is found of the motions ``rows`` (K,) of a division.  beyond (K,): an axis is, the number of which is axis
-    (K,); near (K, n) [rad, m]: what is left to a limit that the correction brings an axis close to, infinite elsewhere;
+    (K,); near (K, n) [rad, m]: the distance to a limit that the correction brings an axis close to, infinite elsewhere;
     singular (K,): newly so; share (K, n): of the speed that an axis can have."""
 
     rows: Ints
@@ -85,7 +85,7 @@ def _looked(task: CompensationProblem, division: Subdivision, rows: Ints, part: 
 def _shares(
     task: CompensationProblem, division: Subdivision, motions: Ints, place: Floats, q: Floats
 ) -> Floats:
-    """(K, n) speeds that the axes ``q`` (K, n) need on the way from the command before, at the programmed feed, over
+    """(K, n) speeds that the axes ``q`` (K, n) need on the path from the command before, at the programmed feed, over
     those that they can have; 0 where that is not known.  ``place`` (K, 3) [m] of the commands."""
     speeds, share = task.model.robot.speeds, np.zeros(q.shape)
     if not np.isfinite(speeds).any():
@@ -104,9 +104,9 @@ class _LimitFindings:
 
     def __init__(self, task: CompensationProblem, division: Subdivision) -> None:
         self.task, self.division = task, division
-        self.held: dict[int, Finding] = {}
+        self.uncorrectable: dict[int, Finding] = {}
         self.near, self.singular, self.over = 0, 0, 0
-        # of each block: what is left to a limit and the share of a speed, with motion and axis
+        # of each block: the distance to a limit and the share of a speed, with motion and axis
         self.nearest: list[tuple[float, int, int]] = []
         self.fastest: list[tuple[float, int, int]] = []
         self.first: list[int] = []
@@ -116,7 +116,7 @@ class _LimitFindings:
         for k in np.flatnonzero(block.beyond).tolist():
             message = f"an inserted motion moves {joints[int(block.axis[k])].name} beyond its limit"
             row = int(source[block.rows[k]])
-            self.held[row] = _at(self.task, row, "COR008", message)
+            self.uncorrectable[row] = _at(self.task, row, "COR008", message)
         k, axis = divmod(int(np.argmin(block.near)), block.near.shape[1])
         self.near += int(np.isfinite(block.near).any(axis=1).sum())
         self.nearest.append((float(block.near[k, axis]), int(block.rows[k]), axis))
@@ -127,16 +127,16 @@ class _LimitFindings:
         self.fastest.append((float(block.share[k, axis]), int(block.rows[k]), axis))
 
     def findings(self) -> list[Finding]:
-        robot, told = self.task.model.robot, []
+        robot, findings = self.task.model.robot, []
         if self.near:
-            left, motion, axis = min(self.nearest)
+            margin, motion, axis = min(self.nearest)
             joint = robot.joints[axis]
             unit, word = (DEG, "deg") if joint.kind == "revolute" else (MM, "mm")
-            message = f"the correction moves {joint.name} to {left / unit:.2f} {word} from its limit"
-            told.append(self._finding("KIN008", motion, message, self.near))
+            message = f"the correction moves {joint.name} to {margin / unit:.2f} {word} from its limit"
+            findings.append(self._finding("KIN008", motion, message, self.near))
         if self.singular:
             message = f"the corrected pose is close to a singularity ({singular_words(robot)})"
-            told.append(self._finding("KIN003", self.first[0], message, self.singular))
+            findings.append(self._finding("KIN003", self.first[0], message, self.singular))
         if self.over:
             share, motion, axis = max(self.fastest, key=lambda one: one[0])
             joint, speed = robot.joints[axis], robot.speeds[axis]
@@ -145,8 +145,8 @@ class _LimitFindings:
                 f"{joint.name} needs {share * speed / unit:.1f} {word} at the programmed feed,"
                 f" its speed limit is {speed / unit:g} {word}"
             )
-            told.append(self._finding("KIN009", motion, message, self.over))
-        return told
+            findings.append(self._finding("KIN009", motion, message, self.over))
+        return findings
 
     def _finding(self, code: str, motion: int, message: str, count: int) -> Finding:
         more = "" if count == 1 else f" ({count} motions)"

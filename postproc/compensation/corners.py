@@ -23,16 +23,16 @@ from postproc.compensation.subdivision import Subdivision, subdivided_motions
 from postproc.toolpath import Role
 
 SAMPLES = np.linspace(0.0, 1.0, 9)
-"""Where the output's corner is looked at."""
+"""Where the output's corner is evaluated."""
 
 DRAWN = 24
 """Straight segments by which the original's parabola is drawn: off by less than a thousandth of what it rounds off."""
 
 LITTLE = 0.1
-"""Share of the tolerance: corners that round off less are not looked at."""
+"""Share of the tolerance: corners that round off less are not evaluated."""
 
 MOST = 2000
-"""Corners looked at: those that round off most."""
+"""Corners evaluated: those that round off most."""
 
 
 @dataclass(frozen=True)
@@ -60,22 +60,22 @@ def compare_corners(task: CompensationProblem, result: CorrectionResult, divisio
         )
         return _differences(task, *sides, distance[part], _original(task, row[part], distance[part]))
 
-    found = [np.empty(0), *in_blocks(of_original, len(row), rows=256)]
-    bent, inner, free = _inserted(task, result, division)
+    differences = [np.empty(0), *in_blocks(of_original, len(row), rows=256)]
+    inserted, inner, free = _inserted(task, result, division)
 
     def of_inserted(part: slice) -> Floats:
         sides = (
-            subdivided_motions(task, division, bent[part]),
-            subdivided_motions(task, division, bent[part] + 1),
+            subdivided_motions(task, division, inserted[part]),
+            subdivided_motions(task, division, inserted[part] + 1),
         )
         return _differences(task, *sides, inner[part], _through(task, *sides, inner[part]))
 
-    found += in_blocks(of_inserted, len(bent), rows=256)
+    differences += in_blocks(of_inserted, len(inserted), rows=256)
     return Corners(
-        np.concatenate([row, division.source[bent]]),
+        np.concatenate([row, division.source[inserted]]),
         np.concatenate([distance, inner]),
         np.concatenate([unknown, free]),
-        np.concatenate(found),
+        np.concatenate(differences),
     )
 
 
@@ -170,12 +170,12 @@ def _differences(
     reach = np.minimum(distance, 0.5 * np.minimum(long_back, long_ahead))
     curve = _parabola(before, after, reach, SAMPLES)
 
-    # the force belongs to the place of the wanted path that a command stands for
-    left = before.last - (before.last - before.first) * reach / long_back
-    joined = after.first + (after.last - after.first) * reach / long_ahead
+    # the force belongs to the place of the wanted path that a command is made for
+    exit_share = before.last - (before.last - before.first) * reach / long_back
+    entry_share = after.first + (after.last - after.first) * reach / long_ahead
     part, back = np.abs(2.0 * SAMPLES - 1.0), SAMPLES <= 0.5
     rows = np.where(back, before.rows[:, None], after.rows[:, None]).ravel()
-    ends = np.where(back, left[:, None], joined[:, None])
+    ends = np.where(back, exit_share[:, None], entry_share[:, None])
     meet = np.where(back, before.last[:, None], after.first[:, None])
     share = (meet + part * (ends - meet)).ravel()
     command = Poses(np.repeat(before.end.rotation, many, axis=0), curve.reshape(-1, 3))
@@ -205,8 +205,8 @@ def _through(
     reach = 2.0 * distance / np.maximum(task.desired_path.length[before.rows], 1e-12)
     low, high = np.maximum(before.last - reach, before.first), np.minimum(before.last + reach, after.last)
     share = low + np.linspace(0.0, 1.0, DRAWN + 1)[:, None] * (high - low)
-    found = task.desired_path.at(np.tile(before.rows, DRAWN + 1), share.ravel()).position
-    return np.swapaxes(found.reshape(DRAWN + 1, -1, 3), 0, 1)
+    points = task.desired_path.at(np.tile(before.rows, DRAWN + 1), share.ravel()).position
+    return np.swapaxes(points.reshape(DRAWN + 1, -1, 3), 0, 1)
 
 
 def _distance(points: Floats, drawn: Floats) -> Floats:

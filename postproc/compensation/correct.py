@@ -29,8 +29,8 @@ from postproc.toolpath import Kind
 class MotionOutcome(IntEnum):
     AIR = 0  # nothing to correct
     CORRECTED = 1
-    UNCORRECTED = 2  # could not be corrected, told
-    OFF = 3  # left alone on the program's own word (COMPENSATE OFF)
+    UNCORRECTED = 2  # could not be corrected, reported
+    OFF = 3  # switched off by the program (COMPENSATE OFF)
     LEAD_IN = 4  # in air, and ends where the cut after it starts corrected
 
 
@@ -40,7 +40,7 @@ class CorrectionResult:
     place minus the wanted one, 0 where nothing is corrected; turn (N, 3) [rad]: by how much they are
     meant to be turned, NaN after the writing; before, after (N,) [m] predicted position error, NaN where
     nothing is predicted, and before_angle, after_angle (N,) [rad]; deflection (N, 3) [m] before; iterations (N,);
-    history (K + 1, N) [m]; findings.  across_after (N,) [m]: the part of the error after across the feed, known behind
+    history (K + 1, N) [m]; findings.  across_after (N,) [m]: the part of the error after across the feed, known after
     the writing."""
 
     state: Ints
@@ -72,14 +72,14 @@ class CorrectionResult:
 def correct(task: CompensationProblem) -> CorrectionResult:
     """Correct every motion that can be.
 
-    Raises Refusal: a cutting pose out of reach (KIN001), a configuration that nothing says (KIN004), a correction
+    Raises Refusal: a cutting pose out of reach (KIN001), a configuration that nothing states (KIN004), a correction
     larger than the cell allows (COR002).
     """
     path, track, n = task.toolpath, task.track, len(task.toolpath)
     cartesian = path.known & ~path.on_axes
     forced = task.carries
     scope = forced if task.process else forced | cartesian
-    # In air every motion stands for itself; a cut stands and falls as a whole.
+    # In air every motion is corrected by itself; a cut is corrected as a whole or not at all.
     cut = (
         number_cuts(scope, path.executes)
         if task.process
@@ -93,15 +93,17 @@ def correct(task: CompensationProblem) -> CorrectionResult:
         why.setdefault(int(row), _at(task, int(row), "COR004", "COMPENSATE is switched inside this cut"))
 
     # What the force does, everywhere it can be predicted; the correction, where it may be made.
-    seen = np.flatnonzero(scope & cartesian & (track.status >= 0) & track.reachable)
+    predictable = np.flatnonzero(scope & cartesian & (track.status >= 0) & track.reachable)
     may = on & ~spread_over_cuts(_in(why, n), cut)
-    found = _Findings(n)
-    for block in in_blocks(lambda part: _correct_block(task, seen[part], may[seen[part]]), len(seen)):
-        found.put(block)
-    found.judged(task, why, findings)
-    keeps = found.tried & ~spread_over_cuts(_in(why, n), cut)
+    corrections = _Findings(n)
+    for block in in_blocks(
+        lambda part: _correct_block(task, predictable[part], may[predictable[part]]), len(predictable)
+    ):
+        corrections.put(block)
+    corrections.judged(task, why, findings)
+    keeps = corrections.tried & ~spread_over_cuts(_in(why, n), cut)
 
-    shift, turn = task.gain * found.shift, task.gain * found.turn
+    shift, turn = task.gain * corrections.shift, task.gain * corrections.turn
     shift[~keeps], turn[~keeps] = 0.0, 0.0
     size = lengths(shift)
     _refuse(
@@ -118,24 +120,24 @@ def correct(task: CompensationProblem) -> CorrectionResult:
     state[off] = MotionOutcome.OFF
     state[keeps] = MotionOutcome.CORRECTED
     findings += uncorrected_findings(task.file, path, cut, why)
-    found.warn_sides(task, keeps, findings)
-    _warn_singular(task, seen[forced[seen]], findings)
+    corrections.warn_sides(task, keeps, findings)
+    _warn_singular(task, predictable[forced[predictable]], findings)
     moved = np.flatnonzero(keeps)
-    after, after_angle = found.before.copy(), found.before_angle.copy()
-    after[moved], after_angle[moved] = found.error[moved], found.angle[moved]
+    after, after_angle = corrections.before.copy(), corrections.before_angle.copy()
+    after[moved], after_angle[moved] = corrections.error[moved], corrections.angle[moved]
     result = CorrectionResult(
         state,
         cut,
         PoseRows(n, lambda rows: _moved(task.wanted[rows], shift[rows], turn[rows])),
         shift,
         turn,
-        found.deflection,
-        found.before,
-        found.before_angle,
+        corrections.deflection,
+        corrections.before,
+        corrections.before_angle,
         after,
         after_angle,
-        found.iterations,
-        found.history,
+        corrections.iterations,
+        corrections.history,
         tuple(findings),
     )
     # What the mirror found holds for the whole correction, and where it corrects all that shows.
@@ -199,12 +201,12 @@ def _correct_block(task: CompensationProblem, rows: Ints, may: Bools) -> _Correc
     wanted, wrench = task.wanted[rows], task.wrench[rows]
     goal = task.goal(rows, wanted)
     q = task.track.q[rows]
-    start, bent = task.start_command(rows, wanted, wrench, goal, q if goal is wanted else None)
-    here = task.simulated(rows, wanted, wrench, bent, q)
+    start, displacement = task.start_command(rows, wanted, wrench, goal, q if goal is wanted else None)
+    here = task.simulated(rows, wanted, wrench, displacement, q)
     shift, turn = task.visible_errors(rows, here.pose, goal)
     shift[~here.settled], turn[~here.settled] = np.nan, np.nan
     tried, wanted = rows[may], wanted[may]
-    done = task.command(tried, wanted, wrench[may], goal[may], (start[may], bent[may]))
+    done = task.command(tried, wanted, wrench[may], goal[may], (start[may], displacement[may]))
     path, robot = task.toolpath, task.model.robot
     low, high = robot.limits.T
     crossed = path.configuration.stated[tried] & (path.kind[tried] == Kind.PTP)
@@ -281,7 +283,7 @@ class _Findings:
             _note(task, why, findings, rows[~_in(why, len(self.before))[rows]], code, words[code])
 
     def warn_sides(self, task: CompensationProblem, keeps: Bools, findings: list[Finding]) -> None:
-        """S and T stand verbatim in the text: they must still be those of the corrected pose."""
+        """S and T are verbatim in the text: they must still be those of the corrected pose."""
         crossed = np.array([row for row in self.crossed if keeps[row]], np.int64)
         if len(crossed):
             message = (
@@ -354,7 +356,7 @@ def _note(
     code: str,
     message: str,
 ) -> None:
-    """Say it once for all ``rows``, and remember it for each."""
+    """Report it once for all ``rows``, and remember it for each."""
     if len(rows):
         why.update(dict.fromkeys(rows.tolist(), _at(task, int(rows[0]), code, message)))
         findings.append(_at(task, int(rows[0]), code, message + _further_findings(task, rows)))

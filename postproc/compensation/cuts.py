@@ -31,11 +31,11 @@ def spread_over_cuts(blocked: Bools, cut: Ints) -> Bools:
 
 
 def feed_motions(toolpath: Toolpath) -> Bools:
-    """(N,) what ``COMPENSATE OFF`` / ``COMPENSATE ON`` comments say; a motion before the first of them is on."""
+    """(N,) what ``COMPENSATE OFF`` / ``COMPENSATE ON`` comments state; a motion before the first of them is on."""
     on = np.ones(len(toolpath), bool)
     for note in toolpath.annotations:
-        if found := _SWITCH.match(note.text.strip()):
-            on[note.row :] = found[1].upper() == "ON"
+        if match := _SWITCH.match(note.text.strip()):
+            on[note.row :] = match[1].upper() == "ON"
     return on
 
 
@@ -58,12 +58,12 @@ def uncorrected_findings(
 ) -> list[Finding]:
     """One finding for every cut (``cut`` (N,), -1 in none) that is not changed, with the first reason in it."""
     findings = []
-    inside, held = np.flatnonzero(cut >= 0), np.array(sorted(why), int)
-    held = held[cut[held] >= 0]
-    held = held[np.unique(cut[held], return_index=True)[1]]  # the first of each cut
-    start, stop = (np.searchsorted(cut[inside], cut[held], side) for side in ("left", "right"))
+    inside, reason_rows = np.flatnonzero(cut >= 0), np.array(sorted(why), int)
+    reason_rows = reason_rows[cut[reason_rows] >= 0]
+    reason_rows = reason_rows[np.unique(cut[reason_rows], return_index=True)[1]]  # the first of each cut
+    start, stop = (np.searchsorted(cut[inside], cut[reason_rows], side) for side in ("left", "right"))
     for row, first, last, count in zip(
-        held.tolist(), inside[start], inside[stop - 1], stop - start, strict=True
+        reason_rows.tolist(), inside[start], inside[stop - 1], stop - start, strict=True
     ):
         reason = why[row]
         place = f"line {toolpath.line[row]}: " if toolpath.line[row] else ""

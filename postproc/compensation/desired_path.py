@@ -38,7 +38,7 @@ class DesiredPath:
     """N motions.  start, end: TCP poses, NaN where unknown; sweep (N,) of arcs, NaN elsewhere; traceable (N,): LIN and
     CIRC whose path is known from start to end; length (N,) [m], 0 where it is not; angle (N,) [rad]: between the
     orientations at start and end, infinite where the tool turns otherwise than evenly about one axis, NaN where it is
-    not known; half_turns: which way they turn."""
+    not known; half_turns: in which sense they turn."""
 
     path: Toolpath
     start: PoseRows
@@ -61,28 +61,28 @@ class DesiredPath:
     ) -> DesiredPath:
         """``wanted`` (N): targets in the robot base; ``base``, ``tool`` (N): frames of each motion."""
         n = len(path)
-        begin = start_poses(wanted, path, tool, robot, track, external).remembered()
+        starts = start_poses(wanted, path, tool, robot, track, external).remembered()
         known = np.isin(path.kind, (Kind.LIN, Kind.CIRC)) & path.known
         length, angle = np.zeros(n), np.full(n, np.nan)
-        desired_path = DesiredPath(path, begin, wanted, base, known, length, angle, track.half_turns)
+        desired_path = DesiredPath(path, starts, wanted, base, known, length, angle, track.half_turns)
         unlike = path.arcs.turns_along | (path.orientation_control.path != OrientationPath.SINGLE_AXIS)
 
         def measured(block: slice) -> None:
             rows = np.arange(block.start, block.stop)
-            start, target = begin[rows], wanted[rows]
+            start, target = starts[rows], wanted[rows]
             end = target.position
-            way = np.linalg.norm(end - start.position, axis=1)
-            known[block] &= np.isfinite(way) & np.isfinite(start.rotation[:, 0, 0])
+            distance = np.linalg.norm(end - start.position, axis=1)
+            known[block] &= np.isfinite(distance) & np.isfinite(start.rotation[:, 0, 0])
             at = np.flatnonzero(known[block])
             angle[rows[at]] = lengths(turn_between(start.rotation[at], target.rotation[at]))
             angle[rows[unlike[rows]]] = np.inf
-            bent = np.flatnonzero(desired_path.arc[rows])
-            if len(bent):
-                centre, normal, sweep = desired_path.circles(rows[bent])
-                radius = np.linalg.norm(start.position[bent] - centre, axis=1)
-                rise = np.sum((end[bent] - start.position[bent]) * normal, axis=1)
-                way[bent] = np.hypot(radius * sweep, rise)
-            length[block] = np.where(known[block], way, 0.0)
+            arcs = np.flatnonzero(desired_path.arc[rows])
+            if len(arcs):
+                centre, normal, sweep = desired_path.circles(rows[arcs])
+                radius = np.linalg.norm(start.position[arcs] - centre, axis=1)
+                rise = np.sum((end[arcs] - start.position[arcs]) * normal, axis=1)
+                distance[arcs] = np.hypot(radius * sweep, rise)
+            length[block] = np.where(known[block], distance, 0.0)
 
         each_block(measured, n)
         return desired_path
@@ -104,20 +104,21 @@ class DesiredPath:
         return centre, turned(base.rotation, self.path.arcs.normal[rows]), self.path.arcs.sweep[rows]
 
     def at(self, rows: Ints, share: Floats) -> Poses:
-        """Poses (K) at the shares (K,) of the ways of ``rows`` (K,): straight or round, turning as the program says."""
+        """Poses (K) at the shares (K,) of the paths of ``rows`` (K,): straight or round, turning as the program
+        states."""
         start, end = self.start[rows], self.end[rows]
-        found = interpolate_poses(start, end, share)
-        self._turn(rows, start, end, share, found)
-        self.turn(rows, np.zeros(len(rows)), np.ones(len(rows)), start, end, share, found)
-        bent = np.flatnonzero(np.isfinite(self.sweep[rows]))
-        if len(bent):
-            found.position[bent] = on_arc(
-                start.position[bent], end.position[bent], *self.circles(rows[bent]), share[bent]
+        poses = interpolate_poses(start, end, share)
+        self._turn(rows, start, end, share, poses)
+        self.turn(rows, np.zeros(len(rows)), np.ones(len(rows)), start, end, share, poses)
+        arcs = np.flatnonzero(np.isfinite(self.sweep[rows]))
+        if len(arcs):
+            poses.position[arcs] = on_arc(
+                start.position[arcs], end.position[arcs], *self.circles(rows[arcs]), share[arcs]
             )
-        return found
+        return poses
 
-    def _turn(self, rows: Ints, start: Poses, end: Poses, share: Floats, found: Poses) -> None:
-        """Puts the orientations of the motions that do not turn the short way into ``found`` (K)."""
+    def _turn(self, rows: Ints, start: Poses, end: Poses, share: Floats, poses: Poses) -> None:
+        """Puts the orientations of the motions that do not turn in the shorter sense into ``poses`` (K)."""
         half = self.half_turns.rows
         if not len(half) and not self._along:
             return
@@ -127,17 +128,17 @@ class DesiredPath:
             along = self.path.arcs.turn(at, self.base[at].rotation)
             turn = turn_beside(start.rotation[other], end.rotation[other], along)
             self.half_turns.put(at, turn)
-            found.rotation[other] = turning(start.rotation[other], turn, along, share[other])
+            poses.rotation[other] = turning(start.rotation[other], turn, along, share[other])
 
     @cached_property
     def _along(self) -> bool:
         return bool(self.path.arcs.turns_along.any())
 
     def turn(
-        self, rows: Ints, first: Floats, last: Floats, start: Poses, end: Poses, share: Floats, found: Poses
+        self, rows: Ints, first: Floats, last: Floats, start: Poses, end: Poses, share: Floats, poses: Poses
     ) -> None:
-        """Turns ``found`` (K), at the shares (K,) between ``start`` and ``end`` (K), as the controller does on a part,
-        ``first`` to ``last`` (K,), of the ways of ``rows`` (K,) (``OrientationPath``)."""
+        """Turns ``poses`` (K), at the shares (K,) between ``start`` and ``end`` (K), as the controller does on a part,
+        ``first`` to ``last`` (K,), of the paths of ``rows`` (K,) (``OrientationPath``)."""
         interpolate_orientation(
             self.path,
             self.base,
@@ -148,20 +149,20 @@ class DesiredPath:
             start.rotation,
             end.rotation,
             share,
-            found.rotation,
+            poses.rotation,
         )
 
     def tangent(self, rows: Ints, share: Floats) -> Floats:
-        """(K, 3) unit vectors along the ways of ``rows`` (K,) at the shares (K,); zero where a motion only turns the
+        """(K, 3) unit vectors along the paths of ``rows`` (K,) at the shares (K,); zero where a motion only turns the
         tool."""
         step = self.end[rows].position - self.start[rows].position
-        bent = np.flatnonzero(np.isfinite(self.sweep[rows]))
-        if len(bent):
-            at = rows[bent]
-            here = self.at(at, share[bent]).position
+        arcs = np.flatnonzero(np.isfinite(self.sweep[rows]))
+        if len(arcs):
+            at = rows[arcs]
+            here = self.at(at, share[arcs]).position
             centre, normal, sweep = self.circles(at)
-            rise = np.sum(step[bent] * normal, axis=1)[:, None]
-            step[bent] = sweep[:, None] * np.cross(normal, here - centre) + rise * normal
+            rise = np.sum(step[arcs] * normal, axis=1)[:, None]
+            step[arcs] = sweep[:, None] * np.cross(normal, here - centre) + rise * normal
         length = np.linalg.norm(step, axis=1, keepdims=True)
         return np.where(length > _NO_MOVE, step / np.maximum(length, _NO_MOVE), 0.0)
 
@@ -172,25 +173,25 @@ def start_poses(
     """Where each motion starts (N): the end pose of the one before it, with the tool of its own; NaN for the first one
     and after a motion to an unknown place.  ``external``: in whose path axes ``end`` is, each in those of its own."""
 
-    def made(rows: Ints) -> Poses:
+    def build(rows: Ints) -> Poses:
         before = np.maximum(rows - 1, 0)
-        found = end[before].copy()
+        poses = end[before].copy()
         other = np.flatnonzero((path.tool[rows] != path.tool[before]) & path.known[before])
         if len(other):
-            found.put(other, found[other] @ tool[before[other]].inverse() @ tool[rows[other]])
+            poses.put(other, poses[other] @ tool[before[other]].inverse() @ tool[rows[other]])
         if external is not None and (moved := np.flatnonzero(external.changes_carrier[rows])).size:
-            found.put(moved, external.begin_from_end(rows[moved]) @ found[moved])
-        behind_axes = np.flatnonzero(~path.known[before])
-        behind_axes = behind_axes[np.isfinite(track.q[before[behind_axes]]).all(axis=1)]
-        if len(behind_axes):
-            flange = nominal_flange(robot, track.q[before[behind_axes]])
+            poses.put(moved, external.begin_from_end(rows[moved]) @ poses[moved])
+        after_axes = np.flatnonzero(~path.known[before])
+        after_axes = after_axes[np.isfinite(track.q[before[after_axes]]).all(axis=1)]
+        if len(after_axes):
+            flange = nominal_flange(robot, track.q[before[after_axes]])
             if external is not None:
-                flange = external.in_path(rows[behind_axes], np.zeros(len(behind_axes)), flange)
-            found.put(behind_axes, flange @ tool[rows[behind_axes]])
-        found.put(rows == 0, UNKNOWN)
-        return found
+                flange = external.in_path(rows[after_axes], np.zeros(len(after_axes)), flange)
+            poses.put(after_axes, flange @ tool[rows[after_axes]])
+        poses.put(rows == 0, UNKNOWN)
+        return poses
 
-    return PoseRows(len(path), made)
+    return PoseRows(len(path), build)
 
 
 def interpolate_poses(start: Poses, end: Poses, share: Floats) -> Poses:

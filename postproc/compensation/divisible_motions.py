@@ -24,7 +24,7 @@ ROOM = 0.7
 tool that is early or late where the force changes."""
 
 STEP = 0.1
-"""Share of the tolerance by which the correction may step, or change on a way, without a look at what that does."""
+"""Share of the tolerance by which the correction may step, or change on a path, without a check of what that does."""
 
 WIDEST = 300 * DEG
 """An arc that turns further is divided: the moved end of a nearly full circle could lie on the wrong side."""
@@ -89,20 +89,20 @@ class DivisibleMotions:
         self.error: Floats = np.zeros(count)
 
     def path_starts(self, chosen: Ints) -> Poses:
-        """The commands (A) where the paths of the motions ``chosen`` (A,) begin: after a transition move or a lead-in,
+        """The commands (A) where the paths of the motions ``chosen`` (A,) start: after a transition move or a lead-in,
         or where the motion before them ends."""
-        found = self.entry[self.rows[chosen]]
+        starts = self.entry[self.rows[chosen]]
         own = np.flatnonzero(self.needs_transition[chosen] | self.has_lead_in[chosen])
         if len(own):
-            found.put(own, self.starts[self.start_at[chosen[own]]])
-        return found
+            starts.put(own, self.starts[self.start_at[chosen[own]]])
+        return starts
 
     def least_segments(self) -> Ints:
         """(I,) segments that an interval has at least."""
         rows, part = self.rows[self.owner], self.high - self.low
         sweep = np.nan_to_num(self.task.desired_path.sweep[rows]) * part
         least = np.where(sweep > WIDEST, np.ceil(sweep / np.pi), 1).astype(np.int32)
-        # of a half turn the corrected ends could be nearer the other way round
+        # of a half turn the corrected ends could be nearer in the other sense
         half = np.isin(rows, self.task.track.half_turns.rows) & (part == 1.0)
         return np.where(half, np.maximum(least, 2), least)
 
@@ -124,9 +124,9 @@ class DivisibleMotions:
         def largest(part: slice) -> Floats:
             segments, owner = self.segments(chosen[part], count[part])
             size = self._allowed(*path_errors(self.task, segments))
-            found = np.zeros(len(count[part]))
-            np.maximum.at(found, owner, size)
-            return found
+            errors = np.zeros(len(count[part]))
+            np.maximum.at(errors, owner, size)
+            return errors
 
         return np.concatenate([np.empty(0), *in_blocks(largest, len(chosen), motions_per_block(count))])
 
@@ -163,14 +163,16 @@ class DivisibleMotions:
         later = np.flatnonzero(number > 0)
         start.put(later, end[later - 1])
         segments = PathSegments.straight(at, first, last, start, end)
-        bent = np.flatnonzero(self.task.desired_path.arc[at])
-        if len(bent):
-            via = self.commands(at[bent], 0.5 * (first + last)[bent])
-            normal = arc_normals(self.task, at[bent])
-            arcs = PathSegments.round(at[bent], first[bent], last[bent], start[bent], via, end[bent], normal)
+        curved = np.flatnonzero(self.task.desired_path.arc[at])
+        if len(curved):
+            via = self.commands(at[curved], 0.5 * (first + last)[curved])
+            normal = arc_normals(self.task, at[curved])
+            arcs = PathSegments.round(
+                at[curved], first[curved], last[curved], start[curved], via, end[curved], normal
+            )
             for name in ("centre", "normal", "sweep"):
                 values = getattr(segments, name).copy()
-                values[bent] = getattr(arcs, name)
+                values[curved] = getattr(arcs, name)
                 segments = replace(segments, **{name: values})
         return segments, owner
 

@@ -13,7 +13,7 @@ CROSSED = 1.0 - 1e-9
 """Share of a gap or a band that counts as all of it."""
 
 NO_LENGTH = 1.0
-"""[m] Stands for the length of a jump, or of a turn on the spot."""
+"""[m] Counts as the length of a jump, or of a turn on the spot."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,10 +30,10 @@ class GapSides:
     gap: Floats
 
     @staticmethod
-    def of(key: Floats, motor: Floats, gap: Floats, anew: Bools) -> GapSides:
-        """``key`` (S,) the place of each station, ``motor`` (S, n) [rad, m], ``gap`` (n,) [rad, m]; ``anew`` (S,): it
-        is not known how the motors came there."""
-        return GapSides(key, motor, operator.play_output(motor, gap, anew), gap)
+    def of(key: Floats, motor: Floats, gap: Floats, restart: Bools) -> GapSides:
+        """``key`` (S,) the place of each station, ``motor`` (S, n) [rad, m], ``gap`` (n,) [rad, m]; ``restart`` (S,):
+        it is not known how the motors came there."""
+        return GapSides(key, motor, operator.play_output(motor, gap, restart), gap)
 
     def at(self, rows: Ints, along: Floats | None = None) -> Floats:
         """(K, n) -1..1 by how much of half the gap each motor is ahead at the shares ``along`` (K,) of the paths of the
@@ -51,7 +51,7 @@ class GapSides:
         motor = self.motor[first] + part * (self.motor[last] - self.motor[first])
         gap = self.gap if self.gap.ndim == 1 else self.gap[last]
         joint = np.clip(self.joint[first], motor - 0.5 * gap, motor + 0.5 * gap)
-        whole = (part == 1.0)[:, 0]  # there it may also have begun again
+        whole = (part == 1.0)[:, 0]  # there it may also have started again
         motor[whole], joint[whole] = self.motor[last[whole]], self.joint[last[whole]]
         known = np.floor(0.5 * self.key[last]) == rows
         return np.where(known[:, None], operator.share(motor, joint, gap), 0.0)
@@ -108,13 +108,14 @@ class Reversals:
     new: Floats
 
     @staticmethod
-    def of(line: MotorPath, position: Floats, shares: Floats, anew: Bools, spacing: Floats) -> Reversals:
-        """Of ``shares`` (S, n) of dead bands at stations at ``position`` (S,) [m], ``anew`` (S,) where nothing is known
-        of how the motors came: a side holds until the band is crossed the other way, and what comes first holds from
-        the start.  ``spacing`` (N,) [m]: no change is shorter, and none starts or ends so near to a target."""
-        found: list[tuple[Floats, ...]] = []
+    def of(line: MotorPath, position: Floats, shares: Floats, restart: Bools, spacing: Floats) -> Reversals:
+        """Of ``shares`` (S, n) of dead bands at stations at ``position`` (S,) [m], ``restart`` (S,) where nothing is
+        known of how the motors came: a side holds until the band is crossed in the other sense, and what comes first
+        holds from the start.  ``spacing`` (N,) [m]: no change is shorter, and none starts or ends so near to a
+        target."""
+        by_axis: list[tuple[Floats, ...]] = []
         start = np.zeros(shares.shape[1])
-        again = np.maximum.accumulate(np.where(anew, np.arange(len(anew)), -1))
+        again = np.maximum.accumulate(np.where(restart, np.arange(len(restart)), -1))
         for axis, share in enumerate(shares.T):
             crossed = np.abs(share) > CROSSED
             events = np.flatnonzero(crossed)
@@ -136,31 +137,31 @@ class Reversals:
             row, _ = line.place(reached)
             until = np.where(until > since, until, line.start[row] + line.length[row])
             until = np.minimum(until, np.maximum(np.append(since[1:], np.inf), since))
-            found.append((np.full(len(since), axis), since, until, old, -old))
-        whole = [np.concatenate(parts) for parts in zip(*found, strict=True)]
+            by_axis.append((np.full(len(since), axis), since, until, old, -old))
+        whole = [np.concatenate(parts) for parts in zip(*by_axis, strict=True)]
         return Reversals(line, start, whole[0].astype(np.int64), *whole[1:])
 
     def at(self, rows: Ints, along: Floats | None = None) -> Floats:
         """(K, n) at the shares ``along`` (K,) of the paths of the motions ``rows`` (K,), at their ends without."""
         position = self.line.position(rows, 1.0 if along is None else along)
-        found = np.tile(self.first, (len(rows), 1))
+        values = np.tile(self.first, (len(rows), 1))
         for axis in np.unique(self.axis).tolist():
             own = self.axis == axis
             knots = np.stack([self.since[own], self.until[own]], axis=1).ravel()
             sides = np.stack([self.old[own], self.new[own]], axis=1).ravel()
-            found[:, axis] = np.interp(position, knots, sides)
-        return found
+            values[:, axis] = np.interp(position, knots, sides)
+        return values
 
 
 @dataclass(frozen=True, eq=False)
 class LostMotion:
     """The play of n axes at stations (S) of a program.
 
-    programmed: as the program runs as it stands.  wanted: the sides that corrections are made for.  A joint that is to
+    programmed: as the uncorrected program runs.  wanted: the sides that corrections are made for.  A joint that is to
     turn round wants its motor on the other side of the gap at once, so they follow the sense of the joint's own motion,
     but for what is less than a dead band.
     row, share (S,): the stations; axes (S, n): programmed; aim (S, n): where the motors of a correction go, but for the
-    lost motion itself; moved (S,): a correction is made there; anew (S,): it is not known how the motors came there;
+    lost motion itself; moved (S,): a correction is made there; restart (S,): it is not known how the motors came there;
     gap (n,) [rad, m] lost by each axis, 0 where none is.
     """
 
@@ -171,7 +172,7 @@ class LostMotion:
     axes: Floats
     aim: Floats
     moved: Bools
-    anew: Bools
+    restart: Bools
     gap: Floats
 
     def run(self, gain: float) -> GapSides:
@@ -179,4 +180,4 @@ class LostMotion:
         wanted before they have crossed the gap."""
         ahead = self.aim + 0.5 * self.gap * self.wanted.at(self.row, self.share) - self.axes
         motor = self.axes + np.where(self.moved[:, None], gain * ahead, 0.0)
-        return GapSides.of(self.programmed.key, motor, self.programmed.gap, self.anew)
+        return GapSides.of(self.programmed.key, motor, self.programmed.gap, self.restart)

@@ -19,19 +19,19 @@ from postproc.model import NOTHING, StiffnessModel
 def _changed_wrench(entry: UncertainInput, value: float, wrench: Floats, axes: Floats | None) -> Floats:
     """The wrenches (N, 6) with one figure of the force at ``value``; ``axes`` (N, 3, 3): of the programmed base.
 
-    A turn leaves the moment, which acts at the tool centre point, as it is.  Where no wrench acts none is added.
+    A turn does not change the moment, which acts at the tool centre point.  Where no wrench acts none is added.
     """
     if entry.parameter == FORCE:
         return value * wrench
     assert axes is not None
-    found = wrench.copy()
+    changed = wrench.copy()
     if entry.parameter in TURNS:
         axis = _across(wrench[:, :3], axes)[TURNS.index(entry.parameter)]
-        found[:, :3] = np.einsum("nij,nj->ni", rotation_from_vector(value * axis), wrench[:, :3])
+        changed[:, :3] = np.einsum("nij,nj->ni", rotation_from_vector(value * axis), wrench[:, :3])
     else:
         acts = wrench.any(axis=1)
-        found[acts, :3] += value * axes[acts, :, COMPONENTS.index(entry.parameter)]
-    return found
+        changed[acts, :3] += value * axes[acts, :, COMPONENTS.index(entry.parameter)]
+    return changed
 
 
 def _across(force: Floats, axes: Floats) -> tuple[Floats, Floats]:
@@ -59,13 +59,13 @@ def sensitivities(
     start: Floats | None = None,
     axes: Floats | None = None,
 ) -> Floats:
-    """d(tool position)/d(figure) (N, 3, P) [m per SI unit] with the motors held at ``q`` (N, n) under ``wrench``
+    """d(tool position)/d(figure) (N, 3, P) [m per SI unit] with the motors fixed at ``q`` (N, n) under ``wrench``
     (N, 6); ``start`` as of the equilibrium; ``axes`` (N, 3, 3) of the programmed base, for directions and components of
     the force.
 
     Central differences that stop at a parameter's bounds.  NaN where a stepped model has no equilibrium.
     """
-    found = np.zeros((len(q), 3, len(entries)))
+    derivatives = np.zeros((len(q), 3, len(entries)))
     for column, entry in enumerate(entries):
         low = max(entry.value - entry.step, entry.lower)
         high = min(entry.value + entry.step, entry.upper)
@@ -80,8 +80,8 @@ def sensitivities(
                 stepped = model.with_values({(entry.term, entry.parameter): value})
                 rest = stepped.equilibrium(q, wrench, tool, conditions, start)
             ends.append(np.where(rest.converged[:, None], rest.pose.position, np.nan))
-        found[:, :, column] = (ends[1] - ends[0]) / (high - low)
-    return found
+        derivatives[:, :, column] = (ends[1] - ends[0]) / (high - low)
+    return derivatives
 
 
 def error_sensitivities(
@@ -113,9 +113,9 @@ def goal_sensitivities(
     """d(goal position)/d(figure) (N, 3, P) of motions ``rows`` (N,) with targets ``wanted`` (N): a base that was
     touched off moves with what the robot does without load."""
     touched = task.touched_off
-    found = np.zeros((len(rows), 3, len(entries)))
+    derivatives = np.zeros((len(rows), 3, len(entries)))
     if task.model.zero_without_load or (not task.process and touched is None):
-        return found
+        return derivatives
     still = np.arange(len(rows))
     if touched is not None and not task.process:
         frame = task.toolpath.base[rows]
@@ -131,12 +131,12 @@ def goal_sensitivities(
             touched.real.displacement,
             task.base[touched.row].rotation,
         )
-        found = touched.sensitivity(places, frame, wanted.position)
+        derivatives = touched.sensitivity(places, frame, wanted.position)
     if len(still):
         at, none = rows[still], np.zeros((len(still), 6))
         here, placed = task.unloaded(at, wanted[still]), task.robot_from_path(at)
         axes = task.base[at].rotation
-        found[still] = sensitivities(
+        derivatives[still] = sensitivities(
             task.model,
             entries,
             here.q,
@@ -146,4 +146,4 @@ def goal_sensitivities(
             here.displacement,
             axes if placed is None else placed.rotation @ axes,
         )
-    return found
+    return derivatives

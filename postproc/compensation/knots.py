@@ -18,7 +18,7 @@ ROUNDED = 0.5
 
 
 def split_at_knots(motions: DivisibleMotions) -> None:
-    """Ways on which a ramp of the force ends are parted there, where one straight or round way would leave the
+    """Paths on which a ramp of the force ends are divided there, where one straight or round path would exceed the
     tolerance."""
     row, share = _knots(motions)
     if not len(row):
@@ -47,9 +47,9 @@ def _with_companions(motions: DivisibleMotions, at: Ints, share: Floats) -> tupl
     reach = np.where(blend == 0, 0.0 if path.constraints.exact_stays else np.inf, np.nan_to_num(blend))
     last = np.append(at[1:] != at[:-1], True)
     first = np.append(True, last[:-1])
-    behind = (np.where(last, 1.0, np.append(share[1:], 1.0)) - share) * length
+    after = (np.where(last, 1.0, np.append(share[1:], 1.0)) - share) * length
     before = (share - np.where(first, 0.0, np.append(0.0, share[:-1]))) * length
-    reach = np.minimum(reach, 0.5 * np.minimum(before, behind))
+    reach = np.minimum(reach, 0.5 * np.minimum(before, after))
 
     def kink(part: slice) -> Floats:
         shifts = []
@@ -70,7 +70,7 @@ def _with_companions(motions: DivisibleMotions, at: Ints, share: Floats) -> tupl
         np.nan_to_num(path.approximation[np.maximum(rows - 1, 0)]),
     )
     room = np.maximum(spacing, np.where(last, 2.0 * corner[0], 0.0))
-    sides = [off & (behind >= spacing + room)]
+    sides = [off & (after >= spacing + room)]
     room = np.where(
         first, np.maximum(spacing, 2.0 * corner[1]), 2.0 * spacing
     )  # the one before may have its own
@@ -85,7 +85,7 @@ def _with_companions(motions: DivisibleMotions, at: Ints, share: Floats) -> tupl
 
 
 def _split_intervals(motions: DivisibleMotions, at: Ints, share: Floats) -> None:
-    """Intervals of the ways ``at`` (K,) that end at the shares (K,), both ascending; of all others one."""
+    """Intervals of the paths ``at`` (K,) that end at the shares (K,), both ascending; of all others one."""
     number = np.arange(len(motions.rows))
     owner = np.concatenate([number, at])
     low = np.concatenate([np.zeros(len(motions.rows)), share])

@@ -1,8 +1,8 @@
 """The lost motion of a program: where its axes turn round, and on which side of its gap each of them then lies.
 
 A joint lags after its motor by half the gap (see ``effects.play``).  For a joint that is to follow y the motor has to
-be at y + (g/2) sign(dy): at a reversal it crosses the whole gap while the joint stands.  Motions of y of less than a
-dead band are none, or the third decimal of a straight line would throw the motor to and fro.  The band is ``ROOM`` of
+be at y + (g/2) sign(dy): at a reversal it crosses the whole gap while the joint is at rest.  Motions of y of less than
+a dead band are none, or the third decimal of a straight line would throw the motor to and fro.  The band is ``ROOM`` of
 the tolerance at the tool, or what the last digit of the program moves the axis by, whichever is larger, and never more
 than the gap.  By so much the tool is off where an axis has just turned round.
 """
@@ -25,7 +25,7 @@ ROOM = 0.25
 """Share of the tolerance that the dead band of a reversal may take at the tool."""
 
 SPACING, TURN, ARC = 25 * MM, 5 * DEG, 15 * DEG
-"""Of stations on a way: along it, by axes, by the angle of an arc."""
+"""Of stations on a path: along it, by axes, by the angle of an arc."""
 
 SHORT = 2 * MM
 """A motion that is shorter, and turns its axes by less than ``LITTLE``, is monotone to less than a dead band."""
@@ -36,7 +36,7 @@ FINE = 0.2 * MM
 """How exactly the place of a reversal is found."""
 
 CHANGE = 0.02
-"""A share of the side that changes by less between two stations is no reversal to be looked at."""
+"""A share of the side that changes by less between two stations is no reversal to be evaluated."""
 
 COARSE = 0.1
 """As much, where a motor crosses its gap: in between it is taken to go evenly."""
@@ -54,7 +54,7 @@ ANGLE_DIGIT = 1e-3 * DEG
 """Last digit of a program's angles."""
 
 UNKNOWN_GAP = 1e-6
-"""[rad, m] Stands for the gap of an axis that has none: its side is the sense in which it came."""
+"""[rad, m] Gap of an axis that has none: its side is the sense in which it came."""
 
 
 def add_lost_motion(task: CompensationProblem, start: Floats | None, spacing: Floats) -> CompensationProblem:
@@ -62,8 +62,8 @@ def add_lost_motion(task: CompensationProblem, start: Floats | None, spacing: Fl
     ``spacing`` (N,) [m]: no motion is to be shorter, and so no change of side."""
     if not task.model.by_direction or not len(task.toolpath):
         return task
-    desired_path = _AxisPaths(task)
-    stations = desired_path.first(start)
+    axis_paths = _AxisPaths(task)
+    stations = axis_paths.first(start)
     for _ in range(ROUNDS):
         coarse = stations.turning()
         if not len(coarse) or len(stations.row) + (PARTS - 1) * len(coarse) > 3 * len(task.toolpath) + MOST:
@@ -71,11 +71,11 @@ def add_lost_motion(task: CompensationProblem, start: Floats | None, spacing: Fl
         stations = stations.denser(coarse)
     line = MotorPath.of(task.desired_path.length)
     position = line.position(stations.row, stations.share)
-    turns = Reversals.of(line, position, stations.within.shares, stations.anew, spacing)
+    turns = Reversals.of(line, position, stations.within.shares, stations.restart, spacing)
     # where a change of side starts and ends there is a station
     row, along = line.place(np.concatenate([turns.since, turns.until]))
     inside = task.desired_path.traceable[row] & (along > 0.0) & (along < 1.0)
-    stations = stations.joined(desired_path.made(row[inside], along[inside]))
+    stations = stations.joined(axis_paths.sample(row[inside], along[inside]))
     lost = LostMotion(
         stations.programmed,
         turns,
@@ -84,7 +84,7 @@ def add_lost_motion(task: CompensationProblem, start: Floats | None, spacing: Fl
         stations.axes,
         stations.aim,
         stations.moved,
-        stations.anew,
+        stations.restart,
         task.model.gaps,
     )
     direction = lost.programmed.at(np.arange(len(task.toolpath)))
@@ -110,10 +110,10 @@ def dead_band(task: CompensationProblem) -> Floats:
     back = np.abs(np.linalg.pinv(columns[:, :, programmed], rcond=1e-6))
     rounding = np.zeros_like(lever)
     rounding[:, programmed] = np.einsum("nij,nj->ni", back, digits)
-    band, found = np.maximum(shows, rounding), np.empty((n, joints))
+    band, bands = np.maximum(shows, rounding), np.empty((n, joints))
     for joint in range(joints):
-        found[:, joint] = np.interp(np.arange(n), rows, band[:, joint])
-    return found
+        bands[:, joint] = np.interp(np.arange(n), rows, band[:, joint])
+    return bands
 
 
 def position_digit(position: Floats) -> float:
@@ -162,26 +162,31 @@ class _AxisPaths:
         along = np.concatenate(
             [np.ones(len(rows)), number / np.repeat(count, count - 1), np.zeros(len(sets_in))]
         )
-        found = self.made(row, along)
-        begin = np.empty((0, q.shape[1])) if start is None or not np.isfinite(start).all() else start[None]
-        before = _Samples(self, np.full(len(begin), -1), np.ones(len(begin)), begin, begin)
-        return before.joined(found)
+        samples = self.sample(row, along)
+        start_axes = (
+            np.empty((0, q.shape[1])) if start is None or not np.isfinite(start).all() else start[None]
+        )
+        before = _Samples(
+            self, np.full(len(start_axes), -1), np.ones(len(start_axes)), start_axes, start_axes
+        )
+        return before.joined(samples)
 
-    def made(self, row: Ints, along: Floats) -> _Samples:
-        """Stations at the shares ``along`` (S,) of the ways of ``row`` (S,), without those that are out of reach."""
+    def sample(self, row: Ints, along: Floats) -> _Samples:
+        """Stations at the shares ``along`` (S,) of the paths of ``row`` (S,), without those that are out of reach."""
         axes = np.empty((len(row), self.gap.size))
         aim = np.empty_like(axes)
 
-        def made(part: slice) -> None:
+        def compute(part: slice) -> None:
             axes[part] = self._axes(row[part], along[part])
             aim[part] = self._aim(row[part], along[part], axes[part])
 
-        each_block(made, len(row))
+        each_block(compute, len(row))
         good = np.isfinite(axes).all(axis=1) & np.isfinite(aim).all(axis=1)
         return _Samples(self, row[good], along[good], axes[good], aim[good])
 
     def _axes(self, row: Ints, along: Floats) -> Floats:
-        """(S, n) axes at the shares ``along`` (S,) of the ways of ``row`` (S,), as the controller interpolates them."""
+        """(S, n) axes at the shares ``along`` (S,) of the paths of ``row`` (S,), as the controller interpolates
+        them."""
         task, q = self.task, self.task.track.q
         axes = np.where((along == 1.0)[:, None], q[row], q[np.maximum(row - 1, 0)])
         inner = np.flatnonzero((along > 0.0) & (along < 1.0))
@@ -191,8 +196,8 @@ class _AxisPaths:
             if (placed := task.robot_from_path(at, part)) is not None:
                 flange = placed @ flange
             near = q[at - 1] + part[:, None] * (q[at] - q[at - 1])
-            found = inverse(task.model.robot.nominal, flange, task.track.status[at], near)
-            axes[inner] = np.where(found.reachable[:, None], found.q, np.nan)
+            solution = inverse(task.model.robot.nominal, flange, task.track.status[at], near)
+            axes[inner] = np.where(solution.reachable[:, None], solution.q, np.nan)
         return axes
 
     def _aim(self, row: Ints, along: Floats, axes: Floats) -> Floats:
@@ -215,7 +220,7 @@ class _Samples:
     """row, share (S,): places on the paths of motions, in order (row -1: before the first one); axes, aim (S, n): as of
     ``LostMotion``."""
 
-    ways: _AxisPaths
+    axis_paths: _AxisPaths
     row: Ints
     share: Floats
     axes: Floats
@@ -226,30 +231,30 @@ class _Samples:
         return 2.0 * self.row + self.share
 
     @cached_property
-    def anew(self) -> Bools:
+    def restart(self) -> Bools:
         """(S,) it is not known how the axes came here: an unknown place before it, or a motion that may not run."""
-        step, runs = np.diff(self.row, prepend=-2), self.ways.task.toolpath.executes
+        step, runs = np.diff(self.row, prepend=-2), self.axis_paths.task.toolpath.executes
         return np.asarray((step > 1) | ((step > 0) & (self.row >= 0) & ~runs[self.row]))
 
     @cached_property
     def moved(self) -> Bools:
         """(S,) of motions that are to be corrected."""
-        return self.ways.moved[self.row] & (self.row >= 0)
+        return self.axis_paths.moved[self.row] & (self.row >= 0)
 
     @cached_property
     def programmed(self) -> GapSides:
-        return GapSides.of(self.key, self.axes, self.ways.gap, self.anew)
+        return GapSides.of(self.key, self.axes, self.axis_paths.gap, self.restart)
 
     @cached_property
     def within(self) -> GapSides:
         """The play of the dead bands."""
         # a correction sets out from where the joint really lies
         joint = np.where(self.moved[:, None], self.aim, self.programmed.joint)
-        return GapSides.of(self.key, joint, self.ways.band[np.maximum(self.row, 0)], self.anew)
+        return GapSides.of(self.key, joint, self.axis_paths.band[np.maximum(self.row, 0)], self.restart)
 
     def turning(self) -> Ints:
-        """Stations that end a part of a way in which an axis turns round, and that is long."""
-        lossy, desired_path = self.ways.lossy, self.ways.task.desired_path
+        """Stations that end a part of a path in which an axis turns round, and that is long."""
+        lossy, desired_path = self.axis_paths.lossy, self.axis_paths.task.desired_path
 
         def changes(sides: GapSides, least: float) -> Bools:
             side = sides.shares[:, lossy]
@@ -261,7 +266,7 @@ class _Samples:
         turns[:-1] |= turns[1:].copy()  # the place itself may lie before that
         turns |= changes(self.programmed, COARSE)
         turns |= self._bulges(lossy)
-        turns &= ~self.anew & (self.row >= 0)
+        turns &= ~self.restart & (self.row >= 0)
         turns &= desired_path.traceable[self.row]
         some = np.flatnonzero(turns)
         return some[self._span(some) * desired_path.length[self.row[some]] > FINE]
@@ -270,13 +275,13 @@ class _Samples:
         """(S,) parts of paths in which a parabola through three stations turns round by more than half a dead band."""
         band, aim = self.within.gap[:, lossy], self.aim[:, lossy]
         step = np.diff(aim, axis=0, prepend=aim[:1])
-        found = np.zeros(len(step), bool)
+        bulges = np.zeros(len(step), bool)
         inside = np.flatnonzero(self.row[1:-1] == self.row[2:]) + 1
         bend = np.abs(step[inside + 1] - step[inside])
         for one in (inside, inside + 1):
             turned = np.any((np.abs(step[one]) < bend) & (bend > 0.5 * band[one]), axis=1)
-            found[one[turned]] = True
-        return found
+            bulges[one[turned]] = True
+        return bulges
 
     def _span(self, chosen: Ints) -> Floats:
         """(A,) share of its path between each station and the one before it."""
@@ -288,10 +293,10 @@ class _Samples:
         """With more stations before each of ``chosen``."""
         part = np.arange(1, PARTS) / PARTS
         added = self.share[chosen, None] - self._span(chosen)[:, None] * part
-        return self.joined(self.ways.made(np.repeat(self.row[chosen], PARTS - 1), added.ravel()))
+        return self.joined(self.axis_paths.sample(np.repeat(self.row[chosen], PARTS - 1), added.ravel()))
 
     def joined(self, other: _Samples) -> _Samples:
         row, share = np.concatenate([self.row, other.row]), np.concatenate([self.share, other.share])
         axes, aim = np.concatenate([self.axes, other.axes]), np.concatenate([self.aim, other.aim])
         order = np.argsort(2.0 * row + share, kind="stable")
-        return _Samples(self.ways, row[order], share[order], axes[order], aim[order])
+        return _Samples(self.axis_paths, row[order], share[order], axes[order], aim[order])

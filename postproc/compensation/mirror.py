@@ -1,4 +1,4 @@
-"""Mirror correction: move each command the other way until the predicted tool lies where it is wanted.
+"""Mirror correction: move each command in the opposite direction until the predicted tool lies where it is wanted.
 
     x_cmd <- x_cmd (-) (x_real(x_cmd) (-) x_goal)      on SE(3), position and orientation apart
 
@@ -20,13 +20,13 @@ from postproc.model import StiffnessModel
 from postproc.robot.inverse import Inverse, inverse
 
 POSITION_TOLERANCE = 1e-8
-"""[m] predicted error at which a motion is done: far below what any program's digits can say."""
+"""[m] predicted error at which a motion is done: far below what any program's digits can express."""
 
 ANGLE_TOLERANCE = 1e-8
 """[rad]"""
 
 REST = 2e-10
-"""[rad, m] What may be left of the way to an equilibrium: less than a nanometre at the tool."""
+"""[rad, m] What may remain of the displacement to an equilibrium: less than a nanometre at the tool."""
 
 MAX_ITERATIONS = 20
 
@@ -58,11 +58,11 @@ def predict(
     ``command``, where they are known.
     """
     if q is not None:
-        found = Inverse(q, np.asarray(np.isfinite(q).all(axis=1)))
+        solution = Inverse(q, np.asarray(np.isfinite(q).all(axis=1)))
     else:
-        found = inverse(model.robot.nominal, command @ case.tool.inverse(), case.status, case.q_reference)
-    rest = model.equilibrium(found.q, case.wrench, case.tool, case.conditions, start, REST)
-    return Prediction(rest.pose, found.q, rest.displacement, found.reachable, rest.converged)
+        solution = inverse(model.robot.nominal, command @ case.tool.inverse(), case.status, case.q_reference)
+    rest = model.equilibrium(solution.q, case.wrench, case.tool, case.conditions, start, REST)
+    return Prediction(rest.pose, solution.q, rest.displacement, solution.reachable, rest.converged)
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def mirror(
     least halve its error (it would not settle): ``converged`` states which, nothing diverges silently.
     """
     n = len(wanted)
-    first, bent = (wanted, None) if guess is None else guess
+    first, displacement = (wanted, None) if guess is None else guess
     rotation, position = first.rotation.copy(), first.position.copy()
     q, iterations = case.q_reference.copy(), np.zeros(n, np.int64)
     reachable, settled, converged = np.ones(n, bool), np.ones(n, bool), np.zeros(n, bool)
@@ -114,7 +114,7 @@ def mirror(
     active = np.arange(n)
     for iteration in range(MAX_ITERATIONS + 1):
         some: Any = active if len(active) < n else slice(None)  # mostly all of them: nothing is copied
-        here = predict(model, Poses(rotation[some], position[some]), case.part(some), bent)
+        here = predict(model, Poses(rotation[some], position[some]), case.part(some), displacement)
         shift, turn = pose_error(here.pose, goal[some])
         if orientation_projection is not None:
             turn = (orientation_projection[some] @ turn[..., None])[..., 0]
@@ -133,12 +133,12 @@ def mirror(
         last[some] = size
         if not going.any() or iteration == MAX_ITERATIONS:
             break
-        bent = here.displacement
+        displacement = here.displacement
         if not going.all():
-            active, some, bent, shift, turn = (
+            active, some, displacement, shift, turn = (
                 active[going],
                 active[going],
-                bent[going],
+                displacement[going],
                 shift[going],
                 turn[going],
             )
@@ -172,15 +172,19 @@ def initial_guess(
         q = inverse(model.robot.nominal, goal @ case.tool.inverse(), case.status, case.q_reference).q
     known = np.asarray(np.isfinite(q).all(axis=1))
     joints = q if known.all() else np.where(known[:, None], q, case.q_reference)
-    motors, bent = model.inverse_equilibrium(joints, case.wrench, case.tool, case.conditions)
+    motors, displacement = model.inverse_equilibrium(joints, case.wrench, case.tool, case.conditions)
     start = model.robot.nominal_chain.flange(motors) @ case.tool
-    good = known & (lengths(start.position - wanted.position) <= farthest) & np.isfinite(bent).all(axis=1)
+    good = (
+        known
+        & (lengths(start.position - wanted.position) <= farthest)
+        & np.isfinite(displacement).all(axis=1)
+    )
     if good.all():
-        return start, bent
+        return start, displacement
     return Poses(
         np.where(good[:, None, None], start.rotation, wanted.rotation),
         np.where(good[:, None], start.position, wanted.position),
-    ), np.where(good[:, None], bent, 0.0)
+    ), np.where(good[:, None], displacement, 0.0)
 
 
 def pose_error(real: Poses, goal: Poses) -> tuple[Floats, Floats]:
@@ -189,7 +193,7 @@ def pose_error(real: Poses, goal: Poses) -> tuple[Floats, Floats]:
 
 
 def interpolate_pose(wanted: Poses, command: Poses, gain: float | Floats) -> Poses:
-    """The share ``gain`` (0..1; one for all, or (N, 1)) of the way from ``wanted`` to ``command``."""
+    """The share ``gain`` (0..1; one for all, or (N, 1)) of the displacement from ``wanted`` to ``command``."""
     if isinstance(gain, float) and gain == 1.0:
         return command
     shift, turn = pose_error(command, wanted)

@@ -1,4 +1,4 @@
-"""How the orientation runs between two commands, and which orientations the words of a program can say."""
+"""How the orientation runs between two commands, and which orientations the words of a program can express."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def interpolate_orientation(
     rows: Ints,
     first: Floats,
     last: Floats,
-    begin: Floats,
+    start: Floats,
     end: Floats,
     share: Floats,
     into: Floats,
 ) -> None:
-    """Puts into ``into`` (K, 3, 3) the orientations at the shares (K,) between ``begin`` and ``end`` (K, 3, 3) where
+    """Puts into ``into`` (K, 3, 3) the orientations at the shares (K,) between ``start`` and ``end`` (K, 3, 3) where
     they run otherwise than evenly about one axis.
 
     ``first``, ``last`` (K,): where start and end lie, as shares of the paths of the motions ``rows`` (K,).  ``base``,
@@ -37,25 +37,28 @@ def interpolate_orientation(
     at = np.flatnonzero(law == OrientationPath.ROTARY_AXES)
     if len(at):
         words = _Words.of(path, base, wanted, rows[at])
-        one, two = words.inside(begin[at]), words.inside(end[at])
-        start = rotary_words.angles_of(one, path.orientation_control.rotary_at(rows[at], first[at]))
-        stop = rotary_words.angles_of(two, path.orientation_control.rotary_at(rows[at], last[at]))
-        # What the words do not say (another base or tool before) turns evenly.
-        said = rotary_words.reproduced(one, start) & rotary_words.reproduced(two, stop)
-        here = words.outside(rotary_words.rotation_of(start + share[at][:, None] * (stop - start)))
-        into[at[said]] = here[said]
+        one, two = words.inside(start[at]), words.inside(end[at])
+        start_angles = rotary_words.angles_of(one, path.orientation_control.rotary_at(rows[at], first[at]))
+        stop_angles = rotary_words.angles_of(two, path.orientation_control.rotary_at(rows[at], last[at]))
+        # What the words do not express (another base or tool before) turns evenly.
+        expressible = rotary_words.reproduced(one, start_angles) & rotary_words.reproduced(two, stop_angles)
+        here = words.outside(
+            rotary_words.rotation_of(start_angles + share[at][:, None] * (stop_angles - start_angles))
+        )
+        into[at[expressible]] = here[expressible]
     at = np.flatnonzero(law == OrientationPath.GREAT_CIRCLE)
     if len(at):
         here, known = _on_great_circle(
-            begin[at], end[at], path.orientation_control.redundant_axis[rows[at]], share[at]
+            start[at], end[at], path.orientation_control.redundant_axis[rows[at]], share[at]
         )
         into[at[known]] = here[known]
 
 
 def _on_great_circle(start: Floats, end: Floats, tool: Floats, share: Floats) -> tuple[Floats, Floats]:
-    """R(t) = G(t) R(0) S(t): G turns the direction of ``tool`` (K, 3, in tool axes) the shortest way, S about the tool.
+    """R(t) = G(t) R(0) S(t): G turns the direction of ``tool`` (K, 3, in tool axes) along the shortest path, S about
+    the tool.
 
-    Gives (K, 3, 3), and (K,) where there is one such way.
+    Gives (K, 3, 3), and (K,) where there is one such path.
     """
     one, two = turned(start, tool), turned(end, tool)
     axis = np.cross(one, two)
@@ -64,10 +67,10 @@ def _on_great_circle(start: Floats, end: Floats, tool: Floats, share: Floats) ->
     known = np.isfinite(angle) & (angle < np.pi - _OPPOSITE)
     vector = axis * (angle / np.where(sine > 0, sine, 1.0))[:, None]
     vector, tool = (np.where(known[:, None], part, 0.0) for part in (vector, tool))
-    # the spin: what is left of R(1) after the great circle turns about the tool
-    left = product(np.swapaxes(product(rotation_from_vector(vector), start), 1, 2), end)
-    odd = np.stack([left[:, k, j] - left[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))], axis=-1)
-    trace = np.trace(left, axis1=1, axis2=2)
+    # the spin: what remains of R(1) after the great circle turns about the tool
+    remaining = product(np.swapaxes(product(rotation_from_vector(vector), start), 1, 2), end)
+    odd = np.stack([remaining[:, k, j] - remaining[:, j, k] for j, k in ((1, 2), (2, 0), (0, 1))], axis=-1)
+    trace = np.trace(remaining, axis1=1, axis2=2)
     spin = np.arctan2(0.5 * np.sum(odd * tool, axis=1), 0.5 * (trace - 1.0))
     path = rotation_from_vector(share[:, None] * vector)
     turn = rotation_from_vector((share * spin)[:, None] * tool)
@@ -75,7 +78,7 @@ def _on_great_circle(start: Floats, end: Floats, tool: Floats, share: Floats) ->
 
 
 class _Words:
-    """K motions: words say R(words) between the base and the tool as it is at A = B = C = 0."""
+    """K motions: words express R(words) between the base and the tool as it is at A = B = C = 0."""
 
     def __init__(self, base: Floats, tool: Floats) -> None:
         self._base, self._tool = base, tool
@@ -89,7 +92,7 @@ class _Words:
         return _Words(frame, product(back, wanted[rows].rotation))
 
     def inside(self, rotation: Floats) -> Floats:
-        """What the words have to say (K, 3, 3) of orientations in the robot base."""
+        """What the words have to express (K, 3, 3) of orientations in the robot base."""
         return product(product(np.swapaxes(self._base, 1, 2), rotation), np.swapaxes(self._tool, 1, 2))
 
     def outside(self, rotation: Floats) -> Floats:
@@ -112,8 +115,9 @@ def pairs(path: Toolpath, rows: Ints) -> Ints:
 def nearest_expressible(
     path: Toolpath, base: Poses, wanted: Placed, rows: Ints, share: Floats, rotation: Floats
 ) -> Floats:
-    """(K, 3, 3) orientations that the pair of axes of motions ``rows`` (K,) says near its place at the shares (K,) of
-    their paths, with the tool along that of ``rotation`` (K, 3, 3) as far as they can: ``rotary_words.pointing``."""
+    """(K, 3, 3) orientations that the pair of axes of motions ``rows`` (K,) expresses near its place at the shares
+    (K,) of their paths, with the tool along that of ``rotation`` (K, 3, 3) as far as they can:
+    ``rotary_words.pointing``."""
     words = _Words.of(path, base, wanted, rows)
     tool = words.inside(rotation)[:, :, 2]
     return words.outside(
@@ -126,30 +130,30 @@ POLE = np.radians(1.0)
 
 
 def spread(path: Toolpath, rows: Ints, low: Floats, high: Floats, part: Floats) -> Floats:
-    """(K,) shares of the ways of ``rows`` (K,): the parts ``part`` (K,), 0 to 1, of what lies between the shares
+    """(K,) shares of the paths of ``rows`` (K,): the parts ``part`` (K,), 0 to 1, of what lies between the shares
     ``low`` and ``high`` (K,).
 
     Evenly; where a pair of axes turns evenly in u = asinh(lean / POLE), because the outer one turns with 1 / lean.
     """
-    found = low + part * (high - low)
+    shares = low + part * (high - low)
     at, (start, stop) = _leans(path, rows, low, high)
     if len(at):
         one, two = np.arcsinh(start / POLE), np.arcsinh(stop / POLE)
         lean = POLE * np.sinh(one + part[at] * (two - one))
-        found[at] = low[at] + (high[at] - low[at]) * (lean - start) / (stop - start)
-    return np.where(part == 1.0, high, found)
+        shares[at] = low[at] + (high[at] - low[at]) * (lean - start) / (stop - start)
+    return np.where(part == 1.0, high, shares)
 
 
 def shortest(path: Toolpath, rows: Ints, low: Floats, high: Floats) -> Floats:
     """(K,) by which factor the shortest of many segments of ``spread``, from the shares ``low`` to ``high`` (K,) of
     motions ``rows`` (K,), is shorter than an even one."""
-    found = np.ones(len(rows))
+    factor = np.ones(len(rows))
     at, (start, stop) = _leans(path, rows, low, high)
     if len(at):
         one, two = np.arcsinh(start / POLE), np.arcsinh(stop / POLE)
         nearest = np.where(start * stop < 0, 0.0, np.minimum(np.abs(one), np.abs(two)))
-        found[at] = np.minimum(1.0, np.cosh(nearest) * POLE * (two - one) / (stop - start))
-    return found
+        factor[at] = np.minimum(1.0, np.cosh(nearest) * POLE * (two - one) / (stop - start))
+    return factor
 
 
 def _leans(path: Toolpath, rows: Ints, low: Floats, high: Floats) -> tuple[Ints, tuple[Floats, Floats]]:

@@ -39,14 +39,14 @@ def along_and_across(task: CompensationProblem, result: CorrectionResult) -> tup
     """(N,) [m] predicted errors before the correction at the end points, along and across the feed; NaN where nothing
     is predicted."""
     rows = np.flatnonzero(np.isfinite(result.deflection[:, 0]))
-    found = np.full((2, len(result.state)), np.nan, np.float32)
+    errors = np.full((2, len(result.state)), np.nan, np.float32)
 
     def parted(part: slice) -> None:
-        found[:, rows[part]] = across_feed(task, rows[part], result.deflection[rows[part]])
+        errors[:, rows[part]] = across_feed(task, rows[part], result.deflection[rows[part]])
 
     for _ in in_blocks(parted, len(rows)):
         pass
-    return found[0], found[1]
+    return errors[0], errors[1]
 
 
 def cuts_not_improved(
@@ -68,9 +68,9 @@ def cuts_not_improved(
     cuts, place = np.unique(result.cut[rows], return_inverse=True)
 
     def largest(values: Floats, at: Ints) -> Floats:
-        found = np.zeros(len(cuts))
-        np.fmax.at(found, at, values)
-        return found
+        maxima = np.zeros(len(cuts))
+        np.fmax.at(maxima, at, values)
+        return maxima
 
     def mean_square(values: Floats) -> Floats:
         return np.bincount(place, np.nan_to_num(values) ** 2, len(cuts)) / np.bincount(place)
@@ -90,7 +90,7 @@ def cuts_not_improved(
             first, largest(_before_between(task, some), np.searchsorted(cuts, result.cut[some]))
         )
     worse = (after > first + ROUNDING) | (square[0] > square[1] - WORTH**2) | turned
-    found = {}
+    findings = {}
     for k in np.flatnonzero(worse).tolist():
         row = int(rows[np.argmax(place == k)])
         what = (
@@ -100,28 +100,28 @@ def cuts_not_improved(
             f" and {first[k] / MM:.4f} without the correction"
         )
         line = int(task.toolpath.line[row])
-        found[row] = Finding(
+        findings[row] = Finding(
             "COR016",
             what,
             task.file,
             line,
             help="allow inserted motions (no --no-insert), raise max_growth, or loosen the tolerance",
         )
-    return found
+    return findings
 
 
 def _before_between(task: CompensationProblem, rows: Ints) -> Floats:
     """(K,) [m] largest error across the feed inside of the motions ``rows`` (K,) as they are programmed."""
 
-    def looked(part: slice) -> Floats:
+    def compare(part: slice) -> Floats:
         some = rows[part]
         known = task.desired_path.traceable[some]
-        found = np.zeros(len(some))
+        errors = np.zeros(len(some))
         at = some[known]
-        found[known], _ = path_errors(task, programmed(task, at))
-        return found
+        errors[known], _ = path_errors(task, programmed(task, at))
+        return errors
 
-    return np.concatenate([np.empty(0), *in_blocks(looked, len(rows))])
+    return np.concatenate([np.empty(0), *in_blocks(compare, len(rows))])
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,7 @@ def evaluate_transitions(
     source, desired_path = division.source, task.desired_path
     chosen = np.flatnonzero(result.corrected[source] & desired_path.traceable[source] & ~division.transitions)
 
-    def looked(part: slice) -> tuple[float, int, float, int]:
+    def compare(part: slice) -> tuple[float, int, float, int]:
         segments = subdivided_motions(task, division, chosen[part])
         if not len(segments):
             return 0.0, 0, np.nan, 0
@@ -170,7 +170,7 @@ def evaluate_transitions(
             int((moves & (ahead < 0)).sum()),
         )
 
-    parts = list(in_blocks(looked, len(chosen)))
+    parts = list(in_blocks(compare, len(chosen)))
     if not parts:
         return Transitions(0.0, 0, np.nan, 0, 0, len(division.lead_ins))
     rate, row, _, _ = max(parts)

@@ -23,13 +23,13 @@ from postproc.compensation.mirror import pose_error
 from postproc.compensation.problem import CompensationProblem
 
 SHARES = (0.25, 0.5, 0.75)
-"""Where the path between two points is looked at; an error that grows from both of them is largest in the middle."""
+"""Where the path between two points is evaluated; an error that grows from both of them is largest in the middle."""
 
 ON_RAMPS = (0.125, 0.375, 0.625, 0.875)
 """And where besides on motions on which a ramp of the force lies: there it is largest anywhere."""
 
 SHORT, LITTLE = 30 * MM, 3 * DEG
-"""Of a segment that is shorter and turns by less the middle tells enough."""
+"""Of a segment that is shorter and turns by less the middle is enough."""
 
 TURNED = 0.02
 """Share of the tolerance: a turn of the wanted orientation, where the tool is early or late, that is not looked at."""
@@ -37,10 +37,10 @@ TURNED = 0.02
 
 @dataclass(frozen=True)
 class PathSegments:
-    """K segments of ways, as a controller makes them.
+    """K segments of paths, as a controller makes them.
 
     rows (K,): the motion each belongs to; first, last (K,): the shares of its path where the segment starts and ends;
-    begin, end: TCP commands in the robot base; centre, normal (K, 3), sweep (K,): of arcs, NaN for straight segments.
+    start, end: TCP commands in the robot base; centre, normal (K, 3), sweep (K,): of arcs, NaN for straight segments.
     """
 
     rows: Ints
@@ -63,7 +63,7 @@ class PathSegments:
         rows: Ints, first: Floats, last: Floats, start: Poses, via: Poses, end: Poses, normal: Floats
     ) -> PathSegments:
         """Arcs through ``via``, of motions ``rows`` (K,) from the shares ``first`` to ``last`` (K,); about ``normal``
-        (K, 3), with what is left along it in proportion, or where that is NaN in the plane of the three points."""
+        (K, 3), with what remains along it in proportion, or where that is NaN in the plane of the three points."""
         points = start.position, via.position, end.position
         axis = np.where(np.isnan(normal), arc_through(*points)[1], normal)
         return PathSegments(rows, first, last, start, end, *arc_in_plane(*points, axis))
@@ -85,23 +85,23 @@ class PathSegments:
 
     def at(self, share: Floats, along: Bools | None = None) -> Poses:
         """Commands (K) at the shares (K,) of the segments; ``along`` (K,): arcs with which the tool turns."""
-        found = interpolate_poses(self.start, self.end, share)
-        bent = np.flatnonzero(np.isfinite(self.sweep))
-        turns = bent[:0] if along is None else bent[along[bent]]
+        commands = interpolate_poses(self.start, self.end, share)
+        arcs = np.flatnonzero(np.isfinite(self.sweep))
+        turns = arcs[:0] if along is None else arcs[along[arcs]]
         if len(turns):
             start, end = self.start.rotation[turns], self.end.rotation[turns]
             arc = self.sweep[turns, None] * self.normal[turns]
-            found.rotation[turns] = turning(start, turn_beside(start, end, arc), arc, share[turns])
-        if len(bent):
-            found.position[bent] = on_arc(
-                self.start.position[bent],
-                self.end.position[bent],
-                self.centre[bent],
-                self.normal[bent],
-                self.sweep[bent],
-                share[bent],
+            commands.rotation[turns] = turning(start, turn_beside(start, end, arc), arc, share[turns])
+        if len(arcs):
+            commands.position[arcs] = on_arc(
+                self.start.position[arcs],
+                self.end.position[arcs],
+                self.centre[arcs],
+                self.normal[arcs],
+                self.sweep[arcs],
+                share[arcs],
             )
-        return found
+        return commands
 
 
 def programmed(task: CompensationProblem, rows: Ints) -> PathSegments:
@@ -117,17 +117,17 @@ def programmed(task: CompensationProblem, rows: Ints) -> PathSegments:
 def path_errors(
     task: CompensationProblem,
     segments: PathSegments,
-    from_begin: Bools | None = None,
-    left: float = 0.0,
+    from_start: Bools | None = None,
+    uncorrected_share: float = 0.0,
     shown: bool = False,
 ) -> tuple[Floats, Floats]:
     """Largest distance (K,) [m] of the predicted tool from the wanted path, and largest angle (K,) [rad] from the
     wanted orientation, inside of each segment; infinite where the robot cannot be there.
 
-    Along the way the tool may be early or late: only what it is off the path counts.  ``from_begin`` (K,): segments
-    that are looked at where they start as well (another ended there in its own place).  ``left``: the share of the
-    error without a correction that is meant to stay, and is none.  ``shown``: all of the angle that shows on the part;
-    else only what further points would take away.
+    Along the path the tool may be early or late: only what it is off the path counts.  ``from_start`` (K,): segments
+    that are evaluated where they start as well (another ended there in its own place).  ``uncorrected_share``: the
+    share of the error without a correction that is meant to stay, and is none.  ``shown``: all of the angle that shows
+    on the part; else only what further points would take away.
     """
     length = lengths(segments.end.position - segments.start.position)
     _, turn = pose_error(segments.end, segments.start)
@@ -141,13 +141,17 @@ def path_errors(
         chosen = np.flatnonzero(ramped | (long & (share in SHARES)) | (share == 0.5))
         if len(chosen):
             here = _errors(
-                task, segments if len(chosen) == len(segments) else segments[chosen], share, left, shown
+                task,
+                segments if len(chosen) == len(segments) else segments[chosen],
+                share,
+                uncorrected_share,
+                shown,
             )
             off[chosen] = np.maximum(off[chosen], here[0])
             angle[chosen] = np.maximum(angle[chosen], here[1])
-    if from_begin is not None and from_begin.any():
-        chosen = np.flatnonzero(from_begin)
-        here = _errors(task, segments[chosen], 0.0, left, shown)
+    if from_start is not None and from_start.any():
+        chosen = np.flatnonzero(from_start)
+        here = _errors(task, segments[chosen], 0.0, uncorrected_share, shown)
         off[chosen], angle[chosen] = np.maximum(off[chosen], here[0]), np.maximum(angle[chosen], here[1])
     return off, angle
 
@@ -159,7 +163,11 @@ def path_errors_at(task: CompensationProblem, segments: PathSegments, share: Flo
 
 
 def _errors(
-    task: CompensationProblem, segments: PathSegments, share: float | Floats, left: float, shown: bool
+    task: CompensationProblem,
+    segments: PathSegments,
+    share: float | Floats,
+    uncorrected_share: float,
+    shown: bool,
 ) -> tuple[Floats, Floats]:
     """As ``path_errors``, at one share of each segment."""
     rows = segments.rows
@@ -172,10 +180,10 @@ def _errors(
     real = task.simulated(rows, command, wrench, share=along, corrected=True)
     goal = task.goal(rows, wanted, along)
     shift, turn = _beside(task, rows, along, real.pose, wanted, goal, shown)
-    if left:
+    if uncorrected_share:
         without = task.simulated(rows, wanted, wrench, share=along).pose
         parts = _beside(task, rows, along, without, wanted, goal, shown)
-        shift, turn = shift - left * parts[0], turn - left * parts[1]
+        shift, turn = shift - uncorrected_share * parts[0], turn - uncorrected_share * parts[1]
     if not shown:
         turn = task.correctable(rows, along, command, turn)
     good = real.reachable & real.settled
@@ -190,7 +198,7 @@ def _beside(
     against what is wanted at the place of it that they are nearest to.
 
     A tool that is early by ds where the wanted orientation R(s) turns is compared with R(s + ds), not against ``goal``
-    (K), which belongs to ``wanted`` (K) at the shares (K,) of the ways of ``rows`` (K,).
+    (K), which belongs to ``wanted`` (K) at the shares (K,) of the paths of ``rows`` (K,).
     """
     desired_path, tangent = task.desired_path, task.desired_path.tangent(rows, share)
     ahead = np.sum((real.position - goal.position) * tangent, axis=1)

@@ -32,7 +32,7 @@ class CompensationProblem:
 
     wanted (N): TCP targets; base, tool (N): the programmed base in the robot base, the TCP on the flange; force: the
     wrench along the path of each motion; conditions (N): what else is known, at their ends and as they are programmed;
-    ``process``: correct what the force does and leave what the robot does without it (a base that was touched off
+    ``process``: correct what the force does and not what the robot does without it (a base that was touched off
     contains that, but for the lost motion of its gears: no base can lie on both sides of a gap); else everything is
     corrected, but for the rigid motion that ``touched_off`` bases contain.  ``max_correction``, ``tolerance`` [m],
     ``tolerance_angle`` [rad].  ``ramp`` [m]: over which a force that steps inside a cut goes over at least.
@@ -100,7 +100,7 @@ class CompensationProblem:
 
     def given(self, rows: Ints, share: Floats | None = None, corrected: bool = False) -> Conditions:
         """What else is known of motions ``rows`` (K,) at ``share`` (K,) of their paths, their ends without: as the
-        program runs as it stands, or ``corrected``."""
+        program runs uncorrected, or ``corrected``."""
         if self.lost_motion is None or (share is None and not corrected):
             return self.conditions.part(rows)
         return self._on(self._sides if corrected else self.lost_motion.programmed, rows, share)
@@ -153,14 +153,14 @@ class CompensationProblem:
         share: Floats | None = None,
     ) -> Prediction:
         placed = self.robot_from_path(rows, share)
-        found = predict(
+        prediction = predict(
             self.model,
             command if placed is None else placed @ command,
             self._load_case(rows, rotate_wrench(placed, wrench), given, share),
             start,
             q,
         )
-        return found if placed is None else replace(found, pose=placed.inverse() @ found.pose)
+        return prediction if placed is None else replace(prediction, pose=placed.inverse() @ prediction.pose)
 
     def goal(self, rows: Ints, wanted: Poses, share: Floats | None = None) -> Poses:
         """Where the tool is to be in motions ``rows`` (K,), at ``share`` (K,) of their paths or at their ends: the
@@ -219,21 +219,21 @@ class CompensationProblem:
     def _in_words(
         self, rows: Ints, goal: Poses, wrench: Floats, share: Floats | None, done: Correction, pairs: Ints
     ) -> Correction:
-        """``done`` with the orientations that two rotary axes can say in its rows ``pairs`` (P,), and the places that
-        go with them; all in the robot's own base."""
+        """``done`` with the orientations that two rotary axes can express in its rows ``pairs`` (P,), and the places
+        that go with them; all in the robot's own base."""
         at = rows[pairs]
         place = np.ones(len(at)) if share is None else share[pairs]
         here, placed = done.command.rotation[pairs], self.robot_from_path(at, place)
         if placed is None:
-            said = self.expressible_orientations(at, place, here)
+            expressible = self.expressible_orientations(at, place, here)
         else:
-            said = product(
+            expressible = product(
                 placed.rotation,
                 self.expressible_orientations(at, place, product(placed.inverse().rotation, here)),
             )
         again = mirror(
             self.model,
-            Poses(said, done.command.position[pairs]),
+            Poses(expressible, done.command.position[pairs]),
             goal[pairs],
             self._load_case(at, wrench[pairs], self._to_be(at, place), place),
             np.zeros((len(at), 3, 3)),
@@ -249,30 +249,30 @@ class CompensationProblem:
         return replace(done, command=command, iterations=iterations, **parts)
 
     def expressible_orientations(self, rows: Ints, share: Floats, rotation: Floats) -> Floats:
-        """(K, 3, 3) orientations nearest to ``rotation`` (K, 3, 3) that the words of motions ``rows`` (K,) say at the
-        shares (K,) of their paths, without a swing of an axis that hardly turns the tool."""
+        """(K, 3, 3) orientations nearest to ``rotation`` (K, 3, 3) that the words of motions ``rows`` (K,) express at
+        the shares (K,) of their paths, without a swing of an axis that hardly turns the tool."""
         pairs = orientations.pairs(self.toolpath, rows)
         if not len(pairs):
             return rotation
-        found, at = rotation.copy(), rows[pairs]
-        found[pairs] = orientations.nearest_expressible(
+        nearest, at = rotation.copy(), rows[pairs]
+        nearest[pairs] = orientations.nearest_expressible(
             self.toolpath, self.base, self.wanted, at, share[pairs], rotation[pairs]
         )
-        return found
+        return nearest
 
     def correctable(self, rows: Ints, share: Floats, command: Poses, turn: Floats) -> Floats:
         """(K, 3) [rad] of ``turn`` (K, 3), by which the tool is off at ``command`` (K), what other words at the shares
-        (K,) of the ways of ``rows`` (K,) would make up for: near the pole of two rotary axes not all of it."""
+        (K,) of the paths of ``rows`` (K,) would make up for: near the pole of two rotary axes not all of it."""
         pairs = orientations.pairs(self.toolpath, rows)
         if not len(pairs):
             return turn
-        found, at = turn.copy(), rows[pairs]
+        correctable, at = turn.copy(), rows[pairs]
         here, tool = command.rotation[pairs], self.toolpath.orientation_control.redundant_axis[at]
         better = self.expressible_orientations(
             at, share[pairs], product(rotation_from_vector(-turn[pairs]), here)
         )
-        found[pairs] = np.cross(turned(better, tool), turned(here, tool))
-        return found
+        correctable[pairs] = np.cross(turned(better, tool), turned(here, tool))
+        return correctable
 
     def start_command(
         self,
@@ -289,7 +289,7 @@ class CompensationProblem:
         placed = self.robot_from_path(rows, share)
         if placed is not None:
             wanted, goal = placed @ wanted, placed @ goal
-        command, bent = initial_guess(
+        command, displacement = initial_guess(
             self.model,
             wanted,
             goal,
@@ -297,7 +297,7 @@ class CompensationProblem:
             self.max_correction,
             q,
         )
-        return (command if placed is None else placed.inverse() @ command), bent
+        return (command if placed is None else placed.inverse() @ command), displacement
 
     def turn_freely(self, rows: Ints) -> bool:
         """Whether the texts of all motions ``rows`` (K,) can express any orientation."""

@@ -47,9 +47,9 @@ def add_force_ramps(task: CompensationProblem, ramp: Floats | float) -> Compensa
 
 
 def correction_steps(task: CompensationProblem, rows: Ints) -> Floats:
-    """(K, 3) [m] by how much the correction would step where the motions ``rows`` (K,) begin: that under the force with
+    """(K, 3) [m] by how much the correction would step where the motions ``rows`` (K,) start: that under the force with
     which they start, less that under the force with which the motion before them ends."""
-    found = np.empty((len(rows), 3))
+    steps = np.empty((len(rows), 3))
 
     def stepped(part: slice) -> None:
         at = rows[part]
@@ -59,7 +59,7 @@ def correction_steps(task: CompensationProblem, rows: Ints) -> Floats:
             task.command(at, wanted, wrench, goal).command.position
             for wrench in (task.force.start[at], task.force.values[at - 1])
         )
-        found[part] = new - old
+        steps[part] = new - old
 
     each_block(stepped, len(rows))
-    return found
+    return steps

@@ -17,7 +17,7 @@ from postproc.compensation.divisible_motions import (
 from postproc.compensation.orientations import shortest
 
 LITTLE = 3 * DEG
-"""Axes that turn by less leave a robot's compliance as it is: what changes with its square is a thousandth."""
+"""Axes that turn by less do not change a robot's compliance: what changes with its square is a thousandth."""
 
 _ORDER = {False: 2.0, True: 3.0}
 """The error between points of a straight segment falls with the square of its length, that of an arc through three
@@ -30,7 +30,7 @@ def refine(motions: DivisibleMotions) -> None:
     desired_path, rows = motions.task.desired_path, motions.rows[motions.owner]
     arc = desired_path.arc[rows]
     motions.least = least = motions.least_segments()
-    # A way that starts beside its place stays beside it, in however many segments.
+    # A path that starts beside its place stays beside it, in however many segments.
     entered = motions.needs_transition | motions.has_lead_in | (motions.step <= ROOM)
     cutting = motions.task.carries[rows]
     can = motions.free[rows] & (entered[motions.owner] | ~cutting)
@@ -52,12 +52,14 @@ def refine(motions: DivisibleMotions) -> None:
     ratio = np.zeros(len(rows))
     motions.count, active = least.copy(), np.flatnonzero(~_even_motions(motions))
     while len(active):
-        found = motions.largest_errors(active, motions.count[active])
-        motions.error[active] = np.where(motions.count[active] == least[active], found, motions.error[active])
-        good = found <= 1.0
+        errors = motions.largest_errors(active, motions.count[active])
+        motions.error[active] = np.where(
+            motions.count[active] == least[active], errors, motions.error[active]
+        )
+        good = errors <= 1.0
         won, lost = active[good], active[~good]
         holds[won] = motions.count[won]
-        fails[lost], ratio[lost] = motions.count[lost], found[~good]
+        fails[lost], ratio[lost] = motions.count[lost], errors[~good]
         going = np.where(holds[active] > 0, holds[active] - fails[active] > 1, fails[active] < most[active])
         motions.count[active] = np.where(holds[active] > 0, holds[active], most[active])
         active = active[going]
@@ -68,8 +70,8 @@ def refine(motions: DivisibleMotions) -> None:
 
 
 def _even_motions(motions: DivisibleMotions) -> Bools:
-    """(I,) straight ways on which the correction hardly changes and the axes hardly turn: it lies on a line from
-    begin to end, and between them nothing is off by more than a part of that change."""
+    """(I,) straight paths on which the correction hardly changes and the axes hardly turn: it lies on a line from
+    start to end, and between them nothing is off by more than a part of that change."""
     task, full, path = motions.task, motions.full, motions.task.toolpath
 
     def even(part: slice) -> Bools:
@@ -83,10 +85,10 @@ def _even_motions(motions: DivisibleMotions) -> Bools:
             alike &= lengths(change[rows] - change[before]) <= STEP * most
         return alike & (np.abs(task.track.q[rows] - task.track.q[before]) <= LITTLE).all(axis=1)
 
-    found = np.concatenate([np.empty(0, bool), *in_blocks(even, len(motions.rows))]) | motions.spline
+    is_even = np.concatenate([np.empty(0, bool), *in_blocks(even, len(motions.rows))]) | motions.spline
     if task.force.ramps is not None:
-        found[np.isin(motions.rows, task.force.ramps.row)] = False
-    return found if len(motions.owner) == len(motions.rows) else found[motions.owner]
+        is_even[np.isin(motions.rows, task.force.ramps.row)] = False
+    return is_even if len(motions.owner) == len(motions.rows) else is_even[motions.owner]
 
 
 def enforce_budget(motions: DivisibleMotions) -> None:
@@ -110,7 +112,7 @@ def enforce_budget(motions: DivisibleMotions) -> None:
     points = motions.count - motions.least
     gets = allocate(points, motions.error, most - int(cost[paid].sum()))
     motions.count = motions.least + gets
-    # of each way what is still wrong on it
+    # of each path the error that remains on it
     np.maximum.at(need, motions.owner[gets < points], motions.error[gets < points])
     short = ~paid
     short[motions.owner[gets < points]] = True
@@ -127,19 +129,19 @@ def enforce_budget(motions: DivisibleMotions) -> None:
     )
 
 
-def _join_intervals(motions: DivisibleMotions, desired_path: Bools) -> None:
-    """Makes ``desired_path`` (R,) one interval each."""
-    kept = ~desired_path[motions.owner] | (motions.low == 0.0)
+def _join_intervals(motions: DivisibleMotions, chosen: Bools) -> None:
+    """Makes the paths ``chosen`` (R,) one interval each."""
+    retained = ~chosen[motions.owner] | (motions.low == 0.0)
     motions.owner, motions.low, motions.high = (
-        motions.owner[kept],
-        motions.low[kept],
-        motions.high[kept].copy(),
+        motions.owner[retained],
+        motions.low[retained],
+        motions.high[retained].copy(),
     )
-    joined = desired_path[motions.owner] & (motions.high < 1.0)
+    joined = chosen[motions.owner] & (motions.high < 1.0)
     motions.high[joined] = 1.0
     motions.least = motions.least_segments()
-    motions.count = np.where(joined, motions.least, motions.count[kept])
-    motions.error = np.where(joined, motions.split_error[motions.owner], motions.error[kept])
+    motions.count = np.where(joined, motions.least, motions.count[retained])
+    motions.error = np.where(joined, motions.split_error[motions.owner], motions.error[retained])
 
 
 def allocate(wanted: Ints, need: Floats, spare: int) -> Ints:

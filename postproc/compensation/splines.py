@@ -14,8 +14,8 @@ from postproc.toolpath import Kind
 
 
 def unknown_displacements(task: CompensationProblem, result: CorrectionResult) -> tuple[Ints, Floats]:
-    """Rows (K,) of the corrected points of splines, and (K,) [m] by how much the displacement of the tool on the way to
-    each of them may be another than the one that is corrected.
+    """Rows (K,) of the corrected points of splines, and (K,) [m] by how much the displacement of the tool on the path
+    to each of them may be another than the one that is corrected.
 
     A correction takes the feed to run along the chords.  At a point of a spline the feed lies between those of both
     sides, where the correction has their mean; where a spline starts or ends it turns as far away from its chord.  So

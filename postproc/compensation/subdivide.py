@@ -1,5 +1,5 @@
 """What is inserted so that the path between corrected points is right too: transition moves where the correction steps,
-and points where a straight or round path between two of them would leave the tolerance."""
+and points where a straight or round path between two of them would exceed the tolerance."""
 
 from __future__ import annotations
 
@@ -72,9 +72,9 @@ def _build_subdivision(motions: DivisibleMotions) -> Subdivision:
 
     arc = task.desired_path.arc[motions.rows]
     none = np.broadcast_to(np.nan, (len(source), 3))
-    desired_path = [none, none, none[:, 0]]
+    arcs = [none, none, none[:, 0]]
     if arc.any():
-        desired_path = [path.copy() for path in desired_path]
+        arcs = [path.copy() for path in arcs]
     chosen = np.flatnonzero((motions.count > 1) | arc[motions.owner] | (motions.high < 1.0))
     earlier = np.cumsum(motions.count) - motions.count  # segments before each interval
     first_of = np.searchsorted(motions.owner, np.arange(len(motions.rows)))
@@ -94,9 +94,7 @@ def _build_subdivision(motions: DivisibleMotions) -> Subdivision:
         inner = np.flatnonzero(segments.last < 1.0)
         there.put(np.searchsorted(inserted, place[inner]), segments.end[inner])
         if arc.any():
-            for path, values in zip(
-                desired_path, (segments.centre, segments.normal, segments.sweep), strict=True
-            ):
+            for path, values in zip(arcs, (segments.centre, segments.normal, segments.sweep), strict=True):
                 path[place] = values
 
     each_block(divided, len(chosen), motions_per_block(motions.count[chosen]))
@@ -109,24 +107,24 @@ def _build_subdivision(motions: DivisibleMotions) -> Subdivision:
 
     def command(rows: Ints) -> Poses:
         at = source[rows]
-        found = full[at]
+        commands = full[at]
         if len(lead_ins):
             near = np.minimum(np.searchsorted(lead_ins, at), len(lead_ins) - 1)
             some = np.flatnonzero((lead_ins[near] == at) & is_own[rows])
-            found.put(some, leads[near[some]])
+            commands.put(some, leads[near[some]])
         added = np.flatnonzero(~is_own[rows])
         if len(added):
-            found.put(added, there[np.searchsorted(inserted, rows[added])])
-        return found
+            commands.put(added, there[np.searchsorted(inserted, rows[added])])
+        return commands
 
     division = Subdivision(
         source,
         role,
         share,
         PoseRows(len(source), command),
-        desired_path[0],
-        desired_path[1],
-        desired_path[2],
+        arcs[0],
+        arcs[1],
+        arcs[2],
         moved,
         tuple(motions.findings),
         dict(sorted(motions.not_refined.items())),
@@ -140,27 +138,27 @@ def _scaled(task: CompensationProblem, division: Subdivision) -> Subdivision:
     source, desired_path = division.source, task.desired_path
 
     def command(rows: Ints) -> Poses:
-        found = division.command[rows]
+        commands = division.command[rows]
         moved = np.flatnonzero(division.moved[rows])
         at, share = source[rows[moved]], division.share[rows[moved]]
         wanted = task.wanted[at].copy()
-        on_way = np.flatnonzero(desired_path.traceable[at])
-        wanted.put(on_way, desired_path.at(at[on_way], share[on_way]))
-        part = interpolate_pose(wanted, found[moved], task.gain)
-        found.put(moved, Poses(task.expressible_orientations(at, share, part.rotation), part.position))
-        return found
+        on_path = np.flatnonzero(desired_path.traceable[at])
+        wanted.put(on_path, desired_path.at(at[on_path], share[on_path]))
+        part = interpolate_pose(wanted, commands[moved], task.gain)
+        commands.put(moved, Poses(task.expressible_orientations(at, share, part.rotation), part.position))
+        return commands
 
     scaled = replace(division, command=PoseRows(len(division), command))
-    bent = np.flatnonzero(np.isfinite(division.sweep))
-    if not len(bent):
+    curved = np.flatnonzero(np.isfinite(division.sweep))
+    if not len(curved):
         return scaled
-    before, part = subdivided_motions(task, division, bent), subdivided_motions(task, scaled, bent)
-    wanted = desired_path.at(source[bent], 0.5 * (before.first + before.last))
-    via = interpolate_pose(wanted, before.at(np.full(len(bent), 0.5)), task.gain)
-    normal = arc_normals(task, source[bent])
+    before, part = subdivided_motions(task, division, curved), subdivided_motions(task, scaled, curved)
+    wanted = desired_path.at(source[curved], 0.5 * (before.first + before.last))
+    via = interpolate_pose(wanted, before.at(np.full(len(curved), 0.5)), task.gain)
+    normal = arc_normals(task, source[curved])
     arcs = PathSegments.round(part.rows, part.first, part.last, part.start, via, part.end, normal)
     for name in ("centre", "normal", "sweep"):
         values = getattr(scaled, name).copy()
-        values[bent] = getattr(arcs, name)
+        values[curved] = getattr(arcs, name)
         scaled = replace(scaled, **{name: values})
     return scaled

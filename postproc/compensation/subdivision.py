@@ -43,9 +43,9 @@ class Subdivision:
 
     source, role (M,); share (M,): of the source's path, where the motion ends; command (M): TCP poses in the robot
     base, NaN where a target is not known; centre, normal (M, 3), sweep (M,): corrected arcs in the robot base, NaN for
-    all others; moved (M,): the motion is another than in the input.  held: rows that cannot be corrected after all, and
-    why.  lead_ins (L,): motions in air of the input that end where the cut after them starts corrected.  blend (M,)
-    [m]: of each motion as in a Toolpath, where it was written.
+    all others; moved (M,): the motion is another than in the input.  not_refined: rows that cannot be corrected after
+    all, and why.  lead_ins (L,): motions in air of the input that end where the cut after them starts corrected.
+    blend (M,) [m]: of each motion as in a Toolpath, where it was written.
     """
 
     source: Ints

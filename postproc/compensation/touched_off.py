@@ -1,9 +1,9 @@
-"""What touching off a base with the robot itself sees: a rigid motion of the part, and nothing of what it leaves over.
+"""What touching off a base with the robot itself measures: a rigid motion of the part, and nothing of what remains.
 
 A probe that the robot brings to places p_k of the part touches them where the robot really is, p_k + e_k, while the
 controller reads p_k; e_k is the error of the unloaded robot there.  The base that is set from these readings therefore
 lies beside the part by the rigid motion M that fits p_k -> p_k + e_k best, and the tool is to be at M x where the
-program says x.
+program states x.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ class TouchedOff:
         tool: Poses,
         frames: int,
     ) -> TouchedOff:
-        """Of ``frames`` frames, touched as the class says: place k (K,) is in ``frame`` (K,) and is the target of
+        """Of ``frames`` frames, touched as the class describes: place k (K,) is in ``frame`` (K,) and is the target of
         motion ``row`` (K,).  Conditions of N motions; each place is touched without a sense of approach."""
         given = conditions.part(row)
         if model.by_direction:
@@ -97,8 +97,8 @@ class TouchedOff:
 
     def residual(self) -> Floats:
         """(T,) [m] how far each touched place is from where its base puts it."""
-        seen = self.motion[self.frame] @ self.wanted
-        return np.asarray(np.linalg.norm(self.real.pose.position - seen.position, axis=1))
+        fitted = self.motion[self.frame] @ self.wanted
+        return np.asarray(np.linalg.norm(self.real.pose.position - fitted.position, axis=1))
 
     def goal(self, frame: Ints, wanted: Poses) -> Poses:
         """Where the tool is to be (K) for poses ``wanted`` (K) in the frames (K,)."""
@@ -107,7 +107,7 @@ class TouchedOff:
     def sensitivity(self, touched: Floats, frame: Ints, place: Floats) -> Floats:
         """d(goal)/d(figure) (K, 3, P) at ``place`` (K, 3) in the frames (K,), of d(touched place)/d(figure)
         (T, 3, P): central differences of the fit."""
-        found = np.zeros((len(place), 3, touched.shape[2]))
+        derivatives = np.zeros((len(place), 3, touched.shape[2]))
         for index in np.unique(frame[self.known[frame]]):
             own, rows = self.frame == index, frame == index
             before, after = self.wanted.position[own], self.real.pose.position[own]
@@ -119,5 +119,5 @@ class TouchedOff:
                 step = STEP / size
                 ends = [rigid_motion(before, after + sign * step * moves) for sign in (1.0, -1.0)]
                 high, low = (place[rows] @ end.rotation.T + end.position for end in ends)
-                found[rows, :, column] = (high - low) / (2 * step)
-        return found
+                derivatives[rows, :, column] = (high - low) / (2 * step)
+        return derivatives

@@ -57,7 +57,7 @@ def add_transitions(motions: DivisibleMotions) -> None:
 
 def _can_lead(motions: DivisibleMotions, rows: Ints) -> Bools:
     """(K,) whether the motion before each of ``rows`` (K,) is one in air at feed, straight and of known end, whose
-    text can say where the cut starts corrected."""
+    text can state where the cut starts corrected."""
     path, before = motions.task.toolpath, np.maximum(rows - 1, 0)
     can = (rows > 0) & (path.kind[before] == Kind.LIN) & path.known[before] & path.executes[before]
     can &= (motions.full.state[before] == MotionOutcome.AIR) & ~motions.task.carries[before]
@@ -73,8 +73,8 @@ def _can_lead(motions: DivisibleMotions, rows: Ints) -> Bools:
 
 
 def _turns_alike(motions: DivisibleMotions, entered: Ints) -> Bools:
-    """(K,) whether the motion before each of the places ``entered`` (K,) still turns the same way where it ends at
-    the corrected begin: of half a turn the way may be the other one then."""
+    """(K,) whether the motion before each of the places ``entered`` (K,) still turns in the same sense where it ends at
+    the corrected start: of half a turn the sense may be the other one then."""
     alike, before, half = (
         np.ones(len(entered), bool),
         motions.rows[entered] - 1,

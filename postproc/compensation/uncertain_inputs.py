@@ -70,7 +70,7 @@ def input_uncertainties(
 
     ``force_ci95``: share of the force, 95 %; without it, and without components in ``vector``, a force that acts
     (``forced``) has no interval.  The model's
-    covariance stands for what the robot file says of its parameters; others are taken as independent.  Raises
+    covariance replaces what the robot file states of its parameters; others are taken as independent.  Raises
     ValueError where it has a name that the model does not have.
     """
     names, block = model.covariance or ((), np.zeros((0, 0)))
@@ -118,11 +118,11 @@ def input_uncertainties(
 def _vector_entries(vector: ForceVectorInterval) -> list[UncertainInput]:
     """The turns and components of the force that have an interval."""
     turn = vector.direction / COVERAGE
-    found = [UncertainInput(DIRECTION, -1, name, 0.0, -np.inf, np.inf, turn) for name in TURNS if turn > 0]
+    entries = [UncertainInput(DIRECTION, -1, name, 0.0, -np.inf, np.inf, turn) for name in TURNS if turn > 0]
     if vector.components is not None:
         each = (vector.components / COVERAGE).tolist()
-        found += [
+        entries += [
             UncertainInput(name, -1, name, 0.0, -np.inf, np.inf, size)
             for name, size in zip(COMPONENTS, each, strict=True)
         ]
-    return found
+    return entries

@@ -6,9 +6,9 @@ A command is fixed and the true parameters differ by dp from those of the model:
 
 by central differences of the solved equilibrium (``input_sensitivities``), and its covariance is S C S^T (GUM, JCGM
 100:2008, eq. 13; ``uncertainty_propagation``).  This is as true of the deflection before as of the residual after a
-correction: what the model does not know of the robot, the correction leaves in.  A parameter is one and the same in all
-motions, so these errors do not average out over a program; nor does the force's, which is taken as one scale common to
-all motions, or to all of an operation, as two turns common to all motions and as one force added to all.
+correction: what the model does not know of the robot, the correction does not remove.  A parameter is one and the same
+in all motions, so these errors do not average out over a program; nor does the force's, which is taken as one scale
+common to all motions, or to all of an operation, as two turns common to all motions and as one force added to all.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Uncertainty:
 
     @property
     def unknown(self) -> bool:
-        """Whether the intervals say nothing of the whole: there are none, or a tenth of what has none does more than
+        """Whether the intervals do not cover the whole: there are none, or a tenth of what has none does more than
         all of them."""
         return bool(np.isnan(self.before)) or any(
             length > self.before for _, length in self.effect_of_10_percent
@@ -96,11 +96,11 @@ def evaluate_uncertainty(
     forced = bool(task.wrench[rows].any())
     force = ForceUncertainty.of(task, rows, force_ci95)
     known = input_uncertainties(task.model, force.largest, forced, vector)
-    if force.partly:
+    if force.incomplete:
         lost = input_uncertainties(task.model, None, True).without_interval
         known = replace(known, without_interval=(*known.without_interval, lost[-1]))
     tenth = tuple((entry.name, np.nan) for entry in known.without_interval)
-    told = Uncertainty(
+    uncertainty = Uncertainty(
         rows,
         len(known.entries),
         known.level_unstated,
@@ -108,7 +108,7 @@ def evaluate_uncertainty(
         force_differs=force.differs,
     )
     if not len(rows):
-        return told
+        return uncertainty
     worst = int(np.nanargmax(result.before))
     place = np.array([worst])
     moved = error_sensitivities(task, known.without_interval, place, task.wanted[place])[1][0]
@@ -116,15 +116,15 @@ def evaluate_uncertainty(
     tenth = tuple(
         (known.without_interval[i].name, float(length[i])) for i in np.argsort(-length, kind="stable")
     )
-    told = replace(told, worst=worst, effect_of_10_percent=tenth)
+    uncertainty = replace(uncertainty, worst=worst, effect_of_10_percent=tenth)
     if not known.entries:
-        return told
+        return uncertainty
 
     error, moves = error_sensitivities(task, known.entries, place, task.wanted[place])
     moves = force.scaled(moves, known.entries, place)
     before = expanded_uncertainty(error, covariances(moves, known.covariance))
     share = variance_shares(moves[0], known.covariance)
-    blame = _by_name(known.entries, share)
+    budget = _by_name(known.entries, share)
 
     error, moves = error_sensitivities(task, known.entries, rows, result.command[rows], corrected=True)
     moves = force.scaled(moves, known.entries, rows)
@@ -134,13 +134,13 @@ def evaluate_uncertainty(
     upper = size + after
     sound = np.isfinite(upper)
     return replace(
-        told,
+        uncertainty,
         before=float(before[0]),
         after=expanded_uncertainty_of_largest(error[sound], moves[sound], known.covariance)
         if sound.any()
         else np.nan,
         expanded=np.stack([expanded_uncertainty(result.deflection[rows], spread), after], axis=1),
-        budget=blame if share.any() else (),
+        budget=budget if share.any() else (),
         unstable=int((~sound).sum()),
     )
 
@@ -156,12 +156,12 @@ def _by_name(entries: Sequence[UncertainInput], share: Floats) -> tuple[tuple[st
 @dataclass(frozen=True)
 class ForceUncertainty:
     """The interval of the force as a share of it: ``largest`` of all motions, None where none has one; ``scale`` (N,):
-    that of each motion over the largest, 0 where not known; ``partly``: it is not known of some that carry force;
+    that of each motion over the largest, 0 where not known; ``incomplete``: it is not known of some that carry force;
     ``differs``: it is not the same in all that do."""
 
     largest: float | None
     scale: Floats
-    partly: bool
+    incomplete: bool
     differs: bool
 
     @staticmethod
@@ -173,12 +173,12 @@ class ForceUncertainty:
         if stated is not None:
             each = np.full(n, stated)
         here = each[rows[task.carries[rows]]]
-        found = here[np.isfinite(here)]
-        if not len(found):
+        known = here[np.isfinite(here)]
+        if not len(known):
             return ForceUncertainty(stated, np.ones(n), False, False)
-        largest = float(found.max())
+        largest = float(known.max())
         scale = np.nan_to_num(each) / largest if largest > 0 else np.ones(n)
-        return ForceUncertainty(largest, scale, len(found) < len(here), bool(found.min() < largest))
+        return ForceUncertainty(largest, scale, len(known) < len(here), bool(known.min() < largest))
 
     def scaled(self, moves: Floats, entries: Sequence[UncertainInput], rows: Ints) -> Floats:
         """Sensitivities (M, 3, P), ``moves`` (M, 3, P) of ``rows`` (M,), in which the force's counts with the interval

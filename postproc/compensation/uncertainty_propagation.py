@@ -46,12 +46,12 @@ def expanded_uncertainty(error: Floats, spread: Floats) -> Floats:
     Of an error that exceeds its uncertainty: along its own direction.  Elsewhere, as after a correction, the length
     that the deviation keeps below with 95 %.
     """
-    size, found = np.linalg.norm(error, axis=1), length_quantile(spread)
-    clear = size > found
+    size, half_width = np.linalg.norm(error, axis=1), length_quantile(spread)
+    clear = size > half_width
     unit = error[clear] / size[clear, None]
     along = np.einsum("ni,nij,nj->n", unit, spread[clear], unit)
-    found[clear] = COVERAGE * np.sqrt(np.maximum(along, 0.0))
-    return found
+    half_width[clear] = COVERAGE * np.sqrt(np.maximum(along, 0.0))
+    return half_width
 
 
 def length_quantile(spread: Floats) -> Floats:
@@ -62,10 +62,10 @@ def length_quantile(spread: Floats) -> Floats:
     one direction this is 1.96 sqrt(lambda), for three alike 2.80 sqrt(lambda): both exact, between them to about 1 %.
     """
     total, squares = np.trace(spread, axis1=1, axis2=2), (spread**2).sum(axis=(1, 2))
-    found, some = 0.0 * total, squares > 0  # NaN where nothing is known
+    quantile, some = 0.0 * total, squares > 0  # NaN where nothing is known
     total, squares = total[some], squares[some]
-    found[some] = np.sqrt(squares / total * np.interp(total**2 / squares, *np.transpose(_CHI_SQUARE)))
-    return np.asarray(found)
+    quantile[some] = np.sqrt(squares / total * np.interp(total**2 / squares, *np.transpose(_CHI_SQUARE)))
+    return np.asarray(quantile)
 
 
 def expanded_uncertainty_of_largest(error: Floats, sensitivity: Floats, covariance: Floats) -> float:
@@ -73,7 +73,7 @@ def expanded_uncertainty_of_largest(error: Floats, sensitivity: Floats, covarian
     in 95 % of all cases at most; S = ``sensitivity`` (M, 3, P), dp of ``covariance`` (P, P).  After a correction, where
     the predicted error is next to nothing, their sum is what the largest error stays below with 95 %.
 
-    ``DRAWS`` sets dp, always the same ones, each principal axis sampled evenly (Latin hypercube): few tell a quantile
+    ``DRAWS`` sets dp, always the same ones, each principal axis sampled evenly (Latin hypercube): few give a quantile
     that one or two axes dominate.  They go through the ``MOST`` motions that have the largest error most often in the
     first ``FIRST``.
     """

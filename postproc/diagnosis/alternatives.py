@@ -30,22 +30,22 @@ CLOSE, CLOSE_SHARE, RIVALS = 30.0, 0.05, 3
 """Alternatives are fitted where -2 ln(likelihood) is linearly worse by less than this, or than this share of the gain;
 so many at most."""
 
-WILD = 5.0
+OUTLIER_LIMIT = 5.0
 """Standard deviations that a reading counts with at most."""
 
 
 def squares_of(fitted: Fit, weights: Weighting, variance: float) -> float:
-    """Squares that a fit leaves, of readings [their variance by ``weights``, wild ones cut] and of priors; ``variance``
-    of the readings as they are seen to scatter."""
+    """Squares that remain after a fit, of readings [their variance by ``weights``, outliers cut] and of priors;
+    ``variance`` of the readings as they scatter."""
     level = np.sqrt(variance)
-    left = np.minimum(np.abs(weights(fitted.point.residual)), WILD * level)
+    residual = np.minimum(np.abs(weights(fitted.point.residual)), OUTLIER_LIMIT * level)
     values = fitted.point.values(fitted.unknowns)
     priors = sum(
         (level * (u.value - value) / u.prior) ** 2
         for u, value in zip(fitted.unknowns, values.tolist(), strict=True)
         if u.prior is not None
     )
-    return float(left @ left) + float(priors)
+    return float(residual @ residual) + float(priors)
 
 
 def find_alternatives(
@@ -56,14 +56,14 @@ def find_alternatives(
     given, chosen = linear.problem, [linear.candidates[g] for g in last.groups]
     variance = scatter(given, last)
     here = squares_of(fitted, fitted.weights, variance)
-    found: list[Alternative] = []
+    alternatives: list[Alternative] = []
     for group in last.groups:
         mine = linear.candidates[group]
         rest = explained(given, tuple(g for g in last.groups if g != group))
-        gain, left = rest.squares - last.squares, residual_of(given, rest)
+        gain, residual = rest.squares - last.squares, residual_of(given, rest)
 
-        def paid(columns: Floats, rest: Explained = rest, left: Floats = left) -> float:
-            return complexity_penalty(beside(given, rest, columns), left, variance)
+        def paid(columns: Floats, rest: Explained = rest, residual: Floats = residual) -> float:
+            return complexity_penalty(beside(given, rest, columns), residual, variance)
 
         def scaled(g: int) -> Floats:
             return given.matrix[:, given.places[g]] * given.size[given.places[g]]
@@ -84,21 +84,23 @@ def find_alternatives(
             if rest.squares - squares > 0.5 * gain:
                 worse = float(squares - last.squares) / variance
                 of_mine.append(Alternative(mine.key, instead, worse, paid(columns) - own, False))
-        of_mine.sort(key=lambda rival: rival.margin)
-        for k, rival in enumerate(of_mine[:RIVALS]):
-            if rival.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
-                there = with_effects(campaign, base, [rival.candidate if c is mine else c for c in chosen])
+        of_mine.sort(key=lambda alternative: alternative.margin)
+        for k, alternative in enumerate(of_mine[:RIVALS]):
+            if alternative.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
+                there = with_effects(
+                    campaign, base, [alternative.candidate if c is mine else c for c in chosen]
+                )
                 worse = float(squares_of(there, fitted.weights, variance) - here) / variance
-                of_mine[k] = replace(rival, worse=worse, fitted=True)
-        found += of_mine
-    return tuple(sorted(found, key=lambda rival: rival.margin))
+                of_mine[k] = replace(alternative, worse=worse, fitted=True)
+        alternatives += of_mine
+    return tuple(sorted(alternatives, key=lambda alternative: alternative.margin))
 
 
 def _instead(
     campaign: Campaign, fitted: Fit, linear: Linear, rest: Explained, mine: Candidate, other: Candidate
 ) -> tuple[Candidate, float, Floats]:
     """``other``, that is not linear in its size, as large as explains the most in the place of ``mine`` beside
-    ``rest``; the squares that are left then, and its columns outside of what is explained anyway."""
+    ``rest``; the squares that then remain, and its columns outside of what is explained anyway."""
     without = point_without(campaign, fitted, [mine])
     model, unknowns = composed(without.model, [other])
     basis = basis_of(linear.common)
@@ -111,6 +113,6 @@ def _instead(
     large = evaluate_at_size(
         campaign, without, model, unknowns, lambda columns: outside(beyond, readings(columns))
     )
-    gain = float(large.target @ large.target - large.left @ large.left)
+    gain = float(large.target @ large.target - large.remaining @ large.remaining)
     alternative = replace(other, columns=large.columns, start=tuple(large.values.tolist()))
     return alternative, rest.squares - gain, outside(basis, readings(large.columns))

@@ -29,9 +29,9 @@ def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> 
     for candidate in chosen:
         start |= _begun(campaign, base, model, candidate)
     own = [u for u in base.asked if u.key in {b.key for b in base.unknowns}]
-    # what turns out not to be seen stays where it is begun with: without a length a spring is none
-    looked = [replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in unknowns]
-    return fit(campaign, model.with_values(start), [*own, *looked], given=base.point.given)
+    # what turns out to be unobservable stays at its start value: without a length a spring is none
+    additional = [replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in unknowns]
+    return fit(campaign, model.with_values(start), [*own, *additional], given=base.point.given)
 
 
 def _begun(

@@ -33,10 +33,10 @@ STRAIGHT = 0.05
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect on one joint ("" where it has none, or ``EVERY``) that the model may lack.
+    """An effect on one joint ("" where it has none, or ``EVERY``) that may be missing in the model.
 
     ``unknowns``: its parameters in ``model``, the model with the effect added at its null; columns (R, 3 or 6, p) what
-    they move, per scale; ``nonlinear``: in its usual size it does not do what its columns at the null say;
+    they move, per scale; ``nonlinear``: in its usual size it does not do what its columns at the null predict;
     ``up_to_joint``: of an effect that is there on no joint alone, the last joint whose parameters it has; start (p,)
     [SI]: values that a fit may start with, () at the null; ``dormant_parameters``: names of parameters that move
     nothing where the others are at the null.
@@ -85,7 +85,7 @@ class Candidate:
 
     @property
     def label(self) -> str:
-        """As people say it: effect, its options where they tell two forms apart, and joint."""
+        """In words: effect, its options where they distinguish two forms, and joint."""
         options, words = self.effect.described(), self.name
         if "harmonics" in options:
             words += f" (harmonic {str(options['harmonics']).strip('[]').replace('.0', '')})"
@@ -99,22 +99,23 @@ class Candidate:
 
 
 def candidates(campaign: Campaign, model: StiffnessModel, given: Nuisances) -> tuple[Candidate, ...]:
-    """All that ``model`` may lack, with what it would move in ``campaign``; also what would move nothing there."""
-    found: list[Candidate] = []
+    """All that may be missing in ``model``, with what it would move in ``campaign``; also what would move nothing
+    there."""
+    entries: list[Candidate] = []
     for name, effect in EFFECTS.items():
         if name == "base_offset" and campaign.tracked:
             continue  # the registration itself
         known = [index for index, term in enumerate(model.terms) if term.effect.name == name]
         for term in known:
-            lacking = [
+            missing = [
                 u for u in unknowns_of(model, term) if u.stated is None and u.value == u.parameter.null
             ]
-            found += _by_joint(campaign, model, given, [u for u in lacking if not u.fixed])
+            entries += _by_joint(campaign, model, given, [u for u in missing if not u.fixed])
         for wider in () if known else _widened(model, effect):
-            found += _by_joint(
+            entries += _by_joint(
                 campaign, wider, given, [u for u in unknowns_of(wider, len(model.terms)) if not u.fixed]
             )
-    return tuple(found)
+    return tuple(entries)
 
 
 def _widened(model: StiffnessModel, effect: type[Effect]) -> list[StiffnessModel]:
@@ -136,24 +137,28 @@ def _by_joint(
     sized = model.with_values({u.key: u.parameter.null + u.parameter.scale for u in unknowns})
     there = campaign.predicted(sized, here.displacement)
     still = np.asarray(~moves.any(axis=(0, 1)))
-    bent = _is_nonlinear(campaign.residual(here, given) - campaign.residual(there, given), moves.sum(axis=2))
-    if still.any() and bent:
+    nonlinear = _is_nonlinear(
+        campaign.residual(here, given) - campaign.residual(there, given), moves.sum(axis=2)
+    )
+    if still.any() and nonlinear:
         # a parameter may show only where others have a size: a length where the spring has a stiffness
         moves[:, :, still] = np.nan_to_num(columns(campaign, sized, unknowns, there, given))[:, :, still]
-    asleep = frozenset(
-        u.parameter.name for u, rests in zip(unknowns, still.tolist(), strict=True) if rests and bent
+    dormant = frozenset(
+        u.parameter.name for u, rests in zip(unknowns, still.tolist(), strict=True) if rests and nonlinear
     )
     named = dict.fromkeys(u.parameter.joint for u in unknowns)
     if not effect.apart:
-        whole = Candidate(effect, "", model, tuple(unknowns), moves, bent, dormant_parameters=asleep)
+        whole = Candidate(effect, "", model, tuple(unknowns), moves, nonlinear, dormant_parameters=dormant)
         return _in_steps(whole, [j for j in named if j])
-    found = []
+    entries = []
     # a whole arm may be off at once, as a geometry that was never calibrated
     for joint in [*named, EVERY] if effect.whole and len(named) > 1 else named:
         own = [i for i, u in enumerate(unknowns) if joint in (EVERY, u.parameter.joint)]
         mine = tuple(unknowns[i] for i in own)
-        found.append(Candidate(effect, joint, model, mine, moves[:, :, own], bent, dormant_parameters=asleep))
-    return found
+        entries.append(
+            Candidate(effect, joint, model, mine, moves[:, :, own], nonlinear, dormant_parameters=dormant)
+        )
+    return entries
 
 
 def _is_nonlinear(does: Floats, foreseen: Floats) -> bool:
@@ -164,16 +169,16 @@ def _is_nonlinear(does: Floats, foreseen: Floats) -> bool:
 
 def _in_steps(whole: Candidate, joints: Sequence[str]) -> list[Candidate]:
     """The candidate with the parameters of its joints up to each one that adds something, and the whole."""
-    found: list[Candidate] = []
+    steps: list[Candidate] = []
     for last in range(len(joints) - 1):
         own = [i for i, u in enumerate(whole.unknowns) if u.parameter.joint in joints[: last + 1]]
         if not whole.columns[:, :, own].any():
             continue
         some = tuple(whole.unknowns[i] for i in own)
-        found.append(
+        steps.append(
             replace(whole, unknowns=some, columns=whole.columns[:, :, own], up_to_joint=joints[last])
         )
-    return [*found, whole]
+    return [*steps, whole]
 
 
 def is_visible(candidate: Candidate, weights: Weighting) -> bool:
@@ -182,5 +187,5 @@ def is_visible(candidate: Candidate, weights: Weighting) -> bool:
     return bool((size > candidate.least).any())
 
 
-def names_of(found: Sequence[Candidate]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(candidate.name for candidate in found))
+def names_of(choices: Sequence[Candidate]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(candidate.name for candidate in choices))

@@ -1,5 +1,5 @@
-"""What an effect has to be told from, although it is never looked for by itself: other courses over the same joint,
-or over the same time."""
+"""What an effect has to be distinguished from, although it is never searched for by itself: other courses over the
+same joint, or over the same time."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from postproc.model import StiffnessModel
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
-FOILED = ("gravity_compensator",)
+HAS_DECOYS = ("gravity_compensator",)
 """Effects that stiffen one joint, more at one angle than at another."""
 
 ORDERS = (0.5, 1.5, 2.5, 3.0, 4.0)
@@ -104,13 +104,13 @@ class DriftingBase(AlternativeForm, Offset):
 
 
 def decoys(model: StiffnessModel, q: Floats, mine: Candidate) -> list[Candidate]:
-    """What ``mine`` has to be told from, in a ``model`` measured at ``q`` (R, n); begun with at the null."""
+    """What ``mine`` has to be distinguished from, in a ``model`` measured at ``q`` (R, n); started at the null."""
     joints = model.robot.joints
     if mine.name == TransmissionError.name:
         return [_decoy(model, q, OtherWave(joints, (order,)), mine.joint) for order in ORDERS]
     if mine.name == ThermalGrowth.name:
         return [_decoy(model, q, DriftingBase(joints, str(mine.effect.described()["variable"])), "")]
-    if mine.name not in FOILED:
+    if mine.name not in HAS_DECOYS:
         return []
     joint = next(i for i, one in enumerate(joints) if one.name == mine.joint)
     middle = float(np.mean([q[:, joint].min(), q[:, joint].max()]))

@@ -1,4 +1,4 @@
-"""The whole way from readings to a verdict."""
+"""All steps from readings to a verdict."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from postproc.diagnosis.candidate_fits import with_effects
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search import model_unknowns, search
 from postproc.diagnosis.search_result import Search
-from postproc.diagnosis.verdict import BEYOND_TELLING, OTHER_COURSE, Verdict, judge, refitted
+from postproc.diagnosis.verdict import OTHER_COURSE, SIZE_UNDETERMINED, Verdict, judge, refitted
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
 from postproc.model import StiffnessModel
 
 FEWEST_POSES = 8
-"""Of fewer nothing can be said."""
+"""Fewer allow no verdict."""
 
 AGAIN = 3
 """Times that the search is done again without what did not hold."""
@@ -26,7 +26,7 @@ AGAIN = 3
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """stated: the robot file as it is, tracker and targets found; where: patterns in what it leaves; search, verdict;
+    """stated: the robot file as it is, tracker and targets found; where: patterns in its residuals; search, verdict;
     final: the final model, of what is named, or of its own parameters refitted."""
 
     stated: Fit
@@ -55,23 +55,25 @@ def diagnose(
     stage("fitting the model's own parameters")
     base = fit(campaign, model, model_unknowns(model), every, given=stated.point.given)
     stage("looking for what is missing")
-    found = search(campaign, base)
-    verdict = judge(found)
+    result = search(campaign, base)
+    verdict = judge(result)
     rejected = list(verdict.rejected)
     for _ in range(AGAIN):
         # of what has no form that is known others would only be imitations
         if not verdict.rejected or any(why == OTHER_COURSE for _, why in verdict.rejected):
             break
-        found = search(campaign, base, [candidate.key for candidate, _ in rejected])
-        verdict = judge(found)
+        result = search(campaign, base, [candidate.key for candidate, _ in rejected])
+        verdict = judge(result)
         rejected += verdict.rejected
-    if verdict.word == "nothing_missing" and any(why == BEYOND_TELLING for _, why in rejected):
+    if verdict.word == "nothing_missing" and any(why == SIZE_UNDETERMINED for _, why in rejected):
         verdict = replace(verdict, word="unknown")
     names = [named.candidate for named in verdict.named]
-    final = found.base
+    final = result.base
     if names and verdict.word != "ambiguous":
-        final = found.final if len(names) == len(found.chosen) else with_effects(campaign, found.base, names)
-    # of a model that lacks something its own parameters stand for that
+        final = (
+            result.final if len(names) == len(result.chosen) else with_effects(campaign, result.base, names)
+        )
+    # where an effect is missing in a model its own parameters compensate for that
     moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
     verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
-    return Diagnosis(stated, residual_patterns(stated, found.final), found, verdict, final)
+    return Diagnosis(stated, residual_patterns(stated, result.final), result, verdict, final)

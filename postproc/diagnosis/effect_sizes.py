@@ -30,8 +30,8 @@ class Gains(NamedTuple):
     needed: Floats
 
 
-def gains(found: Search) -> Gains:
-    given, last = found.linear.problem, found.explained
+def gains(search: Search) -> Gains:
+    given, last = search.linear.problem, search.explained
     alone, beside, needed = np.zeros((3, len(given.places)))
     for g in range(len(given.places)):
         single = explained(given, (g,))
@@ -40,26 +40,26 @@ def gains(found: Search) -> Gains:
             beside[g] = explained(given, [k for k in last.groups if k != g]).squares - last.squares
         else:
             beside[g] = last.squares - explained(given, (*last.groups, g)).squares
-        needed[g] = _needed(found, single.rank)
+        needed[g] = _needed(search, single.rank)
     variance = scatter(given, last)
     return Gains(np.maximum(alone, 0.0) / variance, np.maximum(beside, 0.0) / variance, needed)
 
 
-def _needed(found: Search, rank: int) -> float:
+def _needed(search: Search, rank: int) -> float:
     """The gain from which on a group of ``rank`` is taken in, one of all candidates."""
     from scipy.stats import chi2
 
-    given, last = found.linear.problem, found.explained
+    given, last = search.linear.problem, search.explained
     by_chance = float(chi2.isf(CHANCE / len(given.places), max(rank, 1)))
     if given.known and scatter(given, last) <= EXCEEDED:
         return by_chance
     return max(by_chance, WORTH / (1.0 - WORTH) * max(1, given.freedom - last.rank))
 
 
-def moved(found: Search, named: Named) -> Floats:
-    """(R, 3) [m] what the effect, as it was found, moves of each reading beyond what tracker and targets that stood
+def moved(search: Search, named: Named) -> Floats:
+    """(R, 3) [m] what the effect, as it was found, moves of each reading beyond what tracker and targets that were
     elsewhere would; axes of the robot base."""
-    final = found.final
+    final = search.final
     nulls = {e.unknown.key: e.unknown.parameter.null for e in named.estimates}
     without = at(final.campaign, final.model.with_values(nulls), final.point.given)
     by = without.residual - final.point.residual
@@ -80,29 +80,29 @@ class Smallest:
     usual: float
 
 
-def smallest(found: Search) -> tuple[Smallest, ...]:
+def smallest(search: Search) -> tuple[Smallest, ...]:
     """For each candidate that was not chosen.
 
     A group of rank p explains by chance chi2(p), and chi2(p) off its centre by the squares, in variances of a reading,
     of what it moves outside of what is explained anyway.
     """
-    linear, given, last = found.linear, found.linear.problem, found.explained
+    linear, given, last = search.linear, search.linear.problem, search.explained
     basis = np.linalg.qr(given.matrix[:, last.columns])[0]
     outside = given.matrix - basis @ (basis.T @ given.matrix)
     variance = scatter(given, last)
-    counts = found.base.weights.weight[:, :3] > 0
+    counts = search.base.weights.weight[:, :3] > 0
     sizes = []
     for g, candidate in enumerate(linear.candidates):
         if g in last.groups:
             continue
-        seen = np.linalg.norm(outside[:, given.places[g]], axis=0)
-        size = np.linalg.norm(linear.columns[g], axis=0) * seen
-        on = seen > OUTSIDE
+        outside_share = np.linalg.norm(outside[:, given.places[g]], axis=0)
+        size = np.linalg.norm(linear.columns[g], axis=0) * outside_share
+        on = outside_share > OUTSIDE
         if not on.any():
             sizes.append(Smallest(candidate, np.inf, np.inf))
             continue
         rank = int(on.sum())
-        needed = np.sqrt(variance * _off_centre(rank, _needed(found, rank))) / size[on]
+        needed = np.sqrt(variance * _off_centre(rank, _needed(search, rank))) / size[on]
         moves = np.nan_to_num(candidate.columns[:, :3])[:, :, on][counts]
         rms = np.sqrt(3.0 * np.mean(moves**2, axis=0))
         sizes.append(Smallest(candidate, float((needed * rms).max()), float(needed.min())))

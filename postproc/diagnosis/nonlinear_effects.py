@@ -16,7 +16,7 @@ from postproc.model import StiffnessModel
 STEPS = 8
 
 SAME = 1e-3
-"""Share of the squares left by which a step must gain to be followed by another."""
+"""Share of the remaining squares by which a step must gain to be followed by another."""
 
 DAMPING = 1e-3
 """Of a column's length."""
@@ -26,13 +26,13 @@ Outside = Callable[[Floats], Floats]
 
 
 class NonlinearColumns(NamedTuple):
-    """values (P,) [SI]; columns (R, 3 or 6, P) there, per scale; target (n,), left (n,): what there is to explain,
+    """values (P,) [SI]; columns (R, 3 or 6, P) there, per scale; target (n,), remaining (n,): what there is to explain,
     outside of what is explained anyway, without the effect and with it."""
 
     values: Floats
     columns: Floats
     target: Floats
-    left: Floats
+    remaining: Floats
 
 
 def evaluate_at_size(
@@ -64,14 +64,14 @@ def evaluate_at_size(
     x = np.clip(np.ones(len(unknowns)), low, high)
     near = point.predicted.displacement
     there, does = taken(x, near if near.shape[1] == model.chain.size else None)
-    left = target - outside(does[:, :, None])[:, 0]
+    remaining = target - outside(does[:, :, None])[:, 0]
     for _ in range(STEPS):
         there = with_columns(campaign, there, unknowns)
         matrix = outside(np.nan_to_num(there.taken[0]))
         damping = DAMPING * np.diag(np.linalg.norm(matrix, axis=0) + 1e-9)
-        tall, aim = np.concatenate([matrix, damping]), np.concatenate([left, np.zeros(len(x))])
+        tall, aim = np.concatenate([matrix, damping]), np.concatenate([remaining, np.zeros(len(x))])
         bounds = np.minimum(low - x, 0.0), np.maximum(high - x, 1e-300)
-        step, before = lsq_linear(tall, aim, bounds, "bvls").x, left @ left
+        step, before = lsq_linear(tall, aim, bounds, "bvls").x, remaining @ remaining
         for _ in range(6):
             trial = np.clip(x + step, low, high)
             moved, did = taken(trial, there.predicted.displacement)
@@ -81,12 +81,14 @@ def evaluate_at_size(
             step = 0.3 * step
         else:
             break
-        x, there, does, left = trial, moved, did, rest
-        if before - left @ left < SAME * before:
+        x, there, does, remaining = trial, moved, did, rest
+        if before - remaining @ remaining < SAME * before:
             break
     if there.columns is None:
         there = with_columns(campaign, there, unknowns)
-    return NonlinearColumns(null + x * scale, whole(np.nan_to_num(there.taken[0]), does, x), target, left)
+    return NonlinearColumns(
+        null + x * scale, whole(np.nan_to_num(there.taken[0]), does, x), target, remaining
+    )
 
 
 def whole(columns: Floats, does: Floats, values: Floats) -> Floats:

@@ -26,8 +26,8 @@ FLIPS = 4000
 
 @dataclass(frozen=True)
 class ResidualPattern:
-    """A pattern: ``variable``, the ``pattern`` in words, and the ``share`` of the squares left that follow it (adjusted
-    for the freedom of the pattern)."""
+    """A pattern: ``variable``, the ``pattern`` in words, and the ``share`` of the remaining squares that follow it
+    (adjusted for the freedom of the pattern)."""
 
     variable: str
     pattern: str
@@ -37,31 +37,32 @@ class ResidualPattern:
 def residual_patterns(
     fitted: Fit, against: Fit | None = None, chance: float = CHANCE
 ) -> tuple[ResidualPattern, ...]:
-    """The clear patterns in what ``fitted`` leaves, largest first.
+    """The clear patterns in the residual of ``fitted``, largest first.
 
     Tried are a turn of each joint that depends on its own angle, torque or sense of approach, and a shift of the tool
     that depends on load, order, time, temperature or session; each as a step function in up to ``BINS`` parts, without
-    what the fit could have made of it.  ``chance``: probability that any is told although there is none.
+    what the fit could have made of it.  ``chance``: probability that any is reported although there is none.
 
-    What is chance is said by the scatter that ``against`` leaves, as far as that is a better model.  Without it only
-    the residuals themselves say it: readings of one pose may share errors, and a few may be wild, so the residuals of
-    each pose get a random sign (wild bootstrap by clusters; Cameron, Gelbach and Miller, Rev. Econ. Stat. 90 (2008)).
+    What is chance follows from the residual scatter of ``against``, as far as that is a better model.  Without it it
+    follows from the residuals alone: readings of one pose may share errors, and a few may be outliers, so the
+    residuals of each pose get a random sign (wild bootstrap by clusters; Cameron, Gelbach and Miller, Rev. Econ. Stat.
+    90 (2008)).
     """
     from scipy.stats import f
 
     campaign, weights = fitted.campaign, (against or fitted).weights
-    left = weights(np.nan_to_num(fitted.point.residual))
+    residual = weights(np.nan_to_num(fitted.point.residual))
     taken = np.nan_to_num(np.concatenate([weights(part) for part in fitted.point.taken], axis=1))
     explained_by_fit = basis_of(taken)
-    left = outside(explained_by_fit, left[:, None])[:, 0]
-    squares, rows = float(left @ left), weights.counts
+    residual = outside(explained_by_fit, residual[:, None])[:, 0]
+    squares, rows = float(residual @ residual), weights.counts
     if squares <= 0:
         return ()
     width = fitted.point.residual.shape[1]
     # a residual is smaller than the scatter by what the fit took up
     lever = 1.0 - explained_by_fit.shape[1] / rows
     signs = np.random.default_rng(0).choice([-1.0, 1.0], (FLIPS, campaign.poses))
-    found = []
+    clear_patterns = []
     tried = list(patterns(fitted, campaign))
     for variable, values, turns, unit in tried:
         part, parts = _parts(values, max(2, min(BINS, campaign.poses // POSES)))
@@ -71,7 +72,7 @@ def residual_patterns(
         rank = basis.shape[1]
         if rank == 0 or rows - rank < 3:
             continue
-        of_reading = (basis * left[:, None]).reshape(len(campaign), width, rank).sum(axis=1)
+        of_reading = (basis * residual[:, None]).reshape(len(campaign), width, rank).sum(axis=1)
         of_pose = np.zeros((campaign.poses, rank))
         np.add.at(of_pose, campaign.pose, of_reading)
         explained = float((of_pose.sum(axis=0) ** 2).sum())
@@ -84,8 +85,8 @@ def residual_patterns(
             words = _words(fitted.point.residual[:, :3], part, parts, unit)
             if variable in ("order", "time") and _goes_with_poses(values, campaign.readings.q):
                 words += "; but the poses were taken in such an order: measure again in random order"
-            found.append(ResidualPattern(variable, words, float(share)))
-    return tuple(sorted(found, key=lambda one: -one.share)[:SHOWN])
+            clear_patterns.append(ResidualPattern(variable, words, float(share)))
+    return tuple(sorted(clear_patterns, key=lambda one: -one.share)[:SHOWN])
 
 
 def _clear(columns: Floats) -> Floats:
@@ -96,29 +97,29 @@ def _clear(columns: Floats) -> Floats:
     return np.asarray(u[:, s > max(1e-6 * s[0], 1e-6)])
 
 
-def _probability(seen: float, by_chance: Floats) -> float:
-    """That chance makes as much as ``seen``, of what it made: beyond the largest of that by the gamma distribution of
-    their mean and variance."""
+def _probability(observed: float, by_chance: Floats) -> float:
+    """That chance makes as much as ``observed``, of its own draws: beyond the largest of that by the gamma
+    distribution of their mean and variance."""
     from scipy.stats import gamma
 
-    count = int((by_chance >= seen).sum())
+    count = int((by_chance >= observed).sum())
     if count >= 10:
         return (count + 1) / (len(by_chance) + 1)
     mean, variance = float(by_chance.mean()), float(by_chance.var())
     if variance <= 0:
-        return 1.0 if seen <= mean else 0.0
-    return float(gamma.sf(seen, mean * mean / variance, scale=variance / mean))
+        return 1.0 if observed <= mean else 0.0
+    return float(gamma.sf(observed, mean * mean / variance, scale=variance / mean))
 
 
 def patterns(
     fitted: Fit, campaign: Campaign
 ) -> Iterator[tuple[str, Floats, Floats | None, tuple[str, float]]]:
     """Name, value (R,), what a turn of a joint does (R, 3), None for shifts, and unit of each variable."""
-    readings, seen = campaign.readings, fitted.point.predicted
+    readings, predicted = campaign.readings, fitted.point.predicted
     chain = fitted.model.chain
     coordinates = chain.placed(readings.q)
     swept = chain.evaluate(coordinates, campaign.tool)
-    points = campaign.points(seen, fitted.point.given.places, campaign.at)
+    points = campaign.points(predicted, fitted.point.given.places, campaign.at)
     torque = generalized_force(swept, swept.position, readings.wrench.T)
     loaded = bool(readings.wrench.any())
     for i, joint in enumerate(fitted.model.robot.joints):
@@ -147,7 +148,7 @@ def patterns(
 
 
 def _parts(values: Floats, count: int) -> tuple[Ints, Floats]:
-    """The part (R,) of ``count`` or less each value falls in, and where the parts begin and end (k, 2)."""
+    """The part (R,) of ``count`` or less each value falls in, and where the parts start and end (k, 2)."""
     distinct = np.unique(values)
     if len(distinct) <= count:
         return np.searchsorted(distinct, values), np.stack([distinct, distinct], axis=1)
@@ -179,11 +180,12 @@ def _words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float])
 
 
 def _goes_with_poses(values: Floats, q: Floats) -> bool:
-    """Whether the joints tell most of ``values`` (R,): what depends on one cannot be distinguished from the other."""
+    """Whether the joints explain most of ``values`` (R,): what depends on one cannot be distinguished from the
+    other."""
     spread = np.where(np.ptp(q, axis=0) > 0, np.ptp(q, axis=0), 1.0)
     scaled = (q - q.mean(axis=0)) / spread
     matrix = np.column_stack([np.ones(len(q)), scaled, scaled**2])
     if len(q) < 3 * matrix.shape[1]:
         return False
-    left = values - matrix @ np.linalg.lstsq(matrix, values, rcond=None)[0]
-    return bool(left @ left < 0.5 * ((values - values.mean()) ** 2).sum())
+    residual = values - matrix @ np.linalg.lstsq(matrix, values, rcond=None)[0]
+    return bool(residual @ residual < 0.5 * ((values - values.mean()) ** 2).sum())

@@ -29,7 +29,7 @@ from postproc.identification.unknowns import Unknown, unknowns_of
 from postproc.model import StiffnessModel
 
 PASSES = 4
-"""Of choosing and fitting, until the choice stands."""
+"""Of choosing and fitting, until the choice no longer changes."""
 
 LOOSE, BESIDE = 0.5, 0.05
 """Standard deviation of what a robot file states, as shares of the value and of the largest of its kind."""
@@ -52,18 +52,18 @@ def model_unknowns(model: StiffnessModel) -> tuple[Unknown, ...]:
     Each has a prior as wide as ``LOOSE`` of its value and ``BESIDE`` of the largest of its kind in the effect; none
     where all of a kind are stated as zero.  Dimensions of hardware keep the interval of the robot file.
     """
-    found: list[Unknown] = []
+    unknowns: list[Unknown] = []
     for term in range(len(model.terms)):
         own = [u for u in unknowns_of(model, term) if u.stated is not None and not u.fixed]
         for unknown in own:
             parameter = unknown.parameter
             if parameter.hardware:
-                found.append(unknown)
+                unknowns.append(unknown)
                 continue
             like = [abs(u.value - u.parameter.null) for u in own if u.parameter.unit == parameter.unit]
             wide = LOOSE * abs(unknown.value - parameter.null) + BESIDE * max(like)
-            found.append(replace(unknown, prior=wide or None))
-    return tuple(found)
+            unknowns.append(replace(unknown, prior=wide or None))
+    return tuple(unknowns)
 
 
 def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
@@ -83,13 +83,13 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
             shown = list(linear.candidates)
         before = {c.key for c in chosen}
         start = [i for i, c in enumerate(linear.candidates) if c.key in before]
-        found = selected(linear.problem, range(len(linear.candidates)), start)
-        now = tuple(linear.candidates[g] for g in found.groups)
+        selection = selected(linear.problem, range(len(linear.candidates)), start)
+        now = tuple(linear.candidates[g] for g in selection.groups)
         keys = frozenset(c.key for c in now)
         if keys == before or keys in tried or len(tried) >= PASSES:
             last = explained(linear.problem, start)
             against = find_alternatives(campaign, base, fitted, linear, last)
-            better = next((r for r in against if r.fitted and not r.foil and r.margin < -1.0), None)
+            better = next((r for r in against if r.fitted and not r.is_decoy and r.margin < -1.0), None)
             done = Search(base, fitted, chosen, hidden, linear, last, against)
             if better is None or len(tried) >= PASSES:
                 return done
@@ -103,16 +103,16 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
 
 
 def drop_confounded(base: Fit, weights: Weighting, every: Sequence[Candidate]) -> list[Candidate]:
-    """The candidates without those parameters that, in their usual size, do nothing to be seen but what parameters of
+    """The candidates without those parameters that, in their usual size, do nothing observable but what parameters of
     the robot file, or tracker and targets, do as well: a gain of the force is a softer arm."""
     basis = basis_of(np.nan_to_num(np.concatenate([weights(part) for part in base.point.taken], axis=1)))
-    found = []
+    remaining = []
     for c in every:
         columns = np.nan_to_num(weights(c.columns))
         size = np.linalg.norm(columns, axis=0)
         own = np.linalg.norm(outside(basis, columns), axis=0) > np.maximum(IMITATED * size, c.least)
         if own.any():
-            # of those that only shape what another does nothing is said by themselves
+            # those that only shape what another does are not judged by themselves
             own |= np.array([u.parameter.name in c.dormant_parameters for u in c.unknowns])
         if own.any() and not own.all():
             c = replace(
@@ -120,8 +120,8 @@ def drop_confounded(base: Fit, weights: Weighting, every: Sequence[Candidate]) -
                 unknowns=tuple(u for u, alone in zip(c.unknowns, own.tolist(), strict=True) if alone),
                 columns=c.columns[:, :, own],
             )
-        found.append(c if own.any() else replace(c, columns=np.zeros_like(c.columns)))
-    return found
+        remaining.append(c if own.any() else replace(c, columns=np.zeros_like(c.columns)))
+    return remaining
 
 
 def _confirmed(
@@ -165,8 +165,8 @@ def _linear(
     chosen: Sequence[Candidate],
     shown: Sequence[Candidate],
 ) -> Linear:
-    """The problem that the candidates' columns make of what ``fitted`` leaves without what was chosen; priors of the
-    model's own parameters count as rows."""
+    """The problem that the candidates' columns make of the residual of ``fitted`` without what was chosen; priors of
+    the model's own parameters count as rows."""
     own, nuisance = base.point.taken
     prior = prior_rows(base.unknowns) * np.sqrt(fitted.factor)
     prior = prior[prior.any(axis=1)]
@@ -180,26 +180,26 @@ def _linear(
 
     common = np.concatenate([tall(own, prior), readings(nuisance)], axis=1)
     basis = basis_of(common)
-    looked = _as_fitted(campaign, fitted, chosen, shown)
-    with_chosen = [readings(c.columns) for c in looked if c.only]
+    current = _as_fitted(campaign, fitted, chosen, shown)
+    with_chosen = [readings(c.columns) for c in current if c.only]
     beyond = basis_of(np.concatenate([common, *with_chosen], axis=1)) if with_chosen else basis
-    looked = tuple(
+    current = tuple(
         _as_grown(campaign, fitted, c, lambda columns: outside(beyond, readings(columns)))
         if c.nonlinear and not c.only and not (c.start and chosen)
         else c
-        for c in looked
+        for c in current
     )
-    # so that with what was found of each nothing else is left than by the fit
-    found = [c.columns @ in_scales(fitted, c.only) for c in looked if c.only]
-    residual = tall(sum(found, fitted.point.residual), prior @ (away / scales(base.unknowns)))
-    columns = tuple(readings(c.columns) for c in looked)
-    groups = [(own, _reach(c)) for own, c in zip(columns, looked, strict=True)]
-    made = problem(residual, basis, groups, weights.counts + len(prior), base.noise.known)
-    return Linear(looked, made, residual, common, columns, len(prior), weights)
+    # so that with the value of each the same residual remains as of the fit
+    contributions = [c.columns @ in_scales(fitted, c.only) for c in current if c.only]
+    residual = tall(sum(contributions, fitted.point.residual), prior @ (away / scales(base.unknowns)))
+    columns = tuple(readings(c.columns) for c in current)
+    groups = [(own, _reach(c)) for own, c in zip(columns, current, strict=True)]
+    linear_problem = problem(residual, basis, groups, weights.counts + len(prior), base.noise.known)
+    return Linear(current, linear_problem, residual, common, columns, len(prior), weights)
 
 
 def _as_grown(campaign: Campaign, fitted: Fit, candidate: Candidate, beyond: Outside) -> Candidate:
-    """The candidate with its columns at the size that explains the most of what ``fitted`` leaves."""
+    """The candidate with its columns at the size that explains the most of the residual of ``fitted``."""
     model, unknowns = composed(fitted.model, [candidate])
     large = evaluate_at_size(campaign, fitted.point, model, unknowns, beyond)
     return replace(candidate, columns=large.columns, start=tuple(large.values.tolist()))
@@ -210,7 +210,7 @@ def _values(model: StiffnessModel, unknowns: Sequence[Unknown]) -> Floats:
 
 
 def _as_fitted(
-    campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate], looked: Sequence[Candidate]
+    campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate], current: Sequence[Candidate]
 ) -> tuple[Candidate, ...]:
     """The candidates, those chosen with their columns at the fit instead of at their null."""
     own, _ = fitted.point.taken
@@ -227,7 +227,7 @@ def _as_fitted(
             does = point_without(campaign, fitted, [candidate]).residual - fitted.point.residual
             columns = whole(columns, np.nan_to_num(does), values[at])
         there[candidate.key] = candidate.fitted(columns, [fitted.unknowns[i] for i in at])
-    return tuple(there.get(c.key, c) for c in looked)
+    return tuple(there.get(c.key, c) for c in current)
 
 
 def _reach(candidate: Candidate) -> Floats:

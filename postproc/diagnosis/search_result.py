@@ -20,7 +20,7 @@ Key = tuple[str, str]
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """A search's last step.  candidates: what was looked at, group by group of ``problem``; whitened and as they are:
+    """A search's last step.  candidates: what was evaluated, group by group of ``problem``; whitened and as they are:
     residual (n,) without what was chosen, common (n, k) columns that are explained anyway, columns (n, p) of each
     candidate; the last ``priors`` rows are no readings; ``weights`` that it was whitened with."""
 
@@ -50,7 +50,7 @@ class Alternative:
         return self.worse + self.more
 
     @property
-    def foil(self) -> bool:
+    def is_decoy(self) -> bool:
         """Whether it is never named itself."""
         return isinstance(self.candidate.effect, AlternativeForm)
 

@@ -15,7 +15,7 @@ import numpy as np
 from postproc.base.arrays import Floats, Ints
 
 WORTH = 0.1
-"""Share of the squares left that an effect must explain where the model leaves more than scatter: what is not
+"""Share of the remaining squares that an effect must explain where more than scatter remains: what is not
 understood follows the joints as well, and by chance looks a little like any effect."""
 
 CHANCE = 0.001
@@ -25,10 +25,10 @@ APART = 1e-3
 """A column whose part outside of the others is smaller than this share of it cannot be distinguished from them."""
 
 EXCEEDED = 1.5
-"""Variance left over the stated one from which on the model is taken to leave more than scatter."""
+"""Remaining variance over the stated one from which on more than scatter is taken to remain."""
 
 CLIP = 2.5
-"""Residuals count up to this many standard deviations, so that a few wild readings do not decide."""
+"""Residuals count up to this many standard deviations, so that a few outliers do not decide."""
 
 CLIPPED = 0.9468
 """Mean square of a normal variable clipped there."""
@@ -79,8 +79,8 @@ def basis_of(common: Floats) -> Floats:
 
 def outside(basis: Floats, columns: Floats) -> Floats:
     """(n, p) ``columns`` (n, p) without what lies in ``basis`` (n, r)."""
-    left = columns - basis @ (basis.T @ columns)
-    return np.asarray(left - basis @ (basis.T @ left))
+    remaining = columns - basis @ (basis.T @ columns)
+    return np.asarray(remaining - basis @ (basis.T @ remaining))
 
 
 def problem(
@@ -98,15 +98,17 @@ def problem(
     places = tuple(
         np.arange(end - columns.shape[1], end) for end, (columns, _) in zip(ends, groups, strict=True)
     )
-    left = outside(basis, residual[:, None])[:, 0]
+    remaining = outside(basis, residual[:, None])[:, 0]
     rank = basis.shape[1] + len(residual) - rows
-    return Problem(left, outside(basis, columns / size), places, reach * size[:, None], size, rank, known)
+    return Problem(
+        remaining, outside(basis, columns / size), places, reach * size[:, None], size, rank, known
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """A residual with some ``groups`` taken in: squares left, ``rank`` of what they added, their ``columns`` (p,) of
-    the matrix and ``coefficients`` (p,)."""
+    """A residual with some ``groups`` taken in: remaining squares, ``rank`` of what they added, their ``columns`` (p,)
+    of the matrix and ``coefficients`` (p,)."""
 
     groups: tuple[int, ...]
     squares: float
@@ -134,7 +136,7 @@ def explained(given: Problem, groups: Sequence[int]) -> Explained:
 
 
 def _bounded(value: Floats, vector: Floats, aim: Floats, low: Floats, high: Floats) -> Floats:
-    """min x^T G x - 2 aim^T x within bounds, of G by its eigenvalues, hardly seen directions held."""
+    """min x^T G x - 2 aim^T x within bounds, of G by its eigenvalues, hardly observable directions fixed."""
     from scipy.optimize import lsq_linear
 
     root = np.sqrt(np.maximum(value, (0.1 * APART) ** 2))
@@ -147,10 +149,10 @@ def beside(given: Problem, rest: Explained, columns: Floats) -> Floats:
     return outside(basis_of(given.matrix[:, rest.columns]), columns) if len(rest.columns) else columns
 
 
-def complexity_penalty(columns: Floats, left: Floats, variance: float) -> float:
+def complexity_penalty(columns: Floats, residual: Floats, variance: float) -> float:
     """What an effect has to pay for the parameters that it fits: by how much -2 ln(likelihood) falls more in the fit
-    than it does on the average over all that its parameters might have been.  ``columns`` (n, p) per scale, ``left``
-    (n,): outside of what is explained anyway.
+    than it does on the average over all that its parameters might have been.  ``columns`` (n, p) per scale,
+    ``residual`` (n,): outside of what is explained anyway.
 
     The parameters might have been of any size u, all alike in their scales.  With l the eigenvalues of the information
     that the readings give of them, and b the gradients along its axes, that average is
@@ -164,7 +166,7 @@ def complexity_penalty(columns: Floats, left: Floats, variance: float) -> float:
     if not on.any():
         return 0.0
     information = value[on]
-    gradient = (vector[:, on].T @ (columns.T @ left)) / variance
+    gradient = (vector[:, on].T @ (columns.T @ residual)) / variance
     # from sizes that nobody would see to those that nobody could miss
     u = np.geomspace(
         1e-3 / np.sqrt(information.max()), 1e3 * (1.0 + np.abs(gradient / information).max()), 200
@@ -175,22 +177,22 @@ def complexity_penalty(columns: Floats, left: Floats, variance: float) -> float:
 
 
 def residual_of(given: Problem, last: Explained) -> Floats:
-    """(n,) what is left of the residual."""
+    """(n,) what remains of the residual."""
     return np.asarray(given.residual - given.matrix[:, last.columns] @ last.coefficients)
 
 
 def clipped_squares(given: Problem, last: Explained) -> float:
-    """The squares left, wild readings clipped, as large as those of normal ones would be."""
-    left = residual_of(given, last)
-    rows = np.abs(left[left != 0])
-    # the median tells the level at which readings are wild
+    """The remaining squares, outliers clipped, as large as those of normal ones would be."""
+    residual = residual_of(given, last)
+    rows = np.abs(residual[residual != 0])
+    # the median gives the level from which on readings are outliers
     level = float(np.median(rows)) / 0.6745 if len(rows) else 0.0
-    clipped = np.clip(left, -CLIP * level, CLIP * level)
+    clipped = np.clip(residual, -CLIP * level, CLIP * level)
     return min(last.squares, float(clipped @ clipped) / CLIPPED)
 
 
 def scatter(given: Problem, last: Explained) -> float:
-    """Variance of what is left; at least 1 where that is what was stated."""
+    """Variance of the residual; at least 1 where that is what was stated."""
     variance = clipped_squares(given, last) / max(1, given.freedom - last.rank)
     return max(1.0, variance) if given.known else max(variance, 1e-300)
 
@@ -261,7 +263,7 @@ def _exchanged(given: Problem, now: Explained, candidates: Sequence[int], penalt
 
 
 def _pruned(given: Problem, now: Explained, among: int) -> Explained:
-    """Without the groups that the others have made needless."""
+    """Without the groups that the others make unnecessary."""
     while now.groups:
         without = [explained(given, tuple(g for g in now.groups if g != gone)) for gone in now.groups]
         needless = [w for w in without if not counts(given, w, now, among)]

@@ -1,4 +1,4 @@
-"""What may be said of a search: four gates before an effect is named."""
+"""The verdict on a search: four gates before an effect is named."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.diagnosis.candidates import EVERY, Candidate, names_of
-from postproc.diagnosis.decoys import FOILED
+from postproc.diagnosis.decoys import HAS_DECOYS
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search_result import Alternative, Search
 from postproc.diagnosis.selection import (
@@ -31,7 +31,7 @@ FOLDS = 15
 SEEN = 1e-8
 """Share of a column's squares that readings must show to predict others."""
 
-WILD = 5.0
+OUTLIER_LIMIT = 5.0
 
 USUAL = 3.0
 """Times what was found of an effect that it is expected to be, of readings that were left out."""
@@ -47,23 +47,23 @@ BUILT = 4.6
 describes: odds of 10 to 1."""
 
 UNUSUAL = 3.0
-"""Usual sizes from which on a parameter has to be told well to be believed."""
+"""Usual sizes from which on a parameter has to be determined well to be believed."""
 
-LACK = 3.0
-"""Standard deviations of its own by which the variance left must exceed the stated one to be a lack of fit."""
+EXCESS = 3.0
+"""Standard deviations of its own by which the remaining variance must exceed the stated one to be a lack of fit."""
 
 STRUCTURE = 0.001
-"""Probability that what is left shows a pattern by chance: one that follows a joint is no scatter, however small."""
+"""Probability that what remains shows a pattern by chance: one that follows a joint is no scatter, however small."""
 
 TOLERATED = 0.15
 """Share of the variance that heavier tails than normal may add."""
 
 EXPLAINS = 0.9
-"""Share of the variance beyond scatter that a name must take away where some is left."""
+"""Share of the variance beyond scatter that a name must take away where some remains."""
 
 
 OTHER_COURSE = "the readings follow another course than that of this effect"
-BEYOND_TELLING = "it would have to be unusually large, and the readings hardly determine its size"
+SIZE_UNDETERMINED = "it would have to be unusually large, and the readings hardly determine its size"
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Evidence:
 @dataclass(frozen=True)
 class Named:
     """A missing effect: its ``joints`` that clearly have it (() where it is of none), parameters with intervals;
-    ``held``: names of those that the readings do not tell, and the values (SI) that the others hold for."""
+    ``fixed``: names of those that the readings do not determine, and the values (SI) that the others are valid for."""
 
     candidate: Candidate
     joints: tuple[str, ...]
@@ -106,9 +106,9 @@ class Named:
 @dataclass(frozen=True)
 class Verdict:
     """``word`` of ``VERDICTS``.  named: where the verdict is named, partly_named or ambiguous; alternatives: sets of
-    candidates that explain the same; refitted: own parameters of the model that clearly moved; lack: variance left over
-    the stated one; conditional: nothing states the scatter, so a lack of fit cannot be seen; left: patterns in what
-    all that was chosen leaves."""
+    candidates that explain the same; refitted: own parameters of the model that clearly moved; reduced_chi2: remaining
+    variance over the stated one; conditional: nothing states the scatter, so a lack of fit cannot be detected;
+    remainder: patterns in what remains after all that was chosen."""
 
     word: str
     named: tuple[Named, ...]
@@ -121,72 +121,74 @@ class Verdict:
     remainder: tuple[ResidualPattern, ...] = ()
 
 
-def judge(found: Search) -> Verdict:
+def judge(search: Search) -> Verdict:
     """The verdict on a search."""
-    linear, last = found.linear, found.explained
+    linear, last = search.linear, search.explained
     named, rejected, aliases = [], [], []
     for g in last.groups:
-        candidate, its = linear.candidates[g], _evidence(found, last, g)
-        estimates = _estimates(found.final, candidate, found)
+        candidate, its = linear.candidates[g], _evidence(search, last, g)
+        estimates = _estimates(search.final, candidate, search)
         bounded = all(e.at_bound for e in estimates)
-        several = ambiguity_set(found, g, not bounded and _is_observable(candidate, estimates))
-        if _of_another_course(found, candidate):
+        several = ambiguity_set(search, g, not bounded and _is_observable(candidate, estimates))
+        if _of_another_course(search, candidate):
             rejected.append((candidate, OTHER_COURSE))
         elif not its.is_sufficient:
             rejected.append((candidate, "no gain on held-out readings"))
         elif is_implausible(estimates):
-            rejected.append((candidate, BEYOND_TELLING))
+            rejected.append((candidate, SIZE_UNDETERMINED))
         elif bounded and len(several) == 1:
             rejected.append((candidate, "its parameters would have to lie at their bounds"))
         else:
-            joints, held = _joints(candidate, estimates), _held(found.final, candidate, estimates)
-            named.append(Named(candidate, joints, estimates, its, held))
+            joints, fixed = _joints(candidate, estimates), _fixed_values(search.final, candidate, estimates)
+            named.append(Named(candidate, joints, estimates, its, fixed))
             aliases.append(several)
-    lack, lacking = reduced_chi2_of(found, last)
-    left = residual_patterns(found.final, chance=STRUCTURE)
-    lacking = lacking or bool(left)
-    bare, _ = reduced_chi2_of(found, explained(linear.problem, ()))
-    # two forms of one effect on one joint leave its name certain
+    chi2, unexplained = reduced_chi2_of(search, last)
+    patterns = residual_patterns(search.final, chance=STRUCTURE)
+    unexplained = unexplained or bool(patterns)
+    bare, _ = reduced_chi2_of(search, explained(linear.problem, ()))
+    # two forms of one effect on one joint do not make its name uncertain
     sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
     formless = any(why == OTHER_COURSE for _, why in rejected)
-    enough = not linear.problem.known or lack - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)
+    enough = not linear.problem.known or chi2 - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)
     if not named:
-        word = "unknown" if lacking or rejected else "nothing_missing"
-    elif formless or (lacking and not enough):
+        word = "unknown" if unexplained or rejected else "nothing_missing"
+    elif formless or (unexplained and not enough):
         word, named, sets = "unknown", [], ()
     elif sets:
         word = "ambiguous"
     else:
-        word = "partly_named" if lacking or rejected else "named"
+        word = "partly_named" if unexplained or rejected else "named"
     testable = set(names_of(linear.candidates))
-    hidden = tuple(name for name in names_of(found.untestable) if name not in testable)
+    hidden = tuple(name for name in names_of(search.untestable) if name not in testable)
     return Verdict(
         word,
         tuple(named),
         sets,
         hidden,
         (),
-        lack,
+        chi2,
         not linear.problem.known,
         tuple(rejected),
-        left,
+        patterns,
     )
 
 
 def _is_observable(candidate: Candidate, estimates: Sequence[Estimate]) -> bool:
-    """Whether the readings tell all parameters of an effect that something else imitates, and that it is there."""
-    if candidate.name not in FOILED:
+    """Whether the readings determine all parameters of an effect that something else imitates, and that it is there."""
+    if candidate.name not in HAS_DECOYS:
         return True
-    found = {
+    is_clear = {
         e.unknown.parameter.name: abs(e.value - e.unknown.parameter.null) > THERE * e.ci95 for e in estimates
     }
-    there = all(clear for name, clear in found.items() if name not in candidate.dormant_parameters)
-    return there and found.keys() >= {p.name for p in candidate.effect.parameters if not p.hardware}
+    there = all(clear for name, clear in is_clear.items() if name not in candidate.dormant_parameters)
+    return there and is_clear.keys() >= {p.name for p in candidate.effect.parameters if not p.hardware}
 
 
-def _held(final: Fit, candidate: Candidate, estimates: Sequence[Estimate]) -> tuple[tuple[str, float], ...]:
+def _fixed_values(
+    final: Fit, candidate: Candidate, estimates: Sequence[Estimate]
+) -> tuple[tuple[str, float], ...]:
     """Names and values (SI) of an effect's parameters that were not found, but are not at their null."""
-    found = {e.unknown.parameter.name for e in estimates}
+    estimated = {e.unknown.parameter.name for e in estimates}
     term = next(
         (
             t
@@ -197,75 +199,77 @@ def _held(final: Fit, candidate: Candidate, estimates: Sequence[Estimate]) -> tu
     )
     if term is None:
         return ()
-    names = [u.parameter.name for u in candidate.unknowns if u.parameter.name not in found]
+    names = [u.parameter.name for u in candidate.unknowns if u.parameter.name not in estimated]
     nulls = {u.parameter.name: u.parameter.null for u in candidate.unknowns}
     return tuple((name, float(term.values[name])) for name in names if term.values[name] != nulls[name])
 
 
-def reduced_chi2_of(found: Search, last: Explained) -> tuple[float, bool]:
-    """Variance left over the stated one, and whether that is clearly more; where nothing states it, never."""
-    given = found.linear.problem
+def reduced_chi2_of(search: Search, last: Explained) -> tuple[float, bool]:
+    """Remaining variance over the stated one, and whether that is clearly more; where nothing states it, never."""
+    given = search.linear.problem
     freedom = max(1, given.freedom - last.rank)
     variance = clipped_squares(given, last) / freedom
     spread = np.sqrt(2.0 / freedom)
-    repeats = found.base.noise.freedom if found.base.noise.source == "repeats" else 0
+    repeats = search.base.noise.freedom if search.base.noise.source == "repeats" else 0
     if repeats:
         spread = np.sqrt(spread**2 + 2.0 / repeats)
-    return variance, given.known and variance > 1.0 + TOLERATED + LACK * spread
+    return variance, given.known and variance > 1.0 + TOLERATED + EXCESS * spread
 
 
-def _evidence(found: Search, last: Explained, group: int) -> Evidence:
-    linear, given = found.linear, found.linear.problem
+def _evidence(search: Search, last: Explained, group: int) -> Evidence:
+    linear, given = search.linear, search.linear.problem
     without = explained(given, tuple(g for g in last.groups if g != group))
     variance = scatter(given, last)
     squares = without.squares - last.squares
     chance = probability(given, squares, last.rank - without.rank, variance, given.freedom - last.rank)
-    campaign = found.base.campaign
+    campaign = search.base.campaign
     heldout, regions, sessions = (
-        held_out_gain(found, last, group, rows)
-        for rows in (folds_of(campaign, min(FOLDS, campaign.poses)), _regions(found), _sessions(found))
+        held_out_gain(search, last, group, rows)
+        for rows in (folds_of(campaign, min(FOLDS, campaign.poses)), _regions(search), _sessions(search))
     )
-    nearest = next(iter(_against(found, linear.candidates[group])), None)
+    nearest = next(iter(_against(search, linear.candidates[group])), None)
     margin, alias = (np.inf, None) if nearest is None else (nearest.margin, nearest.candidate)
     among = len(linear.candidates)
     gain = squares / variance
     return Evidence(gain, min(1.0, chance * among), heldout, regions, sessions, margin, alias)
 
 
-def ambiguity_set(found: Search, group: int, seen: bool) -> tuple[Candidate, ...]:
+def ambiguity_set(search: Search, group: int, observable: bool) -> tuple[Candidate, ...]:
     """The candidate, and what explains the same.  Hardware that the robot file describes is taken to be there where its
-    parameters are ``seen``, as long as what is no such thing explains no more."""
-    mine = found.linear.candidates[group]
-    built = any(mechanism.kind == mine.name for mechanism in found.base.model.robot.mechanisms)
-    against = _against(found, mine)
-    near = [r.candidate for r in against if r.margin < (-BUILT if built and seen and r.foil else MARGIN)]
+    parameters are ``observable``, as long as what is no such thing explains no more."""
+    mine = search.linear.candidates[group]
+    built = any(mechanism.kind == mine.name for mechanism in search.base.model.robot.mechanisms)
+    against = _against(search, mine)
+    near = [
+        r.candidate for r in against if r.margin < (-BUILT if built and observable and r.is_decoy else MARGIN)
+    ]
     return (mine, *near)
 
 
 def is_implausible(estimates: Sequence[Estimate]) -> bool:
     """Whether all that was found is beyond plausible sizes, with intervals of more than half of it: past the load at
-    which a tooth changes sides, say, readings do not tell how wide its gap is."""
+    which a tooth changes sides, say, readings do not determine how wide its gap is."""
     sizes = [(abs(e.value - e.unknown.parameter.null), e.unknown.parameter.scale, e.ci95) for e in estimates]
     return bool(sizes) and all(size > UNUSUAL * scale and wide > 0.5 * size for size, scale, wide in sizes)
 
 
-def _of_another_course(found: Search, candidate: Candidate) -> bool:
+def _of_another_course(search: Search, candidate: Candidate) -> bool:
     """Whether another course over the same joint or time, one that no effect has, clearly explains more."""
-    against = [r for r in found.rivals if r.of == candidate.key and r.foil and r.fitted]
+    against = [r for r in search.rivals if r.of == candidate.key and r.is_decoy and r.fitted]
     return any(r.margin < -MARGIN for r in against)
 
 
-def _against(found: Search, mine: Candidate) -> list[Alternative]:
+def _against(search: Search, mine: Candidate) -> list[Alternative]:
     """What may be taken for ``mine``, nearest first; other courses where they are no mere variants of it."""
-    return [r for r in found.rivals if r.of == mine.key and (mine.name in FOILED or not r.foil)]
+    return [r for r in search.rivals if r.of == mine.key and (mine.name in HAS_DECOYS or not r.is_decoy)]
 
 
-def held_out_gain(found: Search, last: Explained, group: int, part: Ints | None) -> float:
+def held_out_gain(search: Search, last: Explained, group: int, part: Ints | None) -> float:
     """Fall of -2 ln(likelihood) of readings left out, part by part, with the group; ``part`` (R,): the part of each
     reading, -1 in none; NaN without parts.
 
-    A reading is predicted with the uncertainty that the fit of the others leaves: where that has to extrapolate, it
-    says little.  Wild readings count up to 5 standard deviations.  A part that is more than half of all is never left
+    A reading is predicted with the uncertainty of the fit of the others: where that has to extrapolate, it
+    has little weight.  Outliers count up to 5 standard deviations.  A part that is more than half of all is never left
     out: a few poses measured later do not foretell a whole campaign.
     """
     if part is None:
@@ -274,7 +278,7 @@ def held_out_gain(found: Search, last: Explained, group: int, part: Ints | None)
     part = np.where(np.isin(part, large), -1, part)
     if not (part >= 0).any() or (len(large) == 0 and len(np.unique(part)) < 2):
         return np.nan
-    linear, given = found.linear, found.linear.problem
+    linear, given = search.linear, search.linear.problem
     rows = len(linear.residual) - linear.priors
     # priors are never left out
     of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
@@ -296,8 +300,8 @@ def _expected(given: Problem, last: Explained, group: int) -> Floats:
     """(p,) one over the deviation that is expected of each parameter of a chosen group, in its scale: ``USUAL`` times
     the largest that was found of it."""
     on = np.isin(last.columns, given.places[group])
-    found = np.abs(last.coefficients[on] / given.size[given.places[group]]).max(initial=0.0)
-    return np.full(len(given.places[group]), 1.0 / (USUAL * found) if found > 0 else 0.0)
+    largest = np.abs(last.coefficients[on] / given.size[given.places[group]]).max(initial=0.0)
+    return np.full(len(given.places[group]), 1.0 / (USUAL * largest) if largest > 0 else 0.0)
 
 
 def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> float:
@@ -312,15 +316,15 @@ def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> floa
         x = root @ (root.T @ (aim - out.T @ target[part == k]))
         uncertainty = variance * (1.0 + ((out @ root) ** 2).sum(axis=1))
         away = (target[part == k] - out @ x) ** 2 / uncertainty
-        total += float((np.minimum(away, WILD**2) + np.log(uncertainty)).sum())
+        total += float((np.minimum(away, OUTLIER_LIMIT**2) + np.log(uncertainty)).sum())
     return total
 
 
-def _regions(found: Search) -> Ints | None:
+def _regions(search: Search) -> Ints | None:
     """(R,) a region of the joints' space for each reading; None with too few poses."""
     from scipy.cluster.vq import kmeans2
 
-    campaign = found.base.campaign
+    campaign = search.base.campaign
     if campaign.poses < 24:
         return None
     q = campaign.readings.q
@@ -329,14 +333,14 @@ def _regions(found: Search) -> Ints | None:
     return label if min(np.bincount(label, minlength=4)) > 0 else None
 
 
-def _sessions(found: Search) -> Ints | None:
-    session = found.base.campaign.readings.session
+def _sessions(search: Search) -> Ints | None:
+    session = search.base.campaign.readings.session
     return session if len(np.unique(session)) > 1 else None
 
 
-def _estimates(final: Fit, candidate: Candidate, found: Search) -> tuple[Estimate, ...]:
+def _estimates(final: Fit, candidate: Candidate, search: Search) -> tuple[Estimate, ...]:
     names = {u.parameter.name for u in candidate.unknowns}
-    base = len(found.base.model.terms)
+    base = len(search.base.model.terms)
     same = candidate.effect.described()
     return tuple(
         e

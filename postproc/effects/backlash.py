@@ -47,7 +47,7 @@ class Backlash(ComplianceLaw):
     ) -> None:
         half, motors = 0.5 * column(values, self.parameters), state.chain.motors
         came = 0.0 if state.conditions.direction is None else state.conditions.direction.T
-        ahead, behind = (np.tanh(2.0 * (force[motors] / self.friction + side)) for side in (-1.0, 1.0))
-        displacement[motors] += half * 0.5 * ((1 + came) * ahead + (1 - came) * behind)
-        rises = (1 + came) * (1 - ahead * ahead) + (1 - came) * (1 - behind * behind)
+        forward, backward = (np.tanh(2.0 * (force[motors] / self.friction + side)) for side in (-1.0, 1.0))
+        displacement[motors] += half * 0.5 * ((1 + came) * forward + (1 - came) * backward)
+        rises = (1 + came) * (1 - forward * forward) + (1 - came) * (1 - backward * backward)
         slope[motors] += half * rises / self.friction

@@ -1,11 +1,11 @@
 """What an effect is: a named piece of physics with parameters, added to one chain.
 
-An effect acts on the generalized coordinates of the chain in one of three ways: as an *offset* of coordinates, as a
+An effect acts on the generalized coordinates of the chain in one of three forms: as an *offset* of coordinates, as a
 *load* on them, or as a *compliance law* (displacement under a generalized force).  The solver in ``model`` only sums:
 
     z = motors + sum of offsets(motors) + theta,    theta = sum of laws(F),    F = J(z)^T w + sum of loads(z)
 
-Coordinates z stand in the order of ``robot.chain``, whatever the order of the effects; effects on one coordinate add.
+Coordinates z are in the order of ``robot.chain``, whatever the order of the effects; effects on one coordinate add.
 Offsets follow from the motors as commanded, not from each other.  The wrench w acts at the TCP where it comes to lie,
 in axes of the robot base that do not turn with it.
 
@@ -45,7 +45,7 @@ SIZES = {
     "m/K": 1e-5,
     "m/s": 1e-7,
 }
-"""SI unit of a parameter -> a size that is felt on a heavy arm, and leaves it standing."""
+"""SI unit of a parameter -> a size that matters on a heavy arm, and does not let it collapse."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +158,7 @@ class Effect:
 
     @classmethod
     def variants(cls, joints: Sequence[Joint]) -> tuple[Self, ...]:
-        """The forms in which the effect is looked for where nothing is known of it."""
+        """The forms in which the effect is searched for where nothing is known of it."""
         return (cls(joints),)
 
     def described(self) -> dict[str, object]:

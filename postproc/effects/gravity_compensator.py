@@ -10,7 +10,7 @@ to P1 on link i:
     d2U/dq2 = -K_c a L eta_q                             eta_q as in (4)
 
 The stiffness of the joint with the spring is K + d2U/dq2 = K - K_c a L eta_q.  Eq. (3) prints a plus; that
-reading is kept as the option ``sign: as_printed`` and is no spring.
+reading is available as the option ``sign: as_printed`` and is no spring.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class SpringState(NamedTuple):
 class GravityCompensator(EnergyLoad):
     """A spring across one joint.  Seen from the joint's axis, P0 lies at (-a_x, -a_y) on the link before and P1 at
     distance L along the link after it: a = hypot(a_x, a_y), alpha = atan2(a_y, a_x), and q of the paper is the joint's
-    angle, bent as it is under load, less ``zero`` [rad].  Only the sum alpha + q counts: no more of the frames is asked
+    angle, displaced by the load, less ``zero`` [rad].  Only the sum alpha + q counts: no more of the frames is asked
     for.  ``h`` [m] is the distance of P0 and P1 along the axis.
 
     On the joint's own coordinate acts, with q_0 its angle without load (motor and offsets):

@@ -32,9 +32,13 @@ class JointStiffening(EnergyLoad):
         return np.asarray(state.coordinates[motors] - state.rest[motors])
 
     def add_force(self, values: Values, state: ChainState, force: Floats, slope: Floats) -> None:
-        k, bent, motors = column(values, self.parameters), self._displacement(state), state.chain.motors
-        square = bent * bent
-        force[motors] -= k * square * bent
+        k, displacement, motors = (
+            column(values, self.parameters),
+            self._displacement(state),
+            state.chain.motors,
+        )
+        square = displacement * displacement
+        force[motors] -= k * square * displacement
         slope[motors] -= 3 * k * square
 
     def energy(self, values: Values, state: ChainState) -> Floats:

@@ -20,7 +20,7 @@ class LinkCompliance(LinearCompliance):
 
     The x and y axes do not turn with the joint itself.  Of ``kuka`` lengths in the zero pose, in axes X, Y, Z of the
     robot base: A1 has x = X, y = -Y; A2, A3 and A5 x = Z, y = X; A4 and A6 x = Z, y = Y.  A joint that its controller
-    counts with ``sign: -1`` has y and z the other way, and one with an ``offset`` starts turned by it about z.
+    counts with ``sign: -1`` has y and z reversed, and one with an ``offset`` starts turned by it about z.
 
     tau = x . (m + (p - p_i) x f) of the wrench (f, m) at the TCP p, with p_i the origin, and the moment of all weights
     after it about the same axis; y likewise, with the axis that theta_x has turned.

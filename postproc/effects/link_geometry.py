@@ -1,4 +1,4 @@
-"""Link geometry: axes that do not lie where the robot's links say."""
+"""Link geometry: axes that do not lie where the robot's links state."""
 
 from __future__ import annotations
 
@@ -64,12 +64,12 @@ def _independent(joints: Sequence[Joint], names: list[str]) -> tuple[str, ...]:
     q = np.random.default_rng(0).uniform(-1.5, 1.5, (_STATES, len(joints)))
     motion = chain.jacobian(q, Poses.identity()).reshape(-1, chain.size)
     basis = np.empty((len(motion), 0))
-    kept = []
+    independent = []
     for name in (*frames, *(joint.name for joint in joints), *names):
         own = motion[:, chain.index[name]]
         rest = own - basis @ (basis.T @ own)
         rest -= basis @ (basis.T @ rest)
         if np.linalg.norm(rest) > _INDEPENDENT * np.linalg.norm(own):
             basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
-            kept.append(name)
-    return tuple(name for name in names if name in kept)
+            independent.append(name)
+    return tuple(name for name in names if name in independent)

@@ -1,4 +1,4 @@
-"""The play of a gear: its output stands still until the motor has crossed the gap, in the order of the path.
+"""The play of a gear: its output is at rest until the motor has crossed the gap, in the order of the path.
 
     y_k = min(max(y_{k-1}, x_k - g/2), x_k + g/2)          motor x, output y, gap g
 
@@ -14,11 +14,11 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats
 
 
-def play_output(motor: Floats, gap: Floats, anew: Bools) -> Floats:
+def play_output(motor: Floats, gap: Floats, restart: Bools) -> Floats:
     """(S, n) [rad, m] output of n gears whose motors go through ``motor`` (S, n) in order, each monotone in between.
 
-    ``gap`` (n,) or (S, n) > 0, the whole of it.  ``anew`` (S,): nothing is known of how the motors came there, and the
-    output is in the middle of the gap; so does the first one.
+    ``gap`` (n,) or (S, n) > 0, the whole of it.  ``restart`` (S,): nothing is known of how the motors came there, and
+    the output is in the middle of the gap; so does the first one.
 
     A clip followed by a clip is a clip, and so is a whole block of them.  The clip of every block, then the output
     where each one starts, then that inside of all blocks at once: 3 sqrt(S) steps instead of S.
@@ -26,7 +26,7 @@ def play_output(motor: Floats, gap: Floats, anew: Bools) -> Floats:
     count, joints = motor.shape
     if not count:
         return motor.copy()
-    half = np.where(anew[:, None], 0.0, 0.5 * gap)
+    half = np.where(restart[:, None], 0.0, 0.5 * gap)
     half[0] = 0.0
     rows = int(np.ceil(np.sqrt(count)))
     blocks = -(-count // rows)

@@ -1,4 +1,4 @@
-"""Tool offset: the TCP is not where the tool data say."""
+"""Tool offset: the TCP is not where the tool data state."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Transmission error: a gear runs ahead and behind with its angle."""
+"""Transmission error: a gear leads and lags with its angle."""
 
 from __future__ import annotations
 

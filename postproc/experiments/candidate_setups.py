@@ -23,10 +23,10 @@ STEP, STEP_SLIDING = 0.1 * DEG, 0.1 * MM
 """Axes are planned in whole steps: what a person types is what was planned."""
 
 SLIDING_DEG = 10.0 * MM / DEG
-"""[m/rad] A way of 10 mm of a sliding axis counts as one degree."""
+"""[m/rad] A travel of 10 mm of a sliding axis counts as one degree."""
 
 BATCH, TRIES = 8192, 40
-"""Random poses looked at together, and how often."""
+"""Random poses checked together, and how often."""
 
 ON_AXIS = 1.0 * MM
 """A reflector nearer than this to the flange's axis faces along it."""
@@ -104,7 +104,7 @@ def usable_limits(robot: Robot, stated: Mapping[str, tuple[float, float]]) -> Fl
     """(n, 2) [rad, m] between which axes are planned: those of the robot file less a margin, of an axis that turns
     further than once round one turn only, about zero; ``stated``: narrower ones, by the name of the joint.
 
-    Raises Refusal PLN001 where nothing is left.
+    Raises Refusal PLN001 where nothing remains.
     """
     limits = []
     for joint in robot.joints:
@@ -145,7 +145,7 @@ def drawn(model: StiffnessModel, offer: CandidateSetups, count: int, rng: np.ran
 
     Raises Refusal PLN001 where there is none.
     """
-    found: list[Floats] = []
+    batches: list[Floats] = []
     inside = total = have = 0
     for _ in range(TRIES):
         low, high = offer.limits.T
@@ -153,10 +153,10 @@ def drawn(model: StiffnessModel, offer: CandidateSetups, count: int, rng: np.ran
         roomy, visible = _allowed(model, offer, q)
         usable = roomy & visible.any(axis=1)
         total, inside, have = total + BATCH, inside + int(roomy.sum()), have + int(usable.sum())
-        found.append(q[usable])
+        batches.append(q[usable])
         if have >= count:
             break
-    q = np.concatenate(found)[:count]
+    q = np.concatenate(batches)[:count]
     if not len(q):
         lost = (
             "TCP, flange and reflectors are never all inside the box"
@@ -194,15 +194,15 @@ def around(
     ``share`` of its range."""
     parents = np.repeat(np.arange(len(setups)), copies)
     span = offer.limits[:, 1] - offer.limits[:, 0]
-    way = (
+    step = (
         rng.normal(0.0, share, (len(parents), len(span)))
         * span
         * rng.integers(0, 2, (len(parents), len(span)))
     )
-    q = _rounded(model.robot, offer, setups.q[parents] + way)
+    q = _rounded(model.robot, offer, setups.q[parents] + step)
     roomy, visible = _allowed(model, offer, q)
-    kept = roomy & visible.any(axis=1)
-    return replace(setups[parents[kept]], q=q[kept], visible=visible[kept])
+    usable = roomy & visible.any(axis=1)
+    return replace(setups[parents[usable]], q=q[usable], visible=visible[usable])
 
 
 def _rounded(robot: Robot, offer: CandidateSetups, q: Floats) -> Floats:
@@ -234,7 +234,7 @@ def readings_of(model: StiffnessModel, offer: CandidateSetups, setups: Setups) -
     load = np.repeat(setups.load.reshape(-1), targets)
     wrench = np.zeros((len(row), 6))
     wrench[:, :3] = load[:, None] * model.gravity
-    made = planned(
+    readings = planned(
         [(joint.name, joint.kind != "revolute") for joint in robot.joints],
         setups.q[row],
         wrench,
@@ -246,4 +246,4 @@ def readings_of(model: StiffnessModel, offer: CandidateSetups, setups: Setups) -
         target=np.tile(np.arange(targets), count * loads),
         sigma=offer.sigma,
     )
-    return made if setups.direction is None else replace(made, direction=setups.direction[row])
+    return readings if setups.direction is None else replace(readings, direction=setups.direction[row])

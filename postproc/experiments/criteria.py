@@ -21,11 +21,11 @@ SHARE = 0.01
 """Of the mean ratio in the score of the worst: what decides between equals."""
 
 NOTHING = 1e-12
-"""Stands for a separation of zero."""
+"""Replaces a separation of zero."""
 
 
 class Criterion(Protocol):
-    """What is to be made small."""
+    """What is to be minimized."""
 
     def score(self, information: Floats) -> Floats:
         """(...) a logarithm, of ``information`` (..., p, p): more of it never makes this larger."""
@@ -79,7 +79,7 @@ class Determinant:
 
 @dataclass(frozen=True)
 class AtTestPoses:
-    """Test-pose criterion: root mean square of the error that the covariance leaves at given poses, tr(S C S^T).
+    """Test-pose criterion: root mean square of the error by the covariance at given poses, tr(S C S^T).
 
     ``root`` (k, p): its R^T R is the mean of S^T S over them.
     """
@@ -101,15 +101,15 @@ class Disagreement:
     """T-optimal: how far two explanations stay apart when each is fitted to what the other would show.
 
     pairs: (shows (k,), fits (f,)) of each as coordinates of M: its own pattern, and what the fit of the other consists
-    of. The separation is the mean square over the patterns, in standard deviations, that the fit leaves: M_ss - M_sf
-    M_ff^-1 M_fs.
+    of. The separation is the mean square over the patterns, in standard deviations, that remain after the fit: M_ss -
+    M_sf M_ff^-1 M_fs.
     """
 
     pairs: tuple[tuple[Ints, Ints], ...]
 
     def separations(self, information: Floats) -> Floats:
         """(..., 2) noncentrality of each of the two, at ``information`` (..., p, p)."""
-        return np.stack([self._left(information, *pair)[0] for pair in self.pairs], axis=-1)
+        return np.stack([self._fit_patterns(information, *pair)[0] for pair in self.pairs], axis=-1)
 
     def score(self, information: Floats) -> Floats:
         """(...) the logarithm of the smaller separation, with the sign turned, of ``information`` (..., p, p)."""
@@ -118,19 +118,21 @@ class Disagreement:
     def directions(self, information: Floats) -> Floats:
         """(p, k) directions in which a setup lowers the score of ``information`` (p, p): see ``Criterion``."""
         size = self.separations(information) + NOTHING
-        found = []
+        columns = []
         for (shows, fits), weight in zip(self.pairs, size.min() / size, strict=True):
-            left = np.zeros((len(information), len(shows)))
-            left[shows, range(len(shows))] = weight / np.sqrt(len(shows))
-            left[fits] = -(weight / np.sqrt(len(shows))) * self._left(information, shows, fits)[1]
-            found.append(left)
-        return np.concatenate(found, axis=1)
+            direction = np.zeros((len(information), len(shows)))
+            direction[shows, range(len(shows))] = weight / np.sqrt(len(shows))
+            direction[fits] = (
+                -(weight / np.sqrt(len(shows))) * self._fit_patterns(information, shows, fits)[1]
+            )
+            columns.append(direction)
+        return np.concatenate(columns, axis=1)
 
     @staticmethod
-    def _left(information: Floats, shows: Ints, fits: Ints) -> tuple[Floats, Floats]:
-        """Mean square that is left of the patterns, and the fits (..., f, k) of the others to them."""
+    def _fit_patterns(information: Floats, shows: Ints, fits: Ints) -> tuple[Floats, Floats]:
+        """Mean square that remains of the patterns, and the fits (..., f, k) of the others to them."""
         own = information[..., shows, :][..., shows]
         cross = information[..., fits, :][..., shows]
         fitted = np.linalg.solve(information[..., fits, :][..., fits], cross)
-        left = np.diagonal(own, axis1=-2, axis2=-1) - (cross * fitted).sum(axis=-2)
-        return np.maximum(left, 0.0).mean(axis=-1), np.asarray(fitted)
+        remaining = np.diagonal(own, axis1=-2, axis2=-1) - (cross * fitted).sum(axis=-2)
+        return np.maximum(remaining, 0.0).mean(axis=-1), np.asarray(fitted)

@@ -42,7 +42,7 @@ class CompetingModel:
 @dataclass(frozen=True)
 class Chosen:
     """setups: rows of the choice; separation: standard deviations by which it shows that the first is no case of the
-    second, and the other way round."""
+    second, and vice versa."""
 
     setups: tuple[int, ...]
     separation: tuple[float, float]
@@ -51,7 +51,7 @@ class Chosen:
 def rivalry(
     first: CompetingModel, second: CompetingModel, common: Floats, q: Floats, spacing: Floats
 ) -> tuple[CandidateSet, Disagreement]:
-    """The choices, and what is to be made large: ``common`` (C, r, U) is fitted by both; q (C, n), spacing (n,) as in
+    """The choices, and what is to be maximized: ``common`` (C, r, U) is fitted by both; q (C, n), spacing (n,) as in
     ``CandidateSet``."""
     fitted = np.concatenate([common, first.columns, second.columns], axis=2)
     length = np.linalg.norm(fitted, axis=(0, 1))
@@ -77,15 +77,15 @@ def discriminating(
     q: Floats,
     spacing: Floats,
     count: int,
-    begun: Sequence[int] = (),
+    start_choice: Sequence[int] = (),
 ) -> Chosen:
     """The ``count`` setups that keep the two furthest apart, the smaller of both separations; ``common`` (C, r, U),
     ``q`` (C, n), ``spacing`` (n,) as of ``rivalry``.
 
-    ``begun``: a choice to start with.
+    ``start_choice``: a choice to start with.
     """
     choices, criterion = rivalry(first, second, common, q, spacing)
-    chosen, _ = exchanged(choices, criterion, grown(choices, criterion, begun, count))
+    chosen, _ = exchanged(choices, criterion, grown(choices, criterion, start_choice, count))
     one, two = np.sqrt(criterion.separations(choices.information(chosen))).tolist()
     return Chosen(tuple(chosen), (one, two))
 
@@ -93,7 +93,7 @@ def discriminating(
 @dataclass(frozen=True)
 class Discrimination:
     """Poses that distinguish two effects, by their number, and the separations [standard deviations]: that the first is
-    no case of the second, and the other way round.  candidates: number of poses to choose from."""
+    no case of the second, and vice versa.  candidates: number of poses to choose from."""
 
     candidates: int
     chosen: dict[int, Setups]
@@ -136,18 +136,18 @@ def apart(
         columns = np.concatenate([*parts, fitted.columns, fitted.nuisance], axis=2)
         return pooled(some, Observability(columns, columns[:, :, :0], ()))
 
-    def chosen_from(pool: Pool, begun: Choice) -> Choice:
+    def chosen_from(pool: Pool, start_choice: Choice) -> Choice:
         parts = np.split(pool.shown.columns, np.cumsum(widths), axis=2)
         alternatives = CompetingModel(parts[0], parts[2]), CompetingModel(parts[1], parts[3])
-        found: dict[int, Sequence[int]] = {}
+        by_size: dict[int, Sequence[int]] = {}
         last: Sequence[int] = ()
         for size in sorted(sizes):
             done = discriminating(
-                *alternatives, parts[4], pool.setups.q, spacing, size, begun.get(size, last)
+                *alternatives, parts[4], pool.setups.q, spacing, size, start_choice.get(size, last)
             )
-            found[size] = last = done.setups
+            by_size[size] = last = done.setups
             separation[size] = done.separation
-        return found
+        return by_size
 
     stage("computing what poses show")
     start = rested(model, setups, evaluated)

@@ -49,10 +49,10 @@ class CandidateSet:
 
     def blocked(self, chosen: Sequence[int]) -> Bools:
         """(C,) setups that cannot be chosen beside ``chosen``."""
-        found = np.zeros(len(self.q), bool)
+        is_blocked = np.zeros(len(self.q), bool)
         for setup in chosen:
-            found |= self.near(setup)
-        return found
+            is_blocked |= self.near(setup)
+        return is_blocked
 
     @cached_property
     def blocks(self) -> Floats:
@@ -113,9 +113,9 @@ def exchanged(choices: CandidateSet, criterion: Criterion, chosen: Sequence[int]
         for place in range(len(chosen)):
             rest = chosen[:place] + chosen[place + 1 :]
             crowd -= near[place]
-            setup, found = best(choices, criterion, choices.information(rest), crowd > 0)
-            if found < score - BETTER:
-                chosen[place], score, near[place] = setup, found, choices.near(setup)
+            setup, new_score = best(choices, criterion, choices.information(rest), crowd > 0)
+            if new_score < score - BETTER:
+                chosen[place], score, near[place] = setup, new_score, choices.near(setup)
             crowd += near[place]
     return chosen, score
 

@@ -9,15 +9,15 @@ from postproc.base.arrays import Floats, Ints
 
 def measuring_order(q: Floats, spacing: Floats) -> Ints:
     """(C,) an order of poses q (C, n) in which the robot travels little: always on to the nearest, from the start that
-    makes the whole way shortest.  ``spacing`` (n,) [rad, m]: travels of the axes that take equally long."""
-    way = np.abs((q[:, None] - q[None]) / spacing).max(axis=2)
+    makes the total travel shortest.  ``spacing`` (n,) [rad, m]: travels of the axes that take equally long."""
+    travel = np.abs((q[:, None] - q[None]) / spacing).max(axis=2)
     count = len(q)
     orders = np.zeros((count, count), np.int64)
     orders[:, 0] = range(count)
-    total, left = np.zeros(count), ~np.eye(count, dtype=bool)
+    total, unvisited = np.zeros(count), ~np.eye(count, dtype=bool)
     for step in range(1, count):
-        here = np.where(left, way[orders[:, step - 1]], np.inf)
+        here = np.where(unvisited, travel[orders[:, step - 1]], np.inf)
         orders[:, step] = here.argmin(axis=1)
         total += here.min(axis=1)
-        left[range(count), orders[:, step]] = False
+        unvisited[range(count), orders[:, step]] = False
     return np.asarray(orders[total.argmin()])

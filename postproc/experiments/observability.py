@@ -20,7 +20,7 @@ from postproc.identification.unknowns import Unknown
 from postproc.model import StiffnessModel
 
 MOVES = 1e-9
-"""[m] An effect whose parameters move no reading further is asleep."""
+"""[m] An effect whose parameters move no reading further is dormant."""
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,12 @@ def observability(
 ) -> Observability:
     """What ``setups`` show under ``model``; NaN where it has no equilibrium."""
     campaign = Campaign(readings_of(model, offer, setups))
-    seen, given = campaign.predicted(model), _placed(campaign, offer)
+    predicted, given = campaign.predicted(model), _placed(campaign, offer)
     weight = _weights(offer, setups)[:, :, None]
-    found = columns(campaign, model, unknowns, seen, given)
-    nuisance = campaign.nuisance_columns(seen, given)
+    derivatives = columns(campaign, model, unknowns, predicted, given)
+    nuisance = campaign.nuisance_columns(predicted, given)
     return Observability(
-        found.reshape(*weight.shape[:2], len(unknowns)) * weight,
+        derivatives.reshape(*weight.shape[:2], len(unknowns)) * weight,
         nuisance.reshape(*weight.shape[:2], len(campaign.nuisance_names)) * weight,
         campaign.nuisance_names,
     )
@@ -86,16 +86,16 @@ def _weights(offer: CandidateSetups, setups: Setups) -> Floats:
 def measured(
     model: StiffnessModel, unknowns: Sequence[Unknown], campaign: Campaign, sigma: float
 ) -> Observability:
-    """What readings that exist show: one setup of all.  ``sigma`` [m] where they say nothing of their own scatter."""
+    """What readings that exist show: one setup of all.  ``sigma`` [m] where they do not state their own scatter."""
     noise = noise_of(campaign.readings)
     if not noise.known:
         noise = replace(noise, sigma=np.full(len(campaign), sigma))
-    seen = campaign.predicted(model)
-    given = registered(campaign, seen, np.ones(len(campaign), bool))
-    weights = weighting(campaign, noise, campaign.residual(seen, given))
-    found = weights(columns(campaign, model, unknowns, seen, given))
+    predicted = campaign.predicted(model)
+    given = registered(campaign, predicted, np.ones(len(campaign), bool))
+    weights = weighting(campaign, noise, campaign.residual(predicted, given))
+    derivatives = weights(columns(campaign, model, unknowns, predicted, given))
     return Observability(
-        found[None], weights(campaign.nuisance_columns(seen, given))[None], campaign.nuisance_names
+        derivatives[None], weights(campaign.nuisance_columns(predicted, given))[None], campaign.nuisance_names
     )
 
 
@@ -105,19 +105,19 @@ def influential(
     """The model with the effects that move nothing where they are at the sizes of their parameters: a fit starts
     there too."""
     still = np.nan_to_num(np.abs(observability(model, unknowns, offer, setups).columns)).max(axis=(0, 1)) == 0
-    asleep = {
+    dormant = {
         unknown.key: unknown.parameter.scale
         for unknown in unknowns
         if all(still[i] for i, other in enumerate(unknowns) if other.term == unknown.term)
         and model.terms[unknown.term].values[unknown.parameter.name] == unknown.parameter.null
     }
-    if not asleep:
+    if not dormant:
         return model
     moves = np.nan_to_num(
-        np.abs(observability(model.with_values(asleep), unknowns, offer, setups).columns)
+        np.abs(observability(model.with_values(dormant), unknowns, offer, setups).columns)
     ).max(axis=(0, 1))
     wakes = {unknown.term for i, unknown in enumerate(unknowns) if moves[i] * offer.sigma > MOVES}
-    woken = {key: value for key, value in asleep.items() if key[0] in wakes}
+    woken = {key: value for key, value in dormant.items() if key[0] in wakes}
     return model.with_values(woken) if woken else model
 
 
@@ -137,10 +137,10 @@ def judged(
         both[: len(nuisance), : len(names)], both[len(nuisance) :, len(names) :] = nuisance, apart
         nuisance, names = both, (*names, *others)
     values = np.array([model.terms[u.term].values[u.parameter.name] for u in unknowns])
-    found = identifiability(unknowns, columns, nuisance, names, prior_rows(unknowns), values)
+    analysis = identifiability(unknowns, columns, nuisance, names, prior_rows(unknowns), values)
     ci95 = np.full(len(unknowns), np.nan)
-    ci95[list(found.kept)] = COVERAGE * np.sqrt(np.diag(found.covariance))
-    return ci95 * scales(unknowns), found
+    ci95[list(analysis.observable)] = COVERAGE * np.sqrt(np.diag(analysis.covariance))
+    return ci95 * scales(unknowns), analysis
 
 
 def _rows(some: Observability) -> tuple[Floats, Floats, tuple[str, ...]]:

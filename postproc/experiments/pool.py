@@ -24,7 +24,7 @@ NEARBY = 1200
 """Such poses together, about."""
 
 Stage = Callable[[str], None]
-"""Is told the name of each stage as it starts."""
+"""Receives the name of each stage as it starts."""
 
 Choice = Mapping[int, Sequence[int]]
 """Number of setups -> their rows in a pool."""
@@ -69,11 +69,11 @@ def rested(model: StiffnessModel, setups: Setups, evaluated: Evaluated) -> Pool:
     return pool
 
 
-def enough(model: StiffnessModel, offer: CandidateSetups, wanted: int, found: int) -> None:
+def enough(model: StiffnessModel, offer: CandidateSetups, wanted: int, count: int) -> None:
     """Raises Refusal PLN004 where fewer distinct poses than wanted were found."""
-    if found < wanted:
+    if count < wanted:
         message = (
-            f"{found} poses differ by {offer.spacing / DEG:g} deg in one axis at least, and"
+            f"{count} poses differ by {offer.spacing / DEG:g} deg in one axis at least, and"
             f" {wanted} are requested"
         )
         raise Refusal(Finding("PLN004", message, str(model.robot.path)))
@@ -89,7 +89,7 @@ def refined(
     stage: Stage,
 ) -> tuple[Pool, Choice]:
     """The best choices, and the pool that they are of.  ``chosen_from``: the best choices out of a pool, never worse
-    than those begun with."""
+    than those at the start."""
     stage("choosing poses")
     pool, chosen = start, chosen_from(start, {})
     for share in SHARES if chosen else ():

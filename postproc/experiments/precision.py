@@ -32,7 +32,7 @@ from postproc.identification.unknowns import Unknown
 from postproc.model import StiffnessModel
 
 FEW = 300
-"""Of them, to see whether an effect is asleep."""
+"""Of them, to check whether an effect is dormant."""
 
 STARTS = 3
 """Random designs that the exchange also starts with."""
@@ -81,7 +81,7 @@ class Design:
 
 @dataclass(frozen=True)
 class UnobservableParameter:
-    """A parameter that cannot be seen, or not well enough, and why in words.  imitated: a place of the tracker or of
+    """A parameter that is not observable, or too weakly, and why in words.  imitated: a place of the tracker or of
     its targets does the same, which is no loss."""
 
     name: str
@@ -93,7 +93,7 @@ class UnobservableParameter:
 class Designs:
     """Designs by number of poses.
 
-    model: with effects that were asleep at the sizes of their parameters; candidates: that there were to choose from;
+    model: with effects that were dormant at the sizes of their parameters; candidates: that there were to choose from;
     at_random: medians over random designs of the intervals (P,) and of their worst ratio; before: intervals (P,) by the
     readings that exist, None without; unseen: what no pose can show; left_out, weak: what the design of the wanted
     number of poses does not show, or less precisely than wanted, weakest first.
@@ -134,19 +134,19 @@ def designs(
     start = rested(model, setups, evaluated)
     whole = judged(model, unknowns, start.shown, task.before)[1]
     unseen = tuple(_unobservable(task, model, start, dropped) for dropped in whole.dropped)
-    if not whole.kept:
+    if not whole.observable:
         lost = "; ".join(f"{one.name}: {one.why}" for one in unseen)
         message = f"no parameter is observable at any pose: {lost}"
         raise Refusal(Finding("PLN002", message, str(model.robot.path)))
-    kept = list(whole.kept)
+    observable = list(whole.observable)
     sizes = sorted({poses, *others})
-    task = replace(task, counts=task.counts & np.isin(range(len(unknowns)), kept))
+    task = replace(task, counts=task.counts & np.isin(range(len(unknowns)), observable))
     hopeful = task
     while True:
-        criterion = _criterion(hopeful, kept, len(start.shown.names))
+        criterion = _criterion(hopeful, observable, len(start.shown.names))
 
-        def chosen_from(pool: Pool, begun: Choice, criterion: Criterion = criterion) -> Choice:
-            return _by_size(choices_of(task, kept, pool), criterion, sizes, begun, rng)
+        def chosen_from(pool: Pool, start_choice: Choice, criterion: Criterion = criterion) -> Choice:
+            return _by_size(choices_of(task, observable, pool), criterion, sizes, start_choice, rng)
 
         pool, chosen = refined(model, offer, start, evaluated, chosen_from, rng, stage)
         enough(model, offer, poses, poses if poses in chosen else max(chosen, default=0))
@@ -157,7 +157,7 @@ def designs(
         if task.criterion == "test":
             break
     stage("comparing with random poses")
-    some = choices_of(task, kept, start)
+    some = choices_of(task, observable, start)
     best = {size: _design(hopeful, model, pool[rows]) for size, rows in chosen.items()}
     never = {lost.name for lost in unseen}
     missed = [dropped for dropped in best[poses].dropped if dropped.name not in never]
@@ -179,66 +179,73 @@ def predicted(task: DesignProblem, model: StiffnessModel, setups: Setups) -> Des
     return _design(task, model, Pool(setups, observability(model, task.unknowns, task.setups, setups)))
 
 
-def choices_of(task: DesignProblem, kept: Sequence[int], pool: Pool) -> CandidateSet:
-    """The pool for the exchange: the unknowns ``kept`` in wanted standard deviations, and nuisances [mm, mrad]."""
-    unit = task.wanted[list(kept)] / COVERAGE
-    per_scale = unit / scales(task.unknowns)[list(kept)]
+def choices_of(task: DesignProblem, observable: Sequence[int], pool: Pool) -> CandidateSet:
+    """The pool for the exchange: the unknowns ``observable`` in wanted standard deviations, and nuisances [mm,
+    mrad]."""
+    unit = task.wanted[list(observable)] / COVERAGE
+    per_scale = unit / scales(task.unknowns)[list(observable)]
     rows = np.concatenate(
-        [pool.shown.columns[:, :, list(kept)] * per_scale, pool.shown.nuisance * MM], axis=2
+        [pool.shown.columns[:, :, list(observable)] * per_scale, pool.shown.nuisance * MM], axis=2
     )
     base = LOOSE * np.eye(rows.shape[2])
-    known = prior_rows(task.unknowns)[np.ix_(kept, kept)] * per_scale
+    known = prior_rows(task.unknowns)[np.ix_(observable, observable)] * per_scale
     block = known.T @ known
     if task.before is not None:
-        own, frames = task.before.columns[0][:, list(kept)] * per_scale, basis(task.before.nuisance[0])
+        own, frames = task.before.columns[0][:, list(observable)] * per_scale, basis(task.before.nuisance[0])
         own = own - frames @ (frames.T @ own)
         block = block + own.T @ own
-    base[: len(kept), : len(kept)] += block
+    base[: len(observable), : len(observable)] += block
     return CandidateSet(rows, pool.setups.q, spacings(task.model.robot, task.setups.spacing), base)
 
 
-def _criterion(task: DesignProblem, kept: Sequence[int], nuisances: int) -> Criterion:
-    counts = task.counts[list(kept)]
-    counts = np.concatenate([counts if counts.any() else np.ones(len(kept), bool), np.zeros(nuisances, bool)])
+def _criterion(task: DesignProblem, observable: Sequence[int], nuisances: int) -> Criterion:
+    counts = task.counts[list(observable)]
+    counts = np.concatenate(
+        [counts if counts.any() else np.ones(len(observable), bool), np.zeros(nuisances, bool)]
+    )
     if task.criterion == "minimax":
         return Minimax(counts)
     if task.criterion == "d":
         return Determinant(counts)
     assert task.tests is not None
-    root = task.tests[:, list(kept)] * (task.wanted[list(kept)] / COVERAGE)
+    root = task.tests[:, list(observable)] * (task.wanted[list(observable)] / COVERAGE)
     return AtTestPoses(np.concatenate([root, np.zeros((len(root), nuisances))], axis=1))
 
 
 def _by_size(
-    choices: CandidateSet, criterion: Criterion, sizes: Sequence[int], begun: Choice, rng: np.random.Generator
+    choices: CandidateSet,
+    criterion: Criterion,
+    sizes: Sequence[int],
+    start_choice: Choice,
+    rng: np.random.Generator,
 ) -> Choice:
-    """The best choice of each size: begun with the given ones, or with the best next setups and at random; and with the
-    next smaller choice."""
-    found: dict[int, Sequence[int]] = {}
+    """The best choice of each size: started with the given ones, or with the best next setups and at random; and with
+    the next smaller choice."""
+    by_size: dict[int, Sequence[int]] = {}
     last: Sequence[int] = ()
     for size in sizes:
         tried = [grown(choices, criterion, last, size)]
-        if begun:
-            tried += [list(begun[size])] if size in begun else []
+        if start_choice:
+            tried += [list(start_choice[size])] if size in start_choice else []
         else:
             tried += [grown(choices, criterion, (), size)] if last else []
             tried += [random_choice(choices, size, rng) for _ in range(STARTS)]
         done = [exchanged(choices, criterion, choice) for choice in tried if len(choice) == size]
         if not done:
             break
-        found[size] = last = min(done, key=lambda pair: pair[1])[0]
-    return found
+        by_size[size] = last = min(done, key=lambda pair: pair[1])[0]
+    return by_size
 
 
 def _design(task: DesignProblem, model: StiffnessModel, pool: Pool) -> Design:
-    ci95, found = judged(model, task.unknowns, pool.shown, task.before)
+    ci95, analysis = judged(model, task.unknowns, pool.shown, task.before)
     ratio = np.where(np.isnan(ci95), np.inf, ci95) / task.wanted
     test = np.nan
-    if task.tests is not None and found.kept:
-        kept = list(found.kept)
-        root = task.tests[:, kept] * scales(task.unknowns)[kept]
-        test = float(np.sqrt(np.einsum("ki,ij,kj->", root, found.covariance, root)))
-    return Design(pool.setups, ci95, float(ratio[task.counts].max(initial=0.0)), found.dropped, test)
+    if task.tests is not None and analysis.observable:
+        observable = list(analysis.observable)
+        root = task.tests[:, observable] * scales(task.unknowns)[observable]
+        test = float(np.sqrt(np.einsum("ki,ij,kj->", root, analysis.covariance, root)))
+    return Design(pool.setups, ci95, float(ratio[task.counts].max(initial=0.0)), analysis.dropped, test)
 
 
 def _at_random(
@@ -273,11 +280,11 @@ def _weak(
 ) -> tuple[UnobservableParameter, ...]:
     """What a design shows less precisely than wanted."""
     ratio = np.where(task.counts, np.nan_to_num(design.ci95 / task.wanted), 0.0)
-    told = []
+    weak = []
     for at in np.argsort(-ratio, kind="stable"):
         if ratio[at] <= 1.0:
             break
         more = reason(model, task.unknowns[at], task.setups, pool.setups, still=False)
         what = f"{ratio[at]:.2g} times as wide as requested"
-        told.append(UnobservableParameter(task.unknowns[at].name, f"{what}; {more}" if more else what))
-    return tuple(told)
+        weak.append(UnobservableParameter(task.unknowns[at].name, f"{what}; {more}" if more else what))
+    return tuple(weak)

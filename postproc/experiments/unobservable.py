@@ -1,4 +1,4 @@
-"""Why a parameter cannot be seen, or only weakly: what the offered loads and poses do to its joint."""
+"""Why a parameter is not observable, or only weakly: what the offered loads and poses do to its joint."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from postproc.model import StiffnessModel
 from postproc.robot.chain import generalized_force
 
 SAMPLE = 300
-"""Poses that are looked at."""
+"""Poses that are checked."""
 
 NO_LEVER = 1e-6
 """[m] A load at less turns nothing."""
@@ -32,8 +32,8 @@ ALIKE = 30.0
 def reason(
     model: StiffnessModel, unknown: Unknown, offer: CandidateSetups, setups: Setups, still: bool
 ) -> str:
-    """What is in the way of an unknown at the ``setups`` that are offered, in words; ``still``: no reading moves
-    with it."""
+    """What prevents the observation of an unknown at the ``setups`` that are offered, in words; ``still``: no reading
+    moves with it."""
     some = setups[np.linspace(0, len(setups) - 1, min(SAMPLE, len(setups))).astype(int)]
     given = readings_of(model, offer, some)
     here = _size(model, unknown, given)
@@ -83,5 +83,5 @@ def _torques(model: StiffnessModel, offer: CandidateSetups, setups: Setups, join
 def _size(model: StiffnessModel, unknown: Unknown, readings: Readings) -> float:
     """[m] by which a parameter of its usual size moves all readings together."""
     campaign = Campaign(readings)
-    found = columns(campaign, model, [unknown], campaign.predicted(model), campaign.start())
-    return float(np.linalg.norm(np.nan_to_num(found)))
+    derivative = columns(campaign, model, [unknown], campaign.predicted(model), campaign.start())
+    return float(np.linalg.norm(np.nan_to_num(derivative)))

@@ -28,7 +28,7 @@ ONE_POSE = 1e-6
 
 
 REST = 1e-14
-"""[rad, m] What may be left of the way to an equilibrium: differences of two loads are taken."""
+"""[rad, m] What may remain of the displacement to an equilibrium: differences of two loads are taken."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Campaign:
         self.place_known: Bools = np.array([name in readings.places for name in named] or [not free])
         # of a target the place is stated, of a tool the axes too
         self.turn_known: Bools = np.array([False for _ in named] or [not free])
-        # begun with on the flange where nothing is stated
+        # started on the flange where nothing is stated
         on_flange = [readings.places.get(name, np.zeros(3)) for name in named] or [self.tool.position]
         into_tool = self.tool.inverse()
         self.stated_places = np.array(
@@ -147,23 +147,23 @@ class Campaign:
             rest.pose.rotation, rest.mount, rest.pose.position, rest.displacement, rest.converged
         )
 
-    def points(self, seen: PredictedReadings, places: Floats, at: Ints) -> Floats:
+    def points(self, predicted: PredictedReadings, places: Floats, at: Ints) -> Floats:
         """(R, 3) [m] what each reading would see in states ``at`` (R,), robot base, with the targets at ``places`` (T,
         3) [m] on the flange."""
-        origin = seen.tip if self.at_tip else seen.body
+        origin = predicted.tip if self.at_tip else predicted.body
         place = places[self.readings.target]
-        return np.asarray(origin[at] + (seen.rotation[at] @ place[:, :, None])[:, :, 0])
+        return np.asarray(origin[at] + (predicted.rotation[at] @ place[:, :, None])[:, :, 0])
 
-    def expected(self, seen: PredictedReadings, given: Nuisances) -> tuple[Floats, Floats | None]:
+    def expected(self, predicted: PredictedReadings, given: Nuisances) -> tuple[Floats, Floats | None]:
         """(R, 3) [m], and rotations (R, 3, 3) where they are measured, in the axes of the readings; NaN where the model
         has no rest."""
-        points = self.points(seen, given.places, self.at)
-        lost = ~seen.converged[self.at]
-        rotation = seen.rotation[self.at]
+        points = self.points(predicted, given.places, self.at)
+        lost = ~predicted.converged[self.at]
+        rotation = predicted.rotation[self.at]
         if self.still is not None:
-            points = points - self.points(seen, given.places, self.still)
-            lost = lost | ~seen.converged[self.still]
-            rotation = rotation @ np.swapaxes(seen.rotation[self.still], 1, 2)
+            points = points - self.points(predicted, given.places, self.still)
+            lost = lost | ~predicted.converged[self.still]
+            rotation = rotation @ np.swapaxes(predicted.rotation[self.still], 1, 2)
         else:
             rotation = rotation @ given.turns[self.readings.target]
         points = np.where(lost[:, None], np.nan, points)
@@ -173,21 +173,21 @@ class Campaign:
             rotation = frame.rotation @ rotation
         return points, rotation if self.posed else None
 
-    def residual(self, seen: PredictedReadings, given: Nuisances) -> Floats:
+    def residual(self, predicted: PredictedReadings, given: Nuisances) -> Floats:
         """(R, 3) [m], or (R, 6) [m, rad] where rotations are measured: measured minus expected, in the axes of the
         readings; NaN where nothing was measured or the model has no rest."""
-        position, rotation = self.expected(seen, given)
-        left = self.readings.value - position
+        position, rotation = self.expected(predicted, given)
+        difference = self.readings.value - position
         if rotation is None or self.readings.rotation is None:
-            return left
-        away = np.full_like(left, np.nan)
+            return difference
+        away = np.full_like(difference, np.nan)
         known = np.isfinite(self.readings.rotation).all(axis=(1, 2)) & np.isfinite(position).all(axis=1)
         away[known] = vector_from_rotation(self.readings.rotation[known] @ np.swapaxes(rotation[known], 1, 2))
-        return np.concatenate([left, away], axis=1)
+        return np.concatenate([difference, away], axis=1)
 
     def in_base(self, residual: Floats, given: Nuisances) -> Floats:
         """(R, 3 or 6) [m, rad] of a ``residual`` (R, 3 or 6) in axes of the robot base.  A coordinate that was not
-        measured counts as none left; a place or turn of which nothing is known stays NaN."""
+        measured counts as zero; a place or turn of which nothing is known stays NaN."""
         if not self.tracked:
             return residual
         back = np.swapaxes(given.frames.rotation, 1, 2)[self.readings.session]
@@ -228,66 +228,66 @@ class Campaign:
             names += [f"{what}{f' {of}' if of else ''}.{axis}" for axis in axes]
         return names
 
-    def nuisance_columns(self, seen: PredictedReadings, given: Nuisances) -> Floats:
+    def nuisance_columns(self, predicted: PredictedReadings, given: Nuisances) -> Floats:
         """(R, 3 or 6, U) derivative of ``expected`` by the steps of ``moved``."""
-        found = np.zeros((len(self), 6, len(self.nuisance_names)))
-        points = self.points(seen, given.places, self.at)
+        derivatives = np.zeros((len(self), 6, len(self.nuisance_names)))
+        points = self.points(predicted, given.places, self.at)
         axes = given.frames.rotation[self.readings.session]
         for block, (kind, k) in enumerate(self._blocks()):
             columns = slice(3 * block, 3 * block + 3)
             if kind in ("shift", "turn"):
                 of = self.readings.session == k
                 if kind == "shift":
-                    found[of, :3, columns] = axes[of]
+                    derivatives[of, :3, columns] = axes[of]
                 else:
-                    found[of, :3, columns] = -axes[of] @ skew(points[of])
-                    found[of, 3:, columns] = axes[of]
+                    derivatives[of, :3, columns] = -axes[of] @ skew(points[of])
+                    derivatives[of, 3:, columns] = axes[of]
                 continue
             of = self.readings.target == k
-            rotation = seen.rotation[self.at[of]]
+            rotation = predicted.rotation[self.at[of]]
             if self.still is not None:
-                rotation = rotation - seen.rotation[self.still[of]]
+                rotation = rotation - predicted.rotation[self.still[of]]
             rows = slice(0, 3) if kind == "place" else slice(3, 6)
-            found[of, rows, columns] = axes[of] @ rotation if self.tracked else rotation
-        return found if self.posed else found[:, :3]
+            derivatives[of, rows, columns] = axes[of] @ rotation if self.tracked else rotation
+        return derivatives if self.posed else derivatives[:, :3]
 
     def columns(
-        self, model: StiffnessModel, seen: PredictedReadings, given: Nuisances, moved: Floats
+        self, model: StiffnessModel, predicted: PredictedReadings, given: Nuisances, moved: Floats
     ) -> Floats:
         """(R, 3 or 6, P) what moves in ``expected`` where the coordinates of the states move by ``moved`` (S, m, P);
         NaN where the model has no rest."""
-        state = model.state(self.q, self.wrench, self.tool, self.conditions, seen.displacement)
+        state = model.state(self.q, self.wrench, self.tool, self.conditions, predicted.displacement)
         chain = model.chain
         # a target is on the body, which does not move with what the spindle gives
         on = np.array([self.at_tip or not name.startswith("spindle.") for name in chain.names])
         j = jacobian(state.swept)
-        found = np.zeros((len(self), 6 if self.posed else 3, moved.shape[2]))
+        derivatives = np.zeros((len(self), 6 if self.posed else 3, moved.shape[2]))
         turn, tip = j[:, 3:] @ moved, (j[:, :3] * on) @ moved
-        origin = seen.tip if self.at_tip else seen.body
+        origin = predicted.tip if self.at_tip else predicted.body
 
         def at(states: Ints, target: int) -> Floats:
-            lever = origin[states] + seen.rotation[states] @ given.places[target] - seen.tip[states]
+            lever = origin[states] + predicted.rotation[states] @ given.places[target] - predicted.tip[states]
             return np.asarray(tip[states] - np.cross(lever[:, :, None], turn[states], axis=1))
 
         for target in range(len(self.targets)):
             rows = np.flatnonzero(self.readings.target == target)
-            found[rows, :3] = at(self.at[rows], target)
+            derivatives[rows, :3] = at(self.at[rows], target)
             if self.still is not None:
-                found[rows, :3] -= at(self.still[rows], target)
+                derivatives[rows, :3] -= at(self.still[rows], target)
         if self.posed:
-            found[:, 3:] = turn[self.at]
+            derivatives[:, 3:] = turn[self.at]
             if self.still is not None:
-                relative = seen.rotation[self.at] @ np.swapaxes(seen.rotation[self.still], 1, 2)
-                found[:, 3:] -= relative @ turn[self.still]
+                relative = predicted.rotation[self.at] @ np.swapaxes(predicted.rotation[self.still], 1, 2)
+                derivatives[:, 3:] -= relative @ turn[self.still]
         if self.tracked:
             axes = given.frames.rotation[self.readings.session]
-            for half in range(0, found.shape[1], 3):
-                found[:, half : half + 3] = axes @ found[:, half : half + 3]
-        lost = ~seen.converged[self.at]
+            for half in range(0, derivatives.shape[1], 3):
+                derivatives[:, half : half + 3] = axes @ derivatives[:, half : half + 3]
+        lost = ~predicted.converged[self.at]
         if self.still is not None:
-            lost |= ~seen.converged[self.still]
-        found[lost] = np.nan
-        return found
+            lost |= ~predicted.converged[self.still]
+        derivatives[lost] = np.nan
+        return derivatives
 
     def moved(self, given: Nuisances, step: Floats) -> Nuisances:
         """The nuisances after a step (U,) [m, rad]: frames T (exp(turn) p + shift), targets c + place and

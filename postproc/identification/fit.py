@@ -25,7 +25,7 @@ ROUNDING = 1e-3
 """Standard deviations below which residuals are no scatter, but rounding."""
 
 PRIOR_ROUNDS, SAME_FACTOR = 5, 0.1
-"""How often the variance of the readings is looked at again, because priors count against it, and the logarithm of its
+"""How often the variance of the readings is estimated again, because priors count against it, and the logarithm of its
 change from which on."""
 
 AT_BOUND = 1e-9
@@ -51,10 +51,10 @@ class Fit:
     """A campaign fitted.
 
     start, asked: the model to start with and the unknowns asked for; weights: as used, plain_weights: before a robust
-    fit changed them; point: the model found and what it leaves; unknowns (k,): found; dropped: asked for, and left as
-    they were; covariance (k, k) [SI]; condition: see ``Insight``; factor: variance of the readings over what ``noise``
-    says, scatter_exceeded if that is clearly more; freedom: of the residuals; quantile: half width of an interval over
-    its deviation.
+    fit changed them; point: the fitted model and its residual; unknowns (k,): found; dropped: asked for, and unchanged;
+    covariance (k, k) [SI]; condition: see ``Insight``; factor: variance of the readings over what ``noise``
+    states, scatter_exceeded if that is clearly more; freedom: of the residuals; quantile: half width of an interval
+    over its deviation.
     """
 
     campaign: Campaign
@@ -79,24 +79,24 @@ class Fit:
 
     @cached_property
     def residual(self) -> Floats:
-        """(R, 3) [m] what is left of each position, axes of the robot base."""
+        """(R, 3) [m] residual of each position, axes of the robot base."""
         return self.campaign.in_base(self.point.residual, self.point.given)[:, :3]
 
     @property
     def shared_error(self) -> float:
-        """[m] one sigma of what readings of one pose have in common in each coordinate; 0 where nothing is seen."""
+        """[m] one sigma of what readings of one pose have in common in each coordinate; 0 where nothing is detected."""
         return self.weights.shared * float(np.sqrt(self.factor))
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
         deviation = np.sqrt(np.diag(self.covariance))
-        found = []
+        estimates = []
         values = self.point.values(self.unknowns)
         for unknown, value, wide in zip(self.unknowns, values.tolist(), deviation.tolist(), strict=True):
             p = unknown.parameter
             edge = min(value - p.lower, p.upper - value) < AT_BOUND * p.scale
-            found.append(Estimate(unknown, value, self.quantile * wide, edge))
-        return tuple(found)
+            estimates.append(Estimate(unknown, value, self.quantile * wide, edge))
+        return tuple(estimates)
 
 
 def fit(
@@ -132,48 +132,52 @@ def fit(
     weights = plain = weighting(campaign, noise, point.residual).times(rows.astype(float))
     _enough(campaign, weights, unknowns)
     point = _influential(campaign, point, unknowns)
-    begin = point
+    start_point = point
     free, dropped = list(unknowns), list[Dropped]()
     factor, again = 1.0, PRIOR_ROUNDS if any(u.prior is not None for u in unknowns) else 0
     while True:
         point = descended(campaign, point, free, plain, factor=factor)
-        told = _with_turns(campaign, point, noise, plain)
+        updated = _with_turns(campaign, point, noise, plain)
         together = np.concatenate(point.taken, axis=2)
-        told = replace(told, shared=shared_error(point.residual, told, together, noise.known))
-        if told.shared != plain.shared or told.weight is not plain.weight:
-            plain, point = told, descended(campaign, point, free, told, factor=factor)
+        updated = replace(updated, shared=shared_error(point.residual, updated, together, noise.known))
+        if updated.shared != plain.shared or updated.weight is not plain.weight:
+            plain, point = updated, descended(campaign, point, free, updated, factor=factor)
         weights = plain
         if robust:
             point, weights = _robust(campaign, point, free, plain, rows, factor, noise.known)
         if not point.settled:
             point = with_columns(campaign, point, free)
-        found, before = _insight(campaign, point, free, weights, factor), factor
-        factor, exceeded, freedom, quantile = _variance(campaign, point, free, weights, plain, noise, found)
+        analysis, before = _insight(campaign, point, free, weights, factor), factor
+        factor, exceeded, freedom, quantile = _variance(
+            campaign, point, free, weights, plain, noise, analysis
+        )
         if again and abs(np.log(factor / before)) > SAME_FACTOR:
             again -= 1
             continue
-        found = _insight(campaign, point, free, weights, factor)
-        if not found.dropped:
+        analysis = _insight(campaign, point, free, weights, factor)
+        if not analysis.dropped:
             break
-        dropped += found.dropped
-        gone = [free[i] for i in range(len(free)) if i not in found.kept]
-        free = [free[i] for i in found.kept]
-        kept, values = list(found.kept), {u.key: u.value for u in gone}
+        dropped += analysis.dropped
+        gone = [free[i] for i in range(len(free)) if i not in analysis.observable]
+        free = [free[i] for i in analysis.observable]
+        observable, values = list(analysis.observable), {u.key: u.value for u in gone}
         if all(point.model.terms[t].values[name] == value for (t, name), value in values.items()):
-            point = replace(point, columns=point.taken[0][:, :, kept])
+            point = replace(point, columns=point.taken[0][:, :, observable])
         else:
-            point = at(campaign, point.model.with_values(values), point.given, begin.predicted.displacement)
+            point = at(
+                campaign, point.model.with_values(values), point.given, start_point.predicted.displacement
+            )
     scale = scales(free)
     return Fit(
         campaign, start, tuple(unknowns), noise, weights, plain, point, tuple(free), tuple(dropped),
-        found.covariance * np.outer(scale, scale), found.condition, factor, exceeded, freedom, quantile,
+        analysis.covariance * np.outer(scale, scale), analysis.condition, factor, exceeded, freedom, quantile,
     )  # fmt: skip
 
 
 def _enough(campaign: Campaign, weights: Weighting, unknowns: Sequence[Unknown]) -> None:
     priors = sum(unknown.prior is not None for unknown in unknowns)
     wanted = len(unknowns) - priors + len(campaign.nuisance_names)
-    # a state that is read twice says no more about unknowns
+    # a state that is read twice gives no more information on unknowns
     rows = weights.weight.any(axis=1)
     state = campaign.at * len(campaign.targets) + campaign.readings.target
     _, first = np.unique(np.where(rows, state, -1), return_index=True)
@@ -197,10 +201,10 @@ def _influential(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) 
     point = with_columns(campaign, point, unknowns)
     moves = np.abs(np.nan_to_num(point.taken[0])).max(axis=(0, 1), initial=0.0) > 0
     moving = {u.term for u, moved in zip(unknowns, moves, strict=True) if moved}
-    asleep = {
+    dormant = {
         u.key: u.parameter.scale for u in unknowns if u.term not in moving and u.value == u.parameter.null
     }
-    return at(campaign, point.model.with_values(asleep), point.given) if asleep else point
+    return at(campaign, point.model.with_values(dormant), point.given) if dormant else point
 
 
 def _robust(
@@ -212,7 +216,7 @@ def _robust(
     factor: float,
     known: bool,
 ) -> tuple[Point, Weighting]:
-    """Reweighted until the weights stand: those of Huber for the length of a reading's residual."""
+    """Reweighted until the weights no longer change: those of Huber for the length of a reading's residual."""
     plain = weights
     share = np.ones(len(rows))
     for _ in range(20):
@@ -243,7 +247,7 @@ def spread_of(length: Floats, known: bool) -> float:
 
 
 def _with_turns(campaign: Campaign, point: Point, noise: Noise, weights: Weighting) -> Weighting:
-    """Where no scatter of rotations is stated, they scatter as they are seen to, against the positions."""
+    """Where no scatter of rotations is stated, their scatter is estimated, relative to the positions."""
     if not campaign.posed or campaign.readings.sigma_turn is not None:
         return weights
     scaled = np.nan_to_num(point.residual) * weights.weight
@@ -274,7 +278,7 @@ def _variance(
     weights: Weighting,
     plain: Weighting,
     noise: Noise,
-    found: Identifiability,
+    analysis: Identifiability,
 ) -> tuple[float, bool, int, float]:
     """Variance of the readings over the assumed one, whether that is clearly more, degrees of freedom, and the 97.5 %
     quantile that goes with them.
@@ -288,10 +292,12 @@ def _variance(
     counts = plain.weight > 0
     share = np.where(counts, weights.weight / np.where(counts, plain.weight, 1.0), 0.0) ** 2
     columns, nuisance = point.taken
-    q = basis(np.nan_to_num(weights(np.concatenate([columns[:, :, list(found.kept)], nuisance], axis=2))))
-    left = weights(point.residual)
-    left = (left - q @ (q.T @ left)) * np.sqrt(share).reshape(-1)
-    squares = float(left @ left)
+    q = basis(
+        np.nan_to_num(weights(np.concatenate([columns[:, :, list(analysis.observable)], nuisance], axis=2)))
+    )
+    residual = weights(point.residual)
+    residual = (residual - q @ (q.T @ residual)) * np.sqrt(share).reshape(-1)
+    squares = float(residual @ residual)
     freedom = max(0, round(share.sum()) - q.shape[1])
     if freedom == 0:
         return 1.0, False, 0, float(norm.ppf(0.975))

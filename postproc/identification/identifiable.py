@@ -1,4 +1,4 @@
-"""What the readings can tell of the unknowns: rank, columns that must be left out, sums, correlations."""
+"""What the readings determine of the unknowns: rank, columns that must be left out, sums, correlations."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class Dropped:
 
 @dataclass(frozen=True)
 class Identifiability:
-    """kept: unknowns that can be found; dropped: the others; covariance (k, k) of the kept ones in units of their
-    ``scale``, for readings of unit variance; condition: of the kept columns, each made as long as the next."""
+    """observable: unknowns that the readings determine; dropped: the others; covariance (k, k) of the former in units
+    of their ``scale``, for readings of unit variance; condition: of their columns, scaled to one length."""
 
-    kept: tuple[int, ...]
+    observable: tuple[int, ...]
     dropped: tuple[Dropped, ...]
     covariance: Floats
     condition: float
@@ -56,17 +56,17 @@ def identifiability(
     values: Floats,
     factor: float = 1.0,
 ) -> Identifiability:
-    """What whitened ``columns`` (n, P) of the unknowns, per scale, and ``nuisance`` (n, U) tell.
+    """What whitened ``columns`` (n, P) of the unknowns, per scale, and ``nuisance`` (n, U) determine.
 
-    prior (P, P): rows of the priors; values (P,) [SI] at hand; factor: variance of the readings over the assumed one.
-    Columns are judged after what the nuisances explain is taken out, in their order: one that those before it can
+    prior (P, P): rows of the priors; values (P,) [SI] of the model; factor: variance of the readings over the assumed
+    one. Columns are judged after what the nuisances explain is taken out, in their order: one that those before it can
     imitate is left out.  Then the least certain is, as long as one states nothing: its 95 % interval is wider than its
     value, and than the stated one or, where none is stated, ``FAR`` times the parameter's usual size.
     """
     frames = basis(nuisance)
     outside = np.concatenate([columns - frames @ (frames.T @ columns), prior])
     whole = np.concatenate([columns, prior])
-    kept: list[int] = []
+    observable: list[int] = []
     dropped: list[Dropped] = []
     frame = np.empty((len(outside), 0))
     for k, unknown in enumerate(unknowns):
@@ -78,28 +78,28 @@ def identifiability(
         rest -= frame @ (frame.T @ rest)
         length = float(np.linalg.norm(rest))
         if length < max(REDUNDANT * size, UNSEEN):
-            dropped.append(_explained(k, unknowns, kept, whole, nuisance, nuisance_names))
+            dropped.append(_explained(k, unknowns, observable, whole, nuisance, nuisance_names))
             continue
         frame = np.column_stack([frame, rest / length])
-        kept.append(k)
-    while kept:
-        part = outside[:, kept]
+        observable.append(k)
+    while observable:
+        part = outside[:, observable]
         covariance = _inverse(part) * factor
         wide = COVERAGE * np.sqrt(np.diag(covariance))
-        limit = np.array([_limit(unknowns[k], values[k]) / unknowns[k].parameter.scale for k in kept])
+        limit = np.array([_limit(unknowns[k], values[k]) / unknowns[k].parameter.scale for k in observable])
         worst = int(np.argmax(wide / limit))
         if wide[worst] <= limit[worst]:
             length = np.linalg.norm(part, axis=0)
             values_of = np.linalg.svd(part / length, compute_uv=False)
             return Identifiability(
-                tuple(kept), tuple(dropped), covariance, float(values_of[0] / values_of[-1])
+                tuple(observable), tuple(dropped), covariance, float(values_of[0] / values_of[-1])
             )
-        unknown = unknowns[kept[worst]]
+        unknown = unknowns[observable[worst]]
         wider = wide[worst] * unknown.parameter.scale
         dropped.append(
             Dropped(unknown.name, f"is observable too weakly: +- {wider:.2g} {unknown.parameter.unit}")
         )
-        del kept[worst]
+        del observable[worst]
     return Identifiability((), tuple(dropped), np.zeros((0, 0)), np.nan)
 
 
@@ -124,7 +124,7 @@ def basis(columns: Floats) -> Floats:
 
 
 def _inverse(part: Floats) -> Floats:
-    """(A^T A)^-1 by the R of A's columns, each made of length one."""
+    """(A^T A)^-1 by the R of A's columns, each scaled to length one."""
     length = np.linalg.norm(part, axis=0)
     back = np.linalg.inv(np.linalg.qr(part / length, mode="r")) / length[:, None]
     return np.asarray(back @ back.T)
@@ -133,28 +133,30 @@ def _inverse(part: Floats) -> Floats:
 def _explained(
     k: int,
     unknowns: Sequence[Unknown],
-    kept: Sequence[int],
+    observable: Sequence[int],
     columns: Floats,
     nuisance: Floats,
     nuisance_names: Sequence[str],
 ) -> Dropped:
-    """Which of the kept columns and nuisances the column ``k`` is made of."""
+    """Which of the observable columns and nuisances the column ``k`` is made of."""
     padded = np.concatenate([nuisance, np.zeros((len(columns) - len(nuisance), nuisance.shape[1]))])
-    others = np.concatenate([columns[:, list(kept)], padded], axis=1)
+    others = np.concatenate([columns[:, list(observable)], padded], axis=1)
     length = np.linalg.norm(others, axis=0)
     length[length == 0] = 1.0
     share = np.linalg.lstsq(others / length, columns[:, k], rcond=1e-9)[0]
     size = np.linalg.norm(columns[:, k])
-    names = [unknowns[i].name for i in kept]
+    names = [unknowns[i].name for i in observable]
     weights = share / length
     parts = [i for i in np.argsort(-np.abs(share)) if abs(share[i]) > PART * size]
     own = unknowns[k].parameter.scale
     together = tuple(
-        (names[i], float(weights[i] * unknowns[kept[i]].parameter.scale / own))
+        (names[i], float(weights[i] * unknowns[observable[i]].parameter.scale / own))
         for i in parts
-        if i < len(kept)
+        if i < len(observable)
     )
-    frames = sorted({nuisance_names[i - len(kept)].split(".")[0] for i in parts if i >= len(kept)})
+    frames = sorted(
+        {nuisance_names[i - len(observable)].split(".")[0] for i in parts if i >= len(observable)}
+    )
     words = [name for name, _ in together] + [f"the {frame}" for frame in frames]
     return Dropped(unknowns[k].name, f"is observable only together with {', '.join(words)}", together)
 

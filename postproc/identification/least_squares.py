@@ -20,13 +20,13 @@ CLOSE = 1e-3
 """A step that moves the prediction by less than this share of its scatter is the last."""
 
 STRAIGHT = 0.01
-"""Where a step's effect was foreseen to this share, the columns are kept."""
+"""Where a step's effect was foreseen to this share, the columns are reused."""
 
 DAMPING, LOOSE = 1e-5, 1e-7
 """Of a column's length: what no reading sees stays where it is, parameters rather than tracker and targets."""
 
 
-BENT, CAREFUL = 0.3, 1e-4
+CURVED, CAREFUL = 0.3, 1e-4
 """Share of a step's effect that may come otherwise than foreseen, and the damping that the next step starts with
 then."""
 
@@ -34,7 +34,7 @@ then."""
 @dataclass(frozen=True)
 class Point:
     """A model among the possible ones.  residual (R, 3 or 6) as ``Campaign.residual``; ``columns`` (R, 3 or 6, P) of
-    the unknowns and ``nuisance`` (R, 3 or 6, U), taken here or where the way was straight from."""
+    the unknowns and ``nuisance`` (R, 3 or 6, U), taken here or at a point from which the path was straight."""
 
     model: StiffnessModel
     given: Nuisances
@@ -59,8 +59,8 @@ class Point:
 
 def at(campaign: Campaign, model: StiffnessModel, given: Nuisances, start: Floats | None = None) -> Point:
     """The point of ``model`` with nuisances ``given``; ``start`` (S, m) [rad, m]: displacements nearby."""
-    seen = campaign.predicted(model, start)
-    return Point(model, given, seen, campaign.residual(seen, given))
+    predicted = campaign.predicted(model, start)
+    return Point(model, given, predicted, campaign.residual(predicted, given))
 
 
 def with_columns(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> Point:
@@ -107,11 +107,11 @@ def descended(
 
     def residuals(candidate: Point) -> tuple[Floats, int]:
         x = candidate.values(unknowns) / scale
-        left = np.concatenate([weights(candidate.residual), prior @ (wanted - x)])
+        weighted = np.concatenate([weights(candidate.residual), prior @ (wanted - x)])
         lost = (weights.weight > 0) & ~np.isfinite(candidate.residual)
-        return left, int(lost.sum())
+        return weighted, int(lost.sum())
 
-    left, lost = residuals(point)
+    residual, lost = residuals(point)
     fresh, careful = point.columns is not None, 0.0
     for _ in range(max_steps):
         if not fresh:
@@ -126,9 +126,11 @@ def descended(
         # a column of nothing may grow with the others, however straight their path is
         awake = length > 0
         length[~awake] = 1.0
-        # many rows to as many as there are columns, which say the same
+        # many rows to as many as there are columns, with the same information
         damping = np.maximum(np.repeat([DAMPING, LOOSE], [len(x), len(loose)]), careful)
-        tall = np.block([[matrix / length, left[:, None]], [np.diag(damping), np.zeros((len(length), 1))]])
+        tall = np.block(
+            [[matrix / length, residual[:, None]], [np.diag(damping), np.zeros((len(length), 1))]]
+        )
         reduced = np.asarray(np.linalg.qr(tall, mode="r"))
         system, right = reduced[:-1, :-1], reduced[:-1, -1]
         low, high = np.concatenate([lower - x, -loose]) * length, np.concatenate([upper - x, loose]) * length
@@ -136,24 +138,24 @@ def descended(
         if np.any(whole < low) or np.any(whole > high):
             whole = lsq_linear(system, right, (np.minimum(low, 0.0), np.maximum(high, 0.0)), "bvls").x
         whole = whole / length
-        share, moved, after, gone = 1.0, point, left, lost
+        share, moved, after, gone = 1.0, point, residual, lost
         for _ in range(12):
             moved = _stepped(campaign, point, unknowns, share * whole, scale)
             after, gone = residuals(moved)
-            if gone <= lost and after @ after <= left @ left * (1 + 1e-12):
+            if gone <= lost and after @ after <= residual @ residual * (1 + 1e-12):
                 break
             share *= 0.5
         else:
             return replace(point, settled=True)
         foreseen = matrix @ (share * whole)
         size = float(np.linalg.norm(foreseen))
-        astray = float(np.linalg.norm(left - foreseen - after))
+        astray = float(np.linalg.norm(residual - foreseen - after))
         fresh = keep_columns or (share == 1.0 and astray < STRAIGHT * size and bool(awake[: len(x)].all()))
-        # a step that went astray went too far along what is hardly seen (Levenberg)
-        bent = share < 1.0 or astray > BENT * size
-        careful = min(max(30.0 * careful, CAREFUL), 0.1) if bent else careful / 10.0
+        # a step that went astray went too far along what is hardly observable (Levenberg)
+        curved = share < 1.0 or astray > CURVED * size
+        careful = min(max(30.0 * careful, CAREFUL), 0.1) if curved else careful / 10.0
         scatter = np.sqrt(after @ after / max(1, len(after) - len(length)))
-        point, left, lost = moved, after, gone
+        point, residual, lost = moved, after, gone
         if share == 1.0 and (size < CLOSE * scatter or size <= 1e-9):
             return replace(point, settled=True)
     return point

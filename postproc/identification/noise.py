@@ -12,7 +12,7 @@ from postproc.identification.identifiable import basis
 from postproc.measurements import Readings
 
 NOMINAL = 1e-5
-"""[m] Stands for the scatter while nothing is known of it: only ratios count then."""
+"""[m] Replaces the scatter while nothing is known of it: only ratios count then."""
 
 LEVER = 0.3
 """[m] A turn counts as the shift that it makes at this distance, until the fit knows better."""
@@ -26,8 +26,8 @@ SMALLEST = 0.01
 
 @dataclass(frozen=True)
 class Noise:
-    """``sigma`` (R,) [m] of each coordinate, ``sigma_turn`` (R,) [rad]; ``known``: stated or seen in repeats, or else
-    only ratios count; ``source``: in words; ``repeats`` [m] one sigma of repeated readings (NaN without), of
+    """``sigma`` (R,) [m] of each coordinate, ``sigma_turn`` (R,) [rad]; ``known``: stated or estimated from repeats,
+    or else only ratios count; ``source``: in words; ``repeats`` [m] one sigma of repeated readings (NaN without), of
     ``freedom``."""
 
     sigma: Floats
@@ -120,15 +120,15 @@ def weighting(campaign: Campaign, noise: Noise, measured: Floats) -> Weighting:
 def shared_error(residual: Floats, weights: Weighting, columns: Floats, known: bool) -> float:
     """[m] ``shared`` of a weighting: one sigma of what readings of one pose have in common; 0 where that is not clear.
 
-    Two moments of the ``residual`` (R, 3 or 6) [m, rad], z [standard deviations] tell it from what each reading has for
-    itself, phi: z'z, and z'Vz of the pairs of one pose.  A fit with ``columns`` (R, 3 or 6, k), Q of which is a basis,
-    leaves M = 1 - Q Q' of what was there, and their means are
+    Two moments of the ``residual`` (R, 3 or 6) [m, rad], z [standard deviations] separate it from what each reading
+    has for itself, phi: z'z, and z'Vz of the pairs of one pose.  A fit with ``columns`` (R, 3 or 6, k), Q of which is
+    a basis, leaves M = 1 - Q Q' of what was there, and their means are
 
         E z'z  = phi tr M   + shared^2 tr M U        U = V + D: u_i u_j within a pose, D its diagonal
         E z'Vz = phi tr V M + shared^2 tr V M U M
 
-    ``shared`` stands beside the sigma that ``weights`` assume.  Where that is not ``known``, or clearly too small, both
-    are to be made larger alike, so that their ratio is the one that is seen.
+    ``shared`` is relative to the sigma that ``weights`` assume.  Where that is not ``known``, or clearly too small,
+    both are to be made larger alike, so that their ratio is the estimated one.
     """
     u = weights.weight[:, :3]
     z = np.where(u > 0, residual[:, :3] * u, 0.0)

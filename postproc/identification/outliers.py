@@ -13,7 +13,7 @@ CHANCE = 0.01
 """Probability that among all readings of a campaign without outliers any is reported as one."""
 
 CLEARLY = 0.2
-"""An explanation leaves at most this share of what there is without it."""
+"""With an explanation at most this share remains of what there is without it."""
 
 
 @dataclass(frozen=True)
@@ -29,11 +29,11 @@ class Outlier:
 
 
 def outliers(fitted: Fit, rows: Bools) -> tuple[tuple[Outlier, ...], Fit]:
-    """The outliers among ``rows`` (R,) of a campaign, worst first, and the fit that tells them: a robust one where the
-    least squares look as if there were any, else ``fitted``.
+    """The outliers among ``rows`` (R,) of a campaign, worst first, and the fit that detects them: a robust one where
+    the least squares look as if there were any, else ``fitted``.
 
-    The scatter is that of most readings (by the median), so that a model that lacks something does not make outliers of
-    all that it does not explain.
+    The scatter is that of most readings (by the median), so that a model in which something is missing does not make
+    outliers of all that it does not explain.
     """
     length, _, limit = _lengths(fitted, rows)
     # a fit pulls an outlier towards it by its leverage, in the mean the share of unknowns in the readings
@@ -43,13 +43,13 @@ def outliers(fitted: Fit, rows: Bools) -> tuple[tuple[Outlier, ...], Fit]:
     campaign = fitted.campaign
     robust = fit(campaign, fitted.start, fitted.asked, rows, robust=True, given=fitted.point.given)
     length, level, limit = _lengths(robust, rows)
-    found = []
+    entries = []
     for row in np.flatnonzero(rows & (length > limit)):
         file, line = campaign.readings.where(int(row))
         distance = float(np.linalg.norm(np.nan_to_num(robust.point.residual[row, :3])))
         what = _explained(robust, int(row), limit)
-        found.append(Outlier(int(row), file, line, distance, float(length[row] / level), what))
-    return tuple(sorted(found, key=lambda o: -o.sigmas)), robust
+        entries.append(Outlier(int(row), file, line, distance, float(length[row] / level), what))
+    return tuple(sorted(entries, key=lambda o: -o.sigmas)), robust
 
 
 def _limit(count: int) -> float:
@@ -106,7 +106,7 @@ def _explained(fitted: Fit, row: int, limit: float) -> str:
 
 
 def _distinct(expected: Floats, pose: Ints, close: float) -> bool:
-    """Whether places are far enough apart for a coincidence to say something: few pairs of poses are as close as
+    """Whether places are far enough apart for a coincidence to be significant: few pairs of poses are as close as
     ``close``."""
     some = np.linspace(0, len(expected) - 1, min(len(expected), 200)).astype(int)
     apart = np.linalg.norm(expected[some][:, None] - expected[some][None], axis=2)

@@ -12,13 +12,13 @@ from postproc.identification.campaign import Campaign, Nuisances, PredictedReadi
 
 MAX_STEPS = 60
 SAMPLE = 300
-"""Readings looked at while the tracker's turn is searched for."""
+"""Readings used while the tracker's turn is searched for."""
 
 FOLLOWED = 4
 """Starts that are followed after their first steps."""
 
 
-def registered(campaign: Campaign, seen: PredictedReadings, rows: Bools) -> Nuisances:
+def registered(campaign: Campaign, predicted: PredictedReadings, rows: Bools) -> Nuisances:
     """Nuisances with the least squares of ``rows`` (R,), every session by itself, the largest first.
 
     The turn of a tracker may be any, and the place of a target on the flange enters together with it: Gauss-Newton
@@ -26,27 +26,31 @@ def registered(campaign: Campaign, seen: PredictedReadings, rows: Bools) -> Nuis
     """
     given = campaign.start()
     session = campaign.readings.session
-    usable = rows & np.isfinite(campaign.readings.value).all(axis=1) & seen.converged[campaign.at]
+    usable = rows & np.isfinite(campaign.readings.value).all(axis=1) & predicted.converged[campaign.at]
     if campaign.tracked:
         for k in np.argsort(-np.bincount(session[usable], minlength=len(campaign.readings.sessions))):
             own = np.flatnonzero(usable & (session == k)).astype(np.int64)
             if len(own):
-                given = _session(campaign, seen, given, int(k), own)
+                given = _session(campaign, predicted, given, int(k), own)
     if campaign.posed and campaign.still is None:
-        given = _turned_targets(campaign, seen, given, usable)
+        given = _turned_targets(campaign, predicted, given, usable)
     return given
 
 
-def _session(campaign: Campaign, seen: PredictedReadings, given: Nuisances, k: int, own: Ints) -> Nuisances:
+def _session(
+    campaign: Campaign, predicted: PredictedReadings, given: Nuisances, k: int, own: Ints
+) -> Nuisances:
     some = own[np.linspace(0, len(own) - 1, min(len(own), SAMPLE)).round().astype(int)]
     tries = []
     for turn in _cube_turns():
         rotation = given.frames.rotation.copy()
         rotation[k] = turn
         start = replace(given, frames=Poses(rotation, given.frames.position))
-        tries.append(_descended(campaign, seen, start, some, 3))
-    tries = [_descended(campaign, seen, tried, some, 12) for tried, _ in sorted(tries, key=_size)[:FOLLOWED]]
-    return _descended(campaign, seen, min(tries, key=_size)[0], own, MAX_STEPS)[0]
+        tries.append(_descended(campaign, predicted, start, some, 3))
+    tries = [
+        _descended(campaign, predicted, tried, some, 12) for tried, _ in sorted(tries, key=_size)[:FOLLOWED]
+    ]
+    return _descended(campaign, predicted, min(tries, key=_size)[0], own, MAX_STEPS)[0]
 
 
 def _size(tried: tuple[Nuisances, float]) -> float:
@@ -54,30 +58,30 @@ def _size(tried: tuple[Nuisances, float]) -> float:
 
 
 def _descended(
-    campaign: Campaign, seen: PredictedReadings, given: Nuisances, rows: Ints, steps: int
+    campaign: Campaign, predicted: PredictedReadings, given: Nuisances, rows: Ints, steps: int
 ) -> tuple[Nuisances, float]:
-    """Gauss-Newton on positions: the nuisances, and the mean square that is left [m2]."""
+    """Gauss-Newton on positions: the nuisances, and the mean square that remains [m2]."""
     last, before = np.inf, given
     for _ in range(steps):
-        left = campaign.residual(seen, given)[rows, :3]
-        size = float(np.mean(left**2))
+        residual = campaign.residual(predicted, given)[rows, :3]
+        size = float(np.mean(residual**2))
         if not size < last * (1 - 1e-9):
             return before, last
         last, before = size, given
-        columns = campaign.nuisance_columns(seen, given)[rows, :3]
-        matrix = columns.reshape(left.size, -1)
-        step = np.linalg.lstsq(matrix.T @ matrix, matrix.T @ left.reshape(-1), rcond=1e-13)[0]
+        columns = campaign.nuisance_columns(predicted, given)[rows, :3]
+        matrix = columns.reshape(residual.size, -1)
+        step = np.linalg.lstsq(matrix.T @ matrix, matrix.T @ residual.reshape(-1), rcond=1e-13)[0]
         given = campaign.moved(given, np.asarray(step, float))
     return given, last
 
 
 def _turned_targets(
-    campaign: Campaign, seen: PredictedReadings, given: Nuisances, usable: Bools
+    campaign: Campaign, predicted: PredictedReadings, given: Nuisances, usable: Bools
 ) -> Nuisances:
-    """The axes of targets whose turn is not stated: the mean of what each reading says."""
+    """The axes of targets whose turn is not stated: the mean over all readings."""
     readings, turns = campaign.readings, given.turns.copy()
     assert readings.rotation is not None
-    rotation = seen.rotation[campaign.at]
+    rotation = predicted.rotation[campaign.at]
     if campaign.tracked:
         rotation = given.frames.rotation[readings.session] @ rotation
     for k in np.flatnonzero(~campaign.turn_known):
@@ -91,10 +95,10 @@ def _turned_targets(
 
 def _cube_turns() -> list[Floats]:
     """The 24 rotations of a cube."""
-    found = []
+    turns = []
     for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)):
         for sign in np.ndindex(2, 2):
             turn = np.eye(3)[list(order)] * (1.0 - 2.0 * np.array([*sign, 0]))[:, None]
             turn[2] *= np.linalg.det(turn)
-            found.append(turn)
-    return found
+            turns.append(turn)
+    return turns

@@ -1,6 +1,6 @@
-"""Data that cannot be what they say: degrees that are radians, millimetres that are metres, exchanged columns.
+"""Data that cannot be what they claim: degrees that are radians, millimetres that are metres, exchanged columns.
 
-What can be seen of the numbers alone is looked at before anything is fitted.  What shows in how badly a model fits is
+What the numbers alone show is checked before anything is fitted.  What shows in how badly a model fits is
 tried out: the one change to the data that makes the fit much better is named.  Nothing is ever changed silently.
 """
 
@@ -45,14 +45,14 @@ ABOUT, ALONG = 1.4, 0.9
 a ratio."""
 
 FAR = 3.0 * MM
-"""Absolute positions that a registration leaves further away, root mean square, are looked at."""
+"""Absolute positions that a registration leaves further away, root mean square, are checked."""
 
 TRIED, POOR = 0.03, 0.3
 """Shares of the deflections that a fit leaves, root mean square: from the first on changes to the data are tried out,
-from the second on it is told where none helps."""
+from the second on it is reported where none helps."""
 
 SCATTER = 2.0
-"""Times the stated scatter: what is left below that is no cause to look."""
+"""Times the stated scatter: what remains below that is no reason to check."""
 
 MUCH_BETTER = 1.0 / 3.0
 """A change to the data is named if it leaves at most this share."""
@@ -155,7 +155,7 @@ def _check_size(readings: Readings, file: str) -> None:
 
 
 def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unknown]) -> tuple[Finding, ...]:
-    """Raises Refusal (IDN014) for readings that fit badly, but well after one change to the data, and names it; tells
+    """Raises Refusal (IDN014) for readings that fit badly, but well after one change to the data, and names it; reports
     IDN015 where they fit badly and no change helps.
 
     Tried are exchanged columns of joints, of measured coordinates and of forces, a wrong sign and other units.
@@ -165,10 +165,10 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
     if len(campaign) > ENOUGH:
         some = np.linspace(0, len(campaign) - 1, ENOUGH).round().astype(int)
         campaign = Campaign(campaign.readings.part(some), campaign.stated_tool)
-    left, signal = _remaining_share(campaign, model, unknowns)
+    remaining, signal = _remaining_share(campaign, model, unknowns)
     if campaign.readings.deflection:
         _check_scale(campaign, model)
-    if not _badly(campaign, left, signal, TRIED):
+    if not _badly(campaign, remaining, signal, TRIED):
         return ()
     some = np.unique(np.linspace(0, len(campaign) - 1, LOOKED_AT).round().astype(int))
     if len(campaign) <= LOOKED_AT:
@@ -191,12 +191,12 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
                 help="correct the file if the change is right; it is never changed silently",
             )
         )
-    left, _ = _remaining_share(campaign, model, unknowns, True)
-    if not _badly(campaign, left, signal, POOR):
+    remaining, _ = _remaining_share(campaign, model, unknowns, True)
+    if not _badly(campaign, remaining, signal, POOR):
         return ()
-    what = f"{left / MM:.3g} mm remain, root mean square"
+    what = f"{remaining / MM:.3g} mm remain, root mean square"
     if campaign.readings.deflection:
-        what = f"{100 * left / signal:.0f} % of the deflections remain"
+        what = f"{100 * remaining / signal:.0f} % of the deflections remain"
     return (
         Finding(
             "IDN015",
@@ -234,10 +234,10 @@ def _check_scale(campaign: Campaign, model: StiffnessModel) -> None:
             )
 
 
-def _badly(campaign: Campaign, left: float, signal: float, share: float) -> bool:
-    if left < SCATTER * noise_of(campaign.readings).rms:
+def _badly(campaign: Campaign, remaining: float, signal: float, share: float) -> bool:
+    if remaining < SCATTER * noise_of(campaign.readings).rms:
         return False
-    return left > (share * signal if campaign.readings.deflection else FAR)
+    return remaining > (share * signal if campaign.readings.deflection else FAR)
 
 
 def _remaining_share(

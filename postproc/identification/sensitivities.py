@@ -19,7 +19,7 @@ def columns(
     campaign: Campaign,
     model: StiffnessModel,
     unknowns: Sequence[Unknown],
-    seen: PredictedReadings,
+    predicted: PredictedReadings,
     given: Nuisances,
 ) -> Floats:
     """(R, 3 or 6, P) change of what is expected [m, rad] with each unknown, per ``scale`` of its parameter.
@@ -33,7 +33,7 @@ def columns(
         step = STEP * max(parameter.scale, abs(value))
         spans[unknown.key] = max(value - step, parameter.lower), min(value + step, parameter.upper)
     moved = model.sensitivity(
-        campaign.q, campaign.wrench, campaign.tool, campaign.conditions, seen.displacement, spans
+        campaign.q, campaign.wrench, campaign.tool, campaign.conditions, predicted.displacement, spans
     )
     moved *= np.array([unknown.parameter.scale for unknown in unknowns])
-    return campaign.columns(model, seen, given, moved)
+    return campaign.columns(model, predicted, given, moved)

@@ -14,8 +14,8 @@ from postproc.robot.description import Value
 @dataclass(frozen=True)
 class Unknown:
     """A parameter to be found: ``name`` as effect.parameter; ``term``: its effect in the model; ``value`` (SI) to start
-    with; ``stated``: what the robot file says of it; ``prior``: its standard deviation there, where that counts as a
-    reading of ``value``; ``held``: a dimension that is taken as it stands."""
+    with; ``stated``: what the robot file states of it; ``prior``: its standard deviation there, where that counts as a
+    reading of ``value``; ``fixed``: a dimension that is taken as stated."""
 
     name: str
     term: int
@@ -32,8 +32,8 @@ class Unknown:
 
 @dataclass(frozen=True)
 class FitRequest:
-    """``model``: with all the effects asked for; ``unknowns``; ``held``: names of dimensions of hardware that no
-    interval is stated of, taken as they stand."""
+    """``model``: with all the effects asked for; ``unknowns``; ``fixed``: names of dimensions of hardware that no
+    interval is stated of, taken as stated."""
 
     model: StiffnessModel
     unknowns: tuple[Unknown, ...]
@@ -45,12 +45,12 @@ def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False)
 
     An effect that the model does not have is added at its null, with the dimensions of a mechanism of its kind where
     the robot file has one.  Dimensions of hardware, unless named by themselves, are taken from the robot file: with an
-    interval as a prior, without one as they stand.  ``priors``: every stated interval counts as a prior.
+    interval as a prior, without one as stated.  ``priors``: every stated interval counts as a prior.
 
     Raises Refusal IDN001 for a name that is not known.
     """
     unknowns: dict[str, Unknown] = {}
-    held: dict[str, None] = {}
+    fixed: dict[str, None] = {}
     for word in words:
         effect, _, single = word.partition(".")
         if effect not in EFFECTS:
@@ -67,10 +67,10 @@ def asked_for(model: StiffnessModel, words: Sequence[str], priors: bool = False)
             for unknown in unknowns_of(model, index, priors):
                 if single in ("", unknown.parameter.name):
                     if unknown.fixed and not single:
-                        held[unknown.name] = None
+                        fixed[unknown.name] = None
                     else:
                         unknowns[unknown.name] = unknown
-    return FitRequest(model, tuple(unknowns.values()), tuple(held))
+    return FitRequest(model, tuple(unknowns.values()), tuple(fixed))
 
 
 def unknowns_of(model: StiffnessModel, term: int, priors: bool = False) -> tuple[Unknown, ...]:
@@ -81,16 +81,16 @@ def unknowns_of(model: StiffnessModel, term: int, priors: bool = False) -> tuple
     """
     of, label = model.terms[term], model.label(term)
     built = any(parameter.hardware and parameter.name in of.stated for parameter in of.effect.parameters)
-    found = []
+    unknowns = []
     for parameter in of.effect.parameters:
         stated = of.stated.get(parameter.name)
         prior = None
         if stated is not None and stated.interval and (priors or parameter.hardware):
             prior = stated.deviation
-        held = parameter.hardware and built and prior is None
+        fixed = parameter.hardware and built and prior is None
         value = of.values[parameter.name]
-        found.append(Unknown(f"{label}.{parameter.name}", term, parameter, value, stated, prior, held))
-    return tuple(found)
+        unknowns.append(Unknown(f"{label}.{parameter.name}", term, parameter, value, stated, prior, fixed))
+    return tuple(unknowns)
 
 
 def with_mechanism(model: StiffnessModel, kind: type[Effect]) -> StiffnessModel:

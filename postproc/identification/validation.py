@@ -40,20 +40,20 @@ def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
 
     Each fold's fit starts from the one of all readings and keeps its columns: what is reported is to first order, as
     the residuals that leverages give (PRESS; Allen, Technometrics 16 (1974)).  Where the readings of the other folds
-    hardly tell a parameter, a fit of its own might run far away along it, which says more of the fold than of the
-    model.
+    hardly determine a parameter, a fit of its own might run far away along it, which describes more the fold than of
+    the model.
     """
     campaign = fitted.campaign
     fold = folds_of(campaign, folds)
-    left = np.full((len(campaign), 3), np.nan)
+    residuals = np.full((len(campaign), 3), np.nan)
     for k in range(folds):
         rows = fold == k
         weights = fitted.weights.times((~rows).astype(float))
         point = descended(campaign, fitted.point, fitted.unknowns, weights, True, factor=fitted.factor)
-        left[rows] = campaign.in_base(point.residual, point.given)[rows, :3]
+        residuals[rows] = campaign.in_base(point.residual, point.given)[rows, :3]
         progress(k + 1, folds)
-    left[~counted(fitted)] = np.nan
-    return left
+    residuals[~counted(fitted)] = np.nan
+    return residuals
 
 
 def counted(fitted: Fit) -> Bools:
@@ -64,7 +64,7 @@ def counted(fitted: Fit) -> Bools:
 @dataclass(frozen=True)
 class Validation:
     """Readings that were not fitted: ``before``, ``after`` (R, 3) [m] residuals of the models before and after, robot
-    base axes; ``registered_anew``: their tracker stood elsewhere."""
+    base axes; ``registered_anew``: their tracker was elsewhere."""
 
     campaign: Campaign
     before: Floats
@@ -73,25 +73,27 @@ class Validation:
 
 
 def validated(before: Fit, after: Fit, campaign: Campaign) -> Validation:
-    """What both fits say of readings ``campaign`` that neither has seen.
+    """What both fits predict of readings ``campaign`` that neither has used.
 
-    Targets are where the fit found them.  The tracker is where it stood for the fit, if it is the same session (or
+    Targets are where the fit found them.  The tracker is where it was for the fit, if it is the same session (or
     there is but one on either side) and that holds; else it is registered again from these readings.
     """
-    anew, left = False, []
+    refitted, residuals = False, []
     for fitted in (before, after):
         known = campaign.knowing(fitted.campaign, fitted.point.given)
         point = at(known, fitted.model, known.start())
         given = registered(known, point.predicted, np.ones(len(known), bool))
         if known.tracked:
-            kept, others = _stations(fitted, known, given)
-            own, there = (np.nanmean(known.residual(point.predicted, g)[:, :3] ** 2) for g in (given, kept))
+            same_station, others = _stations(fitted, known, given)
+            own, there = (
+                np.nanmean(known.residual(point.predicted, g)[:, :3] ** 2) for g in (given, same_station)
+            )
             if there <= OTHER_STATION**2 * own:
-                given, anew = kept, anew or others
+                given, refitted = same_station, refitted or others
             else:
-                anew = True
-        left.append(known.in_base(known.residual(point.predicted, given), given)[:, :3])
-    return Validation(campaign, left[0], left[1], anew)
+                refitted = True
+        residuals.append(known.in_base(known.residual(point.predicted, given), given)[:, :3])
+    return Validation(campaign, residuals[0], residuals[1], refitted)
 
 
 def _stations(fitted: Fit, campaign: Campaign, given: Nuisances) -> tuple[Nuisances, bool]:
@@ -124,7 +126,7 @@ def bootstrap(fitted: Fit, draws: int, progress: Progress = nothing) -> Bootstra
     rng = np.random.default_rng(SEED)
     values = point.values(fitted.unknowns)
     grown = point.residual / _free_share(fitted)[:, None]
-    found = np.empty((draws, len(fitted.unknowns)))
+    samples = np.empty((draws, len(fitted.unknowns)))
     for draw in range(draws):
         sign = rng.choice([-1.0, 1.0], campaign.poses)[campaign.pose]
         if fitted.weights.shared == 0:
@@ -138,9 +140,9 @@ def bootstrap(fitted: Fit, draws: int, progress: Progress = nothing) -> Bootstra
             for u, value in zip(fitted.unknowns, values, strict=True)
         ]
         ends = descended(drawn, start, unknowns, fitted.weights, True, 6, fitted.factor)
-        found[draw] = ends.values(unknowns)
+        samples[draw] = ends.values(unknowns)
         progress(draw + 1, draws)
-    return Bootstrap(found.std(axis=0, ddof=1), draws)
+    return Bootstrap(samples.std(axis=0, ddof=1), draws)
 
 
 def _free_share(fitted: Fit) -> Floats:

@@ -63,11 +63,11 @@ class CsvCells:
         return b"'" in self.raw
 
     def bounds(self, column: int, rows: slice) -> tuple[Ints, Ints]:
-        """Where the cells of a column begin and end, two (K,) offsets of ``rows``, without quotes and blanks; an empty
+        """Where the cells of a column start and end, two (K,) offsets of ``rows``, without quotes and blanks; an empty
         one for ``others``."""
         data = np.frombuffer(self.raw, np.uint8)
-        begin = self.start[rows] if column == 0 else self.ends[rows, column - 1] + 1
-        start, stop = _trimmed(data, begin.astype(np.int64), self.ends[rows, column].astype(np.int64))
+        cell_start = self.start[rows] if column == 0 else self.ends[rows, column - 1] + 1
+        start, stop = _trimmed(data, cell_start.astype(np.int64), self.ends[rows, column].astype(np.int64))
         quoted = (start < stop) & (data[np.minimum(start, len(data) - 1)] == _QUOTED)
         return _trimmed(data, start + quoted, stop - quoted) if quoted.any() else (start, stop)
 
@@ -120,23 +120,23 @@ class CsvColumn(Sequence[str]):
         """
         values = np.empty(len(self))
         for rows in _blocks(len(self)):
-            found, plain = self._plain(rows, comma)
+            block, plain = self._plain(rows, comma)
             if not plain.all():
                 texts = self._texts(rows)
                 for at in np.flatnonzero(~plain).tolist():
-                    found[at] = one(rows.start + at, texts[at])
-            values[rows] = found
+                    block[at] = one(rows.start + at, texts[at])
+            values[rows] = block
         return values
 
     def _plain(self, rows: slice, comma: bool) -> tuple[Floats, Bools]:
         """Values of some rows, and which of them are numbers in the letters that numbers have."""
         start, stop = self.cells.bounds(self.column, rows)
         data = np.frombuffer(self.cells.raw, np.uint8)
-        found, _, plain = plain_decimals(data, start, stop, b"," if comma else b".")
+        values, _, plain = plain_decimals(data, start, stop, b"," if comma else b".")
         rest = np.flatnonzero(~plain)
         if len(rest):
-            found[rest], plain[rest] = _spelled(data, start[rest], stop[rest], comma)
-        return found, plain
+            values[rest], plain[rest] = _spelled(data, start[rest], stop[rest], comma)
+        return values, plain
 
 
 def _spelled(data: NDArray[np.uint8], start: Ints, stop: Ints, comma: bool) -> tuple[Floats, Bools]:
@@ -155,16 +155,16 @@ def _spelled(data: NDArray[np.uint8], start: Ints, stop: Ints, comma: bool) -> t
     letters[~plain, 0] = ord("0")
     try:
         # nothing but these letters: float() takes what is a number and nothing else
-        found = np.array(list(map(float, letters.tobytes().split())))
+        values = np.array(list(map(float, letters.tobytes().split())))
     except ValueError:
         return np.empty(len(plain)), np.zeros_like(plain)
-    return found, plain & np.isfinite(found)
+    return values, plain & np.isfinite(values)
 
 
 def find_cells(
-    lines: CsvLines, begin: int, number: int, separator: str, columns: int, other: Other
+    lines: CsvLines, offset: int, number: int, separator: str, columns: int, other: Other
 ) -> CsvCells:
-    """The cells of the lines from byte ``begin`` on, the first of which has this ``number``.
+    """The cells of the lines from byte ``offset`` on, the first of which has this ``number``.
 
     Raises what ``other`` raises.
     """
@@ -172,9 +172,9 @@ def find_cells(
     parts: list[tuple[NDArray[np.int32], NDArray[np.int32], Ints]] = []
     others: dict[int, Sequence[str]] = {}
     count = 0
-    while begin < len(raw):
-        stop = _cut(raw, begin)
-        text = raw[begin:stop].replace(b"\r\n", b" \n")
+    while offset < len(raw):
+        stop = _cut(raw, offset)
+        text = raw[offset:stop].replace(b"\r\n", b" \n")
         if not text.endswith((b"\n", b"\r")):
             text += b"\n"  # the last line
         kind = np.frombuffer(text.translate(kinds), np.uint8)
@@ -190,34 +190,34 @@ def find_cells(
             stops = ends[last[quoted][:, None] + np.arange(1 - columns, 1)]
             starts = np.column_stack([opening[quoted], stops[:, :-1] + 1])
             quotes = np.add.reduceat((kind == _QUOTE).astype(np.int32), opening)[quoted]
-            common[quoted] = quotes == 2 * _in_quotes(raw, starts + begin, stops + begin).sum(axis=1)
+            common[quoted] = quotes == 2 * _in_quotes(raw, starts + offset, stops + offset).sum(axis=1)
         rows = common.copy()
-        found = []
+        uncommon = []
         for at in np.flatnonzero(~common & ((has & (_OTHER | _SOMETHING) != 0) | ~short)).tolist():
-            start, end = begin + int(opening[at]), begin + int(closing[at])
+            start, end = offset + int(opening[at]), offset + int(closing[at])
             cells = other(start, end - (raw[end - 1 : end + 1] == b"\r\n"), number + at)
             if cells is not None:
                 rows[at] = True
-                found.append((at, cells))
+                uncommon.append((at, cells))
         index = np.flatnonzero(rows)
         where = np.maximum(last[index][:, None] + np.arange(1 - columns, 1), 0)
-        cell_ends = (ends[where] + begin).astype(np.int32)
-        row_begin = (opening[index] + begin).astype(np.int32)
-        for at, cells in found:
+        cell_ends = (ends[where] + offset).astype(np.int32)
+        row_start = (opening[index] + offset).astype(np.int32)
+        for at, cells in uncommon:
             row = int(np.searchsorted(index, at))
             others[count + row] = cells
-            cell_ends[row], row_begin[row] = 0, 0
-        parts.append((row_begin, cell_ends, index + number))
+            cell_ends[row], row_start[row] = 0, 0
+        parts.append((row_start, cell_ends, index + number))
         count += len(index)
         number += len(closing)
-        begin = stop
+        offset = stop
     parts = parts or [(np.empty(0, np.int32), np.empty((0, columns), np.int32), np.empty(0, np.int64))]
-    begins, cells_end, numbers = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return CsvCells(raw, begins, cells_end, numbers, others)
+    row_starts, cells_end, numbers = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return CsvCells(raw, row_starts, cells_end, numbers, others)
 
 
 def _in_quotes(raw: bytes, start: Ints, stop: Ints) -> Bools:
-    """Which cells (K, C) begin and end with a quote."""
+    """Which cells (K, C) start and end with a quote."""
     data = np.frombuffer(raw, np.uint8)
     stop = stop - (data[stop - 1] == 0x0D)  # of the line's end
     first = data[np.minimum(start, len(data) - 1)]

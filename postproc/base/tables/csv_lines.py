@@ -37,8 +37,8 @@ class CsvLines:
 
     def end(self, start: int) -> tuple[int, int]:
         """Where the line that starts at ``start`` ends, and where the next one starts."""
-        found = _LINE_END.search(self.raw, start)
-        return found.span() if found else (len(self.raw), len(self.raw) + 1)
+        match = _LINE_END.search(self.raw, start)
+        return match.span() if match else (len(self.raw), len(self.raw) + 1)
 
     def text(self, start: int, stop: int) -> str:
         return self.raw[start:stop].decode(self.encoding)
@@ -47,7 +47,7 @@ class CsvLines:
         return Refusal(Finding(self.code, message, str(self.path), number, help=help))
 
     def cells(self, line: str, number: int, separator: str) -> list[str]:
-        """The cells of a line as they stand.  Refusal where its quotes are wrong or do not close."""
+        """The cells of a line, unchanged.  Refusal where its quotes are wrong or do not close."""
         try:
             return next(csv.reader([line], delimiter=separator, strict=True, skipinitialspace=True))
         except csv.Error as error:
@@ -63,10 +63,10 @@ def comment(line: str, above: bool) -> str | None:
     A spreadsheet puts a comment that holds separators in quotes and fills the row up with separators; below the
     header quotes belong to cells.
     """
-    begun = line.lstrip()
+    text = line.lstrip()
     if above:
-        begun = begun.lstrip('"')
-    return begun[1:].rstrip(NOTHING).strip() if begun.startswith("#") else None
+        text = text.lstrip('"')
+    return text[1:].rstrip(NOTHING).strip() if text.startswith("#") else None
 
 
 def separator_of(header: str) -> str:

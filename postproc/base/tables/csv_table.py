@@ -3,7 +3,7 @@
 A header row, then rows with as many cells.  Comma, semicolon or tab, whichever gives the header most cells;
 where it is not the comma, a decimal comma is understood.  Blank lines and lines that start with ``#`` are skipped,
 above the header also those that a spreadsheet has put in quotes.  An apostrophe before = + - @, by which a spreadsheet
-is told that a cell is no formula, is not part of the cell.
+is informed that a cell is no formula, is not part of the cell.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def read_table(path: Path, code: str) -> CsvTable:
     """
     raw = read_text_file(path, code, LINE_ENDS)
     lines = CsvLines.of(path, code, raw)
-    comments, header, at, behind = _above(lines)
+    comments, header, at, next_start = _above(lines)
     if header is None:
         raise Refusal(Finding("FIL002", "the file has no header and no rows", str(path)))
     separator = separator_of(header)
@@ -128,7 +128,7 @@ def read_table(path: Path, code: str) -> CsvTable:
             return row
         return None
 
-    cells = find_cells(lines, behind, at + 1, separator, len(names), one)
+    cells = find_cells(lines, next_start, at + 1, separator, len(names), one)
     if not len(cells.number):
         raise lines.wrong("the file has a header, but no rows", at)
     return CsvTable(
@@ -158,14 +158,14 @@ def _above(lines: CsvLines) -> tuple[list[tuple[int, str]], str | None, int, int
     start, number = lines.start, 0
     while start <= len(lines.raw):
         number += 1
-        stop, behind = lines.end(start)
+        stop, next_start = lines.end(start)
         line = lines.text(start, stop)
         note = comment(line, above=True)
         if note is not None:
             comments.append((number, note))
         elif line.strip(NOTHING):
-            return comments, line, number, behind
-        start = behind
+            return comments, line, number, next_start
+        start = next_start
     return comments, None, number, start
 
 
