@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 FILES = sorted(Path(__file__).parent.rglob("*.py"))
+WITHOUT_PUBLIC_NAME = {("regex_automaton.py", name) for name in ("_compiler", "_constants", "_parser")}
+"""Python parses a regular expression in modules that have no other names since version 3.11."""
 BY_NAME = {"getattr", "hasattr", "setattr", "delattr"}
 """Functions and methods (``monkeypatch.setattr``) that take the name of an attribute as a text."""
 
@@ -106,6 +108,7 @@ def test_no_test_uses_a_private_name():
         f"{path.name}:{line}: {name}"
         for path in FILES
         for line, name in private_uses(path.read_text(encoding="utf-8"))
+        if (path.name, name) not in WITHOUT_PUBLIC_NAME
     ]
     assert len(FILES) > 100
     assert not found, "\n".join(found)

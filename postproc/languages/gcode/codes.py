@@ -262,7 +262,7 @@ CODES = define(
         "GCO029": Code(
             "warning",
             "tool offset is not active",
-            meaning="The program switches the tool's length off (G49, D0), and then moves at feed.",
+            meaning="The tool's length is off (G49, D0), and the program moves at feed.",
             consequence=(
                 "Its coordinates are not those of the tool tip that is stated in the cell, so it is not corrected."
             ),
