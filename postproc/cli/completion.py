@@ -25,6 +25,7 @@ class Commands(click.Group):
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
+        """Invoke the command.  Raises UsageError for an option that does not exist."""
         try:
             return super().invoke(ctx)
         except click.NoSuchOption as error:
@@ -32,7 +33,7 @@ class Commands(click.Group):
             names = [_present_option(name) for name in error.possibilities or ()]
             shown = " or ".join(dict.fromkeys(names))
             hint = f" Did you mean {shown}?" if shown else ""
-            raise click.UsageError(f"No such option {error.option_name!r}.{hint}", error.ctx) from None
+            raise click.UsageError(f"There is no option {error.option_name!r}.{hint}", error.ctx) from None
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Commands, and files: a program may be in the place of a command."""

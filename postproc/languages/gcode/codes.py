@@ -266,7 +266,7 @@ CODES = define(
             consequence=(
                 "Its coordinates are not those of the tool tip that is stated in the cell, so it is not corrected."
             ),
-            action="Switch the tool's length on before the cut.",
+            action="Select the tool's length (G43, D1) before the cut.",
             example="`G49`, then `G1 Z-5`.",
         ),
         "SIN001": Code(

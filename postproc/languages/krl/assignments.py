@@ -292,7 +292,7 @@ def _numbered(run: ExecutionContext, table: bytes, at: int, line: int) -> FrameI
     if value is None and not run.survey.table_entries.isdisjoint((table + b"_DATA" + entry, None)):
         name = f"{table.decode()}_DATA[{at}]"
         return UnknownValue(
-            "KRL012", f"{name} is what the last run has left: the program assigns it elsewhere"
+            "KRL012", f"{name} has the value of the last run: the program assigns it elsewhere"
         )
     if value is None:
         return run.frames.known(at, None, line)
