@@ -16,7 +16,7 @@ from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.integer_words import IntegerWords
 from postproc.languages.gcode.modal import Modal
 from postproc.languages.gcode.modal_fill import everywhere, lookup
-from postproc.languages.gcode.positions import Course, CycleEnds
+from postproc.languages.gcode.positions import Course
 from postproc.languages.gcode.source import Source, WordColumn
 from postproc.languages.gcode.words import COLUMNS, How, key
 
@@ -264,12 +264,12 @@ def tilted(given: BlockWords) -> Bools:
 
 
 def frame_events(
-    given: BlockWords, spoiled: Bools, away: Bools, ends: CycleEnds, lengths: Bools, reasons: Reasons
+    given: BlockWords, spoiled: Bools, away: Bools, ends: Floats, lengths: Bools, reasons: Reasons
 ) -> Course:
     """What the blocks do to the coordinates; why they leave them unknown is put into ``reasons``.
 
-    spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``; ends: those of the cycles;
-    lengths (B,): blocks in which another tool length holds than before.
+    spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``; ends (B,) [m]: as of
+    ``cycle_ends``; lengths (B,): blocks in which another tool length holds than before.
     """
     modal, n = given.modal, len(given)
     force, flow = modal.force, modal.flow
@@ -317,11 +317,11 @@ def frame_events(
         deep[np.arange(n), depth] = True
         target &= ~(cycle[:, None] & deep)
         relative = relative & ~(cycle[:, None] & deep)
-        at_level = cycle & np.isfinite(ends.level)
+        at_level = cycle & np.isfinite(ends)
         target |= at_level[:, None] & deep
-        value = np.where(at_level[:, None] & deep, ends.level[:, None], value)
+        value = np.where(at_level[:, None] & deep, ends[:, None], value)
         repeats = given.has(key("L")) | given.has(key("K"))
-        lose(deep, cycle & ~at_level & ~ends.stays, What.CYCLE)
+        lose(deep, cycle & ~at_level, What.CYCLE)
         lose(whole, cycle & repeats & (force[Group.DISTANCE] != 0), What.CYCLE)
     lose(present, given.motion & (flow.reason != FlowReason.NONE), What.UNCERTAIN)
     lose(whole, given.noted("unknown"), What.TEXT)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.base.arrays import Ints
+from postproc.base.arrays import Floats, Ints
 from postproc.languages.gcode.blocks import AXES, BlockWords
 from postproc.languages.gcode.control import Group, Move
 from postproc.languages.gcode.modal_fill import everywhere
-from postproc.languages.gcode.positions import CycleEnds
 from postproc.languages.gcode.words import How, key
 
 
-def cycle_ends(given: BlockWords, events: Ints) -> CycleEnds:
-    """The ends of all cycles of a whole program; ``events`` (E,): blocks that change the frame.
+def cycle_ends(given: BlockWords, events: Ints) -> Floats:
+    """(B,) [m] the coordinate of the working axis after the cycle of each block of a whole program, NaN where it is not
+    known; ``events`` (E,): blocks that change the frame.
 
     G99: at R.  G98: where the first of the cycles without another motion between began, if that is not below R: from
     there controls differ.  R is known where it is a coordinate (G90); it holds to the end of these cycles.
@@ -22,8 +22,8 @@ def cycle_ends(given: BlockWords, events: Ints) -> CycleEnds:
     cycle = given.motion & (given.move == Move.CYCLE)
     rows = np.flatnonzero(cycle)
     if not len(rows):
-        return CycleEnds(everywhere(np.nan, n), everywhere(False, n))
-    level, stays = np.full(n, np.nan), np.zeros(n, np.bool_)
+        return everywhere(np.nan, n)
+    level = np.full(n, np.nan)
     axis = np.array([2, 1, 0])[np.clip(given.modal.force[Group.PLANE], 0, 2)]
     absolute = given.modal.force[Group.DISTANCE] == 0
     back = given.modal.force[Group.RETURN]
@@ -51,6 +51,6 @@ def cycle_ends(given: BlockWords, events: Ints) -> CycleEnds:
             at_r = np.nan
         if back[row] == 1:
             level[row] = at_r
-        elif back[row] == 0:
-            stays[row] = before >= at_r
-    return CycleEnds(level, stays)
+        elif back[row] == 0 and before >= at_r:
+            level[row] = before
+    return level

@@ -35,18 +35,6 @@ class Course:
 
 
 @dataclass(frozen=True, eq=False)
-class CycleEnds:
-    """level (B,) [m]: the coordinate of the working axis after the cycle of a block, NaN where it is not known;
-    stays (B,): it is what it was before the cycles began."""
-
-    level: Floats
-    stays: Bools
-
-    def part(self, start: int, stop: int) -> CycleEnds:
-        return CycleEnds(self.level[start:stop], self.stays[start:stop])
-
-
-@dataclass(frozen=True, eq=False)
 class Positions:
     """Of some blocks, start, end (B, 6) [m, rad]: programmed coordinates before and after every block, in its frame.
 

@@ -161,7 +161,7 @@ def _followed(
             here,
             offset.at[start:stop],
             away[start:stop],
-            ends.part(start, stop),
+            ends[start:stop],
             lengths.changes[start:stop],
             reasons,
         )
