@@ -67,13 +67,13 @@ def test_all_modules_are_looked_at():
 def _time(pattern: re.Pattern, use: str, text: str | bytes) -> float:
     least = float("inf")
     for _ in range(3):
-        start = time.perf_counter()
+        start = time.process_time()
         if use == "search":
             for _ in pattern.finditer(text):
                 pass
         else:
             getattr(pattern, use)(text)
-        least = min(least, time.perf_counter() - start)
+        least = min(least, time.process_time() - start)
     return least
 
 
@@ -88,7 +88,7 @@ def _texts(pattern: re.Pattern, size: int) -> list[str | bytes]:
 @pytest.mark.slow
 @pytest.mark.parametrize("where", range(0, len(PATTERNS), 10))
 def test_measured_time_of_patterns(where):
-    """The judgement above, by the clock: quadratic time at 20,000 characters is more than a second."""
+    """The judgement above, in time of the processor: quadratic time at 20,000 characters is more than a second."""
     for name, pattern, use in PATTERNS[where : where + 10]:
         for text in _texts(pattern, 20_000):
             assert _time(pattern, use, text) < 0.3, (name, text[:20])
@@ -112,7 +112,7 @@ def test_hostile_files_are_read_in_linear_time(kind):
     """Twice as much takes twice as long: judged where it takes so long that it can be judged."""
     import_readers()
     of_kind = [(name, case) for name, case in CASES.items() if case.kind == kind]
-    for name, case in of_kind[:: 1 if kind == "urdf" else 4]:
+    for name, case in of_kind[:: 1 if kind == "urdf" else 25]:
         small = measure(case, MB // 10)
         assert not small.error, name
         assert small.seconds < 2 * SECONDS, name
