@@ -269,7 +269,7 @@ def frame_events(
     """What the blocks do to the coordinates; why they leave them unknown is put into ``reasons``.
 
     spoiled (B,): blocks before which the base became another one; away (B,): see ``tilted``; ends (B,) [m]: as of
-    ``cycle_ends``; lengths (B,): blocks in which another tool length holds than before.
+    ``CycleEnds``; lengths (B,): blocks in which another tool length holds than before.
     """
     modal, n = given.modal, len(given)
     force, flow = modal.force, modal.flow

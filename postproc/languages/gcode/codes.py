@@ -269,6 +269,14 @@ CODES = define(
             action="Select the tool's length (G43, D1) before the cut.",
             example="`G49`, then `G1 Z-5`.",
         ),
+        "GCO030": Code(
+            "info",
+            "the program may end early",
+            meaning="A block that runs only sometimes ends the program.",
+            consequence="The motions after it may not run; where they run, they are corrected.",
+            action="Nothing needs to be done.",
+            example="`/M30` before the last cut.",
+        ),
         "SIN001": Code(
             "info",
             "tool is called by a name",

@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.languages.gcode.blocks import AXES, BlockWords
 from postproc.languages.gcode.control import Group, Move
 from postproc.languages.gcode.modal_fill import everywhere
 from postproc.languages.gcode.words import How, key
 
 
-def cycle_ends(given: BlockWords, events: Ints) -> Floats:
-    """(B,) [m] the coordinate of the working axis after the cycle of each block of a whole program, NaN where it is not
-    known; ``events`` (E,): blocks that change the frame.
+@dataclass(frozen=True, eq=False)
+class CycleEnds:
+    """level (B,) [m]: the coordinate of the working axis after the cycle of a block, NaN where it is not known;
+    inherited (B,): it is that of the motion before the cycles; axis (B,): 0, 1, 2 for X, Y, Z."""
+
+    level: Floats
+    inherited: Bools
+    axis: Ints
+
+    def stated(self, sets: Bools, blocks: Ints) -> Bools:
+        """(N, 3) the coordinates that ``blocks`` (N,) state, of those that they set (N, 3)."""
+        return np.asarray(sets & ~(self.inherited[blocks, None] & (self.axis[blocks, None] == np.arange(3))))
+
+
+def cycle_ends(given: BlockWords, events: Ints) -> CycleEnds:
+    """The ends of all cycles of a whole program; ``events`` (E,): blocks that change the frame.
 
     G99: at R.  G98: where the first of the cycles without another motion between began, if that is not below R: from
     there controls differ.  R is known where it is a coordinate (G90); it holds to the end of these cycles.
@@ -22,7 +37,7 @@ def cycle_ends(given: BlockWords, events: Ints) -> Floats:
     cycle = given.motion & (given.move == Move.CYCLE)
     rows = np.flatnonzero(cycle)
     if not len(rows):
-        return everywhere(np.nan, n)
+        return CycleEnds(everywhere(np.nan, n), everywhere(False, n), everywhere(2, n))
     level = np.full(n, np.nan)
     axis = np.array([2, 1, 0])[np.clip(given.modal.force[Group.PLANE], 0, 2)]
     absolute = given.modal.force[Group.DISTANCE] == 0
@@ -30,13 +45,13 @@ def cycle_ends(given: BlockWords, events: Ints) -> Floats:
     plane, has_plane = given.lengths(key("R")), given.has(key("R"))
     height = np.stack([given.lengths(one) for one in AXES[:3]], axis=1)
     hows = np.stack([given.how(one) for one in AXES[:3]], axis=1)
-    # Where the last coordinate of each axis is that a motion other than a cycle states.
-    placed = (given.motion & ~given.machine & ~cycle & absolute)[:, None] & np.isin(
-        hows, (How.NUMBER, How.INTEGER)
-    )
+    # Where the last coordinate of each axis is stated; words of a cycle along its own axis are depths.
+    placed = (given.motion & ~given.machine & absolute)[:, None] & np.isin(hows, (How.NUMBER, How.INTEGER))
+    placed &= ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
     latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
     frame = np.searchsorted(events, np.arange(n))
     at_r, before, last = np.nan, np.nan, -1
+    inherited = np.zeros(n, np.bool_)
     for row in rows.tolist():
         if last < 0 or given.move[row - 1] != Move.CYCLE or axis[row] != axis[row - 1]:
             source = latest[row, axis[row]]
@@ -52,5 +67,7 @@ def cycle_ends(given: BlockWords, events: Ints) -> Floats:
         if back[row] == 1:
             level[row] = at_r
         elif back[row] == 0 and before >= at_r:
-            level[row] = before
-    return level
+            level[row], inherited[row] = before, True
+        if not inherited[row]:  # which motion a G98 after it would build on is not followed
+            before = np.nan
+    return CycleEnds(level, inherited, axis)

@@ -102,6 +102,12 @@ def diagnostics(
         tell_at(np.unique(at), "SIN001", name)
     if not len(rows):
         return findings
+    uncertain = np.isin(modal.flow.reason, (FlowReason.DELETED, FlowReason.FLOW))
+    ends = m.block[np.isin(m.value, [*given.control.endings]) & uncertain[m.block]]
+    after = rows[(rows > ends[0]) & (modal.flow.reason[rows] == FlowReason.NONE)] if len(ends) else ends
+    if len(after):
+        lines = f"lines {blocks.line[after[0]]} to {blocks.line[after[-1]]}"
+        tell_at(ends[:1], "GCO030", f"the program may end here: the motions in {lines} may not run")
     first = none.copy()
     first[rows[0]] = True
     if not (modal.units & modal.flow.tape).any():

@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.units import MM
 from postproc.languages.gcode.blocks import INCH, BlockWords
 from postproc.languages.gcode.control import Feed, Group, Once
 from postproc.languages.gcode.modal_fill import lookup
 from postproc.languages.gcode.source import WordColumn
 from postproc.languages.gcode.words import key
+
+
+def feeds_before_units(given: BlockWords) -> Bools:
+    """(B,) blocks whose F is in the unit from before them, as they select another one."""
+    units = given.modal.units
+    if not given.control.feed_before_units:
+        return np.zeros(len(given), np.bool_)
+    return np.asarray(given.modal.switched(Group.UNITS) & (np.cumsum(units) > units) & given.has(key("F")))
 
 
 class Feeds:
@@ -21,13 +29,11 @@ class Feeds:
         self._dwell = given.modal.has(Once.DWELL)
         self._force, self._given = given.modal.force, given
         self._unit = lookup(self._force[given.control.feed_units], np.array([MM, INCH, np.nan]))
-        if given.control.feed_before_units:
-            units = given.modal.units
-            late = np.flatnonzero(given.modal.switched(Group.UNITS) & (np.cumsum(units) > units))
-            if len(late):
-                unit = np.array(self._unit)
-                unit[late] = self._unit[late - 1]
-                self._unit = unit
+        late = np.flatnonzero(feeds_before_units(given))
+        if len(late):
+            unit = np.array(self._unit)
+            unit[late] = self._unit[late - 1]
+            self._unit = unit
         self._rate, self._spindle = (self._outside(given.words(key(letter))) for letter in "FS")
 
     def _outside(self, column: WordColumn) -> WordColumn:

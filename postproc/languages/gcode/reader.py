@@ -33,7 +33,7 @@ from postproc.languages.gcode.correctability import Built, check_correctability,
 from postproc.languages.gcode.cycle_ends import cycle_ends
 from postproc.languages.gcode.diagnostics import diagnostics
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
-from postproc.languages.gcode.feeds import Feeds
+from postproc.languages.gcode.feeds import Feeds, feeds_before_units
 from postproc.languages.gcode.integer_words import integer_words
 from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.modal import modal
@@ -161,7 +161,7 @@ def _followed(
             here,
             offset.at[start:stop],
             away[start:stop],
-            ends[start:stop],
+            ends.level[start:stop],
             lengths.changes[start:stop],
             reasons,
         )
@@ -175,7 +175,7 @@ def _followed(
             high - low,
             **_columns(here, where, moves, feeds),
             blend=_blend(here, own, allowed),
-            sets=way.sets[own, :3],
+            sets=ends.stated(way.sets[own, :3], rows[low:high]),
             lost=way.unknown[own, :3],
         )
     built = Built(rows, *(found.taken(name) for name in ("kind", "sets", "lost", "turned")))
@@ -366,6 +366,7 @@ def _whole(given: BlockWords, rows: Ints) -> dict[int, str]:
         (timed, "F is the time of the whole block (G93)"),
         (more, "its block contains more than the motion"),
         (modal.flow.entered, "a jump leads to its block"),
+        (feeds_before_units(given), "its F is in the unit from before it"),
     ):
         found.update(dict.fromkeys(np.flatnonzero(mask[rows]).tolist(), why))
     return found
