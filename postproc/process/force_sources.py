@@ -21,7 +21,7 @@ from postproc.toolpath import Toolpath
 LOG = ".csv"
 PROCESS = (".yaml", ".yml")
 
-Told = tuple[StatedForces, tuple[Finding, ...], str]
+SourcedForces = tuple[StatedForces, tuple[Finding, ...], str]
 """Forces, what there is to say of them, and the name of their source."""
 
 
@@ -60,7 +60,7 @@ class _Given:
     frames: MotionFrames
     offset: bool
 
-    def explicit(self, spec: str, folder: Path, file: str, line: int, name: str) -> Told:
+    def explicit(self, spec: str, folder: Path, file: str, line: int, name: str) -> SourcedForces:
         """A force given as text: a CSV or process file (relative to ``folder``), or one wrench for all motions."""
         if spec.lower().endswith(PROCESS):
             return self.process(folder / spec)
@@ -76,7 +76,7 @@ class _Given:
         all_of_one = np.broadcast_to(np.int32(0), len(self.toolpath))
         return StatedForces(np.array([values]), np.array([frame]), all_of_one), (), spec
 
-    def table(self, path: Path) -> Told:
+    def table(self, path: Path) -> SourcedForces:
         table = read_table(path, "FRC003")
         column, program = place_column(table), str(self.program)
         if column == "line":
@@ -85,7 +85,7 @@ class _Given:
             stated, findings = read_log(table, column, self.toolpath, self.frames, program, self.offset)
         return stated, findings, path.name
 
-    def process(self, path: Path) -> Told:
+    def process(self, path: Path) -> SourcedForces:
         self.no_offset("the force is computed from a process")
         stated, findings = process_forces(path, self.toolpath, self.frames, str(self.program))
         return stated, findings, path.name
@@ -97,7 +97,7 @@ class _Given:
             raise Refusal(Finding("FRC020", message, str(self.program), help="use --force LOG.csv --tare"))
 
 
-def _belonging(given: _Given, cell: Cell) -> Told:
+def _belonging(given: _Given, cell: Cell) -> SourcedForces:
     """The force that belongs to the program, from the first source that exists."""
     program = given.program
     stated, findings = read_annotations(given.toolpath, str(program))

@@ -76,10 +76,10 @@ def structure_refusal(run: ExecutionContext) -> RowRefusal | None:
         word = item.block.word
         if not item.followed and word not in SPLINES:
             what = "loop" if word in LOOPS else "branch"
-            told = word.decode("latin-1")
+            opening = word.decode("latin-1")
             return RowRefusal(
                 "KRL006",
-                f"it is inside the {what} ({told}) of line {item.block.line}",
+                f"it is inside the {what} ({opening}) of line {item.block.line}",
                 f"in {item.block.line}",
             )
     return None

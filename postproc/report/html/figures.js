@@ -92,22 +92,22 @@ function vector(values, i, decimals) {
 // A motion in words, a line each figure.
 function words(i) {
   const cut = motions.cut[i] >= 0 ? `, cut ${motions.cut[i] + 1}` : '';
-  const told = [`line ${motions.line[i]}: ${given.kinds[motions.kind[i]]}${cut}, ${given.states[motions.state[i]]}`];
-  told.push(`at ${vector(motions.position, i, 2)} mm`);
-  if (inAir(i)) return told;
+  const description = [`line ${motions.line[i]}: ${given.kinds[motions.kind[i]]}${cut}, ${given.states[motions.state[i]]}`];
+  description.push(`at ${vector(motions.position, i, 2)} mm`);
+  if (inAir(i)) return description;
   const wide = (widths) => (Number.isFinite(widths[i]) ? ` ± ${number(widths[i], 3)}` : '');
-  told.push(`error before ${number(motions.before[i], 3)}${wide(motions.before_width)} mm`);
+  description.push(`error before ${number(motions.before[i], 3)}${wide(motions.before_width)} mm`);
   if (given.corrected) {
-    told.push(`correction X Y Z ${vector(motions.correction, i, 3)} mm`);
+    description.push(`correction X Y Z ${vector(motions.correction, i, 3)} mm`);
     const between = Number.isFinite(motions.path_error[i]) ? `, path error between points ${number(motions.path_error[i], 4)} mm` : '';
-    told.push(`error after ${number(motions.after[i], 4)}${wide(motions.after_width)} mm${between}`);
-    if (motions.inserted[i]) told.push(`${motions.inserted[i]} inserted before it`);
+    description.push(`error after ${number(motions.after[i], 4)}${wide(motions.after_width)} mm${between}`);
+    if (motions.inserted[i]) description.push(`${motions.inserted[i]} inserted before it`);
   }
-  told.push(`force ${number(quantities.force.values[i], 0)} N (${vector(motions.force, i, 0)})`);
-  return told;
+  description.push(`force ${number(quantities.force.values[i], 0)} N (${vector(motions.force, i, 0)})`);
+  return description;
 }
 
-// The motion that all figures mark; `figures` are told when it changes.
+// The motion that all figures mark; `figures` are informed when it changes.
 const figures = [];
 let chosen = 0;
 

@@ -126,9 +126,9 @@ function readout() {
     chosen() {
       slider.value = chosen;
       line.value = motions.line[chosen];
-      const told = words(chosen);
-      slider.setAttribute('aria-valuetext', told[0]);
-      said.textContent = told.join(' · ');
+      const description = words(chosen);
+      slider.setAttribute('aria-valuetext', description[0]);
+      said.textContent = description.join(' · ');
     },
   };
 }
