@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from postproc.base.arrays import Floats, frozen
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.robot.external_axes import ExternalAxis
+from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
 MODES = ("process", "absolute", "touched_off")
 """What is corrected."""
@@ -65,6 +67,7 @@ class Cell:
     which a force changes, None where it is not stated.  ``correct``: one of ``MODES``; ``touch_points``: number of a
     base -> (K, 3) [m] places in it at which it was touched off, None for the one base that a program uses;
     ``touch_line`` is where they are.  ``temperature`` [degC] of the robot.
+    ``symbols``: values of names that only the controller knows; ``program_start``: the state at the first statement.
     """
 
     path: Path
@@ -99,6 +102,8 @@ class Cell:
     temperature: float | None = None
     temperature_line: int = 0
     external_axes: tuple[ExternalAxis, ...] = ()
+    symbols: Mapping[str, Symbol] = field(default_factory=dict)
+    program_start: InitialState = UNSTATED
 
     @property
     def cycle_ms(self) -> float:

@@ -16,6 +16,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.base.yaml_section import YamlSection, load
+from postproc.cell.controller_state import read_program_start, read_symbols
 from postproc.cell.description import MODES, Cell, Controller, ForceVectorInterval, Tool
 from postproc.robot.read_external_axes import read_external
 
@@ -40,6 +41,8 @@ KEYS = (
     "temperature",
     "start",
     "external_axes",
+    "symbols",
+    "program_start",
     "orientation",
     "tolerance",
     "tolerance_deg",
@@ -135,6 +138,8 @@ def load_cell(path: Path) -> Cell:
         ),
         temperature_line=top.line_of("temperature") if "temperature" in top else 0,
         external_axes=read_external(top),
+        symbols=read_symbols(top),
+        program_start=read_program_start(top),
     )
 
 

@@ -14,6 +14,7 @@ from postproc.base.findings import Finding
 from postproc.toolpath import Plan as Plan
 from postproc.toolpath import Role as Role
 from postproc.toolpath import Toolpath
+from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
 MARK = "COMPENSATED by compensate "
 """With which the comment starts that states that a program is compensated."""
@@ -47,12 +48,16 @@ class ReadingSettings:
     spin about the tool axis is measured from; None where nothing states it.  integer_words: what X10 means where a
     control may count in increments, "mm" or "um", "" where nothing states it.  references: files that are read and
     never written ($config.dat).
+    symbols: name that only the controller knows (capitals) -> its value, mm and deg where it is a pose; initial: the
+    state at the first statement.
     places: what only writing needs is wanted too (``Program.text``); a dialect may give None without.
     """
 
     orientation: Floats | None = None
     integer_words: str = ""
     references: tuple[Document, ...] = ()
+    symbols: Mapping[str, Symbol] = field(default_factory=dict)
+    initial: InitialState = UNSTATED
     places: bool = True
 
 

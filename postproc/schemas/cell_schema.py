@@ -29,6 +29,9 @@ _TOOL = mapping(
     dependentRequired={"mass": ["com"], "com": ["mass"]},
 )
 
+_SYMBOL = r"^(#[0-9]+|[A-Za-z_$][A-Za-z0-9_$]*(\[[0-9]+(,[0-9]+)*\])?)$"
+_COMPONENTS = mapping({}, patterns={"^[A-Za-z][A-Za-z0-9_]*$": number("of a component")}, minProperties=1)
+
 _POINTS = listed(numbers(3, 3), "x y z in the base, mm", least=1)
 
 _FORCE_INTERVAL: Schema = {
@@ -106,6 +109,20 @@ CELL: dict[str, Schema] = {
     "start": numbers(6, 7, "axes before the first motion, deg (mm for a linear axis)"),
     "external_axes": mapping(
         dict.fromkeys(NAMES, _EXTERNAL), about="what the axes E1 to E6 of programs move"
+    ),
+    "symbols": mapping(
+        {},
+        about="values of names that only the controller knows: variables, points, frames, tool and base data; mm, deg",
+        patterns={_SYMBOL: {"anyOf": [number("of a variable"), _COMPONENTS]}},
+    ),
+    "program_start": mapping(
+        {
+            "tool": number("number of the tool in the spindle", 0.0),
+            "base": number("number of the base (work offset) in force", 0.0),
+            **{word: number("mm, in that base") for word in "xyz"},
+            **{word: number("deg") for word in "abc"},
+        },
+        about="the state at the first statement, where the program does not state it",
     ),
     "orientation": mapping(_ABC, about="of the tool in the base, for programs that state none, deg"),
     "tolerance": number("path error that may remain, mm [0.02]", above=0.0),

@@ -114,7 +114,9 @@ def read_program(
     references = () if config_dat is None else (read_document(config_dat),)
     settings = ReadingSettings(references=references)
     if cell is not None:
-        settings = ReadingSettings(cell.orientation, cell.integer_words, references)
+        settings = ReadingSettings(
+            cell.orientation, cell.integer_words, references, cell.symbols, cell.program_start
+        )
     return dialect, dialect.read(documents, settings), settings
 
 
