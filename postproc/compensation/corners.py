@@ -90,12 +90,25 @@ def _rounded(task: CompensationProblem, result: CorrectionResult) -> tuple[Ints,
         some = row[part]
         half = 0.5 * np.minimum(desired_path.length[some], desired_path.length[some + 1])
         distance = np.fmin(path.approximation[some], half)
-        return distance, _cut_off(programmed(task, some), programmed(task, some + 1), distance)
+        arcs = desired_path.arc[some] | desired_path.arc[some + 1]
+        off = (
+            0.25 * distance * lengths(_direction(task, some + 1) - _direction(task, some))
+        )  # of straight ones
+        at = some[arcs]
+        off[arcs] = _cut_off(programmed(task, at), programmed(task, at + 1), distance[arcs])
+        return distance, off
 
     parts = [(np.empty(0), np.empty(0)), *in_blocks(size, len(row))]
     distance, off = (np.concatenate([part[i] for part in parts]) for i in (0, 1))
     chosen = _largest(off, task.tolerance)
     return row[chosen], distance[chosen], np.isnan(path.approximation[row[chosen]])
+
+
+def _direction(task: CompensationProblem, rows: Ints) -> Floats:
+    """(K, 3) unit vectors from the start of motions to their end, NaN for those that lead nowhere."""
+    step = task.wanted[rows].position - task.desired_path.start[rows].position
+    with np.errstate(invalid="ignore"):
+        return np.asarray(step / lengths(step)[:, None])
 
 
 def _inserted(

@@ -108,7 +108,7 @@ class Looks:
                 function = function or f"{file} {code.co_qualname}"
                 stage = stage or stage_of(file, code.co_name)
             frame = frame.f_back
-        if stage == "read" and any(name == "moved" for _, name in stack):
+        if stage == "read" and any(name == "edit_targets" for _, name in stack):
             stage = "write"
         elif stage == "read" and any(file == "output/write.py" for file, _ in stack):
             stage = "read back"
