@@ -22,7 +22,7 @@ from postproc.base.geometry import (
     turning,
 )
 from postproc.compensation.mirror import interpolate_pose
-from postproc.compensation.orientations import interpolate_orientation
+from postproc.compensation.orientations import MotionParts, ProgrammedOrientations
 from postproc.robot.axis_track import AxisTrack, nominal_flange
 from postproc.robot.description import Robot
 from postproc.robot.external_axes import External
@@ -109,7 +109,8 @@ class DesiredPath:
         start, end = self.start[rows], self.end[rows]
         poses = interpolate_poses(start, end, share)
         self._turn(rows, start, end, share, poses)
-        self.turn(rows, np.zeros(len(rows)), np.ones(len(rows)), start, end, share, poses)
+        whole = MotionParts(rows, np.zeros(len(rows)), np.ones(len(rows)), start.rotation, end.rotation)
+        self.turn(whole, share, poses)
         arcs = np.flatnonzero(np.isfinite(self.sweep[rows]))
         if len(arcs):
             poses.position[arcs] = on_arc(
@@ -134,23 +135,15 @@ class DesiredPath:
     def _along(self) -> bool:
         return bool(self.path.arcs.turns_along.any())
 
-    def turn(
-        self, rows: Ints, first: Floats, last: Floats, start: Poses, end: Poses, share: Floats, poses: Poses
-    ) -> None:
-        """Turns ``poses`` (K), at the shares (K,) between ``start`` and ``end`` (K), as the controller does on a part,
-        ``first`` to ``last`` (K,), of the paths of ``rows`` (K,) (``OrientationPath``)."""
-        interpolate_orientation(
-            self.path,
-            self.base,
-            self.end,
-            rows,
-            first,
-            last,
-            start.rotation,
-            end.rotation,
-            share,
-            poses.rotation,
-        )
+    def turn(self, parts: MotionParts, share: Floats, poses: Poses) -> None:
+        """Turns ``poses`` (K), at the shares (K,) of the parts (K) of motions, as the controller does
+        (``OrientationPath``)."""
+        self.orientations.interpolate(parts, share, poses.rotation)
+
+    @property
+    def orientations(self) -> ProgrammedOrientations:
+        """How the motions turn the tool."""
+        return ProgrammedOrientations(self.path, self.base, self.end)
 
     def tangent(self, rows: Ints, share: Floats) -> Floats:
         """(K, 3) unit vectors along the paths of ``rows`` (K,) at the shares (K,); zero where a motion only turns the

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from postproc.base import rotary_words
@@ -13,45 +15,66 @@ _OPPOSITE = 1e-6
 """[rad] Directions that are nearer to opposite have no great circle."""
 
 
-def interpolate_orientation(
-    path: Toolpath,
-    base: Poses,
-    wanted: Placed,
-    rows: Ints,
-    first: Floats,
-    last: Floats,
-    start: Floats,
-    end: Floats,
-    share: Floats,
-    into: Floats,
-) -> None:
-    """Puts into ``into`` (K, 3, 3) the orientations at the shares (K,) between ``start`` and ``end`` (K, 3, 3) where
-    they run otherwise than evenly about one axis.
+@dataclass(frozen=True, eq=False)
+class MotionParts:
+    """Parts (K) of motions.  rows (K,): the motions; first, last (K,): where the parts begin and end, as shares of the
+    motions' paths; start, end (K, 3, 3): orientations there, in the robot base."""
 
-    ``first``, ``last`` (K,): where start and end lie, as shares of the paths of the motions ``rows`` (K,).  ``base``,
-    ``wanted`` (N): bases and targets of the motions.  All orientations are in the robot base.
-    """
-    if not path.orientation_control.any_by_words:
-        return
-    law = path.orientation_control.path[rows]
-    at = np.flatnonzero(law == OrientationPath.ROTARY_AXES)
-    if len(at):
-        words = _Words.of(path, base, wanted, rows[at])
-        one, two = words.inside(start[at]), words.inside(end[at])
-        start_angles = rotary_words.angles_of(one, path.orientation_control.rotary_at(rows[at], first[at]))
-        stop_angles = rotary_words.angles_of(two, path.orientation_control.rotary_at(rows[at], last[at]))
-        # What the words do not express (another base or tool before) turns evenly.
-        expressible = rotary_words.reproduced(one, start_angles) & rotary_words.reproduced(two, stop_angles)
-        here = words.outside(
-            rotary_words.rotation_of(start_angles + share[at][:, None] * (stop_angles - start_angles))
-        )
-        into[at[expressible]] = here[expressible]
-    at = np.flatnonzero(law == OrientationPath.GREAT_CIRCLE)
-    if len(at):
-        here, known = _on_great_circle(
-            start[at], end[at], path.orientation_control.redundant_axis[rows[at]], share[at]
-        )
-        into[at[known]] = here[known]
+    rows: Ints
+    first: Floats
+    last: Floats
+    start: Floats
+    end: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ProgrammedOrientations:
+    """How N motions turn the tool.  base, wanted (N): bases and targets of the motions, in the robot base."""
+
+    path: Toolpath
+    base: Poses
+    wanted: Placed
+
+    def interpolate(self, parts: MotionParts, share: Floats, into: Floats) -> None:
+        """Puts into ``into`` (K, 3, 3) the orientations at the shares (K,) of the parts (K) that turn otherwise than
+        evenly about one axis."""
+        control, rows = self.path.orientation_control, parts.rows
+        if not control.any_by_words:
+            return
+        law = control.path[rows]
+        at = np.flatnonzero(law == OrientationPath.ROTARY_AXES)
+        if len(at):
+            words = self._words(rows[at])
+            one, two = words.inside(parts.start[at]), words.inside(parts.end[at])
+            start_angles = rotary_words.angles_of(one, control.rotary_at(rows[at], parts.first[at]))
+            stop_angles = rotary_words.angles_of(two, control.rotary_at(rows[at], parts.last[at]))
+            # What the words do not express (another base or tool before) turns evenly.
+            expressible = rotary_words.reproduced(one, start_angles) & rotary_words.reproduced(
+                two, stop_angles
+            )
+            angles = start_angles + share[at][:, None] * (stop_angles - start_angles)
+            here = words.outside(rotary_words.rotation_of(angles))
+            into[at[expressible]] = here[expressible]
+        at = np.flatnonzero(law == OrientationPath.GREAT_CIRCLE)
+        if len(at):
+            axis = control.redundant_axis[rows[at]]
+            here, known = _on_great_circle(parts.start[at], parts.end[at], axis, share[at])
+            into[at[known]] = here[known]
+
+    def nearest_expressible(self, rows: Ints, share: Floats, rotation: Floats) -> Floats:
+        """(K, 3, 3) orientations that the pair of axes of motions ``rows`` (K,) expresses near its place at the shares
+        (K,) of their paths, with the tool along that of ``rotation`` (K, 3, 3) as far as they can:
+        ``rotary_words.pointing``."""
+        words = self._words(rows)
+        tool = words.inside(rotation)[:, :, 2]
+        near = self.path.orientation_control.rotary_at(rows, share)
+        return words.outside(rotary_words.rotation_of(rotary_words.pointing(tool, near)))
+
+    def _words(self, rows: Ints) -> _Words:
+        frame = np.broadcast_to(self.base.shared(rows).rotation, (len(rows), 3, 3))
+        to = rotary_words.rotation_of(self.path.orientation_control.rotary_to[rows])
+        back = np.swapaxes(product(frame, to), 1, 2)
+        return _Words(frame, product(back, self.wanted[rows].rotation))
 
 
 def _on_great_circle(start: Floats, end: Floats, tool: Floats, share: Floats) -> tuple[Floats, Floats]:
@@ -83,14 +106,6 @@ class _Words:
     def __init__(self, base: Floats, tool: Floats) -> None:
         self._base, self._tool = base, tool
 
-    @staticmethod
-    def of(path: Toolpath, base: Poses, wanted: Placed, rows: Ints) -> _Words:
-        frame = np.broadcast_to(base.shared(rows).rotation, (len(rows), 3, 3))
-        back = np.swapaxes(
-            product(frame, rotary_words.rotation_of(path.orientation_control.rotary_to[rows])), 1, 2
-        )
-        return _Words(frame, product(back, wanted[rows].rotation))
-
     def inside(self, rotation: Floats) -> Floats:
         """What the words have to express (K, 3, 3) of orientations in the robot base."""
         return product(product(np.swapaxes(self._base, 1, 2), rotation), np.swapaxes(self._tool, 1, 2))
@@ -110,19 +125,6 @@ def pairs(path: Toolpath, rows: Ints) -> Ints:
     # All motions of a program use the same words.
     two = np.isfinite(path.orientation_control.rotary_to[rows]).sum(axis=1) == 2
     return np.flatnonzero(by_axes & two)
-
-
-def nearest_expressible(
-    path: Toolpath, base: Poses, wanted: Placed, rows: Ints, share: Floats, rotation: Floats
-) -> Floats:
-    """(K, 3, 3) orientations that the pair of axes of motions ``rows`` (K,) expresses near its place at the shares
-    (K,) of their paths, with the tool along that of ``rotation`` (K, 3, 3) as far as they can:
-    ``rotary_words.pointing``."""
-    words = _Words.of(path, base, wanted, rows)
-    tool = words.inside(rotation)[:, :, 2]
-    return words.outside(
-        rotary_words.rotation_of(rotary_words.pointing(tool, path.orientation_control.rotary_at(rows, share)))
-    )
 
 
 POLE = np.radians(1.0)

@@ -20,6 +20,7 @@ from postproc.base.geometry import (
 from postproc.base.units import DEG, MM
 from postproc.compensation.desired_path import interpolate_poses
 from postproc.compensation.mirror import pose_error
+from postproc.compensation.orientations import MotionParts
 from postproc.compensation.problem import CompensationProblem
 
 SHARES = (0.25, 0.5, 0.75)
@@ -82,6 +83,11 @@ class PathSegments:
             self.normal[chosen],
             self.sweep[chosen],
         )
+
+    @property
+    def parts(self) -> MotionParts:
+        """The parts of motions that the segments replace."""
+        return MotionParts(self.rows, self.first, self.last, self.start.rotation, self.end.rotation)
 
     def at(self, share: Floats, along: Bools | None = None) -> Poses:
         """Commands (K) at the shares (K,) of the segments; ``along`` (K,): arcs with which the tool turns."""
@@ -176,7 +182,7 @@ def _errors(
     wrench = task.force.along(rows, along)
     shares = np.broadcast_to(share, len(rows))
     command = segments.at(shares, task.toolpath.arcs.turns_along[rows])
-    task.desired_path.turn(rows, segments.first, segments.last, segments.start, segments.end, shares, command)
+    task.desired_path.turn(segments.parts, shares, command)
     real = task.simulated(rows, command, wrench, share=along, corrected=True)
     goal = task.goal(rows, wanted, along)
     shift, turn = _beside(task, rows, along, real.pose, wanted, goal, shown)

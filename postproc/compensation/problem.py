@@ -255,9 +255,8 @@ class CompensationProblem:
         if not len(pairs):
             return rotation
         nearest, at = rotation.copy(), rows[pairs]
-        nearest[pairs] = orientations.nearest_expressible(
-            self.toolpath, self.base, self.wanted, at, share[pairs], rotation[pairs]
-        )
+        law = self.desired_path.orientations
+        nearest[pairs] = law.nearest_expressible(at, share[pairs], rotation[pairs])
         return nearest
 
     def correctable(self, rows: Ints, share: Floats, command: Poses, turn: Floats) -> Floats:

@@ -38,6 +38,17 @@ from postproc.toolpath import Plan, Toolpath, external_at
 
 
 @dataclass(frozen=True)
+class IntendedProgram:
+    """What is to be written: the corrected motions as they are computed, and the edits that make them of the
+    program."""
+
+    task: CompensationProblem
+    result: CorrectionResult
+    division: Subdivision
+    edits: Edits
+
+
+@dataclass(frozen=True)
 class WrittenProgram:
     """``edits`` make the output; ``contents`` are its bytes, a document each; ``result`` has the residual predicted
     from the digits in them, ``division`` the commands as they are in them.
@@ -172,27 +183,24 @@ def edit_program(program: Program, dialect: Dialect, moved: Sequence[Edit], robo
 def write(
     program: Program,
     dialect: Dialect,
-    task: CompensationProblem,
-    result: CorrectionResult,
-    division: Subdivision,
-    edits: Edits,
+    intended: IntendedProgram,
     writing: WritingSettings,
     settings: ReadingSettings,
     completed: Callable[[Toolpath], Toolpath],
 ) -> WrittenProgram:
-    """Turn the edits of ``program`` into files, and read them back.
+    """Turn the edits of ``program`` into the bytes of files, and read them back.
 
     ``completed``: fills in what a target that was read back inherits from the axis motion before it.
     Raises Refusal FIL008 (what was read back is not what was meant), COR002 (it corrects by more than may be).
     """
-    documents = program.documents
+    documents, task, result, edits = program.documents, intended.task, intended.result, intended.edits
     contents = _contents(documents, edits)
     again = _read_back(documents, contents, dialect, settings)
     back = completed(again.toolpath)
     release_free_memory()
-    check_readback(task, result, division, program, again, back, writing)
+    check_readback(task, result, intended.division, program, again, back, writing)
     release_free_memory()
-    there = _as_written(task, division, back)
+    there = _as_written(task, intended.division, back)
     written = _with_lead_ins(task, with_residual(task, result, there.original_command), there)
     written = replace(
         written, turn=np.broadcast_to(np.nan, written.turn.shape)

@@ -14,21 +14,26 @@ from pathlib import Path
 import numpy as np
 
 from postproc.base import rotary_words
-from postproc.base.document import Edits
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
 from postproc.base.memory import release_free_memory
 from postproc.base.units import DEG, MM
 from postproc.compensation.axis_limits import check_limits
-from postproc.compensation.correct import CorrectionResult, MotionOutcome, correct
+from postproc.compensation.correct import MotionOutcome, correct
 from postproc.compensation.path_comparison import cuts_not_improved
-from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.splines import unknown_displacements
 from postproc.compensation.subdivide import subdivide
 from postproc.compensation.subdivision import Limits, Subdivision
 from postproc.languages.dialect import EditedTargets, Program
 from postproc.output.atomic_write import Content, write_atomically
-from postproc.output.write import WrittenProgram, edit_program, plan_motions, write, writing_settings
+from postproc.output.write import (
+    IntendedProgram,
+    WrittenProgram,
+    edit_program,
+    plan_motions,
+    write,
+    writing_settings,
+)
 from postproc.report.corrections_csv import corrections_csv
 from postproc.report.diff import unified_diff
 from postproc.report.page import beside, program_page
@@ -93,22 +98,21 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     target = _target(request)
     excluded: dict[int, Finding] = {}
     while True:
-        task, result, division, edits = _corrected(request, ready, target.stem, excluded)
+        intended = _corrected(request, ready, target.stem, excluded)
+        task, edits = intended.task, intended.edits
         stage("writing, and reading back")
         ready = ready.without_text()
         release_free_memory()
         written = write(
             ready.program,
             ready.dialect,
-            task,
-            result,
-            division,
-            edits,
+            intended,
             writing_settings(ready.cell, request.shared_points),
             ready.settings,
             partial(completed, cell=ready.cell, robot=ready.robot, program=request.program),
         )
-        result, division = written.result, written.division  # what was meant goes, before its place is needed
+        del intended  # before its place is needed
+        result, division = written.result, written.division
         release_free_memory()
         worse = cuts_not_improved(task, result, division, written.path_error, written.across_before)
         if not worse:
@@ -162,9 +166,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     return report
 
 
-def _corrected(
-    request: Request, ready: Prepared, stem: str, worse: Mapping[int, Finding]
-) -> tuple[CompensationProblem, CorrectionResult, Subdivision, Edits]:
+def _corrected(request: Request, ready: Prepared, stem: str, worse: Mapping[int, Finding]) -> IntendedProgram:
     """The correction and its edits; what cannot be divided or written as planned stays, and the rest is computed again.
     worse: rows whose cuts stay as they are, and why."""
     task, cell = ready.task, ready.cell
@@ -199,7 +201,7 @@ def _corrected(
         unwritten = {row: finding for row, finding in moved.unwritten.items() if row not in known}
         if not moved.unwritten:
             edits = edit_program(ready.program, ready.dialect, moved.edits, ready.robot, stem)
-            return task, result, division, edits
+            return IntendedProgram(task, result, division, edits)
         if not unwritten:
             raise ValueError("motions that are not corrected are refused again")
         task = replace(task, toolpath=task.toolpath.with_refused({**known, **unwritten}))
