@@ -71,8 +71,7 @@ def _text(stream: BinaryIO, path: Path, code: str, ends: tuple[bytes, ...]) -> b
     while block := stream.read(MAX_LINE):
         nul = block.find(b"\0")
         if nul >= 0:
-            message = f"byte {text.tell() + nul} is NUL: the file is not plain text"
-            raise Refusal(Finding("FIL003", message, str(path), help="save it as plain text (UTF-8)"))
+            raise Refusal(_no_text(text.getvalue() + block, path))
         line_ends = [(block.find(end), block.rfind(end)) for end in ends if end in block]
         line_bytes += min((first for first, _ in line_ends), default=len(block))
         if line_bytes > MAX_LINE:
@@ -83,6 +82,20 @@ def _text(stream: BinaryIO, path: Path, code: str, ends: tuple[bytes, ...]) -> b
             line_bytes = len(block) - 1 - max(last for _, last in line_ends)
         text.write(block)
     return text.getvalue()
+
+
+def _no_text(raw: bytes, path: Path) -> Finding:
+    """FIL003 of a file with a NUL: what it is instead of a text, and how it becomes one."""
+    if raw.startswith((b"\xff\xfe", b"\xfe\xff")) or raw[1:200:2].count(0) > 50 or raw[:200:2].count(0) > 50:
+        message = "the file is UTF-16 (two bytes for each character)"
+        return Finding(
+            "FIL003", message, str(path), help="save it as UTF-8 or ANSI in the editor that wrote it"
+        )
+    if raw.startswith(b"PK\x03\x04") or raw.startswith(b"\xd0\xcf\x11\xe0"):
+        message = "the file is a spreadsheet or an archive, and no text"
+        return Finding("FIL003", message, str(path), help="save the table as CSV, or unpack the archive")
+    message = f"byte {raw.find(0)} is NUL: the file is not plain text"
+    return Finding("FIL003", message, str(path), help="save it as plain text (UTF-8)")
 
 
 def _line(raw: bytes, ends: tuple[bytes, ...]) -> int:

@@ -34,5 +34,37 @@ CODES = define(
             action="State it: controller: {absolute_accuracy: true} or false.",
             example="`correct: absolute` without `controller:`.",
         ),
+        "CEL005": Code(
+            "warning",
+            "implausible number in the cell",
+            meaning="A frame, an angle or a mass of the cell has a size that only another unit explains.",
+            consequence="The robot would stand elsewhere, or carry another weight, than the prediction assumes.",
+            action="Write lengths in mm, angles in deg and masses in kg.",
+            example="`tools: {1: {x: 0.3, y: 0, z: 0.18}}` in metres.",
+        ),
+        "CEL006": Code(
+            "warning",
+            "implausible tool",
+            meaning="The tool centre point is inside the wrist, or the spindle's axis points away from the tip.",
+            consequence="Forces in the feed frame, and the deflection of the spindle, have the wrong direction.",
+            action="State the pose from the flange to the tip, and the axis from the spindle to the tip.",
+            example="`axis: -z` of a tool whose +z points at the part.",
+        ),
+        "CEL007": Code(
+            "warning",
+            "tolerance permits everything",
+            meaning="The tolerance of the cell is larger than the deflection of a robot.",
+            consequence="Errors that matter are reported as within the tolerance.",
+            action="State the path error that the part permits, in mm and deg.",
+            example="`tolerance: 20` for 0.02 mm.",
+        ),
+        "CEL008": Code(
+            "error",
+            "cell for another language",
+            meaning="The cell states the language of its programs, and this program is in another one.",
+            consequence="Read in the wrong language, a program has no motions, or wrong ones.",
+            action="Remove dialect.name from the cell, or name the cell of this program with --cell.",
+            example="A KRL program beside a cell with `dialect: {name: fanuc}`.",
+        ),
     }
 )

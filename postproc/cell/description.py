@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from postproc.base.arrays import Floats, frozen
+from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.robot.external_axes import ExternalAxis
@@ -67,7 +68,8 @@ class Cell:
     which a force changes, None where it is not stated.  ``correct``: one of ``MODES``; ``touch_points``: number of a
     base -> (K, 3) [m] places in it at which it was touched off, None for the one base that a program uses;
     ``touch_line`` is where they are.  ``temperature`` [degC] of the robot.
-    ``symbols``: values of names that only the controller knows; ``program_start``: the state at the first statement.
+    ``symbols``: values of names that only the controller knows; ``program_start``: the state at the first statement;
+    ``findings``: what is implausible in the file.
     """
 
     path: Path
@@ -104,6 +106,7 @@ class Cell:
     external_axes: tuple[ExternalAxis, ...] = ()
     symbols: Mapping[str, Symbol] = field(default_factory=dict)
     program_start: InitialState = UNSTATED
+    findings: tuple[Finding, ...] = ()
 
     @property
     def cycle_ms(self) -> float:

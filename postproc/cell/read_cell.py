@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from postproc.base.units import DEG, MM
 from postproc.base.yaml_section import YamlSection, load
 from postproc.cell.controller_state import read_program_start, read_symbols
 from postproc.cell.description import MODES, Cell, Controller, ForceVectorInterval, Tool
+from postproc.cell.plausibility import implausible
 from postproc.robot.read_external_axes import read_external
 
 NAME = "cell.yaml"
@@ -99,7 +101,7 @@ def load_cell(path: Path) -> Cell:
     scale, vector = _force_interval(top)
     dialect = top.section("dialect", None)
     dialect.only("integer_words", "name", "config_dat")
-    return Cell(
+    cell = Cell(
         path=path,
         robot=_word(top, "robot"),
         robot_base=_robot_base(top),
@@ -141,6 +143,7 @@ def load_cell(path: Path) -> Cell:
         symbols=read_symbols(top),
         program_start=read_program_start(top),
     )
+    return replace(cell, findings=implausible(top, cell))
 
 
 def _word(section: YamlSection, key: str) -> str:

@@ -21,6 +21,7 @@ from postproc.cli.common import (
     result_options,
     tare_option,
 )
+from postproc.cli.decimals import Decimal
 from postproc.cli.signals import Stopped
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 @tare_option
 @click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cells'.")
 @language_options
-@click.option("--gain", type=click.FloatRange(0.0, 1.0), help="Share of the correction that is applied [1].")
+@click.option("--gain", type=Decimal(0.0, 1.0), help="Share of the correction that is applied [1].")
 @click.option(
     "-o",
     "--output",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import click
@@ -10,6 +11,11 @@ from click.shell_completion import CompletionItem, get_completion_class
 from postproc.workflows.option_names import FORMER_OPTIONS
 
 SHELLS = ("bash", "zsh", "fish")
+SPREADSHEETS = (".xlsx", ".xlsm", ".xls", ".ods")
+
+_SURPLUS = re.compile(r"unexpected extra arguments? \((.*)\)")
+_NUMBERS = re.compile(r"[-+]?\.?\d[\d.,;]*(?:@\w+)?\Z")
+
 VARIABLE = "_COMPENSATE_COMPLETE"
 """The environment variable by which the script asks for words."""
 
@@ -34,6 +40,11 @@ class Commands(click.Group):
             shown = " or ".join(dict.fromkeys(names))
             hint = f" Did you mean {shown}?" if shown else ""
             raise click.UsageError(f"There is no option {error.option_name!r}.{hint}", error.ctx) from None
+        except click.UsageError as error:
+            surplus = _SURPLUS.search(error.message)
+            if surplus and (hint := _about_surplus(surplus[1].split())):
+                raise click.UsageError(f"{error.message}. {hint}", error.ctx) from None
+            raise
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Commands, and files: a program may be in the place of a command."""
@@ -41,6 +52,24 @@ class Commands(click.Group):
         if incomplete.startswith("-"):
             return items + self.commands["program"].shell_complete(ctx, incomplete)
         return [item for item in items if item.value != "program"] + [CompletionItem(incomplete, type="file")]
+
+
+def _about_surplus(words: list[str]) -> str:
+    """What to do with arguments that a command does not take."""
+    for word in words:
+        name = word.lower()
+        if name.endswith(SPREADSHEETS):
+            return f"{word} is a spreadsheet: save it as CSV, and name that: --force FILE.csv"
+        if name.endswith(".txt"):
+            return f"A force file is a CSV or YAML file: rename {word}, and name it: --force FILE.csv"
+        if _NUMBERS.match(word):
+            return (
+                "A force is one word: --force 0,360,560@base; write decimals with a point, and quote it if it has"
+                " blanks"
+            )
+        if "." in word:
+            return "One program is compensated in a run; compensate batch takes many"
+    return ""
 
 
 def _present_option(name: str) -> str:

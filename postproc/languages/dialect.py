@@ -89,6 +89,10 @@ class Dialect(Protocol):
     def name(self) -> str: ...
 
     @property
+    def family(self) -> str:
+        """The language of which it is a dialect, as users call it."""
+
+    @property
     def letters(self) -> bytes:
         """Capital letters of the words that its edits may take out of the line of a motion, or put in."""
 

@@ -273,5 +273,16 @@ CODES = define(
             action="Check that the forces are plausible.",
             example="A largest mean of 560 N in line 42.",
         ),
+        "FRC030": Code(
+            "error",
+            "force is not requested",
+            meaning="A run without --force corrects the effect of no force, so it corrects nothing.",
+            consequence="Nothing was written: the output would be the input.",
+            action=(
+                "Run with --force. It takes FORCE comments of the program, a force CSV beside it, or `force:`"
+                " or `process:` of the cell; or state the force: --force 0,360,560@base."
+            ),
+            example="`compensate panel.src` in a cell with `correct: process`.",
+        ),
     }
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +21,9 @@ from postproc.toolpath import Toolpath
 
 LOG = ".csv"
 PROCESS = (".yaml", ".yml")
+
+_STATED = re.compile(r"force\s+[-+.@\d]", re.IGNORECASE)
+"""A FORCE comment that is no FORCE OFF."""
 
 SourcedForces = tuple[StatedForces, tuple[Finding, ...], str]
 """Forces, what there is to say of them, and the name of their source."""
@@ -49,6 +53,39 @@ def wrenches(
     else:
         stated, findings, source = _belonging(given, cell)
     return turn_to_robot_axes(stated, toolpath, frames, cell, str(program), source, findings)
+
+
+def not_requested(program: Path, toolpath: Toolpath, cell: Cell) -> Finding:
+    """FRC030: a run without --force, which would correct nothing; its help names the force that the program has, or
+    all ways to state one."""
+    source = _found(program, toolpath, cell)
+    help = f"run compensate {program.name} --force" if source else ways_to_state(program, cell)
+    message = "--force is missing, and without a force nothing is corrected: nothing was written"
+    return Finding("FRC030", message + (f"; {source}" if source else ""), str(program), help=help)
+
+
+def _found(program: Path, toolpath: Toolpath, cell: Cell) -> str:
+    """A clause about the force that a bare --force takes; "" where there is none."""
+    if any(_STATED.match(annotation.text.strip()) for annotation in toolpath.annotations):
+        return "the program states its forces in FORCE comments"
+    beside = program.with_name(program.stem + ".force.csv")
+    if beside.is_file():
+        return f"the forces are in {beside.name}"
+    if cell.process is not None or cell.force is not None:
+        return (
+            f"the cell states {'process: ' + cell.process if cell.process else 'force: ' + str(cell.force)}"
+        )
+    return ""
+
+
+def ways_to_state(program: Path, cell: Cell) -> str:
+    """The ways to state a force, for a user."""
+    return (
+        "use one of: (1) a comment in the program, ;FORCE 0 360 560 @base, in G-code (FORCE 0 360 560 @BASE);"
+        f" (2) {program.stem}.force.csv beside it, with the header line,fx,fy,fz and rows such as 12,0,360,560;"
+        f" (3) force: 0,360,560@base, or process: milling.yaml, in {cell.path};"
+        " then run with --force; or state it here: --force 0,360,560@base"
+    )
 
 
 @dataclass(frozen=True)
@@ -121,11 +158,7 @@ def _belonging(given: _Given, cell: Cell) -> SourcedForces:
                 "FRC001",
                 "--force has no value, and no force belongs to this program",
                 str(program),
-                help="use one of: (1) a comment in the program, ;FORCE 0 360 560 @base, in G-code (FORCE"
-                " 0 360 560 @BASE); "
-                f"(2) {beside.name} beside it, with the header line,fx,fy,fz and rows such as 12,0,360,560; "
-                f"(3) force: 0,360,560@base, or process: milling.yaml, in {cell.path}; "
-                "or state it here: --force 0,360,560@base",
+                help=ways_to_state(program, cell),
             ),
             *findings,
         )

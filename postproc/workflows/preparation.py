@@ -108,7 +108,12 @@ def read_program(
     if not main.raw.strip():
         raise Refusal(Finding("FIL002", "the file is empty", str(path)))
     dialect = _dialect(path, main.raw, cell)
-    documents = (main, *(read_document(companion) for companion in dialect.companions(path)))
+    companions = dialect.companions(path)
+    if any(companion.samefile(path) for companion in companions):
+        name = path.with_suffix(".src").name
+        message = f"a {path.suffix} file holds the data of a program; the program is {name}"
+        raise Refusal(Finding("FIL009", message, str(path), help=f"name {name}: its data are read with it"))
+    documents = (main, *(read_document(companion) for companion in companions))
     if config_dat is None and cell is not None and cell.config_dat is not None:
         config_dat = cell.path.parent / cell.config_dat
     references = () if config_dat is None else (read_document(config_dat),)
@@ -117,7 +122,10 @@ def read_program(
         settings = ReadingSettings(
             cell.orientation, cell.integer_words, references, cell.symbols, cell.program_start
         )
-    return dialect, dialect.read(documents, settings), settings
+    program = dialect.read(documents, settings)
+    if not len(program.toolpath) and cell is not None and cell.dialect is not None:
+        _refuse_other_language(path, main.raw, dialect, cell)
+    return dialect, program, settings
 
 
 def _dialect(path: Path, raw: bytes, cell: Cell | None) -> Dialect:
@@ -134,6 +142,17 @@ def _dialect(path: Path, raw: bytes, cell: Cell | None) -> Dialect:
             )
         )
     return DIALECTS[cell.dialect]
+
+
+def _refuse_other_language(path: Path, raw: bytes, dialect: Dialect, cell: Cell) -> None:
+    """Raises Refusal CEL008 where the cell's ``dialect`` found no motion in a program of another family."""
+    other = next((one for one in DIALECTS.values() if one.claims(path, raw)), dialect)
+    if other.family != dialect.family:
+        message = (
+            f"dialect.name: the cell states {dialect.name}, and {path.name} is a program in {other.family}"
+        )
+        help = "remove dialect.name, which detects the language of each program, or name another cell with --cell"
+        raise Refusal(Finding("CEL008", message, str(cell.path), cell.dialect_line, help=help))
 
 
 def find_cell_beside(program: Path) -> Cell | None:
@@ -214,6 +233,7 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     spacing = np.maximum(cell.min_segment, 1e-3 * cell.cycle_ms * np.nan_to_num(path.feed))
     task = add_lost_motion(task, start, spacing)
     findings = [
+        *cell.findings,
         *_read_findings(program, path),
         *orientation_findings,
         *force.findings,

@@ -34,6 +34,7 @@ from postproc.output.write import (
     write,
     writing_settings,
 )
+from postproc.process import not_requested
 from postproc.report.corrections_csv import corrections_csv
 from postproc.report.diff import unified_diff
 from postproc.report.page import beside, program_page
@@ -94,6 +95,8 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
                 help="compensate the original instead, or use --allow-compensated if this is intended",
             )
         )
+    if request.force is None and ready.task.process:
+        raise Refusal(not_requested(request.program, program.toolpath, ready.cell), *program.findings)
     stage("correcting")
     target = _target(request)
     excluded: dict[int, Finding] = {}
@@ -214,8 +217,7 @@ def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list
     path, tolerance = ready.task.toolpath, ready.cell.tolerance
     corrected = result.corrected
     if ready.task.process and not ready.wrenches.any:
-        reason = "--force is not given" if request.force is None else "no motion has a force"
-        findings.append(Finding("COR010", f"{reason}: nothing is corrected", file))
+        findings.append(Finding("COR010", "no motion has a force: nothing is corrected", file))
     if division.inserted or len(division.lead_ins):
         changed = (division.role != Role.ORIGINAL) | (division.moved & ~corrected[division.source])
         findings.append(

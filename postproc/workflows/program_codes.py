@@ -103,8 +103,8 @@ CODES = define(
             "no force",
             meaning="No motion has a force.",
             consequence="The tool is not loaded, so nothing is corrected and the output equals the input.",
-            action="Give a force with --force if the program cuts.",
-            example="`compensate panel.src` without --force.",
+            action="State the forces of the cuts, if the program cuts.",
+            example="`--force 0,0,0`, or FORCE OFF for the whole program.",
         ),
         "COR012": Code(
             "info",

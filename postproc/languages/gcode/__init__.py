@@ -42,6 +42,10 @@ class GcodeDialect:
         return self.control.name
 
     @property
+    def family(self) -> str:
+        return "G-code"
+
+    @property
     def letters(self) -> bytes:
         """Those of coordinates, of G and F that hold for inserted blocks too, and of CIP and EX."""
         return b"ABCEFGIJKPRXYZ"

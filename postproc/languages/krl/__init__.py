@@ -34,6 +34,7 @@ class KrlDialect:
     """KRL as a ``Dialect``."""
 
     name = "krl"
+    family = "KRL"
     letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ"  # points have names
 
     def claims(self, path: Path, raw: bytes) -> bool:
