@@ -84,8 +84,8 @@ def test_every_motion_ends_where_it_should(compensate, job):
     assert [int(row["line"]) for row in rows if row["state"] == "lead_in"] == [8, 17]
 
 
-def test_without_force_nothing_changes(compensate, job):
-    done = compensate(job.program)
+def test_a_force_of_zero_changes_nothing(compensate, job):
+    done = compensate(job.program, "--force=0,0,0")
     assert done.code == 0
     assert job.output.read_bytes() == job.program.read_bytes()
 

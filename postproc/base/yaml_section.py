@@ -126,7 +126,9 @@ class YamlSection:
                     "YML002",
                     f"the key is unknown{nearest(key, allowed)}",
                     key,
-                    "these are allowed here: " + ", ".join(allowed),
+                    "a comma separates two keys here: write decimals with a point"
+                    if key.isdigit()
+                    else "these are allowed here: " + ", ".join(allowed),
                 )
 
     def line_of(self, key: str) -> int:
@@ -305,7 +307,7 @@ def parsed(raw: bytes, path: Path) -> YamlSection:
     if node is None:
         raise Refusal(Finding("FIL002", "the file is empty", str(path)))
     if not isinstance(node, yaml.MappingNode):
-        raise Refusal(_finding(path, node, "YML001", "must contain keys and values"))
+        raise Refusal(_finding(path, node, "YML001", "the file must contain keys and values (YAML)"))
     return YamlSection(node, path, "")
 
 

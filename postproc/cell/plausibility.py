@@ -93,7 +93,7 @@ def _tool(section: YamlSection, tool: Tool) -> Iterator[Finding]:
     reach = float(lengths(tip[None])[0])
     if tip[2] < BEHIND and np.hypot(tip[0], tip[1]) < BESIDE:
         message = (
-            f"the tool centre point is {-tip[2] / MM:g} mm behind the face of the flange, inside the wrist"
+            f"the tool centre point is {-tip[2] / MM:g} mm inside the wrist, on the arm's side of the flange"
         )
         yield _finding(
             section, "CEL006", message, "z", "x y z go from the flange to the tip; +z leaves the flange"
@@ -101,7 +101,7 @@ def _tool(section: YamlSection, tool: Tool) -> Iterator[Finding]:
     elif reach > 0:
         axis = tool.pose.rotation @ tool.axis
         if float(axis @ tip) < POINTS_BACK * reach:
-            message = "the spindle's axis points from the tip back to the flange"
+            message = "the spindle's axis is reversed: it leads from the tip back to the flange"
             help = "axis is the direction from the spindle to the tip, in the tool's axes: change its sign"
             yield _finding(section, "CEL006", message, "axis" if "axis" in section else None, help)
     if tool.mass is not None and 0.0 < tool.mass < TONNES:

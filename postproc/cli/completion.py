@@ -14,7 +14,7 @@ SHELLS = ("bash", "zsh", "fish")
 SPREADSHEETS = (".xlsx", ".xlsm", ".xls", ".ods")
 
 _SURPLUS = re.compile(r"unexpected extra arguments? \((.*)\)")
-_NUMBERS = re.compile(r"[-+]?\.?\d[\d.,;]*(?:@\w+)?\Z")
+_NUMBERS = re.compile(r"[-+]?\.?\d[\d.,;]*(?:@\w+)?\Z|@\w+\Z")
 
 VARIABLE = "_COMPENSATE_COMPLETE"
 """The environment variable by which the script asks for words."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+_PERCENT = re.compile(r"(\d+(?:\.\d*)?)\s*%\Z")
 _COMMA = re.compile(r"[-+]?\d*,\d+\Z")
 
 
@@ -20,6 +21,9 @@ class Decimal(click.FloatRange):
         if isinstance(value, str) and _COMMA.match(value.strip()):
             point = value.strip().replace(",", ".")
             self.fail(f"{value!r} has a decimal comma; write {point}", param, ctx)
+        if isinstance(value, str) and (percent := _PERCENT.match(value.strip())):
+            share = float(percent[1]) / 100.0
+            self.fail(f"{value!r} is a percentage; write {share:g}", param, ctx)
         number = super().convert(value, param, ctx)
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a number", param, ctx)

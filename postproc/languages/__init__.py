@@ -14,10 +14,23 @@ DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (*GCODE, Kr
 """Name -> dialect; the first that claims a file reads it."""
 
 
+_OTHER_FILES = {
+    ".yaml": "a YAML file states a cell, a robot or a process: name the program, and this file with its option",
+    ".yml": "a YAML file states a cell, a robot or a process: name the program, and this file with its option",
+    ".csv": "a CSV file states forces or readings: name the program, and this file with --force",
+    ".mod": "RAPID is not read yet",
+    ".prg": "RAPID is not read yet",
+    ".ls": "Fanuc TP programs are not read yet",
+    ".tp": "Fanuc TP programs are not read yet",
+}
+"""What to do with files of other kinds, by their suffix."""
+
+
 def detect(path: Path, raw: bytes) -> Dialect:
     """The dialect of a file by its name and content; Refusal (FIL009) if it is of none."""
     for dialect in DIALECTS.values():
         if dialect.claims(path, raw):
             return dialect
     known = ", ".join(DIALECTS)
-    raise Refusal(Finding("FIL009", f"the file contains no motion of a known language ({known})", path.name))
+    message = f"the file contains no motion of a known language ({known})"
+    raise Refusal(Finding("FIL009", message, path.name, help=_OTHER_FILES.get(path.suffix.lower(), "")))

@@ -284,5 +284,13 @@ CODES = define(
             ),
             example="`compensate panel.src` in a cell with `correct: process`.",
         ),
+        "FRC031": Code(
+            "warning",
+            "forces are stated twice",
+            meaning="The program has FORCE comments, and a force CSV lies beside it.",
+            consequence="The comments are used, and the CSV is ignored.",
+            action="Name the CSV with --force, or remove what is outdated.",
+            example="`;FORCE 0 360 560` in panel.src, and panel.force.csv.",
+        ),
     }
 )

@@ -138,10 +138,16 @@ def _belonging(given: _Given, cell: Cell) -> SourcedForces:
     """The force that belongs to the program, from the first source that exists."""
     program = given.program
     stated, findings = read_annotations(given.toolpath, str(program))
+    beside = program.with_name(program.stem + ".force.csv")
     if stated is not None:
         given.no_offset("the force comes from FORCE comments")
+        if beside.is_file():
+            message = f"{beside.name} is not used: the FORCE comments of the program come first"
+            findings = (
+                *findings,
+                Finding("FRC031", message, str(program), help=f"use --force {beside.name}"),
+            )
         return stated, findings, "FORCE comments"
-    beside = program.with_name(program.stem + ".force.csv")
     if beside.is_file():
         stated, more, source = given.table(beside)
     elif cell.process is not None:

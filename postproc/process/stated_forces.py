@@ -95,15 +95,14 @@ def parse_force(text: str) -> tuple[tuple[float, ...], int]:
     """The six numbers [N, N m] and the frame (index into FRAMES) of ``0,360,560@base``; raises NotAForce."""
     body, at, name = text.partition("@")
     frame = parse_frame(name) if at else BASE
-    separators = {"," in found for found in _SEPARATOR.findall(body.strip())}
-    if len(separators) > 1:
+    words = _SEPARATOR.split(body.strip())
+    if ";" in body:
+        raise NotAForce("semicolons separate no numbers; use commas or blanks, and a point for decimals")
+    values = [_number(word) for word in words]
+    if len({"," in found for found in _SEPARATOR.findall(body.strip())}) > 1:
         raise NotAForce(
             "it mixes commas and blanks: separate the numbers by one of them, and write decimals with a point"
         )
-    if ";" in body:
-        raise NotAForce("semicolons separate no numbers; use commas or blanks, and a point for decimals")
-    words = _SEPARATOR.split(body.strip())
-    values = [_number(word) for word in words]
     if len(values) not in (3, 6):
         raise NotAForce(f"{len(values)} numbers are given where 3 or 6 are needed")
     return (*values, *[0.0] * (6 - len(values))), frame

@@ -20,6 +20,9 @@ from postproc.process.path_length import SMOOTH_TURN, MotionRuns, PathLength
 from postproc.process.stated_forces import BASE, FEED, TOOL, WORLD, StatedForces
 from postproc.toolpath import Kind, Toolpath
 
+MOST = 1e5
+"""[N, N m] No robot carries a larger force."""
+
 JUMP = float(2 * np.sin(SMOOTH_TURN / 2))
 """A force that changes by more than this share of the larger one is a step: as much as a turn of SMOOTH_TURN makes."""
 
@@ -212,6 +215,10 @@ def turn_to_robot_axes(
     carries = stated.acts & ~is_air(toolpath)
     if not np.any(carries):
         return Wrenches.zero(len(toolpath), source, findings)
+    if np.abs(stated.values).max() > MOST or np.abs(stated.start_values).max() > MOST:
+        largest = max(np.abs(stated.values).max(), np.abs(stated.start_values).max())
+        message = f"{source}: no robot carries a force of {largest:.3g} N (or N m)"
+        raise Refusal(Finding("FRC002", message, file, help="state forces in N and moments in N m"))
     _check_world(stated, carries, toolpath, frames, file)
     path_length = PathLength(toolpath, frames)
     runs = MotionRuns(path_length, carries)

@@ -139,9 +139,9 @@ def show_findings(console: Console, findings: Sequence[Finding], verbose: bool =
         line.append(finding.code, style=_STYLES[finding.severity])
         line.append(" " + sanitize(finding.message))
         console.print(line, soft_wrap=True)
-        if verbose or finding.severity == "error":
-            advice = finding.advice
-            for part in advice.splitlines():
+        if finding.severity != "info" or verbose:
+            shown = finding.advice if verbose or finding.severity == "error" else finding.help
+            for part in shown.splitlines():
                 console.print(Text("    " + sanitize(part), style="dim"), soft_wrap=True)
 
 

@@ -111,7 +111,7 @@ def read_program(
     companions = dialect.companions(path)
     if any(companion.samefile(path) for companion in companions):
         name = path.with_suffix(".src").name
-        message = f"a {path.suffix} file holds the data of a program; the program is {name}"
+        message = f"a {path.suffix} file contains the data of a program; the program is {name}"
         raise Refusal(Finding("FIL009", message, str(path), help=f"name {name}: its data are read with it"))
     documents = (main, *(read_document(companion) for companion in companions))
     if config_dat is None and cell is not None and cell.config_dat is not None:

@@ -109,6 +109,10 @@ def read_table(path: Path, code: str) -> CsvTable:
         raise Refusal(Finding("FIL002", "the file has no header and no rows", str(path)))
     separator = separator_of(header)
     names = [name.strip().lower() for name in lines.cells(header, at, separator)]
+    if all(is_number(name) for name in names):
+        raise lines.wrong(
+            "the first row consists of numbers; the header is missing, which names the columns", at
+        )
     seen: set[str] = set()
     for index, name in enumerate(names, start=1):
         if not name or name in seen:
