@@ -9,7 +9,28 @@
 
 __version__ = "0.3.0"
 
-__all__ = ["Checked", "Finding", "Refusal", "Report", "__version__", "check", "compensate", "predict"]
+__all__ = [
+    "Batched",
+    "Checked",
+    "Diagnosed",
+    "Finding",
+    "Identified",
+    "Mapped",
+    "Planned",
+    "Refusal",
+    "Report",
+    "Verified",
+    "__version__",
+    "batch",
+    "check",
+    "compensate",
+    "diagnose",
+    "identify",
+    "map",
+    "plan",
+    "predict",
+    "verify",
+]
 
 
 def __getattr__(name: str) -> object:

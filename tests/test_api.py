@@ -92,3 +92,48 @@ def test_mistakes_of_the_caller_are_told(at_samples):
     with pytest.raises(postproc.Refusal) as refusal:
         postproc.check("samples/none.src")
     assert refusal.value.findings[0].code == "FIL001"
+
+
+def test_a_result_is_a_table_a_dictionary_and_a_few_words(at_samples):
+    path = "samples/kr270_taught/taught.src"
+    report = postproc.compensate(path, force=True, dry_run=True)
+    table = report.table()
+    assert set(map(len, table.values())) == {report.motions}
+    cutting = table["error_before_mm"] > 0.01
+    assert cutting.any()
+    assert table["error_after_mm"][cutting].max() == pytest.approx(report.after.max * 1e3)
+    assert report.to_dict() == report.as_json()
+    assert "taught.src" in repr(report)
+    assert len(repr(report)) < 400
+    page = report._repr_html_()
+    assert page.count("<tr>") > 5
+    assert "error_before_mm.max" in page
+    checked = postproc.check(path)
+    assert list(checked.table()["kind"]) == list(table["kind"])
+    assert "x_mm" in checked.table()
+
+
+def test_the_other_commands_from_python(at_samples):
+    path = "samples/kr270_taught/taught.src"
+    done = postproc.verify(path, path, force=True)
+    assert done.original.error.max == done.compensated.error.max > 0
+    assert set(done.table()["program"]) == {"original", "compensated"}
+    batched = postproc.batch("samples/kr270_taught", force=True, output="out", workers=1)
+    assert list(batched.table()["state"]) == ["done"]
+    assert list(batched.table()["error_after_max_mm"]) < list(batched.table()["error_before_max_mm"])
+    planned = postproc.plan(
+        "kuka_kr270", "joint_compliance", 8, "plan.csv", loads=[100.0], tool=(0, 200, 300)
+    )
+    assert len(planned.table()["A1_deg"]) == planned.poses
+    assert "Planned" in repr(planned)
+    with pytest.raises(ValueError, match="needs 3 or 6"):
+        postproc.map("kuka_kr270", x=1, y=2, z=3, force="0,0,-500", tool=(1, 2))
+    with pytest.raises(ValueError, match="from < to"):
+        postproc.map("kuka_kr270", x=(2, 1), y=2, z=3, force="0,0,-500")
+
+
+def test_a_table_becomes_a_data_frame(at_samples):
+    pandas = pytest.importorskip("pandas")
+    frame = postproc.check("samples/kr270_taught/taught.src").to_pandas()
+    assert isinstance(frame, pandas.DataFrame)
+    assert len(frame) == 26

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from postproc.base.findings import SEVERITIES, Finding
+from postproc.report.result import Columns, Result, columns_of
 from postproc.report.result_keys import complete_result
 
 DONE, UNCHANGED, FAILED, NOT_RUN = "done", "unchanged", "failed", "not run"
@@ -32,6 +33,8 @@ WORDS_OF_SUMMARY = (
     "error_before_mm",
     "error_after_mm",
     "correction_mm",
+    "gain",
+    "tolerance_mm",
     "verdict",
     "findings",
     "outputs",
@@ -75,6 +78,11 @@ class Outcome:
         spread = self.result.get(key)
         return spread.get(of) if spread else None
 
+    def number(self, key: str) -> str:
+        """A number of the result as it was stated; ``-`` where nothing was written."""
+        value = self.result.get(key)
+        return "-" if value is None else f"{value:g}"
+
     @property
     def verdict(self) -> str:
         """The verdict in words; ``-`` where nothing was written."""
@@ -96,10 +104,12 @@ class Outcome:
         }
 
 
-@dataclass(frozen=True)
-class Batched:
+@dataclass(frozen=True, repr=False)
+class Batched(Result):
     """A batch.  ``root``: the folder of its results; ``outputs``: the files of its summary; ``skipped_files``:
     that match and are no programs; ``seconds``: of the run."""
+
+    headline = ("done", "unchanged", "failed", "not_run", "exit")
 
     root: Path
     outcomes: tuple[Outcome, ...]
@@ -117,6 +127,22 @@ class Batched:
         """State -> programs, of all states."""
         by_state = Counter(outcome.state for outcome in self.outcomes)
         return {state: by_state[state] for state in STATES}
+
+    def table(self) -> Columns:
+        """One row a program: name, state, figures [mm], verdict, exit."""
+        rows = []
+        for outcome in self.outcomes:
+            figures = {
+                f"{key.removesuffix('_mm')}_max_mm": outcome.figure(key)
+                for key in ("error_before_mm", "error_after_mm", "correction_mm")
+            }
+            plain = {
+                key: outcome.result.get(key) for key in ("motions", "corrected", "uncorrected", "verdict")
+            }
+            rows.append(
+                {"name": outcome.name, "state": outcome.state, **plain, **figures, "exit": outcome.exit}
+            )
+        return columns_of(rows)
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public.  It states no times: the same run gives the same result."""

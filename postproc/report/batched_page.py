@@ -90,6 +90,8 @@ def _row(outcome: Outcome, root: Path) -> dict[str, object]:
         **{key: outcome.result.get(key, "–") for key in ("motions", "corrected", "uncorrected")},
         "before": in_decimals(outcome.figure("error_before_mm"), 3, "–"),
         "after": in_decimals(outcome.figure("error_after_mm"), 4, "–"),
+        "tolerance": outcome.number("tolerance_mm"),
+        "gain": outcome.number("gain"),
         "correction": in_decimals(outcome.figure("correction_mm"), 3, "–"),
         "verdict": outcome.verdict,
         "finding": "" if gravest is None else f"{gravest.code} {printed(gravest.message)}",

@@ -20,7 +20,7 @@ def show_batched(console: Console, batched: Batched, verbose: bool = False) -> N
     table = Table(box=None, pad_edge=False)
     for head in ("program", "state"):
         table.add_column(head, overflow="fold")
-    for head in ("motions", "corrected", "not corrected", "before mm", "after mm"):
+    for head in ("motions", "corrected", "not corrected", "before mm", "after mm", "tolerance mm", "gain"):
         table.add_column(head, justify="right")
     table.add_column("verdict", overflow="fold")
     table.add_column("needs review", overflow="fold")
@@ -53,6 +53,7 @@ def _row(outcome: Outcome) -> tuple[str, ...]:
         *(str(outcome.result.get(key, "-")) for key in ("motions", "corrected", "uncorrected")),
         in_decimals(outcome.figure("error_before_mm"), 3),
         in_decimals(outcome.figure("error_after_mm"), 4),
+        *(outcome.number(key) for key in ("tolerance_mm", "gain")),
         outcome.verdict,
         "" if gravest is None else escape(gravest.code),
     )

@@ -5,17 +5,25 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from postproc.base.findings import CODES, Finding
+from postproc.base.geometry import abc_from_rotation
+from postproc.base.units import DEG, MM
 from postproc.languages.dialect import Program
 from postproc.report.report import exit_code, in_order_of_place
+from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
 from postproc.toolpath import Kind, Toolpath
 
 
-@dataclass(frozen=True)
-class Checked:
+@dataclass(frozen=True, repr=False)
+class Checked(Result):
     """A program that was read."""
+
+    headline = ("program", "dialect", "motions", "exit")
 
     program: Program
 
@@ -50,6 +58,19 @@ class Checked:
         yield f"{total} motions{f' ({kinds})' if kinds else ''}: {total - refused} can be corrected, {refused} not"
         for code, count in self.refused.items():
             yield f"  {count} x {code} {CODES[code].title}"
+
+    def table(self) -> Columns:
+        """One row a motion: line, kind, x_mm y_mm z_mm, a_deg b_deg c_deg (KUKA's A, B, C), feed_mm_min; NaN where it
+        is not known."""
+        path = self.toolpath
+        columns: dict[str, Any] = {
+            "line": path.line.copy(),
+            "kind": np.array([kind.name for kind in Kind])[path.kind],
+        }
+        for names, values in (("xyz", path.position / MM), ("abc", abc_from_rotation(path.rotation) / DEG)):
+            unit = "mm" if names == "xyz" else "deg"
+            columns |= {f"{name}_{unit}": column for name, column in zip(names, values.T, strict=True)}
+        return {**columns, "feed_mm_min": path.feed / MM * 60.0}
 
     def as_json(self) -> dict[str, object]:
         result = {

@@ -14,6 +14,7 @@ from postproc.compensation.correct import CorrectionResult, MotionOutcome
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import Subdivision
 from postproc.report.csv_columns import NumberColumn, TextColumn, csv_parts
+from postproc.report.result import Columns
 from postproc.toolpath import Kind, Role
 
 _KINDS = [kind.name for kind in Kind]
@@ -35,10 +36,36 @@ def corrections_csv(
     of ``division``), history."""
 
     def columns(rows: slice) -> list[NumberColumn | TextColumn]:
-        inserted = [] if division is None or path_error is None else _inserted(rows, division, path_error)
-        return [*_motion(rows, task, result), *inserted, *_iterations(rows, result)]
+        return _columns(rows, task, result, division, path_error)
 
     return csv_parts(columns, len(task.toolpath))
+
+
+def correction_table(
+    task: CompensationProblem,
+    result: CorrectionResult,
+    division: Subdivision | None = None,
+    path_error: Floats | None = None,
+) -> Columns:
+    """The same table as columns (N,), one row a motion of the input."""
+    columns = _columns(slice(0, len(task.toolpath)), task, result, division, path_error)
+    return {
+        column.name: column.values
+        if isinstance(column, NumberColumn)
+        else np.array(column.texts)[column.codes]
+        for column in columns
+    }
+
+
+def _columns(
+    rows: slice,
+    task: CompensationProblem,
+    result: CorrectionResult,
+    division: Subdivision | None,
+    path_error: Floats | None,
+) -> list[NumberColumn | TextColumn]:
+    inserted = [] if division is None or path_error is None else _inserted(rows, division, path_error)
+    return [*_motion(rows, task, result), *inserted, *_iterations(rows, result)]
 
 
 def _motion(

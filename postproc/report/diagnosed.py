@@ -21,6 +21,7 @@ from postproc.measurements import Readings
 from postproc.model import STANDARD_GRAVITY
 from postproc.report.report import exit_code
 from postproc.report.residuals import Sizes, gap_of, joint_variables, lengths_of, mm, residuals_csv
+from postproc.report.result import Columns, Result, columns_of
 from postproc.report.result_keys import complete_result
 from postproc.robot.provenance import GAP
 
@@ -57,14 +58,16 @@ class NextPoses:
         return [dict(zip(table, rows[row].tolist(), strict=True)) for row in np.sort(first)]
 
 
-@dataclass(frozen=True, eq=False)
-class Diagnosed:
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosed(Result):
     """The result of ``diagnose``.
 
     data: name and SHA-256 of each file; held_out_before, held_out_after (R, 3) [m]: residuals of each pose by fits
     without this pose, of the robot file as it is and of the final model; robot_file, next_poses_file: as written, None
     where not; outputs: all files written.
     """
+
+    headline = ("robot", "verdict", "gap.before_rms_mm", "gap.after_rms_mm", "exit")
 
     robot: str
     robot_digest: str
@@ -203,6 +206,21 @@ class Diagnosed:
     def patterns(self) -> tuple[ResidualPattern, ...]:
         """Patterns in the residuals of the robot file with its own parameters refitted: signs of a missing effect."""
         return residual_patterns(self.diagnosis.search.base, self.diagnosis.search.final)
+
+    def table(self) -> Columns:
+        """One row a parameter of the named effects: effect, joints, parameter, value, ci95, unit."""
+        return columns_of(
+            [
+                {
+                    "effect": named.effect,
+                    "joints": " ".join(named.joints),
+                    "parameter": estimate.unknown.parameter.name,
+                    **_parameter(estimate),
+                }
+                for named in self.clear
+                for estimate in named.estimates
+            ]
+        )
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public."""

@@ -25,6 +25,7 @@ from postproc.report.residuals import (
     mm,
     residuals_csv,
 )
+from postproc.report.result import Columns, Result, columns_of
 from postproc.report.result_keys import complete_result
 from postproc.robot.chain import generalized_force
 from postproc.robot.provenance import GAP
@@ -47,14 +48,16 @@ class Sum:
     unit: str
 
 
-@dataclass(frozen=True)
-class Identified:
+@dataclass(frozen=True, repr=False)
+class Identified(Result):
     """The result of ``identify``.
 
     data: name and SHA-256 of each file; effects: as asked for; before, after: without and with the unknowns; fixed:
     dimensions of hardware that are not fitted; held_out_before, held_out_after (R, 3) [m]: residuals of each pose by
     fits without this pose; outliers: rows of the campaign, excluded from both fits or not.
     """
+
+    headline = ("robot", "readings", "rank", "gap.before_rms_mm", "gap.after_rms_mm", "exit")
 
     robot: str
     robot_file: Path
@@ -186,6 +189,10 @@ class Identified:
             return {}
         wide = self.after.quantile * self.bootstrap.deviation
         return {u.name: w for u, w in zip(self.after.unknowns, wide.tolist(), strict=True)}
+
+    def table(self) -> Columns:
+        """One row a parameter: parameter, value, ci95, unit, before."""
+        return columns_of([{"parameter": e.unknown.name, **self._parameter(e)} for e in self.after.estimates])
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public."""

@@ -18,6 +18,7 @@ from postproc.base.findings import Finding
 from postproc.base.geometry import abc_from_rotation
 from postproc.base.units import DEG, MM
 from postproc.placement.workspace_map import MapLoad, WorkspaceMap
+from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
 from postproc.report.terminal import show_findings
 
@@ -62,14 +63,16 @@ class MappedQuantity:
         return {"min": round(least.value / MM, 7), "max": round(greatest.value / MM, 7)}
 
 
-@dataclass(frozen=True)
-class Mapped:
+@dataclass(frozen=True, repr=False)
+class Mapped(Result):
     """The result of ``compensate map``.
 
     ``axes``: names and units (deg, mm) of the robot's axes; ``frame``: that of the stated force ``stated`` (6,)
     [N, N m]; ``sign``: of the compensator's eq. (3), None without compensator; ``status``: None for an arm that has
     none.
     """
+
+    headline = ("robot", "cells", "unreachable", "deflection_mm.min", "deflection_mm.max", "exit")
 
     survey: WorkspaceMap
     load: MapLoad
@@ -124,6 +127,14 @@ class Mapped:
     def place(self, row: int) -> dict[str, float]:
         """Coordinates [mm] of a cell."""
         return dict(zip(("x_mm", "y_mm", "z_mm"), _mm(self.survey.grid.positions[row]), strict=True))
+
+    def table(self) -> Columns:
+        """One row a cell, the columns of ``--csv``: place, deflection, difference, axes; NaN where there is none."""
+        return {
+            name: column
+            for names, values, _ in _blocks(self)
+            for name, column in zip(names.split(" "), values.T, strict=True)
+        }
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public."""
@@ -244,13 +255,26 @@ def map_csv(mapped: Mapped) -> bytes:
 
     Empty where there is no value; the axes have values wherever the arm reaches, within its limits or not.
     """
+    heads, columns = [], []
+    for names, values, decimals in _blocks(mapped):
+        heads += names.split(" ")
+        columns += [_texts(column, decimals) for column in values.T]
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(heads)
+    writer.writerows(zip(*columns, strict=True))
+    return stream.getvalue().encode()
+
+
+def _blocks(mapped: Mapped) -> list[tuple[str, Floats, int]]:
+    """Names, values (N, k) and decimals of the columns of a map."""
     survey = mapped.survey
     nothing = np.full(mapped.cells, np.nan)
     without = np.full((mapped.cells, 3), np.nan) if survey.without is None else survey.without
     as_is, bare, difference = (
         nothing if quantity.values is None else quantity.values for quantity in mapped.quantities
     )
-    blocks = [
+    return [
         ("x_mm y_mm z_mm", survey.grid.positions / MM, 6),
         ("reachable", survey.mapped[:, None].astype(float), 0),
         ("dx_mm dy_mm dz_mm", survey.deflection / MM, 6),
@@ -260,15 +284,6 @@ def map_csv(mapped: Mapped) -> bytes:
         ("difference_mm", difference[:, None] / MM, 6),
         (" ".join(f"{axis}_{unit}" for axis, unit in mapped.axes), mapped.axis_values, 6),
     ]
-    heads, columns = [], []
-    for names, values, decimals in blocks:
-        heads += names.split(" ")
-        columns += [_texts(column, decimals) for column in values.T]
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(heads)
-    writer.writerows(zip(*columns, strict=True))
-    return stream.getvalue().encode()
 
 
 def _texts(values: Floats, decimals: int) -> list[str]:

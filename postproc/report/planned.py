@@ -19,6 +19,7 @@ from postproc.experiments.precision import Design, UnobservableParameter
 from postproc.identification.unknowns import Unknown
 from postproc.model import StiffnessModel
 from postproc.report.formatting import fixed, shown_unit
+from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
 from postproc.report.terminal import _once, show_findings
 
@@ -30,8 +31,8 @@ GOALS = {
 }
 
 
-@dataclass(frozen=True)
-class Planned:
+@dataclass(frozen=True, repr=False)
+class Planned(Result):
     """The result of ``compensate plan``.
 
     unknowns (P), ``wanted`` (P,) [SI] and where it is from.  setups: the poses of the plan in their order, of
@@ -40,6 +41,8 @@ class Planned:
     weakly_observable: as unseen, left_out, weak of ``Designs``.  rivals: two effects to be distinguished, and their
     ``separation`` by number of poses.  fixed: dimensions of hardware that are not fitted.
     """
+
+    headline = ("robot", "poses", "readings", "exit")
 
     robot: str
     digest: str
@@ -83,6 +86,17 @@ class Planned:
             return "each unloaded" if not self.setups_offered.loads[0] else f"each with {loads[0]} kg"
         some = "" if self.setups_offered.each_load else "one of "
         return f"each with {some}{', '.join(loads[:-1])} and {loads[-1]} kg"
+
+    def table(self) -> Columns:
+        """One row a pose, in their order: the axes in deg (mm for a linear one), and the loads hung there in kg."""
+        joints = self.model.robot.joints
+        units = [("mm", MM) if joint.kind == "prismatic" else ("deg", DEG) for joint in joints]
+        axes = {
+            f"{joint.name}_{name}": column / unit
+            for joint, (name, unit), column in zip(joints, units, self.setups.q.T, strict=True)
+        }
+        loads = {f"load_{k + 1}_kg": column for k, column in enumerate(self.setups.load.T)}
+        return {**axes, **loads}
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public.  Intervals in the unit that is with them."""

@@ -14,6 +14,7 @@ from postproc.base.findings import SEVERITIES, Finding
 from postproc.base.units import MM
 from postproc.compensation.path_comparison import Transitions
 from postproc.compensation.uncertainty import Uncertainty
+from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
 
 WITHIN, UNCERTAIN, REVIEW, NOT_CORRECTED = "within_tolerance", "uncertain", "needs_review", "not_corrected"
@@ -93,11 +94,21 @@ class PathFigures:
         }
 
 
-@dataclass(frozen=True)
-class Report:
+@dataclass(frozen=True, repr=False)
+class Report(Result):
     """One program.  ``after``, ``path_error`` (between the points) and ``correction`` are None where nothing was to be
     corrected (predict).  ``uncorrected``: motions that stay as they were although they need a correction.
-    ``tolerance`` [m] of the cell."""
+    ``tolerance`` [m] of the cell; ``motion_table``: see ``table``."""
+
+    headline = (
+        "program",
+        "motions",
+        "corrected",
+        "error_before_mm.max",
+        "error_after_mm.max",
+        "verdict",
+        "exit",
+    )
 
     program: str
     dialect: str
@@ -131,6 +142,12 @@ class Report:
     path: PathFigures | None = None
     path_error_deg: float | None = None
     tolerance: float = np.inf
+    motion_table: Columns | None = None
+
+    def table(self) -> Columns:
+        """One row a motion of the input, the columns of corrections.csv.  Raises ValueError where they were not kept:
+        ``postproc.compensate`` and ``postproc.predict`` keep them."""
+        return super().table() if self.motion_table is None else self.motion_table
 
     @property
     def largest_after(self) -> float:

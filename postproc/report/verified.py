@@ -13,6 +13,7 @@ from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.report.formatting import in_decimals
 from postproc.report.report import Spread
+from postproc.report.result import Columns, Result, columns_of
 from postproc.report.result_keys import complete_result
 from postproc.report.terminal import show_findings
 
@@ -55,6 +56,13 @@ class PathComparison:
     converged: bool
     worst: tuple[WorstError, ...]
 
+    def worst_as_json(self) -> list[dict[str, object]]:
+        """The worst places."""
+        return [
+            {"line": p.line, "mm": round(p.error_mm, 6), "axis": p.axis, "force_n": round(p.force_n, 3)}
+            for p in self.worst
+        ]
+
     def as_json(self) -> dict[str, object]:
         return {
             **self.error.as_mm(),
@@ -69,16 +77,15 @@ class PathComparison:
             "approaches": {"count": self.approaches, "length_mm": round(self.approach_length / MM, 3)},
             "unknown_corners": self.unknown_corners,
             "skipped": self.skipped,
-            "worst": [
-                {"line": p.line, "mm": round(p.error_mm, 6), "axis": p.axis, "force_n": round(p.force_n, 3)}
-                for p in self.worst
-            ],
+            "worst": self.worst_as_json(),
         }
 
 
-@dataclass(frozen=True)
-class Verified:
+@dataclass(frozen=True, repr=False)
+class Verified(Result):
     """Two programs under the same forces; step, tolerance [m], tolerance_angle [rad]."""
+
+    headline = ("original.max", "compensated.max", "tolerance_mm", "exit")
 
     original_file: str
     compensated_file: str
@@ -93,6 +100,12 @@ class Verified:
     compensated: PathComparison
     findings: tuple[Finding, ...]
     exit: int
+
+    def table(self) -> Columns:
+        """The worst places of both programs: program, line, mm, axis, force_n."""
+        programs = (("original", self.original), ("compensated", self.compensated))
+        rows = [{"program": name, **place} for name, one in programs for place in one.worst_as_json()]
+        return columns_of(rows)
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public."""

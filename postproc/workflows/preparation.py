@@ -48,7 +48,8 @@ Stage = Callable[[str], None]
 class Request:
     """What the user asked for.  ``force``: None without ``--force``, "" for a bare one, else its value;
     ``tare``: the mean of a force log in air is subtracted; ``allow_compensated``: a program that carries the mark of an
-    earlier compensation is accepted; ``no_insert``: no motion is inserted; ``shared_points``: as of ``Writing``."""
+    earlier compensation is accepted; ``no_insert``: no motion is inserted; ``shared_points``: as of ``Writing``;
+    ``keep_table``: the report keeps the table of its motions."""
 
     program: Path
     force: str | None = None
@@ -65,6 +66,7 @@ class Request:
     shared_points: str = "copy-inline"
     config_dat: Path | None = None
     tare: bool = False
+    keep_table: bool = False
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ from postproc.output.write import (
     writing_settings,
 )
 from postproc.process import not_requested
-from postproc.report.corrections_csv import corrections_csv
+from postproc.report.corrections_csv import correction_table, corrections_csv
 from postproc.report.diff import unified_diff
 from postproc.report.page import beside, program_page
 from postproc.report.page_data import page_data
@@ -58,6 +58,8 @@ def predict(request: Request, stage: Stage = silent) -> Report:
     result = correct(replace(ready.task, gain=0.0))
     findings = in_order_of_place([*ready.findings, *result.findings])
     report = report_of(request, ready, result, findings)
+    if request.keep_table:
+        report = replace(report, motion_table=correction_table(ready.task, result))
     files: dict[Path, Content] = {}
     pages = [] if request.json is None else [request.json]
     shown: Path | None = None
@@ -137,6 +139,9 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     if report.exit == 1:
         raise Refusal(*report.findings)
     report = replace(report, outputs=tuple(str(path) for path in (*paths, *names)))
+    if request.keep_table:
+        table = correction_table(task, result, written.division, written.path_error)
+        report = replace(report, motion_table=table)
     _not_over_inputs(ready, report.outputs)
     if request.dry_run:
         return replace(report, outputs=())
