@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from postproc.base import input_files, yaml_section
 from postproc.base.findings import Code
-from postproc.batch import codes as batch
+from postproc.batching import codes as batch
 from postproc.cell import codes as cell
 from postproc.compensation import codes as compensation
 from postproc.diagnosis import codes as diagnosis

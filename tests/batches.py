@@ -6,7 +6,7 @@ from pathlib import Path
 
 from conftest import CELL, LINES
 
-from postproc.batch.job_file import Job
+from postproc.batching.job_file import Job
 from postproc.workflows.preparation import Request
 
 WRONG = [line.replace("LIN {X 100.000", "LIN {X 99999.000") for line in LINES]

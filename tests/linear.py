@@ -260,7 +260,7 @@ def _yaml(kind: str) -> Callable[[Path, bytes], None]:
             importlib.import_module("postproc.cell.read_cell").load_cell(path)
         else:
             (folder / "a.src").write_text(KRL_HEAD + "END\n")
-            importlib.import_module("postproc.batch.job_file").jobs_of([str(path)], {})
+            importlib.import_module("postproc.batching.job_file").jobs_of([str(path)], {})
 
     return read
 

@@ -12,9 +12,9 @@ import pytest
 from batches import WRONG, contents, four_programs, program
 from conftest import CELL, LINES
 
-from postproc.batch.files_read import code_digest
-from postproc.batch.item import BatchItem, run_item
-from postproc.batch.job_file import jobs_of
+from postproc.batching.files_read import code_digest
+from postproc.batching.item import BatchItem, run_item
+from postproc.batching.job_file import jobs_of
 from postproc.report.batched import Outcome
 
 ROBOT = Path(__file__).resolve().parent.parent / "robots" / "kuka_kr270.yaml"

@@ -14,10 +14,10 @@ from conftest import CELL
 from test_batch_killed import a_long_program
 
 from postproc.base.findings import Refusal
-from postproc.batch.cluster import run_on_cluster
-from postproc.batch.files_read import code_digest
-from postproc.batch.item import BatchItem
-from postproc.batch.job_file import jobs_of
+from postproc.batching.cluster import run_on_cluster
+from postproc.batching.files_read import code_digest
+from postproc.batching.item import BatchItem
+from postproc.batching.job_file import jobs_of
 
 PROGRAMS = 8
 
@@ -111,7 +111,7 @@ def test_one_that_fails_stops_no_other(compensate, parts, cluster):
 
 
 def test_no_cluster_is_told_before_anything_begins(compensate, parts, monkeypatch):
-    from postproc.batch import cluster as module
+    from postproc.batching import cluster as module
 
     monkeypatch.setattr(module, "PATIENCE", 1.0)
     with socket.socket() as free:
@@ -132,7 +132,7 @@ def test_what_is_no_address_is_told_at_once(address):
 
 @pytest.mark.slow
 def test_a_cluster_without_workers_is_told(parts, monkeypatch):
-    from postproc.batch import cluster as module
+    from postproc.batching import cluster as module
 
     monkeypatch.setattr(module, "PATIENCE", 2.0)
     with (

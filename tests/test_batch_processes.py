@@ -15,11 +15,11 @@ from batches import a_job, four_programs, program
 from conftest import CELL
 
 from postproc.base.findings import Refusal
-from postproc.batch import files_read as reading
-from postproc.batch.files_read import code_digest, digest_of, readings
-from postproc.batch.item import BatchItem, run_item
-from postproc.batch.locking import locked
-from postproc.batch.processes import run_here
+from postproc.batching import files_read as reading
+from postproc.batching.files_read import code_digest, digest_of, readings
+from postproc.batching.item import BatchItem, run_item
+from postproc.batching.locking import locked
+from postproc.batching.processes import run_here
 from postproc.report.batched import Outcome
 
 
@@ -77,7 +77,7 @@ def test_a_defect_is_an_outcome(parts, monkeypatch):
 HOLD = """
 import sys
 from pathlib import Path
-from postproc.batch.locking import locked
+from postproc.batching.locking import locked
 with locked(Path(sys.argv[1])):
     print("held", flush=True)
     sys.stdin.read()
@@ -118,7 +118,7 @@ def test_a_lock_waits_for_its_holder_and_survives_its_death(tmp_path):
 COUNT = """
 import sys
 from pathlib import Path
-from postproc.batch.locking import locked
+from postproc.batching.locking import locked
 counter = Path(sys.argv[1])
 for _ in range(150):
     with locked(counter.parent / "state" / "x.lock"):

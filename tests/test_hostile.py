@@ -445,7 +445,7 @@ ATTRIBUTES = frozenset(
     ]
 )
 ALLOWED = {
-    ("batch/cluster.py", "distributed"),
+    ("batching/cluster.py", "distributed"),
     ("__init__.py", "import_module"),
     ("base/memory.py", "ctypes"),
 }

@@ -16,9 +16,9 @@ import postproc
 from postproc.base.findings import Refusal
 from postproc.base.input_files import note, noted
 from postproc.base.read_files import read_file
-from postproc.batch.files_read import code_digest
-from postproc.batch.item import BatchItem, run_item
-from postproc.batch.job_file import Job
+from postproc.batching.files_read import code_digest
+from postproc.batching.item import BatchItem, run_item
+from postproc.batching.job_file import Job
 from postproc.workflows.preparation import Request
 from postproc.workflows.program import compensate, predict
 from postproc.workflows.verify import verify
@@ -264,7 +264,7 @@ def test_a_run_inside_of_another_has_its_own_inputs(tmp_path):
 
 READERS = {"read_bytes", "read_text", "open"}
 ELSEWHERE = (
-    "batch/",
+    "batching/",
     "output/atomic_write.py",
     "base/read_files.py",
     "base/input_files.py",

@@ -78,7 +78,7 @@ ALLOWED = {
     ("robot/", "link"): "of an arm, as a URDF calls it",
     ("effects/", "link"): "of an arm",
     ("effects/", "links"): "of an arm",
-    ("batch/", "link"): "a symbolic link of the file system",
+    ("batching/", "link"): "a symbolic link of the file system",
     ("workflows/program.py", "link"): "a symbolic link of the file system",
 }
 """(Where, an old word) -> the meaning in which it is right there."""

@@ -11,7 +11,7 @@ from conftest import CELL
 
 import postproc
 from postproc.base.findings import Refusal
-from postproc.batch.job_file import PROGRAM_KEYS, jobs_of
+from postproc.batching.job_file import PROGRAM_KEYS, jobs_of
 from postproc.cli.common import FORMER_NAMES, RenamedOption
 from postproc.cli.main import COMMANDS
 from postproc.workflows.option_names import FORMER_OPTIONS, FORMER_VALUES

@@ -13,7 +13,7 @@ from conftest import CELL
 
 from postproc.base.findings import Refusal
 from postproc.base.yaml_section import parsed
-from postproc.batch.job_file import FORMER_KEYS, JOB_KEYS, PROGRAM_KEYS, jobs_of
+from postproc.batching.job_file import FORMER_KEYS, JOB_KEYS, PROGRAM_KEYS, jobs_of
 from postproc.cell import KEYS, load_cell
 from postproc.effects import EFFECTS
 from postproc.model import StiffnessModel

@@ -19,7 +19,7 @@ from postproc.base.units import DEG, MM
 from postproc.base.yaml_section import YamlSection, load
 from postproc.cell.controller_state import read_program_start, read_symbols
 from postproc.cell.description import MODES, Cell, Controller, ForceVectorInterval, Tool
-from postproc.cell.plausibility import implausible
+from postproc.cell.implausible import implausible
 from postproc.robot.read_external_axes import read_external
 
 NAME = "cell.yaml"

@@ -21,12 +21,12 @@ from postproc.cli.common import (
     result_options,
     tare_option,
 )
-from postproc.cli.decimals import Decimal
+from postproc.cli.decimal_option import Decimal
 from postproc.cli.signals import Stopped
 
 if TYPE_CHECKING:
-    from postproc.batch.batch import Watch
-    from postproc.batch.job_file import Jobs
+    from postproc.batching.batch import Watch
+    from postproc.batching.job_file import Jobs
     from postproc.report.batched import Outcome
 
 
@@ -127,7 +127,7 @@ def batch(
     if dask is not None and workers is not None:
         raise click.UsageError("--workers applies to this machine; a Dask cluster has its own workers")
 
-    from postproc.batch.batch import BatchRequest, run_batch
+    from postproc.batching.batch import BatchRequest, run_batch
     from postproc.report.batched_terminal import show_batched
 
     if force is not None and force.lower().endswith((".csv", ".yaml", ".yml")):
@@ -185,7 +185,7 @@ def _watched(out: Out) -> Iterator[Watch | None]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     from postproc.base.sanitize import sanitize
-    from postproc.batch.batch import Watch
+    from postproc.batching.batch import Watch
 
     columns = (
         BarColumn(bar_width=24),

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from postproc.cli.common import FAR, ROBOT, Numbers, Out, ending, number, numbers, result_options, tool_place
-from postproc.cli.decimals import Decimal
+from postproc.cli.decimal_option import Decimal
 from postproc.cli.identify import _words
 
 MOST = 200

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from postproc.cli.common import Out, allow_compensated_option, insertion_options, program_options
-from postproc.cli.decimals import Decimal
+from postproc.cli.decimal_option import Decimal
 from postproc.workflows.option_names import SHARED_POINTS
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from postproc.cli.common import ROBOT, Out, language_options, result_options, tare_option
-from postproc.cli.decimals import Decimal
+from postproc.cli.decimal_option import Decimal
 
 
 @click.command()

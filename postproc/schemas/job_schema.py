@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.batch.job_file import FORMER_KEYS, JOB_KEYS, PROGRAM_KEYS
+from postproc.batching.job_file import FORMER_KEYS, JOB_KEYS, PROGRAM_KEYS
 from postproc.schemas.parts import (
     Schema,
     describe,

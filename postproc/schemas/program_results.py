@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.batch.job_file import FOLDER
+from postproc.batching.job_file import FOLDER
 from postproc.cell import MODES
 from postproc.compensation.correct import MotionOutcome
 from postproc.report.batched import STATES, WORDS_OF_SUMMARY

@@ -41,6 +41,7 @@ from postproc.report.page import beside, program_page
 from postproc.report.page_data import page_data
 from postproc.report.report import Report, in_order_of_place, json_bytes
 from postproc.toolpath import OrientationPath, Role, Toolpath
+from postproc.workflows.corner_findings import corner_findings
 from postproc.workflows.figures import report_of
 from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, silent
 
@@ -233,7 +234,7 @@ def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list
                 int(path.line[division.source[np.argmax(changed)]]),
             )
         )
-    findings += _corners(ready, written)
+    findings += corner_findings(ready, written)
     if request.gain < 1.0:
         share = f"{request.gain:.0%} of the correction is applied, as --gain requests"
         findings.append(Finding("COR007", share, file))
@@ -372,35 +373,6 @@ def _inserted(division: Subdivision, count: int) -> str:
     return (
         f"the output has {counts} (the first one here): {len(division) / max(count, 1):.3f} times the motions"
     )
-
-
-def _corners(ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """Approximated corners of the output that differ from the path of the original by more than the tolerance: where
-    the approximation is stated (COR017), and where it is not (COR015)."""
-    corners, tolerance, findings = written.corners, ready.cell.tolerance, []
-    if ready.task.gain < 1.0:  # a share of the correction moves corners as it moves the rest
-        return []
-    for code, stated in (("COR017", ~corners.unknown), ("COR015", corners.unknown)):
-        above = stated & ~(corners.difference <= tolerance)
-        if not above.any():
-            continue
-        worst = int(np.argmax(np.where(above, np.nan_to_num(corners.difference, posinf=np.inf), -1.0)))
-        off, distance = corners.difference[worst] / MM, corners.distance[worst] / MM
-        limit = f"tolerance {tolerance / MM:g} mm ({int(above.sum())} corners, the worst here)"
-        message = f"a corner that the controller approximates from {distance:.2f} mm on differs"
-        if code == "COR015":
-            message = (
-                f"no approximation distance is stated; with the largest possible one,"
-                f" {distance:.2f} mm, a corner differs"
-            )
-        message += f" by {off:.4f} mm from that of the original, {limit}"
-        help = (
-            "use a smaller approximation distance there, or state a longer force_ramp in the cell if"
-            " the force changes more slowly"
-        )
-        line = int(ready.task.toolpath.line[corners.row[worst]])
-        findings.append(Finding(code, message, ready.task.file, line, help=help))
-    return findings
 
 
 _NO_POINT = (

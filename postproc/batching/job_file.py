@@ -15,7 +15,7 @@ import yaml
 
 from postproc.base.findings import Finding, Refusal, nearest
 from postproc.base.yaml_section import YamlSection, parsed, read
-from postproc.batch.programs import find_programs, is_inside
+from postproc.batching.programs import find_programs, is_inside
 from postproc.process.stated_forces import FORM, NotAForce, parse_force
 from postproc.robot.description import find_robot
 from postproc.workflows.option_names import FORMER_OPTIONS, FORMER_VALUES, SHARED_POINTS, present_value

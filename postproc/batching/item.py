@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from postproc.base.findings import Finding, Refusal
-from postproc.batch.files_read import code_digest, readings
-from postproc.batch.job_file import Job
-from postproc.batch.locking import locked
-from postproc.batch.records import Record, load_record, lock_path, save_record, sweep
+from postproc.batching.files_read import code_digest, readings
+from postproc.batching.job_file import Job
+from postproc.batching.locking import locked
+from postproc.batching.records import Record, load_record, lock_path, save_record, sweep
 from postproc.report.batched import DONE, FAILED, UNCHANGED, Outcome
 from postproc.report.report import failure
 

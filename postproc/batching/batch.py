@@ -9,13 +9,13 @@ from pathlib import Path
 
 import postproc.codes  # noqa: F401  a worker reports findings of any room
 from postproc.base.batches import cores
-from postproc.batch.cluster import run_on_cluster
-from postproc.batch.files_read import code_digest
-from postproc.batch.item import BatchItem
-from postproc.batch.job_file import Jobs, OptionValues, jobs_of
-from postproc.batch.locking import locked
-from postproc.batch.processes import run_here
-from postproc.batch.records import lock_path
+from postproc.batching.cluster import run_on_cluster
+from postproc.batching.files_read import code_digest
+from postproc.batching.item import BatchItem
+from postproc.batching.job_file import Jobs, OptionValues, jobs_of
+from postproc.batching.locking import locked
+from postproc.batching.processes import run_here
+from postproc.batching.records import lock_path
 from postproc.output.atomic_write import write_atomically
 from postproc.report.batched import Batched, Outcome, not_run, summary_json
 from postproc.report.batched_page import batch_page

@@ -10,9 +10,9 @@ from concurrent.futures import CancelledError
 from typing import Any
 
 from postproc.base.findings import Finding, Refusal
-from postproc.batch.files_read import code_digest
-from postproc.batch.item import BatchItem, failed, run_item
-from postproc.batch.processes import Stages, died
+from postproc.batching.files_read import code_digest
+from postproc.batching.item import BatchItem, failed, run_item
+from postproc.batching.processes import Stages, died
 from postproc.report.batched import Outcome
 
 PATIENCE = 30.0

@@ -17,7 +17,7 @@ from types import FrameType
 
 from postproc.base.batches import THREADS, cores
 from postproc.base.findings import Finding
-from postproc.batch.item import BatchItem, failed, run_item
+from postproc.batching.item import BatchItem, failed, run_item
 from postproc.report.batched import Outcome
 
 ATTEMPTS = 2

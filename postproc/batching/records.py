@@ -14,8 +14,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from postproc.base.findings import Refusal
-from postproc.batch.files_read import ABSENT, code_digest, digest_of
-from postproc.batch.job_file import Job
+from postproc.batching.files_read import ABSENT, code_digest, digest_of
+from postproc.batching.job_file import Job
 from postproc.cell import find_cell
 from postproc.output import atomic_write
 

@@ -87,7 +87,16 @@ def _belongs(path: Path, programs: set[Path]) -> bool:
     return path.name == CELL or path.with_name(path.name.partition(".")[0]) in programs
 
 
+NO_PROGRAMS = frozenset(
+    f".{suffix}"
+    for suffix in ("py", "md", "html", "json", "yaml", "yml", "csv", "diff", "svg", "png", "pdf", "log")
+)
+"""Suffixes of files that may quote a program and are none."""
+
+
 def _is_program(path: Path) -> bool:
+    if path.suffix.lower() in NO_PROGRAMS:
+        return False
     try:
         with path.open("rb") as stream:
             head = stream.read(HEAD)
