@@ -11,6 +11,8 @@ import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from filelock import FileLock, Timeout
+
 from postproc.base.system import WINDOWS
 
 POLL = 0.02
@@ -24,8 +26,6 @@ def lock_file(path: Path, waits: Callable[[], None] = lambda: None) -> Iterator[
     The file exists only while it is locked, or was when its process was killed; an orphaned one is free to take.  A
     symbolic link of this name is not followed.  Raises OSError where the folder takes no file.
     """
-    from filelock import FileLock, Timeout
-
     lock = FileLock(path, poll_interval=POLL)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # that it locks by the file's existence is not the user's concern

@@ -25,7 +25,7 @@ from postproc.cli.schema import schema
 from postproc.cli.signals import ended_in_words
 from postproc.cli.streams import guarded_streams
 from postproc.cli.verify import verify
-from postproc.output.atomic_write import publications
+from postproc.output.publications import publications
 
 COMMANDS = {
     "program": program,

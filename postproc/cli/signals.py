@@ -13,7 +13,7 @@ from typing import NoReturn
 
 from postproc.base.sanitize import sanitize
 from postproc.cli.streams import GuardedStream
-from postproc.output.atomic_write import publications
+from postproc.output.publications import publications
 
 SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)

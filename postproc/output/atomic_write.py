@@ -15,6 +15,7 @@ from pathlib import Path
 from postproc.base import system
 from postproc.base.findings import Code, Finding, Refusal, define
 from postproc.base.locks import lock_file
+from postproc.output.publications import note_publication
 
 CODES = define(
     {
@@ -59,20 +60,6 @@ def write_atomically(
     """
     with contextlib.ExitStack() as locks:
         _publish(files, last, still, locks)
-
-
-class _Published:
-    """How often files were written."""
-
-    count = 0
-
-
-_published = _Published()
-
-
-def publications() -> int:
-    """How often this process has written files; from the moment at which they are not taken back any more."""
-    return _published.count
 
 
 def sweep(files: Iterable[Path]) -> None:
@@ -122,7 +109,7 @@ def _publish(
             _rename(ready[at], at)
         for folder in {path.parent for path in files}:
             _sync_folder(folder)
-        _published.count += 1
+        note_publication()
     except BaseException as error:
         for path in reversed(placed):
             if not ready[path].exists():
