@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import unicodedata
 from collections.abc import Iterable
 from pathlib import Path, PureWindowsPath
+
+from postproc.base.sanitize import sanitize
 
 WINDOWS = sys.platform == "win32"
 
@@ -72,3 +75,32 @@ def _is_one_file(place: str, other: str) -> bool:
 
 def _folded(place: str) -> str:
     return unicodedata.normalize("NFC", place).casefold()
+
+
+NO_MEMORY = "the memory of this machine is too small for this run"
+
+_NO_MEMORY = (
+    "can't start new thread",
+    "failed to map segment",
+    "cannot allocate memory",
+    "Cannot allocate memory",
+)
+"""What else says that there is no memory: no room for a thread's stack or for a library."""
+
+LONGEST_NAME = 80
+"""Characters of a name of a file that a message shows."""
+
+
+def refusal_of_the_system(error: BaseException | None) -> str:
+    """What the system did not give, in words; an empty text for a defect of this program."""
+    while error is not None:
+        if isinstance(error, MemoryError) or any(words in str(error) for words in _NO_MEMORY):
+            return NO_MEMORY
+        if isinstance(error, OSError) and error.errno is not None:
+            if error.errno in (errno.EMFILE, errno.ENFILE):
+                return "this process may open too few files (ulimit -n)"
+            name = sanitize(str(error.filename or ""))
+            name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
+            return f"{name}{': ' if name else ''}{error.strerror}"
+        error = error.__cause__ or error.__context__
+    return ""

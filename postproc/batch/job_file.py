@@ -201,7 +201,7 @@ def _job(program: Path, base: Path, root: Path, options: OptionValues, where: st
         raise Refusal(Finding("BAT003", f"{target.parent} leads out of {root}", help=RESULTS_ARE_LINK))
     if where is not None:
         target = Path(os.path.abspath(root / where))
-        if where.endswith(("/", "\\")) or target.is_dir() or (program.suffix and not target.suffix):
+        if where.endswith(("/", "\\")) or os.path.isdir(target) or (program.suffix and not target.suffix):
             target /= program.name
     request = Request(program=program, output=target, **options)  # type: ignore[arg-type]
     return Job(name.as_posix(), target, request)
@@ -288,7 +288,7 @@ def _former_in(section: YamlSection) -> list[str]:
 
 def _file(section: YamlSection, key: str) -> Path:
     path = section.file.parent / _word(section, key)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise section.error(
             "YML004", f"the file {path} does not exist", key, "paths are relative to the job file"
         )

@@ -13,6 +13,7 @@ import click
 
 from postproc.cli.common import (
     ROBOT,
+    NumberRange,
     Out,
     RenamedOption,
     allow_compensated_option,
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 @tare_option
 @click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cells'.")
 @language_options
-@click.option("--gain", type=click.FloatRange(0.0, 1.0), help="Share of the correction that is applied [1].")
+@click.option("--gain", type=NumberRange(0.0, 1.0), help="Share of the correction that is applied [1].")
 @click.option(
     "-o",
     "--output",

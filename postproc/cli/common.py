@@ -87,6 +87,16 @@ class RenamedOption(click.Option):
         return present, source
 
 
+class NumberRange(click.FloatRange):
+    """A range of numbers, which ``nan`` is not in."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        if math.isnan(number):
+            self.fail(f"{value!r} is not a number", param, ctx)
+        return number
+
+
 def number(word: str, limit: float) -> float:
     """The number that ``word`` is, at most ``limit`` in size.  Raises BadParameter."""
     if not _NUMBER.match(word) or not math.isfinite(float(word)):

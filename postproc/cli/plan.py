@@ -7,7 +7,18 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import FAR, ROBOT, Numbers, Out, ending, number, numbers, result_options, tool_place
+from postproc.cli.common import (
+    FAR,
+    ROBOT,
+    NumberRange,
+    Numbers,
+    Out,
+    ending,
+    number,
+    numbers,
+    result_options,
+    tool_place,
+)
 from postproc.cli.identify import _words
 
 MOST = 200
@@ -139,7 +150,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
 )
 @click.option(
     "--sigma",
-    type=click.FloatRange(0.0, 100.0, min_open=True),
+    type=NumberRange(0.0, 100.0, min_open=True),
     default=0.03,
     show_default=True,
     metavar="MM",
@@ -178,7 +189,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
 )
 @click.option(
     "--cone",
-    type=click.FloatRange(0.0, 180.0, min_open=True),
+    type=NumberRange(0.0, 180.0, min_open=True),
     default=60.0,
     show_default=True,
     metavar="DEG",
@@ -201,7 +212,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
 )
 @click.option(
     "--spacing",
-    type=click.FloatRange(0.0, 90.0),
+    type=NumberRange(0.0, 90.0),
     default=5.0,
     show_default=True,
     metavar="DEG",

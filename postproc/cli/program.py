@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Out, allow_compensated_option, insertion_options, program_options
+from postproc.cli.common import NumberRange, Out, allow_compensated_option, insertion_options, program_options
 from postproc.workflows.option_names import SHARED_POINTS
 
 
@@ -14,7 +14,7 @@ from postproc.workflows.option_names import SHARED_POINTS
 @program_options
 @click.option(
     "--gain",
-    type=click.FloatRange(0.0, 1.0),
+    type=NumberRange(0.0, 1.0),
     default=1.0,
     show_default=True,
     help="Share of the correction that is applied; make first cuts with 0.5.",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 import signal
 import sys
 import traceback
@@ -11,7 +10,7 @@ from collections.abc import Iterator
 from types import FrameType
 from typing import NoReturn
 
-from postproc.base.sanitize import sanitize
+from postproc.base.system import refusal_of_the_system
 from postproc.cli.streams import GuardedStream
 from postproc.output.publications import publications
 
@@ -19,9 +18,6 @@ SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
 )
 """Ctrl-C; the end of the session or of the machine; the end of the terminal; Ctrl-Break on Windows."""
-
-LONGEST_NAME = 80
-"""Characters of a name of a file that a message shows."""
 
 
 class Stopped(SystemExit):
@@ -62,7 +58,7 @@ def ended_in_words(and_exits: bool = False) -> Iterator[None]:
         raise
     except Exception as error:
         written = "files are written already" if publications() > before_run else "nothing is written"
-        why = _refusal_of_the_system(error)
+        why = refusal_of_the_system(error)
         if why:
             _print_error(f"{why}: {written}")
             raise SystemExit(1) from None
@@ -70,34 +66,6 @@ def ended_in_words(and_exits: bool = False) -> Iterator[None]:
     finally:
         for number, handler in before.items() if not (stopped and and_exits) else ():
             signal.signal(number, handler)
-
-
-def _refusal_of_the_system(error: BaseException | None) -> str:
-    """What the system did not give, in words; an empty text for a defect of this program."""
-    while error is not None:
-        text = str(error)
-        if isinstance(error, MemoryError) or any(words in text for words in NO_MEMORY):
-            return "the memory of this machine is too small for this run"
-        if isinstance(error, OSError):
-            if error.errno == errno.ENOMEM:
-                return "the memory of this machine is too small for this run"
-            if error.errno in (errno.EMFILE, errno.ENFILE):
-                return "this process may open too few files (ulimit -n)"
-            if error.errno is not None:
-                name = sanitize(str(error.filename or ""))
-                name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
-                return f"{name}{': ' if name else ''}{error.strerror}"
-        error = error.__cause__ or error.__context__
-    return ""
-
-
-NO_MEMORY = (
-    "can't start new thread",
-    "failed to map segment",
-    "cannot allocate memory",
-    "Cannot allocate memory",
-)
-"""What else says that there is no memory: no room for a thread's stack or for a library."""
 
 
 def _report_defect() -> NoReturn:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import ROBOT, Out, language_options, result_options, tare_option
+from postproc.cli.common import ROBOT, NumberRange, Out, language_options, result_options, tare_option
 
 
 @click.command()
@@ -20,7 +20,7 @@ from postproc.cli.common import ROBOT, Out, language_options, result_options, ta
 @language_options
 @click.option(
     "--step",
-    type=click.FloatRange(0.01, 1000.0),
+    type=NumberRange(0.01, 1000.0),
     default=4.0,
     show_default=True,
     metavar="MM",

@@ -68,7 +68,7 @@ def sweep(files: Iterable[Path]) -> None:
     Waits for runs that write into these folders now, as ``write_atomically`` does; does nothing where the folders take
     no lock file.
     """
-    there = [path for path in files if path.parent.is_dir()]
+    there = [path for path in files if os.path.isdir(path.parent)]
     with contextlib.ExitStack() as locks:
         if _lock_folders({path.parent for path in there}, locks):
             _sweep(there)

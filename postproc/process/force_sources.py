@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -105,7 +106,7 @@ def _belonging(given: _Given, cell: Cell) -> SourcedForces:
         given.no_offset("the force comes from FORCE comments")
         return stated, findings, "FORCE comments"
     beside = program.with_name(program.stem + ".force.csv")
-    if beside.is_file():
+    if os.path.isfile(beside):
         stated, more, source = given.table(beside)
     elif cell.process is not None:
         stated, more, _ = given.process(cell.path.parent / cell.process)
