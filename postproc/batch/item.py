@@ -60,6 +60,16 @@ def failed(job: Job, *findings: Finding, seconds: float = 0.0) -> Outcome:
     return Outcome(job.name, FAILED, failure("program", program, findings), seconds)
 
 
+def recorded(task: BatchItem) -> Outcome | None:
+    """The outcome of a job that is done, of which nobody heard that it is; None where no record says so."""
+    if task.job.request.dry_run:
+        return None
+    record = load_record(task.job)
+    if record is None or not record.holds(task.job):
+        return None
+    return Outcome(task.job.name, DONE, record.result, 0.0)
+
+
 def _run_once(task: BatchItem, report_stage: ReportStage, start_time: float) -> Outcome:
     job = task.job
     before = load_record(job)
