@@ -1,4 +1,4 @@
-"""A cluster whose scheduler or whose client goes away: what is done is reported as done, what nobody wants is not done."""
+"""A cluster whose scheduler or client goes away: what is done is reported as done, what nobody wants is not done."""
 
 from __future__ import annotations
 

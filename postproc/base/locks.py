@@ -41,7 +41,8 @@ def lock_file(path: Path, waits: Callable[[], None] = lambda: None) -> Iterator[
         # one sees that and takes another.
         if not WINDOWS:
             _remove(path)
-        lock.release()
+        with contextlib.suppress(OSError):  # what was done under it is done
+            lock.release()
         if WINDOWS:
             _remove(path)
 
