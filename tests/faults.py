@@ -35,7 +35,7 @@ FORBIDDEN = frozenset(
 OWN_LIBRARY = ("ctypes.dlopen", (None,))
 """But for the C library that this process has already, which gives memory back."""
 
-TEMPORARY = re.compile(r"\..*\.tmp(\.old)?")
+TEMPORARY = re.compile(r"\..*\.tmp(\.old)?|\.compensate\.lock")
 
 
 class Child:

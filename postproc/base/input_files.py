@@ -14,6 +14,7 @@ from contextvars import ContextVar
 from pathlib import Path
 
 from postproc.base.findings import Code, Finding, Refusal, define
+from postproc.base.system import FileSet
 
 CODES = define(
     {
@@ -92,11 +93,11 @@ class Inputs:
 
     def refuse_outputs(self, outputs: Iterable[Path], named: Iterable[Path] = ()) -> None:
         """Refusal FIL007 for every output that is one of these files, or of those that are ``named`` and not read."""
-        inputs = {place(path) for path in (*self.digests, *named)}
+        inputs = FileSet((*self.digests, *named))
         findings = [
             Finding("FIL007", "this output is an input of the same run", str(path))
             for path in outputs
-            if place(path) in inputs
+            if path in inputs
         ]
         if findings:
             raise Refusal(*findings)
@@ -104,7 +105,7 @@ class Inputs:
 
 def place(path: Path) -> Path:
     """Where a path leads, to be compared with others; a link that leads to itself is its own place."""
-    return Path(os.path.realpath(path))
+    return Path(os.path.normcase(os.path.realpath(path)))
 
 
 @contextlib.contextmanager

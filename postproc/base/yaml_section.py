@@ -68,6 +68,9 @@ MAX_DEPTH = 20
 MAX_NODES = 100_000
 """Values, lists and mappings: PyYAML takes 20 us and 500 bytes for each."""
 _NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?\Z")
+_NONZERO = re.compile(r"[^eE]*[1-9]")
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Sizes of a number between which no product or quotient of two of them leaves the numbers of the machine."""
 _NULLS = ("", "~", "null", "Null", "NULL")
 _FLAGS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
 # no path and no terminal takes these; an escape in quotes (\0, \uD800) makes them
@@ -260,8 +263,10 @@ class YamlSection:
             help = f"write a number in {unit}, without the unit" if unit else ""
             raise self.error("YML004", f"{shown} is not a number", key, help)
         value = float(node.value)
-        if not math.isfinite(value):
+        if abs(value) > LARGEST:
             raise self.error("YML004", f"{node.value[:40]} is too large", key)
+        if 0.0 < abs(value) < SMALLEST or (value == 0.0 and _NONZERO.match(node.value)):
+            raise self.error("YML004", f"{node.value[:40]} is too small; write 0 instead", key)
         return value
 
 

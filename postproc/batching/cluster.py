@@ -11,7 +11,7 @@ from typing import Any
 
 from postproc.base.findings import Finding, Refusal
 from postproc.batching.files_read import code_digest
-from postproc.batching.item import BatchItem, failed, run_item
+from postproc.batching.item import BatchItem, failed, recorded, run_item
 from postproc.batching.processes import Stages, died
 from postproc.report.batched import Outcome
 
@@ -29,7 +29,8 @@ def run_on_cluster(
     """Do the tasks on the cluster whose scheduler is at ``address``; yields (number, outcome) as they are done.
 
     The scheduler gives the tasks of a worker that died to another one.  Where it is lost itself, or all of its workers
-    for longer than ``PATIENCE``, the remaining tasks fail.  Raises Refusal BAT006, before anything is done, where
+    for longer than ``PATIENCE``, the remaining tasks fail, but for those that are on record as done.  Workers stop what
+    they do for a client that is gone, before they write it.  Raises Refusal BAT006, before anything is done, where
     the cluster is not there, has no workers, or workers of another version.
     """
     if not _ADDRESS.fullmatch(address):  # the client would wait for it, and end in a traceback
@@ -45,7 +46,7 @@ def run_on_cluster(
         _check(client, address)
         name = uuid.uuid4().hex
         pending = {
-            client.submit(run_item, task, key=f"compensate-{name}-{number}", pure=False): number
+            client.submit(_run_on_worker, task, key=f"compensate-{name}-{number}", pure=False): number
             for number, task in enumerate(tasks)
         }
         try:
@@ -56,7 +57,8 @@ def run_on_cluster(
                     yield number, _outcome(distributed, tasks[number], future)
                 if lost:
                     for number in pending.values():
-                        yield number, failed(tasks[number].job, _finding(f"{lost}: {address}"))
+                        lost_item = failed(tasks[number].job, _finding(f"{lost}: {address}"))
+                        yield number, recorded(tasks[number]) or lost_item
                     return
         finally:
             client.cancel(list(pending))
@@ -81,10 +83,24 @@ def _outcome(distributed: Any, task: BatchItem, future: Any) -> Outcome:
     try:
         outcome: Outcome = future.result()
     except distributed.KilledWorker as error:
-        return died(task, f"the workers that computed it died: {_line(error)}")
-    except (Exception, CancelledError) as error:
-        return died(task, f"{type(error).__name__}: {_line(error)}")
+        return recorded(task) or died(task, f"the workers that computed it died: {_line(error)}")
+    except (Exception, CancelledError) as error:  # done perhaps, with a result that did not arrive
+        return recorded(task) or died(task, f"{type(error).__name__}: {_line(error)}")
     return outcome
+
+
+def _run_on_worker(task: BatchItem) -> Outcome:
+    return run_item(task, _stop_without_client)
+
+
+def _stop_without_client(_stage: str) -> None:
+    """Refusal BAT006 at the next stage of a task that nobody waits for any more: its client was stopped or killed."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    task = worker.state.tasks.get(worker.get_current_task())
+    if task is None or task.state == "cancelled":
+        raise Refusal(_finding("the batch that asked for this program is gone"))
 
 
 def _check(client: Any, address: str) -> None:

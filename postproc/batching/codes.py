@@ -64,5 +64,13 @@ CODES = define(
             action="Do not run it; remove the cause of the failure and repeat the batch.",
             example="panel.src of yesterday in compensated/.",
         ),
+        "BAT008": Code(
+            "error",
+            "system refuses",
+            meaning="The system does not give what the program needs: memory, open files, a folder.",
+            consequence="This program has no output; the other programs continue.",
+            action="Use fewer --workers, or remove the cause that the message names.",
+            example="A limit of the memory that is too small for the program.",
+        ),
     }
 )

@@ -90,7 +90,7 @@ def _opened(event: str, arguments: tuple[object, ...]) -> None:
 def _reads(mode: object, flags: object) -> bool:
     if isinstance(mode, str):
         return "r" in mode and "+" not in mode
-    return isinstance(flags, int) and flags & os.O_ACCMODE == os.O_RDONLY
+    return isinstance(flags, int) and not flags & (os.O_WRONLY | os.O_RDWR)
 
 
 @functools.cache

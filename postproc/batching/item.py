@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from postproc.base.findings import Finding, Refusal
+from postproc.base.system import refusal_of_the_system
 from postproc.batching.files_read import code_digest, readings
 from postproc.batching.job_file import Job
 from postproc.batching.locking import locked
@@ -42,6 +44,9 @@ def run_item(task: BatchItem, report_stage: ReportStage = lambda stage: None) ->
     except Refusal as refusal:
         return failed(job, *refusal.findings, seconds=time.monotonic() - start_time)
     except Exception as error:
+        if why := refusal_of_the_system(error):
+            finding = Finding("BAT008", why, str(job.request.program))
+            return failed(job, finding, seconds=time.monotonic() - start_time)
         message = f"{type(error).__name__}: {error}"
         finding = Finding("BAT004", message, str(job.request.program), help=traceback.format_exc())
         return failed(job, finding, seconds=time.monotonic() - start_time)
@@ -50,9 +55,19 @@ def run_item(task: BatchItem, report_stage: ReportStage = lambda stage: None) ->
 def failed(job: Job, *findings: Finding, seconds: float = 0.0) -> Outcome:
     """The outcome of a job that wrote nothing."""
     program = str(job.request.program)
-    if job.target.exists() and not job.request.dry_run:
+    if os.path.exists(job.target) and not job.request.dry_run:
         findings += (Finding("BAT007", f"{job.target} remains from an earlier run", program),)
     return Outcome(job.name, FAILED, failure("program", program, findings), seconds)
+
+
+def recorded(task: BatchItem) -> Outcome | None:
+    """The outcome of a job that is done, of which nobody heard that it is; None where no record says so."""
+    if task.job.request.dry_run:
+        return None
+    record = load_record(task.job)
+    if record is None or not record.holds(task.job):
+        return None
+    return Outcome(task.job.name, DONE, record.result, 0.0)
 
 
 def _run_once(task: BatchItem, report_stage: ReportStage, start_time: float) -> Outcome:

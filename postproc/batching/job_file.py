@@ -14,6 +14,7 @@ from pathlib import Path
 import yaml
 
 from postproc.base.findings import Finding, Refusal, nearest
+from postproc.base.system import FileSet, relative_path
 from postproc.base.yaml_section import YamlSection, parsed, read
 from postproc.batching.programs import find_programs, is_inside
 from postproc.process.stated_forces import FORM, NotAForce, parse_force
@@ -73,7 +74,13 @@ def jobs_of(
     for word, one in zip(words, matches, strict=True):
         if not one.programs:
             raise Refusal(one.nothing(word))
-    base = Path(os.path.commonpath([one.anchor for one in matches]))
+    try:
+        base = Path(os.path.commonpath([one.anchor for one in matches]))
+    except ValueError:
+        message = "the programs are on different drives, which have no folder in common for the results"
+        raise Refusal(
+            Finding("BAT001", message, help="start a batch for each drive, or write a job file")
+        ) from None
     root = base / FOLDER if output is None else Path(os.path.abspath(output))
     if output is None and not is_inside(root, base):
         raise Refusal(Finding("BAT003", f"{root} leads out of {base}", help=RESULTS_ARE_LINK))
@@ -170,7 +177,7 @@ def _overrides(top: YamlSection, base: Path, programs: Sequence[Path]) -> dict[P
             options["output"] = _word(section, "output")
         hit = set(find_programs(pattern, base).programs) & set(programs)
         if not hit:
-            names = [os.path.relpath(program, base) for program in programs]
+            names = [relative_path(program, base) for program in programs]
             raise parent.error(
                 "BAT001", f"matches no program of this batch{nearest(pattern, names)}", pattern
             )
@@ -188,13 +195,13 @@ def _not_below(root: Path, base: Path, programs: Sequence[Path]) -> list[Path]:
 def _job(program: Path, base: Path, root: Path, options: OptionValues, where: str | None) -> Job:
     """``where``: a file, or a folder (no suffix, or a slash at its end), below ``root``; without it the program lies
     there as it does below ``base``."""
-    name = Path(os.path.relpath(program, base))
-    target = root / (program.name if ".." in name.parts else name)
+    name = Path(relative_path(program, base))
+    target = root / (program.name if ".." in name.parts or name.is_absolute() else name)
     if where is None and not is_inside(target.parent, root):
         raise Refusal(Finding("BAT003", f"{target.parent} leads out of {root}", help=RESULTS_ARE_LINK))
     if where is not None:
         target = Path(os.path.abspath(root / where))
-        if where.endswith(("/", "\\")) or target.is_dir() or (program.suffix and not target.suffix):
+        if where.endswith(("/", "\\")) or os.path.isdir(target) or (program.suffix and not target.suffix):
             target /= program.name
     request = Request(program=program, output=target, **options)  # type: ignore[arg-type]
     return Job(name.as_posix(), target, request)
@@ -202,11 +209,11 @@ def _job(program: Path, base: Path, root: Path, options: OptionValues, where: st
 
 def _check(jobs: Sequence[Job], file: str = "") -> None:
     """Refuse outputs that meet each other (BAT002) or a program of the batch (FIL007)."""
-    programs = {os.path.realpath(job.request.program) for job in jobs}
+    programs = FileSet(job.request.program for job in jobs)
     taken: dict[tuple[str, str], Job] = {}
     findings = []
     for job in jobs:
-        if os.path.realpath(job.target) in programs:
+        if job.target in programs:
             findings.append(
                 Finding("FIL007", f"{job.name}: its output {job.target} is a program of this batch", file)
             )
@@ -281,7 +288,7 @@ def _former_in(section: YamlSection) -> list[str]:
 
 def _file(section: YamlSection, key: str) -> Path:
     path = section.file.parent / _word(section, key)
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise section.error(
             "YML004", f"the file {path} does not exist", key, "paths are relative to the job file"
         )

@@ -51,15 +51,15 @@ def find_programs(word: str, folder: Path) -> ProgramMatches:
     A file counts whatever it holds; of a folder or a pattern those that a dialect claims.
     """
     path = Path(os.path.abspath(folder / word))
-    if path.is_file():
+    if os.path.isfile(path):
         return ProgramMatches(path.parent, (path,))
-    if path.is_dir():
+    if os.path.isdir(path):
         return _claimed(path, [entry for entry in path.iterdir() if not entry.name.startswith(".")])
     fixed = next((i for i, part in enumerate(path.parts) if _MAGIC & set(part)), len(path.parts) - 1)
     anchor, pattern = Path(*path.parts[:fixed]), path.parts[fixed:]
     try:
-        matches = list(anchor.glob("/".join(pattern))) if anchor.is_dir() else []
-    except ValueError:  # ** beside other characters
+        matches = list(anchor.glob("/".join(pattern))) if os.path.isdir(anchor) else []
+    except (ValueError, OSError):  # ** beside other characters, a name that is too long
         matches = []
     return _claimed(anchor, [match for match in matches if not _hidden(match.relative_to(anchor), pattern)])
 
@@ -74,7 +74,7 @@ def _claimed(anchor: Path, paths: list[Path]) -> ProgramMatches:
     programs: list[Path] = []
     others: list[Path] = []
     for path in sorted(paths):
-        if path.is_file():
+        if os.path.isfile(path):
             (programs if _is_program(path) else others).append(path)
     known = {path.with_suffix("") for path in programs}
     return ProgramMatches(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import sys
 from collections.abc import Sequence
@@ -24,7 +23,9 @@ from postproc.cli.program import program
 from postproc.cli.robots import robots
 from postproc.cli.schema import schema
 from postproc.cli.signals import ended_in_words
+from postproc.cli.streams import guarded_streams
 from postproc.cli.verify import verify
+from postproc.output.publications import publications
 
 COMMANDS = {
     "program": program,
@@ -70,15 +71,29 @@ def run(argv: Sequence[str] | None = None) -> None:
     # the matrices here are small: threads for them cost more than they give, and runs beside each other fight
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     use_mmap_for_large_arrays()
-    for stream in (sys.stdout, sys.stderr):
-        # A name or a comment that the terminal cannot show is no reason to stop.
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
+    before = publications()
+    with guarded_streams() as out:
+        try:
+            _run(words, and_exits=argv is None)
+        except SystemExit as end:
+            out.flush()
+            if not out.problem or end.code not in (None, 0, 3):
+                raise
+            written = publications() > before
+            if not out.reader_left:
+                known = "the files are written" if written else "the result is lost"
+                click.echo(f"standard output cannot be written ({out.problem}); {known}", err=True)
+            if written:
+                raise
+            raise SystemExit(1) from None
+
+
+def _run(words: list[str], and_exits: bool) -> None:
     if words and words[0].isalpha() and words[0] not in COMMANDS and not os.path.exists(words[0]):
         hint = nearest(words[0], COMMANDS)
         click.echo(f"Error: neither a command nor an existing file has the name {words[0]!r}{hint}", err=True)
         raise SystemExit(2)
-    with ended_in_words(and_exits=argv is None):
+    with ended_in_words(and_exits):
         main.main(args=normalized(words), prog_name="compensate")
 
 

@@ -1,4 +1,4 @@
-"""How a run ends that is not let to its end: by a signal, or by a defect of this program."""
+"""How a run ends that is not let to its end: by a signal, by its surroundings, or by a defect of this program."""
 
 from __future__ import annotations
 
@@ -10,8 +10,14 @@ from collections.abc import Iterator
 from types import FrameType
 from typing import NoReturn
 
-SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""Ctrl-C; the end of the session or of the machine; the end of the terminal."""
+from postproc.base.system import refusal_of_the_system
+from postproc.cli.streams import GuardedStream
+from postproc.output.publications import publications
+
+SIGNALS = tuple(
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)
+)
+"""Ctrl-C; the end of the session or of the machine; the end of the terminal; Ctrl-Break on Windows."""
 
 
 class Stopped(SystemExit):
@@ -23,14 +29,22 @@ class Stopped(SystemExit):
 @contextlib.contextmanager
 def ended_in_words(and_exits: bool = False) -> Iterator[None]:
     """Signals become ``Stopped``, so that a run takes its half-written files away; further ones do not disturb it on
-    its way out.  A defect is reported as one.  Raises SystemExit: 1 after a defect, Stopped with 128 and the number of
-    the signal after one.  ``and_exits``: the process ends with the run, so that a signal that stopped it is the
-    last one that it hears."""
+    its way out.  One that comes when the files are written lets the run end as it would, without its words.  What the
+    system refuses (files, memory) is one line, a defect is reported as one.
+
+    Raises SystemExit: 1 after a defect or a refusal of the system, Stopped with 128 and the number of the signal after
+    one.  ``and_exits``: the process ends with the run, so that a signal that stopped it is the last one that it hears.
+    """
     stopped = False
+    before_run = publications()
 
     def stop(number: int, _frame: FrameType | None) -> None:
         nonlocal stopped
-        if not stopped:
+        if publications() > before_run:
+            for stream in (sys.stdout, sys.stderr):
+                if isinstance(stream, GuardedStream):
+                    stream.abandon()
+        elif not stopped:
             stopped = True
             raise Stopped(128 + number)
 
@@ -42,14 +56,12 @@ def ended_in_words(and_exits: bool = False) -> Iterator[None]:
     except Stopped as end:
         _print_error(end.words)
         raise
-    except (MemoryError, RuntimeError) as error:
-        if not isinstance(error, MemoryError) and "can't start new thread" not in str(
-            error
-        ):  # no room for its stack
-            _report_defect()
-        _print_error("the memory of this machine is too small for this run: nothing is written")
-        raise SystemExit(1) from None
-    except Exception:
+    except Exception as error:
+        written = "files are written already" if publications() > before_run else "nothing is written"
+        why = refusal_of_the_system(error)
+        if why:
+            _print_error(f"{why}: {written}")
+            raise SystemExit(1) from None
         _report_defect()
     finally:
         for number, handler in before.items() if not (stopped and and_exits) else ():

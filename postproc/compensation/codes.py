@@ -180,5 +180,16 @@ CODES = define(
             action="Allow inserted motions (no --no-insert), raise max_growth, or loosen the tolerance.",
             example="A cut with --no-insert whose motions are long.",
         ),
+        "COR022": Code(
+            "error",
+            "tolerance cannot be met",
+            meaning=(
+                "The tolerance needs more motions between the points than a program can have, or more digits than "
+                "its numbers have."
+            ),
+            consequence="They are not computed and nothing is written: no controller executes such a program.",
+            action="Use a larger tolerance or min_segment, or a smaller max_growth in the cell.",
+            example="tolerance: 0.000001 with max_growth: 1000000.",
+        ),
     }
 )

@@ -6,7 +6,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import in_blocks
-from postproc.base.findings import Finding
+from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import lengths
 from postproc.base.units import DEG
 from postproc.compensation.divisible_motions import (
@@ -15,6 +15,9 @@ from postproc.compensation.divisible_motions import (
     DivisibleMotions,
 )
 from postproc.compensation.orientations import shortest
+
+MOST = 5_000_000
+"""Motions of one output at most: half a gigabyte of program, which no controller loads, and some of memory."""
 
 LITTLE = 3 * DEG
 """Axes that turn by less do not change a robot's compliance: what changes with its square is a thousandth."""
@@ -26,7 +29,10 @@ points with the third power at least; where to look first for the number that is
 
 def refine(motions: DivisibleMotions) -> None:
     """The smallest number of even segments with which each interval is within the tolerance, or the most that may
-    be."""
+    be.
+
+    Raises Refusal COR022, before they are computed, where these are more than ``MOST``.
+    """
     desired_path, rows = motions.task.desired_path, motions.rows[motions.owner]
     arc = desired_path.arc[rows]
     motions.least = least = motions.least_segments()
@@ -46,7 +52,8 @@ def refine(motions: DivisibleMotions) -> None:
     length = desired_path.length[rows] * (motions.high - motions.low)
     length *= shortest(motions.task.toolpath, rows, motions.low, motions.high)
     most = np.floor(length / motions.spacing(rows, motions.limits.min_segment))
-    most = np.minimum(most, max(1, int(motions.limits.max_growth * motions.n), motions.limits.least) + least)
+    growth = int(min(motions.limits.max_growth * motions.n, MOST))
+    most = np.minimum(most, max(1, growth, motions.limits.least) + least)
     most = np.where(can, np.maximum(least, most), least).astype(np.int32)
     fails, holds = least - 1, np.zeros(len(rows), np.int32)
     ratio = np.zeros(len(rows))
@@ -67,6 +74,15 @@ def refine(motions: DivisibleMotions) -> None:
         guess = np.ceil(np.maximum(fails[active], 1) * np.minimum(ratio[active], 1e6) ** power)
         top = np.where(holds[active] > 0, holds[active] - 1, most[active])
         motions.count[active] = np.clip(guess, fails[active] + 1, top).astype(np.int32)
+        _refuse_too_many(motions)
+
+
+def _refuse_too_many(motions: DivisibleMotions) -> None:
+    wanted = motions.n + int(motions.count.sum(dtype=np.int64)) - len(motions.count)
+    if wanted > max(MOST, 2 * motions.n):
+        message = f"about {wanted} motions would be needed for this tolerance; {MOST} are possible"
+        help = "use a larger tolerance or min_segment, or a smaller max_growth in the cell"
+        raise Refusal(Finding("COR022", message, motions.task.file, help=help))
 
 
 def _even_motions(motions: DivisibleMotions) -> Bools:

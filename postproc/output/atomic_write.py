@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
 import os
 import re
 import secrets
+import time
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
+from postproc.base import system
 from postproc.base.findings import Code, Finding, Refusal, define
+from postproc.base.locks import lock_file
+from postproc.output.publications import note_publication
 
 CODES = define(
     {
@@ -28,6 +33,17 @@ CODES = define(
 Content = bytes | Iterable[bytes]
 """Of a file: as a whole, or in parts that are built while it is written."""
 
+LOCK = ".compensate.lock"
+"""In a folder while one run writes into it."""
+
+PATIENCE = (0.05, 0.1, 0.2, 0.4, 0.8)
+"""[s] Waits between attempts to rename a file that another program holds open, which Windows refuses: a virus scanner
+or an indexer is soon done with it, Excel is not."""
+
+LONGEST_STEM = 200
+"""Bytes of a name that temporary names repeat; a longer one is replaced by its digest, so that they stay short enough
+for the file system."""
+
 
 def write_atomically(
     files: Mapping[Path, Content], last: Path | None = None, still: Callable[[], None] = lambda: None
@@ -37,10 +53,10 @@ def write_atomically(
     Every file is written whole beside its place and synced before the first one is renamed into it.  ``last``, the
     program itself, is taken away first and comes last: at any moment it is absent or belongs to its companions.
     Folders are made as needed.  A name that is a link is replaced; what it leads to stays as it is.  Of runs that write
-    into one folder at once each waits for the one before it, so what is there is of one of them; half-written
-    files of one that was killed are removed.  ``still``: called when all are written beside their places;
-    where it raises, everything stays as it was.  Raises Refusal FIL004 when the disk or its rights do not
-    allow it; the files that were there before are then there again.
+    into one folder at once each waits for the one before it (where the folder takes a lock file), so what is there is
+    of one of them; half-written files of one that was killed are removed.  ``still``: called when all are written
+    beside their places; where it raises, everything stays as it was.  Raises Refusal FIL004 when the disk or its rights
+    do not allow it; the files that were there before are then there again.
     """
     with contextlib.ExitStack() as locks:
         _publish(files, last, still, locks)
@@ -49,10 +65,10 @@ def write_atomically(
 def sweep(files: Iterable[Path]) -> None:
     """Remove the half-written ``files`` of a run that was killed.
 
-    Waits for runs that write into these folders now, as ``write_atomically`` does; does nothing where there are no
-    locks.
+    Waits for runs that write into these folders now, as ``write_atomically`` does; does nothing where the folders take
+    no lock file.
     """
-    there = [path for path in files if path.parent.is_dir()]
+    there = [path for path in files if os.path.isdir(path.parent)]
     with contextlib.ExitStack() as locks:
         if _lock_folders({path.parent for path in there}, locks):
             _sweep(there)
@@ -67,12 +83,14 @@ def _publish(
     files: Mapping[Path, Content], last: Path | None, still: Callable[[], None], locks: contextlib.ExitStack
 ) -> None:
     # names are noted before their files are created: a signal may come between the two
-    ready = {path: path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp") for path in files}
+    ready = {path: path.with_name(f".{_stem(path)}.{secrets.token_hex(4)}.tmp") for path in files}
     spare: dict[Path, Path] = {}
     placed: list[Path] = []
     at = next(iter(files), Path())
     try:
         for at in files:
+            if system.WINDOWS and (problem := system.windows_name_problem(at)):
+                raise OSError(errno.EINVAL, problem)
             if at.is_dir() and not at.is_symlink():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
             at.parent.mkdir(parents=True, exist_ok=True)
@@ -85,27 +103,23 @@ def _publish(
         for at in reversed(order):
             if os.path.lexists(at):
                 spare[at] = at.with_name(f"{ready[at].name}.old")
-                os.replace(at, spare[at])
+                _rename(at, spare[at])
         for at in order:
             placed.append(at)
-            os.replace(ready[at], at)
+            _rename(ready[at], at)
         for folder in {path.parent for path in files}:
             _sync_folder(folder)
+        note_publication()
     except BaseException as error:
         for path in reversed(placed):
             if not ready[path].exists():
                 _unlink(path)
         for path, old in reversed(spare.items()):
             with contextlib.suppress(OSError):
-                os.replace(old, path)
+                _rename(old, path)
         spare.clear()
         if isinstance(error, OSError):
-            raise refused(
-                at,
-                f"the file cannot be written: {error.strerror or error}",
-                "nothing of this program is written; check the folder's rights and the free space,"
-                " or name another place with -o and --report",
-            ) from None
+            raise _unwritable(at, error) from None
         raise
     finally:
         with contextlib.ExitStack() as cleanup:  # goes on with the others where a signal ends one
@@ -113,32 +127,63 @@ def _publish(
                 cleanup.callback(_unlink, path)
 
 
+def _unwritable(path: Path, error: OSError) -> Refusal:
+    if system.WINDOWS and isinstance(error, PermissionError) and path.exists():
+        return refused(
+            path,
+            "the file cannot be replaced: it is open in another program, or write-protected",
+            "nothing of this program is written; close the file there (Excel, an editor, a viewer) and repeat",
+        )
+    help = (
+        "nothing of this program is written; check the folder's rights and the free space,"
+        " or name another place with -o and --report"
+    )
+    if system.WINDOWS and len(os.path.abspath(path)) > system.LONGEST_PATH:
+        help = f"the path has more than {system.LONGEST_PATH} characters; name a shorter place with -o and --report"
+    return refused(path, f"the file cannot be written: {error.strerror or error}", help)
+
+
+def _rename(source: Path, target: Path) -> None:
+    """Rename a file over another one; Windows refuses that while any program has one of them open."""
+    for wait in PATIENCE if system.WINDOWS else ():
+        try:
+            os.replace(source, target)
+        except PermissionError:
+            time.sleep(wait)
+        else:
+            return
+    os.replace(source, target)
+
+
 def _lock_folders(folders: Iterable[Path], locks: contextlib.ExitStack) -> bool:
-    """Keep other writers out of ``folders`` until ``locks`` is closed or this process dies; False where the system or
-    the file system has no such locks."""
-    try:
-        import fcntl
-    except ImportError:
-        return False
-    handles: dict[tuple[int, int], int] = {}
+    """Keep other writers out of ``folders`` until ``locks`` is closed or this process dies; False where one of them
+    takes no lock file."""
+    places: dict[tuple[int, int], Path] = {}
     try:
         for folder in folders:
-            handle = os.open(folder, os.O_RDONLY)
-            locks.callback(os.close, handle)
-            stat = os.fstat(handle)
-            handles[stat.st_dev, stat.st_ino] = handle  # one folder may have two names
-        for _, handle in sorted(handles.items()):  # all in one order: no two wait for each other
-            fcntl.flock(handle, fcntl.LOCK_EX)
+            stat = os.stat(folder)
+            places.setdefault((stat.st_dev, stat.st_ino), folder)  # one folder may have two names
+        for _, folder in sorted(places.items()):  # all in one order: no two wait for each other
+            locks.enter_context(lock_file(folder / LOCK))
     except OSError:
         return False
     return True
+
+
+def _stem(path: Path) -> str:
+    """What temporary names of a file contain: its name, or its digest where that would be too long for the system."""
+    name = path.name
+    too_long = len(os.fsencode(name)) > LONGEST_STEM or (
+        system.WINDOWS and len(os.path.abspath(path)) > system.LONGEST_PATH - 20
+    )
+    return hashlib.sha256(os.fsencode(name)).hexdigest()[:16] if too_long else name
 
 
 def _sweep(files: Iterable[Path]) -> None:
     """Remove temporary files of ``files``: with their folders locked, only a killed run can have written them."""
     names: dict[Path, list[str]] = {}
     for path in files:
-        names.setdefault(path.parent, []).append(re.escape(path.name))
+        names.setdefault(path.parent, []).append(re.escape(_stem(path)))
     for folder, own in names.items():
         temporary = re.compile(rf"\.({'|'.join(own)})\.[a-z0-9_]{{8}}\.tmp(\.old)?")
         with contextlib.suppress(OSError):

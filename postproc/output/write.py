@@ -158,10 +158,21 @@ def plan_motions(task: CompensationProblem, division: Subdivision) -> Plan:
 
 
 def writing_settings(cell: Cell, shared_points: str) -> WritingSettings:
-    """Decimals whose rounding stays below a twentieth of the tolerances."""
-    return WritingSettings(
-        _decimals(cell.tolerance / MM), _decimals(cell.tolerance_angle / DEG), shared_points
-    )
+    """Decimals whose rounding stays below a twentieth of the tolerances.
+
+    Raises Refusal COR022 for a tolerance below ``FINEST``.
+    """
+    sizes = {"tolerance": cell.tolerance / MM, "tolerance_deg": cell.tolerance_angle / DEG}
+    fine = [
+        Finding(
+            "COR022", f"{key}: {size:.3g} is finer than {FINEST:g}, which digits can express", str(cell.path)
+        )
+        for key, size in sizes.items()
+        if size < 0.999 * FINEST
+    ]
+    if fine:
+        raise Refusal(*fine)
+    return WritingSettings(_decimals(sizes["tolerance"]), _decimals(sizes["tolerance_deg"]), shared_points)
 
 
 def edit_program(program: Program, dialect: Dialect, moved: Sequence[Edit], robot: Robot, stem: str) -> Edits:
@@ -307,6 +318,11 @@ def _as_written(task: CompensationProblem, division: Subdivision, back: Toolpath
     normal[arcs] = (own.rotation @ back.arcs.normal[arcs][..., None])[..., 0]
     sweep[arcs] = back.arcs.sweep[arcs]
     return replace(there, centre=centre, normal=normal, sweep=sweep)
+
+
+FINEST = 1e-6
+"""[mm], [deg] A tolerance is not smaller: of positions of meters the numbers of the machine have no more digits, after
+a few operations on them."""
 
 
 def _decimals(tolerance: float) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,7 +70,7 @@ def _found(program: Path, toolpath: Toolpath, cell: Cell) -> str:
     if any(_STATED.match(annotation.text.strip()) for annotation in toolpath.annotations):
         return "the program states its forces in FORCE comments"
     beside = program.with_name(program.stem + ".force.csv")
-    if beside.is_file():
+    if os.path.isfile(beside):
         return f"the forces are in {beside.name}"
     if cell.process is not None or cell.force is not None:
         return (
@@ -141,14 +142,14 @@ def _belonging(given: _Given, cell: Cell) -> SourcedForces:
     beside = program.with_name(program.stem + ".force.csv")
     if stated is not None:
         given.no_offset("the force comes from FORCE comments")
-        if beside.is_file():
+        if os.path.isfile(beside):
             message = f"{beside.name} is not used: the FORCE comments of the program come first"
             findings = (
                 *findings,
                 Finding("FRC031", message, str(program), help=f"use --force {beside.name}"),
             )
         return stated, findings, "FORCE comments"
-    if beside.is_file():
+    if os.path.isfile(beside):
         stated, more, source = given.table(beside)
     elif cell.process is not None:
         stated, more, _ = given.process(cell.path.parent / cell.process)

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from urllib.parse import quote
 
+from postproc.base.system import relative_path
 from postproc.report.batched import DONE, FAILED, NOT_RUN, UNCHANGED, Batched, Outcome
 from postproc.report.formatting import count, in_decimals
 from postproc.report.page import FINDINGS, finding_rows, rendered
@@ -102,4 +103,5 @@ def _address(path: Path | None, root: Path) -> str:
     """A relative address; a colon or a percent sign in a name is no part of it."""
     if path is None:
         return ""
-    return "./" + quote(os.fsencode(Path(os.path.relpath(path, root)).as_posix()))
+    seen = Path(relative_path(path, root))
+    return seen.as_uri() if seen.is_absolute() else "./" + quote(os.fsencode(seen.as_posix()))

@@ -23,6 +23,7 @@ from markupsafe import Markup
 
 from postproc import __version__
 from postproc.base.findings import CODES, Finding
+from postproc.base.system import relative_path
 from postproc.compensation.correct import MotionOutcome
 from postproc.report.page_data import PageData
 from postproc.report.page_words import (
@@ -130,7 +131,7 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, object]]:
 
 def beside(page: Path, files: Mapping[str, Path | None]) -> dict[str, str]:
     """Words -> path of each of ``files`` as seen from the folder of ``page``, without those that are None."""
-    return {word: os.path.relpath(path, page.parent) for word, path in files.items() if path is not None}
+    return {word: relative_path(path, page.parent) for word, path in files.items() if path is not None}
 
 
 def linked(links: Mapping[str, str]) -> list[tuple[str, str, str]]:
@@ -138,7 +139,8 @@ def linked(links: Mapping[str, str]) -> list[tuple[str, str, str]]:
     rows = []
     for word, path in links.items():
         parts = Path(path).as_posix()
-        rows.append((word, parts, "./" + quote(os.fsencode(parts))))
+        address = Path(path).as_uri() if Path(path).is_absolute() else "./" + quote(os.fsencode(parts))
+        rows.append((word, parts, address))
     return rows
 
 

@@ -10,7 +10,8 @@ between them the extra coordinates that a model asks for by name:
     spindle.x .y .z                  at the TCP, z along the spindle, tip-ward
 
 Pinocchio's model describes the chain up to the flange and is the reference.  Its joint placements are read back into
-the batch evaluation, which works component-wise on arrays with the states in the last, contiguous axis.
+the batch evaluation, which works component-wise on arrays with the states in the last, contiguous axis.  Pinocchio has
+no wheels for Windows: there the placements go to the batch evaluation directly, which are the same numbers.
 """
 
 from __future__ import annotations
@@ -18,9 +19,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-import pinocchio as pin
+
+try:
+    import pinocchio as pin
+except ImportError:  # no wheel for this system
+    pin = None
 
 from postproc.base.arrays import Bools, Floats
 from postproc.base.geometry import Poses
@@ -104,13 +110,14 @@ class ChainKinematics:
 class Chain:
     """A serial chain of ``joints`` with a ``flange``, and the extra coordinates named in ``extras``.
 
-    names (m,): of the coordinates; motors: where the joints are among them (a slice without extras).  Raises
-    ValueError where ``extras`` names a coordinate that is not there.
+    names (m,): of the coordinates; motors: where the joints are among them (a slice without extras); model: Pinocchio's
+    model up to the frame ``flange``, None where there is no Pinocchio.  Raises ValueError where ``extras`` names a
+    coordinate that is not there.
     """
 
     def __init__(self, joints: Sequence[Joint], flange: Poses, extras: Iterable[str] = ()) -> None:
         wanted = set(extras)
-        self.model = pin.Model()
+        self.model: Any = None if pin is None else pin.Model()
         self._at = Poses.identity()
         self._parent = 0
         self._arm: list[tuple[Floats, Floats, bool]] = []
@@ -127,8 +134,10 @@ class Chain:
             names.append(joint.name)
             self._add(joint.name, np.eye(3), joint.kind == "revolute")
         tip = self._at @ flange
-        frame = pin.Frame("flange", self._parent, 0, _se3(tip), pin.FrameType.OP_FRAME)
-        self.flange_id = self.model.addFrame(frame)
+        self.flange_id = 0
+        if self.model is not None:
+            frame = pin.Frame("flange", self._parent, 0, _se3(tip), pin.FrameType.OP_FRAME)
+            self.flange_id = self.model.addFrame(frame)
         self._tip = tip
         self._tool = [name for name in (f"tool.{axis}" for axis in _SIX) if name in wanted]
         self._spindle = [name for name in ("spindle.x", "spindle.y", "spindle.z") if name in wanted]
@@ -162,10 +171,13 @@ class Chain:
     def _add(self, name: str, axes: Floats, turns: bool) -> None:
         """A coordinate about or along the z column of ``axes``; what follows is in the axes before it."""
         placement = self._at @ Poses(axes, np.zeros(3))
-        joint = pin.JointModelRZ() if turns else pin.JointModelPZ()
-        self._parent = self.model.addJoint(self._parent, joint, _se3(placement), name)
-        described = self.model.jointPlacements[self._parent]
-        self._arm.append((described.rotation.copy(), described.translation.copy(), turns))
+        rotation, translation = placement.rotation, placement.position
+        if self.model is not None:
+            joint = pin.JointModelRZ() if turns else pin.JointModelPZ()
+            self._parent = self.model.addJoint(self._parent, joint, _se3(placement), name)
+            described = self.model.jointPlacements[self._parent]
+            rotation, translation = described.rotation, described.translation
+        self._arm.append((rotation.copy(), translation.copy(), turns))
         self._at = Poses(axes.T, np.zeros(3))
 
     def evaluate(self, coordinates: Floats, tool: Poses, spindle: Floats | None = None) -> ChainKinematics:
@@ -379,5 +391,5 @@ def _z_along(direction: Floats) -> Floats:
     return np.stack([x, np.cross(z, x), z], axis=1)
 
 
-def _se3(pose: Poses) -> pin.SE3:
+def _se3(pose: Poses) -> Any:
     return pin.SE3(np.array(pose.rotation), np.array(pose.position))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -179,7 +180,7 @@ def find_robot(name: str, beside: Path | None = None) -> Path:
     path = Path(name)
     if beside is not None and not path.is_absolute():
         path = beside / path
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise Refusal(Finding("CEL003", f"robot file {path} does not exist"))
     return path
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -146,7 +147,7 @@ def beside(section: YamlSection) -> Path:
     path = (folder / name).resolve()
     if Path(name).is_absolute() or not path.is_relative_to(folder):
         raise section.error("YML004", "must be in the folder of the robot file, or below", "file")
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise section.error("YML004", f"the file {path} does not exist", "file")
     return path
 

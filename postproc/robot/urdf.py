@@ -9,6 +9,7 @@ resolve, are passed over.  Lengths are metres and angles radians, as the format 
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
@@ -166,6 +167,10 @@ def _parse(path: Path) -> tuple[list[_UrdfJoint], dict[str, int]]:
         raise _wrong(
             path, error.lineno, f"the file is not XML: {expat.errors.messages[error.code]}"
         ) from None
+    except (ValueError, LookupError):  # what expat asks Python for: UTF-7, an encoding that nobody knows
+        raise _wrong(
+            path, 1, "the file states an encoding that is not supported", "save it as UTF-8"
+        ) from None
     return joints, links
 
 
@@ -214,7 +219,7 @@ def _mesh(path: Path, line: int, name: str) -> None:
     if not mesh.resolve().is_relative_to(path.parent.resolve()):
         raise _wrong(path, line, f"mesh {name!r} is outside the URDF's folder")
     try:
-        exists = mesh.is_file()
+        exists = os.path.isfile(mesh)
     except OSError:
         exists = False
     if not exists:

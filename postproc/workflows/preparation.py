@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -179,7 +180,7 @@ def prepare(request: Request) -> Prepared:
 
 
 def _prepared(request: Request, inputs: Inputs) -> Prepared:
-    if not request.program.is_file():
+    if not os.path.isfile(request.program):
         read_document(request.program)  # raises the reason
     cell = _cell(request)
     dialect, read, settings = read_program(request.program, cell, request.config_dat)

@@ -5,6 +5,7 @@ Nothing is written that was not read back from its own bytes and checked.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -406,7 +407,7 @@ def _target(request: Request) -> Path:
                 )
             )
         return folder / request.program.name
-    if request.output.is_dir() or (request.program.suffix and not request.output.suffix):
+    if os.path.isdir(request.output) or (request.program.suffix and not request.output.suffix):
         return request.output / request.program.name
     return request.output
 
