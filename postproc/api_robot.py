@@ -37,7 +37,8 @@ def map(
     """The deflection over a plane or a box of the workspace, as ``compensate map`` does.
 
     x, y, z: one value or (from, to), mm in the robot base; grid: points along each range; force: ``"-360,0,560@base"``
-    in N and N m; tool: TCP on the flange, mm and deg; orientation: A, B, C of the tool, deg.
+    in N and N m; tool: TCP on the flange, mm and deg; orientation: A, B, C of the tool, deg.  Raises ValueError for
+    ranges, forces and tools that are none.
 
     >>> import postproc
     >>> mapped = postproc.map("kuka_kr270", x=(800, 2200), y=0, z=500, grid=5, force="0,0,-500")
