@@ -13,8 +13,8 @@ WITHOUT_PUBLIC_NAME = {
     *(("regex_automaton.py", name) for name in ("_compiler", "_constants", "_parser")),
     ("test_api.py", "report._repr_html_"),
 }
-"""Python parses a regular expression in modules that have no other names since version 3.11; notebooks ask for a card by
-this name."""
+"""Python parses a regular expression in modules that have no other names since version 3.11; notebooks ask
+for a card by this name."""
 BY_NAME = {"getattr", "hasattr", "setattr", "delattr"}
 """Functions and methods (``monkeypatch.setattr``) that take the name of an attribute as a text."""
 

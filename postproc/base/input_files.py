@@ -9,9 +9,10 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextvars import ContextVar
 from pathlib import Path
+from types import MappingProxyType
 
 from postproc.base.findings import Code, Finding, Refusal, define
 from postproc.base.system import FileSet
@@ -63,6 +64,7 @@ CODES = define(
     }
 )
 
+_provided: ContextVar[Mapping[Path, bytes]] = ContextVar("provided", default=MappingProxyType({}))
 _noting: ContextVar[Inputs | None] = ContextVar("noting", default=None)
 
 
@@ -76,6 +78,8 @@ class Inputs:
         """Refusal FIL010 for every file that no longer holds what was read, FIL001 for those that are gone."""
         findings = []
         for path, digest in self.digests.items():
+            if path in _provided.get():
+                continue
             try:
                 # by its bytes: its time may have been set back
                 same = path.is_file() and _digest_of(path) == digest
@@ -117,6 +121,21 @@ def noted() -> Iterator[Inputs]:
         yield inputs
     finally:
         _noting.reset(before)
+
+
+@contextlib.contextmanager
+def provided(contents: Mapping[Path, bytes]) -> Iterator[None]:
+    """Inside of the ``with``, what is read of these paths is ``contents``, whatever the disk has there."""
+    token = _provided.set(contents)
+    try:
+        yield
+    finally:
+        _provided.reset(token)
+
+
+def provided_content(path: Path) -> bytes | None:
+    """What is provided for a path; None where the disk has it."""
+    return _provided.get().get(path)
 
 
 def note(path: Path, raw: bytes) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from postproc.base.findings import Finding, Refusal
-from postproc.base.input_files import note
+from postproc.base.input_files import note, provided_content
 
 MAX_BYTES = 1_000_000_000
 """Sixteen million motions; offsets in a program have 32 bits."""
@@ -50,6 +50,11 @@ def list_folder(folder: Path) -> list[Path]:
 
 
 def _read(path: Path, largest: int | None, take: Callable[[BinaryIO], bytes]) -> bytes:
+    given = provided_content(path)
+    if given is not None:
+        raw = take(io.BytesIO(given))
+        note(path, raw)
+        return raw
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode) and not stat.S_ISDIR(status.st_mode):

@@ -310,10 +310,12 @@ def result_options(command: _Command) -> _Command:
 
 
 class Out:
-    """Standard output of one command, in words or as JSON."""
+    """Standard output of one command, in words or as JSON; ``to_error``: standard output takes the program itself, and
+    words go to standard error."""
 
-    def __init__(self, json_to: str | None, quiet: bool, verbose: bool) -> None:
+    def __init__(self, json_to: str | None, quiet: bool, verbose: bool, to_error: bool = False) -> None:
         self.json_to = json_to
+        self.to_error = to_error
         self.quiet = quiet or json_to == "-"
         self.verbose = verbose
         context = click.get_current_context()
@@ -324,7 +326,7 @@ class Out:
     def console(self, error: bool = False) -> Any:
         from postproc.cli.console import SafeConsole
 
-        return SafeConsole(sys.stderr if error else sys.stdout)
+        return SafeConsole(sys.stderr if error or self.to_error else sys.stdout)
 
     @property
     def json_file(self) -> Path | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import click
@@ -33,6 +34,12 @@ from postproc.workflows.option_names import SHARED_POINTS
     metavar="DIR",
     help="Folder of the reports [beside the result].",
 )
+@click.option(
+    "--stdin-name",
+    metavar="NAME",
+    help="With PROGRAM -: the path of the program that is read from standard input; its cell, .dat and forces are"
+    " searched there.",
+)
 @insertion_options
 @click.option("--dry-run", is_flag=True, help="Do everything but write files.")
 @allow_compensated_option
@@ -50,6 +57,7 @@ def program(
     gain: float,
     output: str | None,
     report: Path | None,
+    stdin_name: str | None,
     no_insert: bool,
     shared_points: str | None,
     dry_run: bool,
@@ -66,19 +74,36 @@ def program(
       compensate panel.src --force 0,360,560@base --cell cell.yaml -o out/panel.src
       compensate panel.src --force panel.force.csv --gain 0.5 --json -
       compensate panel.src --force milling.yaml
+      compensate - -o - --stdin-name parts/panel.src --force < panel.src > out.src
 
     Exit codes: 0 done; 3 written, but not everything is corrected or something needs review; 1 nothing was written; 2
     wrong command line.
     """
+    from postproc.base.input_files import provided
+    from postproc.cli.streams import write_bytes
     from postproc.report.terminal import show
     from postproc.workflows.preparation import Request
     from postproc.workflows.program import compensate
 
-    target = None if output is None else Path(output)
+    streamed = output == "-"
+    if streamed and json_to == "-":
+        raise click.UsageError("standard output takes the program or the JSON result, not both")
+    if (str(program) == "-") != (stdin_name is not None):
+        raise click.UsageError(
+            "PROGRAM - needs its name: --stdin-name panel.src"
+            if stdin_name is None
+            else "--stdin-name needs PROGRAM -, which is read from standard input"
+        )
+    given: dict[Path, bytes] = {}
+    if stdin_name is not None:
+        program = Path(stdin_name)
+        given[program] = sys.stdin.buffer.read()
+    target = None if output is None or streamed else Path(output)
     if target is not None and output is not None and output.endswith(("/", "\\")):
         target = target / program.name
-    out = Out(json_to, quiet, verbose)
-    with out.refusals(str(program)), out.stages() as stage:
+    taken: list[bytes] = []
+    out = Out(json_to, quiet, verbose, to_error=streamed)
+    with provided(given), out.refusals(str(program)), out.stages() as stage:
         done = compensate(
             Request(
                 program=program,
@@ -96,12 +121,15 @@ def program(
                 no_insert=no_insert,
                 shared_points=shared_points or SHARED_POINTS[0],
                 config_dat=config_dat,
+                stream=taken.append if streamed else None,
             ),
             stage,
         )
+    for content in taken:
+        write_bytes(content)
     out.result(done.as_json(), written=True)
     if not out.quiet:
         show(out.console(), done, verbose)
         if dry_run:
-            click.echo("this is a dry run: nothing is written")
+            click.echo("this is a dry run: nothing is written", err=streamed)
     raise SystemExit(done.exit)

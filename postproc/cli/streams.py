@@ -39,6 +39,18 @@ class GuardedStream:
             self._lose(error)
             return len(text)
 
+    def write_bytes(self, raw: bytes) -> None:
+        """Writes bytes as they are, after what was printed before."""
+        if self._closed:
+            self.problem = self.problem or "it is closed"
+            return
+        try:
+            self._stream.flush()
+            self._stream.buffer.write(raw)
+            self._stream.buffer.flush()
+        except (OSError, ValueError) as error:
+            self._lose(error)
+
     def writelines(self, lines: Iterable[str]) -> None:
         for line in lines:
             self.write(line)
@@ -66,6 +78,12 @@ class GuardedStream:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._stream, name)
+
+
+def write_bytes(raw: bytes) -> None:
+    """Writes bytes to standard output, which ``guarded_streams`` guards."""
+    assert isinstance(sys.stdout, GuardedStream)
+    sys.stdout.write_bytes(raw)
 
 
 @contextlib.contextmanager

@@ -50,7 +50,8 @@ class Request:
     """What the user asked for.  ``force``: None without ``--force``, "" for a bare one, else its value;
     ``tare``: the mean of a force log in air is subtracted; ``allow_compensated``: a program that carries the mark of an
     earlier compensation is accepted; ``no_insert``: no motion is inserted; ``shared_points``: as of ``Writing``;
-    ``keep_table``: the report keeps the table of its motions."""
+    ``keep_table``: the report keeps the table of its motions; ``stream``: takes the bytes of the compensated program
+    instead of a file; reports are then written only where ``report`` names a folder."""
 
     program: Path
     force: str | None = None
@@ -68,6 +69,7 @@ class Request:
     config_dat: Path | None = None
     tare: bool = False
     keep_table: bool = False
+    stream: Callable[[bytes], object] | None = None
 
 
 @dataclass(frozen=True)

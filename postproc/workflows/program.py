@@ -14,17 +14,15 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.base import rotary_words
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
 from postproc.base.memory import release_free_memory
-from postproc.base.units import DEG, MM
+from postproc.base.units import MM
 from postproc.compensation.axis_limits import check_limits
 from postproc.compensation.correct import MotionOutcome, correct
 from postproc.compensation.path_comparison import cuts_not_improved
-from postproc.compensation.splines import unknown_displacements
 from postproc.compensation.subdivide import subdivide
-from postproc.compensation.subdivision import Limits, Subdivision
+from postproc.compensation.subdivision import Limits
 from postproc.languages.dialect import EditedTargets, Program
 from postproc.output.atomic_write import Content, write_atomically
 from postproc.output.write import (
@@ -41,8 +39,7 @@ from postproc.report.diff import unified_diff
 from postproc.report.page import beside, program_page
 from postproc.report.page_data import page_data
 from postproc.report.report import Report, in_order_of_place, json_bytes
-from postproc.toolpath import OrientationPath, Role, Toolpath
-from postproc.workflows.corner_findings import corner_findings
+from postproc.workflows.closing_findings import closing_findings
 from postproc.workflows.figures import report_of
 from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, silent
 
@@ -128,13 +125,20 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         stage("correcting without the cuts that would be no better")
         ready = ready.with_text()
     program = ready.program
-    findings = [*ready.findings, *result.findings, *division.findings, *_closing(request, ready, written)]
+    findings = [
+        *ready.findings,
+        *result.findings,
+        *division.findings,
+        *closing_findings(request, ready, written),
+    ]
     paths = _output_paths(program, target)
     outputs = dict(zip(paths, written.contents, strict=True))
     stem = target.stem
     folder = request.report or target.parent
     names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff", "report.html")]
     names += [] if request.json is None else [request.json]
+    if request.stream is not None:
+        return _streamed(request, ready, written, in_order_of_place(findings))
     stage("reporting")
     release_free_memory()
     report = report_of(request, ready, result, in_order_of_place(findings), written)
@@ -173,6 +177,39 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     ready.inputs.refuse_changed()
     release_free_memory()
     write_atomically(files, target, ready.inputs.refuse_changed)  # writing takes its time as well
+    return report
+
+
+def _streamed(
+    request: Request, ready: Prepared, written: WrittenProgram, findings: tuple[Finding, ...]
+) -> Report:
+    """The report of a program whose bytes go to the request's stream; its reports only where a folder is named."""
+    documents, contents = ready.program.documents, written.contents
+    for document, content in zip(documents[1:], contents[1:], strict=True):
+        if content != document.raw:
+            message = f"{document.path.name} changes with the program, and a stream has no second file"
+            raise Refusal(Finding("FIL012", message, str(document.path), help="name a folder with -o"))
+    report = report_of(request, ready, written.result, findings, written)
+    if report.exit == 1:
+        raise Refusal(*report.findings)
+    pages = [] if request.json is None else [request.json]
+    files: dict[Path, Content] = {}
+    if request.report is not None:
+        place = request.report / request.program.stem
+        pages.append(place.with_name(f"{place.name}.report.json"))
+        files[place.with_name(f"{place.name}.corrections.csv")] = corrections_csv(
+            written.task, written.result, written.division, written.path_error
+        )
+    report = replace(report, outputs=tuple(map(str, [*files, *pages])))
+    _not_over_inputs(ready, report.outputs)
+    if request.dry_run:
+        return replace(report, outputs=())
+    ready.inputs.refuse_changed()
+    if files or pages:
+        files |= dict.fromkeys(pages, json_bytes(report))
+        write_atomically(files, still=ready.inputs.refuse_changed)
+    if request.stream is not None:
+        request.stream(contents[0])
     return report
 
 
@@ -215,182 +252,6 @@ def _corrected(request: Request, ready: Prepared, stem: str, worse: Mapping[int,
         if not unwritten:
             raise ValueError("motions that are not corrected are refused again")
         task = replace(task, toolpath=task.toolpath.with_refused({**known, **unwritten}))
-
-
-def _closing(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """The findings on the corrected program as a whole."""
-    file, findings = str(request.program), []
-    result, division = written.result, written.division
-    path, tolerance = ready.task.toolpath, ready.cell.tolerance
-    corrected = result.corrected
-    if ready.task.process and not ready.wrenches.any:
-        findings.append(Finding("COR010", "no motion has a force: nothing is corrected", file))
-    if division.inserted or len(division.lead_ins):
-        changed = (division.role != Role.ORIGINAL) | (division.moved & ~corrected[division.source])
-        findings.append(
-            Finding(
-                "COR012",
-                _inserted(division, len(path)),
-                file,
-                int(path.line[division.source[np.argmax(changed)]]),
-            )
-        )
-    findings += corner_findings(ready, written)
-    if request.gain < 1.0:
-        share = f"{request.gain:.0%} of the correction is applied, as --gain requests"
-        findings.append(Finding("COR007", share, file))
-    beyond = "" if request.gain == 1.0 else " beyond the share that --gain keeps"
-    turns = corrected & path.constraints.orientation_programmed
-    for off, limit, rows, unit, word in (
-        (written.residual, tolerance, corrected, MM, "mm"),
-        (written.off_angle, ready.cell.tolerance_angle, turns, DEG, "deg"),
-    ):
-        above = rows & ~(off <= limit)
-        if above.any():
-            row = int(np.argmax(np.where(above, np.nan_to_num(off, nan=np.inf), -1.0)))
-            message = (
-                f"the residual is {off[row] / unit:.4f} {word}{beyond}, tolerance {limit / unit:g} {word}"
-            )
-            message += f" ({int(above.sum())} motions)"
-            help = _POLE if unit == DEG and _by_pair(path, row) else ""
-            findings.append(Finding("COR005", message, file, int(path.line[row]), help=help))
-    findings += _between(request, ready, written) + _not_turned(ready, written)
-    return findings + _splines(ready, written) + _assumed(request, ready, written)
-
-
-def _not_turned(ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """Cutting motions whose text cannot state the orientation that would be needed: those that keep the one before
-    (COR019), and those that have no words for it (COR021)."""
-    path, division, limit = ready.task.toolpath, written.division, ready.cell.tolerance_angle
-    motion = written.result.corrected & ready.task.carries & ~path.constraints.orientation_programmed
-    off = np.where(motion, np.nan_to_num(written.result.after_angle), 0.0)
-    np.fmax.at(off, division.source, np.where(motion[division.source], written.between_angle, 0.0))
-    findings = []
-    for code, rows, why, help in (
-        (
-            "COR019",
-            path.keeps_orientation,
-            "#CONSTANT keeps the orientation of the motion before, so only the position is corrected",
-            "program the cut with $ORI_TYPE=#VAR, or state tolerance_deg in the cell",
-        ),
-        (
-            "COR021",
-            ~path.keeps_orientation,
-            "the program does not state the tool's orientation, so only the position is corrected",
-            "",
-        ),
-    ):
-        above = rows & (off > limit)
-        if above.any():
-            row = int(np.argmax(np.where(above, off, -1.0)))
-            message = f"the tool remains rotated by {off[row] / DEG:.4f} deg, tolerance {limit / DEG:g} deg"
-            message += f" ({int(above.sum())} motions): {why}"
-            findings.append(Finding(code, message, ready.task.file, int(path.line[row]), help=help))
-    return findings
-
-
-def _splines(ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """Splines on which the force turns with a feed that only the controller knows."""
-    rows, off = unknown_displacements(ready.task, written.result)
-    above = off > ready.cell.tolerance
-    if not above.any():
-        return []
-    worst = int(np.argmax(off))
-    message = (
-        "only the controller knows the path between the points of a spline: the force rotates with it, and the tool may"
-        f" be off by {off[worst] / MM:.4f} mm (worst here), tolerance {ready.cell.tolerance / MM:g} mm"
-        f" ({int(above.sum())} points)"
-    )
-    line = int(ready.task.toolpath.line[rows[worst]])
-    help = "program the spline with points nearer to each other, or state the force @base"
-    return [Finding("COR018", message, ready.task.file, line, help=help)]
-
-
-def _assumed(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """How rotary axes are taken to run between blocks, where another control would lead the tool elsewhere."""
-    path = ready.task.toolpath
-    if not path.orientation_control.any_by_words:
-        return []
-    rows = np.flatnonzero(
-        written.result.corrected & (path.orientation_control.path == OrientationPath.ROTARY_AXES) & path.known
-    )
-    apart = np.nan_to_num(
-        rotary_words.beside_great_circle(
-            path.orientation_control.rotary_from[rows], path.orientation_control.rotary_to[rows]
-        )
-    )
-    above = apart > ready.cell.tolerance_angle
-    if not above.any():
-        return []
-    worst = int(np.argmax(apart))
-    message = (
-        "between blocks the words of rotary axes are assumed to run linearly; a control that moves the tool on a great"
-        f" circle rotates it up to {apart[worst] / DEG:.4f} deg otherwise ({int(above.sum())} motions)"
-    )
-    return [Finding("COR020", message, str(request.program), int(path.line[rows[worst]]))]
-
-
-def _between(request: Request, ready: Prepared, written: WrittenProgram) -> list[Finding]:
-    """The findings on the path between the points."""
-    path, source, cell, findings = ready.task.toolpath, written.division.source, ready.cell, []
-    beyond = "" if request.gain == 1.0 else " beyond the share that --gain keeps"
-    for off, rows, limit, unit, what, word in (
-        (written.off_between, None, cell.tolerance, MM, "path", "mm"),
-        (
-            written.off_between_angle,
-            path.constraints.orientation_programmed,
-            cell.tolerance_angle,
-            DEG,
-            "orientation",
-            "deg",
-        ),
-    ):
-        over = off > limit
-        if rows is not None:
-            over &= rows[source]
-        if over.any():
-            worst = int(np.argmax(np.where(over, off, -1.0)))
-            row = int(source[worst])
-            message = (
-                f"the {what} error between points is up to {off[worst] / unit:.4f} {word}{beyond} (worst"
-                f" here), tolerance"
-                f" {limit / unit:g} {word} ({int(over.sum())} motions)"
-            )
-            help = _POLE if unit == DEG and _by_pair(path, row) else _NO_POINT
-            findings.append(Finding("COR006", message, str(request.program), int(path.line[row]), help=help))
-    return findings
-
-
-def _inserted(division: Subdivision, count: int) -> str:
-    """What was inserted, and what leads into cuts."""
-    links, leads = int(division.transitions.sum()), len(division.lead_ins)
-    points = division.inserted - links
-    parts = [
-        (points, "intermediate point{} inserted"),
-        (links, "transition move{} inserted where the correction steps"),
-        (leads, "air move{} moved to the corrected start of the next cut"),
-    ]
-    counts = ", ".join(f"{n} " + words.format("" if n == 1 else "s") for n, words in parts if n)
-    return (
-        f"the output has {counts} (the first one here): {len(division) / max(count, 1):.3f} times the motions"
-    )
-
-
-_NO_POINT = (
-    "no point may be inserted there (--no-insert, max_growth, min_segment, a spline, a TRIGGER), or the start of the"
-    " motion is not known"
-)
-
-_POLE = (
-    "near the pole of two rotary axes the outer one hardly rotates the tool: it stays within"
-    f" {rotary_words.SWING / DEG:g} deg of its programmed place, and the rest of the error remains"
-)
-
-
-def _by_pair(path: Toolpath, row: int) -> bool:
-    """Whether two rotary axes turn the tool in a motion."""
-    by_axes = path.orientation_control.path[row] == OrientationPath.ROTARY_AXES
-    return bool(by_axes and np.isfinite(path.orientation_control.rotary_to[row]).sum() == 2)
 
 
 def _target(request: Request) -> Path:

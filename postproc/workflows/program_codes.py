@@ -273,5 +273,13 @@ CODES = define(
             action="Check force and model at this place.",
             example="A pose without an equilibrium.",
         ),
+        "FIL012": Code(
+            "error",
+            "program of two files in a stream",
+            meaning="Points of the program are in its .dat, which changes too, and standard output takes one file.",
+            consequence="The program alone would be corrected in part.",
+            action="Name a folder with -o instead of -.",
+            example="`compensate - -o - --stdin-name taught.src --force` of a program with points in taught.dat.",
+        ),
     }
 )
