@@ -79,7 +79,7 @@ def test_every_command_has_examples_that_parse(name):
     assert lines, f"compensate {name} --help shows no example"
     for line in lines:
         line = re.sub(r'eval "\$\((.*)\)".*', r"\1", line)
-        words = normalized(shlex.split(line.partition("  ")[0].partition(" > ")[0])[1:])
+        words = normalized(shlex.split(re.split("  | [<>] ", line)[0])[1:])
         command = COMMANDS[words[0]]
         with command.make_context(words[0], words[1:]):
             pass

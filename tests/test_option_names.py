@@ -22,7 +22,13 @@ RENAMED = {
     for option in COMMANDS[name].params
     if isinstance(option, RenamedOption)
 }
-WORDS = {"program": ["a.src"], "predict": ["a.src"], "verify": ["a.src", "b.src"], "batch": ["a.src"]}
+WORDS = {
+    "program": ["a.src"],
+    "predict": ["a.src"],
+    "verify": ["a.src", "b.src"],
+    "batch": ["a.src"],
+    "watch": ["."],
+}
 
 
 def read(command: str, *words: str) -> tuple[dict[str, object], list[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -146,3 +147,26 @@ def test_a_terminal_that_goes_away(job):
         for path in job.output.parent.glob("*"):
             path.unlink()
     assert codes
+
+
+def test_from_standard_input_to_standard_output(job):
+    """The bytes are those of the file, and nothing else is printed or written."""
+    command = [sys.executable, "-m", "postproc"]
+    subprocess.run([*command, "part.src", "--force", "-q"], cwd=job.folder, check=True)
+    wanted = job.output.read_bytes()
+    shutil.rmtree(job.folder / "compensated")
+    text = job.program.read_bytes()
+    job.program.unlink()
+    before = sorted(job.folder.rglob("*"))
+    words = [*command, "-", "-o", "-", "--stdin-name", "part.src", "--force"]
+    done = subprocess.run(words, cwd=job.folder, input=text, capture_output=True)
+    assert done.returncode == 0
+    assert done.stdout == wanted
+    assert b"error before" in done.stderr
+    assert sorted(job.folder.rglob("*")) == before
+    refused = subprocess.run(words, cwd=job.folder, input=b"DEF part()\nEND\n", capture_output=True)
+    assert (refused.returncode, refused.stdout) == (1, b"")
+    with open("/dev/full", "wb") as full:
+        lost = subprocess.run(words, cwd=job.folder, input=text, stdout=full, stderr=subprocess.PIPE)
+    assert lost.returncode == 1
+    assert b"cannot be written" in lost.stderr

@@ -92,6 +92,20 @@ def jobs_of(
     return Jobs(root, jobs, tuple(path for one in matches for path in one.passed_over))
 
 
+def options_of_words(**words: object) -> OptionValues:
+    """The options that a command line states, as a Request has them: files are absolute, what is not stated is not
+    there."""
+    options: dict[str, object] = {}
+    for key, value in words.items():
+        if value is None or value is False:
+            continue
+        if key in ("cell", "config_dat"):
+            value = Path(os.path.abspath(str(value)))
+        is_file = isinstance(value, str) and value.lower().endswith((".csv", *JOB_FILE))
+        options[key] = os.path.abspath(str(value)) if key in ("force", "robot") and is_file else value
+    return options
+
+
 def _of_file(path: Path, command_options: OptionValues, output: Path | None, outside: bool) -> Jobs:
     top = _loaded(path)
     top.only(*JOB_KEYS, *_former_in(top))

@@ -75,7 +75,7 @@ def _claimed(anchor: Path, paths: list[Path]) -> ProgramMatches:
     others: list[Path] = []
     for path in sorted(paths):
         if os.path.isfile(path):
-            (programs if _is_program(path) else others).append(path)
+            (programs if is_program(path) else others).append(path)
     known = {path.with_suffix("") for path in programs}
     return ProgramMatches(
         anchor, tuple(programs), tuple(path for path in others if not _belongs(path, known))
@@ -94,7 +94,8 @@ NO_PROGRAMS = frozenset(
 """Suffixes of files that may quote a program and are none."""
 
 
-def _is_program(path: Path) -> bool:
+def is_program(path: Path) -> bool:
+    """Whether a dialect claims a file; one that cannot be read counts: whoever compensates it states what is wrong."""
     if path.suffix.lower() in NO_PROGRAMS:
         return False
     try:

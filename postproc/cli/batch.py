@@ -118,8 +118,6 @@ def batch(
     Exit codes, of the worst program: 0 done; 3 written, but not everything is corrected or something needs review; 1
     failed or not run; 2 wrong command line.
     """
-    import os
-
     if not jobs:
         lost = force is not None and force.lower().endswith((".yaml", ".yml"))
         hint = f"; --force uses {force} as its value: write the programs before --force" if lost else ""
@@ -128,29 +126,26 @@ def batch(
         raise click.UsageError("--workers applies to this machine; a Dask cluster has its own workers")
 
     from postproc.batching.batch import BatchRequest, run_batch
+    from postproc.batching.job_file import options_of_words
     from postproc.report.batched_terminal import show_batched
 
-    if force is not None and force.lower().endswith((".csv", ".yaml", ".yml")):
-        force = os.path.abspath(force)
-    if robot is not None and robot.lower().endswith((".yaml", ".yml")):
-        robot = os.path.abspath(robot)
-    options = {
-        "force": force,
-        "robot": robot,
-        "cell": None if cell is None else Path(os.path.abspath(cell)),
-        "config_dat": None if config_dat is None else Path(os.path.abspath(config_dat)),
-        "gain": gain,
-        "tare": tare or None,
-        "no_insert": no_insert or None,
-        "shared_points": shared_points,
-        "strict": strict or None,
-        "allow_compensated": allow_compensated or None,
-        "dry_run": dry_run or None,
-    }
+    options = options_of_words(
+        force=force,
+        robot=robot,
+        cell=cell,
+        config_dat=config_dat,
+        gain=gain,
+        tare=tare,
+        no_insert=no_insert,
+        shared_points=shared_points,
+        strict=strict,
+        allow_compensated=allow_compensated,
+        dry_run=dry_run,
+    )
     out = Out(json_to, quiet, verbose)
     request = BatchRequest(
         words=jobs,
-        options={key: value for key, value in options.items() if value is not None},
+        options=options,
         output=output,
         workers=workers,
         dask=dask,

@@ -25,6 +25,7 @@ from postproc.cli.schema import schema
 from postproc.cli.signals import ended_in_words
 from postproc.cli.streams import guarded_streams
 from postproc.cli.verify import verify
+from postproc.cli.watch import watch
 from postproc.output.publications import publications
 
 COMMANDS = {
@@ -37,6 +38,7 @@ COMMANDS = {
     "plan": plan,
     "diagnose": diagnose,
     "batch": batch,
+    "watch": watch,
     "robots": robots,
     "schema": schema,
     "completion": completion,
@@ -62,6 +64,7 @@ def main() -> None:
       compensate plan --effects ... --poses 15 ...    the poses and loads worth measuring
       compensate diagnose loads.csv                   the effects that the robot file misses
       compensate batch parts --force                  many programs in parallel
+      compensate watch outbox --force                 every program that arrives in a folder
     """
 
 

@@ -87,7 +87,7 @@ def program(
 
     streamed = output == "-"
     if streamed and json_to == "-":
-        raise click.UsageError("standard output takes the program or the JSON result, not both")
+        raise click.UsageError("standard output can take either the program or the JSON result")
     if (str(program) == "-") != (stdin_name is not None):
         raise click.UsageError(
             "PROGRAM - needs its name: --stdin-name panel.src"

@@ -53,7 +53,7 @@ class Result:
 
     def _repr_html_(self) -> str:
         rows = "".join(
-            f"<tr><th style='text-align:left'>{escape(key)}</th><td>{escape(_short(value))}</td></tr>"
+            f"<tr><th scope='row'>{escape(key)}</th><td>{escape(_short(value))}</td></tr>"
             for key, value in list(self.figures().items())[:_LEAVES]
         )
         findings = self.as_json().get("findings")

@@ -1,0 +1,141 @@
+"""A hot folder: every program once, whole, none lost, whenever the watch is killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from conftest import CELL, LINES
+
+from postproc.batching.hot_folder import HotFolder
+
+PROGRAM = ("\r\n".join(LINES) + "\r\n").encode("latin-1")
+
+
+@pytest.fixture
+def hot(tmp_path):
+    folder = tmp_path / "outbox"
+    folder.mkdir()
+    (folder / "cell.yaml").write_text(CELL)
+    return folder
+
+
+def named(name):
+    return PROGRAM.replace(b"DEF part()", f"DEF {name}()".encode())
+
+
+def words(folder, *more):
+    return ["watch", folder, "--force", "--settle", "0", "--once", *more]
+
+
+def test_programs_are_compensated_and_moved(compensate, hot):
+    (hot / "one.src").write_bytes(named("one"))
+    (hot / "two.src").write_bytes(named("two").replace(b"LIN {X 100.000", b"LIN {X 100,000"))
+    (hot / "two.dat").write_bytes(b"DEFDAT two\r\nENDDAT\r\n")
+    (hot / "three.src").write_bytes(b"DEF three()\r\nEND\r\n")
+    done = compensate(*words(hot, "--json", "-"))
+    rows = [json.loads(line) for line in done.out.splitlines()]
+    assert {row["name"]: row["state"] for row in rows} == {
+        "one.src": "done",
+        "two.src": "done",
+        "three.src": "failed",
+    }
+    assert done.code == 1
+    left = {path.name for path in hot.iterdir() if path.is_file()}
+    assert left == {"cell.yaml"}
+    assert {path.name for path in (hot / "done").iterdir()} == {"one.src", "two.src", "two.dat"}
+    why = json.loads((hot / "failed" / "three.report.json").read_bytes())
+    assert why["findings"][0]["code"] == "FIL009"
+    assert (hot / "compensated" / "one.src").read_bytes() != named("one")
+    assert (hot / "compensated" / "one.report.html").exists()
+
+
+def test_the_same_name_again_keeps_the_earlier_one(compensate, hot):
+    for _ in range(2):
+        (hot / "one.src").write_bytes(named("one"))
+        assert compensate(*words(hot)).code == 0
+    assert {path.name for path in (hot / "done").iterdir()} == {"one.src", "one~2.src"}
+
+
+def test_a_program_that_grows_is_waited_for(hot):
+    watched = HotFolder(hot, options={"force": ""}, settle=1.0)
+    program = hot / "one.src"
+    program.write_bytes(named("one")[:-90])
+    assert watched.step(now=0.0) == 0
+    assert watched.step(now=0.9) == 0
+    program.write_bytes(named("one"))
+    assert watched.step(now=1.1) == 0
+    (hot / "one.dat").write_bytes(b"DEFDAT one\r\n")
+    assert watched.step(now=2.0) == 0  # its data list has just come
+    assert watched.step(now=3.2) == 1
+    assert not watched.waiting()
+    assert (hot / "done" / "one.src").read_bytes() == named("one")
+
+
+def test_a_journal_moves_nothing_outside(hot, tmp_path):
+    (tmp_path / "secret").write_text("x")
+    (hot / ".compensate").mkdir()
+    moves = {
+        str(tmp_path / "secret"): str(hot / "done" / "secret"),
+        str(hot / "cell.yaml"): str(tmp_path / "c"),
+    }
+    (hot / ".compensate" / "moves.json").write_text(json.dumps(moves))
+    with HotFolder(hot).held():
+        pass
+    assert (tmp_path / "secret").exists()
+    assert (hot / "cell.yaml").exists()
+
+
+@pytest.mark.slow
+def test_killed_at_random_moments_every_program_is_done_once(hot):
+    count, kills = 12, int(os.environ.get("POSTPROC_KILLS", "50"))
+    waiting = [(f"p{number}", named(f"p{number}")) for number in range(count)]
+    chance = random.Random(3)
+    command = [sys.executable, "-m", "postproc", *map(str, words(hot, "-q", "--json", "-"))]
+    rows = []
+    for kill in range(kills):
+        if waiting and kill % 3 == 0:
+            name, text = waiting.pop()
+            (hot / f"{name}.src").write_bytes(text)
+        run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        time.sleep(chance.uniform(0.2, 1.5))
+        run.kill()
+        rows += [json.loads(line) for line in run.communicate()[0].splitlines() if line.endswith(b"}")]
+    for name, text in waiting:
+        (hot / f"{name}.src").write_bytes(text)
+    last = subprocess.run(command, stdout=subprocess.PIPE, timeout=600)
+    assert last.returncode == 0
+    archived = {path.name: path.read_bytes() for path in (hot / "done").iterdir()}
+    assert archived == {f"p{number}.src": named(f"p{number}") for number in range(count)}
+    assert {path.name for path in hot.iterdir() if path.is_file()} == {"cell.yaml"}
+    assert not (hot / "failed").exists()
+    results = hot / "compensated"
+    texts = ((results / f"p{n}.src").read_bytes().replace(b"p%d" % n, b"p", 1) for n in range(count))
+    bodies = {re.sub(rb";COMPENSATED[^\r\n]*", b"", text) for text in texts}
+    assert len(bodies) == 1
+    for number in range(count):
+        report = json.loads((results / f"p{number}.report.json").read_bytes())
+        assert report["corrected"] > 0
+    assert not [path for path in results.rglob("*") if path.name.endswith(".tmp")]
+
+
+def test_a_signal_stops_it(hot):
+    command = [sys.executable, "-m", "postproc", "watch", str(hot), "--force", "--settle", "0"]
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert run.stderr is not None
+    assert run.stderr.readline().startswith("watching")
+    (hot / "one.src").write_bytes(named("one"))
+    deadline = time.monotonic() + 60
+    while not Path(hot, "done", "one.src").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    run.terminate()
+    _, words_of_end = run.communicate(timeout=60)
+    assert run.returncode == 128 + 15
+    assert "continues from here" in words_of_end
