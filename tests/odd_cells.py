@@ -179,7 +179,7 @@ def wrong(seed: int, folder: Path) -> str:
         return ""
     result = json.loads(out.getvalue())
     stated = re.search(r"^max_correction: (\S+)$", cell, re.MULTILINE)
-    allowed = float(stated.group(1)) if stated else MAX_CORRECTION
+    allowed = float(stated.group(1)) if stated and stated.group(1) not in ("null", "~") else MAX_CORRECTION
     before, after = (
         {move[3]: move for move in _MOVE.findall(one)} for one in (text.replace("\r", ""), output.read_text())
     )

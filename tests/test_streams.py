@@ -54,7 +54,6 @@ def test_files_that_are_written_are_told_by_the_exit_code(job, words, redirected
         "robots",
         "schema cell",
         "--help",
-        "predict part.src --force",
         "part.src --force --dry-run",
     ],
 )
