@@ -524,6 +524,16 @@ def test_digest_is_of_both_files(tmp_path):
 
 # text, words of the message, the line it is told for (text of the wrong file; None: the file as a whole)
 URDF_ERRORS = {
+    "an encoding that is not supported": (
+        '<?xml version="1.0" encoding="UTF-7"?>' + URDF.lstrip().partition("?>")[2],
+        "encoding that is not supported",
+        None,
+    ),
+    "an encoding that nobody knows": (
+        '<?xml version="1.0" encoding="x-none"?>' + URDF.lstrip().partition("?>")[2],
+        "encoding that is not supported",
+        None,
+    ),
     "not XML": (URDF.replace("</robot>", ""), "not XML", None),
     "not a robot": ("<model/>\n", "<robot> is expected", "<model"),
     "no links": ("<robot name='x'/>\n", "form a circle", None),

@@ -55,7 +55,6 @@ def test_files_that_are_written_are_told_by_the_exit_code(job, words, redirected
         "robots",
         "schema cell",
         "--help",
-        "predict part.src --force",
         "part.src --force --dry-run",
     ],
 )
@@ -124,6 +123,31 @@ def test_a_signal_after_the_files_are_written_changes_nothing(job):
         assert {path.name for path in job.output.parent.iterdir()} == WRITTEN
         assert stray(job.folder) == []
         job.output.unlink()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_at_any_moment_of_a_process(job, number):
+    """From its first moment on: ended by the signal, or with 128 + its number, and without a traceback."""
+    codes = set()
+    for wait in (0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.6, 0.9, 1.3):
+        process = subprocess.Popen(
+            [*COMPENSATE, str(job.program), "--force", "-q"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+        )
+        time.sleep(wait)
+        process.send_signal(number)
+        said, _ = process.communicate(timeout=60)
+        written = {path.name for path in job.output.parent.glob("*")}
+        if b"<frozen" in said:  # Python itself was interrupted while it started
+            assert written == set()
+            continue
+        assert process.returncode in (-number, 128 + number, 0), said
+        assert written == (WRITTEN if process.returncode == 0 else set())
+        assert b"Traceback" not in said
+        codes.add(process.returncode)
+        for path in job.output.parent.glob("*"):
+            path.unlink()
+    assert 128 + number in codes
 
 
 @pytest.mark.slow

@@ -58,8 +58,15 @@ def write_atomically(
     beside their places; where it raises, everything stays as it was.  Raises Refusal FIL004 when the disk or its rights
     do not allow it; the files that were there before are then there again.
     """
-    with contextlib.ExitStack() as locks:
-        _publish(files, last, still, locks)
+    made: list[Path] = []
+    try:
+        with contextlib.ExitStack() as locks:
+            _publish(files, last, still, locks, made)
+    except BaseException:
+        for folder in sorted(made, key=lambda folder: len(folder.parts), reverse=True):
+            with contextlib.suppress(OSError):
+                folder.rmdir()  # only an empty one
+        raise
 
 
 def sweep(files: Iterable[Path]) -> None:
@@ -80,7 +87,11 @@ def refused(path: Path, message: str, help: str) -> Refusal:
 
 
 def _publish(
-    files: Mapping[Path, Content], last: Path | None, still: Callable[[], None], locks: contextlib.ExitStack
+    files: Mapping[Path, Content],
+    last: Path | None,
+    still: Callable[[], None],
+    locks: contextlib.ExitStack,
+    made: list[Path],
 ) -> None:
     # names are noted before their files are created: a signal may come between the two
     ready = {path: path.with_name(f".{_stem(path)}.{secrets.token_hex(4)}.tmp") for path in files}
@@ -93,6 +104,7 @@ def _publish(
                 raise OSError(errno.EINVAL, problem)
             if at.is_dir() and not at.is_symlink():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+            made += [folder for folder in (at.parent, *at.parent.parents) if not os.path.lexists(folder)]
             at.parent.mkdir(parents=True, exist_ok=True)
         if _lock_folders({path.parent for path in files}, locks):
             _sweep(files)

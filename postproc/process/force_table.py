@@ -9,7 +9,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.tables import CsvTable
 from postproc.process.force_comments import marked_air
 from postproc.process.force_gauge import checked_gauge
-from postproc.process.stated_forces import BASE, CHANNELS, NotAForce, StatedForces, parse_frame
+from postproc.process.stated_forces import BASE, CHANNELS, LARGEST, NotAForce, StatedForces, parse_frame
 from postproc.process.wrenches import is_air
 from postproc.toolpath import Toolpath
 
@@ -18,8 +18,6 @@ FORM = (
     "line (of the motion, from 1) or s_mm (path length) or t_s (time at programmed feed), then fx,fy,fz[,mx,my,mz]"
     "[,frame] in N and N m"
 )
-LARGEST = 1e9
-"""[N, N m] No reading is larger."""
 
 _SHOWN = 10
 

@@ -13,6 +13,9 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints, frozen
 from postproc.base.findings import nearest
 
+LARGEST = 1e9
+"""[N, N m] No force is larger."""
+
 FRAMES = ("base", "world", "tool", "feed")
 BASE, WORLD, TOOL, FEED = range(4)
 CHANNELS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -151,4 +154,6 @@ def _number(word: str) -> float:
         raise NotAForce("a number is missing")
     if not _NUMBER.match(word) or not math.isfinite(float(word)):
         raise NotAForce(f"{word[:40]!r} is not a finite number")
+    if abs(float(word)) > LARGEST:
+        raise NotAForce(f"{word[:40]!r} exceeds {LARGEST:g} N or N m")
     return float(word)
