@@ -288,7 +288,7 @@ def test_programs_with_nothing_to_show_have_a_page_too(window, tmp_path, lines):
 
     (tmp_path / "cell.yaml").write_text(CELL)
     (tmp_path / "part.src").write_text("\n".join(lines) + "\n")
-    compensate(Request(tmp_path / "part.src"))
+    compensate(Request(tmp_path / "part.src", force="0,0,0"))
     shown = window(tmp_path / "compensated" / "part.report.html")
     shown.page.locator("#space").hover()
     shown.page.locator("#error").click()

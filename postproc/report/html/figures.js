@@ -28,8 +28,8 @@ function lengths(vectors) {
 // Quantities that colour the path: values by motion, and how many decimals people read.
 const quantities = {
   before: { title: 'error before', unit: 'mm', decimals: 3, values: motions.before },
-  after: { title: 'error after', unit: 'mm', decimals: 4, values: motions.after },
-  path_error: { title: 'path error between points', unit: 'mm', decimals: 4, values: motions.path_error },
+  after: { title: 'error after', unit: 'mm', decimals: 4, values: motions.after, bands: true },
+  path_error: { title: 'path error between points', unit: 'mm', decimals: 4, values: motions.path_error, bands: true },
   correction: { title: 'correction', unit: 'mm', decimals: 3, values: lengths(motions.correction) },
   force: { title: 'force', unit: 'N', decimals: 0, values: lengths(motions.force) },
 };

@@ -124,6 +124,9 @@ class Space {
     const { values } = quantities[this.quantity];
     this.range = extent(values, this.inside);
     if (this.range[0] > 0 && this.range[0] < 0.5 * this.range[1]) this.range[0] = 0;
+    // what is to be within the tolerance is shown in quarters of it: a small residual does not look like a large one
+    this.bands = quantities[this.quantity].bands && given.tolerance > 0 ? 8 : 0;
+    if (this.bands) this.range = [0, 2 * given.tolerance];
     this.box(pen);
     const stride = this.moving ? Math.ceil(count / WHILE_MOVING) : 1;
     this.air(pen, stride);
@@ -181,6 +184,12 @@ class Space {
     pen.setLineDash([]);
   }
 
+  // The middle of the band that a share of the scale lies in; what is above the scale is in the last one.
+  banded(share) {
+    if (!this.bands || !Number.isFinite(share)) return share;
+    return (Math.min(this.bands - 1, Math.floor(share * this.bands)) + 0.5) / this.bands;
+  }
+
   // Segments by depth and value: far ones first, those of one slab and one value in one stroke.
   path(pen, values, stride) {
     const [low, high] = this.range, span = high - low || 1;
@@ -195,7 +204,7 @@ class Space {
     for (let i = stride; i < count; i += stride) {
       if (inAir(i) || !this.known[i] || !this.known[i - stride]) continue;
       const slab = Math.min(SLABS - 1, Math.max(0, Math.floor((SLABS * (this.depth[i] - far)) / thick)));
-      const share = (values[i] - low) / span;
+      const share = this.banded((values[i] - low) / span);
       // motions that were not corrected, or are not known, have a heap of their own
       const plain = !Number.isFinite(share) || (given.corrected && motions.state[i] !== CORRECTED);
       const bin = plain ? BINS : Math.min(BINS - 1, Math.max(0, Math.floor(BINS * share)));
@@ -329,13 +338,14 @@ class Space {
     pen.fillText(`${title}, ${unit}`, wide - 12, 22);
     for (let k = 0; k < BINS; k++) {
       const half = 2 + (8 * k) / BINS;
-      pen.fillStyle = colour((k + 0.5) / BINS);
+      pen.fillStyle = colour(this.banded((k + 0.5) / BINS));
       pen.fillRect(x - half, top + tall * (1 - (k + 1) / BINS), 2 * half, tall / BINS + 0.6);
     }
     pen.fillStyle = theme().soft;
-    for (const value of ticks(low, most, 4)) {
+    for (const value of this.bands ? [0, 0.5 * most, most] : ticks(low, most, 4)) {
       const share = most > low ? (value - low) / (most - low) : 0;
-      pen.fillText(number(value, decimals), x - 16, top + tall * (1 - share) + 4);
+      const name = !this.bands || !value ? number(value, decimals) : value < most ? 'tolerance' : '2 × tolerance or more';
+      pen.fillText(name, x - 16, top + tall * (1 - share) + 4);
     }
   }
 
