@@ -222,8 +222,15 @@ def test_an_arc_is_cut_as_a_ring():
     cut = run(path, block([0, -60, -40], [200, 60, 0]), FLAT)
     # half a ring; the disc at its start is where the cutter stands already
     assert cut.volume[1] / MM**3 == pytest.approx(np.pi / 2 * (38**2 - 22**2) * 5, rel=0.005)
-    ring = np.pi / 2 * (38.5**2 - 38**2) * 5
-    assert cut.volume[3] / MM**3 == pytest.approx(ring, rel=0.02)
+    x, y = np.meshgrid(np.arange(60.025, 140, 0.05), np.arange(-9.975, 40, 0.05))
+
+    def swept(radius):
+        """Which points are within 8 mm of the half circle about (100, 0)."""
+        angle = np.clip(np.mod(np.arctan2(y, x - 100) + np.pi / 2, 2 * np.pi) - np.pi / 2, 0, np.pi)
+        return np.hypot(x - 100 - radius * np.cos(angle), y - radius * np.sin(angle)) < 8
+
+    new = swept(30.5) & ~swept(30.0) & (np.hypot(x - 130.5, y) > 8)
+    assert cut.volume[3] / MM**3 == pytest.approx(new.sum() * 0.05**2 * 5, rel=0.01)
 
 
 def test_collisions_have_their_motion():

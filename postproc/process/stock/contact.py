@@ -42,6 +42,7 @@ COLUMNS = 14
 NEAR_ZERO = 2e-7
 """m: a cutter that follows a surface which is already cut does not cut it again for the digits of a number."""
 
+_LEAST_STOCK = 1e-8  # m: thinner is a digit of a number
 _LEAST_ARC = 0.02 * np.pi / 180
 _SMALL_ARC, _SMALLER_ARC, _STRAIGHT_ENOUGH = 12.0 * np.pi / 180, 1.0 * np.pi / 180, 0.02
 _LEAST_SHARE = 2e-4  # of the radius: the shortest length of profile
@@ -215,7 +216,7 @@ def _set_node(
         return
     middle = np.arctan2(a, b)
     half = np.pi if c >= size else np.arccos(-c / size)
-    find_arcs(stock, pose, r, height, middle - half, middle + half, time, 0.0, _LEAST_ARC, arc)
+    find_arcs(stock, pose, r, height, middle - half, middle + half, time, _LEAST_STOCK, _LEAST_ARC, arc)
     node[_SEEN], node[_MOST] = arc[_GREATEST], arc[BOUND]
     if arc[0] <= 0.0:
         return

@@ -35,6 +35,12 @@ from postproc.toolpath import Toolpath
 SPACING = 0.5
 """Radii of the cutter between two places of a motion that are looked at."""
 
+FINER, UNEVEN = 6, 0.05
+"""How many times closer they are on a sweep along which the removed area changes by more than this share."""
+
+LEAST_AREA = 1e-5 * MM**2
+"""Across the feed: below it nothing is cut."""
+
 DEEP, NARROW = 0.02 * MM, 0.3 * MM
 """A collision is deeper than the first and wider than the second."""
 
@@ -92,13 +98,26 @@ def engage(
 
     radius = np.array([cutter.radius for cutter in sweeps.cutters])[sweeps.rows[:, CUTTER].astype(int)]
     active = live[earlier:, 0] <= live[earlier:, 1]
-    sweep, share, weight = _places(sweeps, radius, np.flatnonzero(active & (sweeps.rows[:, REMOVES] > 0)))
-    found = np.zeros((len(sweep), COLUMNS))
 
-    def look(part: slice) -> None:
-        contacts(stock, profiles, padded, live, heading, earlier + sweep[part], share[part], found[part])
+    def look_at(chosen: Ints, finer: int) -> tuple[Ints, Floats, Floats]:
+        """The sweep of each place, the length of path that it represents, and its contact."""
+        sweep, share, weight = _places(sweeps, radius, chosen, finer)
+        found = np.zeros((len(sweep), COLUMNS))
 
-    each_block(look, len(sweep), _BLOCK)
+        def look(part: slice) -> None:
+            contacts(stock, profiles, padded, live, heading, earlier + sweep[part], share[part], found[part])
+
+        each_block(look, len(sweep), _BLOCK)
+        return sweep, weight, found
+
+    sweep, weight, found = look_at(np.flatnonzero(active & (sweeps.rows[:, REMOVES] > 0)), 1)
+    uneven = _uneven(sweep, found[:, RATE])
+    again = np.isin(sweep, uneven)
+    finer = look_at(uneven, FINER)
+    parts = zip((sweep[~again], weight[~again], found[~again]), finer, strict=True)
+    sweep, weight, found = (np.concatenate(pair) for pair in parts)
+    order = np.argsort(sweep, kind="stable")
+    sweep, weight, found = sweep[order], weight[order], found[order]
     hits = _hits(stock, sweeps, profiles, heading, live, earlier, radius)
     return _by_motion(len(toolpath), sweeps, sweep, weight, found, laws, edges, hits, stock)
 
@@ -129,10 +148,21 @@ def _laws(sweeps: MotionSweeps, toolpath: Toolpath, edges: dict[int, Edges]) -> 
     return laws
 
 
-def _places(sweeps: MotionSweeps, radius: Floats, chosen: Ints) -> tuple[Ints, Floats, Floats]:
+def _uneven(sweep: Ints, rate: Floats) -> Ints:
+    """The sweeps along which the removed area changes: entries, exits, corners."""
+    if not len(sweep):
+        return sweep
+    first = np.flatnonzero(np.append(True, sweep[1:] != sweep[:-1]))
+    most, least = np.maximum.reduceat(rate, first), np.minimum.reduceat(rate, first)
+    return sweep[first][most - least > UNEVEN * most]
+
+
+def _places(
+    sweeps: MotionSweeps, radius: Floats, chosen: Ints, finer: int = 1
+) -> tuple[Ints, Floats, Floats]:
     """The sweep, the share of it, and the length of path [m] that each place (K,) represents."""
     length = sweeps.length[chosen]
-    count = np.clip(np.ceil(length / (SPACING * radius[chosen])), 1, _MOST_PLACES).astype(np.int64)
+    count = np.clip(np.ceil(length / (SPACING * radius[chosen])), 1, _MOST_PLACES).astype(np.int64) * finer
     owner = np.repeat(np.arange(len(chosen)), count)
     place = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
     share = (place + 0.5) / count[owner]
@@ -193,7 +223,8 @@ def _by_motion(
     edges: dict[int, Edges], hits: dict[int, tuple[int, ...]], stock: Stock,
 ) -> EngagedMotions:  # fmt: skip
     motion = sweeps.motion[sweep]
-    touches = found[:, RATE] > 0
+    touches = found[:, RATE] > LEAST_AREA
+    found[~touches, RATE] = 0.0
     found[~touches, FORCE : FORCE + 6] = 0.0
     wrench = np.where(touches[:, None] & np.isnan(laws[sweep, :1]), np.nan, found[:, FORCE : FORCE + 6])
     volume: Floats = np.bincount(motion, found[:, RATE] * weight, count).astype(float)
@@ -217,7 +248,7 @@ def _by_motion(
         volume=volume,
         mean=mean,
         largest=largest,
-        along=_lines(count, motion, wrench),
+        along=_lines(count, motion[touches], wrench[touches]),
         depth=np.where(cuts, table[:, HIGH] - np.maximum(table[:, LOW], 0.0), 0.0),
         width=np.where(cuts, table[:, LEFT] - table[:, RIGHT], 0.0),
         entry=table[:, ENTRY],
@@ -230,8 +261,8 @@ def _by_motion(
 
 
 def _lines(count: int, motion: Ints, wrench: Floats) -> Floats:
-    """(N, 2, 6) the wrench at start and end of each motion: the line through the medians of both halves of its places,
-    so that the short ramps at entry and exit of a long cut do not bend it."""
+    """(N, 2, 6) the wrench at start and end of each motion: the line through the medians of both halves of its places
+    in stock, so that the short ramps at entry and exit of a long cut do not bend it."""
     along = np.zeros((count, 2, 6))
     rows, first, many = np.unique(motion, return_index=True, return_counts=True)
     one = many == 1
@@ -242,6 +273,6 @@ def _lines(count: int, motion: Ints, wrench: Floats) -> Floats:
         early, late = np.median(values[:half], axis=0), np.median(values[number - half :], axis=0)
         apart = (number - half) / number  # of the middles of both halves, as a share of the motion
         slope = (late - early) / max(apart, 0.5)
-        middle = 0.5 * (early + late)
-        along[row] = middle - 0.5 * slope, middle + 0.5 * slope
+        middle, low, high = 0.5 * (early + late), values.min(axis=0), values.max(axis=0)
+        along[row] = np.clip([middle - 0.5 * slope, middle + 0.5 * slope], low, high)
     return along
