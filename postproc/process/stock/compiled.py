@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import importlib.util
 import os
 from collections.abc import Callable
@@ -20,8 +21,8 @@ def compiled(function: Function) -> Function:
 
     It is stored between runs, and compiled at its first call where no folder can be written.
     """
-    from numba import config, njit
-
+    numba: Any = importlib.import_module("numba")
+    config, njit = numba.config, numba.njit
     options = {"nogil": True, "error_model": "numpy"}
     before = config.CACHE_DIR
     config.CACHE_DIR = str(_folder())
