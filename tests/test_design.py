@@ -71,6 +71,7 @@ SAME_MODULE_NAMES = {
     "a command: its options, and the function that does it": {
         "batch": {"cli", "batching"},
         "diagnose": {"cli", "workflows"},
+        "engage": {"cli", "workflows"},
         "identify": {"cli", "workflows"},
         "map": {"cli", "workflows"},
         "plan": {"cli", "workflows"},

@@ -29,6 +29,7 @@ def words_of(text):
 
 FINITE = words_of(
     """
+    collide collides cuts face meets reaches removes touches
     accepts act acts affects agree allows answers applies approximates are asks assumes becomes belong
     belongs can cannot carries carry causes chooses combines come compares computes consist consists contain
     contains continue continues contradict contradicts contribute converge converges converts corrects could
@@ -45,6 +46,7 @@ FINITE = words_of(
 """Verb forms that no message uses as a noun."""
 IMPERATIVES = words_of(
     """
+    complete retract
     add allow approach attach build call change check choose close compare compensate convert copy correct
     create declare define expand export fill fit give identify ignore import increase insert install keep
     let limit list load loosen make mark measure move name omit open pass pick plan program put raise

@@ -15,6 +15,7 @@ from postproc.cli.batch import batch
 from postproc.cli.check import check
 from postproc.cli.completion import Commands, completion
 from postproc.cli.diagnose import diagnose
+from postproc.cli.engage import engage
 from postproc.cli.identify import identify
 from postproc.cli.map import map_
 from postproc.cli.plan import plan
@@ -34,6 +35,7 @@ COMMANDS = {
     "predict": predict,
     "verify": verify,
     "map": map_,
+    "engage": engage,
     "identify": identify,
     "plan": plan,
     "diagnose": diagnose,
@@ -59,6 +61,7 @@ def main() -> None:
       compensate check panel.src                      read it only, report what is not understood
       compensate predict panel.src --force            the deflection at every pose
       compensate verify panel.src compensated/panel.src --force     the path error of both programs
+      compensate engage panel.ngc                     what it cuts of its stock, and with which force
       compensate map --robot kuka_kr270 ...           the deflection over the workspace
       compensate identify loads.csv --effects ...     parameters of the robot from measurements
       compensate plan --effects ... --poses 15 ...    the poses and loads worth measuring

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from postproc.base.findings import Code, define
+from postproc.process.stock.codes import CODES as STOCK_CODES
 
-CODES = define(
+FORCE_CODES = define(
     {
         "EXT005": Code(
             "error",
@@ -294,3 +295,4 @@ CODES = define(
         ),
     }
 )
+CODES = {**FORCE_CODES, **STOCK_CODES}

@@ -17,6 +17,8 @@ from postproc.process.force_logs import read_log
 from postproc.process.force_table import place_column, read_force_table
 from postproc.process.operations import process_forces
 from postproc.process.stated_forces import FORM, NotAForce, StatedForces, parse_force
+from postproc.process.stock.compiled import check_compiler
+from postproc.process.stock.stock_section import has_stock
 from postproc.process.wrenches import Wrenches, turn_to_robot_axes
 from postproc.toolpath import Toolpath
 
@@ -125,6 +127,12 @@ class _Given:
 
     def process(self, path: Path) -> SourcedForces:
         self.no_offset("the force is computed from a process")
+        if has_stock(path):
+            check_compiler(str(path))
+            from postproc.process.stock.simulation import stock_forces  # numba: only where there is a stock
+
+            stated, findings = stock_forces(path, self.toolpath, self.frames, str(self.program))
+            return stated, findings, f"stock of {path.name}"
         stated, findings = process_forces(path, self.toolpath, self.frames, str(self.program))
         return stated, findings, path.name
 

@@ -110,13 +110,13 @@ def _operation(section: YamlSection, defaults: YamlSection) -> Operation:
             by[0] if by else None,
             "state one of: name (words of a comment in the program), tool (its number), lines: [first, last]",
         )
-    own = _Values(section, defaults)
+    own = ProcessValues(section, defaults)
     diameter = own.number("diameter") * MM
-    material = _material(own)
+    material = read_material(own)
     entry, exit_angle = _engagement(own, diameter)
     cut = Engagement(
         diameter=diameter,
-        teeth=_whole(own.place("teeth"), "teeth", _MOST_TEETH),
+        teeth=read_whole(own.place("teeth"), "teeth", _MOST_TEETH),
         helix=own.number("helix") * DEG,
         depth=own.number("axial_depth") * MM,
         entry=entry,
@@ -125,7 +125,7 @@ def _operation(section: YamlSection, defaults: YamlSection) -> Operation:
     )
     return Operation(
         name=_name(section),
-        tool=_whole(section, "tool") if "tool" in section else 0,
+        tool=read_whole(section, "tool") if "tool" in section else 0,
         lines=_lines(section),
         cut=cut,
         speed=own.number("spindle") * 2 * np.pi / 60,
@@ -135,7 +135,7 @@ def _operation(section: YamlSection, defaults: YamlSection) -> Operation:
     )
 
 
-class _Values:
+class ProcessValues:
     """Keys of an operation, or of the defaults where it does not have them."""
 
     def __init__(self, section: YamlSection, defaults: YamlSection) -> None:
@@ -154,7 +154,7 @@ class _Values:
         return self.place(key).number(key, low=low, high=high, unit=unit)
 
 
-def _engagement(own: _Values, diameter: float) -> tuple[float, float]:
+def _engagement(own: ProcessValues, diameter: float) -> tuple[float, float]:
     """Entry and exit angle [rad] of ``direction`` and ``radial_width``."""
     section = own.place("direction")
     direction = section.text("direction", choices=DIRECTIONS)
@@ -175,7 +175,7 @@ def _engagement(own: _Values, diameter: float) -> tuple[float, float]:
     return engagement(direction, width, diameter)
 
 
-def _material(own: _Values) -> Material:
+def read_material(own: ProcessValues) -> Material:
     """Of ``material`` or ``coefficients``: the operation's own before the defaults'; ``ci95`` before the table's."""
     for section in (own.section, own.defaults):
         if "material" in section and "coefficients" in section:
@@ -204,7 +204,7 @@ def _material(own: _Values) -> Material:
     )
 
 
-def _with_interval(material: Material, own: _Values) -> Material:
+def _with_interval(material: Material, own: ProcessValues) -> Material:
     if not own.has("ci95"):
         return material
     return replace(material, ci95=own.place("ci95").number("ci95", low=0.0, high=1.0))
@@ -230,7 +230,7 @@ def _lines(section: YamlSection) -> tuple[int, int]:
     return int(first), int(last)
 
 
-def _whole(section: YamlSection, key: str, most: int = 10**6) -> int:
+def read_whole(section: YamlSection, key: str, most: int = 10**6) -> int:
     value = section.number(key)
     if value < 1 or value != int(value) or value > most:
         raise section.error("YML004", f"{value:g} is not a whole number from 1 to {most}", key)

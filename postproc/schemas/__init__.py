@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from postproc.schemas.cell_schema import cell_schema
 from postproc.schemas.diagnose_schema import diagnose_schema
+from postproc.schemas.engage_schema import engage_schema
 from postproc.schemas.identify_schema import identify_schema
 from postproc.schemas.job_schema import job_schema
 from postproc.schemas.map_schema import map_schema
@@ -36,6 +37,7 @@ RESULT_SCHEMAS: dict[str, Callable[[], Schema]] = {
     "verify": verify_schema,
     "map": map_schema,
     "identify": identify_schema,
+    "engage": engage_schema,
     "plan": plan_schema,
     "diagnose": diagnose_schema,
     "batch": batch_schema,

@@ -184,7 +184,7 @@ def prepare(request: Request) -> Prepared:
 def _prepared(request: Request, inputs: Inputs) -> Prepared:
     if not os.path.isfile(request.program):
         read_document(request.program)  # raises the reason
-    cell = _cell(request)
+    cell = cell_of(request)
     dialect, read, settings = read_program(request.program, cell, request.config_dat)
     beside = None if request.robot else cell.path.parent
     robot = load_robot(find_robot(cell.robot, beside))
@@ -286,7 +286,7 @@ def _disagreeing(program: Path, path: Toolpath, track: AxisTrack) -> list[Findin
     return findings
 
 
-def _cell(request: Request) -> Cell:
+def cell_of(request: Request) -> Cell:
     """The cell file, or an empty cell where ``--robot`` states all that a program with its own frames needs."""
     try:
         cell = load_cell(request.cell or find_cell(request.program))

@@ -1,0 +1,1 @@
+"""What a program cuts of its blank, and with which force."""

@@ -1,0 +1,196 @@
+"""Which sweeps come near each cell of the blank: no map of heights, only lists of what to ask.
+
+A point of the blank is stock until a sweep contains it.  The distance of the point to what is left is asked of the
+sweeps that come near its cell; those after the first that covers the whole cell need not be asked.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.base.arrays import Floats, Ints
+from postproc.process.stock.blank import Blank, blank_distance, corners_of
+from postproc.process.stock.compiled import compiled
+from postproc.process.stock.distance import (
+    ANGLE,
+    CUTTER,
+    LENGTH,
+    RADIUS,
+    REMOVES,
+    arc_of,
+    axis_at,
+    swept_distance,
+    tip_at,
+    turn_of,
+)
+
+CELL = 0.125  # radii of the smallest cutter
+MOST_CELLS = 4_000_000
+LARGEST_CELL, SMALLEST_CELL = 4e-3, 0.25e-3  # m
+
+
+class Stock(NamedTuple):
+    """A blank with all that is removed from it.
+
+    blank: see ``Blank``; sweeps (M, ROW), cutters (T, 6): see ``distance``; grid (5,): size [m] of the cells, how far
+    distances are known [m], and the numbers of cells from the blank's lowest corner; first (C + 1,) and near
+    (E,): the sweeps that come that near to each cell, ascending.
+    """
+
+    blank: Blank
+    sweeps: Floats
+    cutters: Floats
+    grid: Floats
+    first: Ints
+    near: Ints
+
+
+def build_stock(blank: Blank, sweeps: Floats, cutters: Floats) -> tuple[Stock, Floats]:
+    """The stock of sweeps (M, 22) by cutters (T, 6), and heights (M, 2) [m] for each sweep.
+
+    The heights are the lowest and highest above its tip at which it may meet stock, inf and -inf where it meets none.
+    """
+    low, high = corners_of(blank)
+    span = high - low
+    radius = float(cutters[:, RADIUS].min()) if len(cutters) else LARGEST_CELL
+    size = min(max(CELL * radius, SMALLEST_CELL), LARGEST_CELL)
+    size = max(size, float(np.cbrt(np.prod(span) / MOST_CELLS)))
+    while np.prod(np.ceil(span / size)) > 2 * MOST_CELLS:  # thin blanks
+        size *= 1.2
+    shape = np.maximum(np.ceil(span / size).astype(np.int64), 1)
+    cells = int(np.prod(shape))
+    none = np.zeros(1, np.int32)
+    grid = np.array([size, 0.5 * size, *shape], float)
+    stock = Stock(blank, sweeps, cutters, grid, np.zeros(1, np.int64), none)
+    count, covered = np.zeros(cells, np.int64), np.full(cells, np.iinfo(np.int32).max, np.int32)
+    _mark_outside(stock, covered)
+    live = np.full((len(sweeps), 2), [np.inf, -np.inf])
+    _list(stock, count, covered, live, none, False)
+    first = np.zeros(cells + 1, np.int64)
+    np.cumsum(count, out=first[1:])
+    near = np.zeros(max(int(first[-1]), 1), np.int32)
+    _list(stock, first[:-1].copy(), covered, live, near, True)
+    return stock._replace(first=first, near=near), live
+
+
+@compiled
+def _mark_outside(stock: Stock, covered: Ints) -> None:
+    blank, size = stock.blank, stock.grid[0]
+    low = blank.frame[1:4]
+    shape = stock.grid[2:].astype(np.int64)
+    half = size * np.sqrt(0.75)
+    for i in range(shape[0]):
+        for j in range(shape[1]):
+            for k in range(shape[2]):
+                x = low[0] + (i + 0.5) * size
+                y = low[1] + (j + 0.5) * size
+                z = low[2] + (k + 0.5) * size
+                # of a mesh distances are known up to its reach only
+                if blank_distance(blank, x, y, z) < -half:
+                    covered[(i * shape[1] + j) * shape[2] + k] = -1
+
+
+@compiled
+def sweep_box(sweeps: Floats, cutters: Floats, j: int, box: Floats) -> None:
+    """The corners [m] of a box around sweep ``j`` put into ``box`` (2, 3).  sweeps (M, 22), cutters (T, 6)."""
+    c = int(sweeps[j, CUTTER])
+    radius, length = cutters[c, RADIUS], cutters[c, LENGTH]
+    box[0, :], box[1, :] = np.inf, -np.inf
+    turn = turn_of(sweeps, j)
+    parts = 1 if turn == 0.0 and sweeps[j, ANGLE] == 0.0 else 8
+    for step in range(parts + 1):
+        tip, axis = tip_at(sweeps, j, step / parts), axis_at(sweeps, j, step / parts)
+        for k in range(3):
+            disc = radius * np.sqrt(max(1.0 - axis[k] ** 2, 0.0))
+            box[0, k] = min(box[0, k], tip[k] + min(length * axis[k], 0.0) - disc)
+            box[1, k] = max(box[1, k], tip[k] + max(length * axis[k], 0.0) + disc)
+    if parts > 1:  # what an arc rises above its chords
+        bulge = length * (1.0 - np.cos(0.5 * turn / parts))
+        if sweeps[j, ANGLE] != 0.0:
+            bulge += arc_of(sweeps, j)[0] * (1.0 - np.cos(0.5 * sweeps[j, ANGLE] / parts))
+        box[0, :] -= bulge
+        box[1, :] += bulge
+
+
+@compiled
+def _list(stock: Stock, count: Ints, covered: Ints, live: Floats, near: Ints, fill: bool) -> None:
+    """The sweeps near each cell counted, or with ``fill`` put into ``near`` from ``count`` on."""
+    sweeps, cutters, size = stock.sweeps, stock.cutters, stock.grid[0]
+    low = stock.blank.frame[1:4]
+    shape = stock.grid[2:].astype(np.int64)
+    half = size * np.sqrt(0.75)
+    limit = half + stock.grid[1]
+    box = np.zeros((2, 3))
+    first, last = np.zeros(3, np.int64), np.zeros(3, np.int64)
+    for s in range(len(sweeps)):
+        if fill and live[s, 0] > live[s, 1]:
+            continue
+        sweep_box(sweeps, cutters, s, box)
+        outside = False
+        for k in range(3):
+            below, above = (box[0, k] - limit - low[k]) / size, (box[1, k] + limit - low[k]) / size
+            outside = outside or above < 0.0 or below > shape[k]
+            first[k], last[k] = int(max(below, 0.0)), int(min(above, shape[k] - 1.0))
+        if outside:
+            continue
+        tip0, tip1 = tip_at(sweeps, s, 0.0), tip_at(sweeps, s, 1.0)
+        axis0, axis1 = axis_at(sweeps, s, 0.0), axis_at(sweeps, s, 1.0)
+        for i in range(first[0], last[0] + 1):
+            x = low[0] + (i + 0.5) * size
+            for j in range(first[1], last[1] + 1):
+                y = low[1] + (j + 0.5) * size
+                for k in range(first[2], last[2] + 1):
+                    cell = (i * shape[1] + j) * shape[2] + k
+                    if covered[cell] < s:
+                        continue
+                    z = low[2] + (k + 0.5) * size
+                    d = swept_distance(sweeps, cutters, s, x, y, z, limit)
+                    if d > limit:
+                        continue
+                    if fill:
+                        if sweeps[s, REMOVES] > 0.0:
+                            near[count[cell]] = s
+                            count[cell] += 1
+                        continue
+                    # near is enough: the list of a sweep that is close but does not touch must not stay empty
+                    h0 = (x - tip0[0]) * axis0[0] + (y - tip0[1]) * axis0[1] + (z - tip0[2]) * axis0[2]
+                    h1 = (x - tip1[0]) * axis1[0] + (y - tip1[1]) * axis1[1] + (z - tip1[2]) * axis1[2]
+                    live[s, 0] = min(live[s, 0], min(h0, h1) - half)
+                    live[s, 1] = max(live[s, 1], max(h0, h1) + half)
+                    if sweeps[s, REMOVES] > 0.0:
+                        count[cell] += 1
+                        if d <= -half:
+                            covered[cell] = s
+
+
+@compiled
+def stock_distance(stock: Stock, x: float, y: float, z: float, time: int) -> float:
+    """Of a point [m] to what is left of the blank before the sweep ``time``, positive inside, up to ``reach``."""
+    grid = stock.grid
+    size, reach = grid[0], grid[1]
+    best = blank_distance(stock.blank, x, y, z)
+    if best <= 0.0:
+        return max(best, -reach)
+    best = min(best, reach)
+    frame = stock.blank.frame
+    i = min(int((x - frame[1]) / size), int(grid[2]) - 1)
+    j = min(int((y - frame[2]) / size), int(grid[3]) - 1)
+    k = min(int((z - frame[3]) / size), int(grid[4]) - 1)
+    cell = (i * int(grid[3]) + j) * int(grid[4]) + k
+    low, high = stock.first[cell], stock.first[cell + 1]
+    start = low
+    while low < high:  # the first that is not before ``time``
+        middle = (low + high) // 2
+        if stock.near[middle] < time:
+            low = middle + 1
+        else:
+            high = middle
+    for place in range(low - 1, start - 1, -1):
+        d = swept_distance(stock.sweeps, stock.cutters, stock.near[place], x, y, z, reach)
+        if d < best:
+            best = d
+            if best <= -reach:
+                return -reach
+    return best

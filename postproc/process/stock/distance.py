@@ -1,0 +1,206 @@
+"""Signed distances of a point to a cutter and to what a cutter sweeps.
+
+All are negative inside, have the right sign, and change by at most the distance that the point moves (1-Lipschitz).
+What follows relies on these two only, so an interval in which none can be zero needs no further look.  A cutter is
+convex: along a straight motion its distance is a convex function of the share of the motion.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from postproc.base.arrays import Floats
+from postproc.process.stock.compiled import compiled
+
+ACROSS, STRAIGHT, GENERAL = 0, 1, 2
+"""Straight across the spindle; straight; an arc, or one that turns the spindle."""
+
+RADIUS, CORNER, LENGTH, TIP, TAPER, COSINE = range(6)
+"""Columns of the rows of cutters (T, 6): radius, corner radius, length [m], radius at the tip [m], tangent of the half
+angle (-1: no taper) and its cosine."""
+
+_GOLDEN = 0.6180339887498949
+_STEPS = 30  # of golden sections: 1e-6 of the motion
+
+
+TIP_POINT, STEP, AXIS, TURN, CENTRE, NORMAL, ANGLE, MODE, CUTTER, REMOVES = 0, 3, 6, 9, 12, 15, 18, 19, 20, 21
+"""Columns of the rows of sweeps (M, ROW), parts of motions in the order in which they run, in the axes of the stock.
+
+TIP_POINT and STEP (3 each) [m]: where the tip starts, and from there to its end; AXIS (3): unit vector of the
+spindle at the start, from the tip back to the spindle; TURN (3) [rad]: rotation vector by which it turns; CENTRE
+(3) [m], NORMAL (3), ANGLE [rad]: of arcs, see ``Arcs``, angle 0 for lines; MODE: ACROSS, STRAIGHT or GENERAL;
+CUTTER: row of the cutters; REMOVES: 1 where it cuts, 0 for a rapid motion.  One array, because each array that a
+compiled function is given costs.
+"""
+ROW = 22
+
+
+@compiled
+def cutter_distance(cutters: Floats, c: int, across: float, height: float) -> float:
+    """Of a point ``across`` [m] from the spindle axis and ``height`` [m] above the tip; cutters (T, 6)."""
+    corner = cutters[c, CORNER]
+    out = across - (cutters[c, RADIUS] - corner)
+    below = corner - height
+    d = np.sqrt(out * out + below * below) - corner if out > 0.0 and below > 0.0 else max(out, below) - corner
+    if cutters[c, TAPER] >= 0.0:
+        d = max(d, (across - cutters[c, TIP] - height * cutters[c, TAPER]) * cutters[c, COSINE])
+    return max(d, height - cutters[c, LENGTH])
+
+
+@compiled
+def rotated(
+    vx: float, vy: float, vz: float, kx: float, ky: float, kz: float, share: float
+) -> tuple[float, float, float]:
+    """The vector v turned by ``share`` of the rotation vector k (Rodrigues)."""
+    angle = np.sqrt(kx * kx + ky * ky + kz * kz)
+    if angle < 1e-12:
+        return vx, vy, vz
+    ux, uy, uz = kx / angle, ky / angle, kz / angle
+    s, c = np.sin(angle * share), np.cos(angle * share)
+    along = (ux * vx + uy * vy + uz * vz) * (1.0 - c)
+    return (
+        c * vx + s * (uy * vz - uz * vy) + along * ux,
+        c * vy + s * (uz * vx - ux * vz) + along * uy,
+        c * vz + s * (ux * vy - uy * vx) + along * uz,
+    )
+
+
+@compiled
+def tip_at(sweeps: Floats, j: int, t: float) -> tuple[float, float, float]:
+    """The tip [m] at the share ``t`` of sweep ``j`` of sweeps (M, 22)."""
+    x, y, z = sweeps[j, TIP_POINT], sweeps[j, TIP_POINT + 1], sweeps[j, TIP_POINT + 2]
+    dx, dy, dz = sweeps[j, STEP], sweeps[j, STEP + 1], sweeps[j, STEP + 2]
+    angle = sweeps[j, ANGLE]
+    if angle == 0.0:
+        return x + t * dx, y + t * dy, z + t * dz
+    cx, cy, cz = sweeps[j, CENTRE], sweeps[j, CENTRE + 1], sweeps[j, CENTRE + 2]
+    nx, ny, nz = sweeps[j, NORMAL], sweeps[j, NORMAL + 1], sweeps[j, NORMAL + 2]
+    rise = t * (dx * nx + dy * ny + dz * nz)
+    x, y, z = rotated(x - cx, y - cy, z - cz, angle * nx, angle * ny, angle * nz, t)
+    return cx + x + rise * nx, cy + y + rise * ny, cz + z + rise * nz
+
+
+@compiled
+def axis_at(sweeps: Floats, j: int, t: float) -> tuple[float, float, float]:
+    """The spindle axis, from the tip back to the spindle, at the share ``t`` of sweep ``j`` of sweeps (M, 22)."""
+    x, y, z = sweeps[j, AXIS], sweeps[j, AXIS + 1], sweeps[j, AXIS + 2]
+    return rotated(x, y, z, sweeps[j, TURN], sweeps[j, TURN + 1], sweeps[j, TURN + 2], t)
+
+
+@compiled
+def turn_of(sweeps: Floats, j: int) -> float:
+    """[rad] By how much the spindle turns along sweep ``j`` of sweeps (M, 22)."""
+    return np.sqrt(sweeps[j, TURN] ** 2 + sweeps[j, TURN + 1] ** 2 + sweeps[j, TURN + 2] ** 2)
+
+
+@compiled
+def arc_of(sweeps: Floats, j: int) -> tuple[float, float]:
+    """The radius of sweep ``j`` of sweeps (M, 22) and its advance along the normal [m]; of a line infinite, and 0."""
+    if sweeps[j, ANGLE] == 0.0:
+        return np.inf, 0.0
+    rise, out, square = 0.0, 0.0, 0.0
+    for k in range(3):
+        n, r = sweeps[j, NORMAL + k], sweeps[j, TIP_POINT + k] - sweeps[j, CENTRE + k]
+        rise += sweeps[j, STEP + k] * n
+        out += r * n
+        square += r * r
+    return np.sqrt(max(square - out * out, 0.0)), rise
+
+
+@compiled
+def speed_bound(sweeps: Floats, j: int, reach: float) -> float:
+    """[m] How far any point within ``reach`` [m] of the tip moves along sweep ``j`` of sweeps (M, 22)."""
+    length = np.sqrt(sweeps[j, STEP] ** 2 + sweeps[j, STEP + 1] ** 2 + sweeps[j, STEP + 2] ** 2)
+    if sweeps[j, ANGLE] != 0.0:
+        radius, rise = arc_of(sweeps, j)
+        length = np.sqrt((sweeps[j, ANGLE] * radius) ** 2 + rise * rise)
+    return length + turn_of(sweeps, j) * reach
+
+
+@compiled
+def pose_distance(sweeps: Floats, cutters: Floats, j: int, t: float, x: float, y: float, z: float) -> float:
+    """Of the point to the cutter at the share ``t`` of sweep ``j``; sweeps (M, 22), cutters (T, 6)."""
+    px, py, pz = tip_at(sweeps, j, t)
+    ax, ay, az = axis_at(sweeps, j, t)
+    wx, wy, wz = x - px, y - py, z - pz
+    height = wx * ax + wy * ay + wz * az
+    across = np.sqrt(max(wx * wx + wy * wy + wz * wz - height * height, 0.0))
+    return cutter_distance(cutters, int(sweeps[j, CUTTER]), across, height)
+
+
+@compiled
+def _straight(sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: float, enough: float) -> float:
+    """``swept_distance`` of a sweep whose spindle keeps its direction."""
+    c = int(sweeps[j, CUTTER])
+    wx, wy, wz = x - sweeps[j, TIP_POINT], y - sweeps[j, TIP_POINT + 1], z - sweeps[j, TIP_POINT + 2]
+    ax, ay, az = sweeps[j, AXIS], sweeps[j, AXIS + 1], sweeps[j, AXIS + 2]
+    dx, dy, dz = sweeps[j, STEP], sweeps[j, STEP + 1], sweeps[j, STEP + 2]
+    height, rise = wx * ax + wy * ay + wz * az, dx * ax + dy * ay + dz * az
+    ux, uy, uz = wx - height * ax, wy - height * ay, wz - height * az
+    dx, dy, dz = dx - rise * ax, dy - rise * ay, dz - rise * az
+    # |u - t d|^2 = uu - 2 t ud + t^2 dd
+    uu, ud, dd = ux * ux + uy * uy + uz * uz, ux * dx + uy * dy + uz * dz, dx * dx + dy * dy + dz * dz
+    if sweeps[j, MODE] == ACROSS:
+        t = min(max(ud / dd, 0.0), 1.0) if dd > 0.0 else 0.0
+        return cutter_distance(cutters, c, np.sqrt(max(uu - t * (2.0 * ud - t * dd), 0.0)), height)
+    middle = cutter_distance(cutters, c, np.sqrt(max(uu - ud + 0.25 * dd, 0.0)), height - 0.5 * rise)
+    half = 0.5 * np.sqrt(dd + rise * rise)
+    if middle - half > enough or middle <= -enough:
+        return middle - half if middle > 0.0 else middle
+    low, high = 0.0, 1.0
+    t1, t2 = 1.0 - _GOLDEN, _GOLDEN
+    f1 = cutter_distance(cutters, c, np.sqrt(max(uu - t1 * (2.0 * ud - t1 * dd), 0.0)), height - t1 * rise)
+    f2 = cutter_distance(cutters, c, np.sqrt(max(uu - t2 * (2.0 * ud - t2 * dd), 0.0)), height - t2 * rise)
+    best = middle
+    for _ in range(_STEPS):
+        if f1 < f2:
+            high, t2, f2 = t2, t1, f1
+            t1 = high - _GOLDEN * (high - low)
+            f1 = cutter_distance(
+                cutters, c, np.sqrt(max(uu - t1 * (2.0 * ud - t1 * dd), 0.0)), height - t1 * rise
+            )
+        else:
+            low, t1, f1 = t1, t2, f2
+            t2 = low + _GOLDEN * (high - low)
+            f2 = cutter_distance(
+                cutters, c, np.sqrt(max(uu - t2 * (2.0 * ud - t2 * dd), 0.0)), height - t2 * rise
+            )
+    for t in (0.0, 1.0):
+        f = cutter_distance(cutters, c, np.sqrt(max(uu - t * (2.0 * ud - t * dd), 0.0)), height - t * rise)
+        best = min(best, f)
+    return min(best, f1, f2)
+
+
+@compiled
+def swept_distance(
+    sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: float, enough: float
+) -> float:
+    """Of the point to all that the cutter of sweep ``j`` is in; beyond ``enough`` [m] on either side a bound.
+
+    sweeps (M, 22), cutters (T, 6).
+    """
+    if sweeps[j, MODE] != GENERAL:
+        return _straight(sweeps, cutters, j, x, y, z, enough)
+    middle = pose_distance(sweeps, cutters, j, 0.5, x, y, z)
+    tip = tip_at(sweeps, j, 0.5)
+    away = np.sqrt((x - tip[0]) ** 2 + (y - tip[1]) ** 2 + (z - tip[2]) ** 2)
+    half = 0.5 * speed_bound(sweeps, j, away)
+    half += 0.5 * half * turn_of(sweeps, j)
+    if middle - half > enough or middle <= -enough:
+        return middle - half if middle > 0.0 else middle
+    low, high = 0.0, 1.0
+    t1, t2 = 1.0 - _GOLDEN, _GOLDEN
+    f1, f2 = pose_distance(sweeps, cutters, j, t1, x, y, z), pose_distance(sweeps, cutters, j, t2, x, y, z)
+    for _ in range(_STEPS):
+        if f1 < f2:
+            high, t2, f2 = t2, t1, f1
+            t1 = high - _GOLDEN * (high - low)
+            f1 = pose_distance(sweeps, cutters, j, t1, x, y, z)
+        else:
+            low, t1, f1 = t1, t2, f2
+            t2 = low + _GOLDEN * (high - low)
+            f2 = pose_distance(sweeps, cutters, j, t2, x, y, z)
+    ends = min(
+        pose_distance(sweeps, cutters, j, 0.0, x, y, z), pose_distance(sweeps, cutters, j, 1.0, x, y, z)
+    )
+    return min(middle, ends, f1, f2)

@@ -1,0 +1,278 @@
+"""What each motion of a program cuts of the blank: engagement, force, removed volume, collisions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.batches import each_block
+from postproc.base.units import MM
+from postproc.process.stock.blank import Blank
+from postproc.process.stock.cells import Stock, build_stock
+from postproc.process.stock.collision import collisions
+from postproc.process.stock.contact import (
+    CHIP,
+    COLUMNS,
+    ENTRY,
+    EXIT,
+    FORCE,
+    HIGH,
+    LEFT,
+    LOW,
+    RATE,
+    RIGHT,
+    contacts,
+)
+from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK, Cutter
+from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT
+from postproc.process.stock.motion_sweeps import MotionSweeps
+from postproc.process.stock.saved_stock import Removed
+from postproc.process.stock.stock_section import Edges
+from postproc.toolpath import Toolpath
+
+SPACING = 0.5
+"""Radii of the cutter between two places of a motion that are looked at."""
+
+FINER, UNEVEN = 6, 0.05
+"""How many times closer they are on a sweep along which the removed area changes by more than this share."""
+
+LEAST_AREA = 1e-5 * MM**2
+"""Across the feed: below it nothing is cut."""
+
+DEEP, NARROW = 0.02 * MM, 0.3 * MM
+"""A collision is deeper than the first and wider than the second."""
+
+_MOST_PLACES = 64  # of one sweep
+_BLOCK = 64  # places that a thread takes at a time
+
+
+@dataclass(frozen=True, eq=False)
+class EngagedMotions:
+    """Of N motions, in their feed frames (see ``milling_forces``).
+
+    cuts (N,); volume (N,) [m3] that is removed; mean (N, 6) and largest (N, 6) wrench [N, N m] along the motion, its
+    moments about the tip, NaN where feed, teeth, spindle or material are not known; where the force, or without one the
+    removed area, is largest: depth (axial), width (across the feed) [m], entry and exit [rad], chip [m]; along (N,
+    2, 6): wrench at start and end of a line through the motion; power (N,) [W], the mean; speed (N,) [rad/s].
+    hits: row of a motion -> the parts that collide.
+    """
+
+    cuts: Bools
+    volume: Floats
+    mean: Floats
+    largest: Floats
+    along: Floats
+    depth: Floats
+    width: Floats
+    entry: Floats
+    exit: Floats
+    chip: Floats
+    power: Floats
+    hits: dict[int, tuple[int, ...]]
+    stock: Stock
+
+
+def engage(
+    blank: Blank,
+    sweeps: MotionSweeps,
+    toolpath: Toolpath,
+    edges: dict[int, Edges],
+    before: Removed | None = None,
+) -> EngagedMotions:
+    """The engagement of the motions of ``sweeps`` in a blank; ``before``: what earlier programs removed of it."""
+    rows, earlier = sweeps.rows, 0
+    cutters = np.array([cutter.numbers for cutter in sweeps.cutters])
+    if before is not None:
+        earlier = len(before.rows)
+        shifted = before.rows.copy()
+        shifted[:, CUTTER] += len(cutters)
+        rows = np.concatenate([shifted, rows])
+        cutters = np.concatenate([cutters, before.cutters])
+    stock, live = build_stock(blank, np.ascontiguousarray(rows), cutters)
+    profiles = _profiles(sweeps.cutters)
+    laws = _laws(sweeps, toolpath, edges)
+    padded = np.concatenate([np.zeros((earlier, 9)), laws])
+    heading = np.concatenate([np.zeros((earlier, 3)), sweeps.heading])
+
+    radius = np.array([cutter.radius for cutter in sweeps.cutters])[sweeps.rows[:, CUTTER].astype(int)]
+    active = live[earlier:, 0] <= live[earlier:, 1]
+
+    def look_at(chosen: Ints, finer: int) -> tuple[Ints, Floats, Floats]:
+        """The sweep of each place, the length of path that it represents, and its contact."""
+        sweep, share, weight = _places(sweeps, radius, chosen, finer)
+        found = np.zeros((len(sweep), COLUMNS))
+
+        def look(part: slice) -> None:
+            contacts(stock, profiles, padded, live, heading, earlier + sweep[part], share[part], found[part])
+
+        each_block(look, len(sweep), _BLOCK)
+        return sweep, weight, found
+
+    sweep, weight, found = look_at(np.flatnonzero(active & (sweeps.rows[:, REMOVES] > 0)), 1)
+    uneven = _uneven(sweep, found[:, RATE])
+    again = np.isin(sweep, uneven)
+    finer = look_at(uneven, FINER)
+    parts = zip((sweep[~again], weight[~again], found[~again]), finer, strict=True)
+    sweep, weight, found = (np.concatenate(pair) for pair in parts)
+    order = np.argsort(sweep, kind="stable")
+    sweep, weight, found = sweep[order], weight[order], found[order]
+    hits = _hits(stock, sweeps, profiles, heading, live, earlier, radius)
+    return _by_motion(len(toolpath), sweeps, sweep, weight, found, laws, edges, hits, stock)
+
+
+def _profiles(cutters: tuple[Cutter, ...]) -> Floats:
+    """(T, E, 8) the profiles, with unused rows of the part 9."""
+    each = [cutter.profile() for cutter in cutters]
+    profiles = np.full((len(each), max(map(len, each)) + 1, 8), 9.0)
+    for index, profile in enumerate(each):
+        profiles[index, : len(profile)] = profile
+    return profiles
+
+
+def _laws(sweeps: MotionSweeps, toolpath: Toolpath, edges: dict[int, Edges]) -> Floats:
+    """(M, 9) see ``find_contact``; the feed per tooth is NaN where anything that the force needs is not known."""
+    laws = np.zeros((len(sweeps.rows), 9))
+    laws[:, 0] = np.nan
+    for index, cutter in enumerate(sweeps.cutters):
+        of = np.flatnonzero(sweeps.rows[:, CUTTER] == index)
+        own = edges[cutter.number]
+        if not cutter.teeth or cutter.helix is None or own.speed is None or own.material is None:
+            continue
+        per_tooth = 2 * np.pi / (own.speed * cutter.teeth)
+        laws[of, 0] = toolpath.feed[sweeps.motion[of]] * per_tooth
+        known = own.material.coefficients
+        laws[of, 1:] = [cutter.teeth, np.sign(cutter.helix), *known.cutting, *known.edge]
+    laws[~(laws[:, 0] > 0), 0] = np.nan
+    return laws
+
+
+def _uneven(sweep: Ints, rate: Floats) -> Ints:
+    """The sweeps along which the removed area changes: entries, exits, corners."""
+    if not len(sweep):
+        return sweep
+    first = np.flatnonzero(np.append(True, sweep[1:] != sweep[:-1]))
+    most, least = np.maximum.reduceat(rate, first), np.minimum.reduceat(rate, first)
+    return sweep[first][most - least > UNEVEN * most]
+
+
+def _places(
+    sweeps: MotionSweeps, radius: Floats, chosen: Ints, finer: int = 1
+) -> tuple[Ints, Floats, Floats]:
+    """The sweep, the share of it, and the length of path [m] that each place (K,) represents."""
+    length = sweeps.length[chosen]
+    count = np.clip(np.ceil(length / (SPACING * radius[chosen])), 1, _MOST_PLACES).astype(np.int64) * finer
+    owner = np.repeat(np.arange(len(chosen)), count)
+    place = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    share = (place + 0.5) / count[owner]
+    return chosen[owner], share, (length / count)[owner]
+
+
+def _hits(
+    stock: Stock,
+    sweeps: MotionSweeps,
+    profiles: Floats,
+    heading: Floats,
+    live: Floats,
+    earlier: int,
+    radius: Floats,
+) -> dict[int, tuple[int, ...]]:
+    """Row of a motion -> the parts of the tool that collide with stock along it."""
+    rows = sweeps.rows
+    top = np.array(
+        [c.edge_length if c.length is not None or c.holder is None else c.holder[1] for c in sweeps.cutters]
+    )
+    above = _highest_stock(stock, rows) > top[rows[:, CUTTER].astype(int)]
+    rapid = rows[:, REMOVES] == 0
+    tried = [(CUTTING, rapid & (live[earlier:, 0] <= live[earlier:, 1]))]
+    for part in (SHANK, HOLDER):
+        has = np.any(profiles[:, :, 0] == part, axis=1)[rows[:, CUTTER].astype(int)]
+        tried.append((part, has & above))
+    hits: dict[int, tuple[int, ...]] = {}
+    for part, mask in tried:
+        sweep, share, _ = _places(sweeps, radius, np.flatnonzero(mask))
+        found = np.zeros(len(sweep), np.int8)
+        parts = np.full(len(sweep), part)
+
+        def look(
+            at: slice, sweep: Ints = sweep, share: Floats = share, parts: Ints = parts, found: Ints = found
+        ) -> None:
+            collisions(
+                stock, profiles, heading, earlier + sweep[at], share[at], parts[at], DEEP, NARROW, found[at]
+            )
+
+        each_block(look, len(sweep), _BLOCK)
+        for motion in np.unique(sweeps.motion[sweep[found > 0]]).tolist():
+            hits[motion] = (*hits.get(motion, ()), part)
+    return hits
+
+
+def _highest_stock(stock: Stock, rows: Floats) -> Floats:
+    """(M,) [m] how far the blank reaches above the tip along the spindle, at either end of the sweeps."""
+    frame = stock.blank.frame
+    corners = np.array([[frame[1 + k + 3 * (corner >> k & 1)] for k in range(3)] for corner in range(8)])
+    axis, tip = rows[:, AXIS : AXIS + 3], rows[:, TIP_POINT : TIP_POINT + 3]
+    blank = (axis @ corners.T).max(axis=1)
+    ends = [blank - np.einsum("mi,mi->m", axis, at) for at in (tip, tip + rows[:, STEP : STEP + 3])]
+    return np.asarray(np.maximum(*ends))
+
+
+def _by_motion(
+    count: int, sweeps: MotionSweeps, sweep: Ints, weight: Floats, found: Floats, laws: Floats,
+    edges: dict[int, Edges], hits: dict[int, tuple[int, ...]], stock: Stock,
+) -> EngagedMotions:  # fmt: skip
+    motion = sweeps.motion[sweep]
+    touches = found[:, RATE] > LEAST_AREA
+    found[~touches, RATE] = 0.0
+    found[~touches, FORCE : FORCE + 6] = 0.0
+    wrench = np.where(touches[:, None] & np.isnan(laws[sweep, :1]), np.nan, found[:, FORCE : FORCE + 6])
+    volume: Floats = np.bincount(motion, found[:, RATE] * weight, count).astype(float)
+    length = np.bincount(sweeps.motion, sweeps.length, count)
+    sums = [np.bincount(motion, wrench[:, k] * weight, count).astype(float) for k in range(6)]
+    mean = np.stack(sums, axis=1) / np.maximum(length, 1e-9)[:, None]
+    size = np.linalg.norm(wrench[:, :3], axis=1)
+    order = np.lexsort((np.where(np.isnan(size), found[:, RATE], size), motion))
+    rows, last = np.unique(motion[order][::-1], return_index=True)
+    best = order[::-1][last]
+    table = np.zeros((count, COLUMNS))
+    table[rows] = np.where(touches[best, None], found[best], 0.0)
+    largest = np.zeros((count, 6))
+    largest[rows] = wrench[best]
+    speed = np.zeros(count)
+    numbers = np.array([edges[c.number].speed or np.nan for c in sweeps.cutters])
+    speed[sweeps.motion] = numbers[sweeps.rows[:, CUTTER].astype(int)]
+    cuts = volume > 0
+    return EngagedMotions(
+        cuts=cuts,
+        volume=volume,
+        mean=mean,
+        largest=largest,
+        along=_lines(count, motion[touches], wrench[touches]),
+        depth=np.where(cuts, table[:, HIGH] - np.maximum(table[:, LOW], 0.0), 0.0),
+        width=np.where(cuts, table[:, LEFT] - table[:, RIGHT], 0.0),
+        entry=table[:, ENTRY],
+        exit=table[:, EXIT],
+        chip=np.where(np.isnan(mean[:, 0]), np.nan, table[:, CHIP]),
+        power=np.where(cuts, mean[:, 5] * speed, 0.0),
+        hits=hits,
+        stock=stock,
+    )
+
+
+def _lines(count: int, motion: Ints, wrench: Floats) -> Floats:
+    """(N, 2, 6) the wrench at start and end of each motion: the line through the medians of both halves of its places
+    in stock, so that the short ramps at entry and exit of a long cut do not bend it."""
+    along = np.zeros((count, 2, 6))
+    rows, first, many = np.unique(motion, return_index=True, return_counts=True)
+    one = many == 1
+    along[rows[one]] = wrench[first[one]][:, None, :]
+    for row, start, number in zip(rows[~one], first[~one], many[~one], strict=True):
+        values = wrench[start : start + number]
+        half = (number + 1) // 2
+        early, late = np.median(values[:half], axis=0), np.median(values[number - half :], axis=0)
+        apart = (number - half) / number  # of the middles of both halves, as a share of the motion
+        slope = (late - early) / max(apart, 0.5)
+        middle, low, high = 0.5 * (early + late), values.min(axis=0), values.max(axis=0)
+        along[row] = np.clip([middle - 0.5 * slope, middle + 0.5 * slope], low, high)
+    return along

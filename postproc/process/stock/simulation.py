@@ -1,0 +1,260 @@
+"""A program run through the stock that its process file states: engagement, findings, forces for the main job."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats
+from postproc.base.findings import Finding, Refusal
+from postproc.base.units import MM
+from postproc.cell import MotionFrames
+from postproc.process.stated_forces import BASE, FEED, StatedForces
+from postproc.process.stock.blank import Blank, box_blank, corners_of, cylinder_blank, mesh_blank
+from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK
+from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT
+from postproc.process.stock.engagement import EngagedMotions, engage
+from postproc.process.stock.motion_sweeps import MotionSweeps, find_sweeps
+from postproc.process.stock.saved_stock import Removed, read_stock, stock_bytes
+from postproc.process.stock.stl import read_stl
+from postproc.process.stock.stock_section import StockProcess, read_stock_process
+from postproc.toolpath import Kind, Toolpath
+
+_PARTS = {CUTTING: "the cutter", SHANK: "the shank", HOLDER: "the holder"}
+_MOST_FINDINGS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class StockRun:
+    """A program in its stock.  before: what earlier programs removed; ci95 (N,): of the forces, as a share, NaN
+    where not stated."""
+
+    process: StockProcess
+    blank: Blank
+    before: Removed | None
+    sweeps: MotionSweeps
+    engagement: EngagedMotions
+    ci95: Floats
+    findings: tuple[Finding, ...]
+
+    def stock_file(self) -> bytes:
+        """What the program leaves, as a stock file."""
+        stock = self.engagement.stock
+        return stock_bytes(self.blank, stock.sweeps, stock.cutters)
+
+
+def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str) -> StockRun:
+    """Run a program through the stock of the process file ``path``.
+
+    Refusal: of the file; STK002 to STK005, STK016: of the blank; STK006, STK007, STK010: of tools and frames; STK008:
+    no motion reaches the stock.
+    """
+    process = read_stock_process(path)
+    blank, before = _blank(process)
+    low, high = corners_of(blank)
+    sweeps = find_sweeps(toolpath, frames, process, low, high, program)
+    edges = process.edges
+    engagement = engage(blank, sweeps, toolpath, edges, before)
+    if not engagement.cuts.any():
+        raise Refusal(_beside(process, sweeps, low, high, program, toolpath))
+    ci95 = np.full(len(toolpath), np.nan)
+    for index, cutter in enumerate(sweeps.cutters):
+        material = edges[cutter.number].material
+        if material is not None and material.ci95 is not None:
+            ci95[sweeps.motion[sweeps.rows[:, CUTTER] == index]] = material.ci95
+    findings = [
+        *_collisions(engagement, toolpath, program),
+        *_not_simulated(sweeps, toolpath, program),
+        *_lengths(sweeps, process),
+    ]
+    return StockRun(process, blank, before, sweeps, engagement, ci95, tuple(findings))
+
+
+def _blank(process: StockProcess) -> tuple[Blank, Removed | None]:
+    numbers = process.numbers
+    if process.blank == "box":
+        return box_blank(numbers[0], numbers[1]), None
+    if process.blank == "cylinder":
+        row = numbers[0]
+        return cylinder_blank(row[:3], float(row[3]), float(row[4]), process.lengthwise), None
+    file = process.path.parent if process.file is None else process.file
+    if process.blank == "stl":
+        return mesh_blank(read_stl(file, process.scale)), None
+    return read_stock(file, process)
+
+
+def stock_forces(
+    path: Path, toolpath: Toolpath, frames: MotionFrames, program: str
+) -> tuple[StatedForces, tuple[Finding, ...]]:
+    """The forces of every motion that cuts, in the feed frame; where a motion has no feed across the spindle, in
+    its base.
+
+    Refusal: of ``simulate``; STK009 where the force of a cut is not known.
+    """
+    run = simulate(path, toolpath, frames, program)
+    lost = unknown_forces(run, toolpath, program, "STK009")
+    if lost:
+        raise Refusal(*lost)
+    cut = run.engagement
+    rows = np.flatnonzero(cut.cuts)
+    along = cut.along[rows]
+    frame = np.full(len(rows) + 1, FEED)
+    plunges = _along_spindle(run.sweeps, len(toolpath))[rows]
+    frame[1:][plunges] = BASE
+    turned = _to_base(run, toolpath, frames, rows[plunges])
+    along[plunges] = np.einsum("nij,nskj->nski", turned, along[plunges].reshape(-1, 2, 2, 3)).reshape(
+        -1, 2, 6
+    )
+    index = np.zeros(len(toolpath), np.int32)
+    index[rows] = 1 + np.arange(len(rows))
+    nothing = np.zeros((1, 6))
+    radius = np.full(len(toolpath), np.nan)
+    numbers = np.array([cutter.radius for cutter in run.sweeps.cutters])
+    radius[run.sweeps.motion] = numbers[run.sweeps.rows[:, CUTTER].astype(int)]
+    peak = np.full(len(toolpath), np.nan)
+    peak[rows] = np.linalg.norm(cut.largest[rows, :3], axis=1)
+    stated = StatedForces(
+        np.concatenate([nothing, along[:, 1]]),
+        frame,
+        index,
+        start=np.concatenate([nothing, along[:, 0]]),
+        ci95=run.ci95,
+        peak=peak,
+        radius=radius,
+    )
+    return stated, (*_summaries(run, toolpath, path), *run.findings)
+
+
+def _along_spindle(sweeps: MotionSweeps, count: int) -> Bools:
+    """(N,) motions within 1 deg of the spindle at some place."""
+    step, axis = sweeps.rows[:, STEP : STEP + 3], sweeps.rows[:, AXIS : AXIS + 3]
+    size = np.linalg.norm(step, axis=1)
+    along = np.abs(np.einsum("mi,mi->m", step, axis)) >= np.cos(np.pi / 180) * size
+    found = np.zeros(count, bool)
+    found[sweeps.motion[along]] = True
+    return found
+
+
+def _to_base(run: StockRun, toolpath: Toolpath, frames: MotionFrames, rows: np.ndarray) -> Floats:
+    """(K, 3, 3) from the frame in which the force of a plunge is computed to the programmed base of its motion."""
+    last = np.zeros(len(toolpath), np.int64)
+    last[run.sweeps.motion] = np.arange(len(run.sweeps.motion))
+    at = last[rows]
+    z = run.sweeps.rows[at, AXIS : AXIS + 3]
+    heading = run.sweeps.heading[at]
+    x = heading - np.einsum("ni,ni->n", heading, z)[:, None] * z
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    axes = np.stack([x, np.cross(z, x), z], axis=2)
+    spindle = -np.einsum("nij,nj->ni", toolpath.rotation[rows], frames.spindle_in_tool[rows])
+    # the base of the stock and that of the motion differ by a rotation that takes one spindle axis to the other
+    return np.asarray(_aligning(z, spindle) @ axes)
+
+
+def _aligning(one: Floats, other: Floats) -> Floats:
+    cross = np.cross(one, other)
+    cosine = np.einsum("ni,ni->n", one, other)
+    skew = np.zeros((len(one), 3, 3))
+    skew[:, 0, 1], skew[:, 0, 2], skew[:, 1, 2] = -cross[:, 2], cross[:, 1], -cross[:, 0]
+    skew -= np.swapaxes(skew, 1, 2)
+    return np.asarray(np.eye(3) + skew + skew @ skew / np.maximum(1 + cosine, 1e-12)[:, None, None])
+
+
+def unknown_forces(run: StockRun, toolpath: Toolpath, program: str, code: str) -> list[Finding]:
+    """One finding for each tool whose force is not known where it cuts, and what is missing."""
+    findings = []
+    cut = run.engagement
+    unknown = cut.cuts & np.isnan(cut.mean[:, 0])
+    for index, cutter in enumerate(run.sweeps.cutters):
+        rows = np.unique(run.sweeps.motion[run.sweeps.rows[:, CUTTER] == index])
+        rows = rows[unknown[rows]]
+        if not len(rows):
+            continue
+        own = run.process.edges[cutter.number]
+        stated = {
+            "teeth": cutter.teeth,
+            "helix": cutter.helix,
+            "spindle": own.speed,
+            "material": own.material,
+        }
+        missing = [name for name, value in stated.items() if value is None] or ["feed in the program"]
+        names = ", ".join(missing)
+        message = f"tool {cutter.number} cuts in {len(rows)} motions, and its force is not known: no {names}"
+        of_program = missing[0].startswith("feed")
+        where = (program, int(toolpath.line[rows[0]])) if of_program else (str(run.process.path), cutter.line)
+        findings.append(Finding(code, message, *where))
+    return findings
+
+
+def _summaries(run: StockRun, toolpath: Toolpath, path: Path) -> list[Finding]:
+    cut, findings = run.engagement, []
+    for index, cutter in enumerate(run.sweeps.cutters):
+        rows = np.unique(run.sweeps.motion[run.sweeps.rows[:, CUTTER] == index])
+        rows = rows[cut.cuts[rows]]
+        if not len(rows):
+            continue
+        size = np.linalg.norm(cut.largest[rows, :3], axis=1)
+        material = run.process.edges[cutter.number].material
+        name = "" if material is None else f"; {material.name}"
+        if material is not None and material.ci95 is not None:
+            name += f", +- {100 * material.ci95:.0f} %"
+        message = (
+            f"tool {cutter.number} cuts in {len(rows)} motions in lines {toolpath.line[rows[0]]} to "
+            f"{toolpath.line[rows[-1]]}, removes {cut.volume[rows].sum() / MM**3:.0f} mm3, ap up to "
+            f"{cut.depth[rows].max() / MM:.2f} mm, ae up to {cut.width[rows].max() / MM:.2f} mm, mean force "
+            f"over a turn up to {size.max():.0f} N{name}"
+        )
+        findings.append(Finding("STK014", message, str(path), cutter.line))
+    return findings
+
+
+def _collisions(cut: EngagedMotions, toolpath: Toolpath, program: str) -> list[Finding]:
+    findings = []
+    for row, parts in sorted(cut.hits.items())[:_MOST_FINDINGS]:
+        names = " and ".join(_PARTS[part] for part in parts)
+        air = toolpath.kind[row] == Kind.PTP or CUTTING in parts
+        code = "STK011" if air else "STK012"
+        message = f"{names} touches stock on a rapid motion" if air else f"{names} is in the stock"
+        findings.append(Finding(code, message, program, int(toolpath.line[row])))
+    more = len(cut.hits) - len(findings)
+    if more > 0:
+        row = sorted(cut.hits)[_MOST_FINDINGS]
+        findings.append(Finding("STK012", f"{more} more motions collide", program, int(toolpath.line[row])))
+    return findings
+
+
+def _not_simulated(sweeps: MotionSweeps, toolpath: Toolpath, program: str) -> list[Finding]:
+    lost = np.flatnonzero(~sweeps.simulated & np.isin(toolpath.kind, (Kind.LIN, Kind.CIRC, Kind.SPL)))
+    if not len(lost):
+        return []
+    message = f"{len(lost)} motions are not simulated: start, end, tool or spindle axis is not known"
+    return [Finding("STK013", message, program, int(toolpath.line[lost[0]]))]
+
+
+def _lengths(sweeps: MotionSweeps, process: StockProcess) -> list[Finding]:
+    free = [cutter for cutter in sweeps.cutters if cutter.length is None]
+    return [
+        Finding(
+            "STK017", f"tool {cutter.number} states no length of its edges", str(process.path), cutter.line
+        )
+        for cutter in free
+    ]
+
+
+def _beside(
+    process: StockProcess, sweeps: MotionSweeps, low: Floats, high: Floats, program: str, toolpath: Toolpath
+) -> Finding:
+    rows = sweeps.rows[sweeps.rows[:, REMOVES] > 0]
+    points = np.concatenate(
+        [rows[:, TIP_POINT : TIP_POINT + 3], (rows[:, TIP_POINT : TIP_POINT + 3] + rows[:, STEP : STEP + 3])]
+    )
+
+    def box(a: Floats, b: Floats) -> str:
+        return ", ".join(f"{x} {u / MM:.5g}..{v / MM:.5g}" for x, u, v in zip("XYZ", a, b, strict=True))
+
+    moves = (
+        f"the tip moves in {box(points.min(axis=0), points.max(axis=0))}" if len(points) else "nothing cuts"
+    )
+    message = f"no motion cuts: the blank is in {box(low, high)}, and {moves} (mm)"
+    return Finding("STK008", message, str(process.path), process.line)

@@ -1,0 +1,250 @@
+"""``compensate engage``: its files and results, and what it refuses: an error with its place, nothing written."""
+
+import csv
+import json
+import shutil
+import struct
+
+import numpy as np
+import pytest
+
+pytest.importorskip("numba")
+
+import jsonschema
+from click.testing import CliRunner
+
+from postproc.cli.main import main
+from postproc.robot.description import find_robot
+from postproc.schemas import schema_of
+
+CELL = """
+robot: {robot}
+tools:
+  1: {{x: 120, y: 0, z: 250, a: 0, b: 30, c: 0, axis: +z}}
+  2: {{x: 120, y: 0, z: 240, a: 0, b: 30, c: 0, axis: +z}}
+bases: {{1: {{x: 1450, y: -100, z: 600, a: 0, b: 0, c: 0}}}}
+start: [0, -90, 90, 0, 45, 0]
+orientation: {{a: 0, b: 0, c: 180}}
+process: milling.yaml
+dialect: {{name: linuxcnc}}
+"""
+STOCK = "stock: {box: [[0, 0, -30], [100, 60, 0]]}\n"
+TOOLS = """tools:
+  1: {shape: flat, diameter: 16, length: 40, teeth: 3, helix: 30, spindle: 12000}
+defaults: {material: EN AW-7075-T6}
+"""
+SLOT = "G21 G90 G17 G54\nT1 M6\nG0 X-20 Y30 Z5\nG0 Z-5\nG1 X50 F3600\nG1 X120\nG0 Z30\nM2\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "cell.yaml").write_text(CELL.format(robot=find_robot("kuka_kr270")))
+    (tmp_path / "milling.yaml").write_text(STOCK + TOOLS)
+    (tmp_path / "part.ngc").write_text(SLOT)
+    return tmp_path
+
+
+def call(folder, *words, code=0):
+    result = CliRunner().invoke(main, ["engage", str(folder / "part.ngc"), *map(str, words)])
+    assert result.exit_code == code, result.output + result.stderr
+    return result
+
+
+def refused(folder, name, *words, line=None):
+    before = sorted(folder.iterdir())
+    out = call(
+        folder, "--csv", folder / "out.csv", "--stock-out", folder / "out.stock", "--json", "-", code=1
+    )
+    assert sorted(folder.iterdir()) == before
+    (finding, *_) = json.loads(out.stdout)["findings"]
+    assert finding["code"] == name, finding
+    for word in words:
+        assert word in finding["message"] + finding["help"], finding
+    if line is not None:
+        assert finding["line"] == line
+    return finding
+
+
+def state(folder, text):
+    (folder / "milling.yaml").write_text(text)
+
+
+def test_the_result_and_its_files(folder):
+    out = call(folder, "--csv", folder / "out.csv", "--stock-out", folder / "out.stock", "--json", "-")
+    result = json.loads(out.stdout)
+    jsonschema.validate(result, schema_of("engage"))
+    assert result["removal_mm3"] == pytest.approx(100 * 16 * 5, rel=0.003)
+    assert result["states"] == {"air": 3, "cut": 2, "collision": 0}
+    assert result["collisions"] == []
+    rows = list(csv.DictReader((folder / "out.csv").read_text().splitlines()))
+    assert [row["state"] for row in rows] == ["air", "air", "cut", "cut", "air"]
+    cut = {key: float(value) for key, value in rows[2].items() if key != "state"}
+    assert (cut["line"], cut["ap_mm"]) == (5, pytest.approx(5, abs=0.01))
+    assert (cut["phi_entry_deg"], cut["phi_exit_deg"]) == (
+        pytest.approx(0, abs=0.1),
+        pytest.approx(180, abs=0.1),
+    )
+    assert cut["chip_mm"] == pytest.approx(0.1, abs=1e-4)
+    # the second motion is a slot from its start on, with the mean force of the whole
+    assert result["force"]["max_n"] == pytest.approx(float(rows[3]["force_max_n"]), rel=1e-3)
+    assert result["force"]["ci95"] == pytest.approx(0.469, abs=0.001)
+
+
+def test_the_next_program_finds_what_the_first_left(folder):
+    call(folder, "--stock-out", folder / "one.stock")
+    state(folder, "stock: {from: one.stock}\n" + TOOLS)
+    (folder / "part.ngc").write_text(SLOT.replace("Y30", "Y30.5"))
+    result = json.loads(call(folder, "--json", "-").stdout)
+    assert result["removal_mm3"] == pytest.approx(100 * 0.5 * 5, rel=0.01)
+    (folder / "part.ngc").write_text(SLOT)
+    refused(folder, "STK008", "no motion cuts")
+
+
+def test_a_blank_as_a_mesh_is_that_of_the_box(folder):
+    whole = json.loads(call(folder, "--json", "-").stdout)
+    write_stl(folder / "blank.stl", cuboid([0, 0, -30], [100, 60, 0]))
+    state(folder, "stock: {stl: blank.stl}\n" + TOOLS)
+    meshed = json.loads(call(folder, "--json", "-").stdout)
+    assert meshed["removal_mm3"] == pytest.approx(whole["removal_mm3"], rel=1e-3)
+    assert meshed["force"]["max_n"] == pytest.approx(whole["force"]["max_n"], rel=1e-3)
+    write_stl(folder / "blank.stl", cuboid([0, 0, -30], [100, 60, 0]), ascii=True)
+    assert json.loads(call(folder, "--json", "-").stdout)["removal_mm3"] == meshed["removal_mm3"]
+    write_stl(folder / "blank.stl", cuboid([0, 0, -0.03], [0.1, 0.06, 0]))
+    state(folder, "stock: {stl: {file: blank.stl, scale: 1000}}\n" + TOOLS)
+    assert json.loads(call(folder, "--json", "-").stdout)["removal_mm3"] == pytest.approx(
+        meshed["removal_mm3"], rel=1e-4
+    )
+
+
+def test_a_round_blank(folder):
+    state(folder, "stock: {cylinder: {center: [50, 30, -30], diameter: 50, height: 30}}\n" + TOOLS)
+    result = json.loads(call(folder, "--json", "-").stdout)
+    y = np.linspace(-8, 8, 100_001)
+    assert result["removal_mm3"] == pytest.approx(5 * np.trapezoid(2 * np.sqrt(25**2 - y**2), y), rel=0.005)
+
+
+def test_a_tool_without_teeth_is_geometry_only(folder):
+    state(folder, STOCK + "tools:\n  1: {shape: flat, diameter: 16}\n")
+    out = call(folder, "--json", "-", code=3)
+    result = json.loads(out.stdout)
+    jsonschema.validate(result, schema_of("engage"))
+    assert result["force"] == {"max_n": None, "mean_n": None, "ci95": None}
+    assert [finding["code"] for finding in result["findings"]] == ["STK015", "STK017"]
+    assert "teeth, helix, spindle, material" in result["findings"][0]["message"]
+
+
+def test_collisions_have_their_line(folder):
+    (folder / "part.ngc").write_text(SLOT.replace("G1 X50 F3600", "G0 X50"))
+    result = json.loads(call(folder, "--json", "-", code=3).stdout)
+    assert result["collisions"] == [{"line": 5, "part": "cutter"}]
+    assert [finding["line"] for finding in result["findings"] if finding["code"] == "STK011"] == [5]
+    call(folder, "--strict", "--csv", folder / "out.csv", code=1)
+    assert not (folder / "out.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "words", "line"),
+    [
+        (STOCK + TOOLS.replace("teeth: 3", "teeth: 0"), "YML004", ["teeth", "whole number"], 3),
+        (STOCK + TOOLS.replace("teeth: 3", "tooths: 3"), "YML002", ["teeth"], 3),
+        (STOCK.replace("box", "boxx") + TOOLS, "YML002", ["box"], 1),
+        (STOCK + TOOLS.replace("flat", "square"), "YML004", ["flat"], 3),
+        (
+            STOCK + TOOLS.replace("length: 40,", "length: 40, holder: {diameter: 63, from: 30},"),
+            "YML004",
+            ["edges"],
+            3,
+        ),
+        (STOCK + TOOLS.replace("1: {", "2: {"), "STK006", ["tool 1"], 5),
+        ("stock: {box: [[0, 0, 0], [100, 60, 0]]}\n" + TOOLS, "YML004", ["no volume"], 1),
+        (
+            "stock: {box: [[0, 0, -40], [100, 60, -10]]}\n" + TOOLS,
+            "STK008",
+            ["the blank is in", "Z -40..-10"],
+            1,
+        ),
+        ("stock: {box: [[0, 0, -0.03], [0.1, 0.06, 0]]}\n" + TOOLS, "STK008", ["no motion cuts"], 1),
+        ("stock: {stl: none.stl}\n" + TOOLS, "FIL001", [], None),
+        ("stock: {from: cell.yaml}\n" + TOOLS, "STK016", ["no stock file"], 1),
+        ("stock: {base: 7, box: [[0, 0, -30], [100, 60, 0]]}\n" + TOOLS, "STK010", ["base 7"], 1),
+        (STOCK + TOOLS + "operations: []\n", "YML004", ["stock"], 5),
+        (TOOLS, "YML003", ["stock"], None),
+        (STOCK + TOOLS.replace("shape: flat,", "shape: bull, corner_radius: 9,"), "YML004", ["radius"], 3),
+    ],
+)
+def test_what_is_wrong_is_refused(folder, text, code, words, line):
+    state(folder, text)
+    refused(folder, code, *words, line=line)
+
+
+def cuboid(low, high):
+    corners = np.array([[(low, high)[n >> k & 1][k] for k in range(3)] for n in range(8)], float)
+    faces = [(0, 2, 3), (0, 3, 1), (4, 5, 7), (4, 7, 6), (0, 1, 5), (0, 5, 4)]
+    faces += [(2, 6, 7), (2, 7, 3), (0, 4, 6), (0, 6, 2), (1, 3, 7), (1, 7, 5)]
+    return corners[np.array(faces)]
+
+
+def write_stl(path, triangles, ascii=False):
+    if ascii:
+        lines = ["solid blank"]
+        for triangle in triangles:
+            lines += ["facet normal 0 0 0", "outer loop"]
+            lines += ["vertex " + " ".join(map(repr, corner)) for corner in triangle.tolist()]
+            lines += ["endloop", "endfacet"]
+        path.write_text("\n".join([*lines, "endsolid blank"]))
+        return
+    raw = b"\0" * 80 + struct.pack("<I", len(triangles))
+    path.write_bytes(raw + b"".join(struct.pack("<12fH", 0, 0, 0, *t.ravel(), 0) for t in triangles))
+
+
+BOX = cuboid([0, 0, -30], [100, 60, 0])
+
+
+@pytest.mark.parametrize(
+    ("triangles", "code", "words"),
+    [
+        (BOX[:-1], "STK003", ["not closed"]),
+        (BOX[:, ::-1], "STK004", ["face inward"]),
+        (BOX / 1000, "STK005", ["metres", "scale: 1000"]),
+        (BOX * 1000, "STK005", ["scale: 0.001"]),
+        (BOX - np.array([0, 0, 100.0]), "STK008", ["the blank is in"]),
+        (BOX[:0], "STK002", ["0 triangles"]),
+        (np.where(BOX == 60, np.nan, BOX), "STK002", ["not a number"]),
+    ],
+)
+def test_a_mesh_that_is_no_blank_is_refused(folder, triangles, code, words):
+    write_stl(folder / "blank.stl", triangles)
+    state(folder, "stock: {stl: blank.stl}\n" + TOOLS)
+    refused(folder, code, *words)
+
+
+@pytest.mark.parametrize("cut", [83, 84, 200, -1])
+def test_a_mesh_that_is_cut_short_is_refused(folder, cut):
+    write_stl(folder / "blank.stl", BOX)
+    raw = (folder / "blank.stl").read_bytes()
+    (folder / "blank.stl").write_bytes(raw[:cut])
+    state(folder, "stock: {stl: blank.stl}\n" + TOOLS)
+    refused(folder, "STK002")
+
+
+def test_a_damaged_stock_file_is_refused(folder):
+    call(folder, "--stock-out", folder / "one.stock")
+    raw = (folder / "one.stock").read_bytes()
+    (folder / "one.stock").write_bytes(raw[: len(raw) // 2])
+    state(folder, "stock: {from: one.stock}\n" + TOOLS)
+    refused(folder, "STK016")
+
+
+def test_the_main_job_takes_the_forces_of_the_stock(folder):
+    result = CliRunner().invoke(main, ["program", str(folder / "part.ngc"), "--force=", "--json", "-"])
+    assert result.exit_code in (0, 3), result.output
+    report = json.loads(result.stdout)
+    assert report["force"]["source"] == "cell: milling.yaml"
+    engaged = json.loads(call(folder, "--json", "-").stdout)
+    assert report["force"]["max_n"] == pytest.approx(engaged["force"]["max_n"], rel=0.01)
+    shutil.rmtree(folder / "compensated")
+    state(folder, STOCK + "tools:\n  1: {shape: flat, diameter: 16}\n")
+    result = CliRunner().invoke(main, ["program", str(folder / "part.ngc"), "--force=", "--json", "-"])
+    assert result.exit_code == 1
+    assert [finding["code"] for finding in json.loads(result.stdout)["findings"]] == ["STK009"]
+    assert not (folder / "compensated").exists()

@@ -1,0 +1,60 @@
+"""Removed volumes of random programs against solids of another make: unions of convex hulls by manifold3d."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from stock_cases import BALL, BULL, CONE, FLAT, MM, block, path_through, run
+
+from postproc.toolpath import Kind
+
+manifold3d = pytest.importorskip("manifold3d")
+
+LOW, HIGH = np.array([0, 0, -20.0]), np.array([60, 40, 0.0])
+SIDES = 256
+
+
+def outline(cutter, tip, axis, rings=24):
+    """Points (K, 3) mm on the cutter at a place; the hull of those of two places is what it sweeps between them."""
+    if cutter.taper is not None:
+        rise = (cutter.radius - cutter.tip) / np.tan(cutter.taper)
+        profile = [(cutter.tip, 0.0), (cutter.radius, rise)]
+    else:
+        k = np.linspace(0, np.pi / 2, rings if cutter.corner else 1)
+        flat = cutter.radius - cutter.corner
+        profile = list(zip(flat + cutter.corner * np.sin(k), cutter.corner * (1 - np.cos(k)), strict=True))
+        profile = profile if cutter.corner else [(cutter.radius, 0.0)]
+    profile.append((cutter.radius, cutter.length))
+    phi = np.arange(SIDES) / SIDES * 2 * np.pi
+    x = np.cross(axis, [0.3, 0.8, 0.52])
+    x /= np.linalg.norm(x)
+    y = np.cross(axis, x)
+    # a polygon of the same area as its circle
+    even = np.sqrt(2 * np.pi / SIDES / np.sin(2 * np.pi / SIDES))
+    around = even * (np.cos(phi)[:, None] * x + np.sin(phi)[:, None] * y)
+    return np.concatenate([tip + z / MM * axis + r / MM * around for r, z in profile])
+
+
+def volume_by_solids(points, axes, cutter):
+    """mm3 that the cutter removes from where it stands first: the first place counts as gone before."""
+    stock = manifold3d.Manifold.cube(HIGH - LOW).translate(LOW)
+    ends = [outline(cutter, point, axis) for point, axis in zip(points, axes, strict=True)]
+    stock = stock - manifold3d.Manifold.hull_points(ends[0])
+    before = stock.volume()
+    for one, two in pairwise(ends):
+        stock = stock - manifold3d.Manifold.hull_points(np.concatenate([one, two]))
+    return before - stock.volume()
+
+
+@pytest.mark.parametrize("cutter", [FLAT, BALL, BULL, CONE], ids=lambda cutter: cutter.shape)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_random_programs_remove_what_the_solids_say(cutter, seed):
+    """Long and short motions, across, inclined, with a spindle that leans: within 1 %."""
+    random = np.random.default_rng(seed)
+    points = random.uniform([-5, -5, -8], [65, 45, 2], (8, 3))
+    points[1::3, 2] = points[0:-1:3, 2][: len(points[1::3])]
+    lean = random.normal(0, 0.15, 2)
+    axis = np.array([*lean, 1.0]) / np.linalg.norm([*lean, 1.0])
+    axes = np.broadcast_to(axis if seed == 2 else [0.0, 0, 1], (8, 3))
+    cut = run(path_through(points, axes, [Kind.PTP] + [Kind.LIN] * 7), block(LOW, HIGH), cutter)
+    assert cut.volume.sum() / MM**3 == pytest.approx(volume_by_solids(points, axes, cutter), rel=0.01)
