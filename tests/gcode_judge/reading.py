@@ -39,8 +39,8 @@ class Row:
 
     @property
     def claimed(self) -> bool:
-        """The reader says that it knows the target."""
-        return not self.code and self.located
+        """The reader says that it knows the target, whether it may be corrected or not."""
+        return self.located
 
     @property
     def located(self) -> bool:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.languages.gcode.expressions import ExpressionLanguage
 from postproc.languages.gcode.words import Note, key
 
 
@@ -171,7 +172,8 @@ class Control:
     feed_units: the group that says the unit of F;
     further: U, V, W are axes beside X, Y, Z, and leave these as they are; offsets: key of the word that selects the
     tool's offsets, of which 0 switches them off (D); feed_before_units: F in a block with G20 or G21 is in the unit
-    from before it; iso: every word belongs to a code of its block or to its motion.
+    from before it; iso: every word belongs to a code of its block or to its motion;
+    expressions: the language of its variables and expressions, None where these are not read.
     """
 
     name: str
@@ -198,3 +200,4 @@ class Control:
     offsets: int | None = None
     feed_before_units: bool = False
     iso: bool = False
+    expressions: ExpressionLanguage | None = None

@@ -31,6 +31,7 @@ FLOW_MESSAGES = {
         "GCO006",
         "the motion is in a subprogram of the file: it runs where that is called",
     ),
+    FlowReason.SKIPPED: ("GCO025", "the flow of the program passes the motion: it does not run"),
     FlowReason.ENDED: ("GCO025", "the motion follows the end of the program and does not run"),
     FlowReason.COMPUTED: ("GCO005", "a G or M code before it is computed: what is active is not known"),
 }
@@ -78,6 +79,11 @@ def check_correctability(
     force = {group: values[rows] for group, values in modal.force.items()}
     for uncertainty, (code, message) in FLOW_MESSAGES.items():
         refuse(modal.flow.reason[rows] == uncertainty, code, message)
+    refuse(
+        modal.flow.repeated[rows],
+        "GCO006",
+        "the motion runs several times: one number cannot state the targets of all",
+    )
     refuse(force[Group.MACRO] != 0, "GCO007", "every block calls a macro or a cycle here (G66, MCALL)")
     refuse(modal.has(Once.HOME)[rows], "GCO004", "the block leads to the reference point")
     refuse(modal.has(Once.MACHINE)[rows], "GCO004", "the block uses machine coordinates")

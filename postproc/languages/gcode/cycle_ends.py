@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.languages.gcode.blocks import AXES, BlockWords
-from postproc.languages.gcode.control import Group, Move
+from postproc.languages.gcode.control import Group, Move, Once
 from postproc.languages.gcode.modal_fill import everywhere
 from postproc.languages.gcode.words import How, key
 
@@ -27,8 +27,18 @@ class CycleEnds:
         return np.asarray(sets & ~(self.inherited[blocks, None] & (self.axis[blocks, None] == np.arange(3))))
 
 
-def cycle_ends(given: BlockWords, events: Ints) -> CycleEnds:
-    """The ends of all cycles of a whole program; ``events`` (E,): blocks that change the frame.
+def _leaves_unknown(given: BlockWords, lengths: Bools) -> Bools:
+    """(B,) blocks before or after which the place of the tool may be another one than the last coordinates."""
+    modal = given.modal
+    once = (Once.HOME, Once.MACHINE, Once.PROBE, Once.CALL, Once.OTHER, Once.STORE)
+    others = modal.has(*once) | modal.unknown | modal.unused | given.noted("unknown", "axis", "polar", "corner")
+    uncertain = modal.flow.forget | (modal.flow.reason != 0) | modal.switched(Group.OFFSET) | lengths
+    return np.asarray(others | uncertain | given.twice)
+
+
+def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
+    """The ends of all cycles of a whole program; ``events`` (E,): blocks that change the frame; lengths (B,): those in
+    which another tool length holds than before.
 
     G99: at R.  G98: where the first of the cycles without another motion between began, if that is not below R: from
     there controls differ.  R is known where it is a coordinate (G90); it holds to the end of these cycles.
@@ -46,20 +56,23 @@ def cycle_ends(given: BlockWords, events: Ints) -> CycleEnds:
     height = np.stack([given.lengths(one) for one in AXES[:3]], axis=1)
     hows = np.stack([given.how(one) for one in AXES[:3]], axis=1)
     # Where the last coordinate of each axis is stated; words of a cycle along its own axis are depths.
-    placed = (given.motion & ~given.machine & absolute)[:, None] & np.isin(hows, (How.NUMBER, How.INTEGER))
+    sure = given.motion & ~given.machine & absolute & (given.modal.flow.reason == 0)
+    placed = sure[:, None] & np.isin(hows, (How.NUMBER, How.INTEGER))
     placed &= ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
     latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
     frame = np.searchsorted(events, np.arange(n))
+    lost = np.cumsum(_leaves_unknown(given, lengths))
     at_r, before, last = np.nan, np.nan, -1
     inherited = np.zeros(n, np.bool_)
+    drilled = [-1, -1, -1]  # the latest cycle of each axis
     for row in rows.tolist():
         if last < 0 or given.move[row - 1] != Move.CYCLE or axis[row] != axis[row - 1]:
             source = latest[row, axis[row]]
-            same = source >= 0 and frame[source] == frame[row]
+            same = source > drilled[axis[row]] and frame[source] == frame[row] and lost[source] == lost[row]
             at_r, before = np.nan, height[source, axis[row]] if same else np.nan
         elif frame[row] != frame[last]:
             at_r, before = np.nan, np.nan
-        last = row
+        last = drilled[axis[row]] = row
         if has_plane[row]:  # one that is computed is not known
             at_r = plane[row] if absolute[row] else np.nan
         elif not absolute[row]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.languages.gcode.control import UNKNOWN, Control, Group, ModalCode, Move, Once
+from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason, follow
 from postproc.languages.gcode.modal_fill import fill_modal, switched
 from postproc.languages.gcode.source import Source, WordColumn
@@ -107,8 +108,9 @@ class Modal:
         )
 
 
-def modal(source: Source, control: Control) -> Modal:
+def modal(execution: Execution, control: Control) -> Modal:
     """The state at every block of a program."""
+    source = execution.source
     n = len(source.blocks)
     codes = source.column(key("G"))
     blocks = codes.block
@@ -131,7 +133,7 @@ def modal(source: Source, control: Control) -> Modal:
     odd = odd[np.append(blocks[odd][1:] != blocks[odd][:-1], True)[: len(odd)]]
     strange = WordColumn(blocks[odd], codes.value[odd], codes.how[odd])
 
-    flow = follow(source, control, once)
+    flow = follow(execution, control, once)
     groups, values = _offsets(source, number, groups, values, blocks)
     groups, values = _polar_or_offset(flow, number, groups, values, blocks)
     start = {**_START, **control.start}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,8 @@ TOOL_CHANGE = 6
 LENGTH_CODES = (43.0, 43.4, 43.5, 234.0)
 SYSTEM = ((5201, 5400), (7001, 7999), (14001, 20000))
 """Variables that are work offsets: of Fanuc and Haas (7001, 14001: G54.1 Pn), 5211 to 5400 of LinuxCNC."""
+
+_TARGET = re.compile(r"#[ \t]*+(\d++|<)?")
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +73,12 @@ def spoiled(given: BlockWords) -> Spoiled:
     return Spoiled(at[:n], np.arange(n) > since)
 
 
-def _is_offset(text: str) -> bool:
-    if not text.isdigit():
-        return not text.startswith("<")
-    return any(low <= int(text[:9]) <= high for low, high in SYSTEM)
+def _is_offset(assignment: str) -> bool:
+    """Whether an assignment may write a work offset: to a variable that is one, or to one that is computed."""
+    target = _TARGET.match(assignment)
+    if target is None or target[1] is None:
+        return target is not None
+    return target[1].isdigit() and any(low <= int(target[1][:9]) <= high for low, high in SYSTEM)
 
 
 def tools(given: BlockWords) -> tuple[Ints, bool]:

@@ -32,6 +32,7 @@ from postproc.languages.gcode.control import Control, Event, Feed, Group, Move, 
 from postproc.languages.gcode.correctability import Built, check_correctability, locked_rows
 from postproc.languages.gcode.cycle_ends import cycle_ends
 from postproc.languages.gcode.diagnostics import diagnostics
+from postproc.languages.gcode.execution import execute
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds, feeds_before_units
 from postproc.languages.gcode.integer_words import integer_words
@@ -56,9 +57,11 @@ PART = 1 << 14
 def read(documents: tuple[Document, ...], control: Control, settings: ReadingSettings = PLAIN) -> Program:
     """Read a program; never raises on its content."""
     document = documents[0]
-    source = scan(document.raw, control)
-    integers = integer_words(source, control, settings.integer_words)
-    given = blocks(source, modal(source, control), control, integers)
+    text = scan(document.raw, control)
+    integers = integer_words(text, control, settings.integer_words)
+    execution = execute(text, control, settings.symbols)
+    source = execution.source
+    given = blocks(source, modal(execution, control), control, integers)
     rows = np.flatnonzero(given.motion).astype(np.int32)
     offset = spoiled(given)
     base = given.modal.force[Group.OFFSET]
@@ -151,7 +154,8 @@ def _followed(
         Reasons(len(given)),
     )
     allowed = _allowed(given)
-    ends, lengths = cycle_ends(given, events), tool_lengths(given, tool)
+    lengths = tool_lengths(given, tool)
+    ends = cycle_ends(given, events, lengths.changes)
     found = FilledRows(len(rows))
     for start in range(0, max(len(given), 1), PART):
         stop = min(start + PART, len(given))

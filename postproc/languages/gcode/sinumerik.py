@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.base.geometry import rotation_from_abc, rotation_from_vector
 from postproc.base.units import DEG
+from postproc.languages.gcode import expressions
 from postproc.languages.gcode.control import (
     Control,
     Event,
@@ -206,6 +207,7 @@ CONTROL = Control(
     calls=frozenset((key("L"),)),
     further=True,
     offsets=key("D"),
+    expressions=expressions.SINUMERIK,
 )
 """Sinumerik 840D, its own language (G290)."""
 

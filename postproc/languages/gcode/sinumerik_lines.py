@@ -14,7 +14,7 @@ from postproc.languages.gcode.sinumerik_expression import (
     expression_end,
     is_open,
 )
-from postproc.languages.gcode.words import NAMES, How, key
+from postproc.languages.gcode.words import NAMES, How, key, value_note
 
 TURN, RPL = NAMES, NAMES + 1
 NAMED_WORDS: Mapping[bytes, int] = {b"CR": key("R"), b"TURN": TURN, b"RPL": RPL}
@@ -126,8 +126,9 @@ class _Taken:
         if address is not None:
             letter, index = address[1].upper(), address[2]
             if letter == b"R" and index:
-                self.note("assign", b"<" + address[0])
-                return assigned_end(text, address.end())
+                close = assigned_end(text, address.end())
+                self.note("assign", text[place:close].strip())
+                return close
             if letter == b"G":
                 self.note("axis", address[0])
                 return expression_end(text, address.end())
@@ -163,12 +164,17 @@ class _Taken:
             shift = len(inside) - len(inside.lstrip())
             number = constant(inside.strip())
             start, stop = how.end() + shift, how.end() + shift + len(inside.strip())
-            kind = How.UNREAD if math.isnan(number) else _HOWS[how[1].upper()]
+            kind = _HOWS[how[1].upper()]
+            if math.isnan(number):
+                self.note("value", value_note(self.words, address, kind, inside))
+                kind = How.UNREAD
             self.word(place, address, start, stop, number, kind)
             return close
         close = expression_end(text, at)
         literal = text[at:close].rstrip()
         number = constant(literal)
+        if math.isnan(number):
+            self.note("value", value_note(self.words, address, How.NUMBER, literal))
         self.word(
             place, address, at, at + len(literal), number, How.UNREAD if math.isnan(number) else How.NUMBER
         )
@@ -185,12 +191,12 @@ class _Taken:
             if assigned is None:
                 rest = text[place:].strip()
                 if name.startswith(b"$P_UIFR"):
-                    self.note("base", b"<" + rest)
+                    self.note("base", rest)
                 else:
                     self.note("unknown", rest)
                 return len(text)
             close = assigned_end(text, assigned.end())
-            self.note("base" if name.startswith(b"$P_UIFR") else "assign", b"<" + text[place:close].strip())
+            self.note("base" if name.startswith(b"$P_UIFR") else "assign", text[place:close].strip())
             return close
         if name in self.names:
             self.codes(place, end, name)
@@ -220,7 +226,7 @@ class _Taken:
             self.note("axis", name)
         else:
             close = assigned_end(self.text, behind)
-            self.note("assign", b"<" + self.text[place:close].strip())
+            self.note("assign", self.text[place:close].strip())
         return max(close, behind + 1)
 
     def arguments(self, end: int) -> int:
@@ -244,7 +250,7 @@ class _Taken:
             elif name in OPENS or name in CLOSES:
                 self.note("open" if name in OPENS else "close", said)
             else:
-                self.note("assign", b"<" + said)
+                self.note("between" if name == b"ELSE" else "assign", said)
             return len(text)
         closed = self.arguments(end)
         if name in QUIET_CALLS:
@@ -252,5 +258,5 @@ class _Taken:
         if self.words or (closed == end and text[end:].strip()):
             self.note("unknown", text[place:].strip())
             return len(text)
-        self.note("call", name)
+        self.note("call", text[place:closed].strip().upper())
         return closed
