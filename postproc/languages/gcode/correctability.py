@@ -11,6 +11,7 @@ from postproc.base.arrays import Bools, Ints
 from postproc.base.document import Document
 from postproc.languages.gcode.blocks import AXES, FRAMED, SECOND, BlockWords, Reasons, What
 from postproc.languages.gcode.control import Group, Move, Once
+from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.motions import GcodeMotions
 from postproc.languages.gcode.positions import Positions
@@ -221,7 +222,9 @@ def _positions(
     )
 
 
-def locked_rows(document: Document, given: BlockWords, built: Built, collector: RefusalCollector) -> Refusals:
+def locked_rows(
+    document: Document, given: BlockWords, built: Built, collector: RefusalCollector, execution: Execution
+) -> Refusals:
     """Motions whose end a refused motion, an origin or other code builds on; ``given``: the whole program."""
     rows, n = built.block, len(built.block)
     pins = RefusalCollector(n)
@@ -244,7 +247,7 @@ def locked_rows(document: Document, given: BlockWords, built: Built, collector: 
     for at, message in (
         (np.flatnonzero(shifting), "G92 sets the origin at this end point"),
         (np.flatnonzero(modal.flow.calls), "code that is not read may depend on this end point"),
-        (_reading(document, given) - 1, "a variable after it reads the end position of this motion"),
+        (_reading(document, execution) - 1, "a variable after it reads the end position of this motion"),
         (
             np.flatnonzero(given.noted("unknown")),
             "a block that is not understood may depend on this end point",
@@ -270,10 +273,12 @@ def _through(built: Built, refused: Bools, building: Bools) -> Ints:
     return np.concatenate(found)
 
 
-def _reading(document: Document, given: BlockWords) -> Ints:
+def _reading(document: Document, execution: Execution) -> Ints:
     """Blocks with a variable that holds a position (#5001 to #5069, #5420 to #5428, #<_x>), or is itself computed."""
     places = [found.start() for found in _POSITION.finditer(document.raw)]
-    return np.unique(np.searchsorted(given.source.blocks.start, places, side="right") - 1).astype(np.int64)
+    starts, order = execution.text.blocks.start, execution.order
+    blocks = np.unique(np.searchsorted(starts, places, side="right") - 1).astype(np.int64)
+    return blocks if order is None else np.flatnonzero(np.isin(order, blocks))
 
 
 def _mask(n: int, rows: Ints) -> Bools:

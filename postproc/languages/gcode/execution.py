@@ -70,13 +70,14 @@ class FoldedWords:
 class Execution:
     """The run of a program in E steps.
 
-    source: its blocks, one a step, with the known values in their words; order (E,): the block of the text of each;
+    text: the program as it is written.  source: its blocks, one a step, with the known values in their words; order (E,): the block of the text of each;
     None where that is the order of the text.  followed: loops, branches and calls are; reason (E,) FlowReason where
     they are.  called (E,): the step calls a subprogram that is followed.  repeated (E,): the block runs in other steps
     as well.  folded: the words whose values are put in.  unknown: names whose value was wanted and is not known, and
     the block where it was first.
     """
 
+    text: Source
     source: Source
     order: Ints | None
     followed: bool
@@ -109,7 +110,7 @@ def execute(source: Source, control: Control, symbols: Mapping[str, object]) -> 
     n = len(source.blocks)
     nothing = np.zeros(n, np.bool_)
     tape = tape_blocks(source)
-    plain = Execution(source, None, False, np.zeros(n, np.int8), tape, nothing, nothing, _folded([]), {})
+    plain = Execution(source, source, None, False, np.zeros(n, np.int8), tape, nothing, nothing, _folded([]), {})
     language = control.expressions
     if language is None or not n:
         return plain
@@ -710,6 +711,7 @@ class _Run:
         source = self.source if same and not len(held) else self.source.in_order(order, held)
         source = source.with_values(folded.step, folded.key, folded.nth, folded.value, folded.how)
         return Execution(
+            self.source,
             source,
             None if same else order,
             followed,

@@ -125,7 +125,9 @@ def tool_lengths(given: BlockWords, tool: Ints) -> ToolLengths:
         at = np.flatnonzero(stated & (force == 1))
         number = given.number(key("H"))[at]
         number = np.where(np.isnan(number), tool[at], number)
-        changes[at[1:][number[1:] != number[:-1]]] = True
+        # Stated again in the other unit, LinuxCNC moves the coordinates by the length in both.
+        units = given.modal.force[Group.UNITS][at]
+        changes[at[1:][(number[1:] != number[:-1]) | (units[1:] != units[:-1])]] = True
         off &= np.maximum.accumulate(force == 1)
     else:
         off = everywhere(False, n)

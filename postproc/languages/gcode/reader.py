@@ -32,7 +32,7 @@ from postproc.languages.gcode.control import Control, Event, Feed, Group, Move, 
 from postproc.languages.gcode.correctability import Built, check_correctability, locked_rows
 from postproc.languages.gcode.cycle_ends import cycle_ends
 from postproc.languages.gcode.diagnostics import diagnostics
-from postproc.languages.gcode.execution import execute
+from postproc.languages.gcode.execution import FoldedWords, execute
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds, feeds_before_units
 from postproc.languages.gcode.integer_words import integer_words
@@ -45,7 +45,7 @@ from postproc.languages.gcode.orientation_words import OrientationWords
 from postproc.languages.gcode.positions import Positions, Trace
 from postproc.languages.gcode.refusals import RefusalCollector
 from postproc.languages.gcode.source import scan
-from postproc.languages.gcode.source_map import STATE, GcodeSourceMap
+from postproc.languages.gcode.source_map import STATE, FoldedNumbers, GcodeSourceMap
 from postproc.languages.gcode.tool_orientation import ToolOrientations
 from postproc.languages.gcode.words import How, Note, key
 from postproc.toolpath import Arcs, EditConstraints, Kind, OrientationControl, Toolpath
@@ -68,6 +68,9 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     base = (np.where(offset.bad, -1, base) if offset.bad.any() else base)[rows]
     tool, named = tools(given)
     collector = RefusalCollector(len(rows))
+    codes = np.isin(execution.folded.key, (key("G"), key("M")))
+    computed = np.isin(rows, execution.folded.step[codes])
+    collector.refuse(computed, "GCO005", "a G or M code of the block is computed")
     found, built, frames, orientations = _followed(given, rows, offset, base, tool, settings, collector)
     lines = source.blocks
     line, start = lines.line[rows], lines.start[rows]
@@ -78,7 +81,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message)
     refused = collector.done(document, line, start, lines.first[rows])
     frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line)
-    said = remarks(document, source, line)
+    said = remarks(document, source, rows, execution.order is None)
     state = {name: found.taken(name) for name in STATE}
     timed = state["feed_mode"] == Feed.INVERSE_TIME
     path = Toolpath(
@@ -93,7 +96,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         frames=cell_frames,
         constraints=EditConstraints(
             refused=refused,
-            locked=locked_rows(document, given, built, collector),
+            locked=locked_rows(document, given, built, collector, execution),
             no_insert_before={**moves_external(external), **_whole(given, rows)},
             orientation_programmed=found.taken("orientation_programmed"),
             exact_stays=True,
@@ -123,12 +126,21 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
             stop=lines.stop[rows],
             frames=frames,
             orientations=orientations,
+            folded=_folded(execution.folded, rows),
         ),
         tuple(sorted(findings, key=lambda finding: finding.line)),
         said.marker,
         said.marker_at,
         (),
     )
+
+
+def _folded(words: FoldedWords, rows: Ints) -> FoldedNumbers:
+    """The words with values of expressions in the motions, which are the blocks ``rows`` (N,)."""
+    at = np.searchsorted(rows, words.step)
+    mine = np.append(rows, -1)[at] == words.step
+    order = np.argsort(at[mine], kind="stable")
+    return FoldedNumbers(*(column[mine][order] for column in (at, words.key, words.value)))
 
 
 def _followed(
