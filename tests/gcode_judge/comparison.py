@@ -130,7 +130,7 @@ def _check(row: Row, motion: Motion) -> list[tuple[str, str]]:
         wrong.append(("base", f"work offset {row.base}, rs274 has {motion.base}"))
     if row.base >= 0 and motion.rewritten:
         wrong.append(("offset", "the work offset is not that of the cell: the program changes it"))
-    if motion.tool >= 0 and row.tool >= 0 and row.tool != motion.tool:
+    if motion.tool > 0 and row.tool >= 0 and row.tool != motion.tool:
         wrong.append(("tool", f"tool {row.tool}, rs274 has {motion.tool}"))
     return wrong
 

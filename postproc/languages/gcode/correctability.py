@@ -15,7 +15,7 @@ from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.motions import GcodeMotions
 from postproc.languages.gcode.positions import Positions
-from postproc.languages.gcode.refusals import RefusalCollector, Refusals
+from postproc.languages.gcode.refusals import RefusalCollector, RefusalReason, Refusals
 from postproc.languages.gcode.words import How, key
 from postproc.toolpath import Kind
 
@@ -59,6 +59,7 @@ class Built:
     turned: Bools
 
 
+_WRITE = "write them in the first motion"
 NUMBERS = (*AXES, *(key(letter) for letter in "IJKR"))
 
 
@@ -69,11 +70,13 @@ def check_correctability(
     base: Ints,
     tool: Ints,
     reasons: Reasons,
+    unbound: str,
     collector: RefusalCollector,
 ) -> None:
     """Refuses motions of a part of the program.
 
-    base, tool (N,): numbers, -1 where unknown; reasons: of ``frame_events``; doubts (N,): of these motions.
+    base, tool (N,): numbers, -1 where unknown; reasons: of ``frame_events``; unbound: what to do about names whose
+    values are not known.
     """
     rows = moves.block
     refuse, modal = collector.refuse, given.modal
@@ -121,6 +124,7 @@ def check_correctability(
         unread[rows],
         "GCO005",
         "a word is an expression, a variable or far beyond the size of any machine",
+        unbound,
     )
     quiet = np.isin(moves.move, (-1, Move.NOTHING))
     refuse(quiet, "GCO018", "the block has axis words, but no motion code is active")
@@ -179,7 +183,7 @@ def _codes(given: BlockWords, rows: Ints, collector: RefusalCollector) -> None:
         codes = given.modal.unknown_codes.last(rows[some], absent=-1.0)
         values, which = np.unique(np.nan_to_num(codes, nan=-1.0), return_inverse=True)
         messages = [(named := code_name(value), f"{named} is not known here") for value in values.tolist()]
-        collector.refuse_each(some, [("GCO001", message, name) for name, message in messages], which)
+        collector.refuse_each(some, [RefusalReason("GCO001", message, name) for name, message in messages], which)
 
 
 def code_name(value: float) -> str:
@@ -213,7 +217,8 @@ def _positions(
             if cause >= 0 and not what:
                 what = What.ORIGIN
             message = f"{names}: {why}{f' ({what})' if what else ''}"
-            messages.append(("GCO003" if rapid else "GCO002", message, what))
+            help_ = f"state {names} under program_start: in the cell, or {_WRITE}" if cause < 0 else ""
+            messages.append(RefusalReason("GCO003" if rapid else "GCO002", message, what, help_))
         collector.refuse_each(some, messages, which.reshape(-1))
     collector.refuse(
         np.any(frame, axis=1),

@@ -108,8 +108,8 @@ class Modal:
         )
 
 
-def modal(execution: Execution, control: Control) -> Modal:
-    """The state at every block of a program."""
+def modal(execution: Execution, control: Control, base: int | None = None) -> Modal:
+    """The state at every block of a program; ``base``: number of the work offset at its start, if that is stated."""
     source = execution.source
     n = len(source.blocks)
     codes = source.column(key("G"))
@@ -136,7 +136,7 @@ def modal(execution: Execution, control: Control) -> Modal:
     flow = follow(execution, control, once)
     groups, values = _offsets(source, number, groups, values, blocks)
     groups, values = _polar_or_offset(flow, number, groups, values, blocks)
-    start = {**_START, **control.start}
+    start = {**_START, **control.start, **({} if base is None else {Group.OFFSET: base})}
     force: dict[Group, Ints] = {}
     for one in Group:
         if one in (Group.ONCE, Group.NONE):

@@ -81,12 +81,13 @@ def _is_offset(assignment: str) -> bool:
     return target[1].isdigit() and any(low <= int(target[1][:9]) <= high for low, high in SYSTEM)
 
 
-def tools(given: BlockWords) -> tuple[Ints, bool]:
+def tools(given: BlockWords, loaded: int | None = None) -> tuple[Ints, bool]:
     """(B,) number of the tool in force, -1 where it cannot be determined; whether the program names any.
 
     T loads a tool at once, or with M6 in programs that have an M6.  T0 without M6 loads nothing.  A program without a
-    tool works with number 1.
+    tool, or with T0 alone, works with number 1.  ``loaded``: the tool at the start of the program, if that is stated.
     """
+    first = -1 if loaded is None else loaded
     n, column, m = len(given), given.words(key("T")), given.words(key("M"))
     changes = m.block[m.value == TOOL_CHANGE]
     tape, sure = given.modal.flow.tape, given.modal.flow.reason == FlowReason.NONE
@@ -94,14 +95,14 @@ def tools(given: BlockWords) -> tuple[Ints, bool]:
     # The last T of a block counts.
     counts = np.append(column.block[1:] != column.block[:-1], True)[: len(column)] & tape[column.block]
     named = np.flatnonzero(counts & ((column.value != 0) | (len(changes) > 0)))
-    if not len(named):
-        return everywhere(1, n, np.int32), False
+    if not (column.value[named] != 0).any():
+        return everywhere(1 if loaded is None else loaded, n, np.int32), loaded is not None
     block, number = column.block[named], column.value[named]
     whole = (number > 0) & (number == np.floor(number)) & sure[block] & (number < 1e9)
-    chosen = fill_modal(n, block, np.where(whole, number, -1).astype(np.int32), -1, np.int32)
+    chosen = fill_modal(n, block, np.where(whole, number, -1).astype(np.int32), first, np.int32)
     if not len(changes):
         return chosen, True
-    return fill_modal(n, changes, np.where(sure[changes], chosen[changes], -1), -1, np.int32), True
+    return fill_modal(n, changes, np.where(sure[changes], chosen[changes], -1), first, np.int32), True
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.document import Document
 from postproc.base.geometry import Poses, rotation_from_abc
-from postproc.base.units import MM
+from postproc.base.units import DEG, MM
 from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
 from postproc.languages.gcode.arcs import ArcGeometry, arcs, through
@@ -32,7 +32,7 @@ from postproc.languages.gcode.control import Control, Event, Feed, Group, Move, 
 from postproc.languages.gcode.correctability import Built, check_correctability, locked_rows
 from postproc.languages.gcode.cycle_ends import cycle_ends
 from postproc.languages.gcode.diagnostics import diagnostics
-from postproc.languages.gcode.execution import FoldedWords, execute
+from postproc.languages.gcode.execution import Execution, FoldedWords, execute
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds, feeds_before_units
 from postproc.languages.gcode.integer_words import integer_words
@@ -61,17 +61,20 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     integers = integer_words(text, control, settings.integer_words)
     execution = execute(text, control, settings.symbols)
     source = execution.source
-    given = blocks(source, modal(execution, control), control, integers)
+    given = blocks(source, modal(execution, control, settings.initial.base), control, integers)
     rows = np.flatnonzero(given.motion).astype(np.int32)
     offset = spoiled(given)
     base = given.modal.force[Group.OFFSET]
     base = (np.where(offset.bad, -1, base) if offset.bad.any() else base)[rows]
-    tool, named = tools(given)
+    tool, named = tools(given, settings.initial.tool)
     collector = RefusalCollector(len(rows))
     codes = np.isin(execution.folded.key, (key("G"), key("M")))
     computed = np.isin(rows, execution.folded.step[codes])
     collector.refuse(computed, "GCO005", "a G or M code of the block is computed")
-    found, built, frames, orientations = _followed(given, rows, offset, base, tool, settings, collector)
+    unbound = _unbound(execution)
+    found, built, frames, orientations = _followed(
+        given, rows, offset, base, tool, settings, unbound, collector
+    )
     lines = source.blocks
     line, start = lines.line[rows], lines.start[rows]
     external = external_axes(given, rows)
@@ -135,6 +138,21 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     )
 
 
+def _unbound(execution: Execution) -> str:
+    """What to do about names whose values were wanted and are not known."""
+    names = [name for name in execution.unknown if not name.startswith(("#<_", "$"))]
+    if not names:
+        return ""
+    shown = ", ".join([*names[:5], *(["..."] if len(names) > 5 else [])])
+    return f"bind {shown} under symbols: in the cell, or let the post-processor write numbers"
+
+
+def _start(settings: ReadingSettings) -> Floats:
+    """(6,) [m, rad] where the axes are at the first block, NaN where that is not stated."""
+    words = settings.initial.words
+    return np.array([words.get(axis, math.nan) for axis in "XYZABC"]) * np.repeat([MM, DEG], 3)
+
+
 def _folded(words: FoldedWords, rows: Ints) -> FoldedNumbers:
     """The words with values of expressions in the motions, which are the blocks ``rows`` (N,)."""
     at = np.searchsorted(rows, words.step)
@@ -150,6 +168,7 @@ def _followed(
     base: Ints,
     tool: Ints,
     settings: ReadingSettings,
+    unbound: str,
     collector: RefusalCollector,
 ) -> tuple[FilledRows, Built, Poses, tuple[OrientationWords, ...]]:
     """The motions in the blocks ``rows`` (N,), part by part; base (N,), tool (B,): numbers.
@@ -158,7 +177,7 @@ def _followed(
     """
     turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
     events = _events(given)
-    trace = Trace(offsets.start(), events, _change(given, events))
+    trace = Trace(offsets.start(), _start(settings), events, _change(given, events))
     feeds, stands, away, reasons = (
         Feeds(given),
         ToolOrientations(given, turned),
@@ -186,7 +205,7 @@ def _followed(
         part = collector.part(slice(low, high))
         cutting = np.isin(moves.kind, (Kind.LIN, Kind.CIRC)) & lengths.off[rows[low:high]]
         part.refuse(cutting, "GCO029", "the program has switched the tool's length off")
-        check_correctability(here, moves, where, base[low:high], tool[rows[low:high]], reasons, part)
+        check_correctability(here, moves, where, base[low:high], tool[rows[low:high]], reasons, unbound, part)
         found.put(
             high - low,
             **_columns(here, where, moves, feeds),
