@@ -40,7 +40,7 @@ from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.modal import modal
 from postproc.languages.gcode.modal_fill import FilledRows, everywhere
 from postproc.languages.gcode.motions import GcodeMotions
-from postproc.languages.gcode.numbered import Spoiled, references, spoiled, tool_lengths, tools
+from postproc.languages.gcode.numbered import WorkOffsets, references, tool_lengths, tools, work_offsets
 from postproc.languages.gcode.orientation_words import OrientationWords
 from postproc.languages.gcode.positions import Positions, Trace
 from postproc.languages.gcode.refusals import RefusalCollector
@@ -63,9 +63,8 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     source = execution.source
     given = blocks(source, modal(execution, control, settings.initial.base), control, integers)
     rows = np.flatnonzero(given.motion).astype(np.int32)
-    offset = spoiled(given)
-    base = given.modal.force[Group.OFFSET]
-    base = (np.where(offset.bad, -1, base) if offset.bad.any() else base)[rows]
+    offset = work_offsets(given)
+    base = offset.base[rows]
     tool, named = tools(given, settings.initial.tool)
     collector = RefusalCollector(len(rows))
     codes = np.isin(execution.folded.key, (key("G"), key("M")))
@@ -83,7 +82,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         message = f"an axis that is none of X, Y, Z, E1 to E6 and the rotary ones moves (line {where})"
         collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message)
     refused = collector.done(document, line, start, lines.first[rows])
-    frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line)
+    frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line, offset.stated)
     said = remarks(document, source, rows, execution.order is None)
     state = {name: found.taken(name) for name in STATE}
     timed = state["feed_mode"] == Feed.INVERSE_TIME
@@ -164,7 +163,7 @@ def _folded(words: FoldedWords, rows: Ints) -> FoldedNumbers:
 def _followed(
     given: BlockWords,
     rows: Ints,
-    offset: Spoiled,
+    offset: WorkOffsets,
     base: Ints,
     tool: Ints,
     settings: ReadingSettings,
@@ -194,7 +193,7 @@ def _followed(
         here, own = given.part(start, stop), rows[low:high] - start
         way = frame_events(
             here,
-            offset.at[start:stop],
+            offset.changed[start:stop],
             away[start:stop],
             ends.level[start:stop],
             lengths.changes[start:stop],
