@@ -88,7 +88,7 @@ def check_correctability(
         "GCO006",
         "the motion runs several times: one number cannot state the targets of all",
     )
-    refuse(force[Group.MACRO] != 0, "GCO007", "every block calls a macro or a cycle here (G66, MCALL)")
+    refuse(np.abs(force[Group.MACRO]) == 1, "GCO007", "every block calls a macro or a cycle here (G66, MCALL)")
     refuse(modal.has(Once.HOME)[rows], "GCO004", "the block leads to the reference point")
     refuse(modal.has(Once.MACHINE)[rows], "GCO004", "the block uses machine coordinates")
     refuse(modal.has(Once.PROBE)[rows], "GCO011", "the block is a probing move: its end is not known")
@@ -129,7 +129,8 @@ def check_correctability(
     quiet = np.isin(moves.move, (-1, Move.NOTHING))
     refuse(quiet, "GCO018", "the block has axis words, but no motion code is active")
     refuse(
-        moves.move == Move.CYCLE, "GCO008", "the block is a canned cycle: its motions are not in the program"
+        moves.move == Move.CYCLE,
+        "GCO008", "the block is a canned cycle: its motions are not in the program"
     )
     refuse(
         np.isin(moves.move, (Move.SPLINE, Move.THREAD, Move.OTHER)),

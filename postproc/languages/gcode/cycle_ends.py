@@ -36,6 +36,22 @@ def _leaves_unknown(given: BlockWords, lengths: Bools) -> Bools:
     return np.asarray(others | uncertain | given.twice)
 
 
+def _named_ends(given: BlockWords, retract: int) -> CycleEnds:
+    """Of a control whose cycles are called by name: their planes are coordinates."""
+    n, column = len(given), given.words(retract)
+    axis = np.array([2, 1, 0])[np.clip(given.modal.force[Group.PLANE], 0, 2)]
+    if not len(column):
+        return CycleEnds(everywhere(np.nan, n), everywhere(False, n), axis)
+    # Of the latest call; uncertain ones, and a change of units after them, leave it unknown.
+    sure = given.modal.flow.reason[column.block] == 0
+    values = np.where(sure, column.value, np.nan)
+    at = np.searchsorted(column.block, np.arange(n), side="right") - 1
+    block = np.append(column.block, 0)[at]
+    level = np.where(at >= 0, np.append(values, np.nan)[at], np.nan) * given.length
+    level = np.where(given.length[block] == given.length, level, np.nan)
+    return CycleEnds(level, everywhere(False, n), axis)
+
+
 def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     """The ends of all cycles of a whole program; ``events`` (E,): blocks that change the frame; lengths (B,): those in
     which another tool length holds than before.
@@ -44,6 +60,8 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     there controls differ.  R is known where it is a coordinate (G90); it holds to the end of these cycles.
     """
     n = len(given)
+    if given.control.retract is not None:
+        return _named_ends(given, given.control.retract)
     cycle = given.motion & (given.move == Move.CYCLE)
     rows = np.flatnonzero(cycle)
     if not len(rows):

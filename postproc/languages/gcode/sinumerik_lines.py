@@ -16,7 +16,8 @@ from postproc.languages.gcode.sinumerik_expression import (
 )
 from postproc.languages.gcode.words import NAMES, How, key, value_note
 
-TURN, RPL = NAMES, NAMES + 1
+TURN, RPL, RETRACT = NAMES, NAMES + 1, NAMES + 2
+"""Keys of TURN=, of RPL=, and of the plane to which a drilling cycle retracts, its first argument."""
 NAMED_WORDS: Mapping[bytes, int] = {b"CR": key("R"), b"TURN": TURN, b"RPL": RPL}
 """Addresses of several letters whose numbers say where a motion goes."""
 
@@ -31,6 +32,15 @@ SETTINGS = frozenset(
     b"SF SD SR SRA STA SVC FP FMA DISC DISR DISCL LIMS MEAC THETA PHI PSI ID IDS DC FXS FXST FXSW FOC".split()
 )
 """Addresses that say nothing of where a motion goes."""
+
+DRILLING = frozenset(f"CYCLE{number}".encode() for number in range(81, 90))
+"""Cycles that end in their retraction plane, above where they start."""
+MILLING = frozenset(
+    b"CYCLE60 CYCLE61 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE71 CYCLE72 CYCLE73 CYCLE74 CYCLE75 CYCLE76 CYCLE77 CYCLE79 "
+    b"CYCLE90 CYCLE801 CYCLE802 CYCLE830 CYCLE840 CYCLE899 HOLES1 HOLES2 POCKET1 POCKET2 POCKET3 POCKET4 SLOT1 SLOT2 "
+    b"LONGHOLE".split()
+)
+"""Cycles that end elsewhere; as all of the control's cycles they bring back the modes in force before them."""
 
 QUIET_CALLS = frozenset(
     b"MSG CYCLE832 FGROUP SETMS SETAL BRISKA SOFTA DRIVEA JERKA WORKPIECE GROUP_BEGIN GROUP_END GROUP_ADDEND WAITM "
@@ -200,7 +210,10 @@ class _Taken:
             return close
         if name in self.names:
             self.codes(place, end, name)
-            return self.arguments(end)
+            closed = self.arguments(end)
+            if name == b"CYCLE800":
+                self.note("swivel", text[end:closed].strip())
+            return closed
         if name == b"RET":
             self.word(place, key("M"), -1, end, 17.0, How.INTEGER)
             return self.arguments(end)
@@ -236,12 +249,36 @@ class _Taken:
             at += 1
         return bracket_end(self.text, at) if self.text[at : at + 1] == b"(" else end
 
+    def retract(self, end: int) -> None:
+        """The first argument of a cycle whose name ends at ``end``, as a word."""
+        at = end
+        while self.text[at : at + 1] in (b" ", b"\t"):
+            at += 1
+        stop = at + 1 if self.text[at : at + 1] == b"(" else at
+        depth = 1
+        for place in range(stop, len(self.text)):
+            depth += (self.text[place] in b"([") - (self.text[place] in b")]")
+            if depth == 0 or (depth == 1 and self.text[place] in b","):
+                break
+        else:
+            return
+        literal = self.text[stop:place].strip()
+        number = constant(literal)
+        if math.isnan(number) and literal:
+            self.note("value", value_note(self.words, RETRACT, How.NUMBER, literal))
+        how = How.UNREAD if math.isnan(number) else How.NUMBER
+        self.word(end, RETRACT, -1, place, number, how)
+
     def statement(self, name: bytes, place: int, end: int) -> int:
         text = self.text
         if name == b"MCALL":
             # With a cycle after it, every block with a position calls that; alone it ends this.
-            on = bool(text[end:].strip())
-            self.codes(place, len(text.rstrip()), b"MCALL()" if on else b"MCALL_OFF")
+            called = _NAME.search(text, end)
+            drilling = called is not None and called[0].upper() in DRILLING
+            on = b"MCALL(CYCLE)" if drilling else b"MCALL()" if text[end:].strip() else b"MCALL_OFF"
+            self.codes(place, len(text.rstrip()), on)
+            if drilling and called is not None:
+                self.retract(called.end())
             return len(text)
         if name in OPENS or name in CLOSES or name in JUMPS or name in DECLARES or name in QUIET_NAMES:
             said = text[place:].strip().upper()
@@ -254,6 +291,13 @@ class _Taken:
             return len(text)
         closed = self.arguments(end)
         if name in QUIET_CALLS:
+            return closed
+        if name in DRILLING and not self.words:
+            self.note("cycle", name)
+            self.retract(end)
+            return closed
+        if name in MILLING and not self.words:
+            self.note("cycle", name)
             return closed
         if self.words or (closed == end and text[end:].strip()):
             self.note("unknown", text[place:].strip())

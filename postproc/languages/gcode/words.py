@@ -63,7 +63,8 @@ class Note(NamedTuple):
 
     value: the expression of a word, see ``value_note``; assign: an assignment; if: the condition of the rest of the
     block; open, close, between, while: a loop or a branch; jump, label, call, program, tape: as in the text; base: a
-    work offset is written; tool: a tool is called by its name; corner, axis, polar, frame: a word of that kind;
+    work offset is written; tool: a tool is called by its name; corner, axis, polar, frame, swivel: a word of
+    that kind; cycle: a cycle of the control is called;
     unknown: text that is not understood."""
 
     block: int
