@@ -47,7 +47,7 @@ def remarks(document: Document, source: Source, steps: Ints, in_text_order: bool
         spans.tolist(), lines.tolist(), rows.tolist(), alone.tolist(), strict=True
     ):
         said = _text(raw[start:stop])
-        if said.startswith(MARK):
+        if marker is not None and start == marker.start:
             continue
         if _SPEAKS.match(said):
             speaking.append(Annotation(row, said, number))

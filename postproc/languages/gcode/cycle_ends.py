@@ -85,9 +85,11 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     drilled = [-1, -1, -1]  # the latest cycle of each axis
     for row in rows.tolist():
         if last < 0 or given.move[row - 1] != Move.CYCLE or axis[row] != axis[row - 1]:
-            source = latest[row, axis[row]]
-            same = source > drilled[axis[row]] and frame[source] == frame[row] and lost[source] == lost[row]
-            at_r, before = np.nan, height[source, axis[row]] if same else np.nan
+            at, drill = latest[row, axis[row]], drilled[axis[row]]
+            there = level[drill] if drill > at else height[at, axis[row]]
+            at = max(at, drill)
+            same = at >= 0 and frame[at] == frame[row] and lost[at] == lost[row]
+            at_r, before = np.nan, there if same else np.nan
         elif frame[row] != frame[last]:
             at_r, before = np.nan, np.nan
         last = drilled[axis[row]] = row

@@ -84,6 +84,7 @@ class Execution:
     reason: Ints
     tape: Bools
     called: Bools
+    entered: Bools
     repeated: Bools
     folded: FoldedWords
     unknown: Mapping[str, int]
@@ -110,7 +111,7 @@ def execute(source: Source, control: Control, symbols: Mapping[str, object]) -> 
     n = len(source.blocks)
     nothing = np.zeros(n, np.bool_)
     tape = tape_blocks(source)
-    plain = Execution(source, source, None, False, np.zeros(n, np.int8), tape, nothing, nothing, _folded([]), {})
+    plain = Execution(source, source, None, False, np.zeros(n, np.int8), tape, nothing, nothing, nothing, _folded([]), {})
     language = control.expressions
     if language is None or not n:
         return plain
@@ -180,6 +181,7 @@ class _Run:
         self.rows: list[tuple[int, int, int, float, int]] = []
         self.taken: dict[int, bool] = {}  # step of a block behind a condition -> whether that holds
         self.called: list[int] = []
+        self.entered: list[int] = []
         self.unknown: dict[str, int] = {}
         self.frames: list[_Frame] = []
         self.repeats: dict[int, int] = {}
@@ -504,6 +506,7 @@ class _Run:
         target = self.labels.find(self.computed(statement), statement.block)
         if target is None:
             raise NotFollowed
+        self.entered.append(self.count)
         return target
 
     def computed(self, statement: Statement) -> Statement:
@@ -546,6 +549,7 @@ class _Run:
         self.kill(start, stop)
         self.emit(start, start + 1)
         self.perhaps_range(start + 1, stop)
+        self.entered.append(self.count)
         return stop
 
     # Calls
@@ -705,8 +709,10 @@ class _Run:
         reason[self.perhaps_run()[order] & (reason == FlowReason.NONE)] = FlowReason.FLOW
         same = len(order) == n and bool((order == np.arange(n)).all())
         folded = _folded(self.rows)
-        called = np.zeros(len(order), np.bool_)
-        called[self.called] = True
+        called, entered = np.zeros(len(order), np.bool_), np.zeros(len(order) + 1, np.bool_)
+        called[self.called], entered[self.entered] = True, True
+        if not same:
+            entered[:-1] |= np.diff(order, prepend=-1) != 1
         held = np.array(sorted(step for step, holds in self.taken.items() if holds), np.int64)
         source = self.source if same and not len(held) else self.source.in_order(order, held)
         source = source.with_values(folded.step, folded.key, folded.nth, folded.value, folded.how)
@@ -718,6 +724,7 @@ class _Run:
             reason,
             self.tape[order],
             called,
+            entered[:-1],
             many[order] > 1,
             folded,
             self.unknown,

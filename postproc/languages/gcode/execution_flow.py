@@ -87,10 +87,8 @@ def follow(execution: Execution, control: Control, once: Ints) -> ExecutionFlow:
     if control.calls:
         forget[1:] |= source.mask(*control.calls) & ~source.mask(key("G"), key("M"))
     forget[1:] &= ~execution.called
-    entered = _returned(source, n)
-    if execution.order is not None:
-        entered |= np.diff(execution.order, prepend=-1) != 1
-    elif not execution.followed:
+    entered = _returned(source, n) | execution.entered
+    if not execution.followed:
         edge = np.zeros(n + 1, np.int32)
         for start, end in uncertain_stretches(source, entered):
             edge[start] += 1

@@ -213,7 +213,7 @@ def tool_lengths(given: BlockWords, tool: Ints) -> ToolLengths:
 
 
 def references(
-    base: Ints, tool: Ints, line: Ints, stated: tuple[StatedOffset, ...]
+    base: Ints, tool: Ints, line: Ints, stated: tuple[StatedOffset, ...] = ()
 ) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
     """Indices (N,) of bases and (N,) of tools in the frames of a toolpath, of ``base``, ``tool`` and ``line`` (N,), -1
     where unknown, and these frames; stated: see ``WorkOffsets``."""

@@ -176,7 +176,7 @@ def _followed(
     """
     turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
     events = _events(given)
-    trace = Trace(offsets.start(), _start(settings), events, _change(given, events))
+    trace = Trace(offsets.start(), events, _change(given, events), _start(settings))
     feeds, stands, away, reasons = (
         Feeds(given),
         ToolOrientations(given, turned),
