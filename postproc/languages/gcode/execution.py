@@ -450,8 +450,9 @@ class _Run:
         name, _, first = head.partition("=")
         value = self.value(first, around.start) if ahead else self.value(name, around.stop) + 1
         end = self.value(last, around.start)
-        self.variables.set(name, value)
-        return math.nan if math.isnan(value) or math.isnan(end) else float(value <= end)
+        runs = math.nan if math.isnan(value) or math.isnan(end) else float(value <= end)
+        self.variables.set(name, value if runs else math.nan)
+        return runs
 
     def maybe(self, around: Construct) -> int:
         """A construct that may run or not, once or often."""

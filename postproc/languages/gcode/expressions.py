@@ -153,8 +153,8 @@ _TOKENS = {
         r"|AND|XOR|OR|MOD|EQ|NE|GT|GE|LT|LE)"
     ),
     False: re.compile(
-        r"[ \t]*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)|(?P<word>[$A-Z_][$A-Z0-9_.]*)"
-        r"|(?P<sign>==|<>|>=|<=|[-+*/()\[\],<>]))[ \t]*"
+        r"[ \t]*+(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)|(?P<word>[$A-Z_][$A-Z0-9_.]*)"
+        r"|(?P<sign>==|<>|>=|<=|[-+*/()\[\],<>]))"
     ),
 }
 _BLANKS = str.maketrans("", "", " \t\x0b\x0c")
@@ -164,7 +164,7 @@ def evaluate(text: str, language: ExpressionLanguage, lookup: Lookup) -> float:
     """The value of an expression, NaN where it is not known or not finite."""
     if len(text) > LONGEST:
         return math.nan
-    text = text.upper()
+    text = text.strip().upper()
     tokens = _tokens(text.translate(_BLANKS) if language.numbered else text, _TOKENS[language.numbered])
     if not tokens:
         return math.nan

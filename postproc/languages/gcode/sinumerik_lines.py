@@ -266,8 +266,8 @@ class _Taken:
         number = constant(literal)
         if math.isnan(number) and literal:
             self.note("value", value_note(self.words, RETRACT, How.NUMBER, literal))
-        how = How.UNREAD if math.isnan(number) else How.NUMBER
-        self.word(end, RETRACT, -1, place, number, how)
+        how = How.UNREAD if math.isnan(number) else How.INTEGER
+        self.word(end, RETRACT, -1, self.arguments(end), number, how)
 
     def statement(self, name: bytes, place: int, end: int) -> int:
         text = self.text
