@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -98,6 +98,19 @@ class BlockWords:
 
     def __len__(self) -> int:
         return self.stop - self.start
+
+    def with_absolute_centres(self) -> BlockWords | None:
+        """The blocks with I J K as coordinates; None where a code says what they are."""
+        codes = self.words(key("G")).value
+        if np.isin(codes, (90.1, 91.1)).any():
+            return None
+        absolute = everywhere(1, len(self), np.int8)
+        modal = replace(
+            self.modal,
+            force={**self.modal.force, Group.ARCS: absolute},
+            ahead={**self.modal.ahead, Group.ARCS: 1},
+        )
+        return replace(self, modal=modal)
 
     def part(self, start: int, stop: int) -> BlockWords:
         """The blocks begin .. stop - 1 of a whole program."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.document import Document
+from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, rotation_from_abc
 from postproc.base.units import DEG, MM
 from postproc.languages.dialect import PLAIN, Program, ReadingSettings
@@ -66,14 +67,22 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     offset = work_offsets(given)
     base = offset.base[rows]
     tool, named = tools(given, settings.initial.tool)
-    collector = RefusalCollector(len(rows))
-    codes = np.isin(execution.folded.key, (key("G"), key("M")))
-    computed = np.isin(rows, execution.folded.step[codes])
-    collector.refuse(computed, "GCO005", "a G or M code of the block is computed")
+    folded_codes = np.isin(execution.folded.key, (key("G"), key("M")))
+    computed = np.isin(rows, execution.folded.step[folded_codes])
     unbound = _unbound(execution)
-    found, built, frames, orientations = _followed(
-        given, rows, offset, base, tool, settings, unbound, collector
-    )
+
+    def followed(given: BlockWords) -> Followed:
+        collector = RefusalCollector(len(rows))
+        collector.refuse(computed, "GCO005", "a G or M code of the block is computed")
+        return _followed(given, rows, offset, base, tool, settings, unbound, collector)
+
+    run, coordinates = followed(given), False
+    if run.differing_radii and control.iso and given.modal.ahead[Group.ARCS] == 0:
+        # Centres that no code says to be differences may be coordinates: where all arcs are some only so.
+        other = given.with_absolute_centres()
+        if other is not None and not (again := followed(other)).differing_radii:
+            given, run, coordinates = other, again, True
+    found, built, frames, orientations, collector = run.columns, run.built, run.frames, run.orientations, run.collector
     lines = source.blocks
     line, start = lines.line[rows], lines.start[rows]
     external = external_axes(given, rows)
@@ -116,6 +125,10 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         external=external,
     )
     findings = [*refused.findings(), *diagnostics(document, given, rows, tool, named, settings)]
+    if coordinates:
+        message = "I J K are read as coordinates: only so the radii of the arcs agree"
+        arc = np.flatnonzero(built.kind == Kind.CIRC)[:1]
+        findings += [Finding("GCO031", message, str(document.path), int(line[row]), 1) for row in arc.tolist()]
     return Program(
         control.name,
         documents,
@@ -160,6 +173,18 @@ def _folded(words: FoldedWords, rows: Ints) -> FoldedNumbers:
     return FoldedNumbers(*(column[mine][order] for column in (at, words.key, words.value)))
 
 
+class Followed(NamedTuple):
+    """The motions' columns, what others build on, the frames of the program, what its orientation words mean, and why
+    motions are refused; differing_radii: arcs whose radii at start and end differ."""
+
+    columns: FilledRows
+    built: Built
+    frames: Poses
+    orientations: tuple[OrientationWords, ...]
+    collector: RefusalCollector
+    differing_radii: int
+
+
 def _followed(
     given: BlockWords,
     rows: Ints,
@@ -169,11 +194,8 @@ def _followed(
     settings: ReadingSettings,
     unbound: str,
     collector: RefusalCollector,
-) -> tuple[FilledRows, Built, Poses, tuple[OrientationWords, ...]]:
-    """The motions in the blocks ``rows`` (N,), part by part; base (N,), tool (B,): numbers.
-
-    Gives their columns, what others build on, the frames of the program and what its orientation words mean.
-    """
+) -> Followed:
+    """The motions in the blocks ``rows`` (N,), part by part; base (N,), tool (B,): numbers."""
     turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
     events = _events(given)
     trace = Trace(offsets.start(), events, _change(given, events), _start(settings))
@@ -186,7 +208,7 @@ def _followed(
     allowed = _allowed(given)
     lengths = tool_lengths(given, tool)
     ends = cycle_ends(given, events, lengths.changes)
-    found = FilledRows(len(rows))
+    found, differing = FilledRows(len(rows)), 0
     for start in range(0, max(len(given), 1), PART):
         stop = min(start + PART, len(given))
         low, high = np.searchsorted(rows, [start, stop]).tolist()
@@ -201,6 +223,7 @@ def _followed(
         )
         where = trace.follow(way, start)
         moves = _motions(here, where, trace, own, stands)
+        differing += int((moves.arcs.wrong == 3).sum())
         part = collector.part(slice(low, high))
         cutting = np.isin(moves.kind, (Kind.LIN, Kind.CIRC)) & lengths.off[rows[low:high]]
         part.refuse(cutting, "GCO029", "the program has switched the tool's length off")
@@ -217,7 +240,7 @@ def _followed(
         np.array([frame.turn for frame in trace.frames]),
         np.array([frame.shift[:3] for frame in trace.frames]),
     )
-    return found, built, frames, tuple(stands.orientations)
+    return Followed(found, built, frames, tuple(stands.orientations), collector, differing)
 
 
 def _columns(
