@@ -352,7 +352,9 @@ def test_nothing_goes_before_a_block_that_a_jump_leads_to() -> None:
     assert list(path.constraints.no_insert_before) == [len(path) - 2]
     text = "GOTOF PAST\nG1 X4 F100\nPAST: G1 X6 Y0 Z0\nX7\n"
     path = body(text, "sinumerik").toolpath
-    assert list(path.constraints.no_insert_before) == [len(path) - 2]
+    # The block that is passed comes last.
+    assert list(path.constraints.no_insert_before) == [len(path) - 3, len(path) - 1]
+    assert path.line[-1] == path.line[-3] - 1
 
 
 def test_nothing_goes_before_a_block_that_a_subprogram_returns_to() -> None:

@@ -25,7 +25,7 @@ from postproc.languages.gcode.modal_fill import FilledRows, everywhere, fill_mod
 from postproc.languages.gcode.numbered import references
 from postproc.languages.gcode.orientation_words import Angles, Vector, swing
 from postproc.languages.gcode.positions import Course, Trace
-from postproc.languages.gcode.refusals import RefusalCollector
+from postproc.languages.gcode.refusals import RefusalCollector, RefusalReason
 from postproc.languages.gcode.source import NONE, WordColumn, scan
 from postproc.toolpath import Toolpath
 
@@ -161,7 +161,7 @@ def test_the_last_block_of_those_in_doubt() -> None:
             while doubt[row] and last + 1 < n and doubt[last + 1]:
                 last += 1
             expected.append(last)
-        assert ExecutionFlow(doubt, no, no, no, no).last.tolist() == expected
+        assert ExecutionFlow(doubt, no, no, no, no, no, no, no).last.tolist() == expected
     assert FlowReason.NONE == 0
 
 
@@ -389,12 +389,11 @@ def test_percentages_follow_some_codes_of_kuka_cnc() -> None:
 def test_the_first_reason_stays() -> None:
     doubts = RefusalCollector(5)
     doubts.refuse(np.array([False, True, False, True, False]), "GCO001", "one")
-    doubts.refuse(np.array([True, True, False, False, False]), "GCO002", "two", "cause")
+    doubts.refuse(np.array([True, True, False, False, False]), "GCO002", "two", "do this")
     doubts.refuse(np.zeros(5, np.bool_), "GCO003", "never")
     part = doubts.part(slice(2, 5))
-    part.refuse_each(
-        np.array([0, 1, 2]), [("GCO002", "three", "cause"), ("GCO001", "one", "one")], np.array([0, 0, 1])
-    )
+    reasons = [RefusalReason("GCO002", "three", "two"), RefusalReason("GCO001", "one", "one")]
+    part.refuse_each(np.array([0, 1, 2]), reasons, np.array([0, 0, 1]))
     found = doubts.done(
         Document(Path("a.nc"), b""),
         np.arange(10, 15),
@@ -408,7 +407,8 @@ def test_the_first_reason_stays() -> None:
         ("GCO002", "two", 10, 3), ("GCO001", "one", 11, 1), ("GCO002", "three", 12, 2), ("GCO001", "one", 13, 1),
         ("GCO001", "one", 14, 6),
     ]  # fmt: skip
-    assert [finding.advice for finding in found.values()] == [CODES[code].action for code, *_ in said]
+    actions = ["do this", *(CODES[code].action for code, *_ in said[1:])]
+    assert [finding.advice for finding in found.values()] == actions
     assert [str(finding) for finding in found.findings()] == [
         "a.nc:10:3: GCO002 two; 2 motions, lines 10 to 12",
         "a.nc:11:1: GCO001 one; 3 motions, lines 11 to 14",

@@ -32,7 +32,7 @@ OPEN = re.compile(rb"#<[^>]*$|\[[^]]*$|'[^']*$|[-#=+]$")
 
 def address(number: int) -> str:
     if number >= NAMES:
-        return ("TURN", "RPL")[number - NAMES]
+        return ("TURN", "RPL", "RETRACT")[number - NAMES]
     return chr(number & 0xFF) + (f"{number // 256 - 1}=" if number > 255 else "")
 
 

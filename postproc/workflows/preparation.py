@@ -398,6 +398,8 @@ def _missing_orientation(request: Request, path: Toolpath, force: Wrenches, cell
     """Refuse cuts of a program that states positions only, in a cell that does not state how the tool is oriented."""
     lost = force.carries & ~path.constraints.orientation_programmed & np.isfinite(path.position).all(axis=1)
     lost &= ~np.isfinite(path.rotation[:, 0, 0]) & ~path.keeps_orientation
+    if cell.orientation is not None:
+        lost[[*path.constraints.refused]] = False  # rotary axes without a TCP mode: these motions alone
     if lost.any():
         row = int(np.argmax(lost))
         raise Refusal(

@@ -12,7 +12,7 @@ import random
 import re
 import shutil
 import subprocess
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -32,11 +32,11 @@ _AXES = {"XY": (0, 1, 2), "XZ": (2, 0, 1), "YZ": (1, 2, 0)}
 class Motion:
     """A motion of rs274.
 
-    line: from 1.  kind: "PTP", "LIN" or "CIRC".  start, end (3,) [mm]: in the coordinates of the work offset in force,
-    with the shift of G92 in them, as the program's reader has them.  step, start_step [mm]: of the last digits printed.
-    base: number of the work offset; rewritten: the program has changed it.  tool: in the spindle, -1 before any change
-    to a tool of a T word.  Of arcs: centre (3,) [mm]; turn [rad], counter-clockwise about the plane's third axis.
-    """
+    line: from 1.  kind: "PTP", "LIN" or "CIRC".  start, end (3,) [mm]: in the coordinates of the work offset in
+    force, with the shift of G92 in them, as the program's reader has them.  step, start_step [mm]: of the last
+    digits printed. base: number of the work offset; rewritten: the program has changed it.  tool: in the spindle,
+    -1 before any change to a tool of a T word.  offset (3,) [mm], rotation [deg]: the work offset in force.  Of
+    arcs: centre (3,) [mm]; turn [rad], counter-clockwise about the plane's third axis."""
 
     line: int
     kind: str
@@ -50,6 +50,8 @@ class Motion:
     centre: np.ndarray | None = None
     turn: float = 0.0
     plane: tuple[int, int, int] = (0, 1, 2)
+    offset: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    rotation: float = 0.0
 
     @property
     def still(self) -> bool:
@@ -165,6 +167,7 @@ class _Account:
         # Both the place and the shift are printed with four decimals.
         step = 1e-4 * (self.unit + self.shift_unit * self.shift.any())
         changed = self.base in self.rewritten or self.rotation != 0.0
+        arc |= {"offset": self.offset, "rotation": self.rotation}
         self.motions.append(
             Motion(line, kind, self.here, end, step, self.step, self.base, changed, self.tool, **arc)  # type: ignore[arg-type]
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,8 @@ class Row:
     """A motion as it is read; lengths in mm.
 
     code: of the finding that says that the motion is not known or not corrected, "" without.  end, centre, normal (3,),
-    NaN where not known.  base, tool: their numbers, -1 where not known.  executes: it follows the row before it.
+    NaN where not known.  base, tool: their numbers, -1 where not known.  offset (3,), turn [deg]: the base in the
+    machine where the program states it, else NaN.  executes: it follows the row before it.
     """
 
     line: int
@@ -35,12 +36,14 @@ class Row:
     base: int
     tool: int
     code: str
+    offset: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
+    turn: float = float("nan")
     executes: bool = True
 
     @property
     def claimed(self) -> bool:
-        """The reader says that it knows the target."""
-        return not self.code and self.located
+        """The reader says that it knows the target, whether it may be corrected or not."""
+        return self.located
 
     @property
     def located(self) -> bool:
@@ -75,6 +78,11 @@ def read(made: Made) -> Reading:
 
     rows = []
     for row in range(len(toolpath)):
+        pose = toolpath.frames[toolpath.base[row]].pose if toolpath.base[row] >= 0 else None
+        placed = {}
+        if pose is not None:
+            turn = np.degrees(np.arctan2(pose.rotation[1, 0], pose.rotation[0, 0]))
+            placed = {"offset": np.array(pose.position) / MM, "turn": float(turn)}
         rows.append(
             Row(
                 line=int(toolpath.line[row]),
@@ -87,6 +95,7 @@ def read(made: Made) -> Reading:
                 tool=number(int(toolpath.tool[row])),
                 code=toolpath.constraints.refused[row].code if row in toolpath.constraints.refused else "",
                 executes=bool(toolpath.executes[row]),
+                **placed,
             )
         )
     findings = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -56,6 +56,7 @@ class What:
     PARALLEL = "a word U, V or W"
     OTHER = "a motion whose end is not read"
     CYCLE = "the cycle"
+    SWIVEL = "the change of the swivelled plane"
     UNCERTAIN = "a block that runs only sometimes"
     CALL = "code that is not read"
     TEXT = "text that is not understood"
@@ -97,6 +98,19 @@ class BlockWords:
 
     def __len__(self) -> int:
         return self.stop - self.start
+
+    def with_absolute_centres(self) -> BlockWords | None:
+        """The blocks with I J K as coordinates; None where a code says what they are."""
+        codes = self.words(key("G")).value
+        if np.isin(codes, (90.1, 91.1)).any():
+            return None
+        absolute = everywhere(1, len(self), np.int8)
+        modal = replace(
+            self.modal,
+            force={**self.modal.force, Group.ARCS: absolute},
+            ahead={**self.modal.ahead, Group.ARCS: 1},
+        )
+        return replace(self, modal=modal)
 
     def part(self, start: int, stop: int) -> BlockWords:
         """The blocks begin .. stop - 1 of a whole program."""
@@ -194,7 +208,9 @@ class BlockWords:
     @cached_property
     def move(self) -> Ints:
         """(B,) Move in force."""
-        return self.modal.force[Group.MOTION]
+        move, macro = self.modal.force[Group.MOTION], self.modal.force[Group.MACRO]
+        called = macro == 2
+        return np.where(called & self.has(*AXES), np.int8(Move.CYCLE), move) if called.any() else move
 
     @cached_property
     def axis(self) -> Bools:
@@ -309,7 +325,7 @@ def frame_events(
         parallel = np.stack([given.how(axis) >= 0 for axis in SECOND], axis=1)
         both = np.concatenate([parallel, np.zeros((n, 3), np.bool_)], axis=1)
         lose(both, parallel.any(axis=1) & given.motion & ~home, What.PARALLEL)
-    lose(whole, other | (given.motion & (force[Group.MACRO] != 0)), What.OTHER)
+    lose(whole, other | (given.motion & (np.abs(force[Group.MACRO]) == 1)), What.OTHER)
     if cycle.any():
         # Words of a cycle give where it works.
         depth = np.array([2, 1, 0])[np.clip(force[Group.PLANE], 0, 2)]
@@ -325,6 +341,15 @@ def frame_events(
         lose(whole, cycle & repeats & (force[Group.DISTANCE] != 0), What.CYCLE)
     lose(present, given.motion & (flow.reason != FlowReason.NONE), What.UNCERTAIN)
     lose(whole, given.noted("unknown"), What.TEXT)
+    if (called := given.noted("cycle")).any():
+        single = np.zeros((n, 6), np.bool_)
+        single[np.arange(n), np.array([2, 1, 0])[np.clip(force[Group.PLANE], 0, 2)]] = True
+        retracting = () if given.control.retract is None else (given.control.retract,)
+        at_plane = called & given.has(*retracting) & np.isfinite(ends)
+        target |= at_plane[:, None] & single
+        value = np.where(at_plane[:, None] & single, ends[:, None], value)
+        lose(linear, called & ~at_plane, What.CYCLE)
+    leave(linear, given.noted("swivel"), What.SWIVEL)
     lose(whole, given.noted("corner", "axis", "polar"), What.OTHER)
     leave(whole, flow.forget, What.CALL)
 

@@ -277,6 +277,14 @@ CODES = define(
             action="Nothing needs to be done.",
             example="`/M30` before the last cut.",
         ),
+        "GCO031": Code(
+            "info",
+            "centres are coordinates",
+            meaning="No code selects what I J K are; the radii of the arcs agree only if they are coordinates.",
+            consequence="Read otherwise the arcs would be others.",
+            action="Write G90.1 or G91.1.",
+            example="`G3 X5 Y5 I5 J0` after `G1 X10 Y0`.",
+        ),
         "SIN001": Code(
             "info",
             "tool is called by a name",

@@ -31,27 +31,59 @@ class Remarks(NamedTuple):
     marker_at: Span
 
 
-def remarks(document: Document, source: Source, line: Ints) -> Remarks:
-    """``line`` (N,): lines of the motions, ascending."""
-    raw, marker = document.raw, None
-    spans = source.comments[:, :2]
-    lines = source.comments[:, 2]
-    rows = np.searchsorted(line, lines)
+def remarks(document: Document, source: Source, steps: Ints, in_text_order: bool) -> Remarks:
+    """``steps`` (N,): blocks of ``source`` that are the motions."""
+    raw, run = document.raw, source.blocks.line
+    comments = source.comments
+    if in_text_order:
+        rows = np.searchsorted(run[steps], comments[:, 2])
+    else:
+        comments, rows = _passed(comments, run, steps)
+    marker = _marker(raw, source.comments)
+    spans, lines = comments[:, :2], comments[:, 2]
     alone = ~np.isin(lines, source.blocks.line[source.blocks.wordy]) if len(lines) else lines
     speaking, others = [], []
     for (start, stop), number, row, own in zip(
         spans.tolist(), lines.tolist(), rows.tolist(), alone.tolist(), strict=True
     ):
-        said = raw[start:stop].decode("latin-1")
-        said = (said[1:-1] if said[0] == "(" and said[-1] == ")" else said[1:]).strip()
-        if marker is None and said.startswith(MARK):
-            marker = Span(0, start, stop)
-        elif _SPEAKS.match(said):
+        said = _text(raw[start:stop])
+        if marker is not None and start == marker.start:
+            continue
+        if _SPEAKS.match(said):
             speaking.append(Annotation(row, said, number))
         elif own and said:
             others.append(Annotation(row, said, number))
     at = head(raw)
     return Remarks(tuple(speaking), tuple(others), marker, Span(0, at, at))
+
+
+def _text(comment: bytes) -> str:
+    said = comment.decode("latin-1")
+    return (said[1:-1] if said[0] == "(" and said[-1] == ")" else said[1:]).strip()
+
+
+def _marker(raw: bytes, comments: Ints) -> Span | None:
+    """The first comment that says that the program is compensated."""
+    if MARK.encode() not in raw:
+        return None
+    spans = comments[:, :2].tolist()
+    return next((Span(0, *span) for span in spans if _text(raw[slice(*span)]).startswith(MARK)), None)
+
+
+def _passed(comments: Ints, run: Ints, steps: Ints) -> tuple[Ints, Ints]:
+    """The comments in the order in which the run passes them, each as often as it does; the motions after them."""
+    if not len(comments) or not len(run):
+        return comments, comments[:, 2]
+    lines = comments[:, 2]
+    cuts = np.flatnonzero(np.diff(run) <= 0) + 1
+    which, at = [], []
+    for start, stop in zip(np.append(0, cuts).tolist(), np.append(cuts, len(run)).tolist(), strict=True):
+        low, high = np.searchsorted(lines, [run[start], run[stop - 1] + 1]).tolist()
+        if start == 0 and run[0] == run.min():
+            low = 0  # those at the head of the file
+        which.append(np.arange(low, high))
+        at.append(start + np.searchsorted(run[start:stop], lines[low:high]))
+    return comments[np.concatenate(which)], np.searchsorted(steps, np.concatenate(at))
 
 
 def head(raw: bytes) -> int:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.languages.gcode.expression_values import ExpressionLanguage
 from postproc.languages.gcode.words import Note, key
 
 
@@ -35,7 +36,7 @@ class Group(IntEnum):
     POLAR = 16  # 0; else polar coordinates
     DIAMETER = 17  # 0; else X is a diameter
     SPINDLE = 18  # 0 speed, 1 constant surface speed: F per revolution is then unknown
-    MACRO = 19  # 0; else every block calls a macro (G66)
+    MACRO = 19  # 0; 1 every block calls a macro (G66), 2 a drilling cycle (MCALL CYCLE81)
     FEED_UNITS = 24  # 0 mm, 1 inch: of F, where a control tells it apart from that of coordinates
     FOREIGN = 20  # 0; else words are no coordinates of the base in this mode (#MCS ON, TRANSMIT)
     AXIAL = 21  # 0; else targets are axis positions, or reached as the axes go (PTP)
@@ -171,7 +172,10 @@ class Control:
     feed_units: the group that says the unit of F;
     further: U, V, W are axes beside X, Y, Z, and leave these as they are; offsets: key of the word that selects the
     tool's offsets, of which 0 switches them off (D); feed_before_units: F in a block with G20 or G21 is in the unit
-    from before it; iso: every word belongs to a code of its block or to its motion.
+    from before it; retract: key of what says where a cycle that a block calls by its name retracts to;
+    parameter: the letter that is no address with digits and an equals sign but a variable (R1=2); iso: every
+    word belongs to a code of its block or to its motion; expressions: the language of its variables and
+    expressions, None where these are not read.
     """
 
     name: str
@@ -197,4 +201,7 @@ class Control:
     further: bool = False
     offsets: int | None = None
     feed_before_units: bool = False
+    retract: int | None = None
+    parameter: str = ""
     iso: bool = False
+    expressions: ExpressionLanguage | None = None

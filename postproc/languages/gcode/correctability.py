@@ -11,10 +11,11 @@ from postproc.base.arrays import Bools, Ints
 from postproc.base.document import Document
 from postproc.languages.gcode.blocks import AXES, FRAMED, SECOND, BlockWords, Reasons, What
 from postproc.languages.gcode.control import Group, Move, Once
+from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.motions import GcodeMotions
 from postproc.languages.gcode.positions import Positions
-from postproc.languages.gcode.refusals import RefusalCollector, Refusals
+from postproc.languages.gcode.refusals import RefusalCollector, RefusalReason, Refusals
 from postproc.languages.gcode.words import How, key
 from postproc.toolpath import Kind
 
@@ -31,6 +32,7 @@ FLOW_MESSAGES = {
         "GCO006",
         "the motion is in a subprogram of the file: it runs where that is called",
     ),
+    FlowReason.SKIPPED: ("GCO025", "the flow of the program passes the motion: it does not run"),
     FlowReason.ENDED: ("GCO025", "the motion follows the end of the program and does not run"),
     FlowReason.COMPUTED: ("GCO005", "a G or M code before it is computed: what is active is not known"),
 }
@@ -57,6 +59,7 @@ class Built:
     turned: Bools
 
 
+_WRITE = "write them in the first motion"
 NUMBERS = (*AXES, *(key(letter) for letter in "IJKR"))
 
 
@@ -67,18 +70,27 @@ def check_correctability(
     base: Ints,
     tool: Ints,
     reasons: Reasons,
+    unbound: str,
     collector: RefusalCollector,
 ) -> None:
     """Refuses motions of a part of the program.
 
-    base, tool (N,): numbers, -1 where unknown; reasons: of ``frame_events``; doubts (N,): of these motions.
+    base, tool (N,): numbers, -1 where unknown; reasons: of ``frame_events``; unbound: what to do about names whose
+    values are not known.
     """
     rows = moves.block
     refuse, modal = collector.refuse, given.modal
     force = {group: values[rows] for group, values in modal.force.items()}
     for uncertainty, (code, message) in FLOW_MESSAGES.items():
         refuse(modal.flow.reason[rows] == uncertainty, code, message)
-    refuse(force[Group.MACRO] != 0, "GCO007", "every block calls a macro or a cycle here (G66, MCALL)")
+    refuse(
+        modal.flow.repeated[rows],
+        "GCO006",
+        "the motion runs several times: one number cannot state the targets of all",
+    )
+    refuse(
+        np.abs(force[Group.MACRO]) == 1, "GCO007", "every block calls a macro or a cycle here (G66, MCALL)"
+    )
     refuse(modal.has(Once.HOME)[rows], "GCO004", "the block leads to the reference point")
     refuse(modal.has(Once.MACHINE)[rows], "GCO004", "the block uses machine coordinates")
     refuse(modal.has(Once.PROBE)[rows], "GCO011", "the block is a probing move: its end is not known")
@@ -114,6 +126,7 @@ def check_correctability(
         unread[rows],
         "GCO005",
         "a word is an expression, a variable or far beyond the size of any machine",
+        unbound,
     )
     quiet = np.isin(moves.move, (-1, Move.NOTHING))
     refuse(quiet, "GCO018", "the block has axis words, but no motion code is active")
@@ -172,7 +185,9 @@ def _codes(given: BlockWords, rows: Ints, collector: RefusalCollector) -> None:
         codes = given.modal.unknown_codes.last(rows[some], absent=-1.0)
         values, which = np.unique(np.nan_to_num(codes, nan=-1.0), return_inverse=True)
         messages = [(named := code_name(value), f"{named} is not known here") for value in values.tolist()]
-        collector.refuse_each(some, [("GCO001", message, name) for name, message in messages], which)
+        collector.refuse_each(
+            some, [RefusalReason("GCO001", message, name) for name, message in messages], which
+        )
 
 
 def code_name(value: float) -> str:
@@ -206,7 +221,8 @@ def _positions(
             if cause >= 0 and not what:
                 what = What.ORIGIN
             message = f"{names}: {why}{f' ({what})' if what else ''}"
-            messages.append(("GCO003" if rapid else "GCO002", message, what))
+            help_ = f"state {names} under program_start: in the cell, or {_WRITE}" if cause < 0 else ""
+            messages.append(RefusalReason("GCO003" if rapid else "GCO002", message, what, help_))
         collector.refuse_each(some, messages, which.reshape(-1))
     collector.refuse(
         np.any(frame, axis=1),
@@ -215,7 +231,18 @@ def _positions(
     )
 
 
-def locked_rows(document: Document, given: BlockWords, built: Built, collector: RefusalCollector) -> Refusals:
+def bind_names(execution: Execution) -> str:
+    """What to do about names whose values were wanted and are not known."""
+    names = [name for name in execution.unknown if not name.startswith(("#<_", "$"))]
+    if not names:
+        return ""
+    shown = ", ".join([*names[:5], *(["..."] if len(names) > 5 else [])])
+    return f"bind {shown} under symbols: in the cell, or let the post-processor write numbers"
+
+
+def locked_rows(
+    document: Document, given: BlockWords, built: Built, collector: RefusalCollector, execution: Execution
+) -> Refusals:
     """Motions whose end a refused motion, an origin or other code builds on; ``given``: the whole program."""
     rows, n = built.block, len(built.block)
     pins = RefusalCollector(n)
@@ -238,7 +265,7 @@ def locked_rows(document: Document, given: BlockWords, built: Built, collector: 
     for at, message in (
         (np.flatnonzero(shifting), "G92 sets the origin at this end point"),
         (np.flatnonzero(modal.flow.calls), "code that is not read may depend on this end point"),
-        (_reading(document, given) - 1, "a variable after it reads the end position of this motion"),
+        (_reading(document, execution) - 1, "a variable after it reads the end position of this motion"),
         (
             np.flatnonzero(given.noted("unknown")),
             "a block that is not understood may depend on this end point",
@@ -264,10 +291,12 @@ def _through(built: Built, refused: Bools, building: Bools) -> Ints:
     return np.concatenate(found)
 
 
-def _reading(document: Document, given: BlockWords) -> Ints:
+def _reading(document: Document, execution: Execution) -> Ints:
     """Blocks with a variable that holds a position (#5001 to #5069, #5420 to #5428, #<_x>), or is itself computed."""
     places = [found.start() for found in _POSITION.finditer(document.raw)]
-    return np.unique(np.searchsorted(given.source.blocks.start, places, side="right") - 1).astype(np.int64)
+    starts, order = execution.text.blocks.start, execution.order
+    blocks = np.unique(np.searchsorted(starts, places, side="right") - 1).astype(np.int64)
+    return blocks if order is None else np.flatnonzero(np.isin(order, blocks))
 
 
 def _mask(n: int, rows: Ints) -> Bools:

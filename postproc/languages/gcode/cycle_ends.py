@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.languages.gcode.blocks import AXES, BlockWords
-from postproc.languages.gcode.control import Group, Move
+from postproc.languages.gcode.control import Group, Move, Once
 from postproc.languages.gcode.modal_fill import everywhere
 from postproc.languages.gcode.words import How, key
 
@@ -27,13 +27,43 @@ class CycleEnds:
         return np.asarray(sets & ~(self.inherited[blocks, None] & (self.axis[blocks, None] == np.arange(3))))
 
 
-def cycle_ends(given: BlockWords, events: Ints) -> CycleEnds:
-    """The ends of all cycles of a whole program; ``events`` (E,): blocks that change the frame.
+def _leaves_unknown(given: BlockWords, lengths: Bools) -> Bools:
+    """(B,) blocks before or after which the place of the tool may be another one than the last coordinates."""
+    modal = given.modal
+    once = (Once.HOME, Once.MACHINE, Once.PROBE, Once.CALL, Once.OTHER, Once.STORE)
+    others = (
+        modal.has(*once) | modal.unknown | modal.unused | given.noted("unknown", "axis", "polar", "corner")
+    )
+    uncertain = modal.flow.forget | (modal.flow.reason != 0) | modal.switched(Group.OFFSET) | lengths
+    return np.asarray(others | uncertain | given.twice)
+
+
+def _named_ends(given: BlockWords, retract: int) -> CycleEnds:
+    """Of a control whose cycles are called by name: their planes are coordinates."""
+    n, column = len(given), given.words(retract)
+    axis = np.array([2, 1, 0])[np.clip(given.modal.force[Group.PLANE], 0, 2)]
+    if not len(column):
+        return CycleEnds(everywhere(np.nan, n), everywhere(False, n), axis)
+    # Of the latest call; uncertain ones, and a change of units after them, leave it unknown.
+    sure = given.modal.flow.reason[column.block] == 0
+    values = np.where(sure, column.value, np.nan)
+    at = np.searchsorted(column.block, np.arange(n), side="right") - 1
+    block = np.append(column.block, 0)[at]
+    level = np.where(at >= 0, np.append(values, np.nan)[at], np.nan) * given.length
+    level = np.where(given.length[block] == given.length, level, np.nan)
+    return CycleEnds(level, everywhere(False, n), axis)
+
+
+def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
+    """The ends of all cycles of a whole program; ``events`` (E,): blocks that change the frame; lengths (B,): those in
+    which another tool length holds than before.
 
     G99: at R.  G98: where the first of the cycles without another motion between began, if that is not below R: from
     there controls differ.  R is known where it is a coordinate (G90); it holds to the end of these cycles.
     """
     n = len(given)
+    if given.control.retract is not None:
+        return _named_ends(given, given.control.retract)
     cycle = given.motion & (given.move == Move.CYCLE)
     rows = np.flatnonzero(cycle)
     if not len(rows):
@@ -46,20 +76,25 @@ def cycle_ends(given: BlockWords, events: Ints) -> CycleEnds:
     height = np.stack([given.lengths(one) for one in AXES[:3]], axis=1)
     hows = np.stack([given.how(one) for one in AXES[:3]], axis=1)
     # Where the last coordinate of each axis is stated; words of a cycle along its own axis are depths.
-    placed = (given.motion & ~given.machine & absolute)[:, None] & np.isin(hows, (How.NUMBER, How.INTEGER))
+    sure = given.motion & ~given.machine & absolute & (given.modal.flow.reason == 0)
+    placed = sure[:, None] & np.isin(hows, (How.NUMBER, How.INTEGER))
     placed &= ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
     latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
     frame = np.searchsorted(events, np.arange(n))
+    lost = np.cumsum(_leaves_unknown(given, lengths))
     at_r, before, last = np.nan, np.nan, -1
     inherited = np.zeros(n, np.bool_)
+    drilled = [-1, -1, -1]  # the latest cycle of each axis
     for row in rows.tolist():
         if last < 0 or given.move[row - 1] != Move.CYCLE or axis[row] != axis[row - 1]:
-            source = latest[row, axis[row]]
-            same = source >= 0 and frame[source] == frame[row]
-            at_r, before = np.nan, height[source, axis[row]] if same else np.nan
+            at, drill = latest[row, axis[row]], drilled[axis[row]]
+            there = level[drill] if drill > at else height[at, axis[row]]
+            at = max(at, drill)
+            same = at >= 0 and frame[at] == frame[row] and lost[at] == lost[row]
+            at_r, before = np.nan, there if same else np.nan
         elif frame[row] != frame[last]:
             at_r, before = np.nan, np.nan
-        last = row
+        last = drilled[axis[row]] = row
         if has_plane[row]:  # one that is computed is not known
             at_r = plane[row] if absolute[row] else np.nan
         elif not absolute[row]:

@@ -74,9 +74,9 @@ def diagnostics(
     tell(probing, "GCO001", "the block is a probing move without axes")
     calls, m = none.copy(), given.words(key("M"))
     calls[m.block[np.isin(m.value, CALLS)]] = True
-    tell(
-        calls | modal.has(Once.CALL) | given.noted("call"), "GCO007", "the block calls code that is not read"
-    )
+    calls |= modal.has(Once.CALL) | given.noted("call") | given.has(*given.control.calls)
+    tell(calls & ~modal.flow.called, "GCO007", "the block calls code that is not read")
+    tell(given.noted("cycle"), "GCO008", "the block calls a cycle of the control")
     strange_m = ~np.isin(m.value, KNOWN_M) & live[m.block]
     if strange_m.any():
         names = [f"M{value:g}" for value in np.unique(m.value[strange_m & np.isfinite(m.value)]).tolist()]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,13 +15,20 @@ from postproc.languages.gcode.control import Control, Once
 from postproc.languages.gcode.source import Source
 from postproc.languages.gcode.words import key
 
+if TYPE_CHECKING:
+    from postproc.languages.gcode.execution import Execution
+
 _GOTO = re.compile(r"(?:GOTO[BFC]?|REPEATB?)\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
 _CODE = re.compile(r"(?<![A-Z_])[GM][ \t]*[\d#\[]", re.I)
 _ZEROS = re.compile(r"^N?0*(?=\d)")
-CALLS = (72, 97, 98, 198)
-"""M72 of LinuxCNC brings back modes that M70 has saved."""
+SAVES, RESTORES, SAVES_FOR_A_CALL = 70, 72, 73
+"""Of LinuxCNC: M72 brings back modes that M70 has saved; M73 has the end of its subprogram do so."""
+CALLS = (RESTORES, 97, 98, 198)
 LOCAL = 97
 RETURNS = (99,)
+
+
+_ENDS = (2, 17, 30, *RETURNS)
 
 
 class FlowReason(IntEnum):
@@ -32,23 +40,27 @@ class FlowReason(IntEnum):
     PROGRAM = 3
     ENDED = 4
     COMPUTED = 5
+    SKIPPED = 6
 
 
 @dataclass(frozen=True, eq=False)
 class ExecutionFlow:
-    """reason (B,) FlowReason; forget (B,): before it other code ran that was not read; calls (B,): runs it; tape (B,):
-    belongs to the program; entered (B,): a jump leads to it, past what is before it."""
+    """reason (B,) FlowReason; forget (B,): before it other code ran that was not read; calls (B,): runs it; called
+    (B,): calls code of the file, which runs after it; tape (B,): belongs to the program; entered (B,): a jump leads
+    to it, past what is before it; repeated (B,): its line runs in other
+    blocks as well; restored (B,): before it modes were brought back that are not followed."""
 
     reason: Ints
     forget: Bools
     calls: Bools
+    called: Bools
     tape: Bools
     entered: Bools
+    repeated: Bools
+    restored: Bools
 
     def part(self, start: int, stop: int) -> ExecutionFlow:
-        rows = slice(start, stop)
-        forget, calls, tape, entered = self.forget, self.calls, self.tape, self.entered
-        return ExecutionFlow(self.reason[rows], forget[rows], calls[rows], tape[rows], entered[rows])
+        return ExecutionFlow(*(getattr(self, one.name)[start:stop] for one in fields(self)))
 
     @cached_property
     def last(self) -> Ints:
@@ -60,34 +72,58 @@ class ExecutionFlow:
         return np.where(sure[:-1], np.arange(n), following[:-1] - 1)
 
 
-def follow(source: Source, control: Control, once: Ints) -> ExecutionFlow:
+def follow(execution: Execution, control: Control, once: Ints) -> ExecutionFlow:
     """The flow of a program; ``once`` (B,): bits of the Once codes of every block."""
+    source = execution.source
     n = len(source.blocks)
-    uncertainty = np.zeros(n, np.int8)
+    uncertainty = execution.reason.copy() if execution.followed else np.zeros(n, np.int8)
     forget = np.zeros(n + 1, np.bool_)
-    tape = _tape(source, n)
-    uncertainty[source.blocks.deleted] = FlowReason.DELETED
+    tape = execution.tape
+    deleted = source.blocks.deleted & (uncertainty == FlowReason.NONE)
+    uncertainty[deleted] = FlowReason.DELETED
 
     m = source.column(key("M"))
     forget[m.block[np.isin(m.value, CALLS)] + 1] = True
     forget[1:] |= (once & (1 << Once.CALL)) != 0
     # text that is not understood may select anything by a code in it
     coded = [note.block for note in source.notes if note.kind == "unknown" and _CODE.search(note.text)]
+    coded += [note.block for note in source.notes if note.kind == "call"]
     forget[np.array(coded, np.intp) + 1] = True
     if control.calls:
-        forget[1:] |= source.mask(*control.calls) & ~source.mask(key("G"), key("M"))
-    edge = np.zeros(n + 1, np.int32)
-    entered = _returned(source, n)
-    for start, end in _stretches(source, n, forget, entered):
-        edge[start] += 1
-        edge[end] -= 1
-    if edge.any():
-        uncertainty[np.cumsum(edge)[:n] > 0] = FlowReason.FLOW
+        forget[1:] |= source.mask(*control.calls)
+    forget[1:] &= ~execution.called
+    entered = _returned(source, n) | execution.entered
+    if not execution.followed:
+        edge = np.zeros(n + 1, np.int32)
+        for start, end in uncertain_stretches(source, entered):
+            edge[start] += 1
+            edge[end] -= 1
+        if edge.any():
+            uncertainty[np.cumsum(edge)[:n] > 0] = FlowReason.FLOW
     computed = [column.block[np.isnan(column.value)] for column in (source.column(key("G")), m)]
     first = min((int(blocks[0]) for blocks in computed if len(blocks)), default=n)
     rest = uncertainty[first:]
     rest[rest == FlowReason.NONE] = FlowReason.COMPUTED
-    programs = _programs(source)
+    if not execution.followed:
+        _ended(source, control, uncertainty, tape)
+    restored = np.zeros(n + 1, np.bool_)
+    if (m.value == SAVES).any():
+        restored[m.block[m.value == RESTORES] + 1] = True
+    return ExecutionFlow(
+        uncertainty,
+        forget[:-1],
+        forget[1:],
+        execution.called,
+        tape,
+        entered,
+        execution.repeated,
+        restored[:-1],
+    )
+
+
+def _ended(source: Source, control: Control, uncertainty: Ints, tape: Bools) -> None:
+    """Marks what is after the end of the program."""
+    m, programs = source.column(key("M")), program_starts(source)
     if len(programs) > 1:
         uncertainty[programs[1] :] = FlowReason.PROGRAM
     ends = m.block[np.isin(m.value, [*control.endings, *RETURNS])]
@@ -98,7 +134,6 @@ def follow(source: Source, control: Control, once: Ints) -> ExecutionFlow:
         rest[rest != FlowReason.PROGRAM] = (
             FlowReason.PROGRAM if (m.value == LOCAL).any() else FlowReason.ENDED
         )
-    return ExecutionFlow(uncertainty, forget[:-1], forget[1:], tape, entered)
 
 
 def _returned(source: Source, n: int) -> Bools:
@@ -111,8 +146,9 @@ def _returned(source: Source, n: int) -> Bools:
     return entered
 
 
-def _tape(source: Source, n: int) -> Bools:
-    """What is between the first two ``%``, or before the only one where motions are before it."""
+def tape_blocks(source: Source) -> Bools:
+    """(B,) what is between the first two ``%``, or before the only one where motions are before it."""
+    n = len(source.blocks)
     marks = [note.block for note in source.notes if note.kind == "tape"]
     inside = np.ones(n, np.bool_)
     if marks:
@@ -125,24 +161,28 @@ def _tape(source: Source, n: int) -> Bools:
     return inside
 
 
-def _programs(source: Source) -> list[int]:
-    """Blocks where a program starts (O1234, :1234)."""
+def program_starts(source: Source) -> list[int]:
+    """Blocks where a program starts (O1234, :1234); 0 as well where what is before the first of them ends."""
     plain = source.column(key("O")).block
     noted = [note.block for note in source.notes if note.kind == "program"]
-    return sorted({*plain.tolist(), *noted})
+    starts = sorted({*plain.tolist(), *noted})
+    m = source.column(key("M"))
+    headless = starts and np.isin(m.value[m.block < starts[0]], _ENDS).any()
+    return [0, *starts] if headless else starts
 
 
-def _stretches(source: Source, n: int, forget: Bools, entered: Bools) -> list[tuple[int, int]]:
-    """Ranges of blocks that are loops, branches, subprograms or lie under a jump; calls are put into ``forget``, where
-    jumps lead to into ``entered``."""
+def uncertain_stretches(source: Source, entered: Bools | None = None) -> list[tuple[int, int]]:
+    """Ranges of blocks that are loops, branches, subprograms or lie under a jump; where jumps lead to is put into
+    ``entered`` (B,)."""
+    n = len(source.blocks)
     found: list[tuple[int, int]] = []
     stack: list[tuple[int, str]] = []
     labels: dict[str, int] | None = None
     for note in source.notes:
-        if note.kind == "call":
-            forget[note.block + 1] = True
-        elif note.kind == "open" or (note.kind == "while" and not any(s == note.text for _, s in stack[-1:])):
-            stack.append((note.block, note.text))
+        if note.kind == "open" or (
+            note.kind == "while" and not any(label == note.text.split()[0] for _, label in stack[-1:])
+        ):
+            stack.append((note.block, note.text.split()[0]))
         elif note.kind in ("close", "while"):
             if stack:
                 start = stack.pop()[0]
@@ -159,7 +199,8 @@ def _stretches(source: Source, n: int, forget: Bools, entered: Bools) -> list[tu
             else:
                 at = [note.block, *(end for end in ends if end is not None)]
                 found.append((min(at), max([note.block + 1, *at])))
-                entered[at[1:]] = True
+                if entered is not None:
+                    entered[at[1:]] = True
     if stack:
         found.append((stack[0][0], n))
     return found

@@ -6,7 +6,7 @@ import math
 import re
 
 from postproc.languages.gcode.control import LexedLine
-from postproc.languages.gcode.words import How
+from postproc.languages.gcode.words import How, value_note
 
 _NUMBER = rb"[-+]?[ \t]*(?:\d[\d \t]*(?:\.[\d \t]*)?|\.[ \t]*\d[\d \t]*)"
 _TOKEN = re.compile(
@@ -75,7 +75,11 @@ def line(text: bytes) -> LexedLine:
         return LexedLine(words, notes, deleted)
     flow = _FLOW.match(text, place)
     if flow is not None:
-        note(_FLOW_WORDS.get(flow[2].upper(), "unknown"), flow[1])
+        label, word = flow[1].upper().translate(None, b" \t"), flow[2].upper()
+        note(
+            _FLOW_WORDS.get(word, "unknown"),
+            (label + b" " + word + b" " + text[flow.end() :].strip()).strip(),
+        )
         return LexedLine(words, notes, deleted)
     while place < len(text):
         found = _TOKEN.match(text, place)
@@ -100,6 +104,7 @@ def line(text: bytes) -> LexedLine:
             place = _expression(text, found.start("open"))
             at = found.start("letter")
             letter = ord(found["letter"].upper())
+            note("value", value_note(words, letter, How.NUMBER, text[start:place]))
             words.append((at, letter, start, place, math.nan, How.UNREAD))
         elif kind == "slash":
             deleted = True
@@ -114,11 +119,11 @@ def line(text: bytes) -> LexedLine:
                 note("unknown", text[found.start() :].strip())
                 break
         elif kind == "assign":
-            target, end = _TARGET.match(text, found.start()), _assignment_end(text, found.start())
+            end = _assignment_end(text, found.start())
             if end is None:
                 note("unknown", text[found.start() :].strip())
                 break
-            note("assign", (target and target[1]) or b"")
+            note("assign", text[found.start() : end].strip())
             place = end
         elif kind == "corner":
             note("corner", text[found.start() :].strip())
@@ -133,15 +138,16 @@ def line(text: bytes) -> LexedLine:
                 and not text[then.end() :].upper().startswith(b"GOTO")
             ):
                 deleted, place = True, then.end()  # what follows runs where the condition holds
+                note("if", text[found.end() : then.end()].strip()[: -len(b"THEN")])
                 continue
             if then is not None and then.end() == len(text):
-                note("open", b"IF")
+                note("open", b"IF " + text[found.end() : then.end()].strip()[: -len(b"THEN")])
             elif word in (b"ELSE", b"ENDIF"):
                 note("between" if word == b"ELSE" else "close", word)
             elif word in _JUMPS:
                 note("jump", text[found.start() :].strip())
             elif word in (b"WHILE", b"DO", b"END"):
-                note("close" if word == b"END" else "open", b"")
+                note("close" if word == b"END" else "open", text[found.start() :].strip().upper())
             else:
                 note("unknown", text[found.start() :].strip())
             break

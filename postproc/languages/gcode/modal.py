@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.languages.gcode.control import UNKNOWN, Control, Group, ModalCode, Move, Once
+from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason, follow
 from postproc.languages.gcode.modal_fill import fill_modal, switched
 from postproc.languages.gcode.source import Source, WordColumn
@@ -107,8 +108,9 @@ class Modal:
         )
 
 
-def modal(source: Source, control: Control) -> Modal:
-    """The state at every block of a program."""
+def modal(execution: Execution, control: Control, base: int | None = None) -> Modal:
+    """The state at every block of a program; ``base``: number of the work offset at its start, if that is stated."""
+    source = execution.source
     n = len(source.blocks)
     codes = source.column(key("G"))
     blocks = codes.block
@@ -131,10 +133,10 @@ def modal(source: Source, control: Control) -> Modal:
     odd = odd[np.append(blocks[odd][1:] != blocks[odd][:-1], True)[: len(odd)]]
     strange = WordColumn(blocks[odd], codes.value[odd], codes.how[odd])
 
-    flow = follow(source, control, once)
+    flow = follow(execution, control, once)
     groups, values = _offsets(source, number, groups, values, blocks)
     groups, values = _polar_or_offset(flow, number, groups, values, blocks)
-    start = {**_START, **control.start}
+    start = {**_START, **control.start, **({} if base is None else {Group.OFFSET: base})}
     force: dict[Group, Ints] = {}
     for one in Group:
         if one in (Group.ONCE, Group.NONE):
@@ -178,24 +180,27 @@ def _unused(
     number: Ints,
     force: Mapping[Group, Ints],
 ) -> Bools:
-    """(B,) blocks with a word that nothing in them uses; of controls of ISO code only."""
+    """(B,) blocks with a word that nothing in them uses; of a control that is not of ISO code only those of arcs."""
     n = len(source.blocks)
     unused = np.zeros(n, np.bool_)
-    if not control.iso:
+    if control.expressions is None:
         return unused
+    letters = "IJKPQLR" if control.iso else "IJKR"
+    # P gives the turns of an arc of some controls only.
+    straight = "LQ" if control.turns[0] == key("P") else "LQP"
     using = np.zeros(n, np.bool_)  # a code that is free to have any word
     using[blocks[~np.isin(groups, _PLAIN)]] = True
     using |= source.mask(key("M")) | force[Group.MACRO].astype(bool) | force[Group.FOREIGN].astype(bool)
     move = force[Group.MOTION]
     using |= ~np.isin(move, (*_WORDLESS, *_CURVED))
     curved = np.isin(move, _CURVED)
-    for letter in "IJKPQLR":
+    for letter in letters:
         has = source.mask(key(letter))
         if not has.any():
             continue
         own = np.zeros(n, np.bool_)
         own[blocks[np.isin(number, _OWN.get(letter, ()))]] = True
-        unused |= has & ~using & ~own & ~(curved & (letter not in "LQ"))
+        unused |= has & ~using & ~own & ~(curved & (letter not in straight))
     return unused
 
 
@@ -291,7 +296,7 @@ class _Fill:
     def __init__(self, flow: ExecutionFlow, start: int, group: Group) -> None:
         self._flow, self._start = flow, start
         self._type = np.int32 if group == Group.OFFSET else np.int8
-        self._forget = np.flatnonzero(flow.forget) if group in _FORGOTTEN else np.empty(0, np.int64)
+        self._forget = np.flatnonzero(flow.forget if group in _FORGOTTEN else flow.restored)
 
     def __call__(self, at: Ints, value: Ints) -> Ints:
         n = len(self._flow.reason)

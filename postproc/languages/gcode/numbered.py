@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Ints
-from postproc.base.geometry import Poses
-from postproc.languages.gcode.blocks import BlockWords
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.geometry import Poses, rotation_from_abc
+from postproc.base.units import DEG
+from postproc.languages.gcode.blocks import AXES, BlockWords
 from postproc.languages.gcode.control import Group, Once
 from postproc.languages.gcode.execution_flow import FlowReason
 from postproc.languages.gcode.modal_fill import everywhere, fill_modal, switched
@@ -20,68 +22,150 @@ LENGTH_CODES = (43.0, 43.4, 43.5, 234.0)
 SYSTEM = ((5201, 5400), (7001, 7999), (14001, 20000))
 """Variables that are work offsets: of Fanuc and Haas (7001, 14001: G54.1 Pn), 5211 to 5400 of LinuxCNC."""
 
+_TARGET = re.compile(r"#[ \t]*+(\d++|<)?")
+
+
+STATED = 1 << 28
+"""Numbers from here on are those of work offsets that the program itself states, in ``WorkOffsets.stated``."""
+
 
 @dataclass(frozen=True, eq=False)
-class Spoiled:
-    """Offsets that the program itself writes: the cell's base of that number holds no longer.
+class StatedOffset:
+    """A work offset as G10 L2 sets it: its number, and where it is in the coordinates of the machine."""
 
-    at (B,): blocks before which the offset in force changed; bad (B,): blocks whose offset is not the cell's.
-    """
-
-    at: Bools
-    bad: Bools
+    number: int
+    pose: Poses
 
 
-def spoiled(given: BlockWords) -> Spoiled:
-    """G10 L2, G10 L20, and variables that are offsets."""
-    n = len(given)
-    base = given.modal.force[Group.OFFSET]
-    events: list[tuple[int, int | None]] = []  # block, number of the base or None for all
+@dataclass(frozen=True, eq=False)
+class WorkOffsets:
+    """base (B,): number of the work offset in force; that of the cell, STATED and more of one in ``stated``, -1
+    where it is not known.  changed (B,): blocks before which the offset in force became another one."""
+
+    base: Ints
+    changed: Bools
+    stated: tuple[StatedOffset, ...]
+
+
+def work_offsets(given: BlockWords) -> WorkOffsets:
+    """The cell's offsets, with those that the program writes by G10 L2 and L20, or by variables that are offsets."""
+    n, base = len(given), given.modal.force[Group.OFFSET]
+    events = _offset_events(given)
+    if not events:
+        return WorkOffsets(base, everywhere(False, n), ())
+    changed = np.zeros(n + 1, np.bool_)
+    result = np.array(base)
+    stated: list[StatedOffset] = []
+    written: dict[int, Floats] = {}
+    blocks = [block for block, _, _ in events]
+    for (block, number, values), stop in zip(events, [*blocks[1:], n - 1], strict=True):
+        changed[block + 1] |= number is None or number == base[block]
+        if number is None:
+            written = _AllUnknown()
+        else:
+            before = written.get(number, np.full(4, np.nan))
+            written[number] = (
+                np.where(np.isnan(values), before, values) if values is not None else np.full(4, np.nan)
+            )
+        rows = slice(block + 1, stop + 1)
+        here = base[rows]
+        for one in np.unique(here).tolist():
+            if one not in written and not isinstance(written, _AllUnknown):
+                continue
+            result[rows][here == one] = _stated(one, written.get(one, _NOWHERE), stated)
+    return WorkOffsets(result, changed[:n], tuple(stated))
+
+
+class _AllUnknown(dict[int, Floats]):
+    """No offset is the cell's any longer."""
+
+
+_NOWHERE = np.full(4, np.nan)
+MOST_STATED = 1000
+"""Offsets that a program states; what more it writes is not known."""
+
+
+def _stated(number: int, values: Floats, stated: list[StatedOffset]) -> int:
+    """The number of a work offset with ``values`` (4,) X, Y, Z [m] and the angle [rad] about Z, -1 where unknown."""
+    if np.isnan(values).any() or number < 0:
+        return -1
+    pose = Poses(rotation_from_abc(np.array([values[3], 0.0, 0.0])), values[:3])
+    for index, one in enumerate(stated):
+        same = np.array_equal(one.pose.position, values[:3]) and np.array_equal(
+            one.pose.rotation, pose.rotation
+        )
+        if one.number == number and same:
+            return STATED + index
+    if len(stated) == MOST_STATED:
+        return -1
+    stated.append(StatedOffset(number, pose))
+    return STATED + len(stated) - 1
+
+
+def _offset_events(given: BlockWords) -> list[tuple[int, int | None, Floats | None]]:
+    """Blocks that write an offset, its number or None for all, and its X, Y, Z [m] and angle [rad], NaN where they
+    stay; None where they are not known."""
+    base, fanuc = given.modal.force[Group.OFFSET], given.control.increments
+    events: list[tuple[int, int | None, Floats | None]] = []
     settings = np.flatnonzero(given.modal.has(Once.SETTING))
     if len(settings):
-        kind, which = given.number(key("L"))[settings], given.number(key("P"))[settings]
-        has = given.has(key("L"))[settings]
-        for block, level, number, stated in zip(
-            settings.tolist(), kind.tolist(), which.tolist(), has.tolist(), strict=True
-        ):
-            if level in (2, 20):
-                events.append((block, None if np.isnan(number) else int(number) or int(base[block])))
-            elif stated and np.isnan(level):
-                events.append((block, None))
+        level, which = given.number(key("L")), given.number(key("P"))
+        values = np.stack([*(given.lengths(one) for one in AXES[:3]), given.number(key("R")) * DEG], axis=1)
+        read = (
+            (given.modal.flow.reason == FlowReason.NONE)
+            & ~given.has(*AXES[3:])
+            & ~given.unclear
+            & ~given.twice
+        )
+        if fanuc:  # in G91 the values are added
+            read &= (given.modal.force[Group.DISTANCE] == 0) & ~given.has(key("R"))
+        present = np.stack([given.has(one) for one in (*AXES[:3], key("R"))], axis=1)
+        read &= ~(present & np.isnan(values)).any(axis=1)
+        # An angle that no block states is that of the cell: none.
+        turned = present[settings, 3].any()
+        angle = np.where(present[:, 3] | fanuc | (not turned), np.nan_to_num(values[:, 3]), np.nan)
+        values = np.concatenate([values[:, :3], angle[:, None]], axis=1)
+        has = given.has(key("L"))
+        for block in settings.tolist():
+            kind, number = level[block], which[block]
+            if kind not in (2, 20):
+                if has[block] and np.isnan(kind):
+                    events.append((block, None, None))
+                continue
+            if np.isnan(number):
+                events.append((block, None, None))
+                continue
+            if fanuc and kind == 2 and number == 0:
+                # The external offset moves all others.
+                if not (read[block] and not np.nan_to_num(values[block]).any()):
+                    events.append((block, None, None))
+                continue
+            if fanuc and kind == 20:
+                number, kind = 100 + number, 2
+            chosen = int(number) or int(base[block])
+            events.append((block, chosen, values[block] if kind == 2 and read[block] else None))
     for note in given.source.notes:
         assigned = note.kind == "assign" and _is_offset(note.text)
         if assigned or (note.kind == "unknown" and note.text.startswith("#")):
-            events.append((note.block, None))
-    if not events:
-        no = everywhere(False, n)
-        return Spoiled(no, no)
-    at = np.zeros(n + 1, np.bool_)
-    first: dict[int | None, int] = {}
-    for block, number in sorted(events, key=lambda event: event[0]):
-        first.setdefault(number, block)
-        at[block + 1] |= number is None or number == base[block]
-    written = {number: block for number, block in first.items() if number is not None}
-    numbers, blocks = np.array(sorted(written)), np.array([written[number] for number in sorted(written)])
-    # From where on the base in force is not the cell's: the first change of its own number, or of all.
-    since = np.full(n, first.get(None, n))
-    if len(numbers):
-        own = np.minimum(np.searchsorted(numbers, base), len(numbers) - 1)
-        since = np.where(numbers[own] == base, np.minimum(since, blocks[own]), since)
-    return Spoiled(at[:n], np.arange(n) > since)
+            events.append((note.block, None, None))
+    return sorted(events, key=lambda event: event[0])
 
 
-def _is_offset(text: str) -> bool:
-    if not text.isdigit():
-        return not text.startswith("<")
-    return any(low <= int(text[:9]) <= high for low, high in SYSTEM)
+def _is_offset(assignment: str) -> bool:
+    """Whether an assignment may write a work offset: to a variable that is one, or to one that is computed."""
+    target = _TARGET.match(assignment)
+    if target is None or target[1] is None:
+        return target is not None
+    return target[1].isdigit() and any(low <= int(target[1][:9]) <= high for low, high in SYSTEM)
 
 
-def tools(given: BlockWords) -> tuple[Ints, bool]:
+def tools(given: BlockWords, loaded: int | None = None) -> tuple[Ints, bool]:
     """(B,) number of the tool in force, -1 where it cannot be determined; whether the program names any.
 
     T loads a tool at once, or with M6 in programs that have an M6.  T0 without M6 loads nothing.  A program without a
-    tool works with number 1.
+    tool, or with T0 alone, works with number 1.  ``loaded``: the tool at the start of the program, if that is stated.
     """
+    first = -1 if loaded is None else loaded
     n, column, m = len(given), given.words(key("T")), given.words(key("M"))
     changes = m.block[m.value == TOOL_CHANGE]
     tape, sure = given.modal.flow.tape, given.modal.flow.reason == FlowReason.NONE
@@ -89,14 +173,14 @@ def tools(given: BlockWords) -> tuple[Ints, bool]:
     # The last T of a block counts.
     counts = np.append(column.block[1:] != column.block[:-1], True)[: len(column)] & tape[column.block]
     named = np.flatnonzero(counts & ((column.value != 0) | (len(changes) > 0)))
-    if not len(named):
-        return everywhere(1, n, np.int32), False
+    if not (column.value[named] != 0).any():
+        return everywhere(1 if loaded is None else loaded, n, np.int32), loaded is not None
     block, number = column.block[named], column.value[named]
     whole = (number > 0) & (number == np.floor(number)) & sure[block] & (number < 1e9)
-    chosen = fill_modal(n, block, np.where(whole, number, -1).astype(np.int32), -1, np.int32)
+    chosen = fill_modal(n, block, np.where(whole, number, -1).astype(np.int32), first, np.int32)
     if not len(changes):
         return chosen, True
-    return fill_modal(n, changes, np.where(sure[changes], chosen[changes], -1), -1, np.int32), True
+    return fill_modal(n, changes, np.where(sure[changes], chosen[changes], -1), first, np.int32), True
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +204,9 @@ def tool_lengths(given: BlockWords, tool: Ints) -> ToolLengths:
         at = np.flatnonzero(stated & (force == 1))
         number = given.number(key("H"))[at]
         number = np.where(np.isnan(number), tool[at], number)
-        changes[at[1:][number[1:] != number[:-1]]] = True
+        # Stated again in the other unit, LinuxCNC moves the coordinates by the length in both.
+        units = given.modal.force[Group.UNITS][at]
+        changes[at[1:][(number[1:] != number[:-1]) | (units[1:] != units[:-1])]] = True
         off &= np.maximum.accumulate(force == 1)
     else:
         off = everywhere(False, n)
@@ -135,9 +221,11 @@ def tool_lengths(given: BlockWords, tool: Ints) -> ToolLengths:
     return ToolLengths(changes, off)
 
 
-def references(base: Ints, tool: Ints, line: Ints) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
+def references(
+    base: Ints, tool: Ints, line: Ints, stated: tuple[StatedOffset, ...] = ()
+) -> tuple[Ints, Ints, tuple[FrameRef, ...]]:
     """Indices (N,) of bases and (N,) of tools in the frames of a toolpath, of ``base``, ``tool`` and ``line`` (N,), -1
-    where unknown, and these frames."""
+    where unknown, and these frames; stated: see ``WorkOffsets``."""
     frames: list[FrameRef] = []
     columns = []
     for numbers in (base, tool):
@@ -149,6 +237,9 @@ def references(base: Ints, tool: Ints, line: Ints) -> tuple[Ints, Ints, tuple[Fr
                 index[i] = len(frames)
                 # Base 0 is no offset (G500): the control's own coordinates.
                 pose = Poses.identity() if numbers is base and name == 0 else None
+                if numbers is base and name >= STATED:
+                    frames.append(FrameRef(None, stated[name - STATED].pose, int(line[starts[first[i]]])))
+                    continue
                 frames.append(FrameRef(name, pose, int(line[starts[first[i]]])))
         if len(names) == 1:
             columns.append(everywhere(index[0], len(numbers)))

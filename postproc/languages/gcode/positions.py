@@ -64,12 +64,15 @@ class Trace:
         first: ProgrammedFrame,
         events: Ints,
         change: Callable[[int, ProgrammedFrame, Floats], ProgrammedFrame],
+        here: Floats | None = None,
     ) -> None:
-        """events (E,): blocks that change the frame (and move nothing), ascending; ``change`` (block, frame, position
+        """here (6,) [m, rad]: where the axes are at the first block, NaN where that is not known, as without;
+        events (E,): blocks that change the frame (and move nothing), ascending; ``change`` (block, frame, position
         in the base) gives the frame after one."""
         self._events, self._change = events[:MOST], change
         self.frames = [first]
-        self._here, self._origin = np.full(6, np.nan), np.full(6, -1)
+        self._here = np.full(6, np.nan) if here is None else here
+        self._origin = np.full(6, -1)
 
     def frame_of(self, blocks: Ints) -> Ints:
         """Rows (K,) in ``frames`` of blocks (K,) that were followed."""

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.document import Document
+from postproc.base.findings import Finding
 from postproc.base.geometry import Poses, rotation_from_abc
-from postproc.base.units import MM
+from postproc.base.units import DEG, MM
 from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
 from postproc.languages.gcode.arcs import ArcGeometry, arcs, through
@@ -29,9 +30,10 @@ from postproc.languages.gcode.blocks import (
 )
 from postproc.languages.gcode.comments import remarks
 from postproc.languages.gcode.control import Control, Event, Feed, Group, Move, Once, ProgrammedFrame
-from postproc.languages.gcode.correctability import Built, check_correctability, locked_rows
+from postproc.languages.gcode.correctability import Built, bind_names, check_correctability, locked_rows
 from postproc.languages.gcode.cycle_ends import cycle_ends
 from postproc.languages.gcode.diagnostics import diagnostics
+from postproc.languages.gcode.execution import FoldedWords, execute
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds, feeds_before_units
 from postproc.languages.gcode.integer_words import integer_words
@@ -39,12 +41,12 @@ from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.modal import modal
 from postproc.languages.gcode.modal_fill import FilledRows, everywhere
 from postproc.languages.gcode.motions import GcodeMotions
-from postproc.languages.gcode.numbered import Spoiled, references, spoiled, tool_lengths, tools
+from postproc.languages.gcode.numbered import WorkOffsets, references, tool_lengths, tools, work_offsets
 from postproc.languages.gcode.orientation_words import OrientationWords
 from postproc.languages.gcode.positions import Positions, Trace
 from postproc.languages.gcode.refusals import RefusalCollector
 from postproc.languages.gcode.source import scan
-from postproc.languages.gcode.source_map import STATE, GcodeSourceMap
+from postproc.languages.gcode.source_map import STATE, FoldedNumbers, GcodeSourceMap
 from postproc.languages.gcode.tool_orientation import ToolOrientations
 from postproc.languages.gcode.words import How, Note, key
 from postproc.toolpath import Arcs, EditConstraints, Kind, OrientationControl, Toolpath
@@ -56,16 +58,37 @@ PART = 1 << 14
 def read(documents: tuple[Document, ...], control: Control, settings: ReadingSettings = PLAIN) -> Program:
     """Read a program; never raises on its content."""
     document = documents[0]
-    source = scan(document.raw, control)
-    integers = integer_words(source, control, settings.integer_words)
-    given = blocks(source, modal(source, control), control, integers)
+    text = scan(document.raw, control)
+    integers = integer_words(text, control, settings.integer_words)
+    execution = execute(text, control, settings.symbols)
+    source = execution.source
+    given = blocks(source, modal(execution, control, settings.initial.base), control, integers)
     rows = np.flatnonzero(given.motion).astype(np.int32)
-    offset = spoiled(given)
-    base = given.modal.force[Group.OFFSET]
-    base = (np.where(offset.bad, -1, base) if offset.bad.any() else base)[rows]
-    tool, named = tools(given)
-    collector = RefusalCollector(len(rows))
-    found, built, frames, orientations = _followed(given, rows, offset, base, tool, settings, collector)
+    offset = work_offsets(given)
+    base = offset.base[rows]
+    tool, named = tools(given, settings.initial.tool)
+    folded_codes = np.isin(execution.folded.key, (key("G"), key("M")))
+    computed = np.isin(rows, execution.folded.step[folded_codes])
+    unbound = bind_names(execution)
+
+    def followed(given: BlockWords) -> FollowedMotions:
+        collector = RefusalCollector(len(rows))
+        collector.refuse(computed, "GCO005", "a G or M code of the block is computed")
+        return _followed(given, rows, offset, base, tool, settings, unbound, collector)
+
+    run, coordinates = followed(given), False
+    if run.differing_radii and control.iso and given.modal.ahead[Group.ARCS] == 0:
+        # Centres that no code says to be differences may be coordinates: where all arcs are some only so.
+        other = given.with_absolute_centres()
+        if other is not None and not (again := followed(other)).differing_radii:
+            given, run, coordinates = other, again, True
+    found, built, frames, orientations, collector = (
+        run.columns,
+        run.built,
+        run.frames,
+        run.orientations,
+        run.collector,
+    )
     lines = source.blocks
     line, start = lines.line[rows], lines.start[rows]
     external = external_axes(given, rows)
@@ -74,8 +97,8 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         message = f"an axis that is none of X, Y, Z, E1 to E6 and the rotary ones moves (line {where})"
         collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message)
     refused = collector.done(document, line, start, lines.first[rows])
-    frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line)
-    said = remarks(document, source, line)
+    frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line, offset.stated)
+    said = remarks(document, source, rows, execution.order is None)
     state = {name: found.taken(name) for name in STATE}
     timed = state["feed_mode"] == Feed.INVERSE_TIME
     path = Toolpath(
@@ -90,7 +113,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         frames=cell_frames,
         constraints=EditConstraints(
             refused=refused,
-            locked=locked_rows(document, given, built, collector),
+            locked=locked_rows(document, given, built, collector, execution),
             no_insert_before={**moves_external(external), **_whole(given, rows)},
             orientation_programmed=found.taken("orientation_programmed"),
             exact_stays=True,
@@ -108,6 +131,12 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         external=external,
     )
     findings = [*refused.findings(), *diagnostics(document, given, rows, tool, named, settings)]
+    if coordinates:
+        message = "I J K are read as coordinates: only so the radii of the arcs agree"
+        arc = np.flatnonzero(built.kind == Kind.CIRC)[:1]
+        findings += [
+            Finding("GCO031", message, str(document.path), int(line[row]), 1) for row in arc.tolist()
+        ]
     return Program(
         control.name,
         documents,
@@ -120,6 +149,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
             stop=lines.stop[rows],
             frames=frames,
             orientations=orientations,
+            folded=_folded(execution.folded, rows),
         ),
         tuple(sorted(findings, key=lambda finding: finding.line)),
         said.marker,
@@ -128,22 +158,47 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     )
 
 
+def _start(settings: ReadingSettings) -> Floats:
+    """(6,) [m, rad] where the axes are at the first block, NaN where that is not stated."""
+    words = settings.initial.words
+    stated = np.array([words.get(axis, math.nan) for axis in "XYZABC"])
+    return np.asarray(stated * np.repeat([MM, DEG], 3))
+
+
+def _folded(words: FoldedWords, rows: Ints) -> FoldedNumbers:
+    """The words with values of expressions in the motions, which are the blocks ``rows`` (N,)."""
+    at = np.searchsorted(rows, words.step)
+    mine = np.append(rows, -1)[at] == words.step
+    order = np.argsort(at[mine], kind="stable")
+    return FoldedNumbers(*(column[mine][order] for column in (at, words.key, words.value)))
+
+
+class FollowedMotions(NamedTuple):
+    """The motions' columns, what others build on, the frames of the program, what its orientation words mean, and why
+    motions are refused; differing_radii: arcs whose radii at start and end differ."""
+
+    columns: FilledRows
+    built: Built
+    frames: Poses
+    orientations: tuple[OrientationWords, ...]
+    collector: RefusalCollector
+    differing_radii: int
+
+
 def _followed(
     given: BlockWords,
     rows: Ints,
-    offset: Spoiled,
+    offset: WorkOffsets,
     base: Ints,
     tool: Ints,
     settings: ReadingSettings,
+    unbound: str,
     collector: RefusalCollector,
-) -> tuple[FilledRows, Built, Poses, tuple[OrientationWords, ...]]:
-    """The motions in the blocks ``rows`` (N,), part by part; base (N,), tool (B,): numbers.
-
-    Gives their columns, what others build on, the frames of the program and what its orientation words mean.
-    """
+) -> FollowedMotions:
+    """The motions in the blocks ``rows`` (N,), part by part; base (N,), tool (B,): numbers."""
     turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
     events = _events(given)
-    trace = Trace(offsets.start(), events, _change(given, events))
+    trace = Trace(offsets.start(), events, _change(given, events), _start(settings))
     feeds, stands, away, reasons = (
         Feeds(given),
         ToolOrientations(given, turned),
@@ -151,15 +206,16 @@ def _followed(
         Reasons(len(given)),
     )
     allowed = _allowed(given)
-    ends, lengths = cycle_ends(given, events), tool_lengths(given, tool)
-    found = FilledRows(len(rows))
+    lengths = tool_lengths(given, tool)
+    ends = cycle_ends(given, events, lengths.changes)
+    found, differing = FilledRows(len(rows)), 0
     for start in range(0, max(len(given), 1), PART):
         stop = min(start + PART, len(given))
         low, high = np.searchsorted(rows, [start, stop]).tolist()
         here, own = given.part(start, stop), rows[low:high] - start
         way = frame_events(
             here,
-            offset.at[start:stop],
+            offset.changed[start:stop],
             away[start:stop],
             ends.level[start:stop],
             lengths.changes[start:stop],
@@ -167,10 +223,11 @@ def _followed(
         )
         where = trace.follow(way, start)
         moves = _motions(here, where, trace, own, stands)
+        differing += int((moves.arcs.wrong == 3).sum())
         part = collector.part(slice(low, high))
         cutting = np.isin(moves.kind, (Kind.LIN, Kind.CIRC)) & lengths.off[rows[low:high]]
         part.refuse(cutting, "GCO029", "the program has switched the tool's length off")
-        check_correctability(here, moves, where, base[low:high], tool[rows[low:high]], reasons, part)
+        check_correctability(here, moves, where, base[low:high], tool[rows[low:high]], reasons, unbound, part)
         found.put(
             high - low,
             **_columns(here, where, moves, feeds),
@@ -183,7 +240,7 @@ def _followed(
         np.array([frame.turn for frame in trace.frames]),
         np.array([frame.shift[:3] for frame in trace.frames]),
     )
-    return found, built, frames, tuple(stands.orientations)
+    return FollowedMotions(found, built, frames, tuple(stands.orientations), collector, differing)
 
 
 def _columns(

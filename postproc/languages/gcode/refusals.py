@@ -13,11 +13,12 @@ from postproc.base.findings import Finding
 
 
 class RefusalReason(NamedTuple):
-    """Reasons of one code and ``cause`` are reported together."""
+    """Reasons of one code and ``cause`` are reported together; help: what to do, "" for what the code says."""
 
     code: str
     message: str
     cause: str
+    help: str = ""
 
 
 class Refusals(Mapping[int, Finding]):
@@ -52,8 +53,9 @@ class Refusals(Mapping[int, Finding]):
         return at if at < len(self._rows) and self._rows[at] == row else -1
 
     def _finding(self, at: int, message: str) -> Finding:
-        code = self._reasons[self._reason[at]].code
-        return Finding(code, message, self._file, int(self._line[at]), int(self._column[at]))
+        reason = self._reasons[self._reason[at]]
+        line, column = int(self._line[at]), int(self._column[at])
+        return Finding(reason.code, message, self._file, line, column, reason.help)
 
     def findings(self) -> list[Finding]:
         """The refusals, those of one code and cause as one finding, by their first line."""
@@ -63,9 +65,10 @@ class Refusals(Mapping[int, Finding]):
             return []
         group = np.array(number)[self._reason]
         findings = []
-        _, first, count = np.unique(group, return_index=True, return_counts=True)
-        last = len(group) - 1 - np.unique(group[::-1], return_index=True)[1]
-        for at, many, end in sorted(zip(first.tolist(), count.tolist(), last.tolist(), strict=True)):
+        order = np.lexsort((self._line, group))
+        _, first, count = np.unique(group[order], return_index=True, return_counts=True)
+        ends = order[first + count - 1].tolist()
+        for at, many, end in sorted(zip(order[first].tolist(), count.tolist(), ends, strict=True)):
             message = self._reasons[self._reason[at]].message
             if many > 1:
                 message += f"; {many} motions, lines {self._line[at]} to {self._line[end]}"
@@ -93,14 +96,14 @@ class RefusalCollector:
             self.reasons.append(reason)
         return self._number[reason]
 
-    def refuse(self, rows: Bools, code: str, message: str, cause: str = "") -> None:
+    def refuse(self, rows: Bools, code: str, message: str, help: str = "") -> None:
         """Refuses the motions of the mask ``rows`` (N,) that are not refused yet."""
         if rows.any():
-            self.why[rows & (self.why < 0)] = self._reason(RefusalReason(code, message, cause or message))
+            self.why[rows & (self.why < 0)] = self._reason(RefusalReason(code, message, message, help))
 
-    def refuse_each(self, rows: Ints, messages: list[tuple[str, str, str]], which: Ints) -> None:
-        """Refuses ``rows`` (K,) for the reasons (code, message, cause) of number ``which`` (K,)."""
-        numbers = np.array([self._reason(RefusalReason(*message)) for message in messages])
+    def refuse_each(self, rows: Ints, reasons: list[RefusalReason], which: Ints) -> None:
+        """Refuses ``rows`` (K,) for the reasons of number ``which`` (K,)."""
+        numbers = np.array([self._reason(reason) for reason in reasons])
         open_ = self.why[rows] < 0
         self.why[rows[open_]] = numbers[which[open_]]
 

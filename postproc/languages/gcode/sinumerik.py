@@ -10,6 +10,7 @@ import numpy as np
 
 from postproc.base.geometry import rotation_from_abc, rotation_from_vector
 from postproc.base.units import DEG
+from postproc.languages.gcode import expression_values
 from postproc.languages.gcode.control import (
     Control,
     Event,
@@ -20,7 +21,9 @@ from postproc.languages.gcode.control import (
     Once,
     ProgrammedFrame,
 )
-from postproc.languages.gcode.sinumerik_lines import RPL, TURN, SinumerikLines
+from postproc.languages.gcode.offsets import start
+from postproc.languages.gcode.sinumerik_expression import constant
+from postproc.languages.gcode.sinumerik_lines import RETRACT, RPL, TURN, SinumerikLines
 from postproc.languages.gcode.words import key
 
 COMMENT = rb'("[^"\r\n]*"?)|;[^\r\n]*'
@@ -103,6 +106,7 @@ _NAMED: tuple[tuple[Group, int, str], ...] = (
     (Group.DIAMETER, 1, "DIAMON DIAM90 DIAMCYCOF"),
     (Group.DIAMETER, 0, "DIAMOF"),
     (Group.MACRO, 1, "MCALL()"),
+    (Group.MACRO, 2, "MCALL(CYCLE)"),
     (Group.MACRO, 0, "MCALL_OFF"),
     (Group.ONCE, Once.MACHINE, "SUPA G53"),
     (Group.ONCE, Once.PROBE, "MEAS MEAW MEASA MEAWA MEAC"),
@@ -111,7 +115,7 @@ _NAMED: tuple[tuple[Group, int, str], ...] = (
         Group.ONCE,
         Once.FRAME,
         "TRANS ATRANS ROT AROT ROTS AROTS SCALE ASCALE MIRROR AMIRROR TOFRAME TOFRAMEX TOFRAMEY TOFRAMEZ TOROT TOROTX "
-        "TOROTY TOROTZ TOROTOF PAROT PAROTOF",
+        "TOROTY TOROTZ TOROTOF PAROT PAROTOF CYCLE800",
     ),
     (
         Group.NONE,
@@ -147,24 +151,31 @@ CODES: Mapping[int, ModalCode] = {
 
 _FRAMES = {
     NAMED[name.encode()][0]: name
-    for name in ("TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR", "AMIRROR")
+    for name in ("TRANS", "ATRANS", "ROT", "AROT", "SCALE", "ASCALE", "MIRROR", "AMIRROR", "CYCLE800")
 }
 _AXES = tuple(key(letter) for letter in "XYZABC")
 _NORMAL = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 def frame(event: Event) -> ProgrammedFrame:
-    """The programmable frame behind TRANS, ROT ...: absolute ones take the place of the whole frame, A... ones go on
-    from it.  ROT X Y Z turns about Z, the new Y, the new X; RPL= about the axis normal to the plane.  Scales, mirrors
-    and frames that come from the machine are not read: where they are in force the place is not known.
-    """
+    """The programmable frame behind TRANS, ROT ...: absolute ones take the place of the whole frame, A... ones go
+    on from it.  ROT X Y Z turns about Z, the new Y, the new X; RPL= about the axis normal to the plane.  CYCLE800
+    without a plane leaves no frame.  Scales, mirrors and frames that come from the machine are not read: where they
+    are in force the place is not known."""
     unknown = ProgrammedFrame(np.eye(3), np.full(6, np.nan))
     said = [_FRAMES[code] for code in event.codes if code in _FRAMES]
     if len(said) != 1:
         return unknown
     name = said[0]
-    base = event.frame if name.startswith("A") else ProgrammedFrame(np.eye(3), np.zeros(6))
+    if name == "CYCLE800":
+        return _swivelled(event)
+    unknown = replace(unknown, memory=event.frame.memory)
+    base = event.frame
+    if not name.startswith("A"):
+        base = ProgrammedFrame(np.eye(3), np.zeros(6), event.frame.memory)
     given = np.array([event.words.get(axis, 0.0) for axis in _AXES])
+    if event.frame.memory == _SWIVELLED:
+        return unknown
     if not (set(_AXES) | {RPL}) & set(event.words):
         return base
     if name.endswith("TRANS"):
@@ -179,6 +190,22 @@ def frame(event: Event) -> ProgrammedFrame:
     if not np.isfinite(turn).all():
         return unknown
     return replace(base, turn=base.turn @ turn)
+
+
+_SWIVELLED = "swivelled"
+
+
+def _swivelled(event: Event) -> ProgrammedFrame:
+    """After CYCLE800: shifts and angles (arguments 5 to 13) that are all 0 bring the rotary axes back and leave no
+    frame; without arguments the axes stay where they are, so that a plane that was swivelled is not undone."""
+    text = next((note.text for note in event.notes if note.kind == "swivel"), "?")
+    arguments = [part.strip() for part in text.strip("() \t").split(",")]
+    values = [constant(part.encode()) for part in arguments[4:13] if part]
+    if len(arguments) > 12 and not any(value != 0 for value in values):
+        return start()
+    if arguments == [""] and event.frame.memory != _SWIVELLED:
+        return start()
+    return ProgrammedFrame(np.eye(3), np.full(6, np.nan), _SWIVELLED)
 
 
 EULER, VECTOR = (tuple(key(letter, index) for letter in "ABC") for index in (2, 3))
@@ -198,14 +225,17 @@ CONTROL = Control(
     endings=frozenset((2, 17, 30)),
     turns=(TURN, 0),
     frame=frame,
-    columns=(RPL, TURN, *(key(letter, 1) for letter in "IJK"), *EULER, *VECTOR),
+    columns=(RPL, TURN, RETRACT, *(key(letter, 1) for letter in "IJK"), *EULER, *VECTOR),
     angles=((0, 0), (1, 1), (2, 2)),
     whole=True,
     vector=VECTOR,
     euler=EULER,
     calls=frozenset((key("L"),)),
+    retract=RETRACT,
+    parameter="R",
     further=True,
     offsets=key("D"),
+    expressions=expression_values.SINUMERIK,
 )
 """Sinumerik 840D, its own language (G290)."""
 

@@ -14,9 +14,10 @@ from postproc.languages.gcode.sinumerik_expression import (
     expression_end,
     is_open,
 )
-from postproc.languages.gcode.words import NAMES, How, key
+from postproc.languages.gcode.words import NAMES, How, key, value_note
 
-TURN, RPL = NAMES, NAMES + 1
+TURN, RPL, RETRACT = NAMES, NAMES + 1, NAMES + 2
+"""Keys of TURN=, of RPL=, and of the plane to which a drilling cycle retracts, its first argument."""
 NAMED_WORDS: Mapping[bytes, int] = {b"CR": key("R"), b"TURN": TURN, b"RPL": RPL}
 """Addresses of several letters whose numbers say where a motion goes."""
 
@@ -31,6 +32,15 @@ SETTINGS = frozenset(
     b"SF SD SR SRA STA SVC FP FMA DISC DISR DISCL LIMS MEAC THETA PHI PSI ID IDS DC FXS FXST FXSW FOC".split()
 )
 """Addresses that say nothing of where a motion goes."""
+
+DRILLING = frozenset(f"CYCLE{number}".encode() for number in range(81, 90))
+"""Cycles that end in their retraction plane, above where they start."""
+MILLING = frozenset(
+    b"CYCLE60 CYCLE61 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE71 CYCLE72 CYCLE73 CYCLE74 CYCLE75 CYCLE76 CYCLE77 CYCLE79 "
+    b"CYCLE90 CYCLE801 CYCLE802 CYCLE830 CYCLE840 CYCLE899 HOLES1 HOLES2 POCKET1 POCKET2 POCKET3 POCKET4 SLOT1 SLOT2 "
+    b"LONGHOLE".split()
+)
+"""Cycles that end elsewhere; as all of the control's cycles they bring back the modes in force before them."""
 
 QUIET_CALLS = frozenset(
     b"MSG CYCLE832 FGROUP SETMS SETAL BRISKA SOFTA DRIVEA JERKA WORKPIECE GROUP_BEGIN GROUP_END GROUP_ADDEND WAITM "
@@ -126,8 +136,9 @@ class _Taken:
         if address is not None:
             letter, index = address[1].upper(), address[2]
             if letter == b"R" and index:
-                self.note("assign", b"<" + address[0])
-                return assigned_end(text, address.end())
+                close = assigned_end(text, address.end())
+                self.note("assign", text[place:close].strip())
+                return close
             if letter == b"G":
                 self.note("axis", address[0])
                 return expression_end(text, address.end())
@@ -163,12 +174,17 @@ class _Taken:
             shift = len(inside) - len(inside.lstrip())
             number = constant(inside.strip())
             start, stop = how.end() + shift, how.end() + shift + len(inside.strip())
-            kind = How.UNREAD if math.isnan(number) else _HOWS[how[1].upper()]
+            kind = _HOWS[how[1].upper()]
+            if math.isnan(number):
+                self.note("value", value_note(self.words, address, kind, inside))
+                kind = How.UNREAD
             self.word(place, address, start, stop, number, kind)
             return close
         close = expression_end(text, at)
         literal = text[at:close].rstrip()
         number = constant(literal)
+        if math.isnan(number):
+            self.note("value", value_note(self.words, address, How.NUMBER, literal))
         self.word(
             place, address, at, at + len(literal), number, How.UNREAD if math.isnan(number) else How.NUMBER
         )
@@ -185,16 +201,19 @@ class _Taken:
             if assigned is None:
                 rest = text[place:].strip()
                 if name.startswith(b"$P_UIFR"):
-                    self.note("base", b"<" + rest)
+                    self.note("base", rest)
                 else:
                     self.note("unknown", rest)
                 return len(text)
             close = assigned_end(text, assigned.end())
-            self.note("base" if name.startswith(b"$P_UIFR") else "assign", b"<" + text[place:close].strip())
+            self.note("base" if name.startswith(b"$P_UIFR") else "assign", text[place:close].strip())
             return close
         if name in self.names:
             self.codes(place, end, name)
-            return self.arguments(end)
+            closed = self.arguments(end)
+            if name == b"CYCLE800":
+                self.note("swivel", text[end:closed].strip())
+            return closed
         if name == b"RET":
             self.word(place, key("M"), -1, end, 17.0, How.INTEGER)
             return self.arguments(end)
@@ -220,7 +239,7 @@ class _Taken:
             self.note("axis", name)
         else:
             close = assigned_end(self.text, behind)
-            self.note("assign", b"<" + self.text[place:close].strip())
+            self.note("assign", self.text[place:close].strip())
         return max(close, behind + 1)
 
     def arguments(self, end: int) -> int:
@@ -230,12 +249,39 @@ class _Taken:
             at += 1
         return bracket_end(self.text, at) if self.text[at : at + 1] == b"(" else end
 
+    def retract(self, end: int) -> None:
+        """The first argument of a cycle whose name ends at ``end``, as a word."""
+        at = end
+        while self.text[at : at + 1] in (b" ", b"\t"):
+            at += 1
+        stop = at + 1 if self.text[at : at + 1] == b"(" else at
+        depth = 1
+        for place in range(stop, len(self.text)):
+            depth += (self.text[place] in b"([") - (self.text[place] in b")]")
+            if depth == 0 or (depth == 1 and self.text[place] in b","):
+                break
+        else:
+            return
+        literal = self.text[stop:place].strip()
+        number = constant(literal)
+        if math.isnan(number) and literal:
+            self.note("value", value_note(self.words, RETRACT, How.NUMBER, literal))
+        how = How.UNREAD if math.isnan(number) else How.INTEGER
+        self.word(end, RETRACT, -1, self.arguments(end), number, how)
+
     def statement(self, name: bytes, place: int, end: int) -> int:
         text = self.text
         if name == b"MCALL":
             # With a cycle after it, every block with a position calls that; alone it ends this.
-            on = bool(text[end:].strip())
-            self.codes(place, len(text.rstrip()), b"MCALL()" if on else b"MCALL_OFF")
+            called = _NAME.search(text, end)
+            drilling = called is not None and called[0].upper() in DRILLING
+            on = b"MCALL(CYCLE)" if drilling else b"MCALL()" if text[end:].strip() else b"MCALL_OFF"
+            self.codes(place, len(text.rstrip()), on)
+            if drilling and called is not None:
+                self.retract(called.end())
+                rest = text[self.arguments(called.end()) :].strip()
+                if rest:
+                    self.note("unknown", rest)
             return len(text)
         if name in OPENS or name in CLOSES or name in JUMPS or name in DECLARES or name in QUIET_NAMES:
             said = text[place:].strip().upper()
@@ -244,13 +290,18 @@ class _Taken:
             elif name in OPENS or name in CLOSES:
                 self.note("open" if name in OPENS else "close", said)
             else:
-                self.note("assign", b"<" + said)
+                self.note("between" if name == b"ELSE" else "assign", said)
             return len(text)
         closed = self.arguments(end)
         if name in QUIET_CALLS:
             return closed
+        if name in DRILLING | MILLING and not self.words and not text[closed:].strip():
+            self.note("cycle", name)
+            if name in DRILLING:
+                self.retract(end)
+            return closed
         if self.words or (closed == end and text[end:].strip()):
             self.note("unknown", text[place:].strip())
             return len(text)
-        self.note("call", name)
+        self.note("call", text[place:closed].strip().upper())
         return closed

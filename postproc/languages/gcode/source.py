@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 
 import numpy as np
@@ -37,6 +37,14 @@ class WordColumn:
         """Those of the blocks start .. stop - 1, counted from ``start``."""
         low, high = np.searchsorted(self.block, [start, stop]).tolist()
         return WordColumn(self.block[low:high] - start, self.value[low:high], self.how[low:high])
+
+    def in_order(self, order: Ints) -> WordColumn:
+        """The words of blocks ``order`` (E,), which are the rows of the result."""
+        first = np.searchsorted(self.block, order)
+        many = np.searchsorted(self.block, order, side="right") - first
+        total = int(many.sum())
+        at = np.repeat(first - (np.cumsum(many) - many), many) + np.arange(total)
+        return WordColumn(np.repeat(np.arange(len(order)), many), self.value[at], self.how[at])
 
     def last(self, blocks: Ints, absent: float = np.nan) -> Floats:
         """(K,) the last values in blocks (K,)."""
@@ -79,6 +87,40 @@ class Source:
         for note in self.notes:
             rows[note.kind].append(note.block)
         return {kind: np.array(blocks) for kind, blocks in rows.items()}
+
+    def in_order(self, order: Ints, kept: Ints) -> Source:
+        """The blocks in another ``order`` (E,), some maybe many times; those in rows ``kept`` (K,) are not
+        deleted there."""
+        columns = {one: column.in_order(order) for one, column in self.columns.items()}
+        lines = {one.name: getattr(self.blocks, one.name)[order] for one in fields(SourceLines)}
+        lines["deleted"][kept] = False
+        noted: defaultdict[int, list[Note]] = defaultdict(list)
+        for note in self.notes:
+            noted[note.block].append(note)
+        mask = np.zeros(len(self.blocks), np.bool_)
+        mask[list(noted)] = True
+        steps = np.flatnonzero(mask[order])
+        notes = tuple(
+            note._replace(block=step)
+            for step, block in zip(steps.tolist(), order[steps].tolist(), strict=True)
+            for note in noted[block]
+        )
+        return Source(columns, SourceLines(**lines), notes, self.comments)
+
+    def with_values(self, block: Ints, address: Ints, nth: Ints, value: Floats, how: Ints) -> Source:
+        """With other values in words: ``value`` and ``how`` (K,) of the ``nth`` (K,) ones with the key ``address`` (K,)
+        in ``block`` (K,)."""
+        if not len(block):
+            return self
+        columns = dict(self.columns)
+        for one in np.unique(address).tolist():
+            mine = np.flatnonzero(address == one)
+            column = columns[one]
+            values, hows = column.value.copy(), column.how.copy()
+            at = np.searchsorted(column.block, block[mine]) + nth[mine]
+            values[at], hows[at] = value[mine], how[mine]
+            columns[one] = WordColumn(column.block, values, hows)
+        return Source(columns, self.blocks, self.notes, self.comments)
 
     def column(self, wanted: int) -> WordColumn:
         return self.columns.get(wanted, NONE)

@@ -15,7 +15,7 @@ from postproc.languages.gcode.control import Control, Group, Move
 from postproc.languages.gcode.lexing import lex
 from postproc.languages.gcode.modal import said
 from postproc.languages.gcode.orientation_words import OrientationWords
-from postproc.languages.gcode.words import COLUMNS, Text, key
+from postproc.languages.gcode.words import COLUMNS, BlockSpans, How, Text, WordArrays, key
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +54,15 @@ STATE = tuple(field.name for field in fields(WriterState))
 
 
 @dataclass(frozen=True, eq=False)
+class FoldedNumbers:
+    """Words of motions whose text is an expression: row (K,) ascending, key (K,), value (K,) of the expression."""
+
+    row: Ints
+    key: Ints
+    value: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class GcodeSourceMap(WriterState):
     """One row a motion, as in the Toolpath; every motion is a block.
 
@@ -66,19 +75,21 @@ class GcodeSourceMap(WriterState):
     stop: Ints
     frames: Poses
     orientations: tuple[OrientationWords, ...]
+    folded: FoldedNumbers
 
     def part(self, start: int, stop: int) -> SourceMapPart:
         """The rows begin .. stop - 1 with their words."""
         rows = slice(start, stop)
         columns = (*COLUMNS, *self.control.columns)
         state = {name: getattr(self, name)[rows] for name in STATE}
-        span = (int(self.start[start]), int(self.stop[stop - 1])) if stop > start else (0, 0)
-        text = lex(self.raw, self.control, *span)
+        span = (int(self.start[rows].min()), int(self.stop[rows].max())) if stop > start else (0, 0)
+        text = _lexed(self.raw, self.control, self.start[rows], self.stop[rows])
         block = np.searchsorted(text.blocks.start, self.start[rows])
         word = np.full((len(text.blocks), len(columns)), -1, np.int32)
         for k, one in enumerate(columns):
             mine = np.flatnonzero(text.words.key == one)
             word[text.words.block[mine], k] = mine
+        computed = self._fold(text, word, block, start, stop)
         return SourceMapPart(
             **state,
             raw=self.raw,
@@ -91,7 +102,53 @@ class GcodeSourceMap(WriterState):
             insert=text.blocks.code[block],
             frames=self.frames,
             orientations=self.orientations,
+            computed=computed,
         )
+
+    def _fold(self, text: Text, word: Ints, block: Ints, start: int, stop: int) -> Bools:
+        """Puts the values of expressions into the words of the rows start .. stop - 1; (W,) these words."""
+        computed = np.zeros(len(text.words), np.bool_)
+        low, high = np.searchsorted(self.folded.row, [start, stop]).tolist()
+        columns = np.array([*COLUMNS, *self.control.columns])
+        for one in np.unique(self.folded.key[low:high]).tolist():
+            if one in columns:
+                mine = low + np.flatnonzero(self.folded.key[low:high] == one)
+                at = word[block[self.folded.row[mine] - start], np.flatnonzero(columns == one)[0]]
+                text.words.value[at], computed[at] = self.folded.value[mine], True
+                unread = at[text.words.how[at] == How.UNREAD]
+                text.words.how[unread] = How.NUMBER
+        return computed
+
+
+NEARER = 1 << 16
+"""Bytes between lines that are lexed with them."""
+
+
+def _lexed(raw: bytes, control: Control, start: Ints, stop: Ints) -> Text:
+    """The lines from ``start`` to ``stop`` (N,) and those between that are not far."""
+    if not len(start):
+        return lex(raw, control, 0, 0)
+    order = np.argsort(start, kind="stable")
+    first, last = start[order], np.maximum.accumulate(stop[order])
+    cuts = np.flatnonzero(first[1:] > last[:-1] + NEARER) + 1
+    starts, stops = first[np.append(0, cuts)], last[np.append(cuts - 1, len(last) - 1)]
+    parts = [lex(raw, control, *span) for span in zip(starts.tolist(), stops.tolist(), strict=True)]
+    return parts[0] if len(parts) == 1 else _joined(parts)
+
+
+def _joined(parts: list[Text]) -> Text:
+    """Texts that follow each other as one."""
+    before = np.cumsum([0, *(len(part.blocks) for part in parts)]).tolist()
+    words = {
+        one.name: np.concatenate([getattr(part.words, one.name) for part in parts])
+        for one in fields(WordArrays)
+    }
+    words["block"] = np.concatenate([part.words.block + at for part, at in zip(parts, before, strict=False)])
+    blocks = {
+        one.name: np.concatenate([getattr(part.blocks, one.name) for part in parts])
+        for one in fields(BlockSpans)
+    }
+    return Text(WordArrays(**words), BlockSpans(**blocks), (), np.empty((0, 3), np.int64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +159,7 @@ class SourceMapPart(WriterState):
     block (N,): row in text.blocks.
     columns (K,): keys; word (N, K): row in text.words of the word with that key in the block, -1 where it has none.
     verb (N,): row in text.words of the code (G1, G02 ...) that states the motion, -1 where it is inherited.
+    computed (W,): words whose text is an expression.
     insert (N,): offset at which words that are missing are inserted (after the last word of the block).
     """
 
@@ -115,6 +173,7 @@ class SourceMapPart(WriterState):
     insert: Ints
     frames: Poses
     orientations: tuple[OrientationWords, ...]
+    computed: Bools
 
     def column(self, letter: str, index: int | None = None) -> Ints:
         """(N,) row in text.words of the words with this address."""

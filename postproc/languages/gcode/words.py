@@ -52,8 +52,22 @@ class WordArrays:
         return len(self.at)
 
 
+def value_note(
+    words: list[tuple[int, int, int, int, float, int]], address: int, how: int, text: bytes
+) -> bytes:
+    """What a note of the kind "value" says of a word that follows ``words`` of its line: its key, how many words of
+    that key are before it, its How, and its expression."""
+    return b"%d %d %d " % (address, sum(word[1] == address for word in words), how) + text.strip()
+
+
 class Note(NamedTuple):
-    """What a block says besides its words: ``kind`` of the said, and its text."""
+    """What a block says besides its words: ``kind`` of the said, and its text.
+
+    value: the expression of a word, see ``value_note``; assign: an assignment; if: the condition of the rest of the
+    block; open, close, between, while: a loop or a branch; jump, label, call, program, tape: as in the text; base: a
+    work offset is written; tool: a tool is called by its name; corner, axis, polar, frame, swivel: a word of
+    that kind; cycle: a cycle of the control is called;
+    unknown: text that is not understood."""
 
     block: int
     kind: str

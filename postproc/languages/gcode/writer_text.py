@@ -171,5 +171,5 @@ def _written_decimals(places: SourceMapPart, word: Ints) -> Ints:
     raw = np.frombuffer(places.raw, dtype=np.uint8)[start:end]
     points = np.append(np.flatnonzero(raw == ord(".")), len(raw)) + start
     point = points[np.searchsorted(points, words.start)]
-    behind = np.where(point < words.stop, words.stop - point - 1, 0)
+    behind = np.where((point < words.stop) & ~places.computed, words.stop - point - 1, 0)
     return np.where(word >= 0, behind[word], 0)

@@ -1,0 +1,101 @@
+"""The variables of a program and their values, as far as these are the same in every run."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+from postproc.languages.gcode.expression_values import FANUC, LINUXCNC, ExpressionLanguage, evaluate
+
+_NUMBERED = re.compile(r"#(\d{1,9})")
+_PARAMETER = re.compile(r"R\d+")
+_LOCAL = {id(LINUXCNC): 30, id(FANUC): 33}
+_SYSTEM = {id(LINUXCNC): 5000, id(FANUC): 1000}
+"""Variables from these numbers on are the control's own: positions, offsets, signals."""
+
+
+class VariableValues:
+    """name -> value; what is absent is not known.
+
+    volatile: names that are never known.  parallel: the assignments of a block hold after it, so that its words and its
+    other assignments have the values from before it.
+    """
+
+    def __init__(self, language: ExpressionLanguage, known: Mapping[str, float], control: str) -> None:
+        self._language, self._values = language, dict(known)
+        self._bound = frozenset(known)
+        self.volatile: set[str] = set()
+        self.parallel = language is LINUXCNC
+        self.result = math.nan
+
+    def evaluate(self, text: str, without: set[str]) -> tuple[float, list[str]]:
+        """The value of an expression, and the names in it that are not known; those of ``without`` are not."""
+        missing: list[str] = []
+
+        def lookup(name: str) -> float:
+            value = math.nan if name in without or name in self.volatile else self._values.get(name, math.nan)
+            if math.isnan(value):
+                missing.append(name)
+            return value
+
+        return evaluate(text, self._language, lookup), missing
+
+    def name(self, target: str) -> str:
+        """The variable that an assignment sets, "" where that is not known."""
+        if not self._language.numbered:
+            if "[" not in target:
+                return target
+            name, _, index = target.partition("[")
+            value, _ = self.evaluate(index.rstrip("] "), set())
+            if math.isnan(value):
+                return ""
+            return f"{name.strip()}{value:.0f}" if name.strip() == "R" else f"{name.strip()}[{value:g}]"
+        text = target.replace(" ", "")
+        if _NUMBERED.fullmatch(text):
+            return f"#{int(text[1:])}"
+        if text.startswith("#<"):
+            return text
+        value, _ = self.evaluate(text[1:], set()) if text.startswith("#") else (math.nan, [])
+        return f"#{value:.0f}" if value == value and value == math.floor(value) else ""
+
+    def set(self, name: str, value: float) -> None:
+        if not name:
+            self.forget()
+            return
+        number = _NUMBERED.fullmatch(name)
+        system = number is not None and int(number[1]) >= _SYSTEM.get(id(self._language), 0)
+        if math.isnan(value) or system:
+            self._values.pop(name, None)
+        else:
+            self._values[name] = value
+
+    def forget(self) -> None:
+        """Code that was not read ran."""
+        self._values.clear()
+
+    def _is_local(self, name: str) -> bool:
+        if not self._language.numbered:
+            return not _PARAMETER.fullmatch(name) and name not in self._bound
+        number = _NUMBERED.fullmatch(name)
+        if number is not None:
+            return int(number[1]) <= _LOCAL[id(self._language)]
+        return not name.startswith("#<_") and self._language is LINUXCNC
+
+    def own(self) -> dict[str, float] | None:
+        """What a subprogram without arguments has of its own at its start."""
+        return None if self._language.numbered else {}
+
+    def enter(self, arguments: dict[str, float]) -> dict[str, float]:
+        """Goes into a subprogram; the variables of the caller that it does not see."""
+        outer = {name: value for name, value in self._values.items() if self._is_local(name)}
+        self._values = {name: value for name, value in self._values.items() if name not in outer}
+        self._values |= {name: value for name, value in arguments.items() if not math.isnan(value)}
+        return outer
+
+    def leave(self, outer: dict[str, float]) -> None:
+        """Back to the caller."""
+        kept = {name: value for name, value in self._values.items() if not self._is_local(name)}
+        self._values = {**kept, **outer}
+        self.set("#<_VALUE>", self.result)
+        self.result = math.nan
