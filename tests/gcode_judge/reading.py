@@ -86,7 +86,7 @@ def read(made: Made) -> Reading:
                 base=number(int(toolpath.base[row])),
                 tool=number(int(toolpath.tool[row])),
                 code=toolpath.constraints.refused[row].code if row in toolpath.constraints.refused else "",
-                executes=bool(toolpath.executes[row]),
+                executes=bool(toolpath.continues[row]),
             )
         )
     findings = []

@@ -78,6 +78,7 @@ def assign(run: ExecutionContext, statement: Statement, said: Assignment, here: 
     elif name == b"$CIRC_MODE":
         state.arc_frame = ArcFrame.UNKNOWN
     elif name in (b"$ROBROOT", b"$WORLD"):
+        state.root_set = state.root_set or statement.line
         run.root_set = run.root_set or statement.line
     elif name in (b"$EX_AX_IGNORE", b"$ASYNC_AXIS"):
         before = state.external_apart

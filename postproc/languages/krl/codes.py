@@ -69,11 +69,11 @@ CODES = define(
         ),
         "KRL006": Code(
             "warning",
-            "motion in a loop or branch that inputs decide",
-            meaning="The motion may run many times or never.",
-            consequence="Its correction could differ from run to run, so it is not corrected.",
-            action="Write the cut as a straight run of motions, outside of such loops and branches.",
-            example="`IF $IN[3] THEN LIN P4 ENDIF`.",
+            "motion in a block whose structure is not understood",
+            meaning="The block has no end of its own, holds an ELSEIF, or is nested deeper than 100 blocks.",
+            consequence="Whether and how often the motion runs is not known, so it is not corrected.",
+            action="Close every block, and write ELSEIF as ELSE and IF.",
+            example="`IF $IN[3] THEN`, `LIN P4`, and no ENDIF.",
         ),
         "KRL007": Code(
             "warning",
@@ -159,9 +159,12 @@ CODES = define(
         "KRL015": Code(
             "warning",
             "motion in a local subprogram",
-            meaning="The subprogram is called with values that are not known, or by an interrupt.",
+            meaning=(
+                "An interrupt or trigger calls the subprogram, or it is also called from where its frames or "
+                "values are not known."
+            ),
             consequence="The motion may run at several places, so it is not corrected.",
-            action="Call the subprogram with constant values, or make it a file of its own.",
+            action="Set base and tool in the subprogram, and call it with constant values.",
             example="`POCKET(depth)` where depth is an input.",
         ),
         "KRL016": Code(
@@ -200,17 +203,6 @@ CODES = define(
             action="Write the declaration as an aggregate of numbers.",
             example="`DECL E6POS XP1={X 10, Y offset}`.",
         ),
-        "KRL020": Code(
-            "warning",
-            "jump",
-            meaning="A GOTO may lead to this label.",
-            consequence=(
-                "The position is unknown after the label until it is set again; so are base and tool "
-                "where they change in between."
-            ),
-            action="Let the post-processor write the loop as a straight run of motions.",
-            example="`GOTO AGAIN` back to the first cut.",
-        ),
         "KRL021": Code(
             "warning",
             "path is in another file",
@@ -240,7 +232,7 @@ CODES = define(
             "warning",
             "flow is too long to follow",
             meaning="Loops and calls execute more statements than this tool follows.",
-            consequence="The motions in them are not corrected.",
+            consequence="Only those of their motions are corrected that are the same in every pass.",
             action="Let the post-processor write the loop as a straight run of motions.",
             example="A loop of a million passes.",
         ),
