@@ -24,10 +24,11 @@ _PLAIN_NAME = re.compile(rb"[ \t]*+(" + NAME + rb")[ \t]*+(\[[ \t]*+\d++[ \t]*+\
 class Calls(BlockFlow):
     """Follows jumps and calls.
 
-    mentioned_from: start of a routine -> the names in its text.
+    mentioned_from: start of a routine -> the names in its text; resumes: an interrupt may end a subprogram.
     """
 
     mentioned_from: dict[int, frozenset[bytes]]
+    resumes: bool
 
     def _label(self, pc: int, item: Statement, name: bytes) -> None:
         run, routine, active = self.run, self.run.routine, self.activations[-1]
@@ -163,7 +164,8 @@ class Calls(BlockFlow):
             return pc + 1
         if not active.blocks:
             return None
-        self._continue_with(run.merged(active.returned, self._here()))
+        flow = run.merged(active.returned, self._here())
+        self._continue_with(flow)
         while len(self.stack) > active.blocks:
             self._pop()
         call = self._pop()
@@ -171,7 +173,12 @@ class Calls(BlockFlow):
         back = [(run.variables.get(inner), name, path) for inner, name, path in call.returned]
         for name, entry in call.saved:
             run.variables.swap(name, entry)
-        run.routine, run.spline = call.checkpoint.routine, call.checkpoint.spline
+        routine, run.routine, run.spline = run.routine, call.checkpoint.routine, call.checkpoint.spline
+        if flow is None and self.resumes:  # an interrupt may end it
+            self._continue_with(call.before)
+            run.forget(
+                {"point", *routine.effects}, f"after the call in line {self._item(call.back - 1).line}"
+            )
         for value, name, path in back:
             if value is not None:
                 keep(run, name, path, value)

@@ -34,7 +34,10 @@ CODES = define(
             consequence=(
                 "A correction for one value would be wrong for the others, so the motion is not corrected."
             ),
-            action="Write the target as numbers: LIN {X .., Y .., Z .., A .., B .., C ..}.",
+            action=(
+                "Write the target as numbers: LIN {X .., Y .., Z .., A .., B .., C ..}; or state in the cell "
+                "what only the controller knows (symbols:)."
+            ),
             example="`LIN {X myOffset, Y 0, Z 0}` where myOffset is read from an input.",
         ),
         "KRL003": Code(
@@ -43,8 +46,8 @@ CODES = define(
             meaning="Neither the program nor its .dat declares this point.",
             consequence="Its coordinates are unknown, so the motion is not corrected.",
             action=(
-                "Put the module's .dat beside its .src, declare the point there, or give the "
-                "$config.dat that declares it."
+                "Put the module's .dat beside its .src, declare the point there, give the $config.dat that "
+                "declares it, or state it in the cell (symbols:)."
             ),
             example="`LIN XP7` without panel.dat beside panel.src.",
             topic=Topic.UNDECLARED_POINT,
@@ -64,7 +67,11 @@ CODES = define(
             "base or tool is not known",
             meaning="No $BASE or $TOOL that this tool can read is set before the motion.",
             consequence="The place of the target in the cell is unknown, so the motion is not corrected.",
-            action="Set $BASE and $TOOL before it, to numbers or to BASE_DATA[n] and TOOL_DATA[n].",
+            action=(
+                "Set $BASE and $TOOL before it, to numbers or to BASE_DATA[n] and TOOL_DATA[n]; or state in the "
+                "cell what holds at the start (program_start:) and the records that no file declares "
+                "(symbols:, such as FHOME: {TOOL_NO: 1, BASE_NO: 0})."
+            ),
             example="A program that relies on the base which another program set.",
         ),
         "KRL006": Code(

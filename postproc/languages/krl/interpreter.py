@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 from codecs import BOM_UTF8
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
 from postproc.languages.dialect import MARK, Program
+from postproc.languages.krl.controller_data import bind_symbols, start_with
 from postproc.languages.krl.data import Declarations, at_the_start, read_data
 from postproc.languages.krl.execution_context import ExecutionContext, Item
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
@@ -20,7 +22,9 @@ from postproc.languages.krl.program_structure import ProgramStructure, program_s
 from postproc.languages.krl.scan import scan
 from postproc.languages.krl.to_toolpath import to_toolpath
 from postproc.languages.krl.variables import Variables
+from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
+NO_SYMBOLS: Mapping[str, Symbol] = MappingProxyType({})
 MOST_READINGS = 3
 """Readings in which jumps are followed that turned out to be uncertain; then none is followed."""
 
@@ -43,11 +47,13 @@ def read(
     references: Sequence[Document] = (),
     fast: bool = True,
     places: bool = True,
+    symbols: Mapping[str, Symbol] = NO_SYMBOLS,
+    initial: InitialState = UNSTATED,
 ) -> Program:
     """Reads a program; ``fast=False`` takes the general way for the common lines too, with the same result.
 
     references: files that are read and never written, such as $config.dat; places: whether the program is to be
-    written, else its ``text`` is None.
+    written, else its ``text`` is None; symbols, initial: as of ``ReadingSettings``.
     """
     source = documents[0]
     code = list(scan(source, fast))
@@ -57,6 +63,7 @@ def read(
         read_data(declarations, document, file)
     for document in references:
         read_data(declarations, document, -1)
+    bind_symbols(declarations, symbols)
     has_tcp = any(_TCP.search(document.raw) for document in documents)
     has_turning = any(_TURNING.search(document.raw) for document in (*documents, *references))
     unfollowed = Unfollowed()
@@ -71,6 +78,7 @@ def read(
             has_turning,
             MotionRows(source),
         )
+        start_with(run, initial)
         flow = ProgramFlow(run, unfollowed)
         try:
             flow.all()

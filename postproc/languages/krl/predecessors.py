@@ -11,8 +11,10 @@ from postproc.base.arrays import Bools
 from postproc.languages.krl.modal_state import ELSEWHERE, Source
 from postproc.languages.krl.motion_rows import MotionRows
 
-MOST = 100
+MOST = 30
 """Predecessors of a motion that are told apart."""
+_MARKS = 4 * MOST
+"""Places where paths meet that are looked at for them."""
 _TWO = 2
 """So many sources are told apart; more are as good as two."""
 
@@ -44,8 +46,27 @@ def predecessors(rows: MotionRows, continues: Bools) -> dict[int, tuple[int, ...
         if rows.never_from is not None and row >= rows.never_from:
             continue
         sources = rows.sources_of.get(row)
-        known = {row - 1} if sources is None else expanded(rows, sources)
-        found[row] = tuple(sorted(known)) if 0 < len(known) <= MOST else (ELSEWHERE,)
+        known = {row - 1} if sources is None else _few(rows, sources)
+        found[row] = tuple(sorted(known)) or (ELSEWHERE,)
+    return found
+
+
+def _few(rows: MotionRows, sources: Iterable[Source]) -> set[int]:
+    """The rows behind sources, none where they are more than ``MOST``."""
+    seen: set[Source] = set()
+    found: set[int] = set()
+    todo = list(sources)
+    while todo:
+        source = todo.pop()
+        if source in seen:
+            continue
+        seen.add(source)
+        if isinstance(source, int):
+            found.add(source)
+        else:
+            todo.extend(rows.sources[source])
+        if len(found) > MOST or len(seen) > _MARKS:
+            return set()
     return found
 
 

@@ -26,6 +26,7 @@ class ProgramFlow(Calls):
     def all(self) -> None:
         run = self.run
         self.mentioned_from = {}
+        self.resumes = any(isinstance(item, Statement) and item.word == b"RESUME" for item in run.code)
         start = run.flow()
         pc: int | None = 0
         while pc is not None and pc < len(run.code):
