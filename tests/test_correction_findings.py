@@ -431,7 +431,7 @@ def test_cuts_of_an_absolute_correction():
 
 
 def test_motions_that_do_not_follow_are_another_cut():
-    runs = np.arange(9) < 3
-    result = correct(task(executes=runs, refused={2: ONE}))
+    runs = np.arange(9) != 3
+    result = correct(task(continues=runs, predecessors={3: (0, 2)}, refused={2: ONE}))
     assert result.cut.tolist() == [-1, 0, 0, 1, -1, 2, 2, 2, -1]
     assert result.state.tolist() == [A, LEFT, LEFT, C, A, C, C, C, A]

@@ -28,12 +28,12 @@ def path_of(count, annotations=(), lines=None):
 
 def numbered(scope, runs):
     """The cut of each motion, one after the other."""
-    cuts, number, before = [], -1, None
+    cuts, number, before = [], -1, False
     for inside, follows in zip(scope, runs, strict=True):
-        if inside and before != (True, follows):
+        if inside and not (before and follows):
             number += 1
         cuts.append(number if inside else -1)
-        before = inside, follows
+        before = inside
     return cuts
 
 

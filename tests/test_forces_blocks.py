@@ -97,7 +97,7 @@ def repeated(path: Toolpath, times: int) -> Toolpath:
         name: np.empty(0)
         for name in (
             "approximation",
-            "executes",
+            "continues",
             "external",
             "inverse_time_feed",
             "stops",

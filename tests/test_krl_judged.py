@@ -229,7 +229,8 @@ def careless(line: int) -> Callable:
             src.replace("IF $IN[1] THEN\n", "\n").replace("ENDIF\n", "\n"), dat, config, tables
         )
         rows = read_claims(src, dat, config, tables)
-        return [next(t for t in through if t.line == row.line) if row.line == line else row for row in rows]
+        of_line = next(t for t in through if t.line == line)
+        return [replace(of_line, apart=row.apart) if row.line == line else row for row in rows]
 
     return reader
 

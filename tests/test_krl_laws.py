@@ -39,9 +39,9 @@ def body(text: str) -> Program:
 
 
 def runs(program: Program) -> dict[int, bool]:
-    """Line -> whether the motions there are known to run, once or more."""
+    """Line -> whether the motions there are known to follow the one before them."""
     path = program.toolpath
-    return {int(line): bool(known) for line, known in zip(path.line, path.executes, strict=True)}
+    return {int(line): bool(known) for line, known in zip(path.line, path.continues, strict=True)}
 
 
 @pytest.mark.parametrize("path", [*GOOD, *BAD], **ids)
@@ -90,18 +90,20 @@ LINE = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7])
-def test_no_motion_of_a_routine_that_nobody_calls_runs(count: int) -> None:
-    """Neither the first, nor the last, nor those between."""
+def test_a_routine_that_nobody_calls_starts_anywhere(count: int) -> None:
+    """Its first motion follows none, the others the one before them; base and tool are the caller's."""
     text = f"DEF part()\n{FRAMES}{LINE}{LINE}END\nDEF lonely()\n{LINE * count}END\n"
-    found = runs(read(text))
-    assert found == {4: True, 5: True} | {8 + i: False for i in range(count)}
+    program = read(text)
+    assert runs(program) == {4: True, 5: True} | {8 + i: i > 0 for i in range(count)}
+    refused = program.toolpath.constraints.refused
+    assert [refused[row].code for row in sorted(refused)] == ["KRL005"] * count
 
 
 @pytest.mark.parametrize("call", ["lonely()\n", "lonely()\nlonely()\n"])
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_all_motions_of_a_routine_that_is_called_run(call: str, count: int) -> None:
     program = read(f"DEF part()\n{FRAMES}{LINE}{call}{LINE}END\nDEF lonely()\n{LINE * count}END\n")
-    assert program.toolpath.executes.all()
+    assert program.toolpath.continues.all()
     assert len(program.toolpath) == 2 + count * call.count("(")
 
 
@@ -160,7 +162,7 @@ END
 def test_a_jump_leaves_the_blocks_of_its_routine_alone() -> None:
     """Those of the caller stay open: what follows the call runs as it stands there."""
     path = read(INSIDE).toolpath
-    reached = [(round(x, 9), round(y, 9)) for x, y, _ in path.position[path.executes] / MM]
+    reached = [(round(x, 9), round(y, 9)) for x, y, _ in path.position[path.continues] / MM]
     assert reached == [(1, 2), (1, 10), (1, 11), (1, 12), (2, 12), (3, 12)]
 
 
@@ -202,15 +204,20 @@ def test_an_integer_variable_rounds_what_it_is_given(said: str, holds: float) ->
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
-def test_exactly_the_motions_of_a_routine_that_is_also_called_in_a_block_not_followed_are_left(
+def test_exactly_the_motions_of_a_routine_that_is_also_called_with_other_frames_are_left(
     count: int,
 ) -> None:
     calls = "sub()\nIF $IN[1]==TRUE THEN\nsub()\nENDIF\n"
-    program = read(f"DEF part()\n{FRAMES}{LINE}{calls}{LINE}END\nDEF sub()\n{LINE * count}END\n")
+    text = f"DEF part()\n{FRAMES}{LINE}{calls}{LINE}END\nDEF sub()\n{LINE * count}END\n"
+    assert not read(text).toolpath.constraints.refused
+    function = f"DEFFCT INT f()\nsub()\nRETURN 1\nENDFCT\nDEF sub()\n{LINE * count}END\n"
+    program = read(f"DEF part()\n{FRAMES}DECL INT i\n{LINE}sub()\ni=f()\n{LINE}END\n{function}")
     left = {
         int(program.toolpath.line[row]): f.code for row, f in program.toolpath.constraints.refused.items()
     }
-    assert left == {12 + i: "KRL015" for i in range(count)}
+    assert left == {15 + i: "KRL005" for i in range(count)}
+    refused = [f.code for f in program.toolpath.constraints.refused.values()]
+    assert sorted(refused) == ["KRL005"] * 2 * count + ["KRL015"] * count
 
 
 @pytest.mark.parametrize("value", ["TRUE", "FALSE", '"word"', "#NAME"])

@@ -298,7 +298,7 @@ def test_what_does_not_move_the_robot_leaves_the_point_known(between: str) -> No
         ("LOOP\nCIRC {X 5},{X 9,Y 9}\nENDLOOP\n", [1]),
         ("GOTO on\n" + FULL + "on:\nLIN {X 5}\n", []),
         ("IF a THEN\nGOTO on\nENDIF\n" + FULL + "on:\nLIN {X 5}\n", [1, 2]),
-        ("IF a THEN\n" + FULL + "ENDIF\nLIN {X 5}\n", [1]),
+        ("IF a THEN\n" + FULL + "ENDIF\nLIN {X 5}\n", [1, 2]),
         ("SWITCH a\nCASE 1\n" + FULL + "CASE 2\nLIN_REL {X 1}\nENDSWITCH\n", [1]),
         ("sub()\nEND\nDEF sub()\nPTP_REL {A1 5}\n", [1]),
         ("sub()\nEND\nDEF sub()\nLIN_REL {X 5}\n", []),
@@ -442,10 +442,11 @@ def test_a_point_of_one_motion_alone_is_not_locked(text: str, data: str) -> None
     assert not program.text.locked
 
 
-def test_motions_in_blocks_are_refused_with_their_target_known() -> None:
+def test_motions_in_blocks_are_known_where_their_targets_are() -> None:
     program = body("LOOP\nIF a THEN\n" + FULL + "ELSE\n" + FULL + "ENDIF\nENDLOOP\n" + FULL)
-    assert codes(program) == {0: "KRL006", 1: "KRL006"}
+    assert codes(program) == {2: "KRL023"}
     assert np.isfinite(program.toolpath.position).all()
+    assert not program.toolpath.continues.any()
 
 
 def test_what_a_loop_sets_later_is_not_known_at_its_begin() -> None:

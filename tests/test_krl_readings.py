@@ -74,7 +74,7 @@ def story(program: Program) -> list[str]:
         text = text.partition(" refused")[0].replace(" base [1] tool [1]", "")
         if path.approximation[row] != 0:
             text += f" round {path.approximation[row] / MM:.6g}"
-        if not path.executes[row]:
+        if not path.continues[row]:
             text += " apart"
         if row in path.constraints.no_insert_before:
             text += f" - whole: {path.constraints.no_insert_before[row]}"

@@ -111,8 +111,8 @@ def test_as_it_was_read_back_it_holds(krl, blocks):
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("approximation", 0.5), ("executes", False), ("feed", 9.0), ("configuration.status", 5), ("configuration.turn", 5),
-     ("base", 7), ("tool", 7), ("inverse_time_feed", True), ("kind", 5)],
+    [("approximation", 0.5), ("continues", False), ("feed", 9.0), ("configuration.status", 5),
+     ("configuration.turn", 5), ("base", 7), ("tool", 7), ("inverse_time_feed", True), ("kind", 5)],
 )  # fmt: skip
 def test_what_a_motion_says_beside_its_target(krl, blocks, name, value):
     for one, last in ((krl, 5), (blocks, 6)):

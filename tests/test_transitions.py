@@ -61,7 +61,7 @@ def test_the_motion_in_air_ends_where_the_tool_is_on_the_path_under_the_force():
     "change",
     [
         {"kind": [Kind.PTP, Kind.PTP, Kind.LIN, Kind.LIN]},
-        {"executes": np.array([True, False, True, True])},
+        {"continues": np.array([True, False, True, True])},
         {"constraints": EditConstraints(orientation_programmed=np.array([True, False, True, True]))},
         {"tool": np.array([1, 1, 0, 0])},
         {"constraints": EditConstraints(locked={1: "another motion builds on it"})},

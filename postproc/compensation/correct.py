@@ -81,7 +81,7 @@ def correct(task: CompensationProblem) -> CorrectionResult:
     scope = forced if task.process else forced | cartesian
     # In air every motion is corrected by itself; a cut is corrected as a whole or not at all.
     cut = (
-        number_cuts(scope, path.executes)
+        number_cuts(scope, path.continues)
         if task.process
         else np.where(scope, np.cumsum(scope & ~(forced & _shifted(forced))) - 1, -1)
     )
@@ -304,7 +304,16 @@ def _uncorrectable(
     why = {row: unknown for row in lost.tolist() if unknown}
     for stops in (path.constraints.locked, path.constraints.refused):
         why.update({row: stop for row, stop in stops.items() if tried[row]})
+    if task.force.undirected is not None:
+        message = "the force is in the feed frame, and several motions may precede this one: where it comes from varies"
+        for row in np.flatnonzero(tried & task.force.undirected).tolist():
+            why.setdefault(row, _at(task, row, "FRC005", message))
     free = tried & cartesian & ~_in(why, n)
+    # what no state before it settles on every path is no mistake of the cell
+    late = np.maximum.accumulate(~path.continues) & free & (track.status < 0)
+    message = "the robot's configuration differs with the path of the program that leads here"
+    _note(task, why, findings, np.flatnonzero(late), "KIN004", message)
+    free &= ~late
     _refuse(
         task,
         free & (track.status < 0),

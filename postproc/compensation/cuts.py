@@ -14,14 +14,14 @@ from postproc.toolpath import Toolpath
 _SWITCH = re.compile(r"COMPENSATE\s+(ON|OFF)(?![A-Z0-9_])", re.IGNORECASE)
 
 
-def number_cuts(in_scope: Bools, runs: Bools | None = None) -> Ints:
+def number_cuts(in_scope: Bools, continues: Bools | None = None) -> Ints:
     """(N,) number of the cut that a motion belongs to, from 0; -1 for motions outside of any.
 
-    ``in_scope`` (N,): the motion carries force.  ``runs`` (N,): as of a Toolpath; where it changes another cut starts.
+    ``in_scope`` (N,): the motion carries force.  ``continues`` (N,): as of a Toolpath; a motion without starts a cut.
     """
     starts = in_scope & ~np.concatenate([[False], in_scope[:-1]])
-    if runs is not None:
-        starts[1:] |= in_scope[1:] & (runs[1:] != runs[:-1])
+    if continues is not None:
+        starts |= in_scope & ~continues
     return np.where(in_scope, np.cumsum(starts, dtype=np.int32) - 1, -1)
 
 

@@ -163,8 +163,9 @@ class DesiredPath:
 def start_poses(
     end: Placed, path: Toolpath, tool: Poses, robot: Robot, track: AxisTrack, external: External | None = None
 ) -> PoseRows:
-    """Where each motion starts (N): the end pose of the one before it, with the tool of its own; NaN for the first one
-    and after a motion to an unknown place.  ``external``: in whose path axes ``end`` is, each in those of its own."""
+    """Where each motion starts (N): the end pose of the one before it, with the tool of its own; NaN for the first one,
+    after a motion to an unknown place, and where several motions may precede it.  ``external``: in whose path axes
+    ``end`` is, each in those of its own."""
 
     def build(rows: Ints) -> Poses:
         before = np.maximum(rows - 1, 0)
@@ -181,7 +182,7 @@ def start_poses(
             if external is not None:
                 flange = external.in_path(rows[after_axes], np.zeros(len(after_axes)), flange)
             poses.put(after_axes, flange @ tool[rows[after_axes]])
-        poses.put(rows == 0, UNKNOWN)
+        poses.put((rows == 0) | ~path.continues[rows], UNKNOWN)
         return poses
 
     return PoseRows(len(path), build)

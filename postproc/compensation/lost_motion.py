@@ -232,8 +232,8 @@ class _Samples:
 
     @cached_property
     def restart(self) -> Bools:
-        """(S,) it is not known how the axes came here: an unknown place before it, or a motion that may not run."""
-        step, runs = np.diff(self.row, prepend=-2), self.axis_paths.task.toolpath.executes
+        """(S,) it is not known how the axes came here: from an unknown place, or along several paths."""
+        step, runs = np.diff(self.row, prepend=-2), self.axis_paths.task.toolpath.continues
         return np.asarray((step > 1) | ((step > 0) & (self.row >= 0) & ~runs[self.row]))
 
     @cached_property

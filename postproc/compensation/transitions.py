@@ -59,7 +59,13 @@ def _can_lead(motions: DivisibleMotions, rows: Ints) -> Bools:
     """(K,) whether the motion before each of ``rows`` (K,) is one in air at feed, straight and of known end, whose
     text can state where the cut starts corrected."""
     path, before = motions.task.toolpath, np.maximum(rows - 1, 0)
-    can = (rows > 0) & (path.kind[before] == Kind.LIN) & path.known[before] & path.executes[before]
+    can = (
+        (rows > 0)
+        & (path.kind[before] == Kind.LIN)
+        & path.known[before]
+        & path.continues[before]
+        & path.continues[rows]
+    )
     can &= (motions.full.state[before] == MotionOutcome.AIR) & ~motions.task.carries[before]
     can &= feed_motions(path)[before] & (motions.task.track.status[before] >= 0)
     can &= (path.tool[before] == path.tool[rows]) & (

@@ -199,7 +199,7 @@ def _stated(path: Toolpath, configuration: Iterable[str]) -> dict[str, NDArray[A
         "approximation": path.approximation,
         "stops": path.stops,
         "orientation programmed": path.constraints.orientation_programmed,
-        "executes": path.executes,
+        "continues": path.continues,
         "feed": path.feed,
     }
 

@@ -21,7 +21,8 @@ ALONG_SPINDLE = 1 * DEG
 class FeedFrames:
     """The feed frame at the start and at the end of N motions, and on their path, computed for the rows asked for.
 
-    matters (N,): the force or the moment has a part across z, so that x and y are needed.
+    matters (N,): the force or the moment has a part across z, so that x and y are needed.  undirected (N,): they are,
+    and several motions may precede the motion, so that its feed direction is not known.
     """
 
     def __init__(
@@ -42,6 +43,7 @@ class FeedFrames:
         # x and y matter only to a force or moment across z
         self.matters = stated.any((0, 1, 3, 4))
         needed = asked & path_length.known & self.matters
+        self.undirected = needed & ~path_length.continues
 
         n = len(toolpath)
         self._back = np.empty((n, 3))
@@ -82,9 +84,13 @@ class FeedFrames:
         unknown = np.append(np.int32(0), np.cumsum(carries & ~path_length.known, dtype=np.int32))
         lost = np.flatnonzero(undefined)
         lost = lost[unknown[runs.stop[lost] + 1] == unknown[runs.start[lost]]]
+        several = ~path_length.continues[runs.start[lost]]
+        self.undirected[lost[several]] = True
+        lost = lost[~several]
         if len(lost):
             raise Refusal(_no_direction(lost, toolpath, file))
         unresolved = without[~undefined[without]]
+        unresolved = unresolved[~self.undirected[unresolved]]
         before, after = latest[2 * unresolved + 1], coming[2 * unresolved + 1]
         findings = []
         continued, borrowed = unresolved[before >= 0], unresolved[(before < 0) & (after >= 0)]

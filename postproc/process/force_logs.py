@@ -99,7 +99,9 @@ def _scale(
     known = np.flatnonzero(path_length.known)
     start = known[0] if len(known) else len(toolpath)
     index = np.arange(len(toolpath))
-    lost = np.flatnonzero(~air & (index > start) & ~(path_length.known & shifted(path_length.known)))
+    lost = np.flatnonzero(
+        ~air & (index > start) & ~(path_length.known & shifted(path_length.known) & toolpath.continues)
+    )
     if len(lost):
         raise Refusal(
             Finding(

@@ -25,8 +25,9 @@ class PathLength:
     """The path of N motions; what takes more than a few bytes a motion is computed for the rows asked for.
 
     known (N,): target, base and tool are known.  starts (N,): the row before is known and has the same tool on the
-    flange, so that its end pose is where this one starts.  moved (N,): the motion has a length, ``length`` (N,) [m],
-    0 where it has none or is not known.  arc (N,): the motion is an arc of known start; sweep (N,) [rad].
+    flange, so that its end pose is where this one starts, on every path of the program (``continues`` (N,)).
+    moved (N,): the motion has a length, ``length`` (N,) [m], 0 where it has none or is not known.  arc (N,): the motion
+    is an arc of known start; sweep (N,) [rad].
     """
 
     def __init__(self, toolpath: Toolpath, frames: MotionFrames) -> None:
@@ -44,7 +45,8 @@ class PathLength:
             pass
         tool = np.isfinite(frames.tool_in_flange.position[:, 0])
         self.known = toolpath.known & tool & np.isfinite(self._end[:, 0])
-        there = self.known & shifted(self.known)
+        self.continues = toolpath.continues
+        there = self.known & shifted(self.known) & self.continues
         self._changed, self._from = _with_other_tool(toolpath, frames)
         self.starts = there.copy()
         self.starts[self._changed] = False
@@ -135,9 +137,9 @@ class MotionRuns:
     def __init__(self, path_length: PathLength, carries: Bools) -> None:
         n = len(carries)
         index = np.arange(n, dtype=np.int32)
-        before = shifted(carries)
+        before = shifted(carries) & path_length.continues
         self.start = np.maximum.accumulate(np.where(carries & ~before, index, np.int32(0)))
-        last = carries & ~np.append(carries[1:], False)
+        last = carries & ~np.append(carries[1:] & path_length.continues[1:], False)
         stop = np.minimum.accumulate(np.where(last, index, np.int32(n))[::-1])[::-1]
         self.stop = np.minimum(stop, np.int32(n - 1))
 

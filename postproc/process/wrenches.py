@@ -44,7 +44,7 @@ class Wrenches:
     steps (N,): it carries force, and the wrench does not go over from the motion before: a cut starts, the path turns
     by SMOOTH_TURN or more, or the force jumps.  ramps: how it goes over where it would step inside a cut.
     measured: the forces are a log's, whose steps are what was measured.
-    ci95, peak, radius (N,): as of ``Stated``.
+    ci95, peak, radius (N,): as of ``Stated``.  undirected (N,): as of ``FeedFrames``, None where all are False.
     """
 
     values: Floats
@@ -59,6 +59,7 @@ class Wrenches:
     ramps: Ramps | None = None
     measured: bool = False
     radius: Floats | None = None
+    undirected: Bools | None = None
 
     def __post_init__(self) -> None:
         n = len(self.values)
@@ -284,6 +285,7 @@ def turn_to_robot_axes(
         stated.peak,
         measured=stated.error is not None,
         radius=stated.radius,
+        undirected=None if feed is None or not feed.undirected.any() else frozen(feed.undirected),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -211,7 +212,35 @@ def _branches(
     value[1:][stated] = toolpath.configuration["status"][stated] & 7
     value[1:][home] = value[0]
     sets = np.concatenate([[True], on_axes | stated | lost])
-    return np.asarray(value[np.maximum.accumulate(np.where(sets, np.arange(len(sets)), 0))][1:])
+    meets = np.flatnonzero(~toolpath.continues & ~sets[1:])
+    sets[meets + 1] = True
+    source = np.maximum.accumulate(np.where(sets, np.arange(len(sets)), 0))
+    _join_branches(value, source, meets, toolpath.predecessors, isinstance(robot.nominal, SerialArm))
+    return np.asarray(value[source][1:])
+
+
+_UNSEEN = -2
+
+
+def _join_branches(
+    value: Ints, source: Ints, meets: Ints, predecessors: Mapping[int, tuple[int, ...]], serial: bool
+) -> None:
+    """Puts in the branch in force at the motions ``meets`` (M,), which several may precede: the one that all of these
+    have, else -1.  value (N + 1,): that of the start and of the motions that set it; source (N + 1,): which of these
+    is in force after each.  An arm that is followed motion by motion has none there."""
+    value[meets + 1] = -1 if serial else _UNSEEN
+    changed = not serial
+    while changed:
+        changed = False
+        for row in meets.tolist():
+            before = predecessors.get(row, ())
+            found = {int(value[source[one + 1]]) for one in before if one >= -1} - {_UNSEEN}
+            if not before or before[0] < -1 or len(found) > 1:
+                found = {-1}
+            new = found.pop() if found else _UNSEEN
+            changed |= new != value[row + 1]
+            value[row + 1] = new
+    value[value == _UNSEEN] = -1
 
 
 def _settle(
@@ -249,6 +278,7 @@ def _settle(
     turn = np.where(rows >= 0, toolpath.configuration["turn"][rows], -1)
     stated = (turn >= 0) & (np.where(rows >= 0, toolpath.kind[rows], -1) == Kind.PTP)
     reset = given | stated
+    reset |= ~toolpath.continues[np.maximum(rows, 0)]  # several motions may precede it
     reset[0] = True
     last = np.maximum.accumulate(np.where(reset, order, 0))
     large = _large(robot, values, rows, reset, status, toolpath, base, tool)

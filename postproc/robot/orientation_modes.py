@@ -37,7 +37,8 @@ def as_run(
     rows = np.flatnonzero(keeps)
     anchor = np.maximum.accumulate(np.where(keeps, -1, np.arange(len(path))))[rows]
     flange = _flange(path, base, tool, robot, start, anchor)
-    flange[~path.executes[rows]] = np.nan
+    apart = np.maximum.accumulate(np.where(path.continues, -1, np.arange(len(path))))[rows]
+    flange[apart > anchor] = np.nan  # several motions may precede it
     turn = path.arcs.turn(rows, base.rotation[rows])
     unclear = (path.kind == Kind.CIRC) & (path.arcs.frame != ArcFrame.BASE) & ~path.arcs.turns_along
     turn[unclear[rows]] = np.nan

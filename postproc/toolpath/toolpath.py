@@ -82,11 +82,14 @@ class Toolpath(MotionColumns):
     or passes exactly, NaN where the distance is not known.
     ``stops`` (N,): the controller comes to rest at the end point: it is not approximated (``approximation`` is 0), and
     is no inner point of a spline block; without it wherever ``approximation`` is 0.
-    ``executes`` (N,): the motion follows the one before it; False for motions of which it is not known whether, or
-    where, they run: these come last.
+    ``continues`` (N,): in every execution the motion starts where the row before it ends, and no other motion starts
+    there; the first one starts where the program does.  False where paths of the program meet or part, and for motions
+    that never run: where such a motion starts is not known.
 
     What few motions state, and what holds of a dialect, is in types of its own.
 
+    ``predecessors``: row that does not continue the row before it -> the rows whose ends may be its start, -1 for the
+    start of the program, -2 for what the program does not contain.
     ``annotations``: comments that speak to this tool; ``comments``: all others that are alone on their line.
     """
 
@@ -107,10 +110,11 @@ class Toolpath(MotionColumns):
     external: Floats = field(default_factory=not_given, metadata=column(6, default=np.nan))
     approximation: Floats = field(default_factory=not_given, metadata=column(default=0.0))
     stops: Bools = field(default_factory=not_given)
-    executes: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=True))
+    continues: Bools = field(default_factory=not_given, metadata=column(dtype=np.bool_, default=True))
     inverse_time_feed: Bools = field(
         default_factory=not_given, metadata=column(dtype=np.bool_, default=False)
     )
+    predecessors: Mapping[int, tuple[int, ...]] = field(default_factory=dict)
     annotations: tuple[Annotation, ...] = ()
     comments: tuple[Annotation, ...] = ()
 
@@ -261,7 +265,8 @@ def external_at(path: Toolpath, rows: Ints, share: Floats | None = None) -> Floa
     end = path.external[rows]
     if share is None or not path.external.strides[0]:
         return end
-    start = np.where(rows[:, None] > 0, path.external[np.maximum(rows - 1, 0)], end)
+    follows = (rows > 0) & path.continues[rows]
+    start = np.where(follows[:, None], path.external[np.maximum(rows - 1, 0)], end)
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where(start == end, end, start + share[:, None] * (end - start)))
 

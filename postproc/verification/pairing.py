@@ -51,7 +51,7 @@ class Stretches:
         can = moved & path.known & (task.track.status >= 0) & ~np.isin(path.kind, _JUMPS)
         form = np.where(can, 1 + (task.desired_path.traceable & np.isin(path.kind, (Kind.LIN, Kind.CIRC))), 0)
         change = np.ones(n, bool)
-        change[1:] = (form[1:] != form[:-1]) | (path.executes[1:] != path.executes[:-1])
+        change[1:] = (form[1:] != form[:-1]) | ~path.continues[1:]
         start = np.flatnonzero(change)
         stop = np.append(start[1:], n)[: len(start)]
         some = form[start] > 0

@@ -38,7 +38,7 @@ class RunPath:
         path, desired_path, n = task.toolpath, task.desired_path, len(task.toolpath)
         reach, unknown = np.zeros(n), np.zeros(n, bool)
         both = desired_path.traceable[1:] & desired_path.traceable[:-1] & (path.tool[1:] == path.tool[:-1])
-        both &= (path.executes[1:] == path.executes[:-1]) & ~(path.approximation[:-1] <= 0)
+        both &= path.continues[1:] & ~(path.approximation[:-1] <= 0)
         rows = np.flatnonzero(both) + 1
         distance = path.approximation[rows - 1]
         unknown[rows] = np.isnan(distance)

@@ -73,7 +73,7 @@ def compare(motions: list[Motion], reading: Reading) -> Comparison:
                 differ("missing", line, f"{len(there)} motions of rs274 without row and without finding")
             continue
         if not there:
-            if claimed and reading.rows[claimed[0]].executes and not reading.reported(line):
+            if claimed and reading.rows[claimed[0]].continues and not reading.reported(line):
                 differ("extra", line, "a motion that does not run")
             continue
         if len(here) == 1:
@@ -96,7 +96,7 @@ def compare(motions: list[Motion], reading: Reading) -> Comparison:
             for kind, message in wrong:
                 differ(kind, line, message)
             result.known += not wrong
-            if len(pairs) == len(here) and row.executes:
+            if len(pairs) == len(here) and row.continues:
                 first[number] = index
     order = [first[number] for number in sorted(first)]
     for before, after in pairwise(order):

@@ -24,7 +24,7 @@ class Row:
 
     code: of the finding that says that the motion is not known or not corrected, "" without.  end, centre, normal (3,),
     NaN where not known.  base, tool: their numbers, -1 where not known.  offset (3,), turn [deg]: the base in the
-    machine where the program states it, else NaN.  executes: it follows the row before it.
+    machine where the program states it, else NaN.  continues: it follows the row before it.
     """
 
     line: int
@@ -38,7 +38,7 @@ class Row:
     code: str
     offset: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
     turn: float = float("nan")
-    executes: bool = True
+    continues: bool = True
 
     @property
     def claimed(self) -> bool:
@@ -94,7 +94,7 @@ def read(made: Made) -> Reading:
                 base=number(int(toolpath.base[row])),
                 tool=number(int(toolpath.tool[row])),
                 code=toolpath.constraints.refused[row].code if row in toolpath.constraints.refused else "",
-                executes=bool(toolpath.executes[row]),
+                continues=bool(toolpath.continues[row]),
                 **placed,
             )
         )

@@ -25,7 +25,7 @@ class Claim:
     """One row of a toolpath, in mm and deg.
 
     claimed: its target is said to be known and can be corrected.  never: it is said not to run; apart: it is not said
-    when it runs, if it does.  position (3,),
+    after which motion it runs, if it does.  position (3,),
     rotation (3, 3) or None; partial: X .. C of a target whose NaN components are what the axis angles ``origin`` give;
     base, tool: (4, 4), None where not known.
     """
@@ -65,9 +65,9 @@ def _claim(path: Toolpath, row: int, tables: Tables) -> Claim:
     return Claim(
         line=int(path.line[row]),
         kind=Kind(path.kind[row]).name,
-        claimed=said and refused is None and bool(path.executes[row]),
+        claimed=said and refused is None,
         never=refused is not None and refused.code == NEVER_RUNS,
-        apart=not bool(path.executes[row]),
+        apart=not bool(path.continues[row]),
         position=path.position[row] / MM,
         rotation=path.programmed_rotation[row],
         partial=path.partial_targets.coordinates[row] / ([MM] * 3 + [DEG] * 3) if from_row >= 0 else None,

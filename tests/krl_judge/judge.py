@@ -8,9 +8,10 @@ often, or inputs decide how often, each execution has to be that of some row.
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -97,6 +98,9 @@ def judge(case: Case, reader: Reader | None = None) -> Verdict:
             known[line] += matched
             if why:
                 found.setdefault((line, why.partition(":")[0]), Disagreement(line, why))
+    for one in runs:
+        for line, why in wrong_starts(claimed, one.motions):
+            found.setdefault((line, "start"), Disagreement(line, why))
     constant = {line for line, motions in executed.items() if _one_motion(motions)}
     return Verdict(
         tuple(found.values()),
@@ -107,6 +111,23 @@ def judge(case: Case, reader: Reader | None = None) -> Verdict:
         sum(known[line] for line in constant),
         sum(bool(one.stopped) for one in runs),
     )
+
+
+def wrong_starts(claimed: Sequence[Claim], motions: Sequence[Executed]) -> Iterator[tuple[int, str]]:
+    """Motions that are said to start where the one before them in the text ends, and to be the only ones that do, but
+    are not; of lines with one row."""
+    rows = Counter(claim.line for claim in claimed)
+    before = {row.line: last.line for last, row in pairwise(claimed) if not row.apart}
+    before = {line: last for line, last in before.items() if rows[line] == rows[last] == 1}
+    after = {last: line for line, last in before.items()}
+    lines = [motion.line for motion in motions]
+    if lines and lines[0] in before:
+        yield lines[0], f"start: it comes first, not after line {before[lines[0]]}"
+    for last, line in pairwise(lines):
+        if line in before and before[line] != last:
+            yield line, f"start: it comes after line {last}, not {before[line]}"
+        if last in after and after[last] != line:
+            yield line, f"start: line {last} leads to it, not to {after[last]} alone"
 
 
 def execute(case: Case) -> list[Run]:

@@ -51,7 +51,13 @@ class KrlDialect:
         return sorted(matches, key=lambda p: p.stem != path.stem)[:1]
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
-        return interpreter.read(documents, settings.references, places=settings.places)
+        return interpreter.read(
+            documents,
+            settings.references,
+            places=settings.places,
+            symbols=settings.symbols,
+            initial=settings.initial,
+        )
 
     def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
         return writer.edit_targets(program, plan, writing)

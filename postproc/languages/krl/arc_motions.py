@@ -64,9 +64,10 @@ def move_on_arc(
         found = None
         code_of = reason.code if reason is not None else "KRL009"
         end_point = replace(end_point, target=UnknownValue(code_of, "its path is not known"), builds=True)
+    before = state.sources
     row = enter_motion(run, statement, Kind.CIRC, end_point, reason, blend, found, relative)
     if row in run.rows.reasons:
-        run.rows.builds_on[row] = run.rows.builds_on.get(row, frozenset()) | _before(run, row)
+        run.rows.builds_on[row] = before
     if isinstance(first.target, KrlTarget):
         t = first.target
         run.rows.arcs[row] = Auxiliary(
@@ -76,10 +77,6 @@ def move_on_arc(
         )  # fmt: skip
     if relative:
         run.rows.relative[row] = relative_reference(statement, parts)
-
-
-def _before(run: ExecutionContext, row: int) -> frozenset[int | bytes]:
-    return frozenset([row - 1]) if row else frozenset()
 
 
 def _arc_path(

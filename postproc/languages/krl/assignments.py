@@ -78,6 +78,7 @@ def assign(run: ExecutionContext, statement: Statement, said: Assignment, here: 
     elif name == b"$CIRC_MODE":
         state.arc_frame = ArcFrame.UNKNOWN
     elif name in (b"$ROBROOT", b"$WORLD"):
+        state.root_set = state.root_set or statement.line
         run.root_set = run.root_set or statement.line
     elif name in (b"$EX_AX_IGNORE", b"$ASYNC_AXIS"):
         before = state.external_apart
@@ -133,7 +134,7 @@ def command(run: ExecutionContext, statement: Statement, arguments: bytes) -> No
     word, argument = parsed
     if word == b"INITMOV":
         state.base = run.frames.known(0, ZERO, statement.line)
-        state.tool = _numbered(run, b"TOOL", 1, statement.line)
+        state.tool = numbered_frame(run, b"TOOL", 1, statement.line)
         speed = run.variables.get(b"DEF_VEL_CP")
         state.feed = speed if isinstance(speed, float) else NAN
         state.blend, state.tool_known = DEFAULT_ROUNDING, False
@@ -280,10 +281,10 @@ def _indexed(run: ExecutionContext, table: bytes, given: bytes, line: int) -> Fr
     value = run.value(given.strip())
     if not is_number(value) or value != int(value) or value < 0:
         return UnknownValue("KRL012", f"the number '{shown(given)}' is not a constant")
-    return _numbered(run, table, int(value), line)
+    return numbered_frame(run, table, int(value), line)
 
 
-def _numbered(run: ExecutionContext, table: bytes, at: int, line: int) -> FrameIndex | UnknownValue:
+def numbered_frame(run: ExecutionContext, table: bytes, at: int, line: int) -> FrameIndex | UnknownValue:
     """Entry ``at`` of BASE_DATA or TOOL_DATA as the program left it so far."""
     if at == 0:
         return run.frames.known(0, ZERO, line)

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 
 from postproc.languages.krl.assignments import command, keep
-from postproc.languages.krl.block_follower import BlockFollower
-from postproc.languages.krl.execution_context import BlockFrame, Item
+from postproc.languages.krl.block_flow import BlockFlow
+from postproc.languages.krl.execution_context import Item
+from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
+from postproc.languages.krl.modal_state import ELSEWHERE
 from postproc.languages.krl.program_structure import Routine, closure
-from postproc.languages.krl.statement_effects import PATH_FROM_FILE, is_harmless
+from postproc.languages.krl.statement_effects import EVERYTHING, PATH_FROM_FILE, functions_of, is_harmless
 from postproc.languages.krl.target import shown
 from postproc.languages.krl.variables import Entry
 
@@ -19,89 +21,164 @@ MOST_CALLS = 30
 _PLAIN_NAME = re.compile(rb"[ \t]*+(" + NAME + rb")[ \t]*+(\[[ \t]*+\d++[ \t]*+\])?[ \t]*+\Z")
 
 
-class Restart(Exception):
-    """What was taken for certain was not; ``UncertainBlocks`` knows it now."""
+class Calls(BlockFlow):
+    """Follows jumps and calls.
 
+    mentioned_from: start of a routine -> the names in its text; resumes: an interrupt may end a subprogram.
+    """
 
-class Calls(BlockFollower):
-    """Follows jumps and calls."""
+    mentioned_from: dict[int, frozenset[bytes]]
+    resumes: bool
 
-    def _label(self, item: Statement, name: bytes) -> None:
-        run, routine = self.run, self.run.routine
-        if routine is None or (routine.start, name) not in self.uncertain_blocks.labels:
+    def _label(self, pc: int, item: Statement, name: bytes) -> None:
+        run, routine, active = self.run, self.run.routine, self.activations[-1]
+        if routine is None or routine.labels.get(name, (-1,))[0] != pc:
             return
-        effects = {"point", *run.survey.passed_through[routine.start, name]}
-        run.forget(effects, f"after the label {shown(name)} in line {item.line}")
-        mark = b"label %d " % routine.start + name
+        key = (routine.start, name)
+        if key in self.unfollowed.labels:
+            self._lose_all(item, name, key)
+            return
+        waiting = active.waiting.get(name)
+        flow = run.merged(self._here(), waiting)
+        if waiting is not None:
+            active.waiting = active.waiting.set(name, None)
+        self._continue_with(flow)
+        if run.survey.jumps.get(key, (-1, -1))[1] > pc:
+            head = LabelHead(flow, flow, self._checkpoint(copies=True), run.rows.new_mark())
+            active.heads = active.heads.set(name, head)
+            self._begin_at(head)
+
+    def _lose_all(self, item: Statement, name: bytes, key: tuple[int, bytes]) -> None:
+        """After a label to which jumps lead that are not followed."""
+        run, mark = self.run, b"label %d " % key[0] + name
+        self.reachable = True
+        run.forget(EVERYTHING, f"after the label {shown(name)} in line {item.line}")
         run.rows.sources[mark] |= run.state.sources
         run.state.sources = frozenset([mark])
+        run.state.form = None
         run.add_finding(
-            "KRL020",
-            f"a GOTO leads to {shown(name)}: the position is not known from here on, nor is what changes in between",
-            item,
+            "KRL024", f"the jumps to {shown(name)} are not followed: from here on nothing is known", item
         )
+
+    def _begin_at(self, head: LabelHead) -> None:
+        """Goes on after a label with what holds there."""
+        sources = self.run.rows.sources
+        sources[head.mark] = set() if head.entry is None else set(head.entry.state.sources)
+        self._continue_with(head.flow)
+        if head.flow is not None:
+            self.run.state.sources = frozenset([head.mark])
 
     def _goto(self, pc: int, name: bytes) -> int:
         run, routine = self.run, self.run.routine
-        if routine is None:
+        if routine is None or name not in routine.labels:
             return pc + 1
-        if name in routine.labels:
-            at, blocks = routine.labels[name]
-            open_blocks = self._open_in_routine()
-            inside = [opened for opened in open_blocks if opened.block in blocks]
-            certain = (
-                not run.uncertain
-                and not self.uncertain_blocks.plain
-                and [o.block for o in inside] == list(blocks)
-            )
-            if certain:
-                while run.stack and run.stack[-1] in open_blocks and run.stack[-1] not in inside:
-                    self._pop()
-                self.jumped = self.jumped or at <= pc
-                return at
-            if (routine.start, name) not in self.uncertain_blocks.labels:
-                self.uncertain_blocks.labels.add((routine.start, name))
-                self.uncertain_blocks.passed.update(
-                    o.block.start for o in open_blocks if o.block.word in LOOPS
-                )
-                raise Restart
-        run.rows.sources[b"label %d " % routine.start + name] |= run.state.sources
-        return pc + 1
+        at, blocks = routine.labels[name]
+        key = (routine.start, name)
+        active = self.activations[-1]
+        own = self.stack[active.blocks :]
+        inside = [frame for frame in own if frame.block in blocks]
+        single = not self.unfollowed.everything and self._is_single(own)
+        if single and at <= pc and [frame.block for frame in inside] == list(blocks):
+            while self.stack[active.blocks + len(inside) :]:
+                self._pop()
+            self.jumped = True
+            run.spline = None
+            return at
+        if key in self.unfollowed.labels:
+            run.rows.sources[b"label %d " % routine.start + name] |= run.state.sources
+            self.reachable = False
+            return pc + 1
+        left = next(
+            (f for f in own if f.followed and f.block.word in LOOPS - {b"FOR"} and f.block not in blocks),
+            None,
+        )
+        if left is not None and not single:
+            return self._abort(left)
+        if run.opaque is not None:
+            run.forget(run.opaque.effects, f"in the block of line {run.opaque.line}")
+        if at > pc:
+            active.waiting = active.waiting.set(name, run.merged(active.waiting.get(name), run.flow()))
+            self.reachable = False
+            return pc + 1
+        return self._jump_back(pc, name, key, routine)
 
-    def _open_in_routine(self) -> list[BlockFrame]:
-        found: list[BlockFrame] = []
-        for opened in reversed(self.run.stack):
-            if opened.back >= 0:
-                break
-            found.append(opened)
-        return found[::-1]
+    def _jump_back(self, pc: int, name: bytes, key: tuple[int, bytes], routine: Routine) -> int:
+        """To a label before: its text is passed again as long as what holds there learns from it."""
+        run, flow = self.run, self.run.flow()
+        head: LabelHead | None = self.activations[-1].heads.get(name)
+        if head is None:
+            self.unfollowed.labels.add(key)
+            raise Restart
+        run.rows.sources[head.mark] |= flow.state.sources
+        raised = flow if head.flow is None else run.raised(head.flow, flow)
+        if raised is head.flow:
+            self.reachable = False
+            return pc + 1
+        if self.steps > self.most_steps:
+            raised = self._forgotten(raised, routine)
+        self._return_to(head.checkpoint)
+        head = LabelHead(raised, head.entry, head.checkpoint, head.mark)
+        self.activations[-1].heads = self.activations[-1].heads.set(name, head)
+        self._begin_at(head)
+        return routine.labels[name][0] + 1
+
+    def _is_single(self, frames: list[BlockFrame]) -> bool:
+        """Whether only one path leads from the start of the outermost of these frames to here, and no other waits
+        further down."""
+        active = self.activations[-1]
+        if not all(frame.followed and frame.exits is None for frame in frames):
+            return False
+        return active.returned is None and next(active.waiting.items(), None) is None
 
     def _exit(self, pc: int) -> int:
-        run = self.run
-        loop = next((o for o in reversed(self._open_in_routine()) if o.block.word in LOOPS), None)
-        if loop is None or not loop.followed:
+        run, own = self.run, self.stack[self.activations[-1].blocks :]
+        loop = next((frame for frame in reversed(own) if frame.block.word in LOOPS), None)
+        if loop is None or run.opaque is not None:
             return pc + 1
-        if run.uncertain:
-            return self._abort(loop)
-        while run.stack[-1] is not loop:
-            self._pop()
-        self._pop()
-        return loop.block.end + 1
+        if loop.followed:
+            if self._is_single(own[own.index(loop) :]):
+                while self.stack[-1] is not loop:
+                    self._pop()
+                self._pop()
+                return loop.block.end + 1
+            if loop.block.word != b"FOR":
+                return self._abort(loop)
+        loop.exits = run.merged(loop.exits, run.flow())
+        self.reachable = False
+        return pc + 1
 
     def _leave(self, pc: int, kind: str) -> int | None:
-        run = self.run
-        call = next((opened for opened in reversed(run.stack) if opened.back >= 0), None)
-        if kind == "return" and run.uncertain:
-            return pc + 1 if call is None else self._abort(call)
-        if call is None:
-            return None if run.routine is not None else pc + 1
-        while run.stack[-1] is not call:
+        """A RETURN, or the end of a routine."""
+        run, active = self.run, self.activations[-1]
+        if run.routine is None:
+            return pc + 1
+        own = self.stack[active.blocks :]
+        if kind == "return" and not self._is_single(own):
+            loop = next((f for f in own if f.followed and f.block.word in LOOPS - {b"FOR"}), None)
+            if loop is not None:
+                return self._abort(loop)
+            if run.opaque is not None:
+                run.forget(run.opaque.effects, f"in the block of line {run.opaque.line}")
+            active.returned = run.merged(active.returned, run.flow())
+            self.reachable = False
+            return pc + 1
+        if not active.blocks:
+            return None
+        flow = run.merged(active.returned, self._here())
+        self._continue_with(flow)
+        while len(self.stack) > active.blocks:
             self._pop()
-        self._pop()
+        call = self._pop()
+        self.activations.pop()
         back = [(run.variables.get(inner), name, path) for inner, name, path in call.returned]
         for name, entry in call.saved:
-            run.variables.replace(name, entry)
-        run.routine = call.routine
+            run.variables.swap(name, entry)
+        routine, run.routine, run.spline = run.routine, call.checkpoint.routine, call.checkpoint.spline
+        if flow is None and self.resumes:  # an interrupt may end it
+            self._continue_with(call.before)
+            run.forget(
+                {"point", *routine.effects}, f"after the call in line {self._item(call.back - 1).line}"
+            )
         for value, name, path in back:
             if value is not None:
                 keep(run, name, path, value)
@@ -120,13 +197,16 @@ class Calls(BlockFollower):
         return pc + 1
 
     def _follows(self, name: bytes, routine: Routine) -> bool:
-        """Whether a call is followed, as it surely runs now and is no call of a call of a call ..."""
-        run, uncertain_blocks = self.run, self.uncertain_blocks
-        if run.uncertain or uncertain_blocks.plain or routine.is_main or routine.is_function:
+        """Whether a call is followed: it is no call of a call of a call ..., nor one of a routine by itself that maybe
+        runs."""
+        run, unsure = self.run, self.unsure or self.run.walked
+        if self.unfollowed.everything or run.opaque is not None or routine.is_main or routine.is_function:
             return False
-        if routine.start in uncertain_blocks.passed or name in run.survey.later:
+        if routine.start in self.unfollowed.blocks or name in run.survey.later or (unsure and self.shallow):
             return False
-        return sum(opened.back >= 0 for opened in run.stack) < MOST_CALLS
+        if unsure and any(frame.block is routine for frame in self.stack):
+            return False
+        return len(self.activations) <= MOST_CALLS
 
     def _aliased(self, said: Call, routine: Routine) -> bool:
         """Whether a parameter that comes back is a variable that the subprogram knows by its own name too."""
@@ -170,18 +250,29 @@ class Calls(BlockFollower):
             if comes_back and found:
                 path = (found[2] or b"").replace(b" ", b"").replace(b"\t", b"")
                 returned.append((name, found[1].upper(), path))
-        opened = self._push(routine, True)
-        opened.back, opened.returned = pc + 1, tuple(returned)
+        frame = self._push(routine, True)
+        frame.back, frame.returned = pc + 1, tuple(returned)
+        self.activations.append(self._activation())
         own = run.routine.types if run.routine is not None else {}
         names = dict.fromkeys([*own, *routine.types])
-        self.spent += len(names)
+        if self.unsure or run.walked:
+            self.spent_unsure += len(names)
+        else:
+            self.spent += len(names)
         run.routine = routine
         for name, entry in given.items():
             for key, value in entry.items():
                 entry[key] = run.converted(name, value)
-        opened.saved = tuple((name, variables.replace(name, given.get(name))) for name in names)
+        frame.saved = tuple(
+            (name, variables.swap(name, variables.entry(given[name]) if name in given else None))
+            for name in names
+        )
         run.followed[routine.name] = None
         return routine.start + 1
+
+    def _call_functions(self, item: Statement) -> None:
+        for name in functions_of(item):
+            self._called(item, name, item.code)
 
     def _called(self, item: Statement, name: bytes, given: bytes) -> None:
         """Takes up that a routine or function ran; the names in ``given`` may come back from it changed."""
@@ -191,8 +282,11 @@ class Calls(BlockFollower):
         why = f"after the call of {called} in line {item.line}"
         routine = run.survey.routines.get(name)
         if routine is not None:
-            run.rows.sources[b"routine %d" % routine.line] |= run.state.sources
+            mark = b"routine %d" % routine.line
+            run.rows.sources[mark] |= run.state.sources
             self.text_called.add(name)
+            if "point" in routine.effects:
+                run.state.sources = run.rows.joined(run.state.sources | {ELSEWHERE})
             run.forget(routine.effects | words, why)
             return
         if is_harmless(name):

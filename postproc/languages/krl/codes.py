@@ -34,7 +34,10 @@ CODES = define(
             consequence=(
                 "A correction for one value would be wrong for the others, so the motion is not corrected."
             ),
-            action="Write the target as numbers: LIN {X .., Y .., Z .., A .., B .., C ..}.",
+            action=(
+                "Write the target as numbers: LIN {X .., Y .., Z .., A .., B .., C ..}; or state in the cell "
+                "what only the controller knows (symbols:)."
+            ),
             example="`LIN {X myOffset, Y 0, Z 0}` where myOffset is read from an input.",
         ),
         "KRL003": Code(
@@ -43,8 +46,8 @@ CODES = define(
             meaning="Neither the program nor its .dat declares this point.",
             consequence="Its coordinates are unknown, so the motion is not corrected.",
             action=(
-                "Put the module's .dat beside its .src, declare the point there, or give the "
-                "$config.dat that declares it."
+                "Put the module's .dat beside its .src, declare the point there, give the $config.dat that "
+                "declares it, or state it in the cell (symbols:)."
             ),
             example="`LIN XP7` without panel.dat beside panel.src.",
             topic=Topic.UNDECLARED_POINT,
@@ -64,16 +67,20 @@ CODES = define(
             "base or tool is not known",
             meaning="No $BASE or $TOOL that this tool can read is set before the motion.",
             consequence="The place of the target in the cell is unknown, so the motion is not corrected.",
-            action="Set $BASE and $TOOL before it, to numbers or to BASE_DATA[n] and TOOL_DATA[n].",
+            action=(
+                "Set $BASE and $TOOL before it, to numbers or to BASE_DATA[n] and TOOL_DATA[n]; or state in the "
+                "cell what holds at the start (program_start:) and the records that no file declares "
+                "(symbols:, such as FHOME: {TOOL_NO: 1, BASE_NO: 0})."
+            ),
             example="A program that relies on the base which another program set.",
         ),
         "KRL006": Code(
             "warning",
-            "motion in a loop or branch that inputs decide",
-            meaning="The motion may run many times or never.",
-            consequence="Its correction could differ from run to run, so it is not corrected.",
-            action="Write the cut as a straight run of motions, outside of such loops and branches.",
-            example="`IF $IN[3] THEN LIN P4 ENDIF`.",
+            "motion in a block whose structure is not understood",
+            meaning="The block has no end of its own, holds an ELSEIF, or is nested deeper than 100 blocks.",
+            consequence="Whether and how often the motion runs is not known, so it is not corrected.",
+            action="Close every block, and write ELSEIF as ELSE and IF.",
+            example="`IF $IN[3] THEN`, `LIN P4`, and no ENDIF.",
         ),
         "KRL007": Code(
             "warning",
@@ -159,9 +166,12 @@ CODES = define(
         "KRL015": Code(
             "warning",
             "motion in a local subprogram",
-            meaning="The subprogram is called with values that are not known, or by an interrupt.",
+            meaning=(
+                "An interrupt or trigger calls the subprogram, or it is also called from where its frames or "
+                "values are not known."
+            ),
             consequence="The motion may run at several places, so it is not corrected.",
-            action="Call the subprogram with constant values, or make it a file of its own.",
+            action="Set base and tool in the subprogram, and call it with constant values.",
             example="`POCKET(depth)` where depth is an input.",
         ),
         "KRL016": Code(
@@ -200,17 +210,6 @@ CODES = define(
             action="Write the declaration as an aggregate of numbers.",
             example="`DECL E6POS XP1={X 10, Y offset}`.",
         ),
-        "KRL020": Code(
-            "warning",
-            "jump",
-            meaning="A GOTO may lead to this label.",
-            consequence=(
-                "The position is unknown after the label until it is set again; so are base and tool "
-                "where they change in between."
-            ),
-            action="Let the post-processor write the loop as a straight run of motions.",
-            example="`GOTO AGAIN` back to the first cut.",
-        ),
         "KRL021": Code(
             "warning",
             "path is in another file",
@@ -240,7 +239,7 @@ CODES = define(
             "warning",
             "flow is too long to follow",
             meaning="Loops and calls execute more statements than this tool follows.",
-            consequence="The motions in them are not corrected.",
+            consequence="Only those of their motions are corrected that are the same in every pass.",
             action="Let the post-processor write the loop as a straight run of motions.",
             example="A loop of a million passes.",
         ),

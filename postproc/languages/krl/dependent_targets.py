@@ -45,7 +45,7 @@ class DependentTargets:
             self.deviation[rows] = _deviation(*self.task.targets(rows))
         for low in range(0, len(dependent), BLOCK):
             rows = dependent[low : low + BLOCK]
-            before = self.deviation[rows - 1]  # the first row of all depends on none
+            before = np.where(rows[:, None] > 0, self.deviation[rows - 1], 0.0)  # the first depends on none
             active = self.touched[rows] | (self.task.inserted[rows] > 0)
             # Rows far after a change need not be looked at.
             if active.any() or before.any():

@@ -2,65 +2,53 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.languages.krl.data import Declarations
 from postproc.languages.krl.expressions import Value, evaluate
-from postproc.languages.krl.lexing import LOOPS, Statement
-from postproc.languages.krl.modal_state import ZERO, FrameRegister, ModalState, Source
+from postproc.languages.krl.lexing import Statement
+from postproc.languages.krl.modal_state import ZERO, FrameRegister, ModalState, joined
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.program_structure import Block, ProgramStructure, Routine
 from postproc.languages.krl.statement_effects import Effects
 from postproc.languages.krl.target import UnknownValue, known, shown
-from postproc.languages.krl.variables import Entry, Variables
+from postproc.languages.krl.variables import VariableFacts, Variables
 from postproc.languages.krl.vectorised import VectorisedLines
 
 Item = Statement | VectorisedLines
 
 
-@dataclass(eq=False)
-class BlockFrame:
-    """A block or call that is open.
+@dataclass(frozen=True)
+class SplineBlock:
+    """A spline block that is open: the line of its header, its first row, and whether a straight motion can be inserted
+    before the header."""
 
-    followed: it runs with values that are all known; else it is passed over once, and what it changes is forgotten.
-    entry, mark, rows, notes, routine: what was before it (notes: number of annotations, comments, readings of the
-    position, routines followed); sources: where its branches so far may have left the robot; counter: of a FOR: name,
-    value, last value, step; back, returned, saved: of a call: where it goes on, which parameter comes back into which
-    variable (name, path), and the entries that the caller's variables had; enters: a straight motion can be inserted
-    before the header of a spline block.
-    """
+    line: int
+    first_row: int
+    can_be_entered: bool
 
-    block: Block
-    followed: bool
-    entry: ModalState
-    mark: int
-    rows: int
-    notes: tuple[int, int, int, int] = (0, 0, 0, 0)
-    sources: frozenset[Source] = frozenset()
-    counter: tuple[bytes, int, int, int] | None = None
-    back: int = -1
-    returned: tuple[tuple[bytes, bytes, bytes], ...] = ()
-    saved: tuple[tuple[bytes, Entry | None], ...] = ()
-    routine: Routine | None = None
-    enters: bool = False
 
-    @property
-    def repeats(self) -> bool:
-        """A loop or a call that is followed."""
-        return self.followed and (self.back >= 0 or self.block.word in LOOPS)
+class Flow(NamedTuple):
+    """What holds at one place of a program; never changed once it is made."""
+
+    state: ModalState
+    variables: VariableFacts
 
 
 @dataclass(eq=False)
 class ExecutionContext:
-    """``mentioned``: names that code reads, other than as the target of a motion.  ``root_set``: the line, if any, from
-    which on the program itself states where the robot is in the world.  ``later_since``: the line, if any, from which
-    on an interrupt or a trigger may change base or tool.  ``routine``: the one that runs.
-    ``walked``: it is passed over without a call that is known.  ``idle``: what no flow leads to is listed.
-    ``has_tcp_mode``, ``has_turning``: some line names another interpolation mode, or another way of turning the tool,
-    than the usual one.
-    ``triggered``: a TRIGGER is between the last motion and here.  ``followed``: routines that ran.
+    """What all parts of the interpreter share.
+
+    ``mentioned``: names that code reads, other than as the target of a motion.  ``routine``: the one that runs.
+    ``walked``: nothing is known of who calls it; ``walked_rows``: first row, and that after the last, of such routines.
+    ``followed``: routines that ran.  ``idle``: what no flow leads to is listed.  ``opaque``: the block, if any, whose
+    structure is not understood.  ``spline``: the spline block that is open.  ``has_tcp_mode``, ``has_turning``: some
+    line names another interpolation mode, or another way of turning the tool, than the usual one.  ``initial``: what
+    holds where the program starts.  ``root_set``, ``later_since``: the first lines that set what ``ModalState`` calls
+    so.
     """
 
     document: Document
@@ -71,19 +59,21 @@ class ExecutionContext:
     has_tcp_mode: bool
     has_turning: bool
     rows: MotionRows
+    initial: ModalState = field(default_factory=ModalState)
     state: ModalState = field(default_factory=ModalState)
     frames: FrameRegister = field(default_factory=FrameRegister)
-    stack: list[BlockFrame] = field(default_factory=list)
+    spline: SplineBlock | None = None
+    opaque: Block | None = None
     findings: list[Finding] = field(default_factory=list)
     mentioned: set[bytes] = field(default_factory=set)
     reported: set[tuple[str, str]] = field(default_factory=set)
-    root_set: int | None = None
-    later_since: int | None = None
     routine: Routine | None = None
     walked: bool = False
     idle: bool = False
-    triggered: bool = False
     followed: dict[bytes, None] = field(default_factory=dict)
+    walked_rows: list[tuple[int, int, Routine]] = field(default_factory=list)
+    root_set: int = 0
+    later_since: int = 0
 
     def add_finding(self, code: str, message: str, statement: Statement) -> None:
         """Notes a finding; the same words are reported once, at their first place."""
@@ -152,13 +142,24 @@ class ExecutionContext:
             return int(value + 0.5) if value >= 0 else -int(0.5 - value)
         return float(value) if kind == b"REAL" else value
 
-    def why_walked(self, routine: Routine) -> str:
-        """Why the motions of a subprogram are not known to run, or run otherwise than they are read here."""
-        if routine.name in self.survey.later:
-            return f"it is in the subprogram of line {routine.line}, which an interrupt or trigger calls"
-        return f"it is in the subprogram of line {routine.line}, which is not called with known values"
+    def flow(self) -> Flow:
+        """What holds here."""
+        return Flow(self.state.copy(), self.variables.facts)
 
-    @property
-    def uncertain(self) -> bool:
-        """Whether it is not known that, and how often, the present line runs."""
-        return self.walked or any(not item.followed for item in self.stack)
+    def resume(self, flow: Flow) -> None:
+        """Goes on with what held elsewhere."""
+        self.state, self.variables.facts = flow.state.copy(), flow.variables
+
+    def merged(self, one: Flow | None, other: Flow | None) -> Flow | None:
+        """What holds where two paths meet; None for a path that nothing takes."""
+        if one is None or other is None:
+            return one or other
+        sources = self.rows.joined(one.state.sources | other.state.sources)
+        state = replace(joined(one.state, other.state), sources=sources)
+        return Flow(state, self.variables.joined(one.variables, other.variables))
+
+    def raised(self, head: Flow, back: Flow) -> Flow:
+        """What holds at the head of a loop, ``back`` what its end brings; ``head`` itself where that adds nothing."""
+        state = joined(head.state, back.state)
+        facts = self.variables.joined(head.variables, back.variables)
+        return head if state is head.state and facts is head.variables else Flow(state, facts)

@@ -54,6 +54,10 @@ _FUNCTIONS: dict[bytes, Callable[..., float]] = {
 _SYSTEM = {b"TRUE": True, b"FALSE": False}
 
 
+class UntypedNumber(float):
+    """A number of which it is not known whether it is an INT or a REAL: what it divides is not known."""
+
+
 class _NotConstant(Exception):
     def __init__(self, why: UnknownValue) -> None:
         self.why = why
@@ -167,7 +171,7 @@ class _Parser:
             self._next()
             right = self._product(depth)
             a, b = self._number(left), self._number(right)
-            left = a + b if operator == b"+" else a - b
+            left = _of_type(a + b if operator == b"+" else a - b, a, b)
         return left
 
     def _product(self, depth: int) -> Value:
@@ -177,7 +181,9 @@ class _Parser:
             self._next()
             a, b = self._number(left), self._number(self._unary(depth))
             if operator == b"*":
-                left = a * b
+                left = _of_type(a * b, a, b)
+            elif isinstance(a, UntypedNumber) or isinstance(b, UntypedNumber):
+                raise self._unknown("it divides a number whose type is not declared")
             elif isinstance(a, int) and isinstance(b, int):
                 left = abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)  # whole numbers stay whole
             else:
@@ -205,7 +211,7 @@ class _Parser:
         value = self._geometric(depth)
         if signs:
             plain = self._number(value)
-            return -plain if negative % 2 else plain
+            return _of_type(-plain, plain) if negative % 2 else plain
         return value
 
     def _geometric(self, depth: int) -> Value:
@@ -326,6 +332,11 @@ class _Parser:
         if is_number(value):
             return value
         raise self._unknown("it calculates with something that is not a number")
+
+
+def _of_type(result: int | float, *operands: int | float) -> int | float:
+    """A result, whose type is as little known as that of its operands."""
+    return UntypedNumber(result) if any(isinstance(each, UntypedNumber) for each in operands) else result
 
 
 def component(value: Value, path: bytes) -> Value | None:

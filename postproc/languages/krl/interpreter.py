@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import re
 from codecs import BOM_UTF8
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
 from postproc.languages.dialect import MARK, Program
-from postproc.languages.krl.block_follower import UncertainBlocks
-from postproc.languages.krl.calls import Restart
+from postproc.languages.krl.controller_data import bind_symbols, start_with
 from postproc.languages.krl.data import Declarations, at_the_start, read_data
 from postproc.languages.krl.execution_context import ExecutionContext, Item
-from postproc.languages.krl.goto_analysis import resolve_jumps
+from postproc.languages.krl.flow_frames import Restart, Unfollowed
 from postproc.languages.krl.lexing import Statement, lines, module_name
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.program_flow import ProgramFlow
@@ -22,7 +22,9 @@ from postproc.languages.krl.program_structure import ProgramStructure, program_s
 from postproc.languages.krl.scan import scan
 from postproc.languages.krl.to_toolpath import to_toolpath
 from postproc.languages.krl.variables import Variables
+from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
+NO_SYMBOLS: Mapping[str, Symbol] = MappingProxyType({})
 MOST_READINGS = 3
 """Readings in which jumps are followed that turned out to be uncertain; then none is followed."""
 
@@ -45,25 +47,26 @@ def read(
     references: Sequence[Document] = (),
     fast: bool = True,
     places: bool = True,
+    symbols: Mapping[str, Symbol] = NO_SYMBOLS,
+    initial: InitialState = UNSTATED,
 ) -> Program:
     """Reads a program; ``fast=False`` takes the general way for the common lines too, with the same result.
 
     references: files that are read and never written, such as $config.dat; places: whether the program is to be
-    written, else its ``text`` is None.
+    written, else its ``text`` is None; symbols, initial: as of ``ReadingSettings``.
     """
     source = documents[0]
     code = list(scan(source, fast))
     surveyed = program_structure(_statements(code))
-    if surveyed.jumps:
-        resolve_jumps(surveyed, _statements(code))
     declarations = Declarations()
     for file, document in enumerate(documents[1:], 1):
         read_data(declarations, document, file)
     for document in references:
         read_data(declarations, document, -1)
+    bind_symbols(declarations, symbols)
     has_tcp = any(_TCP.search(document.raw) for document in documents)
     has_turning = any(_TURNING.search(document.raw) for document in (*documents, *references))
-    uncertain_blocks = UncertainBlocks()
+    unfollowed = Unfollowed()
     for reading in range(MOST_READINGS + 1):
         run = ExecutionContext(
             source,
@@ -75,16 +78,17 @@ def read(
             has_turning,
             MotionRows(source),
         )
-        flow = ProgramFlow(run, uncertain_blocks)
+        start_with(run, initial)
+        flow = ProgramFlow(run, unfollowed)
         try:
             flow.all()
             break
         except Restart:
             if reading == MOST_READINGS - 1:
-                uncertain_blocks = _uncertain_blocks(surveyed)
+                unfollowed = _nothing_followed(surveyed)
     _report_structure(run)
     marker_at = _marker_at(source, code)
-    toolpath, text, refusals = to_toolpath(run, flow.text_called, places)
+    toolpath, text, refusals = to_toolpath(run, places)
     findings = sorted([*run.findings, *refusals], key=lambda finding: (finding.line, finding.column))
     return Program(
         dialect="krl",
@@ -108,15 +112,14 @@ def _variables(declarations: Declarations, surveyed: ProgramStructure) -> Variab
     variables = Variables(fixed)
     for name, entry in changing.items():
         variables.replace(name, entry)
-    variables.begin()
     return variables
 
 
-def _uncertain_blocks(surveyed: ProgramStructure) -> UncertainBlocks:
+def _nothing_followed(surveyed: ProgramStructure) -> Unfollowed:
     labels = {
         (routine.start, name) for routine in surveyed.routine_at.values() for name in routine.labels
     } & surveyed.jumps.keys()
-    return UncertainBlocks(set(), labels, plain=True)
+    return Unfollowed(set(), labels, everything=True)
 
 
 def _report_structure(run: ExecutionContext) -> None:

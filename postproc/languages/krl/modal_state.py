@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
 
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
-from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED
+from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, six
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import Six, UnknownValue
-from postproc.toolpath import ArcFrame, FrameRef, OrientationMode
+from postproc.toolpath import LOST, ArcFrame, FrameRef, OrientationMode
 
 ZERO: Numbers = (0.0,) * 6
 NOT_TO_TARGET = (OrientationMode.CONSTANT, OrientationMode.UNKNOWN)
 """Modes in which a path motion may end with another orientation than that of its target."""
 NAN = float("nan")
 Source = int | bytes
-"""A row after which the robot may be here, or the mark of a label or routine from where it may come."""
+"""A row after which the robot may be here, or the mark of a place where several paths meet."""
+START, ELSEWHERE = -1, -2
+"""Sources that are no rows: the start of the program, and what this file does not contain."""
 
 Record = dict[bytes, bytes]
 """FDAT, LDAT or PDAT: key -> value, upper case."""
@@ -26,9 +31,10 @@ Record = dict[bytes, bytes]
 
 @dataclass(frozen=True, slots=True)
 class FrameIndex:
-    """A base or tool that is known: its index in the table of frames."""
+    """A base or tool that is known: its index in the table of frames, and the line that set it."""
 
     index: int
+    line: int = field(default=0, compare=False)
 
 
 class FrameRegister:
@@ -51,7 +57,7 @@ class FrameRegister:
             self._index[key] = len(self._refs)
             self._values.append(values)
             self._refs.append(FrameRef(number, pose, line))
-        return FrameIndex(self._index[key])
+        return FrameIndex(self._index[key], line)
 
     def values(self, frame: FrameIndex | UnknownValue) -> Numbers | None:
         return self._values[frame.index] if isinstance(frame, FrameIndex) else None
@@ -67,6 +73,8 @@ class Anchor:
     row: int
     partial_target: Six = (None,) * 6
 
+
+PointFrames = tuple["FrameIndex | UnknownValue", "FrameIndex | UnknownValue"]
 
 NO_BASE = UnknownValue("KRL005", "no $BASE is set before it")
 NO_TOOL = UnknownValue("KRL005", "no $TOOL is set before it")
@@ -89,7 +97,9 @@ class ModalState:
     feed [m/s], blend [mm] ($APO.CDIS): NaN where not known; point: X..C of the last end point [mm, deg], stated in
     ``point_frames``; axes [deg]: those of the last end point, where it was programmed so; form: the inline form that
     was entered last; external [mm, deg]: E1..E6; external_apart: what the
-    program has set so that motions do not take them along.
+    program has set so that motions do not take them along; triggered: a TRIGGER is between the last motion and here;
+    root_set: the line, if any, from which on the program itself states where the robot is in the world; later_since:
+    the line, if any, from which on an interrupt or a trigger may change base or tool.
     """
 
     base: FrameIndex | UnknownValue = NO_BASE
@@ -98,11 +108,11 @@ class ModalState:
     blend: float = NAN
     tool_known: bool = False
     point: Numbers | None = None
-    point_frames: tuple[FrameIndex | UnknownValue, FrameIndex | UnknownValue] | None = None
+    point_frames: PointFrames | None = None
     anchor: Anchor | None = None
     point_unknown: str = "no motion precedes it"
     axes: Numbers | None = None
-    sources: frozenset[Source] = frozenset()
+    sources: frozenset[Source] = frozenset([START])
     frames_record: Record | None = None
     path_record: Record | None = None
     axis_record: Record | None = None
@@ -111,9 +121,12 @@ class ModalState:
     arc_frame: int = ArcFrame.BASE
     external: Numbers = UNSTATED
     external_apart: frozenset[bytes] = frozenset()
+    triggered: bool = False
+    root_set: int = 0
+    later_since: int = 0
 
     def copy(self) -> ModalState:
-        return replace(self)
+        return ModalState(*_VALUES(self))
 
     def lose_point(self, why: str) -> None:
         self.point = self.axes = self.point_frames = self.anchor = None
@@ -139,3 +152,98 @@ class ModalState:
             self.orientation, self.arc_frame = OrientationMode.UNKNOWN, ArcFrame.UNKNOWN
         if "record" in words:
             self.frames_record = self.path_record = self.axis_record = None
+
+
+_NAMES = tuple(entry.name for entry in fields(ModalState))
+_VALUES = attrgetter(*_NAMES)
+
+
+def joined(one: ModalState, other: ModalState) -> ModalState:
+    """What holds where two paths meet, but for ``sources``; ``one`` itself where the other path adds nothing."""
+    changed: dict[str, object] = {}
+    for name, a, b in zip(_NAMES, _VALUES(one), _VALUES(other), strict=True):
+        if a is b or name == "sources" or (name in _OF_POINT) or _same(a, b):
+            continue
+        value = _JOINS[name](a, b)
+        if not _same(value, a):
+            changed[name] = value
+    point = _joined_points(one, other)
+    if not all(map(_same, point, _POINT_OF(one))):
+        changed |= zip(_OF_POINT, point, strict=True)
+    return replace(one, **changed) if changed else one  # type: ignore[arg-type]
+
+
+def _same(one: object, other: object) -> bool:
+    """Whether two values are one, and so are two that are not numbers."""
+    if isinstance(one, tuple) and isinstance(other, tuple):
+        return len(one) == len(other) and all(map(_same, one, other))
+    return one is other or one == other or (one != one and other != other)
+
+
+def _joined_numbers(one: float, other: float) -> float:
+    return one if one == other else NAN
+
+
+def _joined_frames(
+    one: FrameIndex | UnknownValue, other: FrameIndex | UnknownValue, name: str
+) -> FrameIndex | UnknownValue:
+    if isinstance(one, UnknownValue):
+        return one
+    if isinstance(other, UnknownValue):
+        return other
+    return UnknownValue("KRL005", f"{name} varies: line {one.line} or line {other.line}")
+
+
+_OF_POINT = ("point", "point_frames", "anchor", "point_unknown")
+_POINT_OF = attrgetter(*_OF_POINT)
+VARIES = "it varies with the path that leads here"
+
+
+def _joined_points(
+    one: ModalState, other: ModalState
+) -> tuple[Numbers | None, PointFrames | None, Anchor | None, str]:
+    """Point, its frames, what an axis motion gives of it, and why it is not known: component by component, NaN where
+    two paths differ."""
+    own = _POINT_OF(one)
+    same = one.point_frames == other.point_frames and one.anchor == other.anchor
+    if same and _same(one.point, other.point):
+        return own
+    if not (one.point or one.anchor):
+        return own if one.point_frames is None else (None, None, None, one.point_unknown)
+    if not (other.point or other.anchor):
+        return None, None, None, other.point_unknown
+    if same and one.point is not None and other.point is not None:
+        pairs = zip(one.point, other.point, strict=True)
+        point = six([a if _same(a, b) else NAN for a, b in pairs])
+        if any(value == value for value in point):
+            return point, one.point_frames, one.anchor, VARIES
+    return None, None, None, VARIES
+
+
+def _either(one: Any, other: Any) -> Any:
+    return one or other
+
+
+def _or_none(one: object, other: object) -> None:
+    return None
+
+
+_JOINS: dict[str, Callable[[Any, Any], object]] = {
+    "base": lambda one, other: _joined_frames(one, other, "$BASE"),
+    "tool": lambda one, other: _joined_frames(one, other, "$TOOL"),
+    "feed": lambda one, other: NAN,
+    "blend": lambda one, other: NAN,
+    "tool_known": _either,
+    "axes": _or_none,
+    "frames_record": _or_none,
+    "path_record": _or_none,
+    "axis_record": _or_none,
+    "form": _or_none,
+    "orientation": lambda one, other: OrientationMode.UNKNOWN,
+    "arc_frame": lambda one, other: ArcFrame.UNKNOWN,
+    "external": lambda one, other: six([a if _same(a, b) else LOST for a, b in zip(one, other, strict=True)]),
+    "external_apart": frozenset.union,
+    "triggered": _either,
+    "root_set": _either,
+    "later_since": _either,
+}

@@ -6,17 +6,16 @@ from dataclasses import replace
 
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, apart, reached
-from postproc.languages.krl.lexing import SPLINES, Statement
+from postproc.languages.krl.lexing import Statement
 from postproc.languages.krl.modal_state import NAN, NOT_TO_TARGET, Anchor, ModalState
 from postproc.languages.krl.motion_refusals import (
     frames_missing,
-    is_detached,
     orientation_refusal,
     structure_refusal,
 )
 from postproc.languages.krl.motion_rows import NAN6, NO_ARC, MotionRow, RowRefusal, index, path_of, refusal
 from postproc.languages.krl.operands import Operand
-from postproc.languages.krl.partial import anchored, filled, incomplete
+from postproc.languages.krl.partial import anchored, filled, incomplete, varying
 from postproc.languages.krl.source_map import InlineForm
 from postproc.languages.krl.spatial import Arc, Numbers
 from postproc.languages.krl.target import KrlTarget, UnknownValue
@@ -73,6 +72,8 @@ def enter_motion(
     partial = stated is not None and bool(stated.missing) and not relative
     if partial and stated is not None and reason is None and anchor is None:
         reason = incomplete(state, stated, axes if kind is Kind.AXIS else values)
+        if reason is None and kind is not Kind.AXIS and values is not None:
+            reason = varying(state, stated, values)
     if partial and values is not None and state.point_frames != (state.base, state.tool):
         values = None
     if values is not None and way is not None:
@@ -88,6 +89,7 @@ def enter_motion(
         stated = replace(stated.detached(), locked="")
     external = _external(state, target, relative)
     rows = run.rows
+    rows.note_sources(state.sources)
     row = rows.add(
         MotionRow(
             kind, statement.line, extent(statement, operand), values or NAN6, axes or NAN6,
@@ -99,20 +101,18 @@ def enter_motion(
     )  # fmt: skip
     if reason is not None:
         rows.reasons[row] = reason
-    if is_detached(run):
-        rows.apart.append((row, row))
     if operand.variable is not None and stated is not None:
         rows.variables[row] = operand.variable
         if stated.locked:
             rows.locked[row] = stated.locked
-    if kind == Kind.SPL or (run.stack and any(item.block.word in SPLINES for item in run.stack)):
+    if kind == Kind.SPL or run.spline is not None:
         rows.whole[row] = "it is part of a spline"
         _in_block(run, row)
-    elif run.triggered:
+    elif state.triggered:
         rows.whole[row] = "a TRIGGER before it refers to it"
     elif statement.line in run.survey.inline and not _in_form(run, row):
         rows.whole[row] = "it is an inline form that sets another base or tool"
-    run.triggered = False
+    state.triggered = False
     if partial or relative or operand.builds:
         rows.builds_on[row] = state.sources
     _advance(state, statement.line, _reached(state, kind, values), axes, reason)
@@ -127,12 +127,11 @@ def enter_motion(
 
 def _in_block(run: ExecutionContext, row: int) -> None:
     """Notes that the controller passes a point of a spline block, and before which line its first point is entered."""
-    block = next((item for item in reversed(run.stack) if item.block.word in SPLINES), None)
-    if block is None:
+    if run.spline is None:
         return
     run.rows.passing[row] = True
-    if block is run.stack[-1] and block.enters and block.rows == row:
-        run.rows.entries[row] = block.block.line
+    if run.spline.can_be_entered and run.spline.first_row == row:
+        run.rows.entries[row] = run.spline.line
 
 
 def _external(state: ModalState, target: KrlTarget | UnknownValue, relative: bool) -> Numbers:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from postproc.languages.krl.execution_context import ExecutionContext
-from postproc.languages.krl.lexing import LOOPS, SPLINES
 from postproc.languages.krl.modal_state import ModalState
 from postproc.languages.krl.motion_rows import RowRefusal, refusal
 from postproc.languages.krl.target import UnknownValue
@@ -12,10 +11,10 @@ from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 def frames_missing(run: ExecutionContext) -> RowRefusal | None:
     state = run.state
-    if run.root_set is not None:
-        return RowRefusal("KRL005", f"the robot's place in the world is set in line {run.root_set}", "root")
-    if run.later_since is not None:
-        what = f"the interrupt or trigger of line {run.later_since} may change base or tool at any time"
+    if state.root_set:
+        return RowRefusal("KRL005", f"the robot's place in the world is set in line {state.root_set}", "root")
+    if state.later_since:
+        what = f"the interrupt or trigger of line {state.later_since} may change base or tool at any time"
         return RowRefusal("KRL005", what, "later")
     if state.tool_known:
         return RowRefusal("KRL013", "the tool is fixed in the world ($IPO_MODE=#TCP)", "tcp")
@@ -55,11 +54,6 @@ def orientation_refusal(state: ModalState, kind: Kind) -> RowRefusal | None:
     return None
 
 
-def is_detached(run: ExecutionContext) -> bool:
-    """Whether the motion does not follow the one before it: it never runs, or nobody knows when."""
-    return run.idle or run.walked
-
-
 def structure_refusal(run: ExecutionContext) -> RowRefusal | None:
     """The reason that lies in where the motion is."""
     routine = run.routine
@@ -70,16 +64,11 @@ def structure_refusal(run: ExecutionContext) -> RowRefusal | None:
     if routine is None:
         if run.survey.has_routine:
             return RowRefusal("KRL014", "the motion is outside every DEF", "outside")
-    elif run.walked:
-        return RowRefusal("KRL015", run.why_walked(routine), f"def {routine.line}")
-    for item in run.stack:
-        word = item.block.word
-        if not item.followed and word not in SPLINES:
-            what = "loop" if word in LOOPS else "branch"
-            opening = word.decode("latin-1")
-            return RowRefusal(
-                "KRL006",
-                f"it is inside the {what} ({opening}) of line {item.block.line}",
-                f"in {item.block.line}",
-            )
+    elif run.walked and routine.name in run.survey.later:
+        message = f"it is in the subprogram of line {routine.line}, which an interrupt or trigger calls"
+        return RowRefusal("KRL015", message, f"def {routine.line}")
+    if run.opaque is not None:
+        word = run.opaque.word.decode("latin-1")
+        what = f"it is inside the {word} block of line {run.opaque.line}, whose structure is not understood"
+        return RowRefusal("KRL006", what, f"in {run.opaque.line}")
     return None

@@ -71,6 +71,8 @@ class MotionRows:
     """``chunks``: single rows and runs of common lines in their order; ``places``: rows by what is rare.
 
     ``passing``: points of spline blocks; ``entries``: first point of such a block -> line of its header.
+    ``never_from``: the first row of those that never run, None without.
+    ``sources_of``: rows that may start elsewhere than where the row before ends -> where.
     """
 
     document: Document
@@ -84,7 +86,8 @@ class MotionRows:
     arcs: dict[int, Auxiliary] = field(default_factory=dict)
     relative: dict[int, Relative] = field(default_factory=dict)
     whole: dict[int, str] = field(default_factory=dict)
-    apart: list[tuple[int, int]] = field(default_factory=list)
+    sources_of: dict[int, frozenset[Source]] = field(default_factory=dict)
+    never_from: int | None = None
     inline: dict[int, InlineForm] = field(default_factory=dict)
     approximated: dict[int, float] = field(default_factory=dict)
     builds_on: dict[int, frozenset[Source]] = field(default_factory=dict)
@@ -126,11 +129,22 @@ class MotionRows:
             self.ranges.append((first, self.count, reason))
         return self.count - 1
 
+    def note_sources(self, sources: frozenset[Source]) -> None:
+        """Notes where the next row may start, if that is not where the row before ends."""
+        if sources != {self.count - 1}:
+            self.sources_of[self.count] = sources
+
+    def new_mark(self) -> bytes:
+        """A mark of its own, without sources."""
+        mark = b"join %d" % len(self.sources)
+        self.sources[mark] = set()
+        return mark
+
     def joined(self, sources: frozenset[Source]) -> frozenset[Source]:
         """The same rows and marks, as one mark where they are many."""
         if len(sources) <= FEW:
             return sources
-        mark = b"join %d" % len(self.sources)
+        mark = self.new_mark()
         self.sources[mark] |= sources
         return frozenset([mark])
 
@@ -145,7 +159,7 @@ class MotionRows:
                 self.count = count
         for sparse in (
             self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative, self.whole, self.inline,
-            self.approximated, self.builds_on, self.passing, self.entries,
+            self.approximated, self.builds_on, self.passing, self.entries, self.sources_of,
         ):  # fmt: skip
             while sparse and next(reversed(sparse)) >= count:
                 sparse.popitem()

@@ -12,7 +12,6 @@ from postproc.languages.krl.modal_state import NAN, NOT_TO_TARGET, ModalState
 from postproc.languages.krl.motion_entry import enter_motion, extent
 from postproc.languages.krl.motion_refusals import (
     frames_missing,
-    is_detached,
     orientation_refusal,
     structure_refusal,
 )
@@ -56,12 +55,11 @@ def move_bulk(run: ExecutionContext, bulk: VectorisedLines) -> None:
     """Takes up a run of common lines."""
     state = run.state
     reason = structure_refusal(run) or frames_missing(run)
+    run.rows.note_sources(state.sources)
     last = run.rows.add_bulk(bulk, state, reason)
     if (turns := orientation_refusal(state, Kind.LIN)) is not None:
         for row in (last + 1 - len(bulk) + np.flatnonzero(bulk.is_line)).tolist():
             run.rows.reasons[row] = reason or turns
-    if is_detached(run):
-        run.rows.apart.append((last + 1 - len(bulk.values), last))
     state.point, state.point_frames, state.axes, state.anchor = (
         _bulk_end(state, bulk),
         (state.base, state.tool),

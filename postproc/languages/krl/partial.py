@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.languages.krl.modal_state import Anchor, ModalState
+from postproc.languages.krl.modal_state import NOT_TO_TARGET, VARIES, Anchor, ModalState
 from postproc.languages.krl.motion_rows import RowRefusal
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import KrlTarget, Six, six
@@ -33,6 +33,16 @@ def anchored(own: Six, anchor: Anchor) -> tuple[Numbers | None, Anchor | None]:
         return full, None
     open_angles = [value is None for value in given[3:]]
     return None, Anchor(anchor.row, given) if all(open_angles) or not any(open_angles) else None
+
+
+def varying(state: ModalState, target: KrlTarget, values: Numbers) -> RowRefusal | None:
+    """Why components that the point before gives are not known, though others are."""
+    left_out = zip(target.values, values, strict=True)
+    lost = [i for i, (own, value) in enumerate(left_out) if own is None and value != value]
+    if not lost or (lost[0] >= 3 and state.orientation in NOT_TO_TARGET):
+        return None
+    names = ", ".join("XYZABC"[i] for i in lost)
+    return RowRefusal("KRL004", f"the point omits {names}, and the position is not known: {VARIES}", VARIES)
 
 
 def incomplete(state: ModalState, target: KrlTarget, values: Numbers | None) -> RowRefusal | None:

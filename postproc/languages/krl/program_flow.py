@@ -6,13 +6,14 @@ import re
 
 from postproc.languages.krl import motions
 from postproc.languages.krl.assignments import assign, declare
-from postproc.languages.krl.block_follower import BUDGET
-from postproc.languages.krl.calls import Calls, Restart
-from postproc.languages.krl.external_axes import ALL_LOST, by_themselves
+from postproc.languages.krl.calls import Calls
+from postproc.languages.krl.execution_context import Flow, Item
+from postproc.languages.krl.external_axes import by_themselves
 from postproc.languages.krl.lexing import Assignment, Call, Declared, Statement, has_foreign_letters
-from postproc.languages.krl.modal_state import InlineFormState, ModalState
-from postproc.languages.krl.program_structure import INLINE, LATER, Routine
-from postproc.languages.krl.statement_effects import HIDDEN, effects_of, functions_of
+from postproc.languages.krl.modal_state import ELSEWHERE, InlineFormState, ModalState
+from postproc.languages.krl.open_blocks import BUDGET
+from postproc.languages.krl.program_structure import INLINE, LATER, Routine, closure
+from postproc.languages.krl.statement_effects import EVERYTHING, HIDDEN, effects_of
 from postproc.languages.krl.vectorised import VectorisedLines
 from postproc.toolpath import Annotation
 
@@ -20,10 +21,13 @@ _ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 
 
 class ProgramFlow(Calls):
-    """Runs a program line by line; ``all`` once."""
+    """Goes over a program line by line, along all of its paths; ``all`` once."""
 
     def all(self) -> None:
         run = self.run
+        self.mentioned_from = {}
+        self.resumes = any(isinstance(item, Statement) and item.word == b"RESUME" for item in run.code)
+        start = run.flow()
         pc: int | None = 0
         while pc is not None and pc < len(run.code):
             routine = run.survey.routine_at.get(pc)
@@ -31,12 +35,15 @@ class ProgramFlow(Calls):
                 pc = self._step(pc)
                 continue
             if routine.is_main:
-                run.state, run.routine, run.stack = ModalState(), routine, []
+                run.resume(Flow(run.initial, run.variables.facts))
+                run.routine = routine
+                self.begin()
                 self._run(routine)
             pc = routine.end + 1
-        run.variables.undo(0)
+        walked = closure(run.survey, [*self.text_called, *run.survey.later])
         for routine in run.survey.routine_at.values():
-            if not routine.is_main and routine.name not in run.followed:
+            if not routine.is_main and (routine.name not in run.followed or routine.name in walked):
+                run.variables.facts = start.variables
                 self._walk(routine)
         self._idle()
         run.rows.comments = list(self.comments.values())
@@ -47,17 +54,23 @@ class ProgramFlow(Calls):
         outside = routine.end + 1 if run.survey.has_routine else len(run.code)
         while pc is not None and pc < len(run.code) and (pc < outside or run.routine is not routine):
             pc = self._step(pc)
-        run.stack, run.routine, run.state, self.repeating = [], None, ModalState(), 0
+        run.routine, run.state = None, ModalState()
+        self.begin()
 
     def _walk(self, routine: Routine) -> None:
-        """Passes over a routine that no call that is known leads to."""
+        """Goes over a routine of whose callers nothing is known."""
         run = self.run
         mark = b"routine %d" % routine.line
-        run.state = ModalState(sources=frozenset([mark]), external=ALL_LOST)
-        run.state.lose_point("it depends on the caller")
-        run.routine, run.stack, run.walked = routine, [], True
+        run.rows.sources[mark].add(ELSEWHERE)
+        run.state = ModalState(sources=frozenset([mark]))
+        run.state.root_set, run.state.later_since = run.root_set, run.later_since
+        run.walked = True
+        run.forget(EVERYTHING - {"all"}, f"at the start of the subprogram of line {routine.line}")
+        run.routine = routine
+        self.begin()
+        first = len(run.rows)
         self._run(routine)
-        run.variables.undo(0)
+        run.walked_rows.append((first, len(run.rows), routine))
         run.walked = False
 
     def _idle(self) -> None:
@@ -70,9 +83,9 @@ class ProgramFlow(Calls):
                 lines.update(row.line for row in chunk)
             else:
                 bulks.add(id(chunk.bulk))
-        run.idle = True
+        run.idle, run.rows.never_from = True, len(run.rows)
         for item in run.code:
-            run.state, run.stack, run.routine = ModalState(), [], None
+            run.state, run.routine = ModalState(sources=frozenset([ELSEWHERE])), None
             if isinstance(item, VectorisedLines):
                 if id(item) not in bulks:
                     motions.move_bulk(run, item)
@@ -85,12 +98,21 @@ class ProgramFlow(Calls):
         """Takes up a statement; gives the index of the next one, None after the end."""
         run = self.run
         item = run.code[pc]
+        self.steps += 1
+        if not self.reachable:
+            return self._pass_over(pc, item)
         if self.repeating or self.jumped:
             if self.seen[pc]:
-                self.spent += len(item) if isinstance(item, VectorisedLines) else 1
+                count = len(item) if isinstance(item, VectorisedLines) else 1
+                if self.unsure or run.walked:
+                    self.spent_unsure += count
+                else:
+                    self.spent += count
             self.seen[pc] = 1
-            if self.spent > BUDGET and not self.uncertain_blocks.plain:
-                return self._give_up(pc)
+            if self.spent > BUDGET or self.spent_unsure > BUDGET:
+                elsewhere = self._give_up()
+                if elsewhere is not None:
+                    return elsewhere
         if isinstance(item, VectorisedLines):
             motions.move_bulk(run, item)
             return pc + 1
@@ -101,17 +123,12 @@ class ProgramFlow(Calls):
             return pc + 1
         if not item.code.isascii() and kind != "motion" and has_foreign_letters(item.code):
             self._report_letters(item)
-        for name in functions_of(item):
-            self._called(item, name, item.code)
-        events = run.survey.events.get(pc, ())
-        for what, block in events:
-            if what == "open":
-                return self._open(pc, item, block)
-            if what == "branch":
-                return self._branch(pc, block)
-            again = self._close(item, block)
-            if again is not None:
-                return again
+        run.variables.line = item.line
+        self._call_functions(item)
+        if pc in run.survey.events:
+            there = self._block_event(pc, item)
+            if there is not None or not self.reachable:
+                return pc + 1 if there is None else there
         if kind == "motion":
             motions.move(run, item)
         elif kind == "strange":
@@ -131,7 +148,7 @@ class ProgramFlow(Calls):
         elif isinstance(said, Call):
             return self._call(pc, item, said)
         elif kind == "label" and isinstance(said, bytes):
-            self._label(item, said)
+            self._label(pc, item, said)
         elif kind == "goto" and isinstance(said, bytes):
             return self._goto(pc, said)
         elif kind == "exit":
@@ -143,8 +160,33 @@ class ProgramFlow(Calls):
         elif kind == "other" and run.survey.has_routine and HIDDEN.search(item.code):
             motions.unknown_motion(run, item)
         elif item.word in (b"TRIGGER", b"INTERRUPT", b"GLOBAL"):
-            run.triggered = run.triggered or item.word == b"TRIGGER"
+            run.state.triggered = run.state.triggered or item.word == b"TRIGGER"
             self._later(item)
+        return pc + 1
+
+    def _block_event(self, pc: int, item: Statement) -> int | None:
+        """Opens, changes or closes blocks; gives where it goes on if that is not after the statement."""
+        for what, block in self.run.survey.events[pc]:
+            if what == "open":
+                return self._open(pc, item, block)
+            if what == "branch":
+                return self._branch(pc, block)
+            again = self._close(item, block)
+            if again is not None:
+                return again
+        return None
+
+    def _pass_over(self, pc: int, item: Item) -> int | None:
+        """A statement to which no path leads: it may be the end of a block, or a label, to which one does."""
+        if isinstance(item, VectorisedLines):
+            return pc + 1
+        if pc in self.run.survey.events:
+            there = self._block_event(pc, item)
+            return pc + 1 if there is None else there
+        if item.kind == "label" and isinstance(item.strings, bytes):
+            self._label(pc, item, item.strings)
+        elif item.kind == "end":
+            return self._leave(pc, "end")
         return pc + 1
 
     def _comment(self, item: Statement) -> None:
@@ -164,6 +206,7 @@ class ProgramFlow(Calls):
         """Takes up what an interrupt or a trigger may do from here on."""
         run = self.run
         if not run.survey.later_effects.isdisjoint(("base", "tool", "mode", "turning")):
+            run.state.later_since = run.state.later_since or item.line
             run.later_since = run.later_since or item.line
         for name in LATER.findall(item.code):
             name = name.upper()
@@ -175,16 +218,3 @@ class ProgramFlow(Calls):
         self.run.add_finding(
             "KRL025", "the statement contains letters that KRL does not have: its effect is not known", item
         )
-
-    def _give_up(self, pc: int) -> int:
-        """The budget is spent."""
-        run = self.run
-        outermost = next((item for item in run.stack if item.followed and item.repeats), None)
-        self.uncertain_blocks.plain = True
-        if self.jumped or outermost is None:
-            raise Restart
-        at = self._abort(outermost)
-        item = run.code[at]
-        assert isinstance(item, Statement)
-        self._report_length(item)
-        return at

@@ -48,8 +48,9 @@ LATER = re.compile(rb"\bDO[ \t]+(" + NAME + rb")", re.I)
 class Block:
     """An IF, SWITCH, loop or spline block: what it may change, and the routines it calls.
 
-    begin, end: index of its first and last statement; branches: those of its ELSE, CASE, DEFAULT; broken: its end is
-    missing; leaves: an EXIT leads out of it.
+    start, end: index of its first and last statement; branches: those of its ELSE, CASE, DEFAULT; broken: its end is
+    missing, or blocks in it are nested too deep; leaves: an EXIT leads out of it; has_labels: a GOTO leads to a
+    label in it; is_entered: one from outside of it.
     """
 
     word: bytes
@@ -61,6 +62,8 @@ class Block:
     calls: set[bytes] = field(default_factory=set)
     broken: bool = False
     leaves: bool = False
+    has_labels: bool = False
+    is_entered: bool = False
 
 
 @dataclass(eq=False)
@@ -86,8 +89,7 @@ class ProgramStructure:
     names that run or change at a time of their own (interrupts, triggers); ``later_effects``: what these
     change of base, tool and modes; ``inline``: lines of motions in the fold of an inline form; ``jumps``:
     start of the routine and name of every label that a GOTO names -> first and last index of these;
-    ``effects``: all that the program changes anywhere; ``blocks``: all of them; ``passed_through``: the same
-    labels -> what differs between the paths that lead there.
+    ``effects``: all that the program changes anywhere; ``blocks``: all of them.
     """
 
     events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
@@ -100,7 +102,6 @@ class ProgramStructure:
     later_effects: Effects = field(default_factory=set)
     jumps: dict[tuple[int, bytes], tuple[int, int]] = field(default_factory=dict)
     blocks: list[Block] = field(default_factory=list)
-    passed_through: dict[tuple[int, bytes], Effects] = field(default_factory=dict)
     effects: Effects = field(default_factory=set)
     inline: set[int] = field(default_factory=set)
     unclosed: list[tuple[int, str]] = field(default_factory=list)
@@ -197,6 +198,7 @@ class _Surveyor:
         self.note(statement)
         if len(self.stack) > DEEPEST:
             self.buried += 1
+            self.stack[-1].broken = True
             return
         if not self.stack:  # a program without DEF
             self.stack.append(Block(b"", 0, 0))
@@ -296,6 +298,11 @@ def program_structure(statements: Iterable[tuple[int, Statement]]) -> ProgramStr
         found.unclosed.append((stack[0].line, "the DEF has no END"))
     surveyor._close_all(index)
     found.blocks = surveyor.blocks
+    for (start, name), (first, last) in found.jumps.items():
+        if name in (labels := found.routine_at[start].labels):
+            for block in labels[name][1]:
+                block.has_labels = True
+                block.is_entered = block.is_entered or not block.start < first <= last < block.end
     _settle(found, surveyor.blocks)
     found.later_effects = {SYSTEM[name] for name in found.later if name in SYSTEM}
     for name in closure(found, found.later):

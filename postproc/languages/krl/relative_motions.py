@@ -50,9 +50,10 @@ def absolute_target(
             "KRL008", "it is a relative rotation, which is not documented well enough to be followed", "turn"
         )
         return replace(operand, target=UnknownValue("KRL008", "")), reason or why
-    if state.point is None or state.point_frames != (state.base, state.tool):
+    varies = state.point is not None and any(value != value for value in state.point[:3])
+    if varies or state.point is None or state.point_frames != (state.base, state.tool):
         lost = state.point_unknown
-        if state.point is not None:
+        if state.point is not None and not varies:
             lost = "base or tool changed since the point before"
         elif state.anchor is not None:
             lost = "it is the end of an axis motion"

@@ -16,7 +16,7 @@ from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.modal_state import Source
 from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
 from postproc.languages.krl.motion_table import MotionTable, Spots
-from postproc.languages.krl.program_structure import closure
+from postproc.languages.krl.predecessors import continuous, expanded, predecessors, single_sources
 from postproc.languages.krl.source_map import KrlSourceMap
 from postproc.toolpath import (
     COMPUTED,
@@ -33,23 +33,17 @@ from postproc.toolpath import (
 
 READ_TOO = "other code reads it too"
 SEVERAL = "its line runs several times"
+OTHER_PATHS = "several paths of the program lead to it or from the motion before it"
 
 
-def to_toolpath(
-    run: ExecutionContext, text_called: Iterable[bytes], places: bool
-) -> tuple[Toolpath, KrlSourceMap | None, list[Finding]]:
-    """``text_called``: routines that were called where it is not known that, or with what, they run; ``places``:
-    whether they are wanted."""
+def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourceMap | None, list[Finding]]:
+    """``places``: whether they are wanted."""
     rows = run.rows
-    elsewhere = _other_calls(run, text_called)
     run.code.clear()  # the table takes up its arrays one after the other
     table = MotionTable(rows, places)
-    for start, stop, reason in elsewhere:
-        for row in np.flatnonzero((table.line >= start) & (table.line <= stop)).tolist():
-            if (
-                rows.reasons.setdefault(row, reason).code == "KRL023"
-            ):  # not reached by the calls that are followed
-                rows.reasons[row] = reason
+    single = single_sources(rows)
+    _refuse_other_calls(run, table)
+    _refuse_several_starts(rows, table, single)
     _lock(run)
     refused = _refused(rows, table)
     table.base, table.tool, used = _used(table.base, table.tool, run.frames.refs())
@@ -59,6 +53,7 @@ def to_toolpath(
     given = _given(rows, n)
     axes = np.array(list(table.axes.values())).reshape(-1, 6) * DEG
     several = _several(table)
+    continues = _kept(continuous(rows, single))
     toolpath = Toolpath(
         kind=_kept(table.kind),
         position=_kept(table.position),
@@ -72,7 +67,7 @@ def to_toolpath(
         constraints=EditConstraints(
             refused=refused,
             locked=_pinned(rows, table, refused),
-            no_insert_before=_whole(rows, several),
+            no_insert_before=_whole(rows, several, continues),
             spline_headers=_entries(rows, several),
             orientation_programmed=_oriented(table),
         ),
@@ -86,7 +81,8 @@ def to_toolpath(
         ),
         approximation=_kept(table.blend),
         comments=tuple(rows.comments),
-        executes=_runs(rows, n),
+        continues=continues,
+        predecessors=predecessors(rows, continues),
         stops=_stops(rows, table),
         configuration=Configuration({"status": _kept(table.status), "turn": _kept(table.turn)}),
         orientation_control=OrientationControl(mode=_kept(table.orientation)),
@@ -150,23 +146,46 @@ def _used(base: Ints, tool: Ints, frames: tuple[FrameRef, ...]) -> tuple[Ints, I
     return renamed[base], renamed[tool], tuple(frames[i] for i in kept)
 
 
-def _other_calls(run: ExecutionContext, text_called: Iterable[bytes]) -> list[tuple[int, int, RowRefusal]]:
-    """First and last line of routines that also run where their values are not known: they cannot be corrected for the
-    calls that are followed."""
-    survey = run.survey
-    found = []
-    for name in closure(survey, [*text_called, *survey.later]):
-        if name in run.followed:
-            routine = survey.routines[name]
-            last = run.code[min(routine.end, len(run.code) - 1)]
-            reason = RowRefusal("KRL015", run.why_walked(routine), f"def {routine.line}")
-            found.append((routine.line, last.line, reason))
-    return found
+def _refuse_other_calls(run: ExecutionContext, table: MotionTable) -> None:
+    """Motions of a routine that is followed from some of its calls: they also run after the other ones, so what is not
+    known there cannot be corrected at all."""
+    rows = run.rows
+    for start, stop, routine in run.walked_rows:
+        if routine.name not in run.followed:
+            continue
+        ranges = [(max(a, start), min(b, stop)) for a, b, _ in rows.ranges]
+        refused = {row for a, b in ranges for row in range(a, b)}
+        refused |= {
+            row for row, reason in rows.reasons.items() if start <= row < stop and reason.code != "KRL016"
+        }
+        if not refused:
+            continue
+        lines = np.unique(table.line[sorted(refused)])
+        message = (
+            f"it is in the subprogram of line {routine.line}, which also runs with values that are not known"
+        )
+        for row in np.flatnonzero(np.isin(table.line, lines)).tolist():
+            rows.reasons.setdefault(row, RowRefusal("KRL015", message, f"def {routine.line}"))
+
+
+def _refuse_several_starts(rows: MotionRows, table: MotionTable, single: Bools) -> None:
+    """Motions that build on the one before them, where several may be that one: a correction of one of these would
+    change them."""
+    for row in np.flatnonzero(~single).tolist():
+        kind = table.kind[row]
+        if row in rows.reasons or kind == Kind.AXIS or not (kind == Kind.CIRC or row in rows.builds_on):
+            continue
+        code = "KRL009" if kind == Kind.CIRC else "KRL008" if row in rows.relative else "KRL004"
+        what = {"KRL009": "its start", "KRL008": "what it is relative to", "KRL004": "what it omits"}[code]
+        rows.reasons[row] = RowRefusal(
+            code, f"several motions may precede it, and {what} is corrected with them"
+        )
+        rows.builds_on[row] = rows.sources_of[row]
 
 
 def _lock(run: ExecutionContext) -> None:
     """Literals of variables that other code reads stay as they are."""
-    rows, read = run.rows, run.mentioned | run.survey.read
+    rows, read = run.rows, run.mentioned | run.survey.read | run.variables.mixed
     for row, variable in rows.variables.items():
         if variable.name and _root(variable.name) in read:
             rows.locked.setdefault(row, READ_TOO)
@@ -180,17 +199,13 @@ def _root(name: bytes) -> bytes:
     return name.partition(b".")[0].partition(b"[")[0]
 
 
-def _runs(rows: MotionRows, n: int) -> Bools:
-    """(N,) all but the motions that never run, or are in routines of which it is not known when they do."""
-    runs = np.ones(n, np.bool_)
-    for first, last in rows.apart:
-        runs[first : last + 1] = False
-    return runs
-
-
-def _whole(rows: MotionRows, several: Ints) -> dict[int, str]:
-    """Rows before which nothing can be inserted.  ``several``: rows whose line runs several times."""
+def _whole(rows: MotionRows, several: Ints, continues: Bools) -> dict[int, str]:
+    """Rows before which nothing can be inserted.  ``several``: rows whose line runs several times; ``continues`` (N,):
+    the motion surely starts where the row before ends."""
     whole = dict(rows.whole)
+    for row in np.flatnonzero(~continues).tolist():
+        if row not in rows.reasons:
+            whole.setdefault(row, OTHER_PATHS)
     for row in several.tolist():
         whole.setdefault(row, SEVERAL)
     return dict(sorted(whole.items()))
@@ -324,33 +339,21 @@ def _pinned(rows: MotionRows, table: MotionTable, refused: dict[int, Finding]) -
     if not rows.builds_on and not rows.reads:
         return pins
     finding = _finder(rows, table)
+    every = range(len(rows))
     seen: set[Source] = set()
     for row in rows.builds_on:
         if row in refused:
             message = f"the motion in line {table.line[row]} depends on this end point and is not corrected"
-            for pin in _rows_of(rows, rows.builds_on[row], seen):
+            for pin in _among(every, expanded(rows, rows.builds_on[row], seen)):
                 pins.setdefault(pin, finding(pin, rows.reasons[row].code, message))
     seen = set()
     for line, sources in rows.reads:
-        for pin in _rows_of(rows, sources, seen):
+        for pin in _among(every, expanded(rows, sources, seen)):
             message = f"line {line} reads the end position of this motion"
             pins.setdefault(pin, finding(pin, "KRL002", message))
     return dict(sorted(pins.items()))
 
 
-def _rows_of(rows: MotionRows, sources: frozenset[Source], seen: set[Source]) -> set[int]:
-    """The rows after which the robot may stand, marks of labels and routines followed to their callers; what ``seen``
-    has was given before."""
-    found: set[int] = set()
-    todo: list[Source] = list(sources)
-    while todo:
-        source = todo.pop()
-        if source in seen:
-            continue
-        seen.add(source)
-        if isinstance(source, int):
-            if source < len(rows):
-                found.add(source)
-        else:
-            todo.extend(rows.sources[source])
-    return found
+def _among(every: range, rows: set[int]) -> list[int]:
+    """Those that are rows."""
+    return [row for row in rows if row in every]

@@ -1,107 +1,169 @@
-"""What the variables of a program hold: assigned, forgotten, and taken back at the cost of what was done."""
+"""What the variables of a program hold: assigned, forgotten, kept as they are at one place and joined at another."""
 
 from __future__ import annotations
 
-import re
+from typing import NamedTuple
 
+from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.krl.expressions import Value, component
-from postproc.languages.krl.target import UnknownValue
-
-_ROOT = re.compile(rb"[A-Za-z0-9_$]+")
+from postproc.languages.krl.target import KrlTarget, UnknownValue, shown
 
 Entry = dict[bytes, Value]
 """The values of one name by what follows it: b"" itself, b"[2]", b".F", b"[2].F"."""
 
-_NEW: Entry = {}
+
+class Fact(NamedTuple):
+    """A value, and the line that assigned it (0: none did)."""
+
+    value: Value
+    line: int
+
+
+class VariableFacts(NamedTuple):
+    """All variables at one place of a program.
+
+    names: name -> path -> Fact.  unknown: why a name without facts is not known; None where it is as it is declared.
+    """
+
+    names: PersistentMap
+    unknown: UnknownValue | None
 
 
 class Variables:
-    """Names (upper case) and their values.
+    """Names (upper case) and their values at the present place of a program.
 
-    Every change is noted, so that ``undo(mark())`` takes back what happened in between without a copy of everything.
     ``fixed``: what no part of the program changes (points of the .dat), found where no variable hides it.
+    ``line``: the statement that assigns.  ``mixed``: names whose values once differed where paths meet.
     """
 
     def __init__(self, fixed: dict[bytes, Entry]) -> None:
         self.fixed = fixed
-        self._names: dict[bytes, Entry] = {}
-        self._lost: UnknownValue | None = None
-        self._journal: list[tuple[Entry | None, bytes, object]] = []
-
-    def begin(self) -> None:
-        """What was set up to here is what the program starts with."""
-        self._journal.clear()
-
-    def mark(self) -> int:
-        return len(self._journal)
-
-    def undo(self, mark: int) -> None:
-        while len(self._journal) > mark:
-            entry, key, old = self._journal.pop()
-            if entry is None and key == b"*":
-                self._names, self._lost = old  # type: ignore[misc]
-            elif entry is None:
-                if old is None:
-                    self._names.pop(key, None)
-                else:
-                    self._names[key] = old  # type: ignore[assignment]
-            elif old is None:
-                entry.pop(key, None)
-            else:
-                entry[key] = old  # type: ignore[assignment]
+        self.line = 0
+        self.mixed: set[bytes] = set()
+        self._paths = KeyNumbers()
+        self.facts = VariableFacts(PersistentMap(KeyNumbers()), None)
 
     def get(self, name: bytes, path: bytes = b"") -> Value | None:
         """The value of ``name path``; None where nothing was ever assigned; UnknownValue where it is not known."""
-        entry = self._names.get(name)
-        if entry is None:
-            entry = self.fixed.get(name)
-            if entry is None:
-                return self._lost
-        if path in entry:
-            return entry[path]
-        head, dot, _ = path.rpartition(b".")
-        if dot:
-            whole = entry.get(head)
-            if isinstance(whole, UnknownValue):
-                return whole
-            found = None if whole is None else component(whole, path[len(head) :])
-            if found is not None:
-                return found
-        whole = entry.get(b"")
-        return whole if isinstance(whole, UnknownValue) else None
+        found = self._fact(self.facts, name, path)
+        return None if found is None else found.value
 
     def set(self, name: bytes, path: bytes, value: Value) -> None:
         if not path:
             # The value of the whole takes the place of all of its parts.
             self.replace(name, {b"": value})
             return
-        entry = self._names.get(name)
+        entry = self.facts.names.get(name)
         if entry is None:
-            entry = dict(self.fixed.get(name, _NEW)) if name in self.fixed else {}
-            self._journal.append((None, name, None))
-            self._names[name] = entry
-            entry[path] = value
-            return
-        self._journal.append((entry, path, entry.get(path)))
-        entry[path] = value
+            entry = self._entry(self.fixed.get(name) or {}, 0)
+        self._put(name, entry.set(path, Fact(value, self.line)))
 
-    def replace(self, name: bytes, entry: Entry | None) -> Entry | None:
-        """Gives a name another entry (None: none); gives the one before."""
-        before = self._names.get(name)
-        self._journal.append((None, name, before))
-        if entry is None:
-            self._names.pop(name, None)
-        else:
-            self._names[name] = entry
+    def replace(self, name: bytes, entry: Entry) -> None:
+        """Gives a name these values instead of all that it had."""
+        self._put(name, self._entry(entry, self.line))
+
+    def swap(self, name: bytes, entry: PersistentMap | None) -> PersistentMap | None:
+        """Gives a name what another name or call had (None: nothing); gives what it had."""
+        before: PersistentMap | None = self.facts.names.get(name)
+        self._put(name, entry)
         return before
+
+    def entry(self, values: Entry) -> PersistentMap:
+        """Values as ``swap`` takes them."""
+        return self._entry(values, self.line)
 
     def forget(self, name: bytes, why: UnknownValue) -> bool:
         """Makes a name unknown; gives whether it had a value."""
-        had = name in self._names or name in self.fixed
+        had = self.facts.names.get(name) is not None or name in self.fixed
         self.replace(name, {b"": why})
         return had
 
     def forget_all(self, why: UnknownValue) -> None:
         """Makes everything that is not fixed unknown."""
-        self._journal.append((None, b"*", (self._names, self._lost)))
-        self._names, self._lost = {}, why
+        self.facts = VariableFacts(PersistentMap(self.facts.names.numbers), why)
+
+    def joined(self, one: VariableFacts, other: VariableFacts) -> VariableFacts:
+        """What holds where two paths meet; ``one`` itself where the other path adds nothing."""
+        if one.names.root is other.names.root and one.unknown is other.unknown:
+            return one
+
+        def merge(name: bytes, a: PersistentMap | None, b: PersistentMap | None) -> PersistentMap:
+            left, right = self._declared(one, name, a), self._declared(other, name, b)
+            return left.merged(right, lambda path, _a, _b: self._join(name, path, left, right))
+
+        names = one.names.merged(other.names, merge)
+        unknown = one.unknown or other.unknown
+        return one if names is one.names and unknown is one.unknown else VariableFacts(names, unknown)
+
+    def _declared(self, facts: VariableFacts, name: bytes, entry: PersistentMap | None) -> PersistentMap:
+        """What is known of a name whose facts are ``entry``."""
+        if entry is not None:
+            return entry
+        values = self.fixed.get(name)
+        if values is None:
+            values = {} if facts.unknown is None else {b"": facts.unknown}
+        return self._entry(values, 0)
+
+    def _join(self, name: bytes, path: bytes, left: PersistentMap, right: PersistentMap) -> Fact:
+        own: Fact | None = left.get(path)
+        a, b = (_found(side, path) for side in (left, right))
+        if own is not None and isinstance(own.value, UnknownValue):
+            return own
+        if a is not None and b is not None:
+            if isinstance(b.value, UnknownValue):
+                self.mixed.add(name)
+                return Fact(b.value, b.line)
+            if _same(a.value, b.value):
+                return own if own is not None else a
+            if isinstance(a.value, KrlTarget) and isinstance(b.value, KrlTarget):
+                one, two = a.value.detached(), b.value.detached()
+                if one == two:
+                    self.mixed.add(name)
+                    return Fact(one, a.line)
+        self.mixed.add(name)
+        places = " or ".join(
+            dict.fromkeys(f"line {fact.line}" if fact and fact.line else "its declaration" for fact in (a, b))
+        )
+        return Fact(UnknownValue("KRL002", f"{shown(name + path)} varies: {places}"), 0)
+
+    def _entry(self, values: Entry, line: int) -> PersistentMap:
+        entry = PersistentMap(self._paths)
+        for path, value in values.items():
+            entry = entry.set(path, Fact(value, line))
+        return entry
+
+    def _put(self, name: bytes, entry: PersistentMap | None) -> None:
+        self.facts = VariableFacts(self.facts.names.set(name, entry), self.facts.unknown)
+
+    def _fact(self, facts: VariableFacts, name: bytes, path: bytes) -> Fact | None:
+        entry = facts.names.get(name)
+        if entry is not None:
+            return _found(entry, path)
+        values = self.fixed.get(name)
+        if values is None:
+            return None if facts.unknown is None else Fact(facts.unknown, 0)
+        if path in values:
+            return Fact(values[path], 0)
+        return _found(self._entry(values, 0), path)
+
+
+def _found(entry: PersistentMap, path: bytes) -> Fact | None:
+    """What is known of a path: itself, or as a component of what is before it."""
+    fact: Fact | None = entry.get(path)
+    if fact is not None:
+        return fact
+    head, dot, _ = path.rpartition(b".")
+    if dot:
+        before: Fact | None = entry.get(head)
+        if before is not None:
+            if isinstance(before.value, UnknownValue):
+                return before
+            found = component(before.value, path[len(head) :])
+            if found is not None:
+                return Fact(found, before.line)
+    whole: Fact | None = entry.get(b"")
+    return whole if whole is not None and isinstance(whole.value, UnknownValue) else None
+
+
+def _same(one: Value, other: Value) -> bool:
+    return type(one) is type(other) and one == other

@@ -69,7 +69,7 @@ def find_sweeps(
     moves = on_path | (toolpath.kind == Kind.PTP)
     known = toolpath.known & np.isfinite(axis[:, 0]) & np.isfinite(tip[:, 0])
     numbers = np.array([frame.number or 0 for frame in toolpath.frames] + [0])[toolpath.tool]
-    simulated = known & shifted(known) & moves & toolpath.executes
+    simulated = known & shifted(known) & moves & toolpath.continues
     simulated[1:] &= numbers[1:] == numbers[:-1]
     if not simulated.any():
         raise Refusal(Finding("STK007", "no motion has a known start, end and spindle axis", program))

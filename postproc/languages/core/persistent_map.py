@@ -1,0 +1,125 @@
+"""An immutable map whose versions share what they have in common, so that branches of a program cost what they change.
+
+A trie over hashable keys, which are numbered as they come: a new version copies one node a level, and two versions are
+merged in the time that their difference takes (Driscoll, Sarnak, Sleator, Tarjan: Making data structures persistent,
+JCSS 38, 1989).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator
+from typing import Any
+
+WIDTH = 16
+BITS = 4
+_EMPTY: tuple[Any, ...] = (None,) * WIDTH
+
+Merge = Callable[[Any, Any, Any], Any]
+"""The value of a key from its values in two maps, None where one has none."""
+
+
+class KeyNumbers:
+    """The numbers of the keys that maps of one program share."""
+
+    def __init__(self) -> None:
+        self.numbers: dict[Hashable, int] = {}
+        self.keys: list[Any] = []
+
+    def of(self, key: Hashable) -> int:
+        number = self.numbers.get(key)
+        if number is None:
+            number = self.numbers[key] = len(self.keys)
+            self.keys.append(key)
+        return number
+
+
+class PersistentMap:
+    """Keys and their values; None is no value."""
+
+    __slots__ = ("depth", "numbers", "root")
+
+    def __init__(self, numbers: KeyNumbers, root: tuple[Any, ...] = _EMPTY, depth: int = 0) -> None:
+        self.numbers, self.root, self.depth = numbers, root, depth
+
+    def get(self, key: Hashable) -> Any:
+        number = self.numbers.numbers.get(key)
+        if number is None or number >> (BITS * (self.depth + 1)):
+            return None
+        node = self.root
+        for shift in range(BITS * self.depth, 0, -BITS):
+            node = node[(number >> shift) & (WIDTH - 1)]
+            if node is None:
+                return None
+        return node[number & (WIDTH - 1)]
+
+    def set(self, key: Hashable, value: Any) -> PersistentMap:
+        """The map with another value of a key; None takes it out."""
+        number = self.numbers.of(key)
+        grown = self._reaching(number)
+        root = _set(grown.root, BITS * grown.depth, number, value)
+        return self if root is grown.root else PersistentMap(self.numbers, root, grown.depth)
+
+    def items(self) -> Iterator[tuple[Any, Any]]:
+        for number, value in _walk(self.root, self.depth, 0):
+            yield self.numbers.keys[number], value
+
+    def merged(self, other: PersistentMap, merge: Merge) -> PersistentMap:
+        """The map of ``merge(key, own value, value in other)`` for all keys whose values are not the same object; the
+        map itself where that changes nothing."""
+        if self.root is other.root:
+            return self
+        depth = max(self.depth, other.depth)
+        own, others = (m._deepened(depth) for m in (self, other))
+        root = _merged(own.root, others.root, depth, 0, self.numbers.keys, merge)
+        return self if root is own.root else PersistentMap(self.numbers, root, depth)
+
+    def _reaching(self, number: int) -> PersistentMap:
+        depth = self.depth
+        while number >> (BITS * (depth + 1)):
+            depth += 1
+        return self._deepened(depth)
+
+    def _deepened(self, depth: int) -> PersistentMap:
+        if depth == self.depth:
+            return self
+        root = self.root
+        for _ in range(depth - self.depth):
+            root = (root, *_EMPTY[1:])
+        return PersistentMap(self.numbers, root, depth)
+
+
+def _set(node: tuple[Any, ...], shift: int, number: int, value: Any) -> tuple[Any, ...]:
+    at = (number >> shift) & (WIDTH - 1)
+    if shift:
+        value = _set(node[at] or _EMPTY, shift - BITS, number, value)
+    if node[at] is value:
+        return node
+    return (*node[:at], value, *node[at + 1 :])
+
+
+def _walk(node: tuple[Any, ...], depth: int, base: int) -> Iterator[tuple[int, Any]]:
+    for at, child in enumerate(node):
+        if child is not None:
+            if depth:
+                yield from _walk(child, depth - 1, (base + at) * WIDTH)
+            else:
+                yield base + at, child
+
+
+def _merged(
+    own: tuple[Any, ...], other: tuple[Any, ...], depth: int, base: int, keys: list[Any], merge: Merge
+) -> tuple[Any, ...]:
+    merged, changed = list(own), False
+    for at, (one, two) in enumerate(zip(own, other, strict=True)):
+        if one is two:
+            continue
+        if depth:
+            new = _merged(one or _EMPTY, two or _EMPTY, depth - 1, (base + at) * WIDTH, keys, merge)
+            if new is (one or _EMPTY):
+                continue
+        else:
+            new = merge(keys[base + at], one, two)
+            if new is one:
+                continue
+        merged[at], changed = new, True
+    return tuple(merged) if changed else own

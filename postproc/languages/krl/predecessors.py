@@ -1,0 +1,125 @@
+"""From where each motion may start: only from the end of the row before it, or from elsewhere too."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+
+import numpy as np
+
+from postproc.base.arrays import Bools
+from postproc.languages.krl.modal_state import ELSEWHERE, Source
+from postproc.languages.krl.motion_rows import MotionRows
+
+MOST = 30
+"""Predecessors of a motion that are told apart."""
+_MARKS = 4 * MOST
+"""Places where paths meet that are looked at for them."""
+_TWO = 2
+"""So many sources are told apart; more are as good as two."""
+
+
+def single_sources(rows: MotionRows) -> Bools:
+    """(N,) the motion surely starts where the row before it ends, the first one where the program starts."""
+    single = np.ones(len(rows), np.bool_)
+    resolved = _resolved(rows)
+    for row, sources in rows.sources_of.items():
+        single[row] = _distinct(sources, resolved) == {row - 1}
+    single[rows.never_from :] = False
+    return single
+
+
+def continuous(rows: MotionRows, single: Bools) -> Bools:
+    """(N,) the motion surely starts where the row before it ends, and no other motion starts there; ``single`` (N,): as
+    of ``single_sources``."""
+    result = single.copy()
+    for row in expanded(rows, _sources_of_others(rows, single)):
+        if 0 <= row < len(result) - 1:
+            result[row + 1] = False
+    return result
+
+
+def predecessors(rows: MotionRows, continues: Bools) -> dict[int, tuple[int, ...]]:
+    """Row that does not continue the one before it (``continues`` (N,)) -> where it may start, as of a Toolpath."""
+    found: dict[int, tuple[int, ...]] = {}
+    for row in np.flatnonzero(~continues).tolist():
+        if rows.never_from is not None and row >= rows.never_from:
+            continue
+        sources = rows.sources_of.get(row)
+        known = {row - 1} if sources is None else _few(rows, sources)
+        found[row] = tuple(sorted(known)) or (ELSEWHERE,)
+    return found
+
+
+def _few(rows: MotionRows, sources: Iterable[Source]) -> set[int]:
+    """The rows behind sources, none where they are more than ``MOST``."""
+    seen: set[Source] = set()
+    found: set[int] = set()
+    todo = list(sources)
+    while todo:
+        source = todo.pop()
+        if source in seen:
+            continue
+        seen.add(source)
+        if isinstance(source, int):
+            found.add(source)
+        else:
+            todo.extend(rows.sources[source])
+        if len(found) > MOST or len(seen) > _MARKS:
+            return set()
+    return found
+
+
+def _sources_of_others(rows: MotionRows, single: Bools) -> Iterable[Source]:
+    """Where the motions start that do not simply follow the row before them."""
+    return {source for row, sources in rows.sources_of.items() if not single[row] for source in sources}
+
+
+def expanded(rows: MotionRows, sources: Iterable[Source], seen: set[Source] | None = None) -> set[int]:
+    """The rows (and ``START``, ``ELSEWHERE``) among sources, with those behind marks; without what ``seen`` has, which
+    takes up all that is found."""
+    seen = set() if seen is None else seen
+    found: set[int] = set()
+    todo = list(sources)
+    while todo:
+        source = todo.pop()
+        if source in seen:
+            continue
+        seen.add(source)
+        if isinstance(source, int):
+            found.add(source)
+        else:
+            todo.extend(rows.sources[source])
+    return found
+
+
+def _distinct(sources: Iterable[Source], resolved: dict[bytes, set[int]]) -> set[int]:
+    found: set[int] = set()
+    for source in sources:
+        found |= {source} if isinstance(source, int) else resolved[source]
+        if len(found) >= _TWO:
+            break
+    return found
+
+
+def _resolved(rows: MotionRows) -> dict[bytes, set[int]]:
+    """Mark -> the rows that it stands for, of more than two some two."""
+    users: dict[bytes, list[bytes]] = defaultdict(list)
+    resolved: dict[bytes, set[int]] = {}
+    todo: list[tuple[bytes, int]] = []
+    for mark, sources in rows.sources.items():
+        resolved[mark] = set()
+        for source in sources:
+            if isinstance(source, int):
+                todo.append((mark, source))
+            else:
+                users[source].append(mark)
+    while todo:
+        mark, row = todo.pop()
+        known = resolved.setdefault(mark, set())
+        if row not in known and len(known) < _TWO:
+            known.add(row)
+            todo.extend((user, row) for user in users[mark])
+    for mark in users:
+        resolved.setdefault(mark, set())
+    return resolved

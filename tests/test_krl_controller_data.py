@@ -1,0 +1,62 @@
+"""What only the controller knows, as the cell states it: names with values, and the state at the start."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from postproc.base.document import Document
+from postproc.languages.dialect import Program, ReadingSettings
+from postproc.languages.krl import KrlDialect
+from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
+
+FULL = "{X 1,Y 2,Z 3,A 4,B 5,C 6}"
+POSE = {"X": 5.0, "Y": 0.0, "Z": 0.0, "A": 0.0, "B": 0.0, "C": 0.0}
+HOME = {f"A{axis}": 10.0 * axis for axis in range(1, 7)}
+
+
+def read(
+    text: str, symbols: dict[str, Symbol] | None = None, initial: InitialState = UNSTATED, dat: str = ""
+) -> Program:
+    documents = [Document(Path("part.src"), f"DEF part()\n{text}END\n".encode())]
+    if dat:
+        documents.append(Document(Path("part.dat"), f"DEFDAT part\n{dat}ENDDAT\n".encode()))
+    return KrlDialect().read(tuple(documents), ReadingSettings(symbols=symbols or {}, initial=initial))
+
+
+@pytest.mark.parametrize(
+    ("text", "symbols", "last"),
+    [
+        ("FDAT_ACT=FHOME\nBAS(#FRAMES)\nLIN " + FULL + "\n", {"FHOME": {"TOOL_NO": 1.0, "BASE_NO": 0.0}},
+         "LIN X 1 Y 2 Z 3 A 4 B 5 C 6 base {0 0 0 0 0 0} tool [1]"),
+        ("BAS(#FRAMES)\nLIN " + FULL + "\n", {"FDAT_ACT": {"TOOL_NO": 2.0, "BASE_NO": 3.0}},
+         "LIN X 1 Y 2 Z 3 A 4 B 5 C 6 base [3] tool [2]"),
+        ("PTP XHOME\n", {"XHOME": HOME}, "AXIS A1 10 A2 20 A3 30 A4 40 A5 50 A6 60 base ? tool ?"),
+        ("BAS(#BASE,n)\nBAS(#TOOL,1)\nLIN {X n+1,Y 0,Z 0,A 0,B 0,C 0}\n", {"N": 3.0},
+         "LIN X 4 Y 0 Z 0 A 0 B 0 C 0 base [3] tool [1]"),
+        ("$BASE=BASE_DATA[2]\nBAS(#TOOL,1)\nLIN P\n", {"BASE_DATA[2]": POSE, "P": POSE},
+         "LIN X 5 Y 0 Z 0 A 0 B 0 C 0 base {5 0 0 0 0 0} tool [1]"),
+        # an INT or a REAL, and 7/2 is another number then
+        ("BAS(#BASE,1)\nBAS(#TOOL,1)\nLIN {X n/2,Y 0,Z 0,A 0,B 0,C 0}\n", {"N": 7.0},
+         "LIN base [1] tool [1] refused KRL002"),
+        ("BAS(#BASE,1)\nBAS(#TOOL,1)\nLIN P\n", {}, "LIN base [1] tool [1] refused KRL003"),
+    ],
+)  # fmt: skip
+def test_a_name_has_the_value_that_the_cell_states(text: str, symbols: dict[str, Symbol], last: str) -> None:
+    assert list(read(text, symbols).toolpath.dump())[-1].partition(" ")[2] == last
+
+
+def test_what_the_program_declares_or_assigns_is_its_own() -> None:
+    text = "BAS(#BASE,1)\nBAS(#TOOL,1)\nLIN P\nLIN Q\nQ.X=7\n"
+    path = read(text, {"P": POSE, "Q": POSE}, dat=f"DECL FRAME P={FULL}\n").toolpath
+    assert path.position[0].tolist() == pytest.approx([0.001, 0.002, 0.003])
+    assert list(path.constraints.refused) == [1]
+
+
+def test_a_program_starts_with_the_state_of_the_cell() -> None:
+    initial = InitialState(2, 3, {"X": 1.0, "Y": 2.0, "Z": 3.0, "A": 4.0, "B": 5.0, "C": 6.0})
+    lines = list(read("LIN {X 9}\n", initial=initial).toolpath.dump())
+    assert lines == ["2 LIN X 9 Y 2 Z 3 A 4 B 5 C 6 base [3] tool [2]"]
+    part = InitialState(2, 3, {"X": 1.0})
+    assert "refused KRL004" in next(read("LIN {X 9}\n", initial=part).toolpath.dump())
