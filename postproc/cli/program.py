@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 import click
@@ -100,7 +101,8 @@ def program(
         )
     out.result(done.as_json(), written=True)
     if not out.quiet:
-        show(out.console(), done, verbose)
+        with contextlib.suppress(OSError):  # the terminal may be gone; what is written is written
+            show(out.console(), done, verbose)
         if dry_run:
             click.echo("this is a dry run: nothing is written")
     raise SystemExit(done.exit)
