@@ -2,8 +2,7 @@
 
 The library ``filelock`` locks it: by ``flock`` on Linux and macOS, by ``LockFileEx`` on Windows, and where a file
 system has neither, by the existence of the file with the id of its process in it.  It also sees that the last holder
-has removed the file that it waited for, which a library that locks open handles only (portalocker) leaves to its
-caller.
+has removed the file that it waited for, which a library that locks open handles (portalocker) leaves to its caller.
 """
 
 from __future__ import annotations

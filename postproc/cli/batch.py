@@ -164,7 +164,8 @@ def batch(
         raise
     out.result(done.as_json(), written=not dry_run)
     if not out.quiet:
-        show_batched(out.console(), done, verbose)
+        with contextlib.suppress(OSError):  # the terminal may be gone; what is written is written
+            show_batched(out.console(), done, verbose)
         if dry_run:
             click.echo("this is a dry run: nothing is written")
     raise SystemExit(done.exit)

@@ -363,7 +363,8 @@ class Out:
             yield lambda name: progress.update(task, description=name)
         finally:
             timer.cancel()
-            progress.stop()
+            with contextlib.suppress(OSError):  # the terminal may be gone
+                progress.stop()
 
     @contextlib.contextmanager
     def refusals(self, program: str = "", writes: bool = True) -> Iterator[None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from pathlib import Path
 
@@ -129,7 +130,8 @@ def program(
         write_bytes(content)
     out.result(done.as_json(), written=True)
     if not out.quiet:
-        show(out.console(), done, verbose)
+        with contextlib.suppress(OSError):  # the terminal may be gone; what is written is written
+            show(out.console(), done, verbose)
         if dry_run:
             click.echo("this is a dry run: nothing is written", err=streamed)
     raise SystemExit(done.exit)

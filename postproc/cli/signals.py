@@ -64,8 +64,10 @@ def ended_in_words(and_exits: bool = False) -> Iterator[None]:
             raise SystemExit(1) from None
         _report_defect()
     finally:
-        for number, handler in before.items() if not (stopped and and_exits) else ():
-            signal.signal(number, handler)
+        # what remains is the end of the process, whose exit code is known
+        decided = and_exits and (stopped or publications() > before_run)
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_IGN if decided else handler)
 
 
 def _report_defect() -> NoReturn:
