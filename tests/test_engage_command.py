@@ -248,3 +248,13 @@ def test_the_main_job_takes_the_forces_of_the_stock(folder):
     assert result.exit_code == 1
     assert [finding["code"] for finding in json.loads(result.stdout)["findings"]] == ["STK009"]
     assert not (folder / "compensated").exists()
+
+
+def test_a_plunge_has_its_force_in_the_main_job(folder):
+    """Straight down there is no feed across the spindle: the thrust acts along it, away from the part."""
+    (folder / "part.ngc").write_text("G21 G90 G17 G54\nT1 M6\nG0 X50 Y30 Z5\nG1 Z-5 F600\nG0 Z30\nM2\n")
+    result = CliRunner().invoke(main, ["predict", str(folder / "part.ngc"), "--force=", "--json", "-"])
+    assert result.exit_code in (0, 3), result.output
+    chip = 0.01 / 600  # m: 600 mm/min, 600 teeth a second
+    thrust = 3 * 0.008 * (168.8e6 * chip + 26.6e3)
+    assert json.loads(result.stdout)["force"]["max_n"] == pytest.approx(thrust, rel=0.01)

@@ -44,12 +44,13 @@ RUNS = {
         "plan", "--effects", "joint_compliance", "--discriminate", "gravity_compensator,link_compliance", *PLAN
     ],
     "diagnose": ["diagnose", "loads.csv", "--robot", "kr270_plain.yaml", "-o", "new.yaml"],
+    "engage": ["engage", "part.ngc"],
     "batch": ["batch", ".", "--force", "-j", "1"],
     "robots": ["robots"],
     "robots, one": ["robots", "kr270_shop.yaml"],
 }  # fmt: skip
 LONG = {"plan, two effects"}
-SAMPLE = {"identify": CAMPAIGN, "diagnose": MISSING}
+SAMPLE = {"identify": CAMPAIGN, "diagnose": MISSING, "engage": "kr270_stock"}
 FAILING = {
     "report": ["none.src", "--force"],
     "predict": ["predict", "none.src"],
@@ -59,6 +60,7 @@ FAILING = {
     "identify": ["identify", "none.csv", "--effects", "backlash"],
     "plan": ["plan", "--effects", "none", *PLAN],
     "diagnose": ["diagnose", "none.csv"],
+    "engage": ["engage", "none.ngc"],
     "batch": ["batch", "none"],
     "robots": ["robots", "none"],
 }

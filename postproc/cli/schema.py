@@ -14,6 +14,7 @@ RESULTS = (
     "verify",
     "map",
     "identify",
+    "engage",
     "plan",
     "diagnose",
     "batch",

@@ -188,7 +188,8 @@ def stock_distance(stock: Stock, x: float, y: float, z: float, time: int) -> flo
         else:
             high = middle
     for place in range(low - 1, start - 1, -1):
-        d = swept_distance(stock.sweeps, stock.cutters, stock.near[place], x, y, z, reach)
+        # on the positive side only a smaller distance counts
+        d = swept_distance(stock.sweeps, stock.cutters, stock.near[place], x, y, z, max(best, 0.0))
         if d < best:
             best = d
             if best <= -reach:

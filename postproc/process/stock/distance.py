@@ -141,6 +141,9 @@ def _straight(sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: fl
     # |u - t d|^2 = uu - 2 t ud + t^2 dd
     uu, ud, dd = ux * ux + uy * uy + uz * uz, ux * dx + uy * dy + uz * dz, dx * dx + dy * dy + dz * dz
     if sweeps[j, MODE] == ACROSS:
+        beyond = max(-height, height - cutters[c, LENGTH])
+        if beyond > enough:  # no need of a root
+            return beyond
         t = min(max(ud / dd, 0.0), 1.0) if dd > 0.0 else 0.0
         return cutter_distance(cutters, c, np.sqrt(max(uu - t * (2.0 * ud - t * dd), 0.0)), height)
     middle = cutter_distance(cutters, c, np.sqrt(max(uu - ud + 0.25 * dd, 0.0)), height - 0.5 * rise)

@@ -41,7 +41,8 @@ _LONGEST = 4.0  # radii of the smallest cutter
 class MotionSweeps:
     """rows (M, ROW): see ``distance``; motion (M,): row of the toolpath; share (M, 2): of that motion; length (M,)
     [m] of the path of the tip; heading (M, 3): direction of the feed across the spindle, the last where there is
-    none; cutters: in the order of CUTTER; simulated (N,): motions that are known from their start."""
+    none; cutters: in the order of CUTTER; simulated (N,): motions that are known from their start; in_stock
+    (N, 3, 3): rotation of the programmed base to the stock."""
 
     rows: Floats
     motion: Ints
@@ -50,6 +51,7 @@ class MotionSweeps:
     heading: Floats
     cutters: tuple[Cutter, ...]
     simulated: Bools
+    in_stock: Floats
 
     @property
     def which(self) -> Ints:
@@ -117,7 +119,7 @@ def find_sweeps(
     rows[:, REMOVES] = cuts[owner]
     flat = rows[:, STEP : STEP + 3] - along[:, None] * axes[0]
     return MotionSweeps(
-        rows, row[owner], share, _lengths(rows), _headings(flat, axes[0]), tuple(cutters), simulated
+        rows, row[owner], share, _lengths(rows), _headings(flat, axes[0]), tuple(cutters), simulated, turned
     )
 
 

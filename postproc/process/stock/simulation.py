@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import MM
 from postproc.cell import MotionFrames
 from postproc.process.stated_forces import BASE, FEED, StatedForces
 from postproc.process.stock.blank import Blank, box_blank, corners_of, cylinder_blank, mesh_blank
 from postproc.process.stock.cutters import CUTTING, HOLDER, SHANK
-from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT
+from postproc.process.stock.distance import AXIS, CUTTER, REMOVES, STEP, TIP_POINT, TURN
 from postproc.process.stock.engagement import EngagedMotions, engage
 from postproc.process.stock.motion_sweeps import MotionSweeps, find_sweeps
 from postproc.process.stock.saved_stock import Removed, read_stock, stock_bytes
@@ -24,6 +24,7 @@ from postproc.toolpath import Kind, Toolpath
 
 _PARTS = {CUTTING: "the cutter", SHANK: "the shank", HOLDER: "the holder"}
 _MOST_FINDINGS = 20
+_NO_MOVE = 1e-7  # m
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +104,7 @@ def stock_forces(
     frame = np.full(len(rows) + 1, FEED)
     plunges = _along_spindle(run.sweeps, len(toolpath))[rows]
     frame[1:][plunges] = BASE
-    turned = _to_base(run, toolpath, frames, rows[plunges])
+    turned = _to_base(run.sweeps, len(toolpath), rows[plunges])
     along[plunges] = np.einsum("nij,nskj->nski", turned, along[plunges].reshape(-1, 2, 2, 3)).reshape(
         -1, 2, 6
     )
@@ -137,28 +138,15 @@ def _along_spindle(sweeps: MotionSweeps, count: int) -> Bools:
     return found
 
 
-def _to_base(run: StockRun, toolpath: Toolpath, frames: MotionFrames, rows: np.ndarray) -> Floats:
+def _to_base(sweeps: MotionSweeps, count: int, rows: Ints) -> Floats:
     """(K, 3, 3) from the frame in which the force of a plunge is computed to the programmed base of its motion."""
-    last = np.zeros(len(toolpath), np.int64)
-    last[run.sweeps.motion] = np.arange(len(run.sweeps.motion))
-    at = last[rows]
-    z = run.sweeps.rows[at, AXIS : AXIS + 3]
-    heading = run.sweeps.heading[at]
+    last = np.zeros(count, np.int64)
+    last[sweeps.motion] = np.arange(len(sweeps.motion))
+    z, heading = sweeps.rows[last[rows], AXIS : AXIS + 3], sweeps.heading[last[rows]]
     x = heading - np.einsum("ni,ni->n", heading, z)[:, None] * z
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     axes = np.stack([x, np.cross(z, x), z], axis=2)
-    spindle = -np.einsum("nij,nj->ni", toolpath.rotation[rows], frames.spindle_in_tool[rows])
-    # the base of the stock and that of the motion differ by a rotation that takes one spindle axis to the other
-    return np.asarray(_aligning(z, spindle) @ axes)
-
-
-def _aligning(one: Floats, other: Floats) -> Floats:
-    cross = np.cross(one, other)
-    cosine = np.einsum("ni,ni->n", one, other)
-    skew = np.zeros((len(one), 3, 3))
-    skew[:, 0, 1], skew[:, 0, 2], skew[:, 1, 2] = -cross[:, 2], cross[:, 1], -cross[:, 0]
-    skew -= np.swapaxes(skew, 1, 2)
-    return np.asarray(np.eye(3) + skew + skew @ skew / np.maximum(1 + cosine, 1e-12)[:, None, None])
+    return np.asarray(np.swapaxes(sweeps.in_stock[rows], 1, 2) @ axes)
 
 
 def unknown_forces(run: StockRun, toolpath: Toolpath, program: str, code: str) -> list[Finding]:
@@ -225,10 +213,16 @@ def _collisions(cut: EngagedMotions, toolpath: Toolpath, program: str) -> list[F
 
 
 def _not_simulated(sweeps: MotionSweeps, toolpath: Toolpath, program: str) -> list[Finding]:
-    lost = np.flatnonzero(~sweeps.simulated & np.isin(toolpath.kind, (Kind.LIN, Kind.CIRC, Kind.SPL)))
+    on_path = np.isin(toolpath.kind, (Kind.LIN, Kind.CIRC, Kind.SPL))
+    turns = np.zeros(len(toolpath), bool)
+    turns[sweeps.motion[(sweeps.length < _NO_MOVE) & sweeps.rows[:, TURN : TURN + 3].any(axis=1)]] = True
+    lost = np.flatnonzero((~sweeps.simulated | turns | (toolpath.kind == Kind.SPL)) & on_path)
     if not len(lost):
         return []
-    message = f"{len(lost)} motions are not simulated: start, end, tool or spindle axis is not known"
+    message = (
+        f"{len(lost)} motions are not simulated, or not exactly: start, end, tool or spindle axis is not known, "
+        "the tool only turns, or a spline is taken as a straight line"
+    )
     return [Finding("STK013", message, program, int(toolpath.line[lost[0]]))]
 
 
