@@ -198,7 +198,7 @@ class _Run:
             found.update(dict.fromkeys(m.block[m.value == code].tolist(), verb))
         found.update(dict.fromkeys(g.block[g.value == 65].tolist(), "macro"))
         if self.control.calls:
-            calls = self.source.mask(*self.control.calls) & ~self.source.mask(key("G"), key("M"))
+            calls = self.source.mask(*self.control.calls)
             found.update(dict.fromkeys(np.flatnonzero(calls).tolist(), "named"))
         return found
 

@@ -85,7 +85,7 @@ def follow(execution: Execution, control: Control, once: Ints) -> ExecutionFlow:
     coded += [note.block for note in source.notes if note.kind == "call"]
     forget[np.array(coded, np.intp) + 1] = True
     if control.calls:
-        forget[1:] |= source.mask(*control.calls) & ~source.mask(key("G"), key("M"))
+        forget[1:] |= source.mask(*control.calls)
     forget[1:] &= ~execution.called
     entered = _returned(source, n) | execution.entered
     if not execution.followed:

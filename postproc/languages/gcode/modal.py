@@ -180,24 +180,27 @@ def _unused(
     number: Ints,
     force: Mapping[Group, Ints],
 ) -> Bools:
-    """(B,) blocks with a word that nothing in them uses; of controls of ISO code only."""
+    """(B,) blocks with a word that nothing in them uses; of a control that is not of ISO code only those of arcs."""
     n = len(source.blocks)
     unused = np.zeros(n, np.bool_)
-    if not control.iso:
+    if control.expressions is None:
         return unused
+    letters = "IJKPQLR" if control.iso else "IJKR"
+    # P gives the turns of an arc of some controls only.
+    straight = "LQ" if control.turns[0] == key("P") else "LQP"
     using = np.zeros(n, np.bool_)  # a code that is free to have any word
     using[blocks[~np.isin(groups, _PLAIN)]] = True
     using |= source.mask(key("M")) | force[Group.MACRO].astype(bool) | force[Group.FOREIGN].astype(bool)
     move = force[Group.MOTION]
     using |= ~np.isin(move, (*_WORDLESS, *_CURVED))
     curved = np.isin(move, _CURVED)
-    for letter in "IJKPQLR":
+    for letter in letters:
         has = source.mask(key(letter))
         if not has.any():
             continue
         own = np.zeros(n, np.bool_)
         own[blocks[np.isin(number, _OWN.get(letter, ()))]] = True
-        unused |= has & ~using & ~own & ~(curved & (letter not in "LQ"))
+        unused |= has & ~using & ~own & ~(curved & (letter not in straight))
     return unused
 
 

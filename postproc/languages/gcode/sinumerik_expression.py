@@ -7,7 +7,7 @@ import re
 
 _NUMBER = re.compile(rb"[ \t]*((?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)[ \t]*", re.I)
 _OPERAND = re.compile(rb"'[^']*'|[0-9.]+(?:EX[-+]?[0-9]+)?|[$A-Za-z_][$A-Za-z0-9_]*", re.I)
-_NEXT = re.compile(rb"[ \t]*[A-Za-z](?:[ \t]*[-+.0-9]|[0-9]{0,3}[ \t]*=)")
+_OPERATOR = re.compile(rb"[ \t]*+(?:MOD|DIV|AND|OR|XOR|NOT|B_[A-Z]+)(?![A-Za-z_0-9])|[ \t]*+[-+*/<>=]", re.I)
 _CLOSED = re.compile(rb'"[^"]*"')
 _DEEPEST = 20
 _LONGEST = 200
@@ -49,9 +49,10 @@ def expression_end(text: bytes, at: int) -> int:
 
 
 def assigned_end(text: bytes, at: int) -> int:
-    """Where what is assigned to a parameter ends: before another word, else with the line (R1=R2 MOD 3)."""
+    """Where what is assigned to a parameter ends: before another word, with an operator of letters (R1=R2 MOD 3) at the end
+    of the line."""
     close = expression_end(text, at)
-    return close if _NEXT.match(text, close) else len(text)
+    return len(text) if _OPERATOR.match(text, close) else close
 
 
 def is_open(text: bytes) -> bool:

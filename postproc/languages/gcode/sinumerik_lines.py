@@ -279,6 +279,9 @@ class _Taken:
             self.codes(place, len(text.rstrip()), on)
             if drilling and called is not None:
                 self.retract(called.end())
+                rest = text[self.arguments(called.end()) :].strip()
+                if rest:
+                    self.note("unknown", rest)
             return len(text)
         if name in OPENS or name in CLOSES or name in JUMPS or name in DECLARES or name in QUIET_NAMES:
             said = text[place:].strip().upper()
@@ -292,12 +295,10 @@ class _Taken:
         closed = self.arguments(end)
         if name in QUIET_CALLS:
             return closed
-        if name in DRILLING and not self.words:
+        if name in DRILLING | MILLING and not self.words and not text[closed:].strip():
             self.note("cycle", name)
-            self.retract(end)
-            return closed
-        if name in MILLING and not self.words:
-            self.note("cycle", name)
+            if name in DRILLING:
+                self.retract(end)
             return closed
         if self.words or (closed == end and text[end:].strip()):
             self.note("unknown", text[place:].strip())
