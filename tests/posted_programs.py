@@ -18,7 +18,7 @@ def pocket(levels: int = 3, arcs: bool = True, start: str = "") -> list[str]:
             size = step * 4.0
             lines += [f"G1 X{size:.3f}", f"Y{size:.3f}", f"X{-size:.3f}", f"Y{-size:.3f}", f"X{size:.3f}"]
             if arcs:
-                lines += [f"G3 X{size + 2:.3f} Y{-size + 2:.3f} I0. J2.", f"G1 Y0."]
+                lines += [f"G3 X{size + 2:.3f} Y{-size + 2:.3f} I0. J2.", "G1 Y0."]
         lines.append(f"G1 Z{-2.0 - level:.1f}")
     return [*lines, "G0 Z50."]
 
@@ -170,22 +170,59 @@ def linuxcnc() -> dict[str, list[str]]:
     return {
         "linuxcnc-plain.ngc": [*head, *pocket(), "M2"],
         "linuxcnc-named.ngc": [
-            *head, "#<depth>=-3", "#<step> = [ABS[#<depth>]/3]", "G0 X0 Y0", "Z#<step>", "G1 Z#<depth> F100",
-            *(line for i in range(1, 30) for line in (f"X[{i}*#<step>]", f"Y#<step>", f"G1 X{i}. Y[#<step>+{i}]")),
+            *head,
+            "#<depth>=-3",
+            "#<step> = [ABS[#<depth>]/3]",
+            "G0 X0 Y0",
+            "Z#<step>",
+            "G1 Z#<depth> F100",
+            *(
+                line
+                for i in range(1, 30)
+                for line in (f"X[{i}*#<step>]", "Y#<step>", f"G1 X{i}. Y[#<step>+{i}]")
+            ),
             "M2",
         ],
         "linuxcnc-while.ngc": [
-            *head, "G0 X0 Y0", "Z5", "#1=0", "O100 WHILE [#1 GT -4]", "#1=[#1-1]", "G1 Z#1 F100", "X10", "Y10", "X0",
-            "Y0", "O100 ENDWHILE", *pocket(1), "M2",
+            *head,
+            "G0 X0 Y0",
+            "Z5",
+            "#1=0",
+            "O100 WHILE [#1 GT -4]",
+            "#1=[#1-1]",
+            "G1 Z#1 F100",
+            "X10",
+            "Y10",
+            "X0",
+            "Y0",
+            "O100 ENDWHILE",
+            *pocket(1),
+            "M2",
         ],
         "linuxcnc-sub.ngc": [
-            "O200 SUB", "G1 Z#1 F100", "X20", "Y20", "X0", "Y0", "O200 ENDSUB", *head, "G0 X0 Y0", "Z5",
-            "O200 CALL [-1]", "O200 CALL [-2]", *pocket(1), "M2",
+            "O200 SUB",
+            "G1 Z#1 F100",
+            "X20",
+            "Y20",
+            "X0",
+            "Y0",
+            "O200 ENDSUB",
+            *head,
+            "G0 X0 Y0",
+            "Z5",
+            "O200 CALL [-1]",
+            "O200 CALL [-2]",
+            *pocket(1),
+            "M2",
         ],
         "mach-no-start.tap": [*head, "G1 Z-1 F100", *pocket()[3:], "M30"],
         "heidenhain-iso.nc": [
-            "%POCKET G71 *", "N10 G30 G17 X+0 Y+0 Z-20*", "N20 G31 G90 X+100 Y+100 Z+0*", "N30 T1 G17 S5000*",
-            *(f"N{40 + i} G01 X+{i} Y+{i * 2} G40 F200*" for i in range(10)), "N9999999 %POCKET G71 *",
+            "%POCKET G71 *",
+            "N10 G30 G17 X+0 Y+0 Z-20*",
+            "N20 G31 G90 X+100 Y+100 Z+0*",
+            "N30 T1 G17 S5000*",
+            *(f"N{40 + i} G01 X+{i} Y+{i * 2} G40 F200*" for i in range(10)),
+            "N9999999 %POCKET G71 *",
         ],
         "printer-like.gcode": ["G21", "G90", "M82", "G28", "G1 Z5 F3000", *pocket(1)[2:], "M84"],
     }

@@ -1,8 +1,7 @@
 """A word that is put into a block changes the reading or gives a finding: none is ever dropped.
 
-Every word of a list at both ends of every block of programs with one block of each kind; where it makes no difference it
-says what is in force anyway, and stands in a list of these.
-"""
+Every word of a list at both ends of every block of programs with one block of each kind; where it makes no
+difference it says what is in force anyway, and stands in a list of these."""
 
 from __future__ import annotations
 
@@ -32,7 +31,21 @@ ISO_WORDS = (
     "M6", "#2=3", "X#99", "zzz", "G52", "G4", "G51 X2.",
 )  # fmt: skip
 ISO_OTHERS = ("T2 M6", "G43 H2", "G55", "M3 S1000", "F200.", "G80", "G91", "G18", "G20", "#1=5", "M8")
-ISO_STATES = ("X8.25", "Z8.25", "A8.25", "G20", "G41", "G55", "G65", "G68", "G91", "G93", "G38.2", "G777", "zzz")
+ISO_STATES = (
+    "X8.25",
+    "Z8.25",
+    "A8.25",
+    "G20",
+    "G41",
+    "G55",
+    "G65",
+    "G68",
+    "G91",
+    "G93",
+    "G38.2",
+    "G777",
+    "zzz",
+)
 SINUMERIK_MOTIONS = (
     "G1 X5.5 Y6.5 F100", "X7.5", "G2 X11.5 Y2.5 I=5 J=0", "G3 X3.5 Y4.5 CR=9", "X=R1+1",
 )  # fmt: skip

@@ -161,7 +161,7 @@ def test_the_last_block_of_those_in_doubt() -> None:
             while doubt[row] and last + 1 < n and doubt[last + 1]:
                 last += 1
             expected.append(last)
-        assert ExecutionFlow(doubt, no, no, no, no, no, no).last.tolist() == expected
+        assert ExecutionFlow(doubt, no, no, no, no, no, no, no).last.tolist() == expected
     assert FlowReason.NONE == 0
 
 

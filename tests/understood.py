@@ -82,7 +82,9 @@ def main() -> None:
             print(f"        {many:6d}  {reason}")
     if counts:
         motions = sum(one.motions for one in counts)
-        understood, correctable = (sum(getattr(one, name) for one in counts) for name in ("understood", "correctable"))
+        understood, correctable = (
+            sum(getattr(one, name) for one in counts) for name in ("understood", "correctable")
+        )
         print(
             f"{len(counts)} programs, {motions} feed motions: {understood / motions:.1%} understood,"
             f" {correctable / motions:.1%} correctable; mean over the programs"

@@ -31,9 +31,9 @@ class Difference:
 
 @dataclass
 class Comparison:
-    """motions: of rs274, but those without a row that move nothing (a G0 alone), and a cycle as one; known: those that a row claims, and
-    rightly; located: those whose place is right, refused or not; misplaced: refused rows with another place than
-    rs274's, which are no difference."""
+    """motions: of rs274, but those without a row that move nothing (a G0 alone), and a cycle as one; known: those
+    that a row claims, and rightly; located: those whose place is right, refused or not; misplaced: refused rows
+    with another place than rs274's, which are no difference."""
 
     motions: int = 0
     known: int = 0

@@ -32,11 +32,11 @@ _AXES = {"XY": (0, 1, 2), "XZ": (2, 0, 1), "YZ": (1, 2, 0)}
 class Motion:
     """A motion of rs274.
 
-    line: from 1.  kind: "PTP", "LIN" or "CIRC".  start, end (3,) [mm]: in the coordinates of the work offset in force,
-    with the shift of G92 in them, as the program's reader has them.  step, start_step [mm]: of the last digits printed.
-    base: number of the work offset; rewritten: the program has changed it.  tool: in the spindle, -1 before any change
-    to a tool of a T word.  offset (3,) [mm], rotation [deg]: the work offset in force.  Of arcs: centre (3,) [mm]; turn [rad], counter-clockwise about the plane's third axis.
-    """
+    line: from 1.  kind: "PTP", "LIN" or "CIRC".  start, end (3,) [mm]: in the coordinates of the work offset in
+    force, with the shift of G92 in them, as the program's reader has them.  step, start_step [mm]: of the last
+    digits printed. base: number of the work offset; rewritten: the program has changed it.  tool: in the spindle,
+    -1 before any change to a tool of a T word.  offset (3,) [mm], rotation [deg]: the work offset in force.  Of
+    arcs: centre (3,) [mm]; turn [rad], counter-clockwise about the plane's third axis."""
 
     line: int
     kind: str

@@ -344,7 +344,8 @@ def frame_events(
     if (called := given.noted("cycle")).any():
         single = np.zeros((n, 6), np.bool_)
         single[np.arange(n), np.array([2, 1, 0])[np.clip(force[Group.PLANE], 0, 2)]] = True
-        at_plane = called & given.has(given.control.retract) & np.isfinite(ends)
+        retracting = () if given.control.retract is None else (given.control.retract,)
+        at_plane = called & given.has(*retracting) & np.isfinite(ends)
         target |= at_plane[:, None] & single
         value = np.where(at_plane[:, None] & single, ends[:, None], value)
         lose(linear, called & ~at_plane, What.CYCLE)

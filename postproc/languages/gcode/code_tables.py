@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.languages.gcode import expressions, general_lines, offsets
+from postproc.languages.gcode import expression_values, general_lines, offsets
 from postproc.languages.gcode.control import UNKNOWN, Control, Feed, Group, ModalCode, Move, Once
 
 COMMENT = rb"\((?:[^()\r\n]++|\([^()\r\n]*+\))*+\)?|;[^\r\n]*"
@@ -124,7 +124,7 @@ LINUXCNC = Control(
     },
     start={Group.RETURN: UNKNOWN},
     feed_before_units=True,
-    expressions=expressions.LINUXCNC,
+    expressions=expression_values.LINUXCNC,
     frame=offsets.one_shift,
 )
 """LinuxCNC, and ISO code that is of no other control."""
@@ -156,6 +156,6 @@ FANUC = Control(
     cycle_apart=True,
     increments=True,
     turns=(0, 0),
-    expressions=expressions.FANUC,
+    expressions=expression_values.FANUC,
 )
 """Fanuc, and controls that follow it: Haas, Brother, Okuma and Mitsubishi in ISO code."""

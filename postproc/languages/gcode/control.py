@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.languages.gcode.expressions import ExpressionLanguage
+from postproc.languages.gcode.expression_values import ExpressionLanguage
 from postproc.languages.gcode.words import Note, key
 
 

@@ -88,7 +88,9 @@ def check_correctability(
         "GCO006",
         "the motion runs several times: one number cannot state the targets of all",
     )
-    refuse(np.abs(force[Group.MACRO]) == 1, "GCO007", "every block calls a macro or a cycle here (G66, MCALL)")
+    refuse(
+        np.abs(force[Group.MACRO]) == 1, "GCO007", "every block calls a macro or a cycle here (G66, MCALL)"
+    )
     refuse(modal.has(Once.HOME)[rows], "GCO004", "the block leads to the reference point")
     refuse(modal.has(Once.MACHINE)[rows], "GCO004", "the block uses machine coordinates")
     refuse(modal.has(Once.PROBE)[rows], "GCO011", "the block is a probing move: its end is not known")
@@ -129,8 +131,7 @@ def check_correctability(
     quiet = np.isin(moves.move, (-1, Move.NOTHING))
     refuse(quiet, "GCO018", "the block has axis words, but no motion code is active")
     refuse(
-        moves.move == Move.CYCLE,
-        "GCO008", "the block is a canned cycle: its motions are not in the program"
+        moves.move == Move.CYCLE, "GCO008", "the block is a canned cycle: its motions are not in the program"
     )
     refuse(
         np.isin(moves.move, (Move.SPLINE, Move.THREAD, Move.OTHER)),
@@ -184,7 +185,9 @@ def _codes(given: BlockWords, rows: Ints, collector: RefusalCollector) -> None:
         codes = given.modal.unknown_codes.last(rows[some], absent=-1.0)
         values, which = np.unique(np.nan_to_num(codes, nan=-1.0), return_inverse=True)
         messages = [(named := code_name(value), f"{named} is not known here") for value in values.tolist()]
-        collector.refuse_each(some, [RefusalReason("GCO001", message, name) for name, message in messages], which)
+        collector.refuse_each(
+            some, [RefusalReason("GCO001", message, name) for name, message in messages], which
+        )
 
 
 def code_name(value: float) -> str:
@@ -226,6 +229,15 @@ def _positions(
         "GCO019",
         "the coordinates are not known: G92 follows an unknown position, or a frame is not read",
     )
+
+
+def bind_names(execution: Execution) -> str:
+    """What to do about names whose values were wanted and are not known."""
+    names = [name for name in execution.unknown if not name.startswith(("#<_", "$"))]
+    if not names:
+        return ""
+    shown = ", ".join([*names[:5], *(["..."] if len(names) > 5 else [])])
+    return f"bind {shown} under symbols: in the cell, or let the post-processor write numbers"
 
 
 def locked_rows(

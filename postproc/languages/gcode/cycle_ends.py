@@ -31,7 +31,9 @@ def _leaves_unknown(given: BlockWords, lengths: Bools) -> Bools:
     """(B,) blocks before or after which the place of the tool may be another one than the last coordinates."""
     modal = given.modal
     once = (Once.HOME, Once.MACHINE, Once.PROBE, Once.CALL, Once.OTHER, Once.STORE)
-    others = modal.has(*once) | modal.unknown | modal.unused | given.noted("unknown", "axis", "polar", "corner")
+    others = (
+        modal.has(*once) | modal.unknown | modal.unused | given.noted("unknown", "axis", "polar", "corner")
+    )
     uncertain = modal.flow.forget | (modal.flow.reason != 0) | modal.switched(Group.OFFSET) | lengths
     return np.asarray(others | uncertain | given.twice)
 

@@ -74,7 +74,7 @@ def diagnostics(
     tell(probing, "GCO001", "the block is a probing move without axes")
     calls, m = none.copy(), given.words(key("M"))
     calls[m.block[np.isin(m.value, CALLS)]] = True
-    calls |= modal.has(Once.CALL) | given.noted("call")
+    calls |= modal.has(Once.CALL) | given.noted("call") | given.has(*given.control.calls)
     tell(calls & ~modal.flow.called, "GCO007", "the block calls code that is not read")
     tell(given.noted("cycle"), "GCO008", "the block calls a cycle of the control")
     strange_m = ~np.isin(m.value, KNOWN_M) & live[m.block]

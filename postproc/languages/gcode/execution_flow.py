@@ -6,7 +6,6 @@ import re
 from dataclasses import dataclass, fields
 from enum import IntEnum
 from functools import cached_property
-
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,8 +21,9 @@ if TYPE_CHECKING:
 _GOTO = re.compile(r"(?:GOTO[BFC]?|REPEATB?)\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
 _CODE = re.compile(r"(?<![A-Z_])[GM][ \t]*[\d#\[]", re.I)
 _ZEROS = re.compile(r"^N?0*(?=\d)")
-CALLS = (72, 97, 98, 198)
-"""M72 of LinuxCNC brings back modes that M70 has saved."""
+RESTORES, SAVES_FOR_A_CALL = 72, 73
+"""Of LinuxCNC: M72 brings back modes that M70 has saved; M73 has the end of its subprogram do so."""
+CALLS = (RESTORES, 97, 98, 198)
 LOCAL = 97
 RETURNS = (99,)
 
@@ -42,9 +42,10 @@ class FlowReason(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class ExecutionFlow:
-    """reason (B,) FlowReason; forget (B,): before it other code ran that was not read; calls (B,): runs it; called (B,):
-    calls code of the file, which runs after it; tape (B,): belongs to the program; entered (B,): a jump leads to it,
-    past what is before it; repeated (B,): its line runs in other blocks as well."""
+    """reason (B,) FlowReason; forget (B,): before it other code ran that was not read; calls (B,): runs it; called
+    (B,): calls code of the file, which runs after it; tape (B,): belongs to the program; entered (B,): a jump leads
+    to it, past what is before it; repeated (B,): its line runs in other
+    blocks as well; restored (B,): before it modes were brought back that are not followed."""
 
     reason: Ints
     forget: Bools
@@ -53,6 +54,7 @@ class ExecutionFlow:
     tape: Bools
     entered: Bools
     repeated: Bools
+    restored: Bools
 
     def part(self, start: int, stop: int) -> ExecutionFlow:
         return ExecutionFlow(*(getattr(self, one.name)[start:stop] for one in fields(self)))
@@ -101,8 +103,17 @@ def follow(execution: Execution, control: Control, once: Ints) -> ExecutionFlow:
     rest[rest == FlowReason.NONE] = FlowReason.COMPUTED
     if not execution.followed:
         _ended(source, control, uncertainty, tape)
+    restored = np.zeros(n + 1, np.bool_)
+    restored[m.block[np.isin(m.value, (RESTORES, SAVES_FOR_A_CALL))] + 1] = True
     return ExecutionFlow(
-        uncertainty, forget[:-1], forget[1:], execution.called, tape, entered, execution.repeated
+        uncertainty,
+        forget[:-1],
+        forget[1:],
+        execution.called,
+        tape,
+        entered,
+        execution.repeated,
+        restored[:-1],
     )
 
 

@@ -76,7 +76,10 @@ def line(text: bytes) -> LexedLine:
     flow = _FLOW.match(text, place)
     if flow is not None:
         label, word = flow[1].upper().translate(None, b" \t"), flow[2].upper()
-        note(_FLOW_WORDS.get(word, "unknown"), (label + b" " + word + b" " + text[flow.end() :].strip()).strip())
+        note(
+            _FLOW_WORDS.get(word, "unknown"),
+            (label + b" " + word + b" " + text[flow.end() :].strip()).strip(),
+        )
         return LexedLine(words, notes, deleted)
     while place < len(text):
         found = _TOKEN.match(text, place)

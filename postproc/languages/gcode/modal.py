@@ -296,7 +296,7 @@ class _Fill:
     def __init__(self, flow: ExecutionFlow, start: int, group: Group) -> None:
         self._flow, self._start = flow, start
         self._type = np.int32 if group == Group.OFFSET else np.int8
-        self._forget = np.flatnonzero(flow.forget) if group in _FORGOTTEN else np.empty(0, np.int64)
+        self._forget = np.flatnonzero(flow.forget if group in _FORGOTTEN else flow.restored)
 
     def __call__(self, at: Ints, value: Ints) -> Ints:
         n = len(self._flow.reason)

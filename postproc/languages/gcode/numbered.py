@@ -39,8 +39,8 @@ class StatedOffset:
 
 @dataclass(frozen=True, eq=False)
 class WorkOffsets:
-    """base (B,): number of the work offset in force; that of the cell, STATED and more of one in ``stated``, -1 where it
-    is not known.  changed (B,): blocks before which the offset in force became another one."""
+    """base (B,): number of the work offset in force; that of the cell, STATED and more of one in ``stated``, -1
+    where it is not known.  changed (B,): blocks before which the offset in force became another one."""
 
     base: Ints
     changed: Bools
@@ -64,7 +64,9 @@ def work_offsets(given: BlockWords) -> WorkOffsets:
             written = _AllUnknown()
         else:
             before = written.get(number, np.full(4, np.nan))
-            written[number] = np.where(np.isnan(values), before, values) if values is not None else np.full(4, np.nan)
+            written[number] = (
+                np.where(np.isnan(values), before, values) if values is not None else np.full(4, np.nan)
+            )
         rows = slice(block + 1, stop + 1)
         here = base[rows]
         for one in np.unique(here).tolist():
@@ -89,9 +91,11 @@ def _stated(number: int, values: Floats, stated: list[StatedOffset]) -> int:
         return -1
     pose = Poses(rotation_from_abc(np.array([values[3], 0.0, 0.0])), values[:3])
     for index, one in enumerate(stated):
-        if one.number == number and (one.pose.position == values[:3]).all():
-            if np.array_equal(one.pose.rotation, pose.rotation):
-                return STATED + index
+        same = np.array_equal(one.pose.position, values[:3]) and np.array_equal(
+            one.pose.rotation, pose.rotation
+        )
+        if one.number == number and same:
+            return STATED + index
     if len(stated) == MOST_STATED:
         return -1
     stated.append(StatedOffset(number, pose))
@@ -99,15 +103,20 @@ def _stated(number: int, values: Floats, stated: list[StatedOffset]) -> int:
 
 
 def _offset_events(given: BlockWords) -> list[tuple[int, int | None, Floats | None]]:
-    """Blocks that write an offset, its number or None for all, and its X, Y, Z [m] and angle [rad], NaN where they stay;
-    None where they are not known."""
+    """Blocks that write an offset, its number or None for all, and its X, Y, Z [m] and angle [rad], NaN where they
+    stay; None where they are not known."""
     base, fanuc = given.modal.force[Group.OFFSET], given.control.increments
     events: list[tuple[int, int | None, Floats | None]] = []
     settings = np.flatnonzero(given.modal.has(Once.SETTING))
     if len(settings):
         level, which = given.number(key("L")), given.number(key("P"))
         values = np.stack([*(given.lengths(one) for one in AXES[:3]), given.number(key("R")) * DEG], axis=1)
-        read = (given.modal.flow.reason == FlowReason.NONE) & ~given.has(*AXES[3:]) & ~given.unclear & ~given.twice
+        read = (
+            (given.modal.flow.reason == FlowReason.NONE)
+            & ~given.has(*AXES[3:])
+            & ~given.unclear
+            & ~given.twice
+        )
         if fanuc:  # in G91 the values are added
             read &= (given.modal.force[Group.DISTANCE] == 0) & ~given.has(key("R"))
         present = np.stack([given.has(one) for one in (*AXES[:3], key("R"))], axis=1)

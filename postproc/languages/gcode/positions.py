@@ -66,7 +66,8 @@ class Trace:
         change: Callable[[int, ProgrammedFrame, Floats], ProgrammedFrame],
         here: Floats | None = None,
     ) -> None:
-        """here (6,) [m, rad]: where the axes are at the first block, NaN where that is not known, as without; events (E,): blocks that change the frame (and move nothing), ascending; ``change`` (block, frame, position
+        """here (6,) [m, rad]: where the axes are at the first block, NaN where that is not known, as without;
+        events (E,): blocks that change the frame (and move nothing), ascending; ``change`` (block, frame, position
         in the base) gives the frame after one."""
         self._events, self._change = events[:MOST], change
         self.frames = [first]

@@ -30,10 +30,10 @@ from postproc.languages.gcode.blocks import (
 )
 from postproc.languages.gcode.comments import remarks
 from postproc.languages.gcode.control import Control, Event, Feed, Group, Move, Once, ProgrammedFrame
-from postproc.languages.gcode.correctability import Built, check_correctability, locked_rows
+from postproc.languages.gcode.correctability import Built, bind_names, check_correctability, locked_rows
 from postproc.languages.gcode.cycle_ends import cycle_ends
 from postproc.languages.gcode.diagnostics import diagnostics
-from postproc.languages.gcode.execution import Execution, FoldedWords, execute
+from postproc.languages.gcode.execution import FoldedWords, execute
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
 from postproc.languages.gcode.feeds import Feeds, feeds_before_units
 from postproc.languages.gcode.integer_words import integer_words
@@ -69,9 +69,9 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     tool, named = tools(given, settings.initial.tool)
     folded_codes = np.isin(execution.folded.key, (key("G"), key("M")))
     computed = np.isin(rows, execution.folded.step[folded_codes])
-    unbound = _unbound(execution)
+    unbound = bind_names(execution)
 
-    def followed(given: BlockWords) -> Followed:
+    def followed(given: BlockWords) -> FollowedMotions:
         collector = RefusalCollector(len(rows))
         collector.refuse(computed, "GCO005", "a G or M code of the block is computed")
         return _followed(given, rows, offset, base, tool, settings, unbound, collector)
@@ -82,7 +82,13 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         other = given.with_absolute_centres()
         if other is not None and not (again := followed(other)).differing_radii:
             given, run, coordinates = other, again, True
-    found, built, frames, orientations, collector = run.columns, run.built, run.frames, run.orientations, run.collector
+    found, built, frames, orientations, collector = (
+        run.columns,
+        run.built,
+        run.frames,
+        run.orientations,
+        run.collector,
+    )
     lines = source.blocks
     line, start = lines.line[rows], lines.start[rows]
     external = external_axes(given, rows)
@@ -128,7 +134,9 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     if coordinates:
         message = "I J K are read as coordinates: only so the radii of the arcs agree"
         arc = np.flatnonzero(built.kind == Kind.CIRC)[:1]
-        findings += [Finding("GCO031", message, str(document.path), int(line[row]), 1) for row in arc.tolist()]
+        findings += [
+            Finding("GCO031", message, str(document.path), int(line[row]), 1) for row in arc.tolist()
+        ]
     return Program(
         control.name,
         documents,
@@ -150,19 +158,11 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     )
 
 
-def _unbound(execution: Execution) -> str:
-    """What to do about names whose values were wanted and are not known."""
-    names = [name for name in execution.unknown if not name.startswith(("#<_", "$"))]
-    if not names:
-        return ""
-    shown = ", ".join([*names[:5], *(["..."] if len(names) > 5 else [])])
-    return f"bind {shown} under symbols: in the cell, or let the post-processor write numbers"
-
-
 def _start(settings: ReadingSettings) -> Floats:
     """(6,) [m, rad] where the axes are at the first block, NaN where that is not stated."""
     words = settings.initial.words
-    return np.array([words.get(axis, math.nan) for axis in "XYZABC"]) * np.repeat([MM, DEG], 3)
+    stated = np.array([words.get(axis, math.nan) for axis in "XYZABC"])
+    return np.asarray(stated * np.repeat([MM, DEG], 3))
 
 
 def _folded(words: FoldedWords, rows: Ints) -> FoldedNumbers:
@@ -173,7 +173,7 @@ def _folded(words: FoldedWords, rows: Ints) -> FoldedNumbers:
     return FoldedNumbers(*(column[mine][order] for column in (at, words.key, words.value)))
 
 
-class Followed(NamedTuple):
+class FollowedMotions(NamedTuple):
     """The motions' columns, what others build on, the frames of the program, what its orientation words mean, and why
     motions are refused; differing_radii: arcs whose radii at start and end differ."""
 
@@ -194,7 +194,7 @@ def _followed(
     settings: ReadingSettings,
     unbound: str,
     collector: RefusalCollector,
-) -> Followed:
+) -> FollowedMotions:
     """The motions in the blocks ``rows`` (N,), part by part; base (N,), tool (B,): numbers."""
     turned = None if settings.orientation is None else rotation_from_abc(settings.orientation)
     events = _events(given)
@@ -240,7 +240,7 @@ def _followed(
         np.array([frame.turn for frame in trace.frames]),
         np.array([frame.shift[:3] for frame in trace.frames]),
     )
-    return Followed(found, built, frames, tuple(stands.orientations), collector, differing)
+    return FollowedMotions(found, built, frames, tuple(stands.orientations), collector, differing)
 
 
 def _columns(

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.base.geometry import rotation_from_abc, rotation_from_vector
 from postproc.base.units import DEG
-from postproc.languages.gcode import expressions
+from postproc.languages.gcode import expression_values
 from postproc.languages.gcode.control import (
     Control,
     Event,
@@ -158,10 +158,10 @@ _NORMAL = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 def frame(event: Event) -> ProgrammedFrame:
-    """The programmable frame behind TRANS, ROT ...: absolute ones take the place of the whole frame, A... ones go on
-    from it.  ROT X Y Z turns about Z, the new Y, the new X; RPL= about the axis normal to the plane.  CYCLE800 without a plane leaves no frame.  Scales, mirrors
-    and frames that come from the machine are not read: where they are in force the place is not known.
-    """
+    """The programmable frame behind TRANS, ROT ...: absolute ones take the place of the whole frame, A... ones go
+    on from it.  ROT X Y Z turns about Z, the new Y, the new X; RPL= about the axis normal to the plane.  CYCLE800
+    without a plane leaves no frame.  Scales, mirrors and frames that come from the machine are not read: where they
+    are in force the place is not known."""
     unknown = ProgrammedFrame(np.eye(3), np.full(6, np.nan))
     said = [_FRAMES[code] for code in event.codes if code in _FRAMES]
     if len(said) != 1:
@@ -196,8 +196,8 @@ _SWIVELLED = "swivelled"
 
 
 def _swivelled(event: Event) -> ProgrammedFrame:
-    """After CYCLE800: shifts and angles (arguments 5 to 13) that are all 0 bring the rotary axes back and leave no frame;
-    without arguments the axes stay where they are, so that a plane that was swivelled is not undone."""
+    """After CYCLE800: shifts and angles (arguments 5 to 13) that are all 0 bring the rotary axes back and leave no
+    frame; without arguments the axes stay where they are, so that a plane that was swivelled is not undone."""
     text = next((note.text for note in event.notes if note.kind == "swivel"), "?")
     arguments = [part.strip() for part in text.strip("() \t").split(",")]
     values = [constant(part.encode()) for part in arguments[4:13] if part]
@@ -234,7 +234,7 @@ CONTROL = Control(
     retract=RETRACT,
     further=True,
     offsets=key("D"),
-    expressions=expressions.SINUMERIK,
+    expressions=expression_values.SINUMERIK,
 )
 """Sinumerik 840D, its own language (G290)."""
 

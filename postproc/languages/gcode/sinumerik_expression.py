@@ -49,8 +49,8 @@ def expression_end(text: bytes, at: int) -> int:
 
 
 def assigned_end(text: bytes, at: int) -> int:
-    """Where what is assigned to a parameter ends: before another word, with an operator of letters (R1=R2 MOD 3) at the end
-    of the line."""
+    """Where what is assigned to a parameter ends: before another word, with an operator of letters (R1=R2 MOD 3) at
+    the end of the line."""
     close = expression_end(text, at)
     return len(text) if _OPERATOR.match(text, close) else close
 

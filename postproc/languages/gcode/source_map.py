@@ -140,11 +140,13 @@ def _joined(parts: list[Text]) -> Text:
     """Texts that follow each other as one."""
     before = np.cumsum([0, *(len(part.blocks) for part in parts)]).tolist()
     words = {
-        one.name: np.concatenate([getattr(part.words, one.name) for part in parts]) for one in fields(WordArrays)
+        one.name: np.concatenate([getattr(part.words, one.name) for part in parts])
+        for one in fields(WordArrays)
     }
     words["block"] = np.concatenate([part.words.block + at for part, at in zip(parts, before, strict=False)])
     blocks = {
-        one.name: np.concatenate([getattr(part.blocks, one.name) for part in parts]) for one in fields(BlockSpans)
+        one.name: np.concatenate([getattr(part.blocks, one.name) for part in parts])
+        for one in fields(BlockSpans)
     }
     return Text(WordArrays(**words), BlockSpans(**blocks), (), np.empty((0, 3), np.int64))
 

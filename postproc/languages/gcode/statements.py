@@ -36,9 +36,9 @@ OPENING = frozenset((Verb.SUB, Verb.WHILE, Verb.DO, Verb.REPEAT, Verb.IF, Verb.F
 
 
 @dataclass(frozen=True)
-class Statement:
-    """label: of the construct that it opens, closes or leaves, where it leads to, or what it calls; text: its condition,
-    count, arguments or bounds; way: of a jump, "F" forward, "B" backward, "" both."""
+class FlowStatement:
+    """label: of the construct that it opens, closes or leaves, where it leads to, or what it calls; text: its
+    condition, count, arguments or bounds; way: of a jump, "F" forward, "B" backward, "" both."""
 
     block: int
     verb: Verb
@@ -93,37 +93,39 @@ _NAMED = re.compile(r"(IF|WHILE|LOOP|UNTIL|REPEAT|ELSE|ENDIF|ENDWHILE|ENDLOOP|EN
 _DEEPEST = 50
 
 
-def statement(note: Note) -> Statement | None:
+def statement(note: Note) -> FlowStatement | None:
     """The statement of a note about flow; None for other notes.  Raises NotFollowed."""
     if note.kind not in ("open", "close", "between", "while", "jump", "call"):
         return None
     text, block = _BLANKS.sub(" ", note.text).strip().upper(), note.block
     oword = _OWORD.fullmatch(text)
     if oword is not None and oword[2] in _OWORDS:
-        return Statement(block, _OWORDS[oword[2]], oword[1], oword[3])
+        return FlowStatement(block, _OWORDS[oword[2]], oword[1], oword[3])
     if note.kind == "call":
-        return Statement(block, Verb.CALL, text)
+        return FlowStatement(block, Verb.CALL, text)
     if (found := _GOTO.fullmatch(text)) is not None:
         if found[2] in ("C", "S"):
             raise NotFollowed
-        return Statement(block, Verb.GOTO, found[3], found[1] or "", found[2])
+        return FlowStatement(block, Verb.GOTO, found[3], found[1] or "", found[2])
     if (found := _PART.fullmatch(text)) is not None:
-        return Statement(block, Verb.REPEAT_PART, found[2], found[4] or "1", found[3] or found[1])
+        return FlowStatement(block, Verb.REPEAT_PART, found[2], found[4] or "1", found[3] or found[1])
     if (found := _DO.fullmatch(text)) is not None:
-        return Statement(block, Verb.WHILE if found[1] else Verb.LOOP, f"DO{int(found[2])}", found[1] or "")
+        return FlowStatement(
+            block, Verb.WHILE if found[1] else Verb.LOOP, f"DO{int(found[2])}", found[1] or ""
+        )
     if (found := _END.fullmatch(text)) is not None:
-        return Statement(block, Verb.END, f"DO{int(found[1])}")
+        return FlowStatement(block, Verb.END, f"DO{int(found[1])}")
     if (found := _FOR.fullmatch(text)) is not None:
-        return Statement(block, Verb.FOR, "FOR", f"{found[1]}={found[2]}\n{found[3]}")
+        return FlowStatement(block, Verb.FOR, "FOR", f"{found[1]}={found[2]}\n{found[3]}")
     if (found := _NAMED.fullmatch(text)) is not None:
         name = found[1]
         if name.startswith("END"):
-            return Statement(block, Verb.END, name[3:])
+            return FlowStatement(block, Verb.END, name[3:])
         if name == "UNTIL":
-            return Statement(block, Verb.UNTIL, "REPEAT", found[2])
+            return FlowStatement(block, Verb.UNTIL, "REPEAT", found[2])
         if name == "REPEAT":
-            return Statement(block, Verb.LOOP, "REPEAT", "")
-        return Statement(block, Verb[name], "IF" if name == "ELSE" else name, found[2])
+            return FlowStatement(block, Verb.LOOP, "REPEAT", "")
+        return FlowStatement(block, Verb[name], "IF" if name == "ELSE" else name, found[2])
     raise NotFollowed
 
 
@@ -132,7 +134,7 @@ class Structure:
     """The statements about flow of a program, by block; construct: of every block that opens, closes, divides or leaves
     one; followed: the run goes by them."""
 
-    statements: dict[int, Statement]
+    statements: dict[int, FlowStatement]
     construct: dict[int, Construct]
     subprograms: dict[str, Construct]
     followed: bool = True
@@ -140,7 +142,7 @@ class Structure:
 
 def structure(notes: Iterable[Note]) -> Structure:
     """Raises NotFollowed where constructs do not close, or cross each other."""
-    statements: dict[int, Statement] = {}
+    statements: dict[int, FlowStatement] = {}
     construct: dict[int, Construct] = {}
     subprograms: dict[str, Construct] = {}
     stack: list[Construct] = []
@@ -191,7 +193,7 @@ _DECLARED = re.compile(r" ?([A-Z_]\w*) ?(?:=(.*))?")
 
 
 @dataclass(frozen=True)
-class Assignment:
+class VariableAssignment:
     """target: text of the variable, "" where it is not known which; integer: it holds whole numbers only."""
 
     target: str
@@ -199,18 +201,18 @@ class Assignment:
     integer: bool = False
 
 
-def assignments(note: str) -> list[Assignment]:
+def assignments(note: str) -> list[VariableAssignment]:
     """The assignments of a note of that kind."""
     text = _BLANKS.sub(" ", note).strip().upper()
     defined = _DEFINITION.fullmatch(text)
     if defined is not None:
         found = [_DECLARED.fullmatch(part) for part in _parts(defined[2])]
         whole = defined[1] != "REAL"
-        return [Assignment(one[1], one[2] or "0", whole) for one in found if one is not None]
+        return [VariableAssignment(one[1], one[2] or "0", whole) for one in found if one is not None]
     sign = text.find("=", text.find(">") if text.startswith(("#<", "# <")) else 0)
     if sign <= 0 or text[sign + 1 : sign + 2] == "=":
         return []
-    return [Assignment(text[:sign].strip(), text[sign + 1 :])]
+    return [VariableAssignment(text[:sign].strip(), text[sign + 1 :])]
 
 
 def _parts(text: str) -> list[str]:

@@ -52,7 +52,9 @@ class WordArrays:
         return len(self.at)
 
 
-def value_note(words: list[tuple[int, int, int, int, float, int]], address: int, how: int, text: bytes) -> bytes:
+def value_note(
+    words: list[tuple[int, int, int, int, float, int]], address: int, how: int, text: bytes
+) -> bytes:
     """What a note of the kind "value" says of a word that follows ``words`` of its line: its key, how many words of
     that key are before it, its How, and its expression."""
     return b"%d %d %d " % (address, sum(word[1] == address for word in words), how) + text.strip()

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.languages.gcode.execution_flow import program_starts
 from postproc.languages.gcode.source import Source
-from postproc.languages.gcode.statements import Statement
+from postproc.languages.gcode.statements import FlowStatement
 from postproc.languages.gcode.words import key
 
 _ZEROS = re.compile(r"^N?0*(?=\d)")
@@ -47,7 +47,7 @@ class RunLabels:
         start = self.starts[at - 1] if at > 1 else 0
         return start, self.starts[max(at, 1)] if max(at, 1) < len(self.starts) else self._count
 
-    def find(self, statement: Statement, block: int) -> int | None:
+    def find(self, statement: FlowStatement, block: int) -> int | None:
         """The block that a jump from ``block`` leads to; None where that is not certain."""
         start, stop = self.part_of(block)
         places = self._blocks.get(_label(statement.label), [])

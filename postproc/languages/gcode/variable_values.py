@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 
-from postproc.languages.gcode.expressions import FANUC, LINUXCNC, ExpressionLanguage, evaluate
+from postproc.languages.gcode.expression_values import FANUC, LINUXCNC, ExpressionLanguage, evaluate
 
 _NUMBERED = re.compile(r"#(\d{1,9})")
 _PARAMETER = re.compile(r"R\d+")
@@ -15,7 +15,7 @@ _SYSTEM = {id(LINUXCNC): 5000, id(FANUC): 1000}
 """Variables from these numbers on are the control's own: positions, offsets, signals."""
 
 
-class Variables:
+class VariableValues:
     """name -> value; what is absent is not known.
 
     volatile: names that are never known.  parallel: the assignments of a block hold after it, so that its words and its

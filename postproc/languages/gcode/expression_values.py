@@ -106,7 +106,7 @@ class ExpressionLanguage:
 
     levels: Mapping[str, int]
     functions: Mapping[str, Callable[[float], float]]
-    brackets: str
+    brackets: tuple[str, str]
     numbered: bool
     logical: bool = False
 
@@ -114,7 +114,7 @@ class ExpressionLanguage:
 LINUXCNC = ExpressionLanguage(
     _BRACKETED_LEVELS,
     {**_FUNCTIONS, "FIX": lambda x: float(math.floor(x)), "FUP": lambda x: float(math.ceil(x))},
-    "[]",
+    ("[", "]"),
     True,
 )
 FANUC = ExpressionLanguage(
@@ -126,7 +126,7 @@ FANUC = ExpressionLanguage(
         "FIX": lambda x: float(math.trunc(x)),
         "FUP": lambda x: math.copysign(math.ceil(abs(x)), x),
     },
-    "[]",
+    ("[", "]"),
     True,
     logical=True,
 )
@@ -140,7 +140,7 @@ SINUMERIK = ExpressionLanguage(
         **dict.fromkeys(("*", "/", "DIV", "MOD"), 6),
     },
     {**_FUNCTIONS, "TRUNC": lambda x: float(math.trunc(x)), "POT": lambda x: x * x},
-    "()",
+    ("(", ")"),
     False,
 )
 _SAME = {"==": "EQ", "<>": "NE", ">": "GT", ">=": "GE", "<": "LT", "<=": "LE"}
@@ -153,8 +153,8 @@ _TOKENS = {
         r"|AND|XOR|OR|MOD|EQ|NE|GT|GE|LT|LE)"
     ),
     False: re.compile(
-        r"[ \t]*+(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)|(?P<word>[$A-Z_][$A-Z0-9_.]*)"
-        r"|(?P<sign>==|<>|>=|<=|[-+*/()\[\],<>]))"
+        r"(?P<number>(?:\d+\.?\d*|\.\d+)(?:EX[-+]?\d+)?)|(?P<word>[$A-Z_][$A-Z0-9_.]*)"
+        r"|(?P<sign>==|<>|>=|<=|[-+*/()\[\],<>])|(?P<blank>[ \t]++)"
     ),
 }
 _BLANKS = str.maketrans("", "", " \t\x0b\x0c")
@@ -169,7 +169,7 @@ def evaluate(text: str, language: ExpressionLanguage, lookup: Lookup) -> float:
     if not tokens:
         return math.nan
     try:
-        value, end = _Parser(tokens, language, lookup).binary(0, 0, 0)
+        value, end = _ExpressionParser(tokens, language, lookup).binary(0, 0, 0)
     except (ValueError, ZeroDivisionError, OverflowError, TypeError):
         return math.nan
     return value if end == len(tokens) and math.isfinite(value) else math.nan
@@ -183,12 +183,13 @@ def _tokens(text: str, pattern: re.Pattern[str]) -> list[tuple[str, str]]:
         if token is None:
             return []
         kind = token.lastgroup or ""
-        found.append((kind, token[kind]))
+        if kind != "blank":
+            found.append((kind, token[kind]))
         at = token.end()
     return found
 
 
-class _Parser:
+class _ExpressionParser:
     """Precedence climbing; every method gives a value and the token after it.  Raises ValueError on other text."""
 
     def __init__(self, tokens: list[tuple[str, str]], language: ExpressionLanguage, lookup: Lookup) -> None:
@@ -268,7 +269,7 @@ class _Parser:
                 break
         at = self._expect(at, closes)
         if name == "ATAN" and self._language.numbered:
-            value, at = self.primary(self._expect(at, "/") , depth + 1)
+            value, at = self.primary(self._expect(at, "/"), depth + 1)
             arguments.append(value)
         if name in ("ATAN", "ATAN2"):
             angle = math.degrees(math.atan2(*arguments))

@@ -1,0 +1,172 @@
+"""Calls of subprograms of the file, and parts that are repeated."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+
+import numpy as np
+
+from postproc.base.arrays import Bools
+from postproc.languages.gcode.run_state import CallFrame, RunState
+from postproc.languages.gcode.statements import FlowStatement, NotFollowed
+
+DEEPEST_CALL = 20
+_ARGUMENTS = dict(zip("ABCIJKDEFHMQRSTUVWXYZ", (*range(1, 10), 11, 13, *range(17, 27)), strict=True))
+"""Letters of G65 -> the numbers of their variables."""
+
+
+class RunAgain(Exception):
+    """A construct or a call is to be taken as one that may run or not."""
+
+
+class RunCalls(RunState):
+    """Goes into what is called, and back."""
+
+    def call(self, block: int, verb: str, step: int) -> int:
+        """A call; ``step``: at which its block runs."""
+        statement = self.shape.statements.get(block)
+        if statement is not None:
+            self.emit(block, block + 1)
+        found = self.called_part(block, verb, statement)
+        if block in self.opaque:
+            self.perhaps_call(block, verb, statement)
+            found = None
+        if found is None or len(self.frames) >= DEEPEST_CALL:
+            self.variables.forget()
+            return block + 1
+        start, stop, count, arguments = found
+        outer = None
+        if arguments is not None:
+            outer = self.variables.enter(arguments)
+        self.called.append(step)
+        if count < 1:
+            return block + 1
+        self.frames.append(CallFrame(block + 1, start, stop, count, block, outer))
+        return start
+
+    def perhaps_call(self, block: int, verb: str, statement: FlowStatement | None) -> None:
+        """A call that may run or not: the blocks of what it calls may run more often than they are followed."""
+        if statement is None and verb not in ("call", "local", "macro", "named"):
+            return
+        found = self.called_part(block, verb, statement)
+        if found is not None:
+            start, stop = found[:2]
+            self.perhaps_called.append((start, self.sizes.get(start, stop)))
+
+    def called_part(
+        self, block: int, verb: str, statement: FlowStatement | None
+    ) -> tuple[int, int, int, dict[str, float] | None] | None:
+        """First block, the one after the last, runs and own variables of what is called; None where it is not here."""
+        if (
+            statement is not None
+            and statement.label.startswith("O")
+            and statement.label in self.shape.subprograms
+        ):
+            around = self.shape.subprograms[statement.label]
+            self.sizes[around.start + 1] = around.stop
+            values = [self.value(text, block) for text in _bracketed(statement.text)]
+            numbered = {f"#{number}": 0.0 for number in range(1, 31)}
+            numbered |= {f"#{number}": value for number, value in enumerate(values, 1)}
+            return around.start + 1, self.n, 1, numbered
+        if statement is not None:
+            part = self.labels.program(statement.label)
+            return None if part is None else (*part, 1, self.variables.own())
+        if verb == "named":
+            number = self.word(block, "L")
+            part = self.labels.program(f"L{number:.0f}") if not math.isnan(number) else None
+            count = self.word(block, "P")
+            return (
+                None
+                if part is None
+                else (*part, 1 if math.isnan(count) else int(count), self.variables.own())
+            )
+        number, count = self.word(block, "P"), self.word(block, "L")
+        if math.isnan(number) or number != math.floor(number):
+            return None
+        runs = 1 if math.isnan(count) else int(count)
+        if verb == "local":
+            start = self.labels.number(int(number), block)
+            return None if start is None else (start, self.n, runs, None)
+        part = self.labels.program(f"{number:.0f}")
+        if part is None and number >= 10_000 and math.isnan(count):
+            runs, part = int(number) // 10_000, self.labels.program(f"{int(number) % 10_000}")
+        if part is None:
+            return None
+        if verb == "macro":
+            words = {letter: self.word(block, letter) for letter in _ARGUMENTS}
+            given = {f"#{_ARGUMENTS[one]}": value for one, value in words.items() if not math.isnan(value)}
+            return (*part, runs, given)
+        return (*part, runs, None)
+
+    def returned(self, statement: FlowStatement) -> None:
+        """The value that a subprogram returns."""
+        value = self.value(statement.text, statement.block) if statement.text else math.nan
+        self.variables.result = value
+
+    def leave(self) -> int:
+        """From the end of what is repeated or called."""
+        frame = self.frames[-1]
+        frame.count -= 1
+        if frame.count > 0:
+            return frame.start
+        self.frames.pop()
+        if frame.locals is not None:
+            self.variables.leave(frame.locals)
+        return frame.back
+
+    def repeat_part(self, statement: FlowStatement) -> int:
+        """REPEAT from a label up to here, or up to another label."""
+        block = statement.block
+        start = self.labels.find(statement, block)
+        count = self.value(statement.text, block)
+        if start is None or math.isnan(count) or count != math.floor(count):
+            raise NotFollowed
+        self.emit(block, block + 1)
+        if statement.way == "B":
+            stop = start + 1
+        elif statement.way:
+            end = self.labels.find(FlowStatement(block, statement.verb, statement.way), start)
+            if end is None or end < start:
+                raise NotFollowed
+            stop = end
+        else:
+            stop = self.labels.end_label(start, block)
+        if start <= block < stop or count < 1:
+            if count < 1:
+                return block + 1
+            raise NotFollowed
+        self.frames.append(CallFrame(block + 1, start, stop, int(count), block, None))
+        return start
+
+    def hide(self, block: int) -> None:
+        self.opaque.add(block)
+        raise RunAgain
+
+    def perhaps_run(self) -> Bools:
+        """(B,) blocks of subprograms that calls of which it is not known whether they run lead to."""
+        edge = np.zeros(self.n + 1, np.int32)
+        done: set[tuple[int, int]] = set()
+        while self.perhaps_called:
+            start, stop = part = self.perhaps_called.pop()
+            if part in done:
+                continue
+            done.add(part)
+            edge[start] += 1
+            edge[stop] -= 1
+            for block in self.special[bisect_left(self.special, start) : bisect_left(self.special, stop)]:
+                if block in self.calling:
+                    self.perhaps_call(block, self.codes.get(block, ""), self.shape.statements.get(block))
+        return np.asarray(np.cumsum(edge)[: self.n] > 0)
+
+
+def _bracketed(text: str) -> list[str]:
+    """The expressions in brackets that follow each other."""
+    found, depth, start = [], 0, 0
+    for at, letter in enumerate(text):
+        depth += (letter == "[") - (letter == "]")
+        if letter == "[" and depth == 1:
+            start = at
+        if letter == "]" and depth == 0:
+            found.append(text[start : at + 1])
+    return found

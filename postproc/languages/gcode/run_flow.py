@@ -1,0 +1,275 @@
+"""A program is followed, block by block of those that say more than words: loops, branches and jumps."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+
+from postproc.languages.gcode.run_calls import RunCalls
+from postproc.languages.gcode.statements import Construct, FlowStatement, NotFollowed, Verb
+from postproc.languages.gcode.words import key
+
+
+class RunFlow(RunCalls):
+    """Goes where the flow leads; what may run or not is emitted as that, in its place."""
+
+    def follow(self) -> int:
+        """Runs the program; the block after the last one that is certain to run."""
+        at = 0
+        while True:
+            self.budget()
+            limit = self.frames[-1].stop if self.frames else self.n
+            place = bisect_left(self.special, at)
+            block = self.special[place] if place < len(self.special) else self.n
+            if block >= limit:
+                self.emit(at, min(limit, self.n))
+                if not self.frames:
+                    return limit
+                if limit >= self.n:  # a subprogram without an end
+                    raise NotFollowed
+                at = self.leave()
+                continue
+            self.emit(at, block)
+            following = self.step(block)
+            if following is None:
+                return min(self.stop, block + 1)
+            at = following
+
+    def step(self, block: int) -> int | None:
+        """Runs a block that says more than plain words; where the run goes on, None where it ends."""
+        if block in self.programs and not self.frames:
+            self.stop = block
+            return None  # the next program of the file
+        if block in self.strange:
+            self.variables.forget()
+        statement = self.shape.statements.get(block)
+        if block in self.conditions:
+            holds = self.value(self.conditions[block][0], block)
+            if holds == 0:
+                return block + 1
+            if not math.isnan(holds):
+                self.taken[self.count] = True
+                return self.certain(block, statement)
+        if block in self.deleted:
+            return self.perhaps(block, statement)
+        return self.certain(block, statement)
+
+    def certain(self, block: int, statement: FlowStatement | None) -> int | None:
+        step = self.count
+        if statement is None or statement.verb != Verb.SUB:
+            self.fold(block, step)
+        if statement is not None and statement.verb == Verb.SUB:
+            return self.flow(statement)
+        self.assign(block)
+        if statement is not None:
+            return self.flow(statement)
+        self.emit(block, block + 1)
+        verb = self.codes.get(block)
+        if verb == "end":
+            return self.leave() if self.frames and self.control.calls else None
+        if verb == "return":
+            if self.source.mask(key("P"))[block] if self.frames else False:
+                raise NotFollowed
+            return self.leave() if self.frames else None
+        if verb is not None:
+            return self.call(block, verb, step)
+        return block + 1
+
+    def perhaps(self, block: int, statement: FlowStatement | None) -> int:
+        """A block that runs only sometimes."""
+        verb = self.codes.get(block)
+        if statement is not None:
+            if statement.verb == Verb.GOTO:
+                return self.branch_away(statement)
+            if statement.verb != Verb.CALL:
+                raise NotFollowed
+        if verb == "return" and self.frames:
+            self.hide(self.frames[-1].call)
+        self.fold(block, self.count)
+        self.emit(block, block + 1)
+        self.assign(block, certain=False)
+        if statement is not None or verb in ("call", "local", "macro", "named"):
+            self.perhaps_call(block, verb or "", statement)
+            self.variables.forget()
+        return block + 1
+
+    def flow(self, statement: FlowStatement) -> int:
+        """Follows a statement about flow; where the run goes on."""
+        block, verb = statement.block, statement.verb
+        around = self.shape.construct.get(block)
+        if around is not None and block == around.start and block in self.opaque and verb != Verb.SUB:
+            return self.maybe(around)
+        if verb == Verb.SUB:
+            assert around is not None
+            return around.stop + 1
+        if verb == Verb.CALL:
+            return self.call(block, "call", self.count)
+        if verb == Verb.GOTO:
+            return self.jump(statement)
+        if verb == Verb.REPEAT_PART:
+            return self.repeat_part(statement)
+        assert around is not None
+        if verb == Verb.RETURN:
+            if not self.frames:
+                raise NotFollowed
+            self.returned(statement)
+            return self.leave()
+        if verb == Verb.BREAK:
+            self.emit(block, block + 1)
+            self.repeats.pop(around.start, None)
+            return around.stop + 1
+        if verb == Verb.CONTINUE:
+            return around.start if around.verb == Verb.WHILE else around.stop
+        if around.verb == Verb.SUB:
+            if not self.frames:
+                raise NotFollowed
+            self.returned(statement)
+            return self.leave()
+        self.emit(block, block + 1)
+        return self.loop(around, statement) if around.verb != Verb.IF else self.branch(around, block)
+
+    def branch(self, around: Construct, block: int) -> int:
+        if block != around.start:  # from the end of the arm that ran
+            return around.stop + 1
+        for at, text in around.arms:
+            holds = self.value(text, at) if text or at == around.start else 1.0
+            if math.isnan(holds):
+                return self.maybe(around)
+            if holds:
+                return at + 1
+        return around.stop + 1
+
+    def loop(self, around: Construct, statement: FlowStatement) -> int:
+        """At the start or the end of a loop."""
+        ahead = statement.block == around.start
+        inside, behind = around.start + 1, around.stop + 1
+        if around.verb == Verb.WHILE:
+            holds = self.value(around.text, around.start)
+        elif around.verb == Verb.DO:
+            holds = 1.0 if ahead else self.value(around.until, around.stop)
+        elif around.verb == Verb.LOOP:
+            holds = 1.0
+            if not ahead and around.until:
+                until = self.value(around.until, around.stop)
+                holds = math.nan if math.isnan(until) else float(until == 0)
+        elif around.verb == Verb.FOR:
+            holds = self.counted(around, ahead)
+        else:
+            if ahead:
+                count = self.value(around.text, around.start)
+                if math.isnan(count) or count != math.floor(count):
+                    return self.maybe(around)
+                self.repeats[around.start] = int(count)
+            left = self.repeats.get(around.start, 0)
+            self.repeats[around.start] = left - 1
+            holds = float(left > 0)
+        if math.isnan(holds):
+            if not ahead:
+                self.hide(around.start)  # how often it runs is not known
+            return self.maybe(around)
+        return inside if holds else behind
+
+    def counted(self, around: Construct, ahead: bool) -> float:
+        """Whether a FOR runs its body again; its variable is set."""
+        head, _, last = around.text.partition("\n")
+        name, _, first = head.partition("=")
+        value = self.value(first, around.start) if ahead else self.value(name, around.stop) + 1
+        end = self.value(last, around.start)
+        runs = math.nan if math.isnan(value) or math.isnan(end) else float(value <= end)
+        self.variables.set(name, value if runs else math.nan)
+        return runs
+
+    def maybe(self, around: Construct) -> int:
+        """A construct that may run or not, once or often."""
+        self.escape(around.start, around.stop + 1)
+        self.kill(around.start, around.stop + 1)
+        self.perhaps_range(around.start, around.stop + 1)
+        return around.stop + 1
+
+    def perhaps_range(self, start: int, stop: int) -> None:
+        low, high = bisect_left(self.special, start), bisect_left(self.special, stop)
+        for block in self.special[low:high]:
+            self.fold(block, self.count + block - start)
+            statement = self.shape.statements.get(block)
+            if statement is None or statement.verb == Verb.CALL:
+                self.perhaps_call(block, self.codes.get(block, ""), statement)
+        self.emit(start, stop, uncertain=True)
+
+    def escape(self, start: int, stop: int) -> None:
+        """Makes what is left from within the blocks uncertain as well.  Raises RunAgain."""
+        low, high = bisect_left(self.special, start), bisect_left(self.special, stop)
+        for block in self.special[low:high]:
+            statement = self.shape.statements.get(block)
+            if self.codes.get(block) == "return" and self.frames:
+                self.hide(self.frames[-1].call)
+            if self.codes.get(block) == "end" and self.frames and self.control.calls:
+                self.hide(self.frames[-1].call)
+            if statement is None:
+                continue
+            around = self.shape.construct.get(block)
+            if statement.verb in (Verb.BREAK, Verb.CONTINUE) and around is not None and around.start < start:
+                self.hide(around.start)
+            if statement.verb == Verb.RETURN and self.frames:
+                self.hide(self.frames[-1].call)
+            if statement.verb == Verb.GOTO:
+                target = self.labels.find(statement, block)
+                if target is None or not start <= target <= stop:
+                    raise NotFollowed
+            if statement.verb == Verb.REPEAT_PART:
+                raise NotFollowed
+
+    def jump(self, statement: FlowStatement) -> int:
+        holds = self.value(statement.text, statement.block) if statement.text else 1.0
+        if math.isnan(holds):
+            return self.branch_away(statement)
+        self.emit(statement.block, statement.block + 1)
+        if not holds:
+            return statement.block + 1
+        target = self.labels.find(self.computed(statement), statement.block)
+        if target is None:
+            raise NotFollowed
+        self.entered.append(self.count)
+        return target
+
+    def computed(self, statement: FlowStatement) -> FlowStatement:
+        """A jump with the number of its label where that is computed."""
+        if not statement.label.startswith(("#", "[")):
+            return statement
+        number = self.value(statement.label, statement.block)
+        if math.isnan(number):
+            raise NotFollowed
+        return FlowStatement(statement.block, statement.verb, f"{number:.0f}", statement.text, statement.way)
+
+    def branch_away(self, statement: FlowStatement) -> int:
+        """A jump that happens only sometimes: what it passes may run or not."""
+        start = statement.block
+        stop = self.labels.find(statement, start)
+        if stop is None or stop <= start or self.frames:
+            raise NotFollowed
+        at = start + 1
+        while at < stop:  # what jumps from there farther is part of it
+            place = bisect_left(self.special, at)
+            block = self.special[place] if place < len(self.special) else self.n
+            if block >= stop:
+                break
+            inner = self.shape.statements.get(block)
+            around = self.shape.construct.get(block)
+            if around is not None and around.start < start:
+                raise NotFollowed
+            if around is not None:
+                stop = max(stop, around.stop + 1)
+            if inner is not None and inner.verb == Verb.GOTO:
+                target = self.labels.find(inner, block)
+                if target is None or target <= start:
+                    raise NotFollowed
+                stop = max(stop, target)
+            if inner is not None and inner.verb == Verb.REPEAT_PART:
+                raise NotFollowed
+            at = block + 1
+        if self.labels.between(start, stop):
+            raise NotFollowed
+        self.kill(start, stop)
+        self.emit(start, start + 1)
+        self.perhaps_range(start + 1, stop)
+        self.entered.append(self.count)
+        return stop

@@ -1,0 +1,173 @@
+"""What is known while a program is followed: its statements, the values of its variables, what it has run so far."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.languages.gcode.control import Control
+from postproc.languages.gcode.execution_flow import LOCAL, RETURNS, tape_blocks
+from postproc.languages.gcode.lexing import FARTHEST
+from postproc.languages.gcode.run_labels import RunLabels
+from postproc.languages.gcode.source import Source
+from postproc.languages.gcode.statements import (
+    NotFollowed,
+    Structure,
+    Verb,
+    assignments,
+    background_names,
+    by_block,
+)
+from postproc.languages.gcode.variable_values import VariableValues
+from postproc.languages.gcode.words import key
+
+SUBPROGRAM = 98
+STEPS, BLOCKS = 50_000, 200_000
+"""How many statements, and blocks, are followed beyond four times those of the program."""
+
+
+@dataclass
+class CallFrame:
+    """Where a call goes back to, what is repeated and until where; locals: the variables of the caller."""
+
+    back: int
+    start: int
+    stop: int
+    count: int
+    call: int
+    locals: dict[str, float] | None
+
+
+class RunState:
+    """One attempt at following a program; ``opaque``: blocks of constructs and calls that may run or not."""
+
+    def __init__(
+        self, source: Source, control: Control, variables: VariableValues, shape: Structure, opaque: set[int]
+    ) -> None:
+        self.source, self.control, self.variables = source, control, variables
+        self.shape, self.opaque = shape, opaque
+        self.n = len(source.blocks)
+        self.values = by_block(source.notes, "value")
+        self.assigned = by_block(source.notes, "assign")
+        self.conditions = by_block(source.notes, "if")
+        self.strange = {
+            note.block
+            for note in source.notes
+            if note.kind == "unknown" and ("=" in note.text or "#" in note.text)
+        }
+        for texts in self.assigned.values():
+            for text in texts:
+                variables.volatile |= background_names(text)
+        self.flow_codes = {*control.endings, *RETURNS, SUBPROGRAM, LOCAL}
+        self.perhaps_called: list[tuple[int, int]] = []
+        self.sizes: dict[int, int] = {}  # first block of a subprogram -> its last one
+        self.labels = RunLabels(source)
+        self.programs = frozenset(self.labels.starts[1:])
+        self.stop = self.n
+        self.deleted = set(np.flatnonzero(source.blocks.deleted).tolist())
+        self.codes = self._codes()
+        self.calling = {note.block for note in source.notes if note.kind == "call"}
+        self.calling |= {block for block, verb in self.codes.items() if verb not in ("end", "return")}
+        self.tape = tape_blocks(source)
+        special = {
+            *self.values, *self.assigned, *self.conditions, *self.strange, *shape.statements, *self.codes,
+            *self.programs, *self.calling,
+        }  # fmt: skip
+        self.special = sorted(block for block in special if self.tape[block])
+        self.ranges: list[tuple[int, int, bool]] = []
+        self.count = 0
+        self.rows: list[tuple[int, int, int, float, int]] = []
+        self.taken: dict[int, bool] = {}  # step of a block behind a condition -> whether that holds
+        self.called: list[int] = []
+        self.entered: list[int] = []
+        self.unknown: dict[str, int] = {}
+        self.frames: list[CallFrame] = []
+        self.repeats: dict[int, int] = {}
+        self.steps = 0
+
+    def _codes(self) -> dict[int, str]:
+        """Block -> what its M, G65 or L words do to the flow."""
+        found: dict[int, str] = {}
+        m, g = self.source.column(key("M")), self.source.column(key("G"))
+        for code, verb in (
+            *((code, "end") for code in self.control.endings), *((code, "return") for code in RETURNS),
+            (SUBPROGRAM, "call"), (LOCAL, "local"),
+        ):  # fmt: skip
+            found.update(dict.fromkeys(m.block[m.value == code].tolist(), verb))
+        found.update(dict.fromkeys(g.block[g.value == 65].tolist(), "macro"))
+        if self.control.calls:
+            calls = self.source.mask(*self.control.calls)
+            found.update(dict.fromkeys(np.flatnonzero(calls).tolist(), "named"))
+        return found
+
+    def budget(self) -> None:
+        self.steps += 1
+        if self.steps > STEPS + 4 * len(self.special) or self.count > BLOCKS + 4 * self.n:
+            raise NotFollowed
+
+    def emit(self, start: int, stop: int, uncertain: bool = False) -> None:
+        if stop > start:
+            self.ranges.append((start, stop, uncertain))
+            self.count += stop - start
+
+    def fold(self, block: int, step: int) -> None:
+        """Puts the values of expressions into the words of a block that runs at ``step``."""
+        texts = self.values.get(block)
+        if texts is None:
+            return
+        own = set() if self.variables.parallel else self.targets(block)
+        for text in texts:
+            address, nth, how, expression = text.split(" ", 3)
+            value = self.value(expression, block, own)
+            if int(address) == key("M") and value in self.flow_codes and self.shape.followed:
+                raise NotFollowed
+            if abs(value) <= FARTHEST:
+                self.rows.append((step, int(address), int(nth), value, int(how)))
+
+    def value(self, text: str, block: int, without: set[str] | None = None) -> float:
+        value, missing = self.variables.evaluate(text, without or set())
+        for name in missing:
+            self.unknown.setdefault(name, block)
+        return value
+
+    def targets(self, block: int) -> set[str]:
+        found: set[str] = set()
+        for text in self.assigned.get(block, ()):
+            found.update(self.variables.name(one.target) for one in assignments(text))
+        return found
+
+    def assign(self, block: int, certain: bool = True) -> None:
+        """The assignments of a block."""
+        texts = self.assigned.get(block)
+        if texts is None:
+            return
+        every = [one for text in texts for one in assignments(text)]
+        own = set() if self.variables.parallel or len(every) < 2 else self.targets(block)
+        values = [self.value(one.text, block, own) if certain else math.nan for one in every]
+        for one, value in zip(every, values, strict=True):
+            fine = not one.integer or math.isnan(value) or value == math.floor(value)
+            self.variables.set(self.variables.name(one.target), value if fine else math.nan)
+
+    def kill(self, start: int, stop: int) -> None:
+        """What the blocks ``start`` .. ``stop`` - 1 may assign is unknown."""
+        low, high = bisect_left(self.special, start), bisect_left(self.special, stop)
+        for block in self.special[low:high]:
+            statement = self.shape.statements.get(block)
+            if block in self.calling or block in self.strange:
+                self.variables.forget()
+                return
+            if statement is not None and statement.verb == Verb.FOR:
+                self.variables.set(statement.text.partition("=")[0], math.nan)
+            for name in self.targets(block):
+                self.variables.set(name, math.nan)
+
+    def word(self, block: int, letter: str) -> float:
+        """The value of a word of a block that runs now, NaN without."""
+        address = key(letter)
+        for step, one, _, value, _ in reversed(self.rows[-20:]):
+            if step == self.count - 1 and one == address:
+                return value
+        return float(self.source.column(address).last(np.array([block]))[0])
