@@ -129,7 +129,7 @@ def sinumerik() -> dict[str, list[str]]:
             "G0 X0 Y0 Z50", "CYCLE83(50,0,2,-20,,-5,,2,0,0,1,0)", *pocket(1), *end,
         ],
         "840d-parameters.mpf": [
-            *head, "R1=10 R2=R1*2", "R3=-(R1+0.5)", *change, "G0 X=R1 Y=R2", "Z5", "G1 Z=R3 F300",
+            *head, "R1=10", "R2=R1*2 R3=-(R1+0.5)", *change, "G0 X=R1 Y=R2", "Z5", "G1 Z=R3 F300",
             *(line for i in range(1, 20) for line in (f"X=R1+{i}", f"Y=R2*{i}", f"G1 X{i} Y{i}")), *end,
         ],
         "840d-for.mpf": [
@@ -200,6 +200,7 @@ def linuxcnc() -> dict[str, list[str]]:
             "M2",
         ],
         "linuxcnc-sub.ngc": [
+            "%",
             "O200 SUB",
             "G1 Z#1 F100",
             "X20",
@@ -207,7 +208,7 @@ def linuxcnc() -> dict[str, list[str]]:
             "X0",
             "Y0",
             "O200 ENDSUB",
-            *head,
+            *head[1:],
             "G0 X0 Y0",
             "Z5",
             "O200 CALL [-1]",

@@ -280,7 +280,7 @@ CODES = define(
         "GCO031": Code(
             "info",
             "centres are coordinates",
-            meaning="No code says whether I J K are differences from the start; the radii agree only as coordinates.",
+            meaning="No code selects what I J K are; the radii of the arcs agree only if they are coordinates.",
             consequence="Read otherwise the arcs would be others.",
             action="Write G90.1 or G91.1.",
             example="`G3 X5 Y5 I5 J0` after `G1 X10 Y0`.",

@@ -172,9 +172,10 @@ class Control:
     feed_units: the group that says the unit of F;
     further: U, V, W are axes beside X, Y, Z, and leave these as they are; offsets: key of the word that selects the
     tool's offsets, of which 0 switches them off (D); feed_before_units: F in a block with G20 or G21 is in the unit
-    from before it; retract: key of what says where a
-    cycle that a block calls by its name retracts to; iso: every word belongs to a code of its block or to its motion;
-    expressions: the language of its variables and expressions, None where these are not read.
+    from before it; retract: key of what says where a cycle that a block calls by its name retracts to;
+    parameter: the letter that is no address with digits and an equals sign but a variable (R1=2); iso: every
+    word belongs to a code of its block or to its motion; expressions: the language of its variables and
+    expressions, None where these are not read.
     """
 
     name: str
@@ -201,5 +202,6 @@ class Control:
     offsets: int | None = None
     feed_before_units: bool = False
     retract: int | None = None
+    parameter: str = ""
     iso: bool = False
     expressions: ExpressionLanguage | None = None

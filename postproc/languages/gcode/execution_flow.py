@@ -21,11 +21,14 @@ if TYPE_CHECKING:
 _GOTO = re.compile(r"(?:GOTO[BFC]?|REPEATB?)\s*(N?\d+|[A-Z_]\w+)?(?:\s+([A-Z_]\w+))?", re.I)
 _CODE = re.compile(r"(?<![A-Z_])[GM][ \t]*[\d#\[]", re.I)
 _ZEROS = re.compile(r"^N?0*(?=\d)")
-RESTORES, SAVES_FOR_A_CALL = 72, 73
+SAVES, RESTORES, SAVES_FOR_A_CALL = 70, 72, 73
 """Of LinuxCNC: M72 brings back modes that M70 has saved; M73 has the end of its subprogram do so."""
 CALLS = (RESTORES, 97, 98, 198)
 LOCAL = 97
 RETURNS = (99,)
+
+
+_ENDS = (2, 17, 30, *RETURNS)
 
 
 class FlowReason(IntEnum):
@@ -104,7 +107,8 @@ def follow(execution: Execution, control: Control, once: Ints) -> ExecutionFlow:
     if not execution.followed:
         _ended(source, control, uncertainty, tape)
     restored = np.zeros(n + 1, np.bool_)
-    restored[m.block[np.isin(m.value, (RESTORES, SAVES_FOR_A_CALL))] + 1] = True
+    if (m.value == SAVES).any():
+        restored[m.block[m.value == RESTORES] + 1] = True
     return ExecutionFlow(
         uncertainty,
         forget[:-1],
@@ -143,7 +147,7 @@ def _returned(source: Source, n: int) -> Bools:
 
 
 def tape_blocks(source: Source) -> Bools:
-    """What is between the first two ``%``, or before the only one where motions are before it."""
+    """(B,) what is between the first two ``%``, or before the only one where motions are before it."""
     n = len(source.blocks)
     marks = [note.block for note in source.notes if note.kind == "tape"]
     inside = np.ones(n, np.bool_)
@@ -158,15 +162,18 @@ def tape_blocks(source: Source) -> Bools:
 
 
 def program_starts(source: Source) -> list[int]:
-    """Blocks where a program starts (O1234, :1234)."""
+    """Blocks where a program starts (O1234, :1234); 0 as well where what is before the first of them ends."""
     plain = source.column(key("O")).block
     noted = [note.block for note in source.notes if note.kind == "program"]
-    return sorted({*plain.tolist(), *noted})
+    starts = sorted({*plain.tolist(), *noted})
+    m = source.column(key("M"))
+    headless = starts and np.isin(m.value[m.block < starts[0]], _ENDS).any()
+    return [0, *starts] if headless else starts
 
 
 def uncertain_stretches(source: Source, entered: Bools | None = None) -> list[tuple[int, int]]:
     """Ranges of blocks that are loops, branches, subprograms or lie under a jump; where jumps lead to is put into
-    ``entered``."""
+    ``entered`` (B,)."""
     n = len(source.blocks)
     found: list[tuple[int, int]] = []
     stack: list[tuple[int, str]] = []

@@ -55,7 +55,7 @@ def lex(raw: bytes, control: Control, start: int = 0, end: int | None = None, li
     feeds = np.flatnonzero(letters == 10)
     comments = _comments(raw, control.comment, start, end)
     blanked = _blanked(letters, comments, start == 0 and raw.startswith(BOM_UTF8))
-    plain, odd, ends = _plain(letters, _CLASS[blanked])
+    plain, odd, ends = _plain(letters, _CLASS[blanked], control.parameter)
     starts = np.concatenate([[0], ends[:-1] + 1])
     clean = blanked.tobytes()
     other = _taken([clean[starts[i] : ends[i]] for i in odd], np.array(odd, dtype=np.int64), starts, control)
@@ -105,7 +105,7 @@ class _Plain:
     line: Ints
 
 
-def _plain(letters: Bytes, kinds: Bytes) -> tuple[_Plain, list[int], Ints]:
+def _plain(letters: Bytes, kinds: Bytes, parameter: str) -> tuple[_Plain, list[int], Ints]:
     """The words of all plain lines; the lines that are not plain; where every line ends (before its LF or CR)."""
     size = len(letters)
     numeral = (kinds >= _DIGIT) & (kinds <= _SIGN)
@@ -142,6 +142,8 @@ def _plain(letters: Bytes, kinds: Bytes) -> tuple[_Plain, list[int], Ints]:
         bad[equal[~fine]] = True
         dropped[equal] = True
         numbered = equal[indexed & fine]
+        if parameter:
+            bad[numbered[letters[place[numbered - 2]] & 0xDF == ord(parameter)]] = True
         dropped[numbered - 1] = True
         index[numbered - 2] = letters[place[numbered - 1]].astype(np.int64) - ord("0")
 

@@ -116,7 +116,7 @@ class RunCalls(RunState):
         return frame.back
 
     def repeat_part(self, statement: FlowStatement) -> int:
-        """REPEAT from a label up to here, or up to another label."""
+        """REPEAT from a label up to here, or up to another label.  Raises NotFollowed."""
         block = statement.block
         start = self.labels.find(statement, block)
         count = self.value(statement.text, block)
@@ -140,6 +140,7 @@ class RunCalls(RunState):
         return start
 
     def hide(self, block: int) -> None:
+        """Has the program followed anew, with what a block opens or calls as what may run or not.  Raises RunAgain."""
         self.opaque.add(block)
         raise RunAgain
 

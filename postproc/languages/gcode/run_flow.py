@@ -14,7 +14,7 @@ class RunFlow(RunCalls):
     """Goes where the flow leads; what may run or not is emitted as that, in its place."""
 
     def follow(self) -> int:
-        """Runs the program; the block after the last one that is certain to run."""
+        """Runs the program; the block after the last one that is certain to run.  Raises NotFollowed."""
         at = 0
         while True:
             self.budget()
@@ -55,6 +55,7 @@ class RunFlow(RunCalls):
         return self.certain(block, statement)
 
     def certain(self, block: int, statement: FlowStatement | None) -> int | None:
+        """A block that surely runs.  Raises NotFollowed."""
         step = self.count
         if statement is None or statement.verb != Verb.SUB:
             self.fold(block, step)
@@ -76,7 +77,7 @@ class RunFlow(RunCalls):
         return block + 1
 
     def perhaps(self, block: int, statement: FlowStatement | None) -> int:
-        """A block that runs only sometimes."""
+        """A block that runs only sometimes.  Raises NotFollowed."""
         verb = self.codes.get(block)
         if statement is not None:
             if statement.verb == Verb.GOTO:
@@ -94,7 +95,7 @@ class RunFlow(RunCalls):
         return block + 1
 
     def flow(self, statement: FlowStatement) -> int:
-        """Follows a statement about flow; where the run goes on."""
+        """Follows a statement about flow; where the run goes on.  Raises NotFollowed."""
         block, verb = statement.block, statement.verb
         around = self.shape.construct.get(block)
         if around is not None and block == around.start and block in self.opaque and verb != Verb.SUB:
@@ -196,7 +197,7 @@ class RunFlow(RunCalls):
         self.emit(start, stop, uncertain=True)
 
     def escape(self, start: int, stop: int) -> None:
-        """Makes what is left from within the blocks uncertain as well.  Raises RunAgain."""
+        """Makes what is left from within the blocks uncertain as well.  Raises RunAgain, NotFollowed."""
         low, high = bisect_left(self.special, start), bisect_left(self.special, stop)
         for block in self.special[low:high]:
             statement = self.shape.statements.get(block)
@@ -219,6 +220,7 @@ class RunFlow(RunCalls):
                 raise NotFollowed
 
     def jump(self, statement: FlowStatement) -> int:
+        """A jump whose condition is known.  Raises NotFollowed."""
         holds = self.value(statement.text, statement.block) if statement.text else 1.0
         if math.isnan(holds):
             return self.branch_away(statement)
@@ -232,7 +234,7 @@ class RunFlow(RunCalls):
         return target
 
     def computed(self, statement: FlowStatement) -> FlowStatement:
-        """A jump with the number of its label where that is computed."""
+        """A jump with the number of its label where that is computed.  Raises NotFollowed."""
         if not statement.label.startswith(("#", "[")):
             return statement
         number = self.value(statement.label, statement.block)
@@ -241,7 +243,7 @@ class RunFlow(RunCalls):
         return FlowStatement(statement.block, statement.verb, f"{number:.0f}", statement.text, statement.way)
 
     def branch_away(self, statement: FlowStatement) -> int:
-        """A jump that happens only sometimes: what it passes may run or not."""
+        """A jump that happens only sometimes: what it passes may run or not.  Raises NotFollowed."""
         start = statement.block
         stop = self.labels.find(statement, start)
         if stop is None or stop <= start or self.frames:

@@ -84,6 +84,7 @@ class RunState:
         self.called: list[int] = []
         self.entered: list[int] = []
         self.unknown: dict[str, int] = {}
+        self.integers: set[str] = set()  # names that hold whole numbers only
         self.frames: list[CallFrame] = []
         self.repeats: dict[int, int] = {}
         self.steps = 0
@@ -104,6 +105,7 @@ class RunState:
         return found
 
     def budget(self) -> None:
+        """Counts a statement that is followed.  Raises NotFollowed."""
         self.steps += 1
         if self.steps > STEPS + 4 * len(self.special) or self.count > BLOCKS + 4 * self.n:
             raise NotFollowed
@@ -114,7 +116,7 @@ class RunState:
             self.count += stop - start
 
     def fold(self, block: int, step: int) -> None:
-        """Puts the values of expressions into the words of a block that runs at ``step``."""
+        """Puts the values of expressions into the words of a block that runs at ``step``.  Raises NotFollowed."""
         texts = self.values.get(block)
         if texts is None:
             return
@@ -148,8 +150,11 @@ class RunState:
         own = set() if self.variables.parallel or len(every) < 2 else self.targets(block)
         values = [self.value(one.text, block, own) if certain else math.nan for one in every]
         for one, value in zip(every, values, strict=True):
-            fine = not one.integer or math.isnan(value) or value == math.floor(value)
-            self.variables.set(self.variables.name(one.target), value if fine else math.nan)
+            name = self.variables.name(one.target)
+            if one.integer:
+                self.integers.add(name)
+            fine = name not in self.integers or math.isnan(value) or value == math.floor(value)
+            self.variables.set(name, value if fine else math.nan)
 
     def kill(self, start: int, stop: int) -> None:
         """What the blocks ``start`` .. ``stop`` - 1 may assign is unknown."""

@@ -232,6 +232,7 @@ CONTROL = Control(
     euler=EULER,
     calls=frozenset((key("L"),)),
     retract=RETRACT,
+    parameter="R",
     further=True,
     offsets=key("D"),
     expressions=expression_values.SINUMERIK,

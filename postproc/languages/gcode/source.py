@@ -89,7 +89,8 @@ class Source:
         return {kind: np.array(blocks) for kind, blocks in rows.items()}
 
     def in_order(self, order: Ints, kept: Ints) -> Source:
-        """The blocks in another ``order`` (E,), some maybe many times; those in rows ``kept`` are not deleted there."""
+        """The blocks in another ``order`` (E,), some maybe many times; those in rows ``kept`` (K,) are not
+        deleted there."""
         columns = {one: column.in_order(order) for one, column in self.columns.items()}
         lines = {one.name: getattr(self.blocks, one.name)[order] for one in fields(SourceLines)}
         lines["deleted"][kept] = False
@@ -107,7 +108,8 @@ class Source:
         return Source(columns, SourceLines(**lines), notes, self.comments)
 
     def with_values(self, block: Ints, address: Ints, nth: Ints, value: Floats, how: Ints) -> Source:
-        """With other values in words: the ``nth`` (K,) ones with the key ``address`` (K,) in ``block`` (K,)."""
+        """With other values in words: ``value`` and ``how`` (K,) of the ``nth`` (K,) ones with the key ``address`` (K,)
+        in ``block`` (K,)."""
         if not len(block):
             return self
         columns = dict(self.columns)

@@ -1,0 +1,140 @@
+"""Variables, loops, calls and jumps of G-code that are followed; what the cell states of the start; cycles by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from gcode_writing import round_trip
+from posted_programs import posted_programs
+
+from postproc.base.document import Document
+from postproc.languages.dialect import Program, ReadingSettings
+from postproc.languages.gcode import DIALECTS
+from postproc.toolpath.initial_state import InitialState
+
+DIALECT = {dialect.name: dialect for dialect in DIALECTS}
+HEAD = {
+    "linuxcnc": "G21 G90 G17 G54 G94\nT1 M6\nG0 X0 Y0 Z0\nF60\n",
+    "fanuc": "O1\nG21 G90 G17 G54 G94\nT1 M6\nG0 X0. Y0. Z0.\nF60.\n",
+    "sinumerik": "G71 G90 G17 G54 G94\nT1 D1\nG0 X0 Y0 Z0\nF60\n",
+}
+
+
+def read(name: str, text: str, head: str | None = None, **settings: object) -> Program:
+    raw = ((HEAD[name] if head is None else head) + text).encode()
+    given = ReadingSettings(orientation=np.zeros(3), **settings)  # type: ignore[arg-type]
+    return DIALECT[name].read((Document(Path("part.nc"), raw),), given)
+
+
+def run(name: str, text: str, **settings: object) -> list[str]:
+    """The ends of the motions after the head in the order in which they run, a question mark where one is not known,
+    a star where it is not corrected."""
+    path = read(name, text, **settings).toolpath
+    ends = []
+    for row in range(1, len(path)):
+        position = path.position[row] * 1e3
+        known = np.isfinite(position).all()
+        end = " ".join(f"{value + 0.0:g}" for value in np.round(position, 6)) if known else "?"
+        ends.append(end + "*" * (row in path.constraints.refused))
+    return ends
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "ends"),
+    [
+        # values
+        ("linuxcnc", "#1=5\nG1 X#1 Y[#1*2]\n", ["5 10 0"]),
+        ("linuxcnc", "#1=5\n#1=6 G1 X#1\nG1 X#1\n", ["5 0 0*", "6 0 0"]),
+        ("linuxcnc", "#<a b>=2\nG1 X[#<AB> + SIN[30]]\n", ["2.5 0 0"]),
+        ("linuxcnc", "G1 X[1+[2]]\nY-[3]\n", ["3 0 0", "3 -3 0"]),
+        ("linuxcnc", "G1 X#1\nY2\nX1\n", ["?*", "?*", "1 2 0"]),
+        ("linuxcnc", "/#1=5\nG1 X#1\n", ["?*"]),
+        ("linuxcnc", "#1=5\n/#1=6\nG1 X#1\n", ["?*"]),
+        ("fanuc", "#1=5.\n#1=6. X#1\n", ["?*"]),
+        ("fanuc", "#100=5\nG65 P9000\nG90 G54 G1 X#100 Y0. Z0.\n", ["?*"]),
+        ("fanuc", "#100=5\nG1 X#[90+10]\n", ["5 0 0"]),
+        ("fanuc", "#100=5\n#[#500]=3\nG1 X#100\n", ["?*"]),
+        ("sinumerik", "R1=2 R2=3\nG1 X=R1+R2 Y=IC(R1)\n", ["5 2 0"]),
+        ("sinumerik", "DEF REAL _X=2.5, _Y\nG1 X=_X Y=_Y\n", ["2.5 0 0"]),
+        ("sinumerik", "DEF INT _N\n_N=2.5\nG1 X=_N\n", ["?*"]),
+        ("sinumerik", "R1=1\nID=1 WHENEVER $A_IN[1]==1 DO R1=2\nG1 X=R1\n", ["?*"]),
+        # branches
+        ("linuxcnc", "#1=1\nO1 IF [#1 EQ 1]\nG1 X1\nO1 ELSE\nG1 X2\nO1 ENDIF\nM2\n", ["1 0 0", "?*"]),
+        ("linuxcnc", "O1 IF [#5 EQ 1]\nG1 X1\nO1 ENDIF\nG1 Y3\n", ["?*", "?*"]),
+        ("linuxcnc", "#1=1\nO1 IF [#5 EQ 1]\n#1=2\nO1 ENDIF\nG1 X#1\n", ["?*"]),
+        ("fanuc", "#1=2\nIF[#1GT1]GOTO9\nG1 X1.\nN9 G1 Y1.\nM30\n", ["0 1 0", "?*"]),
+        ("fanuc", "IF[#1GT1]GOTO9\nG1 X1.\nN9 G1 Y1.\nX3.\nM30\n", ["?*", "?*", "3 1 0"]),
+        ("fanuc", "#1=2\nIF[#1EQ2]THEN#2=4.\nG1 X#2\n", ["4 0 0"]),
+        ("sinumerik", "R1=1\nIF R1==1 GOTOF A1\nG1 X1\nA1: G1 Y1\nM30\n", ["0 1 0", "?*"]),
+        # loops
+        ("fanuc", "#1=0\nWHILE[#1LT2]DO1\n#1=#1+1\nG1 X#1\nEND1\n", ["1 0 0*", "2 0 0*"]),
+        ("linuxcnc", "O1 REPEAT [2]\nG91 G1 X1\nO1 ENDREPEAT\n", ["1 0 0*", "2 0 0*"]),
+        ("sinumerik", "FOR R1=1 TO 2\nG1 X=R1\nENDFOR\n", ["1 0 0*", "2 0 0*"]),
+        ("sinumerik", "A1:\nG1 X=IC(1)\nA2:\nREPEAT A1 A2 P=2\n", ["1 0 0*", "2 0 0*", "3 0 0*"]),
+        ("linuxcnc", "O1 WHILE [1 EQ 1]\nG1 X1\nO1 ENDWHILE\nG1 Y1\n", ["?*", "?*"]),
+        # subprograms
+        ("linuxcnc", "O1 SUB\nG1 X#1 Y#2\nO1 ENDSUB\nO1 CALL [1]\nO1 CALL [2] [3]\n", ["1 0 0*", "2 3 0*"]),
+        ("linuxcnc", "O1 SUB\nG1 X#1\nO1 ENDSUB\n#1=9\nO1 CALL [1]\nG1 Y#1\n", ["1 0 0", "1 9 0"]),
+        ("fanuc", "M98 P2 L2\nM30\nO2\nG91 G1 X1.\nM99\n", ["1 0 0*", "2 0 0*"]),
+        ("fanuc", "M98 P2\nG1 Y1.\nM30\nO2\nG1 X1.\nM99\n", ["1 0 0", "1 1 0"]),
+        ("fanuc", "M98 P3\nG1 Y1.\nM30\nO2\nG1 X1.\nM99\n", ["?*", "?*"]),
+        ("fanuc", "/M98 P2\nM30\nO2\nG1 X1.\nM99\n", ["?*"]),
+        ("sinumerik", "L5 P2\nM30\n%_N_L5_SPF\nG91 G1 X1\nM17\n", ["1 0 0*", "2 0 0*"]),
+        # cycles and offsets
+        ("sinumerik", "CYCLE82(30,0,2,-5)\nG1 X1\n", ["1 0 30"]),
+        ("sinumerik", "MCALL CYCLE81(R1,0,2,-5)\nX1\nMCALL\nG1 X2 Y2\n", ["?*", "?*"]),
+        ("sinumerik", "R1=30\nMCALL CYCLE81(R1,0,2,-5)\nX1\nMCALL\nG1 X2\n", ["1 0 30*", "2 0 30"]),
+        ("sinumerik", "CYCLE800()\nG1 X1 Y1 Z1\n", ["1 1 1"]),
+        ("sinumerik", 'CYCLE800(1,"",0,57,0,0,0,0,30,0,0,0,0,1)\nG1 X1 Y1 Z1\n', ["?*"]),
+        ("sinumerik", 'CYCLE800(1,"",0,57,0,0,0,0,R1,0,0,0,0,1)\nG1 X1 Y1 Z1\n', ["?*"]),
+    ],
+)  # fmt: skip
+def test_what_runs(name: str, text: str, ends: list[str]) -> None:
+    assert run(name, text) == ends
+
+
+def test_names_that_the_cell_binds() -> None:
+    symbols = {"#501": 4.0, "_X_HOME": 3.0}
+    assert run("fanuc", "G1 X#501\n", symbols=symbols) == ["4 0 0"]
+    assert run("sinumerik", "G1 X=_X_HOME\n", symbols=symbols) == ["3 0 0"]
+    found = read("fanuc", "G1 X#501\n")
+    assert "bind #501 under symbols:" in found.findings[0].help
+
+
+def test_the_start_that_the_cell_states() -> None:
+    text = "G21 G90 G17 G94\nG1 X5 F60\n"
+    start = InitialState(tool=3, base=2, words={"X": 1.0, "Y": 2.0, "Z": 3.0})
+    path = read("linuxcnc", text, "", initial=start).toolpath
+    np.testing.assert_allclose(path.position[0], [5e-3, 2e-3, 3e-3])
+    assert [path.frames[index].number for index in (path.base[0], path.tool[0])] == [2, 3]
+    advice = [finding.help for finding in read("linuxcnc", text, "").findings if finding.code == "GCO002"]
+    assert advice == ["state Y, Z under program_start: in the cell, or write them in the first motion"]
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("G10 L2 P1 X10. Y20. Z30.\n", [10, 20, 30]), ("G10 L2 P1 X10. Y20.\nG10 L2 P1 Z30.\n", [10, 20, 30]),
+        ("G10 L2 P2 X1. Y1. Z1.\n", None), ("G10 L2 P1 X10. Y20.\n", ()), ("G91 G10 L2 P1 X1. Y1. Z1.\nG90\n", ()),
+        ("G10 L2 P1 X#500 Y20. Z30.\n", ()), ("/G10 L2 P1 X10. Y20. Z30.\n", ()),
+    ],
+)  # fmt: skip
+def test_a_work_offset_that_the_program_states(text: str, place: list[float] | tuple[()] | None) -> None:
+    """Where the base is [mm]; None: the cell's; nothing: not known."""
+    path = read("fanuc", text + "G0 X1. Y1. Z1.\nG1 X5.\n").toolpath
+    if place == ():
+        assert path.base[-1] == -1
+    else:
+        pose = path.frames[path.base[-1]].pose
+        assert (None if pose is None else (pose.position * 1e3).round(9).tolist()) == place
+
+
+PROGRAMS = list(posted_programs())
+
+
+@pytest.mark.parametrize(("path", "raw"), PROGRAMS, ids=[path.stem for path, _ in PROGRAMS])
+def test_posted_programs_are_written(path: Path, raw: bytes) -> None:
+    dialect = next(one for one in DIALECTS if one.claims(path, raw))
+    round_trip(dialect, raw, 1)
