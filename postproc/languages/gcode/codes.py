@@ -43,7 +43,7 @@ CODES = define(
         "GCO005": Code(
             "warning",
             "variable or expression",
-            meaning="A word contains a variable or an expression whose value is not known, or the block sets a variable.",
+            meaning="A word has a variable or an expression whose value is not known, or the block sets a variable.",
             consequence="The target is unknown or other blocks use it, so the motion is not corrected.",
             action="Let the post-processor write numbers.",
             example="`G1 X[#1+5]`.",
