@@ -43,8 +43,8 @@ CODES = define(
         "GCO005": Code(
             "warning",
             "variable or expression",
-            meaning="A word contains a variable or an expression.",
-            consequence="Only numbers can be corrected, so the motion is not corrected.",
+            meaning="A word has a variable or an expression whose value is not known, or the block sets a variable.",
+            consequence="The target is unknown or other blocks use it, so the motion is not corrected.",
             action="Let the post-processor write numbers.",
             example="`G1 X[#1+5]`.",
         ),
@@ -125,8 +125,8 @@ CODES = define(
             "warning",
             "work offset is not known",
             meaning=(
-                "The program writes the offset itself (G10, a variable), or it is unclear which one is "
-                "active."
+                "The program writes the offset itself by values that are not known, or it is unclear which "
+                "one is active."
             ),
             consequence="The place of the target in the cell is unknown, so the motion is not corrected.",
             action=(

@@ -31,9 +31,10 @@ STATED = 1 << 28
 
 @dataclass(frozen=True, eq=False)
 class StatedOffset:
-    """A work offset as G10 L2 sets it: its number, and where it is in the coordinates of the machine."""
+    """A work offset as G10 L2 sets it: its number, which one it is, and where it is in the machine."""
 
     number: int
+    index: int
     pose: Poses
 
 
@@ -55,7 +56,7 @@ def work_offsets(given: BlockWords) -> WorkOffsets:
         return WorkOffsets(base, everywhere(False, n), ())
     changed = np.zeros(n + 1, np.bool_)
     result = np.array(base)
-    stated: list[StatedOffset] = []
+    stated: dict[tuple[float, ...], StatedOffset] = {}
     written: dict[int, Floats] = {}
     blocks = [block for block, _, _ in events]
     for (block, number, values), stop in zip(events, [*blocks[1:], n - 1], strict=True):
@@ -73,7 +74,7 @@ def work_offsets(given: BlockWords) -> WorkOffsets:
             if one not in written and not isinstance(written, _AllUnknown):
                 continue
             result[rows][here == one] = _stated(one, written.get(one, _NOWHERE), stated)
-    return WorkOffsets(result, changed[:n], tuple(stated))
+    return WorkOffsets(result, changed[:n], tuple(stated.values()))
 
 
 class _AllUnknown(dict[int, Floats]):
@@ -85,21 +86,17 @@ MOST_STATED = 1000
 """Offsets that a program states; what more it writes is not known."""
 
 
-def _stated(number: int, values: Floats, stated: list[StatedOffset]) -> int:
+def _stated(number: int, values: Floats, stated: dict[tuple[float, ...], StatedOffset]) -> int:
     """The number of a work offset with ``values`` (4,) X, Y, Z [m] and the angle [rad] about Z, -1 where unknown."""
     if np.isnan(values).any() or number < 0:
         return -1
-    pose = Poses(rotation_from_abc(np.array([values[3], 0.0, 0.0])), values[:3])
-    for index, one in enumerate(stated):
-        same = np.array_equal(one.pose.position, values[:3]) and np.array_equal(
-            one.pose.rotation, pose.rotation
-        )
-        if one.number == number and same:
-            return STATED + index
-    if len(stated) == MOST_STATED:
-        return -1
-    stated.append(StatedOffset(number, pose))
-    return STATED + len(stated) - 1
+    same = (float(number), *values.tolist())
+    if same not in stated:
+        if len(stated) == MOST_STATED:
+            return -1
+        pose = Poses(rotation_from_abc(np.array([values[3], 0.0, 0.0])), values[:3])
+        stated[same] = StatedOffset(number, len(stated), pose)
+    return STATED + stated[same].index
 
 
 def _offset_events(given: BlockWords) -> list[tuple[int, int | None, Floats | None]]:
