@@ -202,7 +202,7 @@ def test_where_too_much_runs_is_told_and_passed_over() -> None:
     assert codes(found) == ["7 KRL024", "15 KRL004"]
     assert (
         found.findings[0].message
-        == "it executes more than the 12 statements that are followed; its passes are not told apart"
+        == "it executes more than the 12 statements that are followed; its passes are not distinguished"
     )
     assert xs(found) == [1, 1, 6]
     found = program("FOR i=1 TO 9\nLIN {X i,Y 0,Z 0,A 0,B 0,C 0}\nENDFOR\n" + LINE)

@@ -32,7 +32,7 @@ FINITE = words_of(
     collide collides cuts face meets reaches removes touches
     accepts act acts affects agree allows answers applies approximates are asks assumes becomes belong
     belongs can cannot carries carry causes chooses combines come compares computes consist consists contain
-    contains continue continues contradict contradicts contribute converge converges converts corrects could
+    contains continue continues contradict contradicts contribute converge converges converts corrects could counts
     declares decreases define defines deflects depend depends describe describes determine determines did
     differ differs disagrees divides do does drives enters equals exceed exceeds exclude excludes executes
     exist exists explain explains express fails fits follow follows fulfils generates get gets give gives
@@ -40,7 +40,7 @@ FINITE = words_of(
     mixes move must need needs occupy occur occurs omits overflows overlap overwrites permits precedes
     predicts preserve produces proposes reach reaches reads reduce refuses relates relies remain remains
     repeats replaces requests require requires reserves rotate rotates sees select selects separate serves
-    should show shows slows starts stops stays subtracts treat use uses want wants was will would writes wrote
+    should show shows slows starts stops stays subtracts treat use uses varies want wants was will would writes wrote
     """
 )
 """Verb forms that no message uses as a noun."""

@@ -90,11 +90,13 @@ def judge(case: Case, reader: Reader | None = None) -> Verdict:
     known: dict[int, int] = defaultdict(int)
     executed: dict[int, list[Executed]] = defaultdict(list)
     by_line = [_by_line(one.motions) for one in runs]
+    # where paths meet or part, a row may stand for any number of executions of its line
+    parts = any(claim.apart and not claim.never for claim in claimed)
     for one, of_line in zip(runs, by_line, strict=True):
         for line, motions in of_line.items():
             executed[line] += motions
             always = all(len(other.get(line, ())) == len(rows[line]) for other in by_line)
-            matched, why = align(rows[line], motions, one.reads_inputs and not always)
+            matched, why = align(rows[line], motions, parts or (one.reads_inputs and not always))
             known[line] += matched
             if why:
                 found.setdefault((line, why.partition(":")[0]), Disagreement(line, why))

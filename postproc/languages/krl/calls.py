@@ -153,6 +153,8 @@ class Calls(BlockFlow):
         if run.routine is None:
             return pc + 1
         own = self.stack[active.blocks :]
+        if run.walked and not active.blocks and self.reachable:
+            run.rows.left_from |= run.state.sources
         if kind == "return" and not self._is_single(own):
             loop = next((f for f in own if f.followed and f.block.word in LOOPS - {b"FOR"}), None)
             if loop is not None:

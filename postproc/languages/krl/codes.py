@@ -69,7 +69,7 @@ CODES = define(
             consequence="The place of the target in the cell is unknown, so the motion is not corrected.",
             action=(
                 "Set $BASE and $TOOL before it, to numbers or to BASE_DATA[n] and TOOL_DATA[n]; or state in the "
-                "cell what holds at the start (program_start:) and the records that no file declares "
+                "cell the frames at the start (program_start:) and the records that no file declares "
                 "(symbols:, such as FHOME: {TOOL_NO: 1, BASE_NO: 0})."
             ),
             example="A program that relies on the base which another program set.",
@@ -77,7 +77,7 @@ CODES = define(
         "KRL006": Code(
             "warning",
             "motion in a block whose structure is not understood",
-            meaning="The block has no end of its own, holds an ELSEIF, or is nested deeper than 100 blocks.",
+            meaning="The block has no end of its own, contains an ELSEIF, or is nested deeper than 100 blocks.",
             consequence="Whether and how often the motion runs is not known, so it is not corrected.",
             action="Close every block, and write ELSEIF as ELSE and IF.",
             example="`IF $IN[3] THEN`, `LIN P4`, and no ENDIF.",

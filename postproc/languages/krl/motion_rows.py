@@ -71,8 +71,8 @@ class MotionRows:
     """``chunks``: single rows and runs of common lines in their order; ``places``: rows by what is rare.
 
     ``passing``: points of spline blocks; ``entries``: first point of such a block -> line of its header.
-    ``never_from``: the first row of those that never run, None without.
-    ``sources_of``: rows that may start elsewhere than where the row before ends -> where.
+    ``sources_of``: rows that may start elsewhere than where the row before ends -> where.  ``left_from``: where
+    routines end after which it is not known what runs.  ``never_from``: the first row of those that never run.
     """
 
     document: Document
@@ -87,6 +87,7 @@ class MotionRows:
     relative: dict[int, Relative] = field(default_factory=dict)
     whole: dict[int, str] = field(default_factory=dict)
     sources_of: dict[int, frozenset[Source]] = field(default_factory=dict)
+    left_from: set[Source] = field(default_factory=set)
     never_from: int | None = None
     inline: dict[int, InlineForm] = field(default_factory=dict)
     approximated: dict[int, float] = field(default_factory=dict)

@@ -136,9 +136,7 @@ class OpenBlocks:
         return item
 
     def _report_length(self, item: Statement) -> None:
-        message = (
-            f"it executes more than the {BUDGET} statements that are followed; its passes are not told apart"
-        )
+        message = f"it executes more than the {BUDGET} statements that are followed; its passes are not distinguished"
         self.run.add_finding("KRL024", message, item)
 
     def _abort(self, frame: BlockFrame) -> int:

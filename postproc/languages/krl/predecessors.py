@@ -72,7 +72,8 @@ def _few(rows: MotionRows, sources: Iterable[Source]) -> set[int]:
 
 def _sources_of_others(rows: MotionRows, single: Bools) -> Iterable[Source]:
     """Where the motions start that do not simply follow the row before them."""
-    return {source for row, sources in rows.sources_of.items() if not single[row] for source in sources}
+    others = {source for row, sources in rows.sources_of.items() if not single[row] for source in sources}
+    return others | rows.left_from
 
 
 def expanded(rows: MotionRows, sources: Iterable[Source], seen: set[Source] | None = None) -> set[int]:
