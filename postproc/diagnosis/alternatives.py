@@ -43,7 +43,7 @@ def squares_of(fitted: Fit, weights: Weighting, variance: float) -> float:
     priors = sum(
         (level * (u.value - value) / u.prior) ** 2
         for u, value in zip(fitted.unknowns, values.tolist(), strict=True)
-        if u.prior is not None
+        if u.prior is not None and not u.gauge
     )
     return float(residual @ residual) + float(priors)
 

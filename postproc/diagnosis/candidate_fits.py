@@ -12,7 +12,7 @@ from postproc.diagnosis.candidates import Candidate
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
 from postproc.identification.least_squares import Point, at, scales
-from postproc.identification.unknowns import Unknown, unknowns_of, with_mechanism
+from postproc.identification.unknowns import Unknown, unknowns_of, with_gauge, with_mechanism
 from postproc.model import StiffnessModel
 
 
@@ -30,7 +30,9 @@ def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> 
         start |= _begun(campaign, base, model, candidate)
     own = [u for u in base.asked if u.key in {b.key for b in base.unknowns}]
     # what turns out to be unobservable stays at its start value: without a length a spring is none
-    additional = [replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in unknowns]
+    additional = [
+        replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in with_gauge(unknowns)
+    ]
     return fit(campaign, model.with_values(start), [*own, *additional], given=base.point.given)
 
 

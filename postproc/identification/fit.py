@@ -12,7 +12,7 @@ from postproc.base.arrays import Bools, Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.identification.campaign import Campaign, Nuisances
 from postproc.identification.identifiable import Dropped, Identifiability, basis, identifiability
-from postproc.identification.least_squares import Point, at, descended, prior_rows, scales, with_columns
+from postproc.identification.least_squares import Point, at, descended, prior_rows, prior_weight, scales, with_columns
 from postproc.identification.noise import Noise, Weighting, noise_of, shared_error, weighting
 from postproc.identification.registration import registered
 from postproc.identification.unknowns import Unknown
@@ -267,7 +267,10 @@ def _insight(
     campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, factor: float
 ) -> Identifiability:
     columns, nuisance = (np.nan_to_num(weights(part)) for part in point.taken)
-    prior, values = prior_rows(free) * np.sqrt(factor), point.values(free)
+    known = campaign.nuisance_prior(point.given)[0] * prior_weight(factor)
+    columns = np.concatenate([columns, np.zeros((len(known), columns.shape[1]))])
+    nuisance = np.concatenate([nuisance, known])
+    prior, values = prior_rows(free) * prior_weight(factor), point.values(free)
     return identifiability(free, columns, nuisance, campaign.nuisance_names, prior, values, factor)
 
 

@@ -18,7 +18,7 @@ from postproc.identification.fit import Fit, fit
 from postproc.identification.identifiable import strong_correlations
 from postproc.identification.outliers import Outlier, outliers
 from postproc.identification.sanity_checks import check_fit, check_numbers
-from postproc.identification.unknowns import FitRequest, asked_for
+from postproc.identification.unknowns import FitRequest, asked_for, with_gauge
 from postproc.identification.validation import WIDER, Bootstrap, Validation, bootstrap, held_out, validated
 from postproc.measurements import Readings, joined, read_measurements, robot_named
 from postproc.model import StiffnessModel
@@ -92,6 +92,7 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
     _spare(request.output, measured.robot.path)
     campaign, model = measured.campaign, measured.model
     asked = asked_for(model, request.effects, request.priors)
+    asked = replace(asked, unknowns=with_gauge(asked.unknowns))
     check_numbers(measured.readings, asked.unknowns, asked.model)
     stage("comparing")
     findings = [*measured.findings, *check_fit(campaign, asked.model, asked.unknowns)]
@@ -295,7 +296,7 @@ def _result(
                     file,
                 )
             )
-        if unknown.prior is not None and abs(estimate.value - unknown.value) > PULLED * unknown.prior:
+        if unknown.prior is not None and not unknown.gauge and abs(estimate.value - unknown.value) > PULLED * unknown.prior:
             findings.append(
                 Finding(
                     "IDN023",
