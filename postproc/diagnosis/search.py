@@ -89,7 +89,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
         if keys == before or keys in tried or len(tried) >= PASSES:
             last = explained(linear.problem, start)
             against = find_alternatives(campaign, base, fitted, linear, last)
-            better = next((r for r in against if r.fitted and not r.is_decoy and r.margin < -1.0), None)
+            better = next((r for r in against if r.fitted and not r.is_decoy and r.priced < -1.0), None)
             done = Search(base, fitted, chosen, hidden, linear, last, against)
             if better is None or len(tried) >= PASSES:
                 return done

@@ -14,9 +14,9 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 
-WORTH = 0.1
-"""Share of the remaining squares that an effect must explain where more than scatter remains: what is not
-understood follows the joints as well, and by chance looks a little like any effect."""
+WORTH = 0.19
+"""Share of the remaining squares that an effect must explain where more than scatter remains, a tenth of the root mean
+square: what is not understood follows the joints as well, and by chance looks a little like any effect."""
 
 CHANCE = 0.001
 """Probability that among all groups any is taken in although none is there."""

@@ -61,7 +61,14 @@ TOLERATED = 0.15
 EXPLAINS = 0.9
 """Share of the variance beyond scatter that a name must take away where some remains."""
 
+EVERY_ARM = {"joint_offset": 0.5, "link_geometry": 0.5, "joint_compliance": 0.75, "link_gravity": 0.75}
+"""The same of what every arm has: a geometry that is not quite the nominal one, weight and gears that deflect."""
 
+WORST = 1.1
+"""By how much the largest residual of poses that were left out may grow with an effect."""
+
+
+NOT_ENOUGH = "too much would remain for a name"
 OTHER_COURSE = "the readings follow another course than that of this effect"
 SIZE_UNDETERMINED = "it would have to be unusually large, and the readings hardly determine its size"
 
@@ -70,7 +77,8 @@ SIZE_UNDETERMINED = "it would have to be unusually large, and the readings hardl
 class Evidence:
     """For one candidate.  gain: fall of -2 ln(likelihood) with it; chance: probability of that without it, among all
     candidates; heldout, regions, sessions: fall of the same for poses, regions and sessions left out (NaN where there
-    are too few); margin: of the nearest other candidate in its place, ``alias``."""
+    are too few); margin: of the nearest other candidate in its place, ``alias``; worst: the largest residual of poses
+    left out with it, over that without it."""
 
     gain: float
     chance: float
@@ -79,6 +87,7 @@ class Evidence:
     sessions: float
     margin: float
     alias: Candidate | None
+    worst: float = 1.0
 
     @property
     def is_sufficient(self) -> bool:
@@ -134,6 +143,8 @@ def judge(search: Search) -> Verdict:
             rejected.append((candidate, OTHER_COURSE))
         elif not its.is_sufficient:
             rejected.append((candidate, "no gain on held-out readings"))
+        elif its.worst > WORST:
+            rejected.append((candidate, "it makes the largest residual of held-out poses larger"))
         elif is_implausible(estimates):
             rejected.append((candidate, SIZE_UNDETERMINED))
         elif bounded and len(several) == 1:
@@ -149,11 +160,22 @@ def judge(search: Search) -> Verdict:
     # two forms of one effect on one joint do not make its name uncertain
     sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
     formless = any(why == OTHER_COURSE for _, why in rejected)
-    enough = not linear.problem.known or chi2 - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)
+    taken = 1.0 - (chi2 - 1.0) / (bare - 1.0) if linear.problem.known and bare > 1.0 else 1.0
+    if formless or unexplained:
+        # what is certain stays, whatever remains
+        kept = [
+            k
+            for k, one in enumerate(named)
+            if taken >= EVERY_ARM.get(one.effect, np.inf if formless else EXPLAINS)
+        ]
+        rest = [one.candidate for k, one in enumerate(named) if k not in kept]
+        named = [named[k] for k in kept]
+        aliases = [aliases[k] for k in kept]
+        sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
+        if named:
+            rejected += [(candidate, NOT_ENOUGH) for candidate in rest]
     if not named:
         word = "unknown" if unexplained or rejected else "nothing_missing"
-    elif formless or (unexplained and not enough):
-        word, named, sets = "unknown", [], ()
     elif sets:
         word = "ambiguous"
     else:
@@ -227,11 +249,12 @@ def _evidence(search: Search, last: Explained, group: int) -> Evidence:
         held_out_gain(search, last, group, rows)
         for rows in (folds_of(campaign, min(FOLDS, campaign.poses)), _regions(search), _sessions(search))
     )
+    worst = worst_ratio(search, last, group, folds_of(campaign, min(FOLDS, campaign.poses)))
     nearest = next(iter(_against(search, linear.candidates[group])), None)
     margin, alias = (np.inf, None) if nearest is None else (nearest.margin, nearest.candidate)
     among = len(linear.candidates)
     gain = squares / variance
-    return Evidence(gain, min(1.0, chance * among), heldout, regions, sessions, margin, alias)
+    return Evidence(gain, min(1.0, chance * among), heldout, regions, sessions, margin, alias, worst)
 
 
 def ambiguity_set(search: Search, group: int, observable: bool) -> tuple[Candidate, ...]:
@@ -243,7 +266,9 @@ def ambiguity_set(search: Search, group: int, observable: bool) -> tuple[Candida
     near = [
         r.candidate for r in against if r.margin < (-BUILT if built and observable and r.is_decoy else MARGIN)
     ]
-    return (mine, *near)
+    # of one effect the form with fewest parameters
+    several = [mine, *near]
+    return (mine, *(c for c in near if not any(c is not one and c.contains(one) for one in several)))
 
 
 def is_implausible(estimates: Sequence[Estimate]) -> bool:
@@ -294,6 +319,35 @@ def held_out_gain(search: Search, last: Explained, group: int, part: Ints | None
         return _misfit(matrix, target, np.append(of, np.full(more, -1)), variance)
 
     return surprise([g for g in last.groups if g != group]) - surprise(last.groups)
+
+
+def worst_ratio(search: Search, last: Explained, group: int, part: Ints) -> float:
+    """The largest residual of a pose left out with the group, over that without it."""
+    linear = search.linear
+    rows = len(linear.residual) - linear.priors
+    of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
+    pose = np.repeat(search.base.campaign.pose, rows // len(part))
+
+    def largest(groups: Sequence[int]) -> float:
+        matrix = np.concatenate([linear.common, *(linear.columns[g] for g in groups)], axis=1)
+        away = _left_out(matrix, linear.residual, of)[:rows]
+        return float(np.sqrt(np.bincount(pose, away**2).max()))
+
+    without = largest([g for g in last.groups if g != group])
+    return largest(last.groups) / without if without > 0 else 1.0
+
+
+def _left_out(matrix: Floats, target: Floats, part: Ints) -> Floats:
+    """(n,) residuals of ``target`` (n,), each part predicted from the others by ``matrix`` (n, k)."""
+    size = np.linalg.norm(matrix, axis=0)
+    scaled = matrix[:, size > 0] / size[size > 0]
+    whole, aim, away = scaled.T @ scaled, scaled.T @ target, np.zeros(len(target))
+    for k in np.unique(part[part >= 0]):
+        out = scaled[part == k]
+        value, vector = np.linalg.eigh(whole - out.T @ out)
+        root = vector / np.sqrt(np.maximum(value, SEEN))
+        away[part == k] = target[part == k] - out @ (root @ (root.T @ (aim - out.T @ target[part == k])))
+    return away
 
 
 def _expected(given: Problem, last: Explained, group: int) -> Floats:

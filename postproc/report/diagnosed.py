@@ -30,6 +30,9 @@ CLEAR = ("named", "nothing_missing")
 NEARLY_ALL = 0.9
 """Share of the candidates that would have shown at the reported size."""
 
+REFITTED = 0.9
+"""Share of the residual of held-out poses that refitted parameters leave where a new file is worth writing."""
+
 USUAL = 10.0
 """An effect that only shows beyond so many times its usual size was hardly tested."""
 
@@ -99,9 +102,18 @@ class Diagnosed:
     def improves(self) -> bool:
         """Whether a new robot file would be better than the old one."""
         word = self.verdict.word
-        return word in ("named", "partly_named") or (
-            word == "nothing_missing" and bool(self.verdict.refitted)
-        )
+        if word == "ambiguous":
+            return self.diagnosis.agreed or bool(self.clear)
+        if word == "nothing_missing":
+            return bool(self.verdict.refitted) or self._is_refitted
+        return word in ("named", "partly_named")
+
+    @property
+    def _is_refitted(self) -> bool:
+        """Whether the robot file's own parameters, refitted, predict poses that were left out clearly better, although
+        no single one of them has clearly moved."""
+        before, after = self.rms["held_out_before"], self.rms["held_out_after"]
+        return bool(after < REFITTED * before)
 
     @cached_property
     def clear(self) -> tuple[Named, ...]:
@@ -222,6 +234,10 @@ class Diagnosed:
             "conditional": verdict.conditional,
             "named": [self._named(named) for named in self.clear],
             "ambiguous": _once([list(names_of(one)) for one in verdict.alternatives]),
+            "largest_disagreement_mm": mm(max(self.diagnosis.disagreement))
+            if self.diagnosis.disagreement and np.isfinite(max(self.diagnosis.disagreement))
+            else None,
+            "same_correction": self.diagnosis.agreed,
             "alternatives": [[_candidate(c) for c in one] for one in verdict.alternatives],
             "rejected": [{**_candidate(candidate), "why": why} for candidate, why in verdict.rejected],
             "tried": list(self.tried),

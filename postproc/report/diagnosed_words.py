@@ -76,12 +76,19 @@ def headline(result: Diagnosed) -> str:
         "nothing_missing": "nothing missing" + (", but parameters have moved" if verdict.refitted else ""),
         "named": f"named: {names}",
         "partly_named": f"partly named: {names}",
-        "ambiguous": f"ambiguous: {sets}{f'; named: {names}' if names else ''}",
+        "ambiguous": f"ambiguous: {sets}{_either_way(result)}{f'; named: {names}' if names else ''}",
         "unknown": "unknown: no effect that was tried explains the residual"
         if result.scatter_exceeded
         else "unknown: not clear whether an effect is missing",
     }[verdict.word]
     return f"{words} (if the residual is scatter)" if verdict.conditional else words
+
+
+def _either_way(result: Diagnosed) -> str:
+    if not result.diagnosis.agreed:
+        return ""
+    largest = max(result.diagnosis.disagreement, default=0.0)
+    return f" (the same correction within {_mm(largest)} mm)"
 
 
 def _nothing_missing(result: Diagnosed) -> Iterator[str]:
@@ -130,15 +137,30 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
         yield from _missing(result, result.clear)
     for alternatives in result.verdict.alternatives:
         one_of = " or ".join(candidate.label for candidate in alternatives)
-        yield f"These readings can not distinguish {one_of}: each explains them nearly as well as the first."
+        yield f"These readings can not distinguish {one_of}: each explains them as well as the others."
+    largest = max(result.diagnosis.disagreement, default=np.inf)
+    if result.diagnosis.agreed:
+        yield (
+            f"Either way the correction is the same within {_mm(largest)} mm, anywhere in the workspace and under loads"
+            " as large as those measured: the robot file can be used, whichever it is."
+        )
+        yield from _closed(result)
+        yield from _more(result, "More is missing:", "after")
+        yield "No pose and no load of this size separates what predicts the same; only a look at the robot does."
+        return
+    differ = f" by up to {_mm(largest)} mm" if np.isfinite(largest) else ""
     yield (
-        f"With all effects found the residual would be {_mm(result.rms['explained'])} mm; no robot file is written from"
-        " an ambiguous result."
+        f"Elsewhere in the workspace, or under other loads, their corrections differ{differ}, so the robot file"
+        f" {'gets only what is clear' if result.clear else 'is not changed'}. With all effects found the residual would"
+        f" be {_mm(result.rms['explained'])} mm."
     )
     yield from _more(result, "More is missing:", "explained")
     planned = result.next_poses
     if planned is None:
-        yield "No pose within the limits, with the loads used so far, distinguishes them: other loads or targets may."
+        yield (
+            "No pose within the limits, with the loads used so far, distinguishes them better than the scatter: other"
+            " loads or targets may."
+        )
         return
     first, second = (candidate.label for candidate in planned.between)
     apart = min(planned.separation)
@@ -422,4 +444,6 @@ def _list(words: Iterable[str]) -> str:
 
 
 def _mm(length: float) -> str:
+    if length < 1e-4 * MM:
+        return "0.0001"
     return f"{length / MM:.3f}" if length >= 0.01 * MM else f"{length / MM:.2g}"

@@ -101,6 +101,12 @@ def diagnose_schema() -> Schema:
             "conditional": boolean("whether the scatter is not stated and the residuals replace it"),
             "named": array(named, "missing effects"),
             "ambiguous": array(names, "sets of effects that the readings can not distinguish"),
+            "largest_disagreement_mm": quantity(
+                "mm",
+                "largest difference over the workspace of what the explanations of a set predict",
+                nullable=True,
+            ),
+            "same_correction": boolean("whether all explanations of each set give the same correction"),
             "alternatives": array(
                 array(record(_CANDIDATE, "one candidate"), "one set"), "the same as candidates"
             ),

@@ -105,7 +105,7 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     folds = min(FOLDS, campaign.poses)
     residuals = held_out(diagnosis.stated, folds), held_out(diagnosis.final, folds)
     planned = None
-    if diagnosis.verdict.word == "ambiguous":
+    if diagnosis.verdict.word == "ambiguous" and not diagnosis.agreed:
         stage("looking for poses that settle it")
         planned = _next_poses(measured, diagnosis)
     result = Diagnosed(

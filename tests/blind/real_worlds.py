@@ -197,7 +197,7 @@ def twin(number: int, seed: int) -> Trial:
             scene = as_filed(False).having({"tilts": tilts})
         accept = frozenset({("base_compliance", ""), ("link_compliance", "A1")})
     else:
-        raw = robot_file(True, False, [("joint_offset", "A1")])
+        raw = robot_file(False, False)
         design = with_targets(campaign(rng, count, stated=True, filed=raw), rng)
         design = replace(design, frame=None)
         turn = sized(rng, 3e-4, 2e-3)
