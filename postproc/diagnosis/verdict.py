@@ -367,10 +367,15 @@ def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> floa
         out = scaled[part == k]
         value, vector = np.linalg.eigh(whole - out.T @ out)
         root = vector / np.sqrt(np.maximum(value, SEEN))
-        x = root @ (root.T @ (aim - out.T @ target[part == k]))
-        uncertainty = variance * (1.0 + ((out @ root) ** 2).sum(axis=1))
-        away = (target[part == k] - out @ x) ** 2 / uncertainty
-        total += float((np.minimum(away, OUTLIER_LIMIT**2) + np.log(uncertainty)).sum())
+        away = target[part == k] - out @ (root @ (root.T @ (aim - out.T @ target[part == k])))
+        # of a part that is left out as a whole what all share, as where its tracker is, is uncertain together:
+        # the covariance is variance (1 + B B'), B = out root
+        b = out @ root
+        gram = np.eye(b.shape[1]) + b.T @ b
+        shared = np.linalg.solve(gram, b.T @ away)
+        own = (away - b @ shared) ** 2 / variance
+        total += float(np.minimum(own, OUTLIER_LIMIT**2).sum() + len(own) * np.log(variance))
+        total += float(min(shared @ shared / variance, OUTLIER_LIMIT**2 * len(shared)) + np.linalg.slogdet(gram)[1])
     return total
 
 

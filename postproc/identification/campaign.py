@@ -36,6 +36,9 @@ SCALE_NAME = "scale of the tracker"
 SCALE = 2e-4
 """Standard deviation of the scale of a tracker's lengths over those of a robot: 10 K of steel are 1.2e-4."""
 
+LARGEST_SCALE = 5e-4
+"""No tracker and no temperature makes more: the rest is the arm."""
+
 
 @dataclass(frozen=True)
 class PredictedReadings:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.identification.campaign import Campaign, Nuisances, PredictedReadings
+from postproc.identification.campaign import LARGEST_SCALE, Campaign, Nuisances, PredictedReadings
 from postproc.identification.noise import Weighting
 from postproc.identification.sensitivities import columns
 from postproc.identification.unknowns import Unknown
@@ -144,7 +144,12 @@ def descended(
         )
         reduced = np.asarray(np.linalg.qr(tall, mode="r"))
         system, right = reduced[:-1, :-1], reduced[:-1, -1]
-        low, high = np.concatenate([lower - x, -loose]) * length, np.concatenate([upper - x, loose]) * length
+        if campaign.scaled:
+            below, above = loose.copy(), loose.copy()
+            below[-1], above[-1] = LARGEST_SCALE + point.given.scale, LARGEST_SCALE - point.given.scale
+        else:
+            below = above = loose
+        low, high = np.concatenate([lower - x, -below]) * length, np.concatenate([upper - x, above]) * length
         whole = np.linalg.lstsq(system, right, rcond=None)[0]
         if np.any(whole < low) or np.any(whole > high):
             whole = lsq_linear(system, right, (np.minimum(low, 0.0), np.maximum(high, 0.0)), "bvls").x

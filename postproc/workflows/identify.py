@@ -16,6 +16,7 @@ from postproc.base.units import DEG, MM
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
 from postproc.identification.identifiable import strong_correlations
+from postproc.identification.mounting import check_mounting
 from postproc.identification.outliers import Outlier, outliers
 from postproc.identification.sanity_checks import check_fit, check_numbers
 from postproc.identification.unknowns import FitRequest, asked_for, with_gauge
@@ -183,7 +184,12 @@ def measured_of(
         six = [*tool_mm_deg, 0.0, 0.0, 0.0][:6]
         tool = Poses.from_abc(np.array(six[:3]) * MM, np.array(six[3:]) * DEG)
     campaign = Campaign(readings, tool)
-    return Measured(described, StiffnessModel.from_robot(described), readings, campaign, tuple(findings))
+    model = StiffnessModel.from_robot(described)
+    mounting = check_mounting(campaign, model)
+    if mounting.readings is not readings:
+        readings, campaign = mounting.readings, Campaign(mounting.readings, tool)
+    findings += mounting.findings
+    return Measured(described, model, readings, campaign, tuple(findings))
 
 
 def _known(named: str, path: Path) -> str:
