@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.diagnosis.candidate_fits import point_without, term_of, with_effects
+from postproc.diagnosis.candidate_fits import keys_of, point_without, with_effects
 from postproc.diagnosis.candidates import Candidate
 from postproc.effects import Conditions
 from postproc.identification.campaign import Campaign
@@ -56,10 +56,9 @@ def largest_disagreement(
 
 def without_effects(campaign: Campaign, fitted: Fit, gone: Sequence[Candidate]) -> Fit:
     """The fit with the effects ``gone`` at their null, everything else as it was estimated beside them."""
-    keys = set()
+    keys: set[tuple[int, str]] = set()
     for candidate in gone:
-        term = term_of(fitted.model, candidate)
-        keys |= {(term, u.parameter.name) for u in candidate.unknowns}
+        keys |= keys_of(fitted.model, candidate).keys()
     rest = [i for i, u in enumerate(fitted.unknowns) if u.key not in keys]
     point = point_without(campaign, fitted, gone)
     own, nuisance = fitted.point.taken

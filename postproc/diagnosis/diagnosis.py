@@ -72,7 +72,8 @@ def diagnose(
         rejected += verdict.rejected
     if verdict.word == "nothing_missing" and any(why == SIZE_UNDETERMINED for _, why in rejected):
         verdict = replace(verdict, word="unknown")
-    names = [named.candidate for named in verdict.named]
+    # zeros that belong to the geometry of the whole arm are fitted with it
+    names = [named.candidate for named in verdict.named if named.candidate.key in {c.key for c in result.chosen}]
     final = result.base
     disagreement: tuple[float, ...] = ()
     agreed = True

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.diagnosis.alternatives import find_alternatives
-from postproc.diagnosis.candidate_fits import composed, in_scales, point_without, term_of, with_effects
+from postproc.diagnosis.candidate_fits import composed, in_scales, keys_of, point_without, with_effects
 from postproc.diagnosis.candidates import Candidate, candidates, is_visible
 from postproc.diagnosis.nonlinear_effects import Outside, evaluate_at_size, whole
 from postproc.diagnosis.search_result import Key, Linear, Search
@@ -232,10 +232,11 @@ def _as_fitted(
     own, _ = fitted.point.taken
     values = in_scales(fitted, fitted.unknowns)
     there: dict[Key, Candidate] = {}
+    counted: set[tuple[int, str]] = set()
     for candidate in chosen:
-        term = term_of(fitted.model, candidate)
-        names = {u.parameter.name for u in candidate.unknowns}
-        at = [i for i, u in enumerate(fitted.unknowns) if u.term == term and u.parameter.name in names]
+        keys = keys_of(fitted.model, candidate).keys() - counted
+        counted |= keys
+        at = [i for i, u in enumerate(fitted.unknowns) if u.key in keys]
         if not at:
             continue
         columns = np.nan_to_num(own[:, :, at])

@@ -199,13 +199,13 @@ def scatter(given: Problem, last: Explained) -> float:
 
 def probability(given: Problem, squares: float, rank: int, variance: float, freedom: int) -> float:
     """That ``rank`` columns explain ``squares`` by chance."""
-    from scipy.stats import chi2, f
+    from scipy.special import chdtrc, fdtrc
 
     if rank == 0 or squares <= 0:
         return 1.0
     if given.known and variance == 1.0:
-        return float(chi2.sf(squares, rank))
-    return float(f.sf(squares / rank / variance, rank, max(1, freedom)))
+        return float(chdtrc(rank, squares))
+    return float(fdtrc(rank, max(1, freedom), squares / rank / variance))
 
 
 def selected(

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.diagnosis.candidate_fits import has_zeros
 from postproc.diagnosis.candidates import EVERY, Candidate, names_of
 from postproc.diagnosis.decoys import HAS_DECOYS
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
@@ -20,6 +21,7 @@ from postproc.diagnosis.selection import (
     probability,
     scatter,
 )
+from postproc.effects.joint_offset import JointOffset
 from postproc.identification.fit import Estimate, Fit
 from postproc.identification.validation import folds_of
 
@@ -134,6 +136,7 @@ def judge(search: Search) -> Verdict:
     """The verdict on a search."""
     linear, last = search.linear, search.explained
     named, rejected, aliases = [], [], []
+    zeros: list[tuple[Candidate, Evidence]] = []
     for g in last.groups:
         candidate, its = linear.candidates[g], _evidence(search, last, g)
         estimates = _estimates(search.final, candidate, search)
@@ -153,6 +156,8 @@ def judge(search: Search) -> Verdict:
             joints, fixed = _joints(candidate, estimates), _fixed_values(search.final, candidate, estimates)
             named.append(Named(candidate, joints, estimates, its, fixed))
             aliases.append(several)
+            if has_zeros(candidate):
+                zeros.append((candidate, its))
     chi2, unexplained = reduced_chi2_of(search, last)
     patterns = residual_patterns(search.final, chance=STRUCTURE)
     unexplained = unexplained or bool(patterns)
@@ -180,6 +185,10 @@ def judge(search: Search) -> Verdict:
         word = "ambiguous"
     else:
         word = "partly_named" if unexplained or rejected else "named"
+    kept_keys = {one.candidate.key for one in named}
+    named += [
+        more for whole, its in zeros if whole.key in kept_keys for more in _zeros_of(search, named, its)
+    ]
     testable = set(names_of(linear.candidates))
     hidden = tuple(name for name in names_of(search.untestable) if name not in testable)
     return Verdict(
@@ -193,6 +202,19 @@ def judge(search: Search) -> Verdict:
         tuple(rejected),
         patterns,
     )
+
+
+def _zeros_of(search: Search, named: Sequence[Named], its: Evidence) -> list[Named]:
+    """The zeros of joints that were found with the geometry of the whole arm, where any is clearly there."""
+    if any(one.effect == JointOffset.name for one in named):
+        return []
+    whole = [c for c in search.linear.candidates if (c.name, c.joint) == (JointOffset.name, EVERY)]
+    for candidate in whole:
+        estimates = _estimates(search.final, candidate, search)
+        joints = _joints(candidate, estimates)
+        if joints:
+            return [Named(candidate, joints, estimates, its)]
+    return []
 
 
 def _is_observable(candidate: Candidate, estimates: Sequence[Estimate]) -> bool:

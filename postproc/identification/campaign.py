@@ -33,8 +33,8 @@ REST = 1e-14
 
 SCALE_NAME = "scale of the tracker"
 
-SCALE = 2e-4
-"""Standard deviation of the scale of a tracker's lengths over those of a robot: 10 K of steel are 1.2e-4."""
+SCALE = 5e-5
+"""Standard deviation of the scale of a tracker's lengths over those of a robot: 5 K of steel are 6e-5."""
 
 LARGEST_SCALE = 5e-4
 """No tracker and no temperature makes more: the rest is the arm."""

@@ -290,7 +290,7 @@ def _variance(
     not make them worse.  A residual that a robust fit weighs down counts with as much as it pulls, and its reading as a
     part of one (Huber, Robust Statistics, Sec. 7.6).
     """
-    from scipy.stats import chi2, norm, t
+    from scipy.special import chdtri, ndtri, stdtrit
 
     counts = plain.weight > 0
     share = np.where(counts, weights.weight / np.where(counts, plain.weight, 1.0), 0.0) ** 2
@@ -303,9 +303,9 @@ def _variance(
     squares = float(residual @ residual)
     freedom = max(0, round(share.sum()) - q.shape[1])
     if freedom == 0:
-        return 1.0, False, 0, float(norm.ppf(0.975))
-    exceeded = bool(noise.known and squares > chi2.ppf(1.0 - UNLIKELY, freedom))
+        return 1.0, False, 0, float(ndtri(0.975))
+    exceeded = bool(noise.known and squares > chdtri(freedom, UNLIKELY))
     if noise.known and not exceeded:
         least = 1.0 if weights is plain else max(1.0, squares / freedom)
-        return least, False, freedom, float(norm.ppf(0.975))
-    return squares / freedom, exceeded, freedom, float(t.ppf(0.975, freedom))
+        return least, False, freedom, float(ndtri(0.975))
+    return squares / freedom, exceeded, freedom, float(stdtrit(freedom, 0.975))
