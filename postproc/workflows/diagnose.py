@@ -13,6 +13,7 @@ from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
 from postproc.base.units import DEG, MM
+from postproc.diagnosis.approach_sides import diagnose_sides
 from postproc.diagnosis.candidate_fits import composed
 from postproc.diagnosis.candidates import Candidate
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
@@ -85,12 +86,14 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     own = model_unknowns(model)
     check_numbers(measured.readings, (), model)
     findings = [*measured.findings, *check_fit(campaign, model, own)]
-    diagnosis = diagnose(campaign, model, stage)
+    diagnosis, sides = diagnose_sides(campaign, model, stage)
+    findings += sides
     wild = gross_errors(diagnosis.final)
     if wild:
         stage("once more without outliers")
         inliers = np.setdiff1d(np.arange(len(campaign)), [one.row for one in wild])
-        diagnosis = diagnose(Campaign(measured.readings.part(inliers), campaign.stated_tool), model)
+        rest = Campaign(campaign_of(diagnosis).readings.part(inliers), campaign.stated_tool)
+        diagnosis = diagnose(rest, model)
         findings += [
             Finding(
                 "DIA002",
@@ -125,6 +128,11 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
         strict=request.strict,
     )
     return _published(request, measured, result, stage)
+
+
+def campaign_of(diagnosis: Diagnosis) -> Campaign:
+    """The readings as they were diagnosed, sides of approach and all."""
+    return diagnosis.final.campaign
 
 
 def gross_errors(final: Fit) -> tuple[Outlier, ...]:

@@ -18,7 +18,7 @@ from postproc.measurements.readings import alike
 from postproc.measurements.write_csv import measurements_csv
 
 from . import hidden, measured
-from .arm import ARM, COMPLIANCE, Scene, as_filed, joints, model_of, robot_file
+from .arm import COMPLIANCE, Scene, as_filed, model_of, robot_file
 from .design import Design, drawn, poses
 
 LENGTHS = {
@@ -331,5 +331,3 @@ TRIALS: dict[str, Callable[[int, int], Trial]] = {
     "sag": sag,
     "lost": lost,
 }
-
-__all__ = ["ARM", "TRIALS", "Trial", "joints"]
