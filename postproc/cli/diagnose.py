@@ -27,6 +27,13 @@ from postproc.cli.common import (
     help="If two explanations fit alike: write a plan of poses that distinguish them [beside NEW.yaml].",
 )
 @click.option(
+    "--validate",
+    type=click.Path(path_type=Path, dir_okay=False),
+    multiple=True,
+    metavar="FILE.csv",
+    help="Readings that are not diagnosed: the residuals of each file before and after. May be repeated.",
+)
+@click.option(
     "--picture",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.png|svg",
@@ -42,6 +49,7 @@ def diagnose(
     output: Path | None,
     tool: Numbers | None,
     next_poses: Path | None,
+    validate: tuple[Path, ...],
     picture: Path | None,
     page: Path | None,
     csv_to: Path | None,
@@ -75,6 +83,7 @@ def diagnose(
         robot=robot,
         output=output,
         next_poses=next_poses,
+        validate=validate,
         tool_mm_deg=tool,
         picture=picture,
         page=page,

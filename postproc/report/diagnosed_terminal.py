@@ -14,6 +14,7 @@ from postproc.base.units import MM
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_words import headline, paragraph
 from postproc.report.formatting import campaign_in_words, count, fixed, shown_unit, some
+from postproc.report.placed import stations, targets, tracker_scale
 from postproc.report.identified_terminal import add_sizes
 from postproc.report.terminal import show_findings, show_rows
 from postproc.robot.description import robot_words
@@ -27,7 +28,7 @@ def show_diagnosed(console: Console, result: Diagnosed, verbose: bool = False) -
     console.print(Text(sanitize(headline(result)), style="bold"), soft_wrap=True)
     console.print(Text(sanitize(paragraph(result))), width=min(WIDE, console.width))
     show_rows(console, ((key, Text(sanitize(value))) for key, value in _rows(result)))
-    tables = (_parameters, _evidence, _alternatives, _refitted, _where, _residuals, _next_poses)
+    tables = (_places, _parameters, _evidence, _alternatives, _refitted, _where, _residuals, _next_poses)
     for make in tables:
         table = make(result, verbose)
         if table.row_count:
@@ -62,6 +63,24 @@ def _table(title: str, *heads: str) -> Table:
     table.add_column(title)
     for head in heads:
         table.add_column(head, justify="right" if head else "left")
+    return table
+
+
+def _places(result: Diagnosed, _verbose: bool) -> Table:
+    """Where tracker and targets were found."""
+    table = _table("found with the fit", "x, mm", "y, mm", "z, mm", "A, deg", "B, deg", "C, deg")
+    for kind, several in (("robot base in the tracker's frame", stations), ("target", targets)):
+        for one in several(result.final):
+            name = f"{kind} {one.name}".strip()
+            cells = [
+                f"{value:.3f} +- {wide:.2g}" for value, wide in zip(one.position, one.ci95, strict=True)
+            ]
+            if one.angles is not None and one.angles_ci95 is not None:
+                cells += [f"{value:.4f}" for value in one.angles]
+            table.add_row(name, *cells)
+    scale = tracker_scale(result.final)
+    if scale is not None:
+        table.add_row("scale of the tracker", f"{1e6 * scale[0]:.0f} +- {1e6 * scale[1]:.2g} ppm")
     return table
 
 
@@ -154,6 +173,10 @@ def _residuals(result: Diagnosed, _verbose: bool) -> Table:
     if not result.diagnosis.search.base.unknowns:
         del rows["refitted"]
     add_sizes(table, {words: result.lengths[name] for name, words in rows.items()})
+    for one in result.validation:
+        for words, size in (("robot file", one.before), ("final model", one.after)):
+            cells = [f"{value / MM:.3f}" for value in (size.rms, size.mean, size.max)]
+            table.add_row(f"{one.file}, {words}", *cells, str(size.readings))
     if result.final.noise.known:
         table.add_row("scatter of the readings", f"{result.scatter / MM:.3f}")
     return table
