@@ -580,7 +580,7 @@ def test_what_is_said_of_doubt(spring):
     alias = named.evidence.alias.label
     text = paragraph(result)
     assert f"These readings can not distinguish gravity_compensator on A2 or {alias}: " in text
-    assert "no robot file is written from an ambiguous result" in text
+    assert "so the robot file is not changed" in text
     assert "No pose within the limits" in text
     assert "K_c" not in text
     more = lacking(result, "ambiguous", named=result.verdict.named)

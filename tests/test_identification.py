@@ -17,7 +17,7 @@ from postproc.identification.fit import fit
 from postproc.identification.identifiable import identifiability
 from postproc.identification.noise import Weighting, noise_of, shared_error
 from postproc.identification.sensitivities import columns
-from postproc.identification.unknowns import with_gauge, Unknown, asked_for
+from postproc.identification.unknowns import Unknown, asked_for, with_gauge
 from postproc.model import StiffnessModel
 from postproc.robot.description import Value
 

@@ -1,4 +1,4 @@
-"""Whether explanations that the readings do not tell apart matter for cutting: what each predicts over the workspace."""
+"""What explanations that the readings do not tell apart predict over the workspace: whether it matters for cutting."""
 
 from __future__ import annotations
 
@@ -81,7 +81,9 @@ def _states(campaign: Campaign, model: StiffnessModel) -> tuple[Floats, Floats, 
         reach = np.pi if turns else 1.0
         low = joint.lower if np.isfinite(joint.lower) else -reach
         high = joint.upper if np.isfinite(joint.upper) else reach
-        bounds.append((max(low, -np.pi), min(high, np.pi)) if turns and high - low > 2 * np.pi else (low, high))
+        bounds.append(
+            (max(low, -np.pi), min(high, np.pi)) if turns and high - low > 2 * np.pi else (low, high)
+        )
     low, high = np.array(bounds).T
     q = rng.uniform(low, high, (8 * STATES, len(low)))
     height = (model.chain.flange(q) @ campaign.tool).position[:, 2]
@@ -113,14 +115,15 @@ def _places(
     return np.asarray(place - np.where(still.converged[:, None], still.pose.position, np.nan))
 
 
-def _beyond_touching_off(
-    campaign: Campaign, model: StiffnessModel, q: Floats, difference: Floats
-) -> Floats:
+def _beyond_touching_off(campaign: Campaign, model: StiffnessModel, q: Floats, difference: Floats) -> Floats:
     """(N, 3) ``difference`` without a motion of the base and a shift of the tool, as far as those are unknowns."""
     columns = []
     pose = model.chain.flange(q) @ campaign.tool
     if campaign.tracked:
-        columns += [np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.cross(np.eye(3), pose.position[:, None, :])]
+        columns += [
+            np.broadcast_to(np.eye(3), (len(q), 3, 3)),
+            np.cross(np.eye(3), pose.position[:, None, :]),
+        ]
     if not campaign.place_known.all():
         columns.append(np.swapaxes(pose.rotation, 1, 2))
     if not columns:

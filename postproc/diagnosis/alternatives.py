@@ -14,6 +14,7 @@ from postproc.diagnosis.nonlinear_effects import evaluate_at_size
 from postproc.diagnosis.search_result import Alternative, Linear
 from postproc.diagnosis.selection import (
     Explained,
+    Problem,
     basis_of,
     beside,
     complexity_penalty,
@@ -94,7 +95,9 @@ def find_alternatives(
         of_mine = [
             a
             for a in of_mine
-            if not (a.twin and any(b.twin and b is not a and a.candidate.contains(b.candidate) for b in of_mine))
+            if not (
+                a.twin and any(b.twin and b is not a and a.candidate.contains(b.candidate) for b in of_mine)
+            )
         ]
         of_mine.sort(key=lambda alternative: (not alternative.twin, alternative.margin))
         for k, alternative in enumerate(of_mine[:RIVALS]):

@@ -38,7 +38,7 @@ class Diagnosis:
     verdict: Verdict
     final: Fit
     disagreement: tuple[float, ...] = ()
-    agreed: bool = True
+    agreed: bool = False
 
 
 def diagnose(
@@ -73,10 +73,12 @@ def diagnose(
     if verdict.word == "nothing_missing" and any(why == SIZE_UNDETERMINED for _, why in rejected):
         verdict = replace(verdict, word="unknown")
     # zeros that belong to the geometry of the whole arm are fitted with it
-    names = [named.candidate for named in verdict.named if named.candidate.key in {c.key for c in result.chosen}]
+    names = [
+        named.candidate for named in verdict.named if named.candidate.key in {c.key for c in result.chosen}
+    ]
     final = result.base
     disagreement: tuple[float, ...] = ()
-    agreed = True
+    agreed = False
     if names:
         final = (
             result.final if len(names) == len(result.chosen) else with_effects(campaign, result.base, names)

@@ -83,7 +83,7 @@ def residual_patterns(
         share = 1.0 - (1.0 - explained / squares) * rows / (rows - rank)
         if by_chance * len(tried) < chance and share > 0:
             words = _words(fitted.point.residual[:, :3], part, parts, unit)
-            if variable in ("order", "time") and _goes_with_poses(values, campaign.readings.q):
+            if variable in ("order", "time") and goes_with_poses(values, campaign.readings.q):
                 words += "; but the poses were taken in such an order: measure again in random order"
             clear_patterns.append(ResidualPattern(variable, words, float(share)))
     return tuple(sorted(clear_patterns, key=lambda one: -one.share)[:SHOWN])
@@ -179,7 +179,7 @@ def _words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float])
     return f"{size[most] / MM:.3g} mm at {span(most)}, {size[least] / MM:.3g} mm at {span(least)}"
 
 
-def _goes_with_poses(values: Floats, q: Floats) -> bool:
+def goes_with_poses(values: Floats, q: Floats) -> bool:
     """Whether the joints explain most of ``values`` (R,): what depends on one cannot be distinguished from the
     other."""
     spread = np.where(np.ptp(q, axis=0) > 0, np.ptp(q, axis=0), 1.0)

@@ -9,6 +9,7 @@ from postproc.effects.effect import Conditions, Offset, Parameter, Values, colum
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
+
 class LinkGeometry(Offset):
     """The axis of each joint after the first, moved in the frame of that joint: shifts d_x, d_y [m] and turns r_x, r_y
     [rad] across the axis, before its own motion: Tx(d_x) Ty(d_y) Rx(r_x) Ry(r_y) Rz(q), about the origin of the joint's

@@ -56,8 +56,8 @@ class PredictedReadings:
 @dataclass(frozen=True)
 class Nuisances:
     """Where tracker and targets are: ``frames`` (M) of the robot base in the tracker's frame, one a session; ``places``
-    (K, 3) [m] of the targets in tool axes from the TCP; ``turns`` (K, 3, 3) of their frames in it; ``scale`` of lengths that the tracker reads over the
-    robot's, less 1."""
+    (K, 3) [m] of the targets in tool axes from the TCP; ``turns`` (K, 3, 3) of their frames in it; ``scale``: what the
+    tracker reads of a length of the robot, over that, less 1."""
 
     frames: Poses
     places: Floats

@@ -12,7 +12,15 @@ from postproc.base.arrays import Bools, Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.identification.campaign import Campaign, Nuisances
 from postproc.identification.identifiable import Dropped, Identifiability, basis, identifiability
-from postproc.identification.least_squares import Point, at, descended, prior_rows, prior_weight, scales, with_columns
+from postproc.identification.least_squares import (
+    Point,
+    at,
+    descended,
+    prior_rows,
+    prior_weight,
+    scales,
+    with_columns,
+)
 from postproc.identification.noise import Noise, Weighting, noise_of, shared_error, weighting
 from postproc.identification.registration import registered
 from postproc.identification.unknowns import Unknown

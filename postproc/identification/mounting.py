@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding
 from postproc.base.units import MM
 from postproc.identification.campaign import Campaign, Nuisances
@@ -74,7 +74,7 @@ def _moved_targets(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
             if name not in readings.places and (target[readings.session == s] == k).any():
                 anew[k, s] = f"{name} ({session})"
     kept = [name for name in names if name in readings.places]
-    split = tuple([*kept, *anew.values()])
+    split = (*kept, *anew.values())
     place = [
         split.index(anew[k, s]) if (k, s) in anew else split.index(names[k])
         for k, s in zip(target.tolist(), readings.session.tolist(), strict=True)
@@ -125,7 +125,10 @@ def _moved_tracker(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
             least = int(np.argmin(sizes))
             if sizes[least] < best:
                 best, moment, of = sizes[least], int(tried[least]), s
-            near = inner[np.abs(np.searchsorted(inner, tried[least]) - np.arange(len(inner))) <= len(inner) // MOMENTS + 1]
+            near = inner[
+                np.abs(np.searchsorted(inner, tried[least]) - np.arange(len(inner)))
+                <= len(inner) // MOMENTS + 1
+            ]
             tried = near if len(tried) == min(MOMENTS, len(inner)) and len(near) < len(tried) else near[:0]
     if moment < 0 or best > (LEFT**2) * whole:
         return readings, []
@@ -145,7 +148,7 @@ def _moved_tracker(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
     return changed, [Finding("IDN033", message, readings.where(0)[0], line)]
 
 
-def _after(columns: Floats, basis: Floats, target: Floats, own: Floats, row: int, session: int) -> float:
+def _after(columns: Floats, basis: Floats, target: Floats, own: Ints, row: int, session: int) -> float:
     """Squares that remain where the tracker of a session is elsewhere from ``row`` on."""
     later = own[own >= row]
     more = np.zeros((len(columns), 3, 6))

@@ -257,8 +257,9 @@ def _check_rows(campaign: Campaign, model: StiffnessModel) -> None:
                     Finding(
                         "IDN034",
                         f"{'from' if start else 'up to'} line {line} on the joint angles belong to the readings"
-                        f" {count} {side}" if start else
-                        f"up to line {line} the joint angles belong to the readings {count} {side}",
+                        f" {count} {side}"
+                        if start
+                        else f"up to line {line} the joint angles belong to the readings {count} {side}",
                         file,
                         line,
                         help="move the measured values there, and check where a row was skipped or is there twice",

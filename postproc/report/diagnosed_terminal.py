@@ -14,13 +14,16 @@ from postproc.base.units import MM
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_words import headline, paragraph
 from postproc.report.formatting import campaign_in_words, count, fixed, shown_unit, some
-from postproc.report.placed import stations, targets, tracker_scale
 from postproc.report.identified_terminal import add_sizes
+from postproc.report.placed import stations, targets, tracker_scale
 from postproc.report.terminal import show_findings, show_rows
 from postproc.robot.description import robot_words
 
 WIDE = 110
 """Columns of the paragraph at most: longer lines are hard to read."""
+
+LEAST_CHANCE = 1e-99
+"""A smaller probability is not printed as zero."""
 
 
 def show_diagnosed(console: Console, result: Diagnosed, verbose: bool = False) -> None:
@@ -72,9 +75,7 @@ def _places(result: Diagnosed, _verbose: bool) -> Table:
     for kind, several in (("robot base in the tracker's frame", stations), ("target", targets)):
         for one in several(result.final):
             name = f"{kind} {one.name}".strip()
-            cells = [
-                f"{value:.3f} +- {wide:.2g}" for value, wide in zip(one.position, one.ci95, strict=True)
-            ]
+            cells = [f"{value:.3f} +- {wide:.2g}" for value, wide in zip(one.position, one.ci95, strict=True)]
             if one.angles is not None and one.angles_ci95 is not None:
                 cells += [f"{value:.4f}" for value in one.angles]
             table.add_row(name, *cells)
@@ -114,7 +115,11 @@ def _evidence(result: Diagnosed, verbose: bool) -> Table:
         its = named.evidence
         numbers = (its.heldout, its.regions, its.sessions, its.margin)
         nearest = "" if its.alias is None else f"next: {its.alias.label}"
-        cells = [_number(its.gain), f"{its.chance:.1g}", *map(_number, numbers)]
+        cells = [
+            _number(its.gain),
+            f"{its.chance:.1g}" if its.chance > LEAST_CHANCE else "< 1e-99",
+            *map(_number, numbers),
+        ]
         table.add_row(named.candidate.label, *cells, nearest)
     for candidate, why in result.verdict.rejected:
         table.add_row(candidate.label, *[""] * 6, f"rejected: {why}")

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from postproc.base.units import MM
 from postproc.diagnosis.candidates import EVERY, Candidate
 from postproc.diagnosis.decoys import AlternativeForm
+from postproc.diagnosis.residual_patterns import goes_with_poses
 from postproc.diagnosis.verdict import MARGIN, Named
-from postproc.effects import EFFECTS, ComplianceLaw
-from postproc.identification.fit import Estimate, Fit
-from postproc.identification.sanity_checks import LOADED
-from postproc.report.diagnosed import USUAL, Diagnosed
-from postproc.report.formatting import count, fixed, shown_unit
+from postproc.identification.fit import Estimate
+from postproc.report.diagnosed import Diagnosed
+from postproc.report.diagnosed_limits import conditional, not_tested
+from postproc.report.formatting import count, fixed, listed, shown_unit
+from postproc.report.formatting import millimetres as _mm
 from postproc.report.terminal import _once
 
 NOUNS = {
@@ -51,6 +51,9 @@ PARAMETERS = 3
 OVERSTATED = 0.5
 """Variance over the stated one below which readings scatter by less than is stated."""
 
+WIDE = 1.5
+"""Plausible sizes: an interval that is wider says that the readings do not tell a parameter from others."""
+
 FAR_OFF = 1.5
 """Times the scatter: where more is left, yet no lack of fit, a few readings lie far off."""
 
@@ -64,7 +67,7 @@ def paragraph(result: Diagnosed) -> str:
         "ambiguous": _ambiguous,
         "unknown": _unknown,
     }[result.verdict.word](result)
-    return " ".join([*sentences, *_conditional(result), *_not_tested(result)])
+    return " ".join([*sentences, *conditional(result), *not_tested(result)])
 
 
 def headline(result: Diagnosed) -> str:
@@ -117,6 +120,8 @@ def _nothing_missing(result: Diagnosed) -> Iterator[str]:
 
 def _named(result: Diagnosed) -> Iterator[str]:
     yield from _missing(result, result.verdict.named)
+    yield from _class_of_geometry(result)
+    yield from _ordered(result)
     yield from _attributed(result)
     yield from _closed(result)
     yield from _nearest(result.verdict.named)
@@ -148,7 +153,8 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
         yield from _more(result, "More is missing:", "after")
         yield "No pose and no load of this size separates what predicts the same; only a look at the robot does."
         return
-    differ = f" by up to {_mm(largest)} mm" if np.isfinite(largest) else ""
+    measured = bool(result.diagnosis.disagreement)
+    differ = f" by up to {_mm(largest)} mm" if measured and np.isfinite(largest) else ""
     yield (
         f"Elsewhere in the workspace, or under other loads, their corrections differ{differ}, so the robot file"
         f" {'gets only what is clear' if result.clear else 'is not changed'}. With all effects found the residual would"
@@ -191,7 +197,7 @@ def _unknown(result: Diagnosed) -> Iterator[str]:
     near = [candidate.label for candidate in search.chosen if candidate.key not in rejected]
     if near:
         yield (
-            f"The best explanation is {_list(near)}, but the residual would still be"
+            f"The best explanation is {listed(near)}, but the residual would still be"
             f" {_mm(result.rms['explained'])} mm: too much to name an effect."
         )
     yield from _rejected(result)
@@ -202,6 +208,33 @@ def _unknown(result: Diagnosed) -> Iterator[str]:
             " check robot and measurement there."
         )
     yield from _moved_too(result)
+
+
+def _class_of_geometry(result: Diagnosed) -> Iterator[str]:
+    """What predicts the same."""
+    hidden = [
+        e for e in result.final.estimates if e.unknown.gauge and e.ci95 > WIDE * (e.unknown.prior or np.inf)
+    ]
+    if hidden and any(one.candidate.joint == EVERY for one in result.verdict.named):
+        names = listed([e.unknown.parameter.name for e in hidden[:PARAMETERS]])
+        more = f" and {len(hidden) - PARAMETERS} more" if len(hidden) > PARAMETERS else ""
+        yield (
+            "Some lengths, twists and zeros predict the same together: the values are the smallest plausible ones, and"
+            f" their intervals hold all others; the readings hardly determine {names}{more} alone."
+        )
+
+
+def _ordered(result: Diagnosed) -> Iterator[str]:
+    """A drift that may as well be an effect of the poses."""
+    readings = result.final.campaign.readings
+    for named in result.verdict.named:
+        variable = named.candidate.effect.described().get("variable")
+        values = {"time": readings.time, "temperature": readings.temperature}.get(str(variable))
+        if values is not None and goes_with_poses(values, readings.q):
+            yield (
+                f"But the {variable} follows the order of the poses, so that {named.candidate.label} may as well be an"
+                " effect of the poses: measure again in random order."
+            )
 
 
 def _missing(result: Diagnosed, several: Sequence[Named]) -> Iterator[str]:
@@ -225,12 +258,12 @@ def _fixed(named: Named) -> str:
     entries = [
         f"{name} (fixed at {value / units[name][1]:.4g} {units[name][0]})" for name, value in named.fixed
     ]
-    return _list(entries)
+    return listed(entries)
 
 
 def noun(named: Named) -> str:
     """What the effect is, and where."""
-    joints = _list(named.joints) if named.joints else "the joints" if named.candidate.joint == EVERY else ""
+    joints = listed(named.joints) if named.joints else "the joints" if named.candidate.joint == EVERY else ""
     return NOUNS[named.effect].format(joints=joints)
 
 
@@ -395,55 +428,3 @@ def _changes(moved: Sequence[Estimate]) -> str:
 
 def _against_scatter(result: Diagnosed) -> str:
     return "" if result.verdict.conditional else f" where readings scatter by {_mm(result.scatter)} mm"
-
-
-def _conditional(result: Diagnosed) -> Iterator[str]:
-    if result.verdict.conditional:
-        yield (
-            f"This verdict assumes that readings scatter as much as the residuals, {_mm(result.scatter)} mm RMS:"
-            " neither SIGMA nor repeated readings state it, and an effect of that size would be mistaken for scatter."
-        )
-
-
-def _not_tested(result: Diagnosed) -> Iterator[str]:
-    """The effects that were not tested, or only at large size, and which readings would show them."""
-    for names, start in (
-        (result.verdict.not_testable, "Not tested:"),
-        (result.hardly_tested, f"Tested only at {USUAL:.0f} times their usual size or more:"),
-    ):
-        advised: dict[str, list[str]] = {}
-        for name in names:
-            advised.setdefault(evidence_words(name, result.final), []).append(name)
-        if advised:
-            yield f"{start} {'; '.join(f'{_list(of)} (shown by {what})' for what, of in advised.items())}."
-
-
-def evidence_words(name: str, fitted: Fit) -> str:
-    """What would show an effect that readings and model of a fit do not."""
-    effect, campaign = EFFECTS[name], fitted.campaign
-    readings = campaign.readings
-    if name == "thermal_growth" and readings.temperature is None and readings.time is None:
-        return "a column TEMP or T while the robot warms up"
-    if effect.family in ("geometric", "weight") and readings.deflection:
-        return "absolute positions"
-    if name == "tool_offset" and not campaign.place_known.all():
-        return "targets with stated positions"
-    if effect.family == "weight" and not any(isinstance(t.effect, ComplianceLaw) for t in fitted.model.terms):
-        return "a robot file with joint compliance"
-    if effect.family in LOADED and not readings.wrench.any():
-        return "readings with and without a weight"
-    if effect.by_direction:
-        return "poses reached from both sides"
-    return "other poses or loads, `compensate plan`"
-
-
-def _list(words: Iterable[str]) -> str:
-    """``a, b and c``"""
-    several = list(words)
-    return " and ".join([", ".join(several[:-1]), several[-1]] if len(several) > 1 else several)
-
-
-def _mm(length: float) -> str:
-    if length < 1e-4 * MM:
-        return "0.0001"
-    return f"{length / MM:.3f}" if length >= 0.01 * MM else f"{length / MM:.2g}"

@@ -14,9 +14,9 @@ from postproc.identification.least_squares import prior_rows, prior_weight
 
 
 class Placed(NamedTuple):
-    """``name`` of a session or target; position (3,) [mm] and angles A, B, C (3,) [deg] of the robot base in the
-    tracker's frame, or position of the target on the flange (angles None); their 95 % intervals [mm, deg], NaN of what
-    the file states."""
+    """``name`` of a session or target; position (3,) [mm] and angles (3,) [deg] A, B, C of the robot base in the
+    tracker's frame, or of the target on the flange (angles None); ci95 (3,) [mm], angles_ci95 (3,) [deg]: 95 %
+    intervals."""
 
     name: str
     position: Floats

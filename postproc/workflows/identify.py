@@ -302,12 +302,16 @@ def _result(
                     file,
                 )
             )
-        if unknown.prior is not None and not unknown.gauge and abs(estimate.value - unknown.value) > PULLED * unknown.prior:
+        if (
+            unknown.prior is not None
+            and not unknown.gauge
+            and abs(estimate.value - unknown.value) > PULLED * unknown.prior
+        ):
             findings.append(
                 Finding(
                     "IDN023",
                     f"{unknown.name}: the readings give {estimate.value:.4g}, the robot file states"
-                    f" {unknown.value:.4g} +- {1.96 * unknown.prior:.2g} {unknown.parameter.unit}",
+                    f" {unknown.value:.4g} +- {1.96 * (unknown.prior or 0.0):.2g} {unknown.parameter.unit}",
                     file,
                 )
             )

@@ -16,14 +16,14 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parent.parent))
 
 import numpy as np
+from scipy.stats import binomtest
+
 from blind import measured
 from blind.arm import model_of
 from blind.command import Diagnosing
 from blind.design import poses
 from blind.real_worlds import TRIALS, Trial
 from blind.worker import ROOMS
-from scipy.stats import binomtest
-
 from postproc.identification.campaign import Campaign
 from postproc.identification.registration import registered
 
@@ -154,20 +154,25 @@ def main(argv: Sequence[str] | None = None) -> int:
             for key, value in held.items():
                 counts[key].append(value)
             if given.verbose:
-                names = "; ".join(f"{one['effect']} {' '.join(one['joints'])}" for one in answer.get("named", ()))
+                names = "; ".join(
+                    f"{one['effect']} {' '.join(one['joints'])}" for one in answer.get("named", ())
+                )
                 sets = " | ".join(
                     " = ".join(c["label"] for c in one) for one in answer.get("alternatives", ())
                 )
                 flags = ", ".join(
                     f"{k} {v:.3f}" if isinstance(v, float) else k for k, v in held.items() if v is not False
                 )
-                told = answer["told"].strip()[-150:].replace("\n", " ") if answer["verdict"] == "refused" else ""
+                told = (
+                    answer["told"].strip()[-150:].replace("\n", " ") if answer["verdict"] == "refused" else ""
+                )
                 print(f"{row} {number}: {trial.words}: {answer['verdict']} [{names}] {sets} <{flags}> {told}",
                       flush=True)  # fmt: skip
         print(f"{row}: " + ", ".join(f"{n} {word}" for word, n in sorted(words.items())))
         for key, values in counts.items():
             if any(isinstance(v, float) for v in values):
-                print(f"  {key:36} {100 * np.median(values):.1f} % in the median, {100 * np.mean(values):.1f} in the mean of {len(values)}")
+                middle, mean = 100 * np.median(values), 100 * np.mean(values)
+                print(f"  {key:36} {middle:.1f} % in the median, {mean:.1f} in the mean of {len(values)}")
             else:
                 print(f"  {key:36} {share(values)}")
         print(f"  seconds {np.median(seconds):.1f} in the median, {max(seconds):.1f} at most", flush=True)

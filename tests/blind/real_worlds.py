@@ -321,6 +321,88 @@ def files_of(raw: bytes, readings: Readings) -> dict[str, bytes]:
     return {"robot.yaml": raw, "data.csv": measurements_csv(readings)}
 
 
+STRANGE_SIZE = 3.0
+"""Standard deviations of a coordinate, root mean square, by which a strange error shows."""
+
+
+def _settling(at: Poses, q: np.ndarray, seen: np.ndarray, rng) -> np.ndarray:
+    """Read before the arm stands still: behind on its way, the more the further it came."""
+    way = np.diff(q, axis=0, prepend=q[:1])
+    return np.cross(way[:, :3] @ rng.normal(size=(3, 3)), at.position)
+
+
+def _flank(at: Poses, q: np.ndarray, seen: np.ndarray, rng) -> np.ndarray:
+    """A gear of A3 with another ratio on one side of its range: a corner at some angle."""
+    corner = np.median(q[:, 2]) + rng.uniform(-0.3, 0.3)
+    return np.maximum(q[:, 2] - corner, 0.0)[:, None] * np.cross([0.0, 1.0, 0.0], at.position)
+
+
+def _drag(at: Poses, q: np.ndarray, seen: np.ndarray, rng) -> np.ndarray:
+    """Cables that pull the wrist back once A4 and A6 are twisted together."""
+    twisted = np.maximum(np.abs(q[:, 3] + q[:, 5]) - 2.0, 0.0) ** 2
+    return twisted[:, None] * at.rotation[:, :, 0]
+
+
+def _nest(at: Poses, q: np.ndarray, seen: np.ndarray, rng) -> np.ndarray:
+    """A reflector that does not sit in the middle of its nest's sphere: off along the beam's side of the nest."""
+    beam = seen / np.linalg.norm(seen, axis=1, keepdims=True)
+    incidence = (at.rotation[:, :, 2] * beam).sum(axis=1)
+    return (incidence**2)[:, None] * beam
+
+
+def _refraction(at: Poses, q: np.ndarray, seen: np.ndarray, rng) -> np.ndarray:
+    """A beam that warm air above the floor bends."""
+    size = np.linalg.norm(seen[:, :2], axis=1) ** 2 * np.exp(-at.position[:, 2] / 0.5)
+    return size[:, None] * np.array([0.0, 0.0, 1.0])
+
+
+def _warming(at: Poses, q: np.ndarray, seen: np.ndarray, rng) -> np.ndarray:
+    """A column that leans while the arm warms up, in a file without time and temperature."""
+    share = 1.0 - np.exp(-np.arange(len(q)) / (0.3 * len(q)))
+    return share[:, None] * np.cross(rng.normal(size=3), at.position)
+
+
+STRANGE = {
+    "settling": _settling,
+    "flank": _flank,
+    "cable drag": _drag,
+    "nest": _nest,
+    "refraction": _refraction,
+    "warming": _warming,
+}
+"""Errors of an arm, its tool and its tracker that no effect of the library is."""
+
+
+def strange(number: int, seed: int) -> Trial:
+    """Something is wrong that is no effect of the library."""
+    rng = rng_of("strange", number, seed)
+    name = list(STRANGE)[number % len(STRANGE)]
+    raw = robot_file(True, False)
+    design = with_targets(campaign(rng, stated=bool(rng.random() < 0.5)), rng)
+    model = model_of(raw)
+    at = model.chain.flange(design.q) @ design.tool
+    frame = Poses.identity() if design.frame is None else design.frame
+    seen = at.position @ frame.rotation.T + frame.position
+    moved = STRANGE[name](at, design.q, seen, rng) @ frame.rotation.T
+    sigma = measured.scatter(design, model)
+    moved *= STRANGE_SIZE * sigma / np.sqrt(np.mean((moved - moved.mean(axis=0)) ** 2))
+    value = measured.observed(as_filed(False), design, jitter(design, rng)) + np.repeat(
+        moved, design.points, axis=0
+    )
+    readings = measured.readings(design, value + measured.noise(design, rng), sigma)
+    return Trial(
+        "strange",
+        number,
+        files_of(raw, readings),
+        frozenset(),
+        frozenset(),
+        as_filed(False),
+        design,
+        sigma,
+        name,
+    )
+
+
 TRIALS: dict[str, Callable[[int, int], Trial]] = {
     "length": length,
     "twist": twist,
@@ -330,4 +412,5 @@ TRIALS: dict[str, Callable[[int, int], Trial]] = {
     "stations": stations,
     "sag": sag,
     "lost": lost,
+    "strange": strange,
 }
