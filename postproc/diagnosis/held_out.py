@@ -55,7 +55,8 @@ def held_out_gain(search: Search, last: Explained, group: int, part: Ints | None
 
 
 def worst_ratio(search: Search, last: Explained, group: int, part: Ints) -> float:
-    """The largest residual of a pose left out with the group, over that without it."""
+    """The largest residual of a pose left out with the group, over that without it; part (R,): as of
+    ``held_out_gain``."""
     linear = search.linear
     rows = len(linear.residual) - linear.priors
     of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
@@ -128,5 +129,6 @@ def regions_of(search: Search) -> Ints | None:
 
 
 def sessions_of(search: Search) -> Ints | None:
+    """(R,) the session of each reading; None where there is one."""
     session = search.base.campaign.readings.session
     return session if len(np.unique(session)) > 1 else None

@@ -180,8 +180,8 @@ def _words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float])
 
 
 def goes_with_poses(values: Floats, q: Floats) -> bool:
-    """Whether the joints explain most of ``values`` (R,): what depends on one cannot be distinguished from the
-    other."""
+    """Whether the joints ``q`` (R, n) [rad, m] explain most of ``values`` (R,): what depends on one cannot be
+    distinguished from the other."""
     spread = np.where(np.ptp(q, axis=0) > 0, np.ptp(q, axis=0), 1.0)
     scaled = (q - q.mean(axis=0)) / spread
     matrix = np.column_stack([np.ones(len(q)), scaled, scaled**2])

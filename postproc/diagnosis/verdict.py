@@ -126,6 +126,7 @@ def judge(search: Search) -> Verdict:
     linear, last = search.linear, search.explained
     named, rejected, aliases = [], [], []
     zeros: list[tuple[Candidate, Evidence]] = []
+    groups: list[int] = []
     for g in last.groups:
         candidate, its = linear.candidates[g], _evidence(search, last, g)
         estimates = _estimates(search.final, candidate, search)
@@ -144,6 +145,7 @@ def judge(search: Search) -> Verdict:
         else:
             joints, fixed = _joints(candidate, estimates), _fixed_values(search.final, candidate, estimates)
             named.append(Named(candidate, joints, estimates, its, fixed))
+            groups.append(g)
             aliases.append(several)
             if has_zeros(candidate):
                 zeros.append((candidate, its))
@@ -154,14 +156,17 @@ def judge(search: Search) -> Verdict:
     # two forms of one effect on one joint do not make its name uncertain
     sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
     formless = any(why == OTHER_COURSE for _, why in rejected)
-    taken = 1.0 - (chi2 - 1.0) / (bare - 1.0) if linear.problem.known and bare > 1.0 else 1.0
     if formless or unexplained:
-        # what is certain stays, whatever remains
-        kept = [
-            k
-            for k, one in enumerate(named)
-            if taken >= EVERY_ARM.get(one.effect, np.inf if formless else EXPLAINS)
-        ]
+        # what is certain stays, whatever remains: it must take its share by itself
+        rare = np.inf if formless else EXPLAINS
+        kept = list(range(len(named)))
+        while kept:
+            alone, _ = reduced_chi2_of(search, explained(linear.problem, [groups[k] for k in kept]))
+            taken = _taken(alone, bare, linear.problem.known)
+            still = [k for k in kept if taken >= EVERY_ARM.get(named[k].effect, rare)]
+            if still == kept:
+                break
+            kept = still
         rest = [one.candidate for k, one in enumerate(named) if k not in kept]
         named = [named[k] for k in kept]
         aliases = [aliases[k] for k in kept]
@@ -191,6 +196,12 @@ def judge(search: Search) -> Verdict:
         tuple(rejected),
         patterns,
     )
+
+
+def _taken(variance: float, bare: float, known: bool) -> float:
+    """Share of the variance beyond scatter that is explained; of one that is not known, of all."""
+    floor = 1.0 if known else 0.0
+    return 1.0 - (variance - floor) / (bare - floor) if bare > floor else 1.0
 
 
 def _zeros_of(search: Search, named: Sequence[Named], its: Evidence) -> list[Named]:

@@ -401,6 +401,8 @@ def _course(result: Diagnosed, candidate: Candidate) -> str:
             and alternative.margin < -MARGIN
         ):
             what = f"{course.about} {alternative.candidate.joint}".strip()
+            if course.advice:
+                return f"; {what} explains clearly more: {course.advice}"
             return (
                 f"; {what}, no effect of the library, has a likelihood gain {-alternative.margin:.0f} higher"
             )
