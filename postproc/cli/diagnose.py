@@ -63,7 +63,10 @@ def diagnose(
     The verdict is one of: nothing missing (the residual is scatter, or old parameters have changed); named; partly
     named (more is missing than can be named); ambiguous (several effects explain the readings alike: a plan of poses
     that distinguish them is written); unknown (an effect is missing, and it is none of the known ones). An effect is
-    only named if it also reduces the residual on held-out poses and fits clearly better than any other.
+    only named if it also reduces the residual on held-out poses and fits clearly better than any other. Effects that
+    predict the same are ambiguous; the robot file is written where all of them give the same correction.
+
+    Backlash and hysteresis depend on the side from which a joint came: state it in the columns DIR1, DIR2, ... (1, -1).
 
     \b
     Examples:
