@@ -101,7 +101,7 @@ CODES = define(
         "IDN034": Code(
             "error",
             "readings belong to other rows",
-            meaning="From one row on the readings fit the joint angles of the row above or below.",
+            meaning="From one row on the readings belong to the joint angles of the row above or below.",
             consequence="Every reading would be compared with another pose.",
             action="Move the measured values by one row from there on.",
             example="One pose was skipped, its row was not.",

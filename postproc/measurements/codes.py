@@ -94,7 +94,7 @@ CODES = define(
             "readings of 0, 0, 0",
             meaning="Some trackers write zeros where the beam was lost.",
             consequence="These rows are excluded; as readings they would be far off.",
-            action="Leave the cells empty, or measure these poses again.",
+            action="Remove the zeros so that the cells are empty, or measure these poses again.",
             example="X, Y, Z of a row are 0.",
         ),
         "MEA012": Code(

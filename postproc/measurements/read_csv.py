@@ -29,7 +29,8 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
     stated = stated_in(table)
     findings = list(stated.findings)
     if ignored:
-        message = f"{'columns' if len(ignored) > 1 else 'column'} {', '.join(ignored)} not used: no part of the format"
+        these = "these columns are" if len(ignored) > 1 else "this column is"
+        message = f"the format has no {', '.join(ignored)}: {these} ignored"
         findings.append(Finding("MEA010", message, str(path), table.header_line))
     if deflection and stated.frame == "tracker":
         message = "# frame: tracker is ignored: DX, DY, DZ are in the axes of the robot base"
@@ -50,10 +51,10 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
     if lost.any():
         lines = table.lines[lost]
         message = (
-            f"{'the reading is' if len(lines) == 1 else f'{len(lines)} readings are'} 0, 0, 0, as of a lost beam:"
-            f" excluded ({_lines(lines)})"
+            f"a lost beam is written as 0, 0, 0 ({_lines(lines)}):"
+            f" {'this reading is' if len(lines) == 1 else f'these {len(lines)} readings are'} excluded"
         )
-        findings.append(Finding("MEA011", message, str(path), int(lines[0]), help="leave the cells empty"))
+        findings.append(Finding("MEA011", message, str(path), int(lines[0]), help="remove the zeros"))
         value = np.where(lost[:, None], np.nan, value)
     measured = ~np.isnan(value).all(axis=1)
     rows = np.flatnonzero(measured)

@@ -151,7 +151,7 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
         )
         yield from _closed(result)
         yield from _more(result, "More is missing:", "after")
-        yield "No pose and no load of this size separates what predicts the same; only a look at the robot does."
+        yield "No pose and no load of this size separates what predicts the same; only an inspection of the robot does."
         return
     measured = bool(result.diagnosis.disagreement)
     differ = f" by up to {_mm(largest)} mm" if measured and np.isfinite(largest) else ""

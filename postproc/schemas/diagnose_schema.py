@@ -188,7 +188,7 @@ def diagnose_schema() -> Schema:
                             for name, words in (("before", "robot file"), ("after", "final model"))
                             for size in ("rms", "mean", "max")
                         },
-                        "registration_refitted": boolean("whether its tracker was registered anew"),
+                        "registration_refitted": boolean("whether its tracker was registered again"),
                     },
                     "one file",
                 ),
