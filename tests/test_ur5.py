@@ -20,7 +20,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 REGISTRATION = 0.452
-"""[mm] mean on the 20 held-out poses of what finding tracker, its scale and reflector leaves; no merit of the geometry."""
+"""[mm] mean on the 20 held-out poses of what finding tracker, scale and reflector leaves; no merit of the geometry."""
 
 
 def identified(compensate, folder, effects):
