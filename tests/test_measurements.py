@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from tiers import examples
 
@@ -649,6 +649,8 @@ def same(one, other, absolute, relative=0.0):
 @settings(max_examples=examples(150), deadline=None)
 @given(readings())
 def test_what_is_written_reads_back(tmp_path_factory, r):
+    # 0, 0, 0 is what a tracker writes where the beam was lost
+    assume(not (np.round(r.value, 7) == 0.0).all(axis=1).any())
     path = tmp_path_factory.getbasetemp() / "written.csv"
     path.write_bytes(measurements_csv(r))
     back = read_measurements(path, r.joints)

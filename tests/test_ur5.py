@@ -19,8 +19,8 @@ pytestmark = pytest.mark.skipif(
     reason="POSTPROC_DATA names no folder with ur5/train.csv and ur5/test.csv",
 )
 
-REGISTRATION = 0.487
-"""[mm] mean on the 20 held-out poses of what finding the tracker and the reflector leaves; no merit of the geometry."""
+REGISTRATION = 0.452
+"""[mm] mean on the 20 held-out poses of what finding tracker, scale and reflector leaves; no merit of the geometry."""
 
 
 def identified(compensate, folder, effects):

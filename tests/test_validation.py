@@ -264,12 +264,13 @@ def test_of_few_readings_the_bootstrap_is_not_too_narrow():
         )
         campaign = Campaign(scattered(read(asked.model, readings, rng), SIGMA, rng))
         found = fit(campaign, asked.model, asked.unknowns)
-        assert found.freedom == 21 - 10
+        assert found.freedom == 21 - 11
         wide = np.sqrt(
             np.diag(found.covariance) * np.sum((found.point.residual / SIGMA) ** 2) / found.freedom
         )
         ratio.append(bootstrap(found, 80).deviation / wide)
-    assert 0.85 < np.mean(ratio) < 1.2
+    # the scale of the tracker, which is nearly known, counts as an unknown here
+    assert 0.75 < np.mean(ratio) < 1.2
 
 
 @pytest.mark.slow

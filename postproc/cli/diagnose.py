@@ -27,6 +27,13 @@ from postproc.cli.common import (
     help="If two explanations fit alike: write a plan of poses that distinguish them [beside NEW.yaml].",
 )
 @click.option(
+    "--validate",
+    type=click.Path(path_type=Path, dir_okay=False),
+    multiple=True,
+    metavar="FILE.csv",
+    help="Readings that are not diagnosed: the residuals of each file before and after. May be repeated.",
+)
+@click.option(
     "--picture",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.png|svg",
@@ -42,6 +49,7 @@ def diagnose(
     output: Path | None,
     tool: Numbers | None,
     next_poses: Path | None,
+    validate: tuple[Path, ...],
     picture: Path | None,
     page: Path | None,
     csv_to: Path | None,
@@ -55,7 +63,10 @@ def diagnose(
     The verdict is one of: nothing missing (the residual is scatter, or old parameters have changed); named; partly
     named (more is missing than can be named); ambiguous (several effects explain the readings alike: a plan of poses
     that distinguish them is written); unknown (an effect is missing, and it is none of the known ones). An effect is
-    only named if it also reduces the residual on held-out poses and fits clearly better than any other.
+    only named if it also reduces the residual on held-out poses and fits clearly better than any other. Effects that
+    predict the same are ambiguous; the robot file is written where all of them give the same correction.
+
+    Backlash and hysteresis depend on the side from which a joint came: state it in the columns DIR1, DIR2, ... (1, -1).
 
     \b
     Examples:
@@ -75,6 +86,7 @@ def diagnose(
         robot=robot,
         output=output,
         next_poses=next_poses,
+        validate=validate,
         tool_mm_deg=tool,
         picture=picture,
         page=page,

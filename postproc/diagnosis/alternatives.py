@@ -14,6 +14,7 @@ from postproc.diagnosis.nonlinear_effects import evaluate_at_size
 from postproc.diagnosis.search_result import Alternative, Linear
 from postproc.diagnosis.selection import (
     Explained,
+    Problem,
     basis_of,
     beside,
     complexity_penalty,
@@ -30,6 +31,10 @@ CLOSE, CLOSE_SHARE, RIVALS = 30.0, 0.05, 3
 """Alternatives are fitted where -2 ln(likelihood) is linearly worse by less than this, or than this share of the gain;
 so many at most."""
 
+TWIN, TWIN_SHARE = 4.0, 0.05
+"""An alternative that misses less of what a choice does, in variances of a reading and as a share of it, predicts the
+same."""
+
 OUTLIER_LIMIT = 5.0
 """Standard deviations that a reading counts with at most."""
 
@@ -43,7 +48,7 @@ def squares_of(fitted: Fit, weights: Weighting, variance: float) -> float:
     priors = sum(
         (level * (u.value - value) / u.prior) ** 2
         for u, value in zip(fitted.unknowns, values.tolist(), strict=True)
-        if u.prior is not None
+        if u.prior is not None and not u.gauge
     )
     return float(residual @ residual) + float(priors)
 
@@ -68,6 +73,7 @@ def find_alternatives(
         def scaled(g: int) -> Floats:
             return given.matrix[:, given.places[g]] * given.size[given.places[g]]
 
+        signal = _signal(given, rest, last, group)
         own, of_mine = paid(scaled(group)), []
         against = [
             *enumerate(linear.candidates),
@@ -83,8 +89,17 @@ def find_alternatives(
                 columns = scaled(other)
             if rest.squares - squares > 0.5 * gain:
                 worse = float(squares - last.squares) / variance
-                of_mine.append(Alternative(mine.key, instead, worse, paid(columns) - own, False))
-        of_mine.sort(key=lambda alternative: alternative.margin)
+                twin = _predicts(beside(given, rest, columns), signal, variance)
+                of_mine.append(Alternative(mine.key, instead, worse, paid(columns) - own, False, twin))
+        # of one effect the form with fewest parameters that predicts the same
+        of_mine = [
+            a
+            for a in of_mine
+            if not (
+                a.twin and any(b.twin and b is not a and a.candidate.contains(b.candidate) for b in of_mine)
+            )
+        ]
+        of_mine.sort(key=lambda alternative: (not alternative.twin, alternative.margin))
         for k, alternative in enumerate(of_mine[:RIVALS]):
             if alternative.margin < max(CLOSE, CLOSE_SHARE * gain / variance):
                 there = with_effects(
@@ -94,6 +109,20 @@ def find_alternatives(
                 of_mine[k] = replace(alternative, worse=worse, fitted=True)
         alternatives += of_mine
     return tuple(sorted(alternatives, key=lambda alternative: alternative.margin))
+
+
+def _signal(given: Problem, rest: Explained, last: Explained, group: int) -> Floats:
+    """(n,) what a chosen group does, outside of what the others explain."""
+    on = np.isin(last.columns, given.places[group])
+    does = given.matrix[:, last.columns[on]] @ last.coefficients[on]
+    return beside(given, rest, does[:, None])[:, 0]
+
+
+def _predicts(columns: Floats, signal: Floats, variance: float) -> bool:
+    """Whether ``columns`` (n, p) can do what ``signal`` (n,) is."""
+    misses = outside(basis_of(columns), signal[:, None])[:, 0] if columns.any() else signal
+    squares = float(misses @ misses)
+    return squares < TWIN * variance and squares < TWIN_SHARE * float(signal @ signal)
 
 
 def _instead(

@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.diagnosis.candidates import Candidate
+from postproc.diagnosis.candidates import EVERY, Candidate
+from postproc.effects.joint_offset import JointOffset
+from postproc.effects.link_geometry import LinkGeometry
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
 from postproc.identification.least_squares import Point, at, scales
-from postproc.identification.unknowns import Unknown, unknowns_of, with_mechanism
+from postproc.identification.unknowns import Unknown, unknowns_of, with_gauge, with_mechanism
 from postproc.model import StiffnessModel
 
 
@@ -30,7 +32,9 @@ def with_effects(campaign: Campaign, base: Fit, chosen: Sequence[Candidate]) -> 
         start |= _begun(campaign, base, model, candidate)
     own = [u for u in base.asked if u.key in {b.key for b in base.unknowns}]
     # what turns out to be unobservable stays at its start value: without a length a spring is none
-    additional = [replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in unknowns]
+    additional = [
+        replace(u, value=start.get(u.key, u.value)) if u.prior is None else u for u in with_gauge(unknowns)
+    ]
     return fit(campaign, model.with_values(start), [*own, *additional], given=base.point.given)
 
 
@@ -72,13 +76,41 @@ def composed(
         names = {u.parameter.name for u in candidate.unknowns}
         known = {u.key for u in unknowns}
         unknowns += [u for u in unknowns_of(model, term) if u.parameter.name in names and u.key not in known]
+        if has_zeros(candidate):
+            term = _term(model, JointOffset.name, {})
+            if term is None:
+                model = model.with_effect(JointOffset(model.robot.joints))
+                term = len(model.terms) - 1
+            known = {u.key for u in unknowns}
+            unknowns += [u for u in unknowns_of(model, term) if u.stated is None and u.key not in known]
     return model, tuple(unknowns)
 
 
+def has_zeros(candidate: Candidate) -> bool:
+    """Whether the zeros of the joints belong to a candidate: of a geometry that is wrong in all joints they are the
+    more plausible part, and what they do its twists and shifts would do as well."""
+    return candidate.name == LinkGeometry.name and candidate.joint == EVERY
+
+
+def keys_of(model: StiffnessModel, candidate: Candidate) -> dict[tuple[int, str], float]:
+    """The parameters in ``model`` that belong to a candidate, and their nulls."""
+    term = term_of(model, candidate)
+    if term is None:
+        return {}
+    keys = {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
+    zeros = _term(model, JointOffset.name, {}) if has_zeros(candidate) else None
+    if zeros is not None:
+        keys |= {u.key: u.parameter.null for u in unknowns_of(model, zeros) if u.stated is None}
+    return keys
+
+
 def term_of(model: StiffnessModel, candidate: Candidate) -> int | None:
-    wanted = (candidate.name, candidate.effect.described())
+    return _term(model, candidate.name, candidate.effect.described())
+
+
+def _term(model: StiffnessModel, name: str, options: dict[str, object]) -> int | None:
     for index, term in enumerate(model.terms):
-        if (term.effect.name, term.effect.described()) == wanted:
+        if (term.effect.name, term.effect.described()) == (name, options):
             return index
     return None
 
@@ -87,9 +119,7 @@ def point_without(campaign: Campaign, fitted: Fit, chosen: Sequence[Candidate]) 
     """The fitted model with what was chosen put back to its null: what there is to explain."""
     nulls: dict[tuple[int, str], float] = {}
     for candidate in chosen:
-        term = term_of(fitted.model, candidate)
-        if term is not None:
-            nulls |= {(term, u.parameter.name): u.parameter.null for u in candidate.unknowns}
+        nulls |= keys_of(fitted.model, candidate)
     if not nulls:
         return fitted.point
     return at(campaign, fitted.model.with_values(nulls), fitted.point.given)

@@ -14,5 +14,13 @@ CODES = define(
             action="Measure more poses; `compensate plan` proposes them.",
             example="6 poses.",
         ),
+        "DIA003": Code(
+            "info",
+            "sides of approach are assumed",
+            meaning="Backlash and hysteresis depend on the side from which a joint came; the columns DIR state it.",
+            consequence="Where they are missing the sides are taken from elsewhere, or are unknown.",
+            action="State DIR1, DIR2, ... in the next campaign.",
+            example="A hysteresis that only the order of the rows shows.",
+        ),
     }
 )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.findings import Finding, Refusal
+from postproc.diagnosis.agreement import AGREES, largest_disagreement, without_effects
 from postproc.diagnosis.candidate_fits import with_effects
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search import model_unknowns, search
@@ -27,13 +28,17 @@ AGAIN = 3
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """stated: the robot file as it is, tracker and targets found; where: patterns in its residuals; search, verdict;
-    final: the final model, of what is named, or of its own parameters refitted."""
+    final: the final model, of what is named, or of its own parameters refitted; disagreement [m]: the largest over the
+    workspace of what explanations predict that can not be told apart, one of each set; ``agreed``: it is so small
+    that the correction is the same."""
 
     stated: Fit
     where: tuple[ResidualPattern, ...]
     search: Search
     verdict: Verdict
     final: Fit
+    disagreement: tuple[float, ...] = ()
+    agreed: bool = False
 
 
 def diagnose(
@@ -67,13 +72,33 @@ def diagnose(
         rejected += verdict.rejected
     if verdict.word == "nothing_missing" and any(why == SIZE_UNDETERMINED for _, why in rejected):
         verdict = replace(verdict, word="unknown")
-    names = [named.candidate for named in verdict.named]
+    # zeros that belong to the geometry of the whole arm are fitted with it
+    names = [
+        named.candidate for named in verdict.named if named.candidate.key in {c.key for c in result.chosen}
+    ]
     final = result.base
-    if names and verdict.word != "ambiguous":
+    disagreement: tuple[float, ...] = ()
+    agreed = False
+    if names:
         final = (
             result.final if len(names) == len(result.chosen) else with_effects(campaign, result.base, names)
         )
+    if verdict.alternatives:
+        stage("comparing the explanations over the workspace")
+        disagreement = tuple(
+            largest_disagreement(campaign, result.base, final, names, one) for one in verdict.alternatives
+        )
+        scatter = np.sqrt(3 * np.mean(final.noise.sigma**2) * (1.0 if final.noise.known else final.factor))
+        differ = [
+            one[0]
+            for one, by in zip(verdict.alternatives, disagreement, strict=True)
+            if not by <= AGREES * scatter
+        ]
+        agreed = not differ
+        if differ:
+            final = without_effects(campaign, final, differ)
     # where an effect is missing in a model its own parameters compensate for that
     moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
     verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
-    return Diagnosis(stated, residual_patterns(stated, result.final), result, verdict, final)
+    where = residual_patterns(stated, result.final)
+    return Diagnosis(stated, where, result, verdict, final, disagreement, agreed)

@@ -47,10 +47,10 @@ def gains(search: Search) -> Gains:
 
 def _needed(search: Search, rank: int) -> float:
     """The gain from which on a group of ``rank`` is taken in, one of all candidates."""
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
     given, last = search.linear.problem, search.explained
-    by_chance = float(chi2.isf(CHANCE / len(given.places), max(rank, 1)))
+    by_chance = float(chdtri(max(rank, 1), CHANCE / len(given.places)))
     if given.known and scatter(given, last) <= EXCEEDED:
         return by_chance
     return max(by_chance, WORTH / (1.0 - WORTH) * max(1, given.freedom - last.rank))
@@ -112,6 +112,6 @@ def smallest(search: Search) -> tuple[Smallest, ...]:
 def _off_centre(rank: int, limit: float) -> float:
     """How far off its centre chi2(``rank``) must be to exceed ``limit`` with probability ``SURELY``."""
     from scipy.optimize import brentq
-    from scipy.stats import ncx2
+    from scipy.special import chndtr
 
-    return float(brentq(lambda away: ncx2.sf(limit, rank, away) - SURELY, 1e-6, 10.0 * limit + 100.0))
+    return float(brentq(lambda away: 1.0 - chndtr(limit, rank, away) - SURELY, 1e-6, 10.0 * limit + 100.0))

@@ -48,7 +48,7 @@ def residual_patterns(
     residuals of each pose get a random sign (wild bootstrap by clusters; Cameron, Gelbach and Miller, Rev. Econ. Stat.
     90 (2008)).
     """
-    from scipy.stats import f
+    from scipy.special import fdtrc
 
     campaign, weights = fitted.campaign, (against or fitted).weights
     residual = weights(np.nan_to_num(fitted.point.residual))
@@ -79,11 +79,11 @@ def residual_patterns(
         if against is None:
             by_chance = _probability(explained, ((signs @ of_pose) ** 2).sum(axis=1) / max(lever, 0.1))
         else:
-            by_chance = float(f.sf(explained / rank / against.factor, rank, max(1, against.freedom)))
+            by_chance = float(fdtrc(rank, max(1, against.freedom), explained / rank / against.factor))
         share = 1.0 - (1.0 - explained / squares) * rows / (rows - rank)
         if by_chance * len(tried) < chance and share > 0:
             words = _words(fitted.point.residual[:, :3], part, parts, unit)
-            if variable in ("order", "time") and _goes_with_poses(values, campaign.readings.q):
+            if variable in ("order", "time") and goes_with_poses(values, campaign.readings.q):
                 words += "; but the poses were taken in such an order: measure again in random order"
             clear_patterns.append(ResidualPattern(variable, words, float(share)))
     return tuple(sorted(clear_patterns, key=lambda one: -one.share)[:SHOWN])
@@ -100,7 +100,7 @@ def _clear(columns: Floats) -> Floats:
 def _probability(observed: float, by_chance: Floats) -> float:
     """That chance makes as much as ``observed``, of its own draws: beyond the largest of that by the gamma
     distribution of their mean and variance."""
-    from scipy.stats import gamma
+    from scipy.special import gammaincc
 
     count = int((by_chance >= observed).sum())
     if count >= 10:
@@ -108,7 +108,7 @@ def _probability(observed: float, by_chance: Floats) -> float:
     mean, variance = float(by_chance.mean()), float(by_chance.var())
     if variance <= 0:
         return 1.0 if observed <= mean else 0.0
-    return float(gamma.sf(observed, mean * mean / variance, scale=variance / mean))
+    return float(gammaincc(mean * mean / variance, observed * mean / variance))
 
 
 def patterns(
@@ -179,9 +179,9 @@ def _words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float])
     return f"{size[most] / MM:.3g} mm at {span(most)}, {size[least] / MM:.3g} mm at {span(least)}"
 
 
-def _goes_with_poses(values: Floats, q: Floats) -> bool:
-    """Whether the joints explain most of ``values`` (R,): what depends on one cannot be distinguished from the
-    other."""
+def goes_with_poses(values: Floats, q: Floats) -> bool:
+    """Whether the joints ``q`` (R, n) [rad, m] explain most of ``values`` (R,): what depends on one cannot be
+    distinguished from the other."""
     spread = np.where(np.ptp(q, axis=0) > 0, np.ptp(q, axis=0), 1.0)
     scaled = (q - q.mean(axis=0)) / spread
     matrix = np.column_stack([np.ones(len(q)), scaled, scaled**2])

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.diagnosis.alternatives import find_alternatives
-from postproc.diagnosis.candidate_fits import composed, in_scales, point_without, term_of, with_effects
+from postproc.diagnosis.candidate_fits import composed, in_scales, keys_of, point_without, with_effects
 from postproc.diagnosis.candidates import Candidate, candidates, is_visible
 from postproc.diagnosis.nonlinear_effects import Outside, evaluate_at_size, whole
 from postproc.diagnosis.search_result import Key, Linear, Search
@@ -23,9 +23,9 @@ from postproc.diagnosis.selection import (
 )
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit
-from postproc.identification.least_squares import prior_rows, scales
+from postproc.identification.least_squares import prior_rows, prior_weight, scales
 from postproc.identification.noise import Weighting
-from postproc.identification.unknowns import Unknown, unknowns_of
+from postproc.identification.unknowns import Unknown, unknowns_of, with_gauge
 from postproc.model import StiffnessModel
 
 PASSES = 4
@@ -63,7 +63,7 @@ def model_unknowns(model: StiffnessModel) -> tuple[Unknown, ...]:
             like = [abs(u.value - u.parameter.null) for u in own if u.parameter.unit == parameter.unit]
             wide = LOOSE * abs(unknown.value - parameter.null) + BESIDE * max(like)
             unknowns.append(replace(unknown, prior=wide or None))
-    return tuple(unknowns)
+    return with_gauge(unknowns)
 
 
 def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
@@ -89,7 +89,7 @@ def search(campaign: Campaign, base: Fit, banned: Sequence[Key] = ()) -> Search:
         if keys == before or keys in tried or len(tried) >= PASSES:
             last = explained(linear.problem, start)
             against = find_alternatives(campaign, base, fitted, linear, last)
-            better = next((r for r in against if r.fitted and not r.is_decoy and r.margin < -1.0), None)
+            better = next((r for r in against if r.fitted and not r.is_decoy and r.priced < -1.0), None)
             done = Search(base, fitted, chosen, hidden, linear, last, against)
             if better is None or len(tried) >= PASSES:
                 return done
@@ -168,9 +168,7 @@ def _linear(
     """The problem that the candidates' columns make of the residual of ``fitted`` without what was chosen; priors of
     the model's own parameters count as rows."""
     own, nuisance = base.point.taken
-    prior = prior_rows(base.unknowns) * np.sqrt(fitted.factor)
-    prior = prior[prior.any(axis=1)]
-    away = np.array([u.value for u in base.unknowns]) - _values(fitted.model, base.unknowns)
+    prior, away = _priors(campaign, base, fitted)
 
     def tall(columns: Floats, below: Floats) -> Floats:
         return np.asarray(np.nan_to_num(np.concatenate([weights(columns), below])))
@@ -178,7 +176,8 @@ def _linear(
     def readings(columns: Floats) -> Floats:
         return tall(columns, np.zeros((len(prior), columns.shape[2])))
 
-    common = np.concatenate([tall(own, prior), readings(nuisance)], axis=1)
+    p = own.shape[2]
+    common = np.concatenate([tall(own, prior[:, :p]), tall(nuisance, prior[:, p:])], axis=1)
     basis = basis_of(common)
     current = _as_fitted(campaign, fitted, chosen, shown)
     with_chosen = [readings(c.columns) for c in current if c.only]
@@ -191,11 +190,28 @@ def _linear(
     )
     # so that with the value of each the same residual remains as of the fit
     contributions = [c.columns @ in_scales(fitted, c.only) for c in current if c.only]
-    residual = tall(sum(contributions, fitted.point.residual), prior @ (away / scales(base.unknowns)))
+    residual = tall(sum(contributions, fitted.point.residual), away)
     columns = tuple(readings(c.columns) for c in current)
     groups = [(own, _reach(c)) for own, c in zip(columns, current, strict=True)]
     linear_problem = problem(residual, basis, groups, weights.counts + len(prior), base.noise.known)
     return Linear(current, linear_problem, residual, common, columns, len(prior), weights)
+
+
+def _priors(campaign: Campaign, base: Fit, fitted: Fit) -> tuple[Floats, Floats]:
+    """Rows (k, P + U) of what is known of the unknowns of ``base`` and of the nuisances besides readings, and how far
+    ``fitted`` is from it (k,), in standard deviations."""
+    own = prior_rows(base.unknowns)
+    away = np.array([u.value for u in base.unknowns]) - _values(fitted.model, base.unknowns)
+    known, offset = campaign.nuisance_prior(fitted.point.given)
+    stated = own.any(axis=1)
+    rows = np.block(
+        [
+            [own[stated], np.zeros((int(stated.sum()), known.shape[1]))],
+            [np.zeros((len(known), own.shape[1])), known],
+        ]
+    )
+    offsets = np.concatenate([(own @ (away / scales(base.unknowns)))[stated], offset])
+    return rows * prior_weight(fitted.factor), offsets * prior_weight(fitted.factor)
 
 
 def _as_grown(campaign: Campaign, fitted: Fit, candidate: Candidate, beyond: Outside) -> Candidate:
@@ -216,10 +232,11 @@ def _as_fitted(
     own, _ = fitted.point.taken
     values = in_scales(fitted, fitted.unknowns)
     there: dict[Key, Candidate] = {}
+    counted: set[tuple[int, str]] = set()
     for candidate in chosen:
-        term = term_of(fitted.model, candidate)
-        names = {u.parameter.name for u in candidate.unknowns}
-        at = [i for i, u in enumerate(fitted.unknowns) if u.term == term and u.parameter.name in names]
+        keys = keys_of(fitted.model, candidate).keys() - counted
+        counted |= keys
+        at = [i for i, u in enumerate(fitted.unknowns) if u.key in keys]
         if not at:
             continue
         columns = np.nan_to_num(own[:, :, at])

@@ -36,17 +36,24 @@ class Linear:
 @dataclass(frozen=True, eq=False)
 class Alternative:
     """A ``candidate`` in the place of the choice ``of``: by how much -2 ln(likelihood) is ``worse``, and what it pays
-    ``more`` for its parameters (negative: less); ``fitted``, or only linearly so."""
+    ``more`` for its parameters (negative: less); ``fitted``, or only linearly so; ``twin``: it predicts the same
+    readings, and no price of parameters decides between the two."""
 
     of: Key
     candidate: Candidate
     worse: float
     more: float
     fitted: bool
+    twin: bool = False
 
     @property
     def margin(self) -> float:
         """By how much it is the lesser explanation; negative: the better one."""
+        return self.worse if self.twin else self.worse + self.more
+
+    @property
+    def priced(self) -> float:
+        """By how much it is the lesser one to go on with: of twins that with fewer parameters."""
         return self.worse + self.more
 
     @property

@@ -14,9 +14,9 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 
-WORTH = 0.1
-"""Share of the remaining squares that an effect must explain where more than scatter remains: what is not
-understood follows the joints as well, and by chance looks a little like any effect."""
+WORTH = 0.19
+"""Share of the remaining squares that an effect must explain where more than scatter remains, a tenth of the root mean
+square: what is not understood follows the joints as well, and by chance looks a little like any effect."""
 
 CHANCE = 0.001
 """Probability that among all groups any is taken in although none is there."""
@@ -199,13 +199,13 @@ def scatter(given: Problem, last: Explained) -> float:
 
 def probability(given: Problem, squares: float, rank: int, variance: float, freedom: int) -> float:
     """That ``rank`` columns explain ``squares`` by chance."""
-    from scipy.stats import chi2, f
+    from scipy.special import chdtrc, fdtrc
 
     if rank == 0 or squares <= 0:
         return 1.0
     if given.known and variance == 1.0:
-        return float(chi2.sf(squares, rank))
-    return float(f.sf(squares / rank / variance, rank, max(1, freedom)))
+        return float(chdtrc(rank, squares))
+    return float(fdtrc(rank, max(1, freedom), squares / rank / variance))
 
 
 def selected(

@@ -7,34 +7,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.diagnosis.candidate_fits import has_zeros
 from postproc.diagnosis.candidates import EVERY, Candidate, names_of
 from postproc.diagnosis.decoys import HAS_DECOYS
+from postproc.diagnosis.held_out import FOLDS, held_out_gain, regions_of, sessions_of, worst_ratio
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
 from postproc.diagnosis.search_result import Alternative, Search
 from postproc.diagnosis.selection import (
     Explained,
-    Problem,
     clipped_squares,
     explained,
     probability,
     scatter,
 )
+from postproc.effects.joint_offset import JointOffset
 from postproc.identification.fit import Estimate, Fit
 from postproc.identification.validation import folds_of
 
 VERDICTS = ("nothing_missing", "named", "partly_named", "ambiguous", "unknown")
 
-FOLDS = 15
-"""Parts that poses are left out in; each pose by itself where there are fewer."""
-
-SEEN = 1e-8
-"""Share of a column's squares that readings must show to predict others."""
-
-OUTLIER_LIMIT = 5.0
-
-USUAL = 3.0
-"""Times what was found of an effect that it is expected to be, of readings that were left out."""
 
 MARGIN = 10.0
 """By how much -2 ln(likelihood) of the nearest other explanation must be worse: odds of 150 to 1."""
@@ -61,7 +52,14 @@ TOLERATED = 0.15
 EXPLAINS = 0.9
 """Share of the variance beyond scatter that a name must take away where some remains."""
 
+EVERY_ARM = {"joint_offset": 0.5, "link_geometry": 0.5, "joint_compliance": 0.75, "link_gravity": 0.75}
+"""The same of what every arm has: a geometry that is not quite the nominal one, weight and gears that deflect."""
 
+WORST = 1.1
+"""By how much the largest residual of poses that were left out may grow with an effect."""
+
+
+NOT_ENOUGH = "too much would remain for a name"
 OTHER_COURSE = "the readings follow another course than that of this effect"
 SIZE_UNDETERMINED = "it would have to be unusually large, and the readings hardly determine its size"
 
@@ -70,7 +68,8 @@ SIZE_UNDETERMINED = "it would have to be unusually large, and the readings hardl
 class Evidence:
     """For one candidate.  gain: fall of -2 ln(likelihood) with it; chance: probability of that without it, among all
     candidates; heldout, regions, sessions: fall of the same for poses, regions and sessions left out (NaN where there
-    are too few); margin: of the nearest other candidate in its place, ``alias``."""
+    are too few); margin: of the nearest other candidate in its place, ``alias``; worst: the largest residual of poses
+    left out with it, over that without it."""
 
     gain: float
     chance: float
@@ -79,6 +78,7 @@ class Evidence:
     sessions: float
     margin: float
     alias: Candidate | None
+    worst: float = 1.0
 
     @property
     def is_sufficient(self) -> bool:
@@ -125,6 +125,8 @@ def judge(search: Search) -> Verdict:
     """The verdict on a search."""
     linear, last = search.linear, search.explained
     named, rejected, aliases = [], [], []
+    zeros: list[tuple[Candidate, Evidence]] = []
+    groups: list[int] = []
     for g in last.groups:
         candidate, its = linear.candidates[g], _evidence(search, last, g)
         estimates = _estimates(search.final, candidate, search)
@@ -134,6 +136,8 @@ def judge(search: Search) -> Verdict:
             rejected.append((candidate, OTHER_COURSE))
         elif not its.is_sufficient:
             rejected.append((candidate, "no gain on held-out readings"))
+        elif its.worst > WORST:
+            rejected.append((candidate, "it makes the largest residual of held-out poses larger"))
         elif is_implausible(estimates):
             rejected.append((candidate, SIZE_UNDETERMINED))
         elif bounded and len(several) == 1:
@@ -141,7 +145,10 @@ def judge(search: Search) -> Verdict:
         else:
             joints, fixed = _joints(candidate, estimates), _fixed_values(search.final, candidate, estimates)
             named.append(Named(candidate, joints, estimates, its, fixed))
+            groups.append(g)
             aliases.append(several)
+            if has_zeros(candidate):
+                zeros.append((candidate, its))
     chi2, unexplained = reduced_chi2_of(search, last)
     patterns = residual_patterns(search.final, chance=STRUCTURE)
     unexplained = unexplained or bool(patterns)
@@ -149,15 +156,33 @@ def judge(search: Search) -> Verdict:
     # two forms of one effect on one joint do not make its name uncertain
     sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
     formless = any(why == OTHER_COURSE for _, why in rejected)
-    enough = not linear.problem.known or chi2 - 1.0 <= (1.0 - EXPLAINS) * (bare - 1.0)
+    if formless or unexplained:
+        # what is certain stays, whatever remains: it must take its share by itself
+        rare = np.inf if formless else EXPLAINS
+        kept = list(range(len(named)))
+        while kept:
+            alone, _ = reduced_chi2_of(search, explained(linear.problem, [groups[k] for k in kept]))
+            taken = _taken(alone, bare, linear.problem.known)
+            still = [k for k in kept if taken >= EVERY_ARM.get(named[k].effect, rare)]
+            if still == kept:
+                break
+            kept = still
+        rest = [one.candidate for k, one in enumerate(named) if k not in kept]
+        named = [named[k] for k in kept]
+        aliases = [aliases[k] for k in kept]
+        sets = tuple(a for a in aliases if len({(c.name, c.joint) for c in a}) > 1)
+        if named:
+            rejected += [(candidate, NOT_ENOUGH) for candidate in rest]
     if not named:
         word = "unknown" if unexplained or rejected else "nothing_missing"
-    elif formless or (unexplained and not enough):
-        word, named, sets = "unknown", [], ()
     elif sets:
         word = "ambiguous"
     else:
         word = "partly_named" if unexplained or rejected else "named"
+    kept_keys = {one.candidate.key for one in named}
+    named += [
+        more for whole, its in zeros if whole.key in kept_keys for more in _zeros_of(search, named, its)
+    ]
     testable = set(names_of(linear.candidates))
     hidden = tuple(name for name in names_of(search.untestable) if name not in testable)
     return Verdict(
@@ -171,6 +196,25 @@ def judge(search: Search) -> Verdict:
         tuple(rejected),
         patterns,
     )
+
+
+def _taken(variance: float, bare: float, known: bool) -> float:
+    """Share of the variance beyond scatter that is explained; of one that is not known, of all."""
+    floor = 1.0 if known else 0.0
+    return 1.0 - (variance - floor) / (bare - floor) if bare > floor else 1.0
+
+
+def _zeros_of(search: Search, named: Sequence[Named], its: Evidence) -> list[Named]:
+    """The zeros of joints that were found with the geometry of the whole arm, where any is clearly there."""
+    if any(one.effect == JointOffset.name for one in named):
+        return []
+    whole = [c for c in search.linear.candidates if (c.name, c.joint) == (JointOffset.name, EVERY)]
+    for candidate in whole:
+        estimates = _estimates(search.final, candidate, search)
+        joints = _joints(candidate, estimates)
+        if joints:
+            return [Named(candidate, joints, estimates, its)]
+    return []
 
 
 def _is_observable(candidate: Candidate, estimates: Sequence[Estimate]) -> bool:
@@ -225,13 +269,14 @@ def _evidence(search: Search, last: Explained, group: int) -> Evidence:
     campaign = search.base.campaign
     heldout, regions, sessions = (
         held_out_gain(search, last, group, rows)
-        for rows in (folds_of(campaign, min(FOLDS, campaign.poses)), _regions(search), _sessions(search))
+        for rows in (folds_of(campaign, min(FOLDS, campaign.poses)), regions_of(search), sessions_of(search))
     )
+    worst = worst_ratio(search, last, group, folds_of(campaign, min(FOLDS, campaign.poses)))
     nearest = next(iter(_against(search, linear.candidates[group])), None)
     margin, alias = (np.inf, None) if nearest is None else (nearest.margin, nearest.candidate)
     among = len(linear.candidates)
     gain = squares / variance
-    return Evidence(gain, min(1.0, chance * among), heldout, regions, sessions, margin, alias)
+    return Evidence(gain, min(1.0, chance * among), heldout, regions, sessions, margin, alias, worst)
 
 
 def ambiguity_set(search: Search, group: int, observable: bool) -> tuple[Candidate, ...]:
@@ -243,7 +288,9 @@ def ambiguity_set(search: Search, group: int, observable: bool) -> tuple[Candida
     near = [
         r.candidate for r in against if r.margin < (-BUILT if built and observable and r.is_decoy else MARGIN)
     ]
-    return (mine, *near)
+    # of one effect the form with fewest parameters
+    several = [mine, *near]
+    return (mine, *(c for c in near if not any(c is not one and c.contains(one) for one in several)))
 
 
 def is_implausible(estimates: Sequence[Estimate]) -> bool:
@@ -262,80 +309,6 @@ def _of_another_course(search: Search, candidate: Candidate) -> bool:
 def _against(search: Search, mine: Candidate) -> list[Alternative]:
     """What may be taken for ``mine``, nearest first; other courses where they are no mere variants of it."""
     return [r for r in search.rivals if r.of == mine.key and (mine.name in HAS_DECOYS or not r.is_decoy)]
-
-
-def held_out_gain(search: Search, last: Explained, group: int, part: Ints | None) -> float:
-    """Fall of -2 ln(likelihood) of readings left out, part by part, with the group; ``part`` (R,): the part of each
-    reading, -1 in none; NaN without parts.
-
-    A reading is predicted with the uncertainty of the fit of the others: where that has to extrapolate, it
-    has little weight.  Outliers count up to 5 standard deviations.  A part that is more than half of all is never left
-    out: a few poses measured later do not foretell a whole campaign.
-    """
-    if part is None:
-        return np.nan
-    large = np.flatnonzero(2 * np.bincount(part) > len(part))
-    part = np.where(np.isin(part, large), -1, part)
-    if not (part >= 0).any() or (len(large) == 0 and len(np.unique(part)) < 2):
-        return np.nan
-    linear, given = search.linear, search.linear.problem
-    rows = len(linear.residual) - linear.priors
-    # priors are never left out
-    of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
-    variance = scatter(given, last)
-
-    def surprise(groups: Sequence[int]) -> float:
-        columns = [linear.common, *(linear.columns[g] for g in groups)]
-        matrix = np.concatenate(columns, axis=1)
-        own = np.concatenate([np.zeros(linear.common.shape[1]), *(_expected(given, last, g) for g in groups)])
-        matrix = np.concatenate([matrix, np.diag(own)[own > 0]])
-        more = len(matrix) - len(of)
-        target = np.append(linear.residual, np.zeros(more))
-        return _misfit(matrix, target, np.append(of, np.full(more, -1)), variance)
-
-    return surprise([g for g in last.groups if g != group]) - surprise(last.groups)
-
-
-def _expected(given: Problem, last: Explained, group: int) -> Floats:
-    """(p,) one over the deviation that is expected of each parameter of a chosen group, in its scale: ``USUAL`` times
-    the largest that was found of it."""
-    on = np.isin(last.columns, given.places[group])
-    largest = np.abs(last.coefficients[on] / given.size[given.places[group]]).max(initial=0.0)
-    return np.full(len(given.places[group]), 1.0 / (USUAL * largest) if largest > 0 else 0.0)
-
-
-def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> float:
-    """-2 ln(likelihood) of ``target`` (n,), each part predicted from the others by ``matrix`` (n, k)."""
-    size = np.linalg.norm(matrix, axis=0)
-    scaled = matrix[:, size > 0] / size[size > 0]
-    whole, aim, total = scaled.T @ scaled, scaled.T @ target, 0.0
-    for k in np.unique(part[part >= 0]):
-        out = scaled[part == k]
-        value, vector = np.linalg.eigh(whole - out.T @ out)
-        root = vector / np.sqrt(np.maximum(value, SEEN))
-        x = root @ (root.T @ (aim - out.T @ target[part == k]))
-        uncertainty = variance * (1.0 + ((out @ root) ** 2).sum(axis=1))
-        away = (target[part == k] - out @ x) ** 2 / uncertainty
-        total += float((np.minimum(away, OUTLIER_LIMIT**2) + np.log(uncertainty)).sum())
-    return total
-
-
-def _regions(search: Search) -> Ints | None:
-    """(R,) a region of the joints' space for each reading; None with too few poses."""
-    from scipy.cluster.vq import kmeans2
-
-    campaign = search.base.campaign
-    if campaign.poses < 24:
-        return None
-    q = campaign.readings.q
-    spread = np.where(np.ptp(q, axis=0) > 1e-9, np.ptp(q, axis=0), 1.0)
-    _, label = kmeans2(q / spread, 4, minit="++", rng=np.random.default_rng(0))
-    return label if min(np.bincount(label, minlength=4)) > 0 else None
-
-
-def _sessions(search: Search) -> Ints | None:
-    session = search.base.campaign.readings.session
-    return session if len(np.unique(session)) > 1 else None
 
 
 def _estimates(final: Fit, candidate: Candidate, search: Search) -> tuple[Estimate, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.experiments.candidate_setups import CandidateSetups, Setups, readings_of
-from postproc.identification.campaign import Campaign, Nuisances
+from postproc.identification.campaign import SCALE, SCALE_NAME, Campaign, Nuisances
 from postproc.identification.identifiable import COVERAGE, Identifiability, identifiability
 from postproc.identification.least_squares import prior_rows, scales
 from postproc.identification.noise import noise_of, weighting
@@ -136,6 +136,11 @@ def judged(
         both = np.zeros((len(columns), len(names) + len(others)))
         both[: len(nuisance), : len(names)], both[len(nuisance) :, len(names) :] = nuisance, apart
         nuisance, names = both, (*names, *others)
+    scales_of_trackers = [k for k, name in enumerate(names) if name == SCALE_NAME]
+    known = np.zeros((len(scales_of_trackers), len(names)))
+    known[np.arange(len(known)), scales_of_trackers] = 1.0 / SCALE
+    columns = np.concatenate([columns, np.zeros((len(known), columns.shape[1]))])
+    nuisance = np.concatenate([nuisance, known])
     values = np.array([model.terms[u.term].values[u.parameter.name] for u in unknowns])
     analysis = identifiability(unknowns, columns, nuisance, names, prior_rows(unknowns), values)
     ci95 = np.full(len(unknowns), np.nan)

@@ -2,11 +2,12 @@
 
 A reading sees one point of the robot at one state: a target on the flange, or without targets the TCP.
 
-    absolute     T_s (p + R c)                             T_s: the robot base in the tracker's frame of session s
+    absolute     T_s (1 + e) (p + R c)                     T_s: the robot base in the tracker's frame of session s
     deflection   (p + R c) loaded - (p + R c) unloaded     with the same motors, robot base axes
 
 p, R: place and rotation of the tool at the equilibrium, c the target in tool axes.  T_s, and c where it is not stated,
-are nuisances: found with every fit, and credited to no effect.
+are nuisances: found with every fit, and credited to no effect.  So is e, the scale of the tracker's lengths over the
+robot's: a tracker, or an arm that is warm, is off by some 1e-4.
 """
 
 from __future__ import annotations
@@ -30,6 +31,14 @@ ONE_POSE = 1e-6
 REST = 1e-14
 """[rad, m] What may remain of the displacement to an equilibrium: differences of two loads are taken."""
 
+SCALE_NAME = "scale of the tracker"
+
+SCALE = 5e-5
+"""Standard deviation of the scale of a tracker's lengths over those of a robot: 5 K of steel are 6e-5."""
+
+LARGEST_SCALE = 5e-4
+"""No tracker and no temperature makes more: the rest is the arm."""
+
 
 @dataclass(frozen=True)
 class PredictedReadings:
@@ -47,11 +56,13 @@ class PredictedReadings:
 @dataclass(frozen=True)
 class Nuisances:
     """Where tracker and targets are: ``frames`` (M) of the robot base in the tracker's frame, one a session; ``places``
-    (K, 3) [m] of the targets in tool axes from the TCP; ``turns`` (K, 3, 3) of their frames in it."""
+    (K, 3) [m] of the targets in tool axes from the TCP; ``turns`` (K, 3, 3) of their frames in it; ``scale``: what the
+    tracker reads of a length of the robot, over that, less 1."""
 
     frames: Poses
     places: Floats
     turns: Floats
+    scale: float = 0.0
 
 
 class Campaign:
@@ -85,6 +96,8 @@ class Campaign:
             [into_tool.rotation @ place + into_tool.position for place in on_flange]
         )
         self.stated_turns = np.tile(np.eye(3), (len(self.targets), 1, 1))
+        self.known_scale: float | None = None
+        self.expected_scale = 0.0
         self.nuisance_names = tuple(self._nuisance_names())
 
     def __len__(self) -> int:
@@ -100,6 +113,7 @@ class Campaign:
                 at = other.targets.index(name)
                 new.stated_places[k], new.stated_turns[k] = given.places[at], given.turns[at]
                 new.place_known[k] = new.turn_known[k] = True
+        new.known_scale = given.scale
         new.nuisance_names = tuple(new._nuisance_names())
         return new
 
@@ -169,6 +183,7 @@ class Campaign:
         points = np.where(lost[:, None], np.nan, points)
         if self.tracked:
             frame = given.frames[self.readings.session]
+            points = points * (1.0 + given.scale)
             points = (frame.rotation @ points[:, :, None])[:, :, 0] + frame.position
             rotation = frame.rotation @ rotation
         return points, rotation if self.posed else None
@@ -204,10 +219,21 @@ class Campaign:
         """Tracker in the robot base, targets at their stated places or on the flange."""
         sessions = len(self.readings.sessions)
         frames = Poses(np.tile(np.eye(3), (sessions, 1, 1)), np.zeros((sessions, 3)))
-        return Nuisances(frames, self.stated_places, self.stated_turns)
+        return Nuisances(frames, self.stated_places, self.stated_turns, self.known_scale or 0.0)
+
+    @property
+    def scaled(self) -> bool:
+        """Whether the scale of the tracker is an unknown, the last of the nuisances."""
+        return self.tracked and self.known_scale is None
+
+    def nuisance_prior(self, given: Nuisances) -> tuple[Floats, Floats]:
+        """(k, U) rows and (k,) values, in standard deviations, of what is known of the nuisances besides readings."""
+        rows = np.zeros((int(self.scaled), len(self.nuisance_names)))
+        rows[:, -1:] = 1.0 / SCALE
+        return rows, np.full(len(rows), (self.expected_scale - given.scale) / SCALE)
 
     def _blocks(self) -> list[tuple[str, int]]:
-        """What is not known, three columns each, and of which session or target it is."""
+        """What is not known, three columns each, and of which session or target it is; the scale is not among them."""
         blocks = []
         if self.tracked:
             for k in range(len(self.readings.sessions)):
@@ -226,13 +252,15 @@ class Campaign:
             what = "registration" if kind in ("shift", "turn") else "target"
             axes = ("x", "y", "z") if kind in ("shift", "place") else ("rx", "ry", "rz")
             names += [f"{what}{f' {of}' if of else ''}.{axis}" for axis in axes]
-        return names
+        return [*names, SCALE_NAME] if self.scaled else names
 
     def nuisance_columns(self, predicted: PredictedReadings, given: Nuisances) -> Floats:
         """(R, 3 or 6, U) derivative of ``expected`` by the steps of ``moved``."""
         derivatives = np.zeros((len(self), 6, len(self.nuisance_names)))
         points = self.points(predicted, given.places, self.at)
         axes = given.frames.rotation[self.readings.session]
+        if self.scaled:
+            derivatives[:, :3, -1] = (axes @ points[:, :, None])[:, :, 0]
         for block, (kind, k) in enumerate(self._blocks()):
             columns = slice(3 * block, 3 * block + 3)
             if kind in ("shift", "turn"):
@@ -290,8 +318,8 @@ class Campaign:
         return derivatives
 
     def moved(self, given: Nuisances, step: Floats) -> Nuisances:
-        """The nuisances after a step (U,) [m, rad]: frames T (exp(turn) p + shift), targets c + place and
-        exp(axes) turn."""
+        """The nuisances after a step (U,) [m, rad, 1]: frames T (exp(turn) p + shift), targets c + place and
+        exp(axes) turn, the scale plus its step."""
         rotation, position = given.frames.rotation.copy(), given.frames.position.copy()
         places, turns = given.places.copy(), given.turns.copy()
         for block, (kind, k) in enumerate(self._blocks()):
@@ -304,4 +332,5 @@ class Campaign:
                 places[k] += part
             else:
                 turns[k] = rotation_from_vector(part) @ turns[k]
-        return Nuisances(Poses(rotation, position), places, turns)
+        scale = given.scale + float(step[-1]) if self.scaled else given.scale
+        return Nuisances(Poses(rotation, position), places, turns, scale)

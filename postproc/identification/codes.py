@@ -82,5 +82,29 @@ CODES = define(
             action="Check robot, tool and effects; `compensate robots NAME` lists what the model contains.",
             example="60 % of the deflections remain as residuals.",
         ),
+        "IDN032": Code(
+            "warning",
+            "reflector mounted anew",
+            meaning="Between two sessions a reflector was at different places of the tool.",
+            consequence="It counts as another reflector in each session, so that the robot is not blamed for it.",
+            action="Give reflectors that were mounted anew other names.",
+            example="A nest that was taken off over night.",
+        ),
+        "IDN033": Code(
+            "warning",
+            "tracker moved within a session",
+            meaning="From one row on all readings are moved as a whole.",
+            consequence="The rows from there on count as another session.",
+            action="State a new SESSION where the tracker was moved.",
+            example="Somebody bumped the stand.",
+        ),
+        "IDN034": Code(
+            "error",
+            "readings belong to other rows",
+            meaning="From one row on the readings belong to the joint angles of the row above or below.",
+            consequence="Every reading would be compared with another pose.",
+            action="Move the measured values by one row from there on.",
+            example="One pose was skipped, its row was not.",
+        ),
     }
 )

@@ -12,7 +12,15 @@ from postproc.base.arrays import Bools, Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.identification.campaign import Campaign, Nuisances
 from postproc.identification.identifiable import Dropped, Identifiability, basis, identifiability
-from postproc.identification.least_squares import Point, at, descended, prior_rows, scales, with_columns
+from postproc.identification.least_squares import (
+    Point,
+    at,
+    descended,
+    prior_rows,
+    prior_weight,
+    scales,
+    with_columns,
+)
 from postproc.identification.noise import Noise, Weighting, noise_of, shared_error, weighting
 from postproc.identification.registration import registered
 from postproc.identification.unknowns import Unknown
@@ -267,7 +275,10 @@ def _insight(
     campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, factor: float
 ) -> Identifiability:
     columns, nuisance = (np.nan_to_num(weights(part)) for part in point.taken)
-    prior, values = prior_rows(free) * np.sqrt(factor), point.values(free)
+    known = campaign.nuisance_prior(point.given)[0] * prior_weight(factor)
+    columns = np.concatenate([columns, np.zeros((len(known), columns.shape[1]))])
+    nuisance = np.concatenate([nuisance, known])
+    prior, values = prior_rows(free) * prior_weight(factor), point.values(free)
     return identifiability(free, columns, nuisance, campaign.nuisance_names, prior, values, factor)
 
 
@@ -287,7 +298,7 @@ def _variance(
     not make them worse.  A residual that a robust fit weighs down counts with as much as it pulls, and its reading as a
     part of one (Huber, Robust Statistics, Sec. 7.6).
     """
-    from scipy.stats import chi2, norm, t
+    from scipy.special import chdtri, ndtri, stdtrit
 
     counts = plain.weight > 0
     share = np.where(counts, weights.weight / np.where(counts, plain.weight, 1.0), 0.0) ** 2
@@ -300,9 +311,9 @@ def _variance(
     squares = float(residual @ residual)
     freedom = max(0, round(share.sum()) - q.shape[1])
     if freedom == 0:
-        return 1.0, False, 0, float(norm.ppf(0.975))
-    exceeded = bool(noise.known and squares > chi2.ppf(1.0 - UNLIKELY, freedom))
+        return 1.0, False, 0, float(ndtri(0.975))
+    exceeded = bool(noise.known and squares > chdtri(freedom, UNLIKELY))
     if noise.known and not exceeded:
         least = 1.0 if weights is plain else max(1.0, squares / freedom)
-        return least, False, freedom, float(norm.ppf(0.975))
-    return squares / freedom, exceeded, freedom, float(t.ppf(0.975, freedom))
+        return least, False, freedom, float(ndtri(0.975))
+    return squares / freedom, exceeded, freedom, float(stdtrit(freedom, 0.975))

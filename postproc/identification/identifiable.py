@@ -74,10 +74,14 @@ def identifiability(
         if size < UNSEEN:
             dropped.append(Dropped(unknown.name, "no reading depends on it"))
             continue
+        own = float(np.linalg.norm(outside[: len(columns), k]))
+        if unknown.gauge and own < max(REDUNDANT * size, UNSEEN):
+            dropped.append(_explained(k, unknowns, (), whole, nuisance, nuisance_names))
+            continue
         rest = outside[:, k] - frame @ (frame.T @ outside[:, k])
         rest -= frame @ (frame.T @ rest)
         length = float(np.linalg.norm(rest))
-        if length < max(REDUNDANT * size, UNSEEN):
+        if length < (UNSEEN if unknown.gauge else max(REDUNDANT * size, UNSEEN)):
             dropped.append(_explained(k, unknowns, observable, whole, nuisance, nuisance_names))
             continue
         frame = np.column_stack([frame, rest / length])
@@ -104,7 +108,10 @@ def identifiability(
 
 
 def _limit(unknown: Unknown, value: float) -> float:
-    """[SI] An interval wider than this states nothing of the unknown."""
+    """[SI] An interval wider than this states nothing of the unknown; of geometry, what can not be told apart is in the
+    interval."""
+    if unknown.gauge:
+        return np.inf
     null = unknown.parameter.null
     stated = unknown.stated
     usual = 0.0 if stated is None else abs(stated.value - null)

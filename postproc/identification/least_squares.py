@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.identification.campaign import Campaign, Nuisances, PredictedReadings
+from postproc.identification.campaign import LARGEST_SCALE, Campaign, Nuisances, PredictedReadings
 from postproc.identification.noise import Weighting
 from postproc.identification.sensitivities import columns
 from postproc.identification.unknowns import Unknown
@@ -25,6 +25,9 @@ STRAIGHT = 0.01
 DAMPING, LOOSE = 1e-5, 1e-7
 """Of a column's length: what no reading sees stays where it is, parameters rather than tracker and targets."""
 
+
+EXACT = 1e-6
+"""Variance of readings over the assumed one below which they are exact."""
 
 CURVED, CAREFUL = 0.3, 1e-4
 """Share of a step's effect that may come otherwise than foreseen, and the damping that the next step starts with
@@ -82,6 +85,12 @@ def prior_rows(unknowns: Sequence[Unknown]) -> Floats:
     return np.diag([0.0 if u.prior is None else u.parameter.scale / u.prior for u in unknowns])
 
 
+def prior_weight(factor: float) -> float:
+    """What rows of priors count by, beside readings whose variance is ``factor`` times the assumed one: however exact
+    those are, priors choose among values that predict the same."""
+    return float(np.sqrt(max(factor, EXACT)))
+
+
 def descended(
     campaign: Campaign,
     point: Point,
@@ -99,7 +108,8 @@ def descended(
     """
     from scipy.optimize import lsq_linear
 
-    scale, prior = scales(unknowns), prior_rows(unknowns) * np.sqrt(factor)
+    scale, prior = scales(unknowns), prior_rows(unknowns) * prior_weight(factor)
+    known = campaign.nuisance_prior(point.given)[0] * prior_weight(factor)
     lower = np.array([u.parameter.lower for u in unknowns]) / scale
     upper = np.array([u.parameter.upper for u in unknowns]) / scale
     wanted = np.array([u.value for u in unknowns]) / scale
@@ -107,7 +117,8 @@ def descended(
 
     def residuals(candidate: Point) -> tuple[Floats, int]:
         x = candidate.values(unknowns) / scale
-        weighted = np.concatenate([weights(candidate.residual), prior @ (wanted - x)])
+        of_nuisances = campaign.nuisance_prior(candidate.given)[1] * prior_weight(factor)
+        weighted = np.concatenate([weights(candidate.residual), prior @ (wanted - x), of_nuisances])
         lost = (weights.weight > 0) & ~np.isfinite(candidate.residual)
         return weighted, int(lost.sum())
 
@@ -118,7 +129,7 @@ def descended(
             point, fresh = with_columns(campaign, point, unknowns), True
         x = point.values(unknowns) / scale
         matrix = np.concatenate([weights(part) for part in point.taken], axis=1)
-        extra = np.concatenate([prior, np.zeros((len(x), len(loose)))], axis=1)
+        extra = np.block([[prior, np.zeros((len(x), len(loose)))], [np.zeros((len(known), len(x))), known]])
         matrix = np.nan_to_num(np.concatenate([matrix, extra]))
         if matrix.shape[1] == 0:
             return replace(point, settled=True)
@@ -133,7 +144,12 @@ def descended(
         )
         reduced = np.asarray(np.linalg.qr(tall, mode="r"))
         system, right = reduced[:-1, :-1], reduced[:-1, -1]
-        low, high = np.concatenate([lower - x, -loose]) * length, np.concatenate([upper - x, loose]) * length
+        if campaign.scaled:
+            below, above = loose.copy(), loose.copy()
+            below[-1], above[-1] = LARGEST_SCALE + point.given.scale, LARGEST_SCALE - point.given.scale
+        else:
+            below = above = loose
+        low, high = np.concatenate([lower - x, -below]) * length, np.concatenate([upper - x, above]) * length
         whole = np.linalg.lstsq(system, right, rcond=None)[0]
         if np.any(whole < low) or np.any(whole > high):
             whole = lsq_linear(system, right, (np.minimum(low, 0.0), np.maximum(high, 0.0)), "bvls").x

@@ -54,9 +54,9 @@ def outliers(fitted: Fit, rows: Bools) -> tuple[tuple[Outlier, ...], Fit]:
 
 def _limit(count: int) -> float:
     """Length of a residual [its standard deviation] that one of ``count`` normal ones in space exceeds by chance."""
-    from scipy.stats import chi
+    from scipy.special import chdtri
 
-    return float(chi.ppf((1.0 - CHANCE) ** (1.0 / max(count, 1)), 3))
+    return float(np.sqrt(chdtri(3, 1.0 - (1.0 - CHANCE) ** (1.0 / max(count, 1)))))
 
 
 def _lengths(fitted: Fit, rows: Bools) -> tuple[Floats, float, float]:

@@ -32,6 +32,10 @@ def registered(campaign: Campaign, predicted: PredictedReadings, rows: Bools) ->
             own = np.flatnonzero(usable & (session == k)).astype(np.int64)
             if len(own):
                 given = _session(campaign, predicted, given, int(k), own)
+        if len(campaign.readings.sessions) > 1 and not campaign.place_known.all():
+            # each session has put the targets where it wants them
+            rows_of_all = np.flatnonzero(usable).astype(np.int64)
+            given = _descended(campaign, predicted, given, rows_of_all, MAX_STEPS)[0]
     if campaign.posed and campaign.still is None:
         given = _turned_targets(campaign, predicted, given, usable)
     return given
@@ -69,6 +73,8 @@ def _descended(
             return before, last
         last, before = size, given
         columns = campaign.nuisance_columns(predicted, given)[rows, :3]
+        if campaign.scaled:  # of an arm that is not calibrated the scale says nothing yet
+            columns[:, :, -1] = 0.0
         matrix = columns.reshape(residual.size, -1)
         step = np.linalg.lstsq(matrix.T @ matrix, matrix.T @ residual.reshape(-1), rcond=1e-13)[0]
         given = campaign.moved(given, np.asarray(step, float))

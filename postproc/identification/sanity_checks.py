@@ -63,6 +63,9 @@ ENOUGH = 300
 LOOKED_AT = 60
 """Readings that alternatives are tried on."""
 
+PART, SHIFT_TRIED = 12, 5000
+"""Readings that show that a part of a file belongs to other rows, and how many a file may have to be checked."""
+
 LOADED = ("elastic", "gear", "sensor")
 """Families of effects that only a load shows."""
 
@@ -162,6 +165,7 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
     """
     if campaign.readings.rotation is not None:
         campaign = Campaign(replace(campaign.readings, rotation=None, sigma_turn=None), campaign.stated_tool)
+    _check_rows(campaign, model)
     if len(campaign) > ENOUGH:
         some = np.linspace(0, len(campaign) - 1, ENOUGH).round().astype(int)
         campaign = Campaign(campaign.readings.part(some), campaign.stated_tool)
@@ -205,6 +209,62 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
             help="check robot, tool and effects; `compensate robots NAME` lists what the model contains",
         ),
     )
+
+
+def _check_rows(campaign: Campaign, model: StiffnessModel) -> None:
+    """Refuses (IDN034) absolute readings of which those before some row, or after it, fit the rows above or below."""
+    readings = campaign.readings
+    if readings.deflection or len(readings) > SHIFT_TRIED or len(readings) < 4 * PART:
+        return
+    point = at(campaign, model, campaign.start())
+    every = np.ones(len(campaign), bool)
+    if not point.predicted.converged.all():
+        return
+    given = registered(campaign, point.predicted, every)
+    if _rms(campaign.residual(point.predicted, given)[:, :3]) < FAR:
+        return
+    for start in (True, False):
+        part = every.copy()
+        part[len(part) // 3 :] = False
+        rows = part if start else part[::-1]
+        if len(np.unique(readings.session[rows])) < len(readings.sessions):
+            continue
+        given = registered(campaign, point.predicted, rows)
+        expected, _ = campaign.expected(point.predicted, given)
+        away = np.linalg.norm(readings.value - expected, axis=1)
+        fits = away < 3 * FAR
+        if not fits[rows].mean() > 0.9:
+            continue
+        # the longest part that does not fit, at the other end
+        wrong = ~fits if start else ~fits[::-1]
+        first = next((k for k in range(len(wrong)) if wrong[k:].mean() > 0.9 and wrong[k]), len(wrong))
+        span = np.arange(first, len(wrong)) if start else np.arange(0, len(wrong) - first)
+        if len(span) < PART:
+            continue
+        for step in [s for k in range(1, 1 + max(1, len(readings.targets))) for s in (k, -k)]:
+            inner = span[(span + step >= 0) & (span + step < len(wrong))]
+            inner = inner[np.isin(inner + step, span)]
+            same = readings.target[inner + step] == readings.target[inner]
+            if len(inner) < PART or not same.all():
+                continue
+            off = np.linalg.norm(readings.value[inner + step] - expected[inner], axis=1)
+            if np.median(off) < 3 * FAR < np.median(away[inner]):
+                file, line = readings.where(int(span[0] if start else span[-1]))
+                poses = max(1, abs(step) // max(1, len(readings.targets)))
+                count = "one pose" if poses == 1 else f"{poses} poses"
+                side = "below" if step > 0 else "above"
+                raise Refusal(
+                    Finding(
+                        "IDN034",
+                        f"{'from' if start else 'up to'} line {line} on the joint angles belong to the readings"
+                        f" {count} {side}"
+                        if start
+                        else f"up to line {line} the joint angles belong to the readings {count} {side}",
+                        file,
+                        line,
+                        help="move the measured values there, and check where a row was skipped or is there twice",
+                    )
+                )
 
 
 def _check_scale(campaign: Campaign, model: StiffnessModel) -> None:

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from postproc.base.findings import Finding, Refusal, nearest
 from postproc.effects import EFFECTS, Effect, Parameter
+from postproc.effects.joint_offset import JointOffset
+from postproc.effects.link_geometry import LinkGeometry
 from postproc.model import StiffnessModel
 from postproc.robot.description import Value
+
+PLAUSIBLE = {JointOffset.name: 5e-3, LinkGeometry.name: 5e-4}
+"""[m, rad] Standard deviation of what geometry is off by: a drive is mastered by hand, an axis is bored by a machine.
+Of values that predict the same readings, the smallest in these units are the most plausible."""
 
 
 @dataclass(frozen=True)
 class Unknown:
     """A parameter to be found: ``name`` as effect.parameter; ``term``: its effect in the model; ``value`` (SI) to start
     with; ``stated``: what the robot file states of it; ``prior``: its standard deviation there, where that counts as a
-    reading of ``value``; ``fixed``: a dimension that is taken as stated."""
+    reading of ``value``; ``fixed``: a dimension that is taken as stated; ``gauge``: nothing is stated, and the prior
+    only chooses among values that predict the same."""
 
     name: str
     term: int
@@ -24,6 +31,7 @@ class Unknown:
     stated: Value | None = None
     prior: float | None = None
     fixed: bool = False
+    gauge: bool = False
 
     @property
     def key(self) -> tuple[int, str]:
@@ -91,6 +99,17 @@ def unknowns_of(model: StiffnessModel, term: int, priors: bool = False) -> tuple
         value = of.values[parameter.name]
         unknowns.append(Unknown(f"{label}.{parameter.name}", term, parameter, value, stated, prior, fixed))
     return tuple(unknowns)
+
+
+def with_gauge(unknowns: Sequence[Unknown]) -> tuple[Unknown, ...]:
+    """The unknowns; those of geometry, which are redundant, with a prior as wide as is plausible where none is
+    stated."""
+    return tuple(
+        replace(u, value=u.parameter.null if u.stated is None else u.stated.value, prior=wide, gauge=True)
+        if u.prior is None and (wide := PLAUSIBLE.get(u.name.partition(".")[0].partition(" ")[0])) is not None
+        else u
+        for u in unknowns
+    )
 
 
 def with_mechanism(model: StiffnessModel, kind: type[Effect]) -> StiffnessModel:

@@ -9,7 +9,7 @@ import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses
-from postproc.identification.campaign import Campaign, Nuisances
+from postproc.identification.campaign import SCALE, Campaign, Nuisances
 from postproc.identification.fit import Fit
 from postproc.identification.least_squares import at, descended
 from postproc.identification.registration import registered
@@ -133,6 +133,7 @@ def bootstrap(fitted: Fit, draws: int, progress: Progress = nothing) -> Bootstra
             sign = rng.choice([-1.0, 1.0], len(campaign))
         moved = sign[:, None] * grown - point.residual
         drawn = campaign.shifted(moved)
+        drawn.expected_scale = float(rng.normal(point.given.scale, SCALE)) if campaign.scaled else 0.0
         start = replace(point, residual=point.residual + moved)
         # a prior is a reading like the others: it would have been another one
         unknowns = [

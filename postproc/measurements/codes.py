@@ -81,5 +81,29 @@ CODES = define(
             action="Remove the comment, or give positions instead of deflections.",
             example="`# frame: tracker` with the columns DX, DY, DZ.",
         ),
+        "MEA010": Code(
+            "info",
+            "columns are not used",
+            meaning="The file has columns that are no part of the format.",
+            consequence="They have no influence on the result.",
+            action="Nothing, unless one was to be used: rename it then.",
+            example="A column OPERATOR.",
+        ),
+        "MEA011": Code(
+            "warning",
+            "readings of 0, 0, 0",
+            meaning="Some trackers write zeros where the beam was lost.",
+            consequence="These rows are excluded; as readings they would be far off.",
+            action="Remove the zeros so that the cells are empty, or measure these poses again.",
+            example="X, Y, Z of a row are 0.",
+        ),
+        "MEA012": Code(
+            "warning",
+            "readings of two files are the same",
+            meaning="Rows of two files agree in every digit of joints, loads and values.",
+            consequence="They count once; twice, intervals would be too narrow.",
+            action="Name each file once, and remove copies of rows.",
+            example="A file and a copy of it with another comment.",
+        ),
     }
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
@@ -28,6 +29,8 @@ _UNITS = {
     "": ((), "this column has no unit"),
 }
 _BRACKETS = {"]": "[", ")": "("}
+_DIRECTION_LIKE = re.compile(r"dir[0-9]+")
+_CLOSE = 0.75
 _JOINT_LIKE = re.compile(r"[aej][0-9]+")
 
 
@@ -47,10 +50,14 @@ def expected_joints(names: Sequence[str], joints: Sequence[tuple[str, bool]]) ->
     return f"one column per joint, with the commanded values: {listed}"
 
 
-def split_columns(table: CsvTable, joints: Sequence[tuple[str, bool]]) -> tuple[CsvTable, CsvTable, bool]:
-    """The columns of the joints in their order, the others under their own names, and whether they hold deflections.
+def split_columns(
+    table: CsvTable, joints: Sequence[tuple[str, bool]]
+) -> tuple[CsvTable, CsvTable, bool, tuple[str, ...]]:
+    """The columns of the joints in their order, the others under their own names, whether they hold deflections, and
+    the names of columns that are no part of the format.
 
-    Refusal: a column that is missing, unknown, of another unit, or one too many.
+    Refusal: a column that is missing, of another unit, one too many, or that differs from a known one by a typing
+    error.
     """
     heads = _heads(table, joints)
     own = _joint_columns(table, heads, joints)
@@ -69,17 +76,29 @@ def split_columns(table: CsvTable, joints: Sequence[tuple[str, bool]]) -> tuple[
         **{name: "mm" if slides else "deg" for name, (_, slides) in zip(own, joints, strict=True)},
     }
     spelled = {name.lower(): name for name in units}
+    ignored = []
     for name, (head, unit) in heads.items():
         if name not in spelled:
-            raise _unknown(table, head, own, joints, spelled)
+            if _is_mistyped(name, spelled):
+                raise _unknown(table, head, own, joints, spelled)
+            ignored.append(name)
+            continue
         words, expected = _UNITS[units[spelled[name]]]
         if unit and unit not in words:
             raise table.header_error(
                 f"the unit of column {head!r} is wrong: {expected}", "convert the column and its header"
             )
     axes = {name: table.columns[heads[name.lower()][0]] for name in own}
-    rest = {spelled[name]: table.columns[heads[name][0]] for name in others}
-    return replace(table, columns=axes), replace(table, columns=rest), deflection
+    rest = {spelled[name]: table.columns[heads[name][0]] for name in others if name in spelled}
+    names = tuple(heads[name][0] for name in ignored)
+    return replace(table, columns=axes), replace(table, columns=rest), deflection, names
+
+
+def _is_mistyped(name: str, known: Collection[str]) -> bool:
+    """Whether a column probably was to be one of the format: of one letter, of a joint, or nearly its name."""
+    if len(name) <= 2 or _JOINT_LIKE.match(name) or _DIRECTION_LIKE.match(name):
+        return True
+    return bool(difflib.get_close_matches(name, [one for one in known if len(one) > 2], 1, _CLOSE))
 
 
 def _heads(table: CsvTable, joints: Sequence[tuple[str, bool]]) -> Mapping[str, tuple[str, str]]:

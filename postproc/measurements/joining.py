@@ -17,6 +17,9 @@ from postproc.measurements.header_comments import FRAMES
 from postproc.measurements.readings import ARRAYS, Readings, numbered
 from postproc.measurements.write_csv import number_texts, pose_text
 
+COPIES = 3
+"""So many equal rows of two files are no coincidence."""
+
 
 def joined(several: Sequence[Readings]) -> Readings:
     """The readings of several files, one after the other; their sessions and repeats stay apart.
@@ -46,7 +49,7 @@ def joined(several: Sequence[Readings]) -> Readings:
     arrays: dict[str, Any] = {
         name: None if part[0] is None else np.concatenate(part) for name, part in parts.items()
     }
-    return replace(
+    whole = replace(
         several[0],
         files=tuple(path for one in several for path in one.files),
         digests=tuple(digest for one in several for digest in one.digests),
@@ -62,6 +65,25 @@ def joined(several: Sequence[Readings]) -> Readings:
         findings=tuple(finding for one in several for finding in one.findings),
         **arrays,
     )
+    return _each_once(whole)
+
+
+def _each_once(readings: Readings) -> Readings:
+    """Without rows that another file has digit by digit (MEA012)."""
+    one = readings
+    parts = [one.q, one.wrench, np.nan_to_num(one.value), one.target[:, None]]
+    if one.time is not None:
+        parts.append(one.time[:, None])
+    _, first, of = np.unique(np.column_stack(parts), axis=0, return_index=True, return_inverse=True)
+    first = first[of.reshape(-1)]
+    copied = (one.file != one.file[first]) & np.isfinite(one.value).all(axis=1)
+    if copied.sum() < COPIES:
+        return readings
+    row = int(np.argmax(copied))
+    other = one.where(int(first[row]))
+    message = f"{int(copied.sum())} readings are those of {other[0]} digit by digit (line {other[1]}): they count once"
+    finding = Finding("MEA012", message, *one.where(row))
+    return replace(one.part(~copied), findings=(*one.findings, finding))
 
 
 def _apart(parts: Sequence[Ints], counts: Sequence[int]) -> list[Ints]:

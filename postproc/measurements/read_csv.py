@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.findings import Finding, Refusal, nearest
 from postproc.base.geometry import rotation_from_abc
 from postproc.base.tables import CsvTable, is_missing, read_table
@@ -25,9 +25,13 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
 
     Raises Refusal: FIL001..FIL003 (no text), MEA001 (comments, header or rows are wrong), MEA002 (no readings yet).
     """
-    axes, table, deflection = split_columns(read_table(path, "MEA001"), joints)
+    axes, table, deflection, ignored = split_columns(read_table(path, "MEA001"), joints)
     stated = stated_in(table)
     findings = list(stated.findings)
+    if ignored:
+        these = "these columns are" if len(ignored) > 1 else "this column is"
+        message = f"the format has no {', '.join(ignored)}: {these} ignored"
+        findings.append(Finding("MEA010", message, str(path), table.header_line))
     if deflection and stated.frame == "tracker":
         message = "# frame: tracker is ignored: DX, DY, DZ are in the axes of the robot base"
         findings.append(Finding("MEA009", message, str(path)))
@@ -43,6 +47,15 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
     names = _names(table, "TARGET", "the name of the target is missing in this row")
     visits = _names(table, "SESSION", "state it in every row, or remove the column", may_be_empty=True)
 
+    lost = _placeholders(value, wrench, deflection)
+    if lost.any():
+        lines = table.lines[lost]
+        message = (
+            f"a lost beam is written as 0, 0, 0 ({_lines(lines)}):"
+            f" {'this reading is' if len(lines) == 1 else f'these {len(lines)} readings are'} excluded"
+        )
+        findings.append(Finding("MEA011", message, str(path), int(lines[0]), help="remove the zeros"))
+        value = np.where(lost[:, None], np.nan, value)
     measured = ~np.isnan(value).all(axis=1)
     rows = np.flatnonzero(measured)
     if not len(rows):
@@ -50,8 +63,8 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
             f"the file contains no readings yet: {', '.join(values)} are empty in all rows ({len(table)})"
         )
         raise Refusal(Finding("MEA002", message, str(path), help="fill in the measured values"))
-    if len(rows) < len(table):
-        unmeasured = table.lines[~measured]
+    if len(rows) + lost.sum() < len(table):
+        unmeasured = table.lines[~(measured | lost)]
         message = f"{len(unmeasured)} rows have no reading and are excluded ({_lines(unmeasured)})"
         findings.append(Finding("MEA003", message, str(path), int(unmeasured[0])))
 
@@ -91,6 +104,15 @@ def read_measurements(path: Path, joints: Sequence[tuple[str, bool]]) -> Reading
         findings=tuple(findings),
     )
     return with_repeats(readings, _of(table.texts("REPEAT"), rows) if "REPEAT" in table else [])
+
+
+def _placeholders(value: Floats, wrench: Floats, deflection: bool) -> Bools:
+    """(rows,) values that are zero in every coordinate where no reading is: of a deflection only under a load, and not
+    where all of a file are."""
+    zero = (value == 0.0).all(axis=1)
+    if deflection:
+        zero &= wrench.any(axis=1)
+    return np.asarray(zero & (~zero & ~np.isnan(value).all(axis=1)).any())
 
 
 def _column(table: CsvTable, name: str) -> Floats:

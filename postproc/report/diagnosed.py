@@ -19,6 +19,7 @@ from postproc.diagnosis.verdict import Evidence, Named, Verdict, reduced_chi2_of
 from postproc.identification.fit import Estimate, Fit
 from postproc.measurements import Readings
 from postproc.model import STANDARD_GRAVITY
+from postproc.report.placed import Placed, stations, targets, tracker_scale
 from postproc.report.report import exit_code
 from postproc.report.residuals import Sizes, gap_of, joint_variables, lengths_of, mm, residuals_csv
 from postproc.report.result import Columns, Result, columns_of
@@ -30,6 +31,9 @@ CLEAR = ("named", "nothing_missing")
 
 NEARLY_ALL = 0.9
 """Share of the candidates that would have shown at the reported size."""
+
+REFITTED = 0.9
+"""Share of the residual of held-out poses that refitted parameters leave where a new file is worth writing."""
 
 USUAL = 10.0
 """An effect that only shows beyond so many times its usual size was hardly tested."""
@@ -58,6 +62,28 @@ class NextPoses:
         return [dict(zip(table, rows[row].tolist(), strict=True)) for row in np.sort(first)]
 
 
+@dataclass(frozen=True)
+class ValidatedFile:
+    """Readings of a file that were not diagnosed, by the robot file as it is and by the final model: RMS, mean and
+    maximum [m]; ``registered_anew``: their tracker was elsewhere."""
+
+    file: str
+    before: Sizes
+    after: Sizes
+    registered_anew: bool
+
+    def as_json(self) -> dict[str, object]:
+        """The keys are public."""
+        entry: dict[str, object] = {"file": self.file, "readings": self.after.readings}
+        for name, size in (("before", self.before), ("after", self.after)):
+            entry |= {
+                f"{name}_rms_mm": mm(size.rms),
+                f"{name}_mean_mm": mm(size.mean),
+                f"{name}_max_mm": mm(size.max),
+            }
+        return entry | {"registration_refitted": self.registered_anew}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosed(Result):
     """The result of ``diagnose``.
@@ -82,6 +108,7 @@ class Diagnosed(Result):
     next_poses_file: str | None = None
     outputs: tuple[str, ...] = ()
     strict: bool = False
+    validation: tuple[ValidatedFile, ...] = ()
 
     @property
     def verdict(self) -> Verdict:
@@ -102,9 +129,18 @@ class Diagnosed(Result):
     def improves(self) -> bool:
         """Whether a new robot file would be better than the old one."""
         word = self.verdict.word
-        return word in ("named", "partly_named") or (
-            word == "nothing_missing" and bool(self.verdict.refitted)
-        )
+        if word == "ambiguous":
+            return self.diagnosis.agreed or bool(self.clear)
+        if word == "nothing_missing":
+            return bool(self.verdict.refitted) or self._is_refitted
+        return word in ("named", "partly_named")
+
+    @property
+    def _is_refitted(self) -> bool:
+        """Whether the robot file's own parameters, refitted, predict poses that were left out clearly better, although
+        no single one of them has clearly moved."""
+        before, after = self.rms["held_out_before"], self.rms["held_out_after"]
+        return bool(after < REFITTED * before)
 
     @cached_property
     def clear(self) -> tuple[Named, ...]:
@@ -240,6 +276,10 @@ class Diagnosed(Result):
             "conditional": verdict.conditional,
             "named": [self._named(named) for named in self.clear],
             "ambiguous": _once([list(names_of(one)) for one in verdict.alternatives]),
+            "largest_disagreement_mm": mm(max(self.diagnosis.disagreement))
+            if self.diagnosis.disagreement and np.isfinite(max(self.diagnosis.disagreement))
+            else None,
+            "same_correction": self.diagnosis.agreed,
             "alternatives": [[_candidate(c) for c in one] for one in verdict.alternatives],
             "rejected": [{**_candidate(candidate), "why": why} for candidate, why in verdict.rejected],
             "tried": list(self.tried),
@@ -260,6 +300,11 @@ class Diagnosed(Result):
             "next_poses_separation": None
             if self.next_poses is None
             else [_finite(separation) for separation in self.next_poses.separation],
+            "stations": [_placed(one, "session") for one in stations(self.final)],
+            "target_places": [_placed(one, "target") for one in targets(self.final)],
+            "tracker_scale": None if (scale := tracker_scale(self.final)) is None else scale[0],
+            "tracker_scale_ci95": None if scale is None else scale[1],
+            "validation": [one.as_json() for one in self.validation],
             "robot_file": self.robot_file,
             "findings": [finding.as_json() for finding in self.findings],
             "outputs": list(self.outputs),
@@ -291,6 +336,16 @@ def diagnosed_csv(result: Diagnosed) -> bytes:
     }
     fitted = [str(int(counts)) for counts in result.counts]
     return residuals_csv(result.final.campaign, residuals, {"fitted": fitted})
+
+
+def _placed(one: Placed, kind: str) -> dict[str, object]:
+    entry: dict[str, object] = {kind: one.name}
+    entry |= {axis: float(v) for axis, v in zip("xyz", one.position, strict=True)}
+    entry |= {f"{axis}_ci95": float(v) for axis, v in zip("xyz", one.ci95, strict=True)}
+    if one.angles is not None and one.angles_ci95 is not None:
+        entry |= {axis: float(v) for axis, v in zip("abc", one.angles, strict=True)}
+        entry |= {f"r{axis}_ci95": float(v) for axis, v in zip("xyz", one.angles_ci95, strict=True)}
+    return entry
 
 
 def _candidate(candidate: Candidate) -> dict[str, object]:

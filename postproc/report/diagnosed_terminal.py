@@ -15,11 +15,15 @@ from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_words import headline, paragraph
 from postproc.report.formatting import campaign_in_words, count, fixed, shown_unit, some
 from postproc.report.identified_terminal import add_sizes
+from postproc.report.placed import stations, targets, tracker_scale
 from postproc.report.terminal import show_findings, show_rows
 from postproc.robot.description import robot_words
 
 WIDE = 110
 """Columns of the paragraph at most: longer lines are hard to read."""
+
+LEAST_CHANCE = 1e-99
+"""A smaller probability is not printed as zero."""
 
 
 def show_diagnosed(console: Console, result: Diagnosed, verbose: bool = False) -> None:
@@ -27,7 +31,7 @@ def show_diagnosed(console: Console, result: Diagnosed, verbose: bool = False) -
     console.print(Text(sanitize(headline(result)), style="bold"), soft_wrap=True)
     console.print(Text(sanitize(paragraph(result))), width=min(WIDE, console.width))
     show_rows(console, ((key, Text(sanitize(value))) for key, value in _rows(result)))
-    tables = (_parameters, _evidence, _alternatives, _refitted, _where, _residuals, _next_poses)
+    tables = (_places, _parameters, _evidence, _alternatives, _refitted, _where, _residuals, _next_poses)
     for make in tables:
         table = make(result, verbose)
         if table.row_count:
@@ -65,6 +69,22 @@ def _table(title: str, *heads: str) -> Table:
     return table
 
 
+def _places(result: Diagnosed, _verbose: bool) -> Table:
+    """Where tracker and targets were found."""
+    table = _table("found with the fit", "x, mm", "y, mm", "z, mm", "A, deg", "B, deg", "C, deg")
+    for kind, several in (("robot base in the tracker's frame", stations), ("target", targets)):
+        for one in several(result.final):
+            name = f"{kind} {one.name}".strip()
+            cells = [f"{value:.3f} +- {wide:.2g}" for value, wide in zip(one.position, one.ci95, strict=True)]
+            if one.angles is not None and one.angles_ci95 is not None:
+                cells += [f"{value:.4f}" for value in one.angles]
+            table.add_row(name, *cells)
+    scale = tracker_scale(result.final)
+    if scale is not None:
+        table.add_row("scale of the tracker", f"{1e6 * scale[0]:.0f} +- {1e6 * scale[1]:.2g} ppm")
+    return table
+
+
 def _parameters(result: Diagnosed, _verbose: bool) -> Table:
     """One row a parameter, under what it is of."""
     table = _table("missing", "value", "+- 95 %", "unit", "")
@@ -95,7 +115,11 @@ def _evidence(result: Diagnosed, verbose: bool) -> Table:
         its = named.evidence
         numbers = (its.heldout, its.regions, its.sessions, its.margin)
         nearest = "" if its.alias is None else f"next: {its.alias.label}"
-        cells = [_number(its.gain), f"{its.chance:.1g}", *map(_number, numbers)]
+        cells = [
+            _number(its.gain),
+            f"{its.chance:.1g}" if its.chance > LEAST_CHANCE else "< 1e-99",
+            *map(_number, numbers),
+        ]
         table.add_row(named.candidate.label, *cells, nearest)
     for candidate, why in result.verdict.rejected:
         table.add_row(candidate.label, *[""] * 6, f"rejected: {why}")
@@ -154,6 +178,10 @@ def _residuals(result: Diagnosed, _verbose: bool) -> Table:
     if not result.diagnosis.search.base.unknowns:
         del rows["refitted"]
     add_sizes(table, {words: result.lengths[name] for name, words in rows.items()})
+    for one in result.validation:
+        for words, size in (("robot file", one.before), ("final model", one.after)):
+            cells = [f"{value / MM:.3f}" for value in (size.rms, size.mean, size.max)]
+            table.add_row(f"{one.file}, {words}", *cells, str(size.readings))
     if result.final.noise.known:
         table.add_row("scatter of the readings", f"{result.scatter / MM:.3f}")
     return table

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from postproc.base.units import MM
 from postproc.diagnosis.candidates import EVERY, Candidate
 from postproc.diagnosis.decoys import AlternativeForm
+from postproc.diagnosis.residual_patterns import goes_with_poses
 from postproc.diagnosis.verdict import MARGIN, Named
-from postproc.effects import EFFECTS, ComplianceLaw
-from postproc.identification.fit import Estimate, Fit
-from postproc.identification.sanity_checks import LOADED
-from postproc.report.diagnosed import USUAL, Diagnosed
-from postproc.report.formatting import count, fixed, shown_unit
+from postproc.identification.fit import Estimate
+from postproc.report.diagnosed import Diagnosed
+from postproc.report.diagnosed_limits import conditional, not_tested
+from postproc.report.formatting import count, fixed, listed, shown_unit
+from postproc.report.formatting import millimetres as _mm
 from postproc.report.terminal import _once
 
 NOUNS = {
@@ -51,6 +51,9 @@ PARAMETERS = 3
 OVERSTATED = 0.5
 """Variance over the stated one below which readings scatter by less than is stated."""
 
+WIDE = 1.5
+"""Plausible sizes: an interval that is wider says that the readings do not tell a parameter from others."""
+
 FAR_OFF = 1.5
 """Times the scatter: where more is left, yet no lack of fit, a few readings lie far off."""
 
@@ -64,7 +67,7 @@ def paragraph(result: Diagnosed) -> str:
         "ambiguous": _ambiguous,
         "unknown": _unknown,
     }[result.verdict.word](result)
-    return " ".join([*sentences, *_conditional(result), *_not_tested(result)])
+    return " ".join([*sentences, *conditional(result), *not_tested(result)])
 
 
 def headline(result: Diagnosed) -> str:
@@ -76,12 +79,19 @@ def headline(result: Diagnosed) -> str:
         "nothing_missing": "nothing missing" + (", but parameters have moved" if verdict.refitted else ""),
         "named": f"named: {names}",
         "partly_named": f"partly named: {names}",
-        "ambiguous": f"ambiguous: {sets}{f'; named: {names}' if names else ''}",
+        "ambiguous": f"ambiguous: {sets}{_either_way(result)}{f'; named: {names}' if names else ''}",
         "unknown": "unknown: no effect that was tried explains the residual"
         if result.scatter_exceeded
         else "unknown: not clear whether an effect is missing",
     }[verdict.word]
     return f"{words} (if the residual is scatter)" if verdict.conditional else words
+
+
+def _either_way(result: Diagnosed) -> str:
+    if not result.diagnosis.agreed:
+        return ""
+    largest = max(result.diagnosis.disagreement, default=0.0)
+    return f" (the same correction within {_mm(largest)} mm)"
 
 
 def _nothing_missing(result: Diagnosed) -> Iterator[str]:
@@ -110,6 +120,8 @@ def _nothing_missing(result: Diagnosed) -> Iterator[str]:
 
 def _named(result: Diagnosed) -> Iterator[str]:
     yield from _missing(result, result.verdict.named)
+    yield from _class_of_geometry(result)
+    yield from _ordered(result)
     yield from _attributed(result)
     yield from _closed(result)
     yield from _nearest(result.verdict.named)
@@ -130,15 +142,31 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
         yield from _missing(result, result.clear)
     for alternatives in result.verdict.alternatives:
         one_of = " or ".join(candidate.label for candidate in alternatives)
-        yield f"These readings can not distinguish {one_of}: each explains them nearly as well as the first."
+        yield f"These readings can not distinguish {one_of}: each explains them as well as the others."
+    largest = max(result.diagnosis.disagreement, default=np.inf)
+    if result.diagnosis.agreed:
+        yield (
+            f"Either way the correction is the same within {_mm(largest)} mm, anywhere in the workspace and under loads"
+            " as large as those measured: the robot file can be used, whichever it is."
+        )
+        yield from _closed(result)
+        yield from _more(result, "More is missing:", "after")
+        yield "No pose and no load of this size separates what predicts the same; only an inspection of the robot does."
+        return
+    measured = bool(result.diagnosis.disagreement)
+    differ = f" by up to {_mm(largest)} mm" if measured and np.isfinite(largest) else ""
     yield (
-        f"With all effects found the residual would be {_mm(result.rms['explained'])} mm; no robot file is written from"
-        " an ambiguous result."
+        f"Elsewhere in the workspace, or under other loads, their corrections differ{differ}, so the robot file"
+        f" {'gets only what is clear' if result.clear else 'is not changed'}. With all effects found the residual would"
+        f" be {_mm(result.rms['explained'])} mm."
     )
     yield from _more(result, "More is missing:", "explained")
     planned = result.next_poses
     if planned is None:
-        yield "No pose within the limits, with the loads used so far, distinguishes them: other loads or targets may."
+        yield (
+            "No pose within the limits, with the loads used so far, distinguishes them better than the scatter: other"
+            " loads or targets may."
+        )
         return
     first, second = (candidate.label for candidate in planned.between)
     apart = min(planned.separation)
@@ -169,7 +197,7 @@ def _unknown(result: Diagnosed) -> Iterator[str]:
     near = [candidate.label for candidate in search.chosen if candidate.key not in rejected]
     if near:
         yield (
-            f"The best explanation is {_list(near)}, but the residual would still be"
+            f"The best explanation is {listed(near)}, but the residual would still be"
             f" {_mm(result.rms['explained'])} mm: too much to name an effect."
         )
     yield from _rejected(result)
@@ -180,6 +208,33 @@ def _unknown(result: Diagnosed) -> Iterator[str]:
             " check robot and measurement there."
         )
     yield from _moved_too(result)
+
+
+def _class_of_geometry(result: Diagnosed) -> Iterator[str]:
+    """What predicts the same."""
+    hidden = [
+        e for e in result.final.estimates if e.unknown.gauge and e.ci95 > WIDE * (e.unknown.prior or np.inf)
+    ]
+    if hidden and any(one.candidate.joint == EVERY for one in result.verdict.named):
+        names = listed([e.unknown.parameter.name for e in hidden[:PARAMETERS]])
+        more = f" and {len(hidden) - PARAMETERS} more" if len(hidden) > PARAMETERS else ""
+        yield (
+            "Some lengths, twists and zeros predict the same together: the values are the smallest plausible ones, and"
+            f" their intervals hold all others; the readings hardly determine {names}{more} alone."
+        )
+
+
+def _ordered(result: Diagnosed) -> Iterator[str]:
+    """A drift that may as well be an effect of the poses."""
+    readings = result.final.campaign.readings
+    for named in result.verdict.named:
+        variable = named.candidate.effect.described().get("variable")
+        values = {"time": readings.time, "temperature": readings.temperature}.get(str(variable))
+        if values is not None and goes_with_poses(values, readings.q):
+            yield (
+                f"But the {variable} follows the order of the poses, so that {named.candidate.label} may as well be an"
+                " effect of the poses: measure again in random order."
+            )
 
 
 def _missing(result: Diagnosed, several: Sequence[Named]) -> Iterator[str]:
@@ -203,12 +258,12 @@ def _fixed(named: Named) -> str:
     entries = [
         f"{name} (fixed at {value / units[name][1]:.4g} {units[name][0]})" for name, value in named.fixed
     ]
-    return _list(entries)
+    return listed(entries)
 
 
 def noun(named: Named) -> str:
     """What the effect is, and where."""
-    joints = _list(named.joints) if named.joints else "the joints" if named.candidate.joint == EVERY else ""
+    joints = listed(named.joints) if named.joints else "the joints" if named.candidate.joint == EVERY else ""
     return NOUNS[named.effect].format(joints=joints)
 
 
@@ -346,6 +401,8 @@ def _course(result: Diagnosed, candidate: Candidate) -> str:
             and alternative.margin < -MARGIN
         ):
             what = f"{course.about} {alternative.candidate.joint}".strip()
+            if course.advice:
+                return f"; {what} explains clearly more: {course.advice}"
             return (
                 f"; {what}, no effect of the library, has a likelihood gain {-alternative.margin:.0f} higher"
             )
@@ -373,53 +430,3 @@ def _changes(moved: Sequence[Estimate]) -> str:
 
 def _against_scatter(result: Diagnosed) -> str:
     return "" if result.verdict.conditional else f" where readings scatter by {_mm(result.scatter)} mm"
-
-
-def _conditional(result: Diagnosed) -> Iterator[str]:
-    if result.verdict.conditional:
-        yield (
-            f"This verdict assumes that readings scatter as much as the residuals, {_mm(result.scatter)} mm RMS:"
-            " neither SIGMA nor repeated readings state it, and an effect of that size would be mistaken for scatter."
-        )
-
-
-def _not_tested(result: Diagnosed) -> Iterator[str]:
-    """The effects that were not tested, or only at large size, and which readings would show them."""
-    for names, start in (
-        (result.verdict.not_testable, "Not tested:"),
-        (result.hardly_tested, f"Tested only at {USUAL:.0f} times their usual size or more:"),
-    ):
-        advised: dict[str, list[str]] = {}
-        for name in names:
-            advised.setdefault(evidence_words(name, result.final), []).append(name)
-        if advised:
-            yield f"{start} {'; '.join(f'{_list(of)} (shown by {what})' for what, of in advised.items())}."
-
-
-def evidence_words(name: str, fitted: Fit) -> str:
-    """What would show an effect that readings and model of a fit do not."""
-    effect, campaign = EFFECTS[name], fitted.campaign
-    readings = campaign.readings
-    if name == "thermal_growth" and readings.temperature is None and readings.time is None:
-        return "a column TEMP or T while the robot warms up"
-    if effect.family in ("geometric", "weight") and readings.deflection:
-        return "absolute positions"
-    if name == "tool_offset" and not campaign.place_known.all():
-        return "targets with stated positions"
-    if effect.family == "weight" and not any(isinstance(t.effect, ComplianceLaw) for t in fitted.model.terms):
-        return "a robot file with joint compliance"
-    if effect.family in LOADED and not readings.wrench.any():
-        return "readings with and without a weight"
-    if effect.by_direction:
-        return "poses reached from both sides"
-    return "other poses or loads, `compensate plan`"
-
-
-def _list(words: Iterable[str]) -> str:
-    """``a, b and c``"""
-    several = list(words)
-    return " and ".join([", ".join(several[:-1]), several[-1]] if len(several) > 1 else several)
-
-
-def _mm(length: float) -> str:
-    return f"{length / MM:.3f}" if length >= 0.01 * MM else f"{length / MM:.2g}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from postproc.base.units import MM
 from postproc.identification.campaign import Campaign
@@ -76,3 +76,16 @@ def campaign_in_words(campaign: Campaign) -> str:
         f"{count(len(readings), 'reading')} ({kind}{frame}) at {count(campaign.poses, 'pose')},"
         f" {count(len(campaign.targets), 'target')}, {count(len(readings.sessions), 'session')}"
     )
+
+
+def listed(words: Iterable[str]) -> str:
+    """``a, b and c``"""
+    several = list(words)
+    return " and ".join([", ".join(several[:-1]), several[-1]] if len(several) > 1 else several)
+
+
+def millimetres(length: float) -> str:
+    """``0.123`` of a length [m], two digits of one below 0.01 mm."""
+    if length < 1e-4 * MM:
+        return "0.0001"
+    return f"{length / MM:.3f}" if length >= 0.01 * MM else f"{length / MM:.2g}"

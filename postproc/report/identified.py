@@ -274,7 +274,7 @@ class Identified(Result):
             entry["bootstrap_ci95"] = self.bootstrap_ci95[unknown.name]
         if estimate.at_bound:
             entry["at_bound"] = True
-        if unknown.prior is not None:
+        if unknown.prior is not None and not unknown.gauge:
             entry["prior"] = True
         return entry
 

@@ -117,7 +117,7 @@ def _cells(result: Identified, estimate: Estimate) -> list[str]:
     notes = []
     if estimate.at_bound:
         notes.append("at its bound")
-    if unknown.prior is not None:
+    if unknown.prior is not None and not unknown.gauge:
         notes.append("its stated interval is used")
     drawn = result.bootstrap_ci95.get(unknown.name)
     if drawn is not None and drawn > WIDER * estimate.ci95:

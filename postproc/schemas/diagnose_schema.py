@@ -13,6 +13,7 @@ from postproc.schemas.result_parts import (
     array,
     boolean,
     by_name,
+    integer,
     quantity,
     record,
     result,
@@ -101,6 +102,12 @@ def diagnose_schema() -> Schema:
             "conditional": boolean("whether the scatter is not stated and the residuals replace it"),
             "named": array(named, "missing effects"),
             "ambiguous": array(names, "sets of effects that the readings can not distinguish"),
+            "largest_disagreement_mm": quantity(
+                "mm",
+                "largest difference over the workspace of what the explanations of a set predict",
+                nullable=True,
+            ),
+            "same_correction": boolean("whether all explanations of each set give the same correction"),
             "alternatives": array(
                 array(record(_CANDIDATE, "one candidate"), "one set"), "the same as candidates"
             ),
@@ -142,6 +149,50 @@ def diagnose_schema() -> Schema:
                 quantity("1", "standard deviations", nullable=True),
                 "expected separation, both ways",
                 nullable=True,
+            ),
+            "stations": array(
+                record(
+                    {
+                        "session": word("name of the session"),
+                        **{axis: quantity("mm", "robot base in the tracker's frame") for axis in "xyz"},
+                        **{f"{axis}_ci95": quantity("mm", "95 % interval") for axis in "xyz"},
+                        **{axis: quantity("deg", "angle of the robot base there") for axis in "abc"},
+                        **{f"r{axis}_ci95": quantity("deg", "95 % interval of a turn") for axis in "xyz"},
+                    },
+                    "one station",
+                ),
+                "where the tracker was found",
+            ),
+            "target_places": array(
+                record(
+                    {
+                        "target": word("name of the target"),
+                        **{axis: quantity("mm", "place on the flange") for axis in "xyz"},
+                        **{f"{axis}_ci95": quantity("mm", "95 % interval") for axis in "xyz"},
+                    },
+                    "one target",
+                ),
+                "where targets were found whose place is not stated",
+            ),
+            "tracker_scale": quantity(
+                "1", "lengths that the tracker reads over those of the robot, less 1", nullable=True
+            ),
+            "tracker_scale_ci95": quantity("1", "its 95 % interval", nullable=True),
+            "validation": array(
+                record(
+                    {
+                        "file": word("path"),
+                        "readings": integer("readings of the file"),
+                        **{
+                            f"{name}_{size}_mm": quantity("mm", f"residual, {words}, {size}")
+                            for name, words in (("before", "robot file"), ("after", "final model"))
+                            for size in ("rms", "mean", "max")
+                        },
+                        "registration_refitted": boolean("whether its tracker was registered again"),
+                    },
+                    "one file",
+                ),
+                "readings that were not diagnosed, file by file",
             ),
             "robot_file": word("path of the new robot file", nullable=True),
             **ENDING,

@@ -13,6 +13,7 @@ from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
 from postproc.base.units import DEG, MM
+from postproc.diagnosis.approach_sides import diagnose_sides
 from postproc.diagnosis.candidate_fits import composed
 from postproc.diagnosis.candidates import Candidate
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
@@ -25,12 +26,13 @@ from postproc.identification.fit import Fit, lengths, spread_of
 from postproc.identification.outliers import Outlier, outliers
 from postproc.identification.sanity_checks import check_fit, check_numbers
 from postproc.identification.unknowns import Unknown
-from postproc.identification.validation import held_out
-from postproc.measurements import Readings, measurements_csv
+from postproc.identification.validation import held_out, validated
+from postproc.measurements import Readings, measurements_csv, read_measurements
 from postproc.model import STANDARD_GRAVITY, approach
 from postproc.output.atomic_write import write_atomically
-from postproc.report.diagnosed import Diagnosed, NextPoses, diagnosed_csv
+from postproc.report.diagnosed import Diagnosed, NextPoses, ValidatedFile, diagnosed_csv
 from postproc.report.report import json_bytes
+from postproc.report.residuals import Sizes, lengths_of
 from postproc.workflows.identify import Measured, measured_of
 from postproc.workflows.preparation import Stage, silent
 from postproc.workflows.robot_files import new_robot_file
@@ -42,6 +44,9 @@ NEXT = 6
 
 HARDLY = 0.5
 """Standard deviations between two explanations below which poses are not worth measuring."""
+
+UPRIGHT = 0.996
+"""Cosine of a force with straight down from which on it is a weight that hangs: 5 degrees."""
 
 LOADS = 3
 """Of the weights that were hung, so many different ones are proposed again."""
@@ -68,6 +73,7 @@ class DiagnoseRequest:
     robot: str | None = None
     output: Path | None = None
     next_poses: Path | None = None
+    validate: tuple[Path, ...] = ()
     tool_mm_deg: tuple[float, ...] | None = None
     picture: Path | None = None
     page: Path | None = None
@@ -85,12 +91,14 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     own = model_unknowns(model)
     check_numbers(measured.readings, (), model)
     findings = [*measured.findings, *check_fit(campaign, model, own)]
-    diagnosis = diagnose(campaign, model, stage)
+    diagnosis, sides = diagnose_sides(campaign, model, stage)
+    findings += sides
     wild = gross_errors(diagnosis.final)
     if wild:
         stage("once more without outliers")
         inliers = np.setdiff1d(np.arange(len(campaign)), [one.row for one in wild])
-        diagnosis = diagnose(Campaign(measured.readings.part(inliers), campaign.stated_tool), model)
+        rest = Campaign(campaign_of(diagnosis).readings.part(inliers), campaign.stated_tool)
+        diagnosis = diagnose(rest, model)
         findings += [
             Finding(
                 "DIA002",
@@ -105,7 +113,7 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
     folds = min(FOLDS, campaign.poses)
     residuals = held_out(diagnosis.stated, folds), held_out(diagnosis.final, folds)
     planned = None
-    if diagnosis.verdict.word == "ambiguous":
+    if diagnosis.verdict.word == "ambiguous" and not diagnosis.agreed:
         stage("looking for poses that settle it")
         planned = _next_poses(measured, diagnosis)
     result = Diagnosed(
@@ -123,8 +131,31 @@ def diagnose_robot(request: DiagnoseRequest, stage: Stage = silent) -> Diagnosed
         robot_file=None,
         outputs=(),
         strict=request.strict,
+        validation=tuple(_validated(path, measured, diagnosis) for path in request.validate),
     )
     return _published(request, measured, result, stage)
+
+
+def _validated(path: Path, measured: Measured, diagnosis: Diagnosis) -> ValidatedFile:
+    """What the robot file and the final model predict of the readings of a file that was not diagnosed."""
+    readings = read_measurements(path, list(measured.readings.joints))
+    if readings.deflection != measured.readings.deflection:
+        raise Refusal(Finding("MEA008", "the file is of another kind than the diagnosed data", str(path)))
+    if readings.direction is None:
+        readings = replace(readings, direction=np.zeros_like(readings.q))
+    campaign = Campaign(readings, measured.campaign.stated_tool)
+    check_numbers(readings, (), measured.model)
+    done = validated(diagnosis.stated, diagnosis.final, campaign)
+    known = np.isfinite(readings.value)
+    before, after = (Sizes.of(lengths_of(one, known)) for one in (done.before, done.after))
+    if before is None or after is None:
+        raise Refusal(Finding("MEA002", "no reading of the file can be predicted", str(path)))
+    return ValidatedFile(str(path), before, after, done.registered_anew)
+
+
+def campaign_of(diagnosis: Diagnosis) -> Campaign:
+    """The readings as they were diagnosed, sides of approach and all."""
+    return diagnosis.final.campaign
 
 
 def gross_errors(final: Fit) -> tuple[Outlier, ...]:
@@ -141,7 +172,7 @@ def gross_errors(final: Fit) -> tuple[Outlier, ...]:
 
 
 def _spare_inputs(request: DiagnoseRequest) -> None:
-    inputs = {place(path) for path in request.data}
+    inputs = {place(path) for path in (*request.data, *request.validate)}
     if request.robot and request.robot.endswith((".yaml", ".yml")):
         inputs.add(place(Path(request.robot)))
     outputs = (
@@ -163,6 +194,8 @@ def _spare_inputs(request: DiagnoseRequest) -> None:
 def _next_poses(measured: Measured, diagnosis: Diagnosis) -> NextPoses | None:
     """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do."""
     offer = _offer(measured, diagnosis.search.base)
+    if measured.readings.deflection and not len(hung_weights(measured.readings)):
+        return None  # only pulls: what can be pulled where is not known
     pairs = [(first, other) for first, *others in diagnosis.verdict.alternatives for other in others[:TRIED]]
     plans = [_discriminating_poses(measured, diagnosis, offer, one, other) for one, other in pairs]
     return max((plan for plan in plans if plan), key=lambda plan: min(plan.separation), default=None)
@@ -221,8 +254,7 @@ def _offer(measured: Measured, base: Fit) -> CandidateSetups:
     """What was measured with: targets, weights, scatter."""
     readings, campaign = measured.readings, measured.campaign
     in_flange = campaign.tool.rotation @ base.point.given.places[:, :, None]
-    loads = np.unique(np.round(np.linalg.norm(readings.wrench[:, :3], axis=1) / STANDARD_GRAVITY, 1))
-    loads = loads[loads > 0] if readings.deflection else loads
+    loads = hung_weights(readings)
     if len(loads) > LOADS:
         loads = loads[np.linspace(0, len(loads) - 1, LOADS).round().astype(int)]
     return CandidateSetups(
@@ -240,6 +272,16 @@ def _offer(measured: Measured, base: Fit) -> CandidateSetups:
         cone=np.pi,
         spacing=5 * DEG,
     )
+
+
+def hung_weights(readings: Readings) -> Floats:
+    """(L,) [kg] weights that were hung: forces straight down, not pulls; 0 too where places without a load are
+    measured."""
+    force = readings.wrench[:, :3]
+    size = np.linalg.norm(force, axis=1)
+    down = -force[:, 2] >= UPRIGHT * size
+    loads = np.unique(np.round(size[down] / STANDARD_GRAVITY, 1))
+    return loads[loads > 0] if readings.deflection else loads
 
 
 def _box() -> Floats:

@@ -16,9 +16,10 @@ from postproc.base.units import DEG, MM
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit, fit
 from postproc.identification.identifiable import strong_correlations
+from postproc.identification.mounting import check_mounting
 from postproc.identification.outliers import Outlier, outliers
 from postproc.identification.sanity_checks import check_fit, check_numbers
-from postproc.identification.unknowns import FitRequest, asked_for
+from postproc.identification.unknowns import FitRequest, asked_for, with_gauge
 from postproc.identification.validation import WIDER, Bootstrap, Validation, bootstrap, held_out, validated
 from postproc.measurements import Readings, joined, read_measurements, robot_named
 from postproc.model import StiffnessModel
@@ -92,6 +93,7 @@ def identify(request: IdentifyRequest, stage: Stage = silent, progress: Progress
     _spare(request.output, measured.robot.path)
     campaign, model = measured.campaign, measured.model
     asked = asked_for(model, request.effects, request.priors)
+    asked = replace(asked, unknowns=with_gauge(asked.unknowns))
     check_numbers(measured.readings, asked.unknowns, asked.model)
     stage("comparing")
     findings = [*measured.findings, *check_fit(campaign, asked.model, asked.unknowns)]
@@ -182,7 +184,12 @@ def measured_of(
         six = [*tool_mm_deg, 0.0, 0.0, 0.0][:6]
         tool = Poses.from_abc(np.array(six[:3]) * MM, np.array(six[3:]) * DEG)
     campaign = Campaign(readings, tool)
-    return Measured(described, StiffnessModel.from_robot(described), readings, campaign, tuple(findings))
+    model = StiffnessModel.from_robot(described)
+    mounting = check_mounting(campaign, model)
+    if mounting.readings is not readings:
+        readings, campaign = mounting.readings, Campaign(mounting.readings, tool)
+    findings += mounting.findings
+    return Measured(described, model, readings, campaign, tuple(findings))
 
 
 def _known(named: str, path: Path) -> str:
@@ -295,12 +302,16 @@ def _result(
                     file,
                 )
             )
-        if unknown.prior is not None and abs(estimate.value - unknown.value) > PULLED * unknown.prior:
+        if (
+            unknown.prior is not None
+            and not unknown.gauge
+            and abs(estimate.value - unknown.value) > PULLED * unknown.prior
+        ):
             findings.append(
                 Finding(
                     "IDN023",
                     f"{unknown.name}: the readings give {estimate.value:.4g}, the robot file states"
-                    f" {unknown.value:.4g} +- {1.96 * unknown.prior:.2g} {unknown.parameter.unit}",
+                    f" {unknown.value:.4g} +- {1.96 * (unknown.prior or 0.0):.2g} {unknown.parameter.unit}",
                     file,
                 )
             )

@@ -49,6 +49,7 @@ class Diagnosing:
         ended = json.loads(line)
         told = folder / f"{new}.json"
         answer = json.loads(told.read_text(encoding="utf-8")) if told.exists() else {"verdict": "refused"}
+        answer.setdefault("verdict", "refused")
         return {**answer, "seconds": ended["seconds"], "told": ended["told"]}
 
     def close(self) -> None:

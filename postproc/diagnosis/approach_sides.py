@@ -1,0 +1,107 @@
+"""From which side each joint came, where the readings do not state it: unknown, in the order of the rows, or as the
+residuals show it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.base.arrays import Floats, Ints
+from postproc.base.findings import Finding
+from postproc.diagnosis.diagnosis import Diagnosis, diagnose
+from postproc.diagnosis.residual_patterns import patterns
+from postproc.identification.campaign import Campaign
+from postproc.model import StiffnessModel
+
+SOUND = ("nothing_missing", "named")
+"""Verdicts that no side of approach has to mend."""
+
+BIT = 2.0 * np.log(2.0)
+"""What the choice of one of two sides costs, as -2 ln(likelihood)."""
+
+SMALLER = 0.9
+"""Share of the residual that must remain at most where sides of approach are taken from somewhere."""
+
+JOINTS = 2
+"""Of the joints whose sides the residuals show best, so many are tried."""
+
+
+def diagnose_sides(
+    campaign: Campaign, model: StiffnessModel, stage: Callable[[str], None] = lambda name: None
+) -> tuple[Diagnosis, tuple[Finding, ...]]:
+    """The diagnosis, and what was assumed of the sides of approach where the columns DIR do not state them.
+
+    They are unknown first: every gear lies in the middle of its gap, or where its load puts it.  Where that leaves
+    something, the order of the rows is tried, then sides by the residuals of one joint, each at the price of a bit for
+    every visit of a pose; these only where an effect of approach then explains all of it.
+    """
+    readings = campaign.readings
+    if readings.direction is not None:
+        return diagnose(campaign, model, stage), ()
+    unknown = Campaign(replace(readings, direction=np.zeros_like(readings.q)), campaign.stated_tool)
+    done = diagnose(unknown, model, stage)
+    if done.verdict.word in SOUND and not done.verdict.conditional:
+        return done, ()
+    stage("trying sides of approach")
+    other = diagnose(campaign, model)
+    if _is_better(other, done):
+        return other, (_finding(readings.where(0)[0], "they are taken from the order of the rows"),)
+    if done.verdict.conditional or done.verdict.word in SOUND:
+        return done, ()
+    for joint, sides in _shown(done):
+        direction = np.zeros_like(readings.q)
+        direction[:, joint] = sides
+        tried = diagnose(Campaign(replace(readings, direction=direction), campaign.stated_tool), model)
+        if tried.verdict.word in (*SOUND, "ambiguous") and _is_better(tried, done):
+            name = readings.joints[joint][0]
+            words = f"those of {name} are taken from the residuals, which lie on two sides"
+            return tried, (_finding(readings.where(0)[0], words),)
+    return done, ()
+
+
+def _finding(file: str, words: str) -> Finding:
+    return Finding(
+        "DIA003",
+        f"the sides of approach are not stated (DIR1, DIR2, ...): {words}",
+        file,
+        help="state in DIR1, DIR2, ... whether each axis came up (1) or down (-1) to its place",
+    )
+
+
+def _is_better(other: Diagnosis, done: Diagnosis) -> bool:
+    """Whether an effect of approach is there, and leaves clearly less."""
+    by_direction = any(
+        candidate.effect.by_direction
+        for candidate in [n.candidate for n in other.verdict.named]
+        + [c for one in other.verdict.alternatives for c in one]
+    )
+    rms = [float(np.sqrt(np.nanmean(one.search.final.residual**2))) for one in (other, done)]
+    return by_direction and rms[0] < SMALLER * rms[1]
+
+
+def _shown(done: Diagnosis) -> list[tuple[int, Floats]]:
+    """Joints whose turn by one width, to one side or the other at each visit, explains the residual best, and the
+    sides (R,): -1 where the joint stopped above its place."""
+    fitted = done.search.base
+    campaign = fitted.campaign
+    weight = fitted.plain_weights.weight[:, :3] ** 2
+    visit = _visits(campaign.pose)
+    residual = np.nan_to_num(fitted.point.residual[:, :3])
+    names = [joint.name for joint in fitted.model.robot.joints]
+    entries = []
+    for variable, _, turn, _ in patterns(fitted, campaign):
+        if turn is None or not variable.endswith("over its angle"):
+            continue
+        along = np.bincount(visit, (weight * turn * residual).sum(axis=1))
+        size = np.bincount(visit, (weight * turn * turn).sum(axis=1))
+        gain = np.abs(along).sum() ** 2 / max(float(size.sum()), 1e-300) - BIT * len(along)
+        entries.append((float(gain), names.index(variable.split(" over ")[0]), -np.sign(along)[visit]))
+    entries.sort(key=lambda entry: -entry[0])
+    return [(joint, sides) for gain, joint, sides in entries[:JOINTS] if gain > 0]
+
+
+def _visits(pose: Ints) -> Ints:
+    """(R,) number of the visit of each reading: rows of one pose after each other are one."""
+    return np.asarray(np.cumsum(np.append(0, np.diff(pose) != 0)))

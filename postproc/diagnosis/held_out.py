@@ -1,0 +1,134 @@
+"""What a choice is worth on readings that were left out: poses, regions, sessions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from postproc.base.arrays import Floats, Ints
+from postproc.diagnosis.search_result import Search
+from postproc.diagnosis.selection import Explained, Problem, scatter
+
+FOLDS = 15
+"""Parts that poses are left out in; each pose by itself where there are fewer."""
+
+SEEN = 1e-8
+"""Share of a column's squares that readings must show to predict others."""
+
+OUTLIER_LIMIT = 5.0
+
+USUAL = 3.0
+"""Times what was found of an effect that it is expected to be, of readings that were left out."""
+
+
+def held_out_gain(search: Search, last: Explained, group: int, part: Ints | None) -> float:
+    """Fall of -2 ln(likelihood) of readings left out, part by part, with the group; ``part`` (R,): the part of each
+    reading, -1 in none; NaN without parts.
+
+    A reading is predicted with the uncertainty of the fit of the others: where that has to extrapolate, it
+    has little weight.  Outliers count up to 5 standard deviations.  A part that is more than half of all is never left
+    out: a few poses measured later do not foretell a whole campaign.
+    """
+    if part is None:
+        return np.nan
+    large = np.flatnonzero(2 * np.bincount(part) > len(part))
+    part = np.where(np.isin(part, large), -1, part)
+    if not (part >= 0).any() or (len(large) == 0 and len(np.unique(part)) < 2):
+        return np.nan
+    linear, given = search.linear, search.linear.problem
+    rows = len(linear.residual) - linear.priors
+    # priors are never left out
+    of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
+    variance = scatter(given, last)
+
+    def surprise(groups: Sequence[int]) -> float:
+        columns = [linear.common, *(linear.columns[g] for g in groups)]
+        matrix = np.concatenate(columns, axis=1)
+        own = np.concatenate([np.zeros(linear.common.shape[1]), *(_expected(given, last, g) for g in groups)])
+        matrix = np.concatenate([matrix, np.diag(own)[own > 0]])
+        more = len(matrix) - len(of)
+        target = np.append(linear.residual, np.zeros(more))
+        return _misfit(matrix, target, np.append(of, np.full(more, -1)), variance)
+
+    return surprise([g for g in last.groups if g != group]) - surprise(last.groups)
+
+
+def worst_ratio(search: Search, last: Explained, group: int, part: Ints) -> float:
+    """The largest residual of a pose left out with the group, over that without it; part (R,): as of
+    ``held_out_gain``."""
+    linear = search.linear
+    rows = len(linear.residual) - linear.priors
+    of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
+    pose = np.repeat(search.base.campaign.pose, rows // len(part))
+
+    def largest(groups: Sequence[int]) -> float:
+        matrix = np.concatenate([linear.common, *(linear.columns[g] for g in groups)], axis=1)
+        away = _left_out(matrix, linear.residual, of)[:rows]
+        return float(np.sqrt(np.bincount(pose, away**2).max()))
+
+    without = largest([g for g in last.groups if g != group])
+    return largest(last.groups) / without if without > 0 else 1.0
+
+
+def _left_out(matrix: Floats, target: Floats, part: Ints) -> Floats:
+    """(n,) residuals of ``target`` (n,), each part predicted from the others by ``matrix`` (n, k)."""
+    size = np.linalg.norm(matrix, axis=0)
+    scaled = matrix[:, size > 0] / size[size > 0]
+    whole, aim, away = scaled.T @ scaled, scaled.T @ target, np.zeros(len(target))
+    for k in np.unique(part[part >= 0]):
+        out = scaled[part == k]
+        value, vector = np.linalg.eigh(whole - out.T @ out)
+        root = vector / np.sqrt(np.maximum(value, SEEN))
+        away[part == k] = target[part == k] - out @ (root @ (root.T @ (aim - out.T @ target[part == k])))
+    return away
+
+
+def _expected(given: Problem, last: Explained, group: int) -> Floats:
+    """(p,) one over the deviation that is expected of each parameter of a chosen group, in its scale: ``USUAL`` times
+    the largest that was found of it."""
+    on = np.isin(last.columns, given.places[group])
+    largest = np.abs(last.coefficients[on] / given.size[given.places[group]]).max(initial=0.0)
+    return np.full(len(given.places[group]), 1.0 / (USUAL * largest) if largest > 0 else 0.0)
+
+
+def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> float:
+    """-2 ln(likelihood) of ``target`` (n,), each part predicted from the others by ``matrix`` (n, k)."""
+    size = np.linalg.norm(matrix, axis=0)
+    scaled = matrix[:, size > 0] / size[size > 0]
+    whole, aim, total = scaled.T @ scaled, scaled.T @ target, 0.0
+    for k in np.unique(part[part >= 0]):
+        out = scaled[part == k]
+        value, vector = np.linalg.eigh(whole - out.T @ out)
+        root = vector / np.sqrt(np.maximum(value, SEEN))
+        away = target[part == k] - out @ (root @ (root.T @ (aim - out.T @ target[part == k])))
+        # of a part that is left out as a whole what all share, as where its tracker is, is uncertain together:
+        # the covariance is variance (1 + B B'), B = out root
+        b = out @ root
+        gram = np.eye(b.shape[1]) + b.T @ b
+        shared = np.linalg.solve(gram, b.T @ away)
+        own = (away - b @ shared) ** 2 / variance
+        total += float(np.minimum(own, OUTLIER_LIMIT**2).sum() + len(own) * np.log(variance))
+        total += float(
+            min(shared @ shared / variance, OUTLIER_LIMIT**2 * len(shared)) + np.linalg.slogdet(gram)[1]
+        )
+    return total
+
+
+def regions_of(search: Search) -> Ints | None:
+    """(R,) a region of the joints' space for each reading; None with too few poses."""
+    from scipy.cluster.vq import kmeans2
+
+    campaign = search.base.campaign
+    if campaign.poses < 24:
+        return None
+    q = campaign.readings.q
+    spread = np.where(np.ptp(q, axis=0) > 1e-9, np.ptp(q, axis=0), 1.0)
+    _, label = kmeans2(q / spread, 4, minit="++", rng=np.random.default_rng(0))
+    return label if min(np.bincount(label, minlength=4)) > 0 else None
+
+
+def sessions_of(search: Search) -> Ints | None:
+    """(R,) the session of each reading; None where there is one."""
+    session = search.base.campaign.readings.session
+    return session if len(np.unique(session)) > 1 else None

@@ -1,0 +1,164 @@
+"""Reflectors that were mounted anew between sessions, and a tracker that was moved within one: what readings show of
+how they were taken, before a robot is blamed for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from postproc.base.arrays import Floats, Ints
+from postproc.base.findings import Finding
+from postproc.base.units import MM
+from postproc.identification.campaign import Campaign, Nuisances
+from postproc.identification.least_squares import at
+from postproc.identification.registration import registered
+from postproc.measurements import Readings
+from postproc.model import StiffnessModel
+
+LEFT = 0.5
+"""Share of the residual, root mean square, that a tracker or targets elsewhere must leave at most to be blamed."""
+
+CLEAR = 5.0
+"""Times what then remains that they must have moved by."""
+
+FEWEST = 6
+"""Poses on either side of a moment at which a tracker may have been moved."""
+
+MOMENTS = 40
+"""Moments that are tried first."""
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """readings: with targets and sessions as they were; findings: what was noticed."""
+
+    readings: Readings
+    findings: tuple[Finding, ...]
+
+
+def check_mounting(campaign: Campaign, model: StiffnessModel) -> Mounting:
+    """The readings with targets and stations that were moved as two, where that explains most of what a registration
+    with ``model`` leaves."""
+    readings = campaign.readings
+    findings: list[Finding] = []
+    if campaign.tracked and not campaign.posed:
+        for check in (_moved_tracker, _moved_targets):
+            changed, found = check(Campaign(readings, campaign.stated_tool), model)
+            readings, findings = changed, [*findings, *found]
+    return Mounting(readings, tuple(findings))
+
+
+def _registered(campaign: Campaign, model: StiffnessModel) -> tuple[Nuisances, Floats]:
+    """Tracker and targets, and the residuals (R, 3) [m] that they leave."""
+    point = at(campaign, model, campaign.start())
+    given = registered(campaign, point.predicted, np.ones(len(campaign), bool))
+    return given, campaign.residual(point.predicted, given)[:, :3]
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(3 * np.nanmean(values**2)))
+
+
+def _moved_targets(campaign: Campaign, model: StiffnessModel) -> tuple[Readings, list[Finding]]:
+    """Targets whose place is not stated, each by itself in every session."""
+    readings = campaign.readings
+    sessions = len(readings.sessions)
+    if sessions < 2 or campaign.place_known.all():
+        return readings, []
+    names = readings.targets or ("target",)
+    target = readings.target if readings.targets else np.zeros(len(readings), np.int64)
+    anew = {}
+    for k, name in enumerate(names):
+        for s, session in enumerate(readings.sessions):
+            if name not in readings.places and (target[readings.session == s] == k).any():
+                anew[k, s] = f"{name} ({session})"
+    kept = [name for name in names if name in readings.places]
+    split = (*kept, *anew.values())
+    place = [
+        split.index(anew[k, s]) if (k, s) in anew else split.index(names[k])
+        for k, s in zip(target.tolist(), readings.session.tolist(), strict=True)
+    ]
+    changed = replace(readings, targets=split, target=np.array(place, np.int64))
+    _, before = _registered(campaign, model)
+    other = Campaign(changed, campaign.stated_tool)
+    given, after = _registered(other, model)
+    if _rms(after) > LEFT * _rms(before):
+        return readings, []
+    words = []
+    for k, name in enumerate(names):
+        places = [given.places[split.index(anew[k, s])] for s in range(sessions) if (k, s) in anew]
+        if len(places) > 1:
+            by = max(float(np.linalg.norm(place - places[0])) for place in places[1:])
+            if by > CLEAR * _rms(after) / np.sqrt(len(after) / sessions):
+                words.append(f"{name} by {by / MM:.2g} mm")
+    if not words:
+        return readings, []
+    message = (
+        f"the reflector was mounted anew between sessions ({', '.join(words)}): one place leaves"
+        f" {_rms(before) / MM:.3g} mm RMS, one for each session {_rms(after) / MM:.3g} mm; it counts as another"
+        " reflector in each session"
+    )
+    return changed, [Finding("IDN032", message, *readings.where(0)[:1])]
+
+
+def _moved_tracker(campaign: Campaign, model: StiffnessModel) -> tuple[Readings, list[Finding]]:
+    """One moment at most, at which a tracker was moved within a session."""
+    readings = campaign.readings
+    given, before = _registered(campaign, model)
+    if not np.isfinite(before).all():
+        return readings, []
+    columns = campaign.nuisance_columns(at(campaign, model, given).predicted, given)[:, :3]
+    common = columns.reshape(3 * len(campaign), -1)
+    basis, target = _basis(common), before.reshape(-1)
+    whole = float(target @ target)
+    best, moment, of = whole, -1, -1
+    for s in range(len(readings.sessions)):
+        own = np.flatnonzero(readings.session == s)
+        changes = own[1:][np.diff(campaign.pose[own]) != 0]
+        if len(changes) < 2 * FEWEST:
+            continue
+        inner = changes[FEWEST - 1 : len(changes) - FEWEST + 1]
+        tried = np.unique(inner[np.linspace(0, len(inner) - 1, MOMENTS).round().astype(int)])
+        while len(tried):
+            sizes = [_after(columns, basis, target, own, row, s) for row in tried.tolist()]
+            least = int(np.argmin(sizes))
+            if sizes[least] < best:
+                best, moment, of = sizes[least], int(tried[least]), s
+            near = inner[
+                np.abs(np.searchsorted(inner, tried[least]) - np.arange(len(inner)))
+                <= len(inner) // MOMENTS + 1
+            ]
+            tried = near if len(tried) == min(MOMENTS, len(inner)) and len(near) < len(tried) else near[:0]
+    if moment < 0 or best > (LEFT**2) * whole:
+        return readings, []
+    session = readings.session.copy()
+    session[(readings.session == of) & (np.arange(len(session)) >= moment)] = len(readings.sessions)
+    line = readings.where(moment)[1]
+    name = readings.sessions[of] or "all"
+    changed = replace(readings, session=session, sessions=(*readings.sessions, f"{name}, from line {line}"))
+    other = Campaign(changed, campaign.stated_tool)
+    _, after = _registered(other, model)
+    if _rms(after) > LEFT * _rms(before):
+        return readings, []
+    message = (
+        f"the tracker was moved before line {line}: one station leaves {_rms(before) / MM:.3g} mm RMS, two"
+        f" {_rms(after) / MM:.3g} mm; the rows from there on count as another session"
+    )
+    return changed, [Finding("IDN033", message, readings.where(0)[0], line)]
+
+
+def _after(columns: Floats, basis: Floats, target: Floats, own: Ints, row: int, session: int) -> float:
+    """Squares that remain where the tracker of a session is elsewhere from ``row`` on."""
+    later = own[own >= row]
+    more = np.zeros((len(columns), 3, 6))
+    more[later] = columns[later][:, :, 6 * session : 6 * session + 6]
+    flat = more.reshape(len(target), 6)
+    flat = _basis(flat - basis @ (basis.T @ flat))
+    return float(target @ target - ((flat.T @ target) ** 2).sum())
+
+
+def _basis(columns: Floats) -> Floats:
+    length = np.linalg.norm(columns, axis=0)
+    u, s, _ = np.linalg.svd(columns[:, length > 0] / length[length > 0], full_matrices=False)
+    return np.asarray(u[:, s > 1e-8 * s.max(initial=0.0)])

@@ -1,0 +1,184 @@
+"""Runs the trials of ``real_worlds``: python -m tests.blind.real_command [--rows a,b] [--runs N] [--package FOLDER]"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections import defaultdict
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parent.parent))
+
+import numpy as np
+from scipy.stats import binomtest
+
+from blind import measured
+from blind.arm import model_of
+from blind.command import Diagnosing
+from blind.design import poses
+from blind.real_worlds import TRIALS, Trial
+from blind.worker import ROOMS
+from postproc.identification.campaign import Campaign
+from postproc.identification.registration import registered
+
+FRESH = 20
+"""Poses that were not measured."""
+
+LARGE = 1e-3
+"""[m, rad] from which on a shift or zero that is not there would send a mechanic to work."""
+
+SOUND = {"nothing_missing": 0, "named": 0, "partly_named": 1, "ambiguous": 2, "unknown": 3, "refused": 4}
+"""A verdict -> how little it says."""
+
+
+def fresh_gap(trial: Trial, model) -> float:
+    """[m] root mean square at poses that were not measured, tracker and targets found anew."""
+    rng = np.random.default_rng([trial.number, 9])
+    old = trial.design
+    q = poses(model_of(trial.files["robot.yaml"]), FRESH, old.tool, rng)
+    design = replace_design(old, q, rng)
+    seen = Campaign(measured.readings(design, measured.observed(trial.scene, design), trial.sigma))
+    at = seen.predicted(model)
+    given = registered(seen, at, np.ones(len(seen), bool))
+    return float(np.sqrt(3 * np.mean(seen.residual(at, given)[:, :3] ** 2)))
+
+
+def replace_design(old, q, rng):
+    from dataclasses import replace
+
+    rows = rng.integers(0, len(old.wrench), len(q))
+    senses = None if old.senses is None else rng.choice([-1.0, 1.0], q.shape)
+    return replace(old, q=q, wrench=old.wrench[rows], time=None, temperature=None, senses=senses, told=True)
+
+
+def pairs(answer: dict) -> set[tuple[str, str]]:
+    return {(one["effect"], joint) for one in answer.get("named", ()) for joint in one["joints"] or [""]}
+
+
+def fits(pair: tuple[str, str], accepted) -> bool:
+    return pair in accepted or (pair[0], "*") in accepted
+
+
+def judge(trial: Trial, answer: dict, new: Path) -> dict[str, bool | float]:
+    """What is counted of a run."""
+    word = answer["verdict"]
+    names = pairs(answer)
+    sets = [{(c["effect"], c["joint"] or "") for c in one} for one in answer.get("alternatives", ())]
+    held: dict[str, bool | float] = {"refused": word == "refused"}
+    held["a name that is wrong"] = any(not fits(name, trial.accept) for name in names)
+    if sets:
+        everything = names.union(*sets)
+        held["truth in the set"] = any(fits(pair, trial.needed or trial.accept) for pair in everything)
+    if trial.needed:
+        everything = names.union(*sets)
+        held["named or in the set"] = any(
+            fits(pair, trial.needed) or (pair[1] == "all joints" and (pair[0], "*") in
+            {(n, "*") for n, _ in trial.needed}) for pair in everything
+        )  # fmt: skip
+    else:
+        held["nothing named"] = not names and word != "refused"
+    if trial.row == "twin":
+        held["one of two named"] = bool(names & set(trial.accept))
+    held["file written"] = new.exists()
+    if new.exists():
+        from postproc.model import StiffnessModel
+        from postproc.robot.description import load_robot
+
+        found = StiffnessModel.from_robot(load_robot(new))
+        values = [
+            (f"{t.effect.name}.{p}", v)
+            for t in found.terms
+            if t.effect.name in ("link_geometry", "joint_offset")
+            for p, v in t.values.items()
+        ]
+        if trial.row in ("length", "twist", "scale"):
+            held["shift or zero above 1 mm, 1 mrad"] = any(abs(v) > LARGE for _, v in values)
+        before = fresh_gap(trial, model_of(trial.files["robot.yaml"]))
+        after = fresh_gap(trial, found)
+        held["gap closed"] = 1.0 - after / before if before > 1e-9 else 1.0
+        stated = answer.get("largest_disagreement_mm")
+        if trial.row == "twin" and stated is not None:
+            held["stated disagreement is true"] = after * 1e3 <= stated + 3 * trial.sigma * 1e3
+    return held
+
+
+def run(trial: Trial, diagnosing: Diagnosing) -> tuple[dict[str, bool | float], dict]:
+    with TemporaryDirectory(prefix=f"{ROOMS}data-") as data:
+        folder = Path(data)
+        for name, content in trial.files.items():
+            (folder / name).write_bytes(content)
+        answer = diagnosing(folder, trial.data, "robot.yaml", "new")
+        held = judge(trial, answer, folder / "new.yaml")
+        if trial.also:
+            for name, content in trial.also.items():
+                (folder / name).write_bytes(content)
+            other = diagnosing(folder, trial.data, "robot.yaml", "other")
+            held["worse with the scatter stated"] = SOUND[answer["verdict"]] > SOUND[other["verdict"]]
+            held["wrong name, scatter not stated"] = any(
+                not fits(name, trial.accept) for name in pairs(other)
+            )
+            answer["other"] = other["verdict"]
+    return held, answer
+
+
+def share(values: Sequence[bool]) -> str:
+    k, n = sum(values), len(values)
+    low, high = binomtest(k, n).proportion_ci(method="wilson")
+    return f"{k:4d} of {n:4d}  {100 * k / n:5.1f} %  ({100 * low:.1f} .. {100 * high:.1f})"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m tests.blind.real_command", description=__doc__)
+    parser.add_argument("--rows", default=",".join(TRIALS), help="[all]")
+    parser.add_argument("--runs", type=int, default=300, help="of each row [300]")
+    parser.add_argument("--first", type=int, default=0, help="number of the first run [0]")
+    parser.add_argument("--seed", type=int, default=1, help="[1]")
+    parser.add_argument("--verbose", action="store_true", help="a line for every run")
+    given = parser.parse_args(argv)
+    diagnosing = Diagnosing()
+    for row in given.rows.split(","):
+        counts: dict[str, list] = defaultdict(list)
+        words: dict[str, int] = defaultdict(int)
+        seconds = []
+        for number in range(given.first, given.first + given.runs):
+            trial = TRIALS[row](number, given.seed)
+            held, answer = run(trial, diagnosing)
+            words[answer["verdict"]] += 1
+            seconds.append(answer["seconds"])
+            for key, value in held.items():
+                counts[key].append(value)
+            if given.verbose:
+                names = "; ".join(
+                    f"{one['effect']} {' '.join(one['joints'])}" for one in answer.get("named", ())
+                )
+                sets = " | ".join(
+                    " = ".join(c["label"] for c in one) for one in answer.get("alternatives", ())
+                )
+                flags = ", ".join(
+                    f"{k} {v:.3f}" if isinstance(v, float) else k for k, v in held.items() if v is not False
+                )
+                told = (
+                    answer["told"].strip()[-150:].replace("\n", " ") if answer["verdict"] == "refused" else ""
+                )
+                print(f"{row} {number}: {trial.words}: {answer['verdict']} [{names}] {sets} <{flags}> {told}",
+                      flush=True)  # fmt: skip
+        print(f"{row}: " + ", ".join(f"{n} {word}" for word, n in sorted(words.items())))
+        for key, values in counts.items():
+            if any(isinstance(v, float) for v in values):
+                middle, mean = 100 * np.median(values), 100 * np.mean(values)
+                print(f"  {key:36} {middle:.1f} % in the median, {mean:.1f} in the mean of {len(values)}")
+            else:
+                print(f"  {key:36} {share(values)}")
+        print(f"  seconds {np.median(seconds):.1f} in the median, {max(seconds):.1f} at most", flush=True)
+    diagnosing.close()
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

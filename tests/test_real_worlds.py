@@ -1,0 +1,93 @@
+"""A small fixed part of ``python -m tests.blind.real_command``: readings as shops take them."""
+
+import pytest
+from blind import command, real_command
+from blind.real_worlds import TRIALS
+
+
+@pytest.fixture(scope="module")
+def diagnosed():
+    """``diagnosed(row, number)``: the trial, what is counted of it, and the answer."""
+    process = command.Diagnosing()
+
+    def run(row, number):
+        trial = TRIALS[row](number, 1)
+        return trial, *real_command.run(trial, process)
+
+    yield run
+    process.close()
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("number", [0, 1, 8, 10, 11])
+def test_a_wrong_length_is_named_as_that_length(diagnosed, number):
+    """Not as millimetres and milliradians that cancel, however the scatter is stated."""
+    _, held, answer = diagnosed("length", number)
+    assert answer["verdict"] == answer["other"] == "named"
+    assert held["named or in the set"]
+    assert not held["a name that is wrong"]
+    assert not held["shift or zero above 1 mm, 1 mrad"]
+    assert held["gap closed"] > 0.9
+
+
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("number", [0, 5, 8])
+def test_a_scale_of_the_tracker_is_no_effect(diagnosed, number):
+    trial, _, answer = diagnosed("scale", number)
+    assert answer["verdict"] == "nothing_missing"
+    truth = 1e-6 * float(trial.words.split()[1])
+    assert abs(answer["tracker_scale"] - truth) < 0.5 * abs(truth) + 2e-5
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_twins_are_never_a_name_and_correct_the_same(diagnosed, number):
+    _, held, answer = diagnosed("twin", number)
+    assert answer["verdict"] == "ambiguous"
+    assert answer["same_correction"]
+    assert answer["named"] == []
+    assert held["truth in the set"]
+    assert held["file written"]
+    assert held["stated disagreement is true"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [3, 7, 15])
+def test_sides_that_are_not_stated(diagnosed, number):
+    _, held, answer = diagnosed("approach", number)
+    assert held["named or in the set"]
+    assert "DIA003" in {finding["code"] for finding in answer["findings"]}
+
+
+@pytest.mark.parametrize(
+    ("number", "code"), [(0, "MEA011"), (1, "IDN034"), (2, "MEA010")], ids=["zeros", "shifted", "columns"]
+)
+def test_files_as_they_are_written(diagnosed, number, code):
+    _, _, answer = diagnosed("lost", number)
+    assert code in {finding["code"] for finding in answer["findings"]}
+    assert answer["verdict"] == ("refused" if code == "IDN034" else "nothing_missing")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [0, 3])
+def test_stations_of_one_mounting(diagnosed, number):
+    """Number 3 mounts its reflector anew between sessions."""
+    _, held, answer = diagnosed("stations", number)
+    assert held["gap closed"] > 0.95
+    assert len(answer["stations"]) == 2
+    remounted = "IDN032" in {finding["code"] for finding in answer["findings"]}
+    assert remounted == (number == 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(4))
+def test_what_no_library_has_gets_no_name(diagnosed, number):
+    _, held, answer = diagnosed("strange", number)
+    assert held["nothing named"]
+    assert answer["verdict"] == "unknown"
+
+
+@pytest.mark.slow
+def test_a_sag_without_a_stiffness_is_no_wave_of_a_gear(diagnosed):
+    _, held, answer = diagnosed("sag", 2)
+    assert not held["a name that is wrong"]
+    assert any("follow another course" in one["why"] for one in answer["rejected"])
