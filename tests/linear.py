@@ -338,7 +338,7 @@ def import_readers() -> None:
     """So that no process measures imports."""
     for name in (
         "workflows.preparation",
-        "batch.job_file",
+        "batching.job_file",
         "api",
         "model.files",
         "measurements.read_csv",

@@ -708,10 +708,10 @@ def test_prediction_alone_has_the_same_doubt(compensate, job):
 
 
 def test_without_force_there_is_nothing_to_doubt(compensate, job):
-    report = compensate(job.program, "--json", "-").json
+    report = compensate(job.program, "--force=0,0,0", "--json", "-").json
     assert report["error_before_mm"]["ci95"] is None
     assert report["uncertainty"]["budget"] == []
-    words = compensate(job.program).out
+    words = compensate(job.program, "--force=0,0,0").out
     assert "+-" not in words
     assert "uncertainty" not in words
     assert row_of(words, "verdict") == "not corrected"

@@ -412,7 +412,8 @@ def test_nothing_more_can_be_taken_off_at_the_solution():
     share = (matrix.T @ left / np.linalg.norm(matrix, axis=0))[:-1]
     assert np.abs(share).max() < 1e-3 * np.linalg.norm(left) / np.sqrt(len(left))
     assert found.freedom == 3 * 40 - len(found.unknowns) - len(found.campaign.nuisance_names)
-    assert found.factor * found.freedom == pytest.approx(left @ left, rel=1e-6)
+    # and what is known of them counts as a reading
+    assert found.factor * found.freedom == pytest.approx(left @ left, rel=1e-4)
 
 
 @pytest.mark.sample(2)

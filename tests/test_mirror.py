@@ -621,8 +621,8 @@ def test_cuts_are_the_runs_of_forced_motions():
     assert number_cuts(np.zeros(3, bool)).tolist() == [-1, -1, -1]
     assert number_cuts(np.zeros(0, bool)).tolist() == []
     # what does not follow is a cut of its own
-    runs = np.array([True, True, True, True, False, False, True])
-    assert number_cuts(np.ones(7, bool), runs).tolist() == [0, 0, 0, 0, 1, 1, 2]
+    continues = np.array([True, True, True, True, False, False, True])
+    assert number_cuts(np.ones(7, bool), continues).tolist() == [0, 0, 0, 0, 1, 2, 2]
 
 
 def test_spread_reaches_the_cut_and_no_farther():

@@ -89,7 +89,7 @@ MISTAKES = [
     Mistake("frame misspelt", [], [P, f"--force={FORCE}@bse"], 1, ["did you mean 'base'"]),
     Mistake("two numbers", [], [P, "--force=0,360"], 1, ["2 numbers", "3 or 6"]),
     Mistake("millinewtons", [], [P, "--force=0,360000,560000"], 1, ["no robot carries", "in N"]),
-    Mistake("overflow", [], [P, "--force=0,1e308,0"], 1, ["no robot carries"]),
+    Mistake("overflow", [], [P, "--force=0,1e308,0"], 1, ["exceeds 1e+09 N"]),
     Mistake("spreadsheet", [put("f.xlsx", b"PK\3\4")], [P, "--force", "f.xlsx"], 2, ["spreadsheet", "as CSV"]),
     Mistake("text file", [put("f.txt", "x")], [P, "--force", "f.txt"], 2, ["CSV or YAML file: rename f.txt"]),
     Mistake("no such CSV", [], [P, "--force", "f.csv"], 1, ["f.csv", "No such file"]),

@@ -13,7 +13,7 @@ from postproc.workflows.option_names import FORMER_OPTIONS
 SHELLS = ("bash", "zsh", "fish")
 SPREADSHEETS = (".xlsx", ".xlsm", ".xls", ".ods")
 
-_SURPLUS = re.compile(r"unexpected extra arguments? \((.*)\)")
+_SURPLUS = re.compile(r"unexpected extra arguments? \(([^)]*+)\)")
 _NUMBERS = re.compile(r"[-+]?\.?\d[\d.,;]*(?:@\w+)?\Z|@\w+\Z")
 
 VARIABLE = "_COMPENSATE_COMPLETE"
