@@ -13,7 +13,6 @@ from postproc.workflows.option_names import FORMER_OPTIONS
 SHELLS = ("bash", "zsh", "fish")
 SPREADSHEETS = (".xlsx", ".xlsm", ".xls", ".ods")
 
-_SURPLUS = re.compile(r"unexpected extra arguments? \(([^)]*+)\)")
 _NUMBERS = re.compile(r"[-+]?\.?\d[\d.,;]*(?:@\w+)?\Z|@\w+\Z")
 
 VARIABLE = "_COMPENSATE_COMPLETE"
@@ -41,8 +40,9 @@ class Commands(click.Group):
             hint = f" Did you mean {shown}?" if shown else ""
             raise click.UsageError(f"There is no option {error.option_name!r}.{hint}", error.ctx) from None
         except click.UsageError as error:
-            surplus = _SURPLUS.search(error.message)
-            if surplus and (hint := _about_surplus(surplus[1].split())):
+            head, bracket, words = error.message.partition("(")
+            surplus = "unexpected extra argument" in head and bracket
+            if surplus and (hint := _about_surplus(words.rstrip(")").split())):
                 raise click.UsageError(f"{error.message}. {hint}", error.ctx) from None
             raise
 
