@@ -354,3 +354,18 @@ def test_corrections_that_are_wrong_are_refused_or_told(shop, monkeypatch, name,
     if done.code == 3:
         said = done.out + done.err
         assert any(code in said for code in ("COR001", "COR003", "COR005", "COR006", "COR009")), said
+
+
+def test_a_cut_that_starts_elsewhere_from_run_to_run_is_reported(compensate, job):
+    """Behind a branch only the end point is corrected for certain; what follows is corrected as ever."""
+    branch = ["IF $IN[1] THEN", "LIN {Z 40.000}", "ELSE", "LIN {Z 60.000}", "ENDIF", ";FORCE -360 50 560 @base"]
+    lines = [*LINES[:8], *branch, *LINES[9:]]
+    job.write(lines)
+    done = compensate(job.program, "--force", "--json", "-")
+    assert done.code == 3
+    found = [one for one in done.json["findings"] if one["code"] == "COR023"]
+    assert [one["line"] for one in found] == [15]
+    assert "after line 10 or 12" in found[0]["message"]
+    job.write([*lines[:13], "LIN {X 50.000,Y 0.000,Z 20.000,A 0.000,B 0.000,C 180.000}", *lines[13:]])
+    again = compensate(job.program, "--force", "--json", "-")
+    assert "COR023" not in {one["code"] for one in again.json["findings"]}

@@ -12,7 +12,7 @@ from postproc.compensation.subdivision import Subdivision
 from postproc.output.write import (
     WrittenProgram,
 )
-from postproc.toolpath import OrientationPath, Role, Toolpath
+from postproc.toolpath import Kind, OrientationPath, Role, Toolpath
 from postproc.workflows.corner_findings import corner_findings
 from postproc.workflows.preparation import Prepared, Request
 
@@ -55,7 +55,26 @@ def closing_findings(request: Request, ready: Prepared, written: WrittenProgram)
             help = _POLE if unit == DEG and _by_pair(path, row) else ""
             findings.append(Finding("COR005", message, file, int(path.line[row]), help=help))
     findings += _between(request, ready, written) + _not_turned(ready, written)
+    findings += _started(ready, written)
     return findings + _splines(ready, written) + _assumed(request, ready, written)
+
+
+def _started(ready: Prepared, written: WrittenProgram) -> list[Finding]:
+    """Cutting motions before which paths of the program meet or part: nothing leads to their corrected start."""
+    path = ready.task.toolpath
+    on_a_path = np.isin(path.kind, (Kind.LIN, Kind.CIRC)) & written.result.corrected & ready.task.carries
+    rows = np.flatnonzero(on_a_path & ~path.continues)
+    rows = rows[rows > 0]
+    if not len(rows):
+        return []
+    before = [one for one in path.predecessors.get(int(rows[0]), ()) if one >= 0]
+    lines = " or ".join(str(path.line[one]) for one in before[:4])
+    message = (
+        f"branches of the program meet or part before this motion{f' (after line {lines})' if lines else ''}: its end"
+        f" point is corrected, its start is not ({len(rows)} motions)"
+    )
+    help = "program a motion in air to the start of the cut, within the same branch"
+    return [Finding("COR023", message, ready.task.file, int(path.line[rows[0]]), help=help)]
 
 
 def _not_turned(ready: Prepared, written: WrittenProgram) -> list[Finding]:

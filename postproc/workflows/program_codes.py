@@ -165,6 +165,14 @@ CODES = define(
             action="Check the interpolation of the control.",
             example="Two blocks with A0 C0 and A30 C90.",
         ),
+        "COR023": Code(
+            "warning",
+            "cut starts where branches meet or part",
+            meaning="Several motions may precede the first motion of a cut, or others start where it starts.",
+            consequence="Its end point is corrected; at its start the tool is where the motion before leads it.",
+            action="Program a motion in air to the start of the cut, within the same branch.",
+            example="A LIN under force that follows ENDIF, after branches that end at different points.",
+        ),
         "COR021": Code(
             "info",
             "orientation is not corrected",
