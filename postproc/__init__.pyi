@@ -1,6 +1,7 @@
 from postproc.api import Batched as Batched
 from postproc.api import Checked as Checked
 from postproc.api import Diagnosed as Diagnosed
+from postproc.api import Engaged as Engaged
 from postproc.api import Finding as Finding
 from postproc.api import Identified as Identified
 from postproc.api import Mapped as Mapped
@@ -12,6 +13,7 @@ from postproc.api import batch as batch
 from postproc.api import check as check
 from postproc.api import compensate as compensate
 from postproc.api import diagnose as diagnose
+from postproc.api import engage as engage
 from postproc.api import identify as identify
 from postproc.api import map as map
 from postproc.api import plan as plan

@@ -18,6 +18,7 @@ from postproc.base.units import MM
 from postproc.report.batched import Batched
 from postproc.report.checked import Checked
 from postproc.report.diagnosed import Diagnosed
+from postproc.report.engaged import Engaged
 from postproc.report.identified import Identified
 from postproc.report.mapped import Mapped
 from postproc.report.planned import Planned
@@ -33,6 +34,7 @@ __all__ = [
     "Batched",
     "Checked",
     "Diagnosed",
+    "Engaged",
     "Finding",
     "Identified",
     "Mapped",
@@ -44,6 +46,7 @@ __all__ = [
     "check",
     "compensate",
     "diagnose",
+    "engage",
     "identify",
     "map",
     "plan",
@@ -193,6 +196,38 @@ def verify(
         config_dat=_path(config_dat),
     )
     return run(request, Path(compensated), step_mm * MM)
+
+
+def engage(
+    path: PathLike,
+    *,
+    process: PathLike | None = None,
+    cell: PathLike | None = None,
+    robot: str | None = None,
+    csv: PathLike | None = None,
+    stock_out: PathLike | None = None,
+    config_dat: PathLike | None = None,
+    strict: bool = False,
+) -> Engaged:
+    """What a program cuts of its stock, as ``compensate engage`` does.
+
+    process: a process file with ``stock:`` and ``tools:`` [the cell's]; stock_out: what is left of the blank.
+    """
+    from postproc.workflows.engage import EngageRequest
+    from postproc.workflows.engage import engage as run
+
+    return run(
+        EngageRequest(
+            program=Path(path),
+            process=_path(process),
+            cell=_path(cell),
+            robot=robot,
+            config_dat=_path(config_dat),
+            csv=_path(csv),
+            stock_out=_path(stock_out),
+            strict=strict,
+        )
+    )
 
 
 def batch(

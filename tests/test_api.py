@@ -137,3 +137,13 @@ def test_a_table_becomes_a_data_frame(at_samples):
     frame = postproc.check("samples/kr270_taught/taught.src").to_pandas()
     assert isinstance(frame, pandas.DataFrame)
     assert len(frame) == 26
+
+
+def test_engagement_from_python():
+    pytest.importorskip("numba")
+    engaged = postproc.engage(ROOT / "samples" / "kr270_stock" / "part.ngc")
+    table = engaged.table()
+    assert engaged.removal > 0
+    assert table["removal_mm3"].sum() == pytest.approx(engaged.removal)
+    assert {"air", "cut"} <= set(table["state"])
+    assert "removal_mm3" in repr(engaged)

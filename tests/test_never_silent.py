@@ -358,7 +358,14 @@ def test_corrections_that_are_wrong_are_refused_or_told(shop, monkeypatch, name,
 
 def test_a_cut_that_starts_elsewhere_from_run_to_run_is_reported(compensate, job):
     """Behind a branch only the end point is corrected for certain; what follows is corrected as ever."""
-    branch = ["IF $IN[1] THEN", "LIN {Z 40.000}", "ELSE", "LIN {Z 60.000}", "ENDIF", ";FORCE -360 50 560 @base"]
+    branch = [
+        "IF $IN[1] THEN",
+        "LIN {Z 40.000}",
+        "ELSE",
+        "LIN {Z 60.000}",
+        "ENDIF",
+        ";FORCE -360 50 560 @base",
+    ]
     lines = [*LINES[:8], *branch, *LINES[9:]]
     job.write(lines)
     done = compensate(job.program, "--force", "--json", "-")

@@ -15,6 +15,7 @@ from rich.text import Text
 from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
+from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
 from postproc.report.terminal import show_findings
 
@@ -26,14 +27,16 @@ COLUMNS = (
 """Columns of the CSV, one row a motion; what is not known is empty."""
 
 
-@dataclass(frozen=True, eq=False)
-class Engaged:
+@dataclass(frozen=True, eq=False, repr=False)
+class Engaged(Result):
     """The result of ``compensate engage``: N motions.
 
-    line (N,); state (N,): index into STATES; table (N, 15): the other columns of the CSV, in its units; mean (N,) and
+    line (N,); state (N,): index into STATES; values (N, 15): the other columns of the CSV, in its units; mean (N,) and
     largest (N,) [N]: size of the force along each motion; weight (N,): length of the motions.  by_tool: number ->
     motions that cut, removed mm3, largest ap and ae mm, largest force N.
     """
+
+    headline = ("program", "force.max_n", "removal_mm3", "exit")
 
     program: str
     dialect: str
@@ -41,7 +44,7 @@ class Engaged:
     blank: str
     line: Ints
     state: Ints
-    table: Floats
+    values: Floats
     mean: Floats
     largest: Floats
     weight: Floats
@@ -69,7 +72,12 @@ class Engaged:
     @property
     def removal(self) -> float:
         """[mm3]"""
-        return float(self.table[:, COLUMNS.index("removal_mm3") - 1].sum())
+        return float(self.values[:, COLUMNS.index("removal_mm3") - 1].sum())
+
+    def table(self) -> Columns:
+        """One row a motion, the columns of ``--csv``; NaN where a figure is not known."""
+        columns = dict(zip(COLUMNS[1:-1], self.values.T, strict=True))
+        return {"line": self.line, **columns, "state": np.array(STATES)[self.state]}
 
     def as_json(self) -> dict[str, object]:
         """The machine-readable result; the keys are public."""
@@ -111,7 +119,7 @@ def engaged_csv(engaged: Engaged) -> bytes:
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)
     for line, values, state in zip(
-        engaged.line.tolist(), engaged.table.tolist(), engaged.state.tolist(), strict=True
+        engaged.line.tolist(), engaged.values.tolist(), engaged.state.tolist(), strict=True
     ):
         writer.writerow([line, *(_text(value) for value in values), STATES[state]])
     return stream.getvalue().encode()
