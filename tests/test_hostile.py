@@ -448,10 +448,11 @@ ALLOWED = {
     ("batching/cluster.py", "distributed"),
     ("__init__.py", "import_module"),
     ("report/result.py", "import_module"),
+    ("process/stock/compiled.py", "import_module"),
     ("base/memory.py", "ctypes"),
 }
-"""The one way out, the cluster that the user names; the package's own names, loaded when they are asked for; pandas;
-and the C library of this process, which gives memory back."""
+"""The one way out, the cluster that the user names; the package's own names, loaded when they are asked for; pandas and
+numba; and the C library of this process, which gives memory back."""
 
 
 def banned(module: str) -> set[str]:

@@ -267,11 +267,14 @@ ELSEWHERE = (
     "batching/",
     "output/atomic_write.py",
     "base/read_files.py",
+    "cli/streams.py",
+    "process/stock/compiled.py",
     "base/input_files.py",
     "report/page.py",
     "robot/write_robot_file.py",
 )
-"""What is read there is no input: records, locks, heads of files that a batch looks at, parts of a page, results."""
+"""What is read there is no input: standard streams, sources of the package, records, locks, heads of files that a batch
+looks at, parts of a page, results."""
 
 
 @pytest.mark.slow

@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.languages.gcode.certain_flow import follow
 from postproc.languages.gcode.control import UNKNOWN, Control, Group, ModalCode, Move, Once
 from postproc.languages.gcode.execution import Execution
-from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason, follow
+from postproc.languages.gcode.execution_flow import ExecutionFlow, FlowReason
 from postproc.languages.gcode.modal_fill import fill_modal, switched
 from postproc.languages.gcode.source import Source, WordColumn
 from postproc.languages.gcode.words import key

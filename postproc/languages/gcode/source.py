@@ -48,9 +48,10 @@ class WordColumn:
 
     def last(self, blocks: Ints, absent: float = np.nan) -> Floats:
         """(K,) the last values in blocks (K,)."""
-        at = np.searchsorted(self.block, blocks, side="right") - 1
-        there = np.append(self.block, -1)[at] == blocks
-        return np.where(there, np.append(self.value, absent)[at], absent)
+        if not len(self.block):
+            return np.full(len(blocks), absent)
+        at = np.maximum(np.searchsorted(self.block, blocks, side="right") - 1, 0)
+        return np.where(self.block[at] == blocks, self.value[at], absent)
 
 
 NONE = WordColumn(np.empty(0, np.int32), np.empty(0), np.empty(0, np.int8))

@@ -199,6 +199,7 @@ class _Surveyor:
         if len(self.stack) > DEEPEST:
             self.buried += 1
             self.stack[-1].broken = True
+            self.stack[1].broken = True  # a loop around a loop is passed again for each level
             return
         if not self.stack:  # a program without DEF
             self.stack.append(Block(b"", 0, 0))

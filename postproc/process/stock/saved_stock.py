@@ -47,7 +47,7 @@ def read_stock(path: Path, process: StockProcess) -> tuple[Blank, Removed]:
     """The blank and what was removed of it.  Refusal FIL001; STK016: no stock file, or one of another version."""
     raw = read_file(path)
     try:
-        with np.load(io.BytesIO(raw), allow_pickle=False) as archive:
+        with np.load(io.BytesIO(raw)) as archive:
             values = [np.asarray(archive[key], float) for key in _KEYS]
     except (ValueError, KeyError, OSError, zipfile.BadZipFile, EOFError):
         raise _refused(path, "it is no stock file", process) from None
