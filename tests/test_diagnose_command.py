@@ -180,8 +180,8 @@ def undecided(found, monkeypatch):
     (one,) = found.verdict.named
     other = next(c for c in found.search.linear.candidates if (c.name, c.joint) == ("link_compliance", "A2"))
     verdict = replace(found.verdict, word="ambiguous", alternatives=((one.candidate, other),))
-    doubted = replace(found, verdict=verdict, final=found.search.base)
-    monkeypatch.setattr(workflow, "diagnose", lambda campaign, model, stage: doubted)
+    doubted = replace(found, verdict=verdict, final=found.search.base, agreed=False)
+    monkeypatch.setattr(workflow, "diagnose_sides", lambda campaign, model, stage: (doubted, ()))
     monkeypatch.setattr(workflow, "CANDIDATES", 100)
 
 

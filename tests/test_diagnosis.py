@@ -223,11 +223,12 @@ def wave(model, order):
 
 @pytest.mark.slow
 def test_a_wave_of_another_order_is_no_harmonic():
-    for order, word in ((1.0, "named"), (2.0, "named"), (0.5, "unknown"), (1.5, "unknown")):
+    # half a wave over the range of A3 looks like its zero for the most part
+    for order, word in ((1.0, "named"), (2.0, "named"), (0.5, "ambiguous"), (1.5, "unknown")):
         campaign = campaign_of(wave(stated(), order), 40, deflection=False, in_robot_frame=True)
         told = diagnose(campaign, stated()).verdict
         assert told.word == word, order
-        assert bool(told.named) == (word == "named")
+        assert ("transmission_error" in {n.effect for n in told.named}) == (word == "named")
         if word == "named":
             assert [(n.effect, n.joints) for n in told.named] == [("transmission_error", ("A3",))]
             (named,) = told.named
