@@ -112,17 +112,14 @@ def test_the_same_bytes_without_posix_and_without_pinocchio(tmp_path, name):
 
 
 def test_no_module_of_the_package_needs_posix_to_be_imported():
-    script = (
-        BLOCK
-        + (
-            "import importlib, importlib.util, pkgutil, postproc\n"
-            "names = [one.name for one in pkgutil.walk_packages(postproc.__path__, 'postproc.')]\n"
-            "names = [name for name in names if not name.endswith('__main__')]\n"
-            "if importlib.util.find_spec('numba') is None:\n"  # an extra, which the simulation of the stock is made with
-            "    names = [name for name in names if not name.startswith('postproc.process.stock.')]\n"
-            "[importlib.import_module(name) for name in names]\n"
-            "print(len(names))\n"
-        )
+    script = BLOCK + (
+        "import importlib, importlib.util, pkgutil, postproc\n"
+        "names = [one.name for one in pkgutil.walk_packages(postproc.__path__, 'postproc.')]\n"
+        "names = [name for name in names if not name.endswith('__main__')]\n"
+        "if importlib.util.find_spec('numba') is None:\n"  # an extra
+        "    names = [name for name in names if not name.startswith('postproc.process.stock.')]\n"
+        "[importlib.import_module(name) for name in names]\n"
+        "print(len(names))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
