@@ -34,7 +34,7 @@ TRANSIENT = frozenset(["FIL001", "FIL010", "BAT008"])
 """Findings of a program that is still being written, or of a system that is short of something: it is tried again."""
 
 Listen = Callable[[Outcome], None]
-"""Is told every outcome, after its program was moved."""
+"""Gets every outcome, after its program was moved."""
 
 
 @dataclass

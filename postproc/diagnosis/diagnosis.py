@@ -29,7 +29,7 @@ AGAIN = 3
 class Diagnosis:
     """stated: the robot file as it is, tracker and targets found; where: patterns in its residuals; search, verdict;
     final: the final model, of what is named, or of its own parameters refitted; disagreement [m]: the largest over the
-    workspace of what explanations predict that can not be told apart, one of each set; ``agreed``: it is so small
+    workspace of what explanations predict that cannot be distinguished, one of each set; ``agreed``: it is so small
     that the correction is the same."""
 
     stated: Fit

@@ -12,11 +12,11 @@ from postproc.languages.krl.modal_state import ELSEWHERE, Source
 from postproc.languages.krl.motion_rows import MotionRows
 
 MOST = 30
-"""Predecessors of a motion that are told apart."""
+"""Predecessors of a motion that are distinguished."""
 _MARKS = 4 * MOST
 """Places where paths meet that are looked at for them."""
 _TWO = 2
-"""So many sources are told apart; more are as good as two."""
+"""So many sources are distinguished; more are as good as two."""
 
 
 def single_sources(rows: MotionRows) -> Bools:
