@@ -108,7 +108,7 @@ def identifiability(
 
 
 def _limit(unknown: Unknown, value: float) -> float:
-    """[SI] An interval wider than this states nothing of the unknown; of geometry, what cannot be distinguished is in the
+    """[SI] An interval wider than this states nothing of the unknown; of geometry, what is not distinguished is in the
     interval."""
     if unknown.gauge:
         return np.inf
