@@ -12,16 +12,12 @@ from typing import TYPE_CHECKING
 import click
 
 from postproc.cli.common import (
-    ROBOT,
     Out,
     RenamedOption,
     allow_compensated_option,
-    insertion_options,
-    language_options,
+    many_programs_options,
     result_options,
-    tare_option,
 )
-from postproc.cli.decimal_option import Decimal
 from postproc.cli.signals import Stopped
 
 if TYPE_CHECKING:
@@ -32,17 +28,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("jobs", nargs=-1, metavar="JOBS...")
-@click.option(
-    "--force",
-    metavar="[SPEC]",
-    default=None,
-    help="Machining force of every program. Without a value: the forces that belong to each program; with a value: "
-    "0,360,560@base or a CSV, as in the main job.",
-)
-@tare_option
-@click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cells'.")
-@language_options
-@click.option("--gain", type=Decimal(0.0, 1.0), help="Share of the correction that is applied [1].")
+@many_programs_options
 @click.option(
     "-o",
     "--output",
@@ -50,8 +36,6 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Folder of the results; it repeats the folder structure of the programs [compensated/ beside JOBS].",
 )
-@insertion_options
-@click.option("--strict", is_flag=True, help="Treat warnings as errors.")
 @allow_compensated_option
 @click.option("--dry-run", is_flag=True, help="Do everything but write files.")
 @click.option(

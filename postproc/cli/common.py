@@ -18,6 +18,7 @@ from click.shell_completion import CompletionItem
 from click.types import StringParamType
 
 from postproc.base.findings import Finding, Refusal
+from postproc.cli.decimal_option import Decimal
 from postproc.workflows.option_names import SHARED_POINTS, former_names_of, present_value
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
@@ -162,6 +163,33 @@ def insertion_options(command: _Command) -> _Command:
                 "or as a new point in the .dat, or the point is kept and these motions are not corrected "
                 f"[{SHARED_POINTS[0]}].",
             ),
+        )
+    ):
+        command = decorate(command)
+    return command
+
+
+def many_programs_options(command: _Command) -> _Command:
+    """What predicts and corrects each of many programs."""
+    for decorate in reversed(
+        (
+            click.option(
+                "--force",
+                metavar="[SPEC]",
+                default=None,
+                help="Machining force of every program. Without a value: the forces that belong to each program; with "
+                "a value: 0,360,560@base or a CSV, as in the main job.",
+            ),
+            tare_option,
+            click.option(
+                "--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cells'."
+            ),
+            language_options,
+            click.option(
+                "--gain", type=Decimal(0.0, 1.0), help="Share of the correction that is applied [1]."
+            ),
+            insertion_options,
+            click.option("--strict", is_flag=True, help="Treat warnings as errors."),
         )
     ):
         command = decorate(command)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from postproc.cli.common import ROBOT, Out, insertion_options, language_options, result_options, tare_option
+from postproc.cli.common import Out, many_programs_options, result_options
 from postproc.cli.decimal_option import Decimal
 from postproc.cli.signals import SIGNALS, Stopped
 
@@ -26,16 +26,7 @@ POLL = 0.5
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
-@click.option(
-    "--force",
-    metavar="[SPEC]",
-    default=None,
-    help="Machining force of every program, as for the main job. Without a value: the forces that belong to each one.",
-)
-@tare_option
-@click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cell's.")
-@language_options
-@click.option("--gain", type=Decimal(0.0, 1.0), help="Share of the correction that is applied [1].")
+@many_programs_options
 @click.option(
     "-o",
     "--output",
@@ -43,8 +34,6 @@ POLL = 0.5
     metavar="DIR",
     help="Folder of the results [compensated/ in FOLDER].",
 )
-@insertion_options
-@click.option("--strict", is_flag=True, help="Treat warnings as errors.")
 @click.option(
     "--settle",
     type=Decimal(0.0, 3600.0),

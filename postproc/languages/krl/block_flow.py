@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from abc import abstractmethod
 
 from postproc.languages.krl.assignments import with_clause
 from postproc.languages.krl.execution_context import Flow, SplineBlock
@@ -302,8 +303,9 @@ class BlockFlow(OpenBlocks):
             run.variables.set(bounds[0], b"", AFTER_FOR)
         return None
 
+    @abstractmethod
     def _call_functions(self, item: Statement) -> None:
-        raise NotImplementedError
+        """Takes up that the expressions of a statement call functions."""
 
     def _end_spline(self, item: Statement, frame: BlockFrame) -> None:
         """What a WITH of the spline set ends with it."""

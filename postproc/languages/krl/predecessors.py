@@ -54,20 +54,8 @@ def predecessors(rows: MotionRows, continues: Bools) -> dict[int, tuple[int, ...
 def _few(rows: MotionRows, sources: Iterable[Source]) -> set[int]:
     """The rows behind sources, none where they are more than ``MOST``."""
     seen: set[Source] = set()
-    found: set[int] = set()
-    todo = list(sources)
-    while todo:
-        source = todo.pop()
-        if source in seen:
-            continue
-        seen.add(source)
-        if isinstance(source, int):
-            found.add(source)
-        else:
-            todo.extend(rows.sources[source])
-        if len(found) > MOST or len(seen) > _MARKS:
-            return set()
-    return found
+    found = expanded(rows, sources, seen, MOST)
+    return set() if len(found) > MOST or len(seen) > _MARKS else found
 
 
 def _sources_of_others(rows: MotionRows, single: Bools) -> Iterable[Source]:
@@ -76,9 +64,11 @@ def _sources_of_others(rows: MotionRows, single: Bools) -> Iterable[Source]:
     return others | rows.left_from
 
 
-def expanded(rows: MotionRows, sources: Iterable[Source], seen: set[Source] | None = None) -> set[int]:
+def expanded(
+    rows: MotionRows, sources: Iterable[Source], seen: set[Source] | None = None, most: int | None = None
+) -> set[int]:
     """The rows (and ``START``, ``ELSEWHERE``) among sources, with those behind marks; without what ``seen`` has, which
-    takes up all that is found."""
+    takes up all that is found.  ``most``: the search ends when it has found more, or more than ``_MARKS`` marks."""
     seen = set() if seen is None else seen
     found: set[int] = set()
     todo = list(sources)
@@ -91,6 +81,8 @@ def expanded(rows: MotionRows, sources: Iterable[Source], seen: set[Source] | No
             found.add(source)
         else:
             todo.extend(rows.sources[source])
+        if most is not None and (len(found) > most or len(seen) > _MARKS):
+            break
     return found
 
 
