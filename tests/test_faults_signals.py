@@ -147,6 +147,23 @@ def test_the_signal_that_ends_a_process_is_the_last_one_it_hears():
             signal.signal(number, handler)
 
 
+def test_a_signal_that_arrives_as_another_exception(capsys):
+    """Python before 3.12 makes a RuntimeError of what is raised while a class is made, that is, in an import."""
+
+    class Interrupted:
+        def __set_name__(self, owner, name):
+            try:
+                signal.raise_signal(signal.SIGTERM)
+            except Stopped as end:
+                raise RuntimeError("Error calling __set_name__") from end
+
+    with pytest.raises(Stopped) as end, ended_in_words():
+        type("Imported", (), {"member": Interrupted()})
+    said = capsys.readouterr().err
+    assert end.value.code == 143
+    assert said == "interrupted\n"
+
+
 @pytest.mark.parametrize(
     ("error", "words"),
     [

@@ -35,7 +35,7 @@ def ended_in_words(and_exits: bool = False) -> Iterator[None]:
     Raises SystemExit: 1 after a defect or a refusal of the system, Stopped with 128 and the number of the signal after
     one.  ``and_exits``: the process ends with the run, so that a signal that stopped it is the last one that it hears.
     """
-    stopped = False
+    stopped: Stopped | None = None
     before_run = publications()
 
     def stop(number: int, _frame: FrameType | None) -> None:
@@ -44,9 +44,9 @@ def ended_in_words(and_exits: bool = False) -> Iterator[None]:
             for stream in (sys.stdout, sys.stderr):
                 if isinstance(stream, GuardedStream):
                     stream.abandon()
-        elif not stopped:
-            stopped = True
-            raise Stopped(128 + number)
+        elif stopped is None:
+            stopped = Stopped(128 + number)
+            raise stopped
 
     # what whoever started this run ignores (nohup) stays ignored
     heard = [number for number in SIGNALS if signal.getsignal(number) != signal.SIG_IGN]
@@ -57,6 +57,9 @@ def ended_in_words(and_exits: bool = False) -> Iterator[None]:
         _print_error(end.words)
         raise
     except Exception as error:
+        if stopped is not None:  # what Python made of it on its way, RuntimeError out of __set_name__
+            _print_error(stopped.words)
+            raise stopped from None
         written = "files are written already" if publications() > before_run else "nothing is written"
         why = refusal_of_the_system(error)
         if why:
@@ -65,7 +68,7 @@ def ended_in_words(and_exits: bool = False) -> Iterator[None]:
         _report_defect()
     finally:
         # what remains is the end of the process, whose exit code is known
-        decided = and_exits and (stopped or publications() > before_run)
+        decided = and_exits and (stopped is not None or publications() > before_run)
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if decided else handler)
 
