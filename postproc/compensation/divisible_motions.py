@@ -9,7 +9,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.batches import ROWS, in_blocks
 from postproc.base.findings import Finding
-from postproc.base.geometry import Poses
+from postproc.base.geometry import Poses, lengths
 from postproc.base.units import DEG
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.desired_path import start_poses
@@ -124,11 +124,37 @@ class DivisibleMotions:
         def largest(part: slice) -> Floats:
             segments, owner = self.segments(chosen[part], count[part])
             size = self._allowed(*path_errors(self.task, segments))
-            errors = np.zeros(len(count[part]))
+            errors = self._rounded_off(chosen[part], count[part])
             np.maximum.at(errors, owner, size)
             return errors
 
         return np.concatenate([np.empty(0), *in_blocks(largest, len(chosen), motions_per_block(count))])
+
+    def _rounded_off(self, chosen: Ints, count: Ints) -> Floats:
+        """(A,) by how much the controller rounds off points inserted into the arcs among the intervals ``chosen``
+        (A,), divided into ``count`` (A,) segments, in parts of the error that is allowed.
+
+        The parabola from d before a point of a circle to d after it passes the middle of the places d / 2 before and
+        after: d^2 / (8 r) inside of it, d half of a segment at most.  Of arcs between exact points alone, where it is
+        stated: short segments beside a corner that is approximated itself would change that corner.
+        """
+        task, rows = self.task, self.rows[self.owner[chosen]]
+        off = np.zeros(len(rows))
+        if task.toolpath.constraints.exact_stays:
+            return off
+        divided = (count > 1) | (self.low[chosen] > 0.0) | (self.high[chosen] < 1.0)
+        exact = task.toolpath.approximation == 0
+        divided &= exact[rows] & exact[np.maximum(rows - 1, 0)]
+        arc = np.flatnonzero(task.desired_path.arc[rows] & divided)
+        if not len(arc):
+            return off
+        at = rows[arc]
+        part = (self.high - self.low)[chosen[arc]] / count[arc]
+        stated = np.nan_to_num(task.toolpath.constraints.inserted_approximation[at])
+        reach = np.minimum(stated, 0.5 * part * task.desired_path.length[at])
+        radius = lengths(task.desired_path.start[at].position - task.desired_path.circles(at)[0])
+        off[arc] = reach**2 / (8.0 * np.maximum(radius, SAME))
+        return self._allowed(off, np.zeros(len(off)))
 
     def errors_at(self, chosen: Ints, share: Floats) -> Floats:
         """(A,) the same at the shares (A,) of the intervals ``chosen`` (A,), undivided."""

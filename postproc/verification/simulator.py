@@ -29,8 +29,12 @@ STILL, STILL_SHARE = 2e-7, 0.02
 DOUBLINGS, MOST = 6, 4_000_000
 """How often the samples are doubled at most, and how many they may become."""
 
-HALVES = ((1.0,), (0.5, 1.0))
-"""Where on either half of a parabola samples are, besides its middle: at first, and then."""
+BESIDE = 2 * STEP
+"""[m] How far before and after the place of a point the path of the tool is looked at for the way past it."""
+
+WORST, FINER = 12, 16
+"""Motions with the largest errors, and in how many times as many parts as others they and their parabolas are
+divided."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,13 +225,15 @@ class Simulator:
         """Samples so dense that twice as many change nothing, and what the last doubling changed."""
         stretch, rows = np.repeat(np.arange(len(start)), stop - start), _rows(start, stop)
         parts = np.maximum(LEAST, np.ceil(run.desired_path.length[rows] / step)).astype(np.int64)
-        samples = self._sampled(run, path, stretch, rows, parts, HALVES[0])
+        halves = np.ones(len(rows), np.int64)
+        samples = self._sampled(run, path, stretch, rows, parts, halves)
         change = change_angle = float("nan")
         for _ in range(DOUBLINGS):
-            parts = 2 * parts
+            parts, halves = 2 * parts, 2 * halves
             if not len(rows) or parts.sum() > MOST or not samples.place.settled.all():
                 break
-            finer = self._sampled(run, path, stretch, rows, parts, HALVES[1])
+            often = _often(samples, rows)
+            finer = self._sampled(run, path, stretch, rows, parts * often, halves * often)
             old, new = samples.distance, finer.distance
             change = abs(float(new.max() - old.max()))
             mean = abs(finer.rms - samples.rms)
@@ -245,13 +251,13 @@ class Simulator:
         stretch: Ints,
         rows: Ints,
         parts: Ints,
-        halves: tuple[float, ...],
+        halves: Ints,
     ) -> PathSamples:
-        """Samples at the ends of ``parts`` (R,) even parts of the motions ``rows`` (R,), and where each stretch
-        starts."""
+        """Samples at the ends of ``parts`` (R,) even parts of the motions ``rows`` (R,), of ``halves`` (R,) even parts
+        of the halves of parabolas on them, and where each stretch starts."""
         opens = np.append(True, stretch[1:] != stretch[:-1])[: len(rows)]
         closes = np.append(stretch[1:] != stretch[:-1], True)[: len(rows)]
-        number, share, end = _shares(run, path, rows, parts, opens, np.array(halves))
+        number, share, end = _shares(run, path, rows, parts, opens, halves)
         motion, where = rows[number], stretch[number]
         place = place_tool(self.grid, path, where, motion, share)
         before = np.append(0.0, np.where(number[1:] == number[:-1], share[:-1], 0.0))[: len(share)]
@@ -280,13 +286,21 @@ class Simulator:
         node = (np.repeat(np.arange(len(grid.first) - 1), np.diff(grid.first)) * far + grid.arc)[some]
         vertex = grid.goal_at[some]
         last = np.searchsorted(samples.stretch, samples.stretch, side="right") - 1
-        near, best = np.searchsorted(passed, node), np.full(len(node), np.inf)
-        for shift in range(-3, 3):
-            start = np.clip(near + shift, 0, len(there) - 1)
+        best = np.full(len(node), np.inf)
+        # all that the program runs from BESIDE before it passes the place until as far after
+        gone = np.cumsum(samples.distance_along)
+        near = [np.minimum(np.searchsorted(passed, node, side), len(gone) - 1) for side in ("left", "right")]
+        first = np.searchsorted(gone, gone[near[0]] - BESIDE) - 3
+        stop = np.searchsorted(gone, gone[near[1]] + BESIDE) + 3
+        active = np.arange(len(node))
+        while len(active):
+            start = np.clip(first[active], 0, len(there) - 1)
             end = np.minimum(start + 1, last[start])
-            path, out = there[end] - there[start], vertex - there[start]
+            path, out = there[end] - there[start], vertex[active] - there[start]
             share = np.clip(np.sum(out * path, axis=1) / np.maximum(np.sum(path**2, axis=1), 1e-24), 0.0, 1.0)
-            best = np.minimum(best, lengths(out - share[:, None] * path))
+            best[active] = np.minimum(best[active], lengths(out - share[:, None] * path))
+            first[active] += 1
+            active = active[first[active] < stop[active]]
         return float(best.max(initial=0.0))
 
 
@@ -297,27 +311,45 @@ def _rows(start: Ints, stop: Ints) -> Ints:
 
 
 def _shares(
-    run: CompensationProblem, path: RunPath, rows: Ints, parts: Ints, opens: Bools, halves: Floats
+    run: CompensationProblem, path: RunPath, rows: Ints, parts: Ints, opens: Bools, halves: Ints
 ) -> tuple[Ints, Floats, Bools]:
     """The samples of the motions ``rows`` (R,): their numbers among these, shares, and whether they are at ends.
 
-    Each motion in ``parts`` (R,) even ones; of the parabolas on it at ``halves`` of their halves; of its
+    Each motion in ``parts`` (R,) even ones; the halves of the parabolas on it in ``halves`` (R,); of its
     start nothing, as it is the end of another, but where a stretch ``opens`` (R,).
     """
-    number = np.repeat(np.arange(len(rows)), parts)
-    share = (np.arange(len(number)) - np.repeat(sums(parts)[:-1], parts) + 1) / np.repeat(parts, parts)
+    number, share = _even(parts)
     first = np.flatnonzero(opens)
     numbers, shares = [number, first], [share, np.zeros(len(first))]
     length = run.desired_path.length[rows]
     following = np.where(rows + 1 < len(path.reach), rows + 1, 0)
     for at_end, reach in ((False, path.reach[rows]), (True, path.reach[following])):
         near = np.flatnonzero(reach > 0)
-        parts_of_reach = (reach[near] / length[near])[:, None] * halves
-        numbers.append(np.repeat(near, len(halves)))
-        shares.append((1 - parts_of_reach if at_end else parts_of_reach).ravel())
+        own, part = _even(halves[near])
+        part = part * (reach[near] / length[near])[own]
+        numbers.append(near[own])
+        shares.append(1 - part if at_end else part)
     number, share = np.concatenate(numbers), np.concatenate(shares)
     order = np.lexsort((share, number))
     number, share = number[order], share[order]
     other = np.append(True, (number[1:] != number[:-1]) | (share[1:] > share[:-1] + 1e-9))[: len(number)]
     number, share = number[other], share[other]
     return number, share, share == 1.0
+
+
+def _even(parts: Ints) -> tuple[Ints, Floats]:
+    """Numbers of owners, and the shares at which even ``parts`` (R,) of them end."""
+    number = np.repeat(np.arange(len(parts)), parts)
+    share = (np.arange(len(number)) - np.repeat(sums(parts)[:-1], parts) + 1) / np.repeat(parts, parts)
+    return number, share
+
+
+def _often(samples: PathSamples, rows: Ints) -> Ints:
+    """(R,) how many times as often the motions ``rows`` (R,) are to be sampled: those about the largest errors
+    more, as a peak between two samples would be missed there."""
+    often = np.ones(len(rows), np.int64)
+    worst = np.argsort(-samples.distance, kind="stable")[:WORST]
+    at = np.unique(np.searchsorted(rows, samples.motion[worst]))
+    for beside in (at - 1, at, at + 1):
+        often[np.clip(beside, 0, len(rows) - 1)] = FINER
+    return often

@@ -15,6 +15,10 @@ REACH, MARGIN = 1.5, 2.0 * MM
 """How far from the last place the next one may be, besides the path of the command: so many times the largest
 displacement of the tool, and this."""
 
+STRIDE = 3.0 * MM
+"""Of the path of the command, REACH times: places nearer to each other are all seen from the same last place, or many
+of them would lead away step by step."""
+
 _BLOCK = 128
 """Commands that are looked at together."""
 
@@ -39,21 +43,25 @@ class _Tracking:
         self.level = np.sum(self.v * self.tangent, axis=1)
         self.reach = REACH * grid.farthest + MARGIN
         self.last = len(self.v) - 2
+        self.from_arc, self.gone = float(self.arc[0]), 0.0
 
     def run(self, command: Floats, interval: Ints, part: Floats) -> None:
         """Fills in ``interval`` and ``part`` (S,) of the commands (S, 3)."""
         step = np.append(0.0, REACH * lengths(np.diff(command, axis=0)))
-        done, here = 0, float(self.arc[0])
+        done = 0
         while done < len(command):
             block = slice(done, min(done + _BLOCK, len(command)))
-            placed, share, here = self._locate(command[block], step[block], here)
+            placed, share = self._locate(command[block], step[block])
             interval[done : done + len(placed)], part[done : done + len(placed)] = placed, share
             done += len(placed)
 
-    def _locate(self, command: Floats, step: Floats, here: float) -> tuple[Ints, Floats, float]:
+    def _locate(self, command: Floats, step: Floats) -> tuple[Ints, Floats]:
         """Of the commands (B, 3), or of the first of them whose path stays in view: of the intervals near the last
-        place, ``here`` [m], where h changes from positive to negative, the one that the tool is nearest to."""
-        start = np.searchsorted(self.arc, [here - 2 * self.reach, here + 2 * self.reach + step.sum()])
+        place, where h changes from positive to negative, the one that the tool is nearest to."""
+        begin = self.from_arc
+        start = np.searchsorted(
+            self.arc, [begin - 2 * self.reach, begin + 2 * self.reach + self.gone + step.sum()]
+        )
         low, high = max(int(start[0]) - 1, 0), min(int(start[1]), self.last)
         some = self._candidates(command, low, high)
         least = -np.inf if low == 0 else float(self.arc[low])
@@ -62,7 +70,7 @@ class _Tracking:
         arc, away, steps = some.arc.tolist(), some.away.tolist(), step.tolist()
         chosen: list[int] = []
         for row in range(len(command)):
-            back, ahead = here - self.reach, here + self.reach + steps[row]
+            back, ahead = self.from_arc - self.reach, self.from_arc + self.reach + self.gone + steps[row]
             if row and (back < least or ahead > most):
                 break
             best, nearest = -1, np.inf
@@ -72,10 +80,17 @@ class _Tracking:
             if best < 0:  # nowhere square to it: the solution will show
                 if row:
                     break
-                return self._node(command[:1], back, ahead)
+                interval, share, place = self._node(command[:1], back, ahead)
+                self._go_on(place, steps[0])
+                return interval, share
             chosen.append(best)
-            here = arc[best]
-        return some.interval[chosen], some.share[chosen], here
+            self._go_on(arc[best], steps[row])
+        return some.interval[chosen], some.share[chosen]
+
+    def _go_on(self, place: float, step: float) -> None:
+        self.gone += step
+        if self.gone >= STRIDE:
+            self.from_arc, self.gone = place, 0.0
 
     def _candidates(self, command: Floats, low: int, high: int) -> _Candidates:
         """Where, in the intervals ``low`` to ``high``, the tools of the commands may be."""

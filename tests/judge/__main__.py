@@ -1,6 +1,7 @@
 """``python -m tests.judge [--rule centred|after|stretched] [words of names]``: what the judge finds of the cases.
 
-``--package FOLDER`` judges the package that lies there.
+``--package FOLDER`` judges the package that lies there.  ``--drawn COUNT [--seed S]``: of so many programs drawn at
+random instead, where a line with exit 0 that failed, or whose error ``verify`` does not see, is a defect.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import tempfile
 from pathlib import Path
 
 from .cases import CASES, DEG, PACKAGE, Outcome, run
+from .drawn import defects, drawn
 from .force import RULE
 from .motion import MM
 
@@ -40,22 +42,28 @@ def row(outcome: Outcome) -> str:
 
 
 def main(words: list[str]) -> int:
-    failed, rule, package = 0, RULE, PACKAGE
+    failed, rule, package, count, seed = 0, RULE, PACKAGE, 0, 0
     while words and words[0].startswith("--"):
         option, value, *words = words
         if option == "--rule":
             rule = value
+        elif option == "--drawn":
+            count = int(value)
+        elif option == "--seed":
+            seed = int(value)
         else:
             package = Path(value).resolve()
     print(HEADER, flush=True)
-    for case in CASES:
+    cases = [drawn(number) for number in range(seed, seed + count)] if count else CASES
+    for case in cases:
         if words and not any(word in case.name for word in words):
             continue
         with tempfile.TemporaryDirectory() as folder:
             outcome = run(case, Path(folder), verify=True, rule=rule, package=package)
-        failed += bool(outcome.failed)
-        print(row(outcome), flush=True)
-    print(f"{failed} failed")
+        wrong = defects(outcome) if count else outcome.failed
+        failed += bool(wrong)
+        print(row(outcome) + (f"  DEFECT: {'; '.join(wrong)}" if count and wrong else ""), flush=True)
+    print(f"{failed} failed" if not count else f"{failed} of {count} with a defect")
     return 1 if failed else 0
 
 

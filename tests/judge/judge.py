@@ -21,10 +21,15 @@ from .reader import read
 from .robot import Robot, check_on_mujoco, rotation_vectors
 
 STEP = 1.0 * MM
-GRID = 0.2 * MM
+SAGITTA = 2e-7
+"""[m] How far a curve may be from the chords between its samples."""
+GRID, POINTS = 0.02 * MM, 50_000
+"""Steps in which places are looked for, larger where a cut would have more of them."""
 NEARBY = 5.0 * MM
 """A tool this far from the path counts, along a stretch of it, as much as a jump along the path of the same length."""
-MARCHES, ROUNDS = 3, 8
+MARCHES, ROUNDS, BESIDE = 3, 8, 6
+REACHES, CLOSE = (1.1, 3.3, 10.0, 30.0, 100.0), (0.5, 3.0, 10.0)
+"""Steps of the grid to either side in which a place is looked for again, one after the other."""
 SETTLED = 1e-10
 BACKWARDS = 2e-6
 MATCH = 1e-9
@@ -174,14 +179,22 @@ def _stops(path: Path, low: int, high: int) -> int:
 
 
 def _samples(path: Path, low: int, high: int, step: float) -> np.ndarray:
-    """Labels along a cut: each motion in even steps, each approximated vertex at its ends, quarters and middle."""
+    """Labels along a cut: each motion and each approximated vertex in even steps, so small that the path is nowhere
+    farther than ``SAGITTA`` from the line through them."""
     some = []
     for i in range(low, high + 1):
-        count = max(4, int(np.ceil(path.length[i] / step)))
+        fine = step
+        if path.arc[i]:
+            radius = np.linalg.norm(path.place[i, 0] - path.centre[i])
+            fine = min(step, np.sqrt(8 * radius * SAGITTA))
+        count = max(4, int(np.ceil(path.length[i] / fine)))
         some.append(path.start[i] + path.length[i] * np.arange(count + 1) / count)
-    vertices = np.arange(low, high)
-    spread = np.linspace(-1, 1, 9)
-    some.append((path.start[vertices + 1][:, None] + path.approximation[vertices][:, None] * spread).ravel())
+    for i in range(low, high):
+        reach = path.approximation[i]
+        turn = path.tangent(np.array([i, i + 1]), np.array([1.0, 0.0]))
+        bulge = 0.25 * reach * np.linalg.norm(turn[1] - turn[0])
+        count = max(8, int(np.ceil(np.sqrt(bulge / SAGITTA))))
+        some.append(path.start[i + 1] + reach * np.linspace(-1, 1, count + 1))
     ends = path.start[low], path.start[high + 1]
     return np.unique(np.clip(np.concatenate(some), *ends))
 
@@ -211,16 +224,21 @@ def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes:
     for _ in range(MARCHES):
         there, tilted, gives = loaded(wrench)
         place = _march(wanted, cut, one, label, there, wrench, gives)
-        for _ in range(ROUNDS):
-            wrench = one.at(place)
-            there, tilted, gives = loaded(wrench)
-            found, lost = _refined(wanted, cut, one, place, there, wrench, gives)
-            moved, place = np.abs(found - place).max(), found
-            if moved < SETTLED:
-                break
+        place, lost = _settled(wanted, cut, one, place, loaded)
         if not lost.any():
             break
         wrench = one.at(place)
+    there, tilted, gives = loaded(one.at(place))
+    # beside a corner places may have been looked for on the wrong side: those between the good ones are others
+    away = np.linalg.norm(there - wanted.points(place, *cut), axis=1)
+    near = np.lib.stride_tricks.sliding_window_view(np.pad(away, BESIDE, mode="edge"), 2 * BESIDE + 1)
+    good = ~lost & (away <= 2.0 * np.median(near, axis=1) + 1e-7)
+    between = np.interp(label, label[good], place[good]) if good.any() else place
+    other, still = _settled(wanted, cut, one, between, loaded, CLOSE)
+    nearer = ~still & (
+        lost | (np.linalg.norm(loaded(one.at(other))[0] - wanted.points(other, *cut), axis=1) < away)
+    )
+    place, lost = np.where(nearer, other, place), lost & ~nearer
     wrench = one.at(place)
     there, tilted, gives = loaded(wrench)
     goal, straight, _ = wanted.at(place, *cut)
@@ -252,6 +270,21 @@ def _along(wanted: Path, cut: tuple, path: Path, rows: tuple, one: Field, nodes:
     }
 
 
+def _settled(
+    wanted: Path, cut: tuple, one: Field, place: np.ndarray, loaded: Callable, reaches: tuple = REACHES
+) -> tuple[np.ndarray, np.ndarray]:
+    """Labels (S,) near ``place`` at which the tool, under the wrench of that place, has the path square to it, and
+    which were not found; ``loaded``: wrenches to the tool and its compliance."""
+    for _ in range(ROUNDS):
+        wrench = one.at(place)
+        there, _, gives = loaded(wrench)
+        found, lost = _refined(wanted, cut, one, place, there, wrench, gives, reaches)
+        moved, place = np.abs(found - place).max(), found
+        if moved < SETTLED:
+            break
+    return place, lost
+
+
 def _between(one: np.ndarray, two: np.ndarray) -> np.ndarray:
     return np.arctan2(np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(1))
 
@@ -271,7 +304,7 @@ def _march(
     ways through them that is taken which is nearest to the tool, and which goes on along the path as the program goes
     on: a path that comes back the same way is not taken for its first leg again."""
     low, high = wanted.start[cut[0]], wanted.start[cut[1] + 1]
-    grid = np.linspace(low, high, max(int((high - low) / GRID), 8) + 1)
+    grid = np.linspace(low, high, min(max(int((high - low) / GRID), 8), POINTS) + 1)
     points, forces = wanted.points(grid, *cut), one.at(grid)
     tangents = wanted.direction(grid, *cut)
     free = there - np.einsum("kij,kj->ki", gives, wrench)
@@ -327,20 +360,27 @@ def _refined(
     there: np.ndarray,
     wrench: np.ndarray,
     gives: np.ndarray,
+    reaches: tuple,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The labels (S,) near ``place`` at which the path is square to the way to the tool, by bisection and
     secants; which were not found."""
     ends = wanted.start[cut[0]], wanted.start[cut[1] + 1]
+    size = max(GRID, (ends[1] - ends[0]) / POINTS)
 
     def ahead_of(rows: np.ndarray, at: np.ndarray) -> np.ndarray:
         tool = there[rows] + np.einsum("kij,kj->ki", gives[rows], one.at(at) - wrench[rows])
         return ((tool - wanted.points(at, *cut)) * wanted.direction(at, *cut)).sum(1)
 
     rows = np.arange(len(place))
-    a, b = (np.clip(place + side * 1.1 * GRID, *ends) for side in (-1, 1))
-    fa, fb = ahead_of(rows, a), ahead_of(rows, b)
+    a, b = place.copy(), place.copy()
+    fa, fb = np.zeros(len(rows)), np.zeros(len(rows))
+    lost = np.ones(len(rows), bool)
+    for reach in reaches:
+        some = np.flatnonzero(lost)
+        a[some], b[some] = (np.clip(place[some] + side * reach * size, *ends) for side in (-1, 1))
+        fa[some], fb[some] = ahead_of(some, a[some]), ahead_of(some, b[some])
+        lost = ((fa <= 0) & (a > ends[0])) | ((fb >= 0) & (b < ends[1]))
     found = np.where(fa <= 0, a, b)
-    lost = ((fa <= 0) & (a > ends[0])) | ((fb >= 0) & (b < ends[1]))
     rows = np.flatnonzero((fa > 0) & (fb < 0))
     a, b, fa, fb = a[rows], b[rows], fa[rows], fb[rows]
     for turn in range(60):

@@ -71,8 +71,9 @@ class MotionRows:
     """``chunks``: single rows and runs of common lines in their order; ``places``: rows by what is rare.
 
     ``passing``: points of spline blocks; ``entries``: first point of such a block -> line of its header.
-    ``sources_of``: rows that may start elsewhere than where the row before ends -> where.  ``left_from``: where
-    routines end after which it is not known what runs.  ``never_from``: the first row of those that never run.
+    ``arc_blends``: exact arcs -> $APO.CDIS [mm] there.  ``sources_of``: rows that may start elsewhere than where the
+    row before ends -> where.  ``left_from``: where routines end after which it is not known what runs.
+    ``never_from``: the first row of those that never run.
     """
 
     document: Document
@@ -91,6 +92,7 @@ class MotionRows:
     never_from: int | None = None
     inline: dict[int, InlineForm] = field(default_factory=dict)
     approximated: dict[int, float] = field(default_factory=dict)
+    arc_blends: dict[int, float] = field(default_factory=dict)
     builds_on: dict[int, frozenset[Source]] = field(default_factory=dict)
     reads: list[tuple[int, frozenset[Source]]] = field(default_factory=list)
     sources: defaultdict[bytes, set[Source]] = field(default_factory=lambda: defaultdict(set))
@@ -160,7 +162,7 @@ class MotionRows:
                 self.count = count
         for sparse in (
             self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative, self.whole, self.inline,
-            self.approximated, self.builds_on, self.passing, self.entries, self.sources_of,
+            self.approximated, self.arc_blends, self.builds_on, self.passing, self.entries, self.sources_of,
         ):  # fmt: skip
             while sparse and next(reversed(sparse)) >= count:
                 sparse.popitem()

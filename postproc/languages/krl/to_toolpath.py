@@ -70,6 +70,7 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
             no_insert_before=_whole(rows, several, continues),
             spline_headers=_entries(rows, several),
             orientation_programmed=_oriented(table),
+            inserted_approximation=_sparse((n,), np.nan, rows.arc_blends, MM),
         ),
         annotations=tuple(rows.annotations),
         partial_targets=PartialTargets(anchor, given),
