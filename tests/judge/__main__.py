@@ -12,7 +12,7 @@ from pathlib import Path
 
 from .cases import CASES, DEG, PACKAGE, Outcome, run
 from .drawn import defects, drawn
-from .force import RULE
+from .force import RULE, STRETCHED
 from .motion import MM
 
 HEADER = (
@@ -42,7 +42,7 @@ def row(outcome: Outcome) -> str:
 
 
 def main(words: list[str]) -> int:
-    failed, rule, package, count, seed = 0, RULE, PACKAGE, 0, 0
+    failed, rule, package, count, seed = 0, "", PACKAGE, 0, 0
     while words and words[0].startswith("--"):
         option, value, *words = words
         if option == "--rule":
@@ -59,7 +59,9 @@ def main(words: list[str]) -> int:
         if words and not any(word in case.name for word in words):
             continue
         with tempfile.TemporaryDirectory() as folder:
-            outcome = run(case, Path(folder), verify=True, rule=rule, package=package)
+            outcome = run(
+                case, Path(folder), verify=True, rule=rule or (STRETCHED if count else RULE), package=package
+            )
         wrong = defects(outcome) if count else outcome.failed
         failed += bool(wrong)
         print(row(outcome) + (f"  DEFECT: {'; '.join(wrong)}" if count and wrong else ""), flush=True)

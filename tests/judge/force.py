@@ -11,8 +11,8 @@ changes linearly over a ramp of total length r, half of it on each side (at most
 mean of both sides at the vertex.  A cut begins and ends with steps.
 
 That is the rule CENTRED.  By the rule AFTER the motion before a vertex keeps its force up to it, and the change goes
-over along r behind it; by the rule STRETCHED as well, along as much more as keeps the change of the deflection below
-0.9 mm a millimetre."""
+over along r behind it; by the rule STRETCHED as well, along as much more as keeps the deflection from growing along the
+feed by more than 0.9 mm a millimetre: the tool would not be back on its path otherwise."""
 
 from __future__ import annotations
 
@@ -66,7 +66,8 @@ class Field:
                 reach, change = ramp, begin[k + 1] - end[k]
                 if rule == STRETCHED and deflect is not None:
                     moved = deflect(low + k + 1, begin[k + 1]) - deflect(low + k + 1, end[k])
-                    reach = max(ramp, np.linalg.norm(moved) / STEEPEST)
+                    feed = path.tangent(np.array([low + k + 1]), np.zeros(1))[0]
+                    reach = max(ramp, moved @ feed / STEEPEST)
                 self.after.append((path.start[low + k + 1], reach, change))
             step = step[:0]
         lengths = path.length[self.rows]
