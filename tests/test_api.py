@@ -139,6 +139,7 @@ def test_a_table_becomes_a_data_frame(at_samples):
     assert len(frame) == 26
 
 
+@pytest.mark.slow
 def test_engagement_from_python():
     pytest.importorskip("numba")
     engaged = postproc.engage(ROOT / "samples" / "kr270_stock" / "part.ngc")

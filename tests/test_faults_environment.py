@@ -116,6 +116,7 @@ def test_a_working_folder_that_is_gone(compensate, tmp_path, monkeypatch, words)
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("length", [256, 300, 5000])
 @pytest.mark.parametrize(
     "words",

@@ -107,6 +107,7 @@ def test_lines_that_run_at_import_are_reached_by_all(tmp_path):
     assert kept.reaching("thing.py", 7, 9) == []
 
 
+@pytest.mark.slow
 def test_mutants_fall_by_the_tests_that_reach_them(tree, tmp_path):
     """And the tree is afterwards what it was, with nothing left of them."""
     quick, slow, far = (f"tests/test_thing.py::test_{word}" for word in ("quick", "slow", "far"))

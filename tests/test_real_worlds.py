@@ -18,7 +18,7 @@ def diagnosed():
     process.close()
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("number", [0, 1, 8, 10, 11])
 def test_a_wrong_length_is_named_as_that_length(diagnosed, number):
     """Not as millimetres and milliradians that cancel, however the scatter is stated."""
@@ -39,6 +39,7 @@ def test_a_scale_of_the_tracker_is_no_effect(diagnosed, number):
     assert abs(answer["tracker_scale"] - truth) < 0.5 * abs(truth) + 2e-5
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("number", [0, 1])
 def test_twins_are_never_a_name_and_correct_the_same(diagnosed, number):
     _, held, answer = diagnosed("twin", number)
@@ -58,6 +59,7 @@ def test_sides_that_are_not_stated(diagnosed, number):
     assert "DIA003" in {finding["code"] for finding in answer["findings"]}
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("number", "code"), [(0, "MEA011"), (1, "IDN034"), (2, "MEA010")], ids=["zeros", "shifted", "columns"]
 )

@@ -294,7 +294,7 @@ HOSTILE = [
 ]
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("text", HOSTILE)
 @pytest.mark.parametrize("dialect", [SINUMERIK, KUKA], ids=lambda dialect: dialect.name)
 def test_long_lines_are_taken_apart_in_linear_time(dialect, text: str) -> None:

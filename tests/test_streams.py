@@ -29,7 +29,7 @@ def shell(folder: Path, words: str, redirected: str) -> tuple[int, str]:
     return done.returncode, done.stderr.decode()
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("words", ["part.src --force", "part.src --force --json -", "part.src --force -v"])
 @pytest.mark.parametrize(
     "redirected",
@@ -44,7 +44,7 @@ def test_files_that_are_written_are_told_by_the_exit_code(job, words, redirected
     assert ("the files are written" in said) == (redirected in (">/dev/full", ">&-"))
 
 
-@pytest.mark.sample(3)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "redirected", [">/dev/full", ">&-", ">/dev/full 2>&1", "| true; exit ${PIPESTATUS[0]}"]
 )
@@ -79,6 +79,7 @@ def test_a_quiet_run_needs_no_output(job):
     assert shell(job.folder, "check part.src -q", ">/dev/full")[0] == 0
 
 
+@pytest.mark.slow
 def test_a_console_that_knows_few_letters(job):
     """cp1252, as of a Windows console, and ASCII: what they do not have is an escape."""
     job.write([LINES[0], "; \u0416\u4e2d\U0001f600", *LINES[1:]][:1] + LINES[1:])
@@ -173,6 +174,7 @@ def test_a_terminal_that_goes_away(job):
     assert codes
 
 
+@pytest.mark.slow
 def test_from_standard_input_to_standard_output(job):
     """The bytes are those of the file, and nothing else is printed or written."""
     command = [sys.executable, "-m", "postproc"]

@@ -199,6 +199,7 @@ def test_a_touched_off_base_is_corrected_on_the_plant(compensate, job, points):
     assert told[0]["line"] == 10
 
 
+@pytest.mark.slow
 def test_the_temperature_counts_from_the_reference(compensate, job):
     heavy_robot(job.folder)
     job.write(PLATE)
@@ -208,6 +209,7 @@ def test_the_temperature_counts_from_the_reference(compensate, job):
     assert OnPlant(job, 0.0).errors(POINTS).max() > 0.02 * MM
 
 
+@pytest.mark.slow
 def test_points_see_more_of_the_sag_of_a_plate_than_one_corner(compensate, job):
     """The error that a correction of the process alone leaves on a plate of 900 x 600 mm."""
     heavy_robot(job.folder)
@@ -343,6 +345,7 @@ def test_growth_without_a_temperature_and_a_temperature_without_growth(compensat
     assert found == {"COR031": ["thermal_growth by time is not corrected: the time of a run is not known"]}
 
 
+@pytest.mark.slow
 def test_an_accurate_controller_still_grows_warm(compensate, job):
     """Geometry is the controller's business; that of a warm robot is not the one it was calibrated with."""
     heavy_robot(job.folder)

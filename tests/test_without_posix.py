@@ -85,7 +85,7 @@ def run(folder: Path, words: list[str], blocked: Path | None) -> tuple[int, str,
     return done.returncode, done.stdout + done.stderr, files
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["program", "identify", "diagnose", "batch"])
 def test_the_same_bytes_without_posix_and_without_pinocchio(tmp_path, name):
     hook = tmp_path / "hook"
@@ -111,6 +111,7 @@ def test_the_same_bytes_without_posix_and_without_pinocchio(tmp_path, name):
         assert said == wanted_said
 
 
+@pytest.mark.slow
 def test_no_module_of_the_package_needs_posix_to_be_imported():
     script = BLOCK + (
         "import importlib, importlib.util, pkgutil, postproc\n"
