@@ -41,7 +41,9 @@ def defects(outcome: Outcome) -> list[str]:
     wrong = [
         word for word in wrong if not word.endswith("stops")
     ]  # what is inserted under G61 stops, and is told
-    off = np.inf if outcome.verify is None else abs(outcome.verify - 1e3 * outcome.verdict.after.largest)
+    if outcome.verify is None:  # where force and place do not converge it gives no figure, and says so
+        return wrong
+    off = abs(outcome.verify - 1e3 * outcome.verdict.after.largest)
     return wrong + ([f"verify is {off:.4f} mm off"] if off > SEEN else [])
 
 
