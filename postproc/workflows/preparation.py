@@ -22,7 +22,7 @@ from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramped_forces import ASSUMED, add_force_ramps
 from postproc.effects import Conditions
 from postproc.languages import DIALECTS, detect
-from postproc.languages.dialect import Dialect, Program, ReadingSettings
+from postproc.languages.dialect import Dialect, Program, ReadingSettings, read_with_siblings
 from postproc.model import StiffnessModel
 from postproc.process import Wrenches, is_no_force, wrenches
 from postproc.robot.axis_track import (
@@ -125,9 +125,9 @@ def read_program(
     settings = ReadingSettings(references=references)
     if cell is not None:
         settings = ReadingSettings(
-            cell.orientation, cell.integer_words, references, cell.symbols, cell.program_start
+            cell.orientation, cell.integer_words, references, (), cell.symbols, cell.program_start
         )
-    program = dialect.read(documents, settings)
+    program, settings = read_with_siblings(dialect, documents, settings)
     if not len(program.toolpath) and cell is not None and cell.dialect is not None:
         _refuse_other_language(path, main.raw, dialect, cell)
     return dialect, program, settings

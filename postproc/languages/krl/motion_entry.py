@@ -164,6 +164,7 @@ def _advance(
 ) -> None:
     if values is not None:
         state.point, state.point_frames = values, (state.base, state.tool)
+        state.point_line = line
         state.axes = state.anchor = None
     elif axes is not None:
         state.lose_point(f"after the axis motion in line {line}")

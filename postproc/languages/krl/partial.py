@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.languages.krl.modal_state import NOT_TO_TARGET, VARIES, Anchor, ModalState
+from postproc.languages.krl.modal_state import NOT_TO_TARGET, Anchor, ModalState
 from postproc.languages.krl.motion_rows import RowRefusal
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import KrlTarget, Six, six
@@ -42,7 +42,8 @@ def varying(state: ModalState, target: KrlTarget, values: Numbers) -> RowRefusal
     if not lost or (lost[0] >= 3 and state.orientation in NOT_TO_TARGET):
         return None
     names = ", ".join("XYZABC"[i] for i in lost)
-    return RowRefusal("KRL004", f"the point omits {names}, and the position is not known: {VARIES}", VARIES)
+    why = state.point_unknown
+    return RowRefusal("KRL004", f"the point omits {names}, and the position is not known: {why}", why)
 
 
 def incomplete(state: ModalState, target: KrlTarget, values: Numbers | None) -> RowRefusal | None:

@@ -37,6 +37,14 @@ class UnknownValue:
 
 
 @dataclass(frozen=True, slots=True)
+class FrameEntry(UnknownValue):
+    """A copy of an entry of BASE_DATA or TOOL_DATA whose numbers only the cell states."""
+
+    table: bytes = b""
+    number: int = 0
+
+
+@dataclass(frozen=True, slots=True)
 class KrlTarget:
     """What a point is.
 
