@@ -53,7 +53,7 @@ class Variables:
     def set(self, name: bytes, path: bytes, value: Value) -> None:
         if not path:
             # The value of the whole takes the place of all of its parts.
-            self.replace(name, {b"": value})
+            self._put(name, PersistentMap(self._paths).set(b"", Fact(value, self.line)))
             return
         entry = self.facts.names.get(name)
         if entry is None:
