@@ -222,3 +222,17 @@ def test_a_changed_file_beside_makes_a_batch_compute_again(tmp_path: Path) -> No
         before = {path: digest_of(path) for path in digests}
         (tmp_path / name).write_text(text)
         assert {path: digest_of(path) for path in digests} != before, name
+
+
+def test_a_compensated_program_has_the_files_of_the_original(tmp_path: Path) -> None:
+    """By default it lies in a folder below; ``verify`` says where the original is."""
+    text = ";COMPENSATED by compensate 1\n" + HEAD + f"init()\nLIN {FULL}\n"
+    module = "DEF init()\nBAS(#TOOL,4)\nEND\n"
+    assert dump(read(tmp_path / "compensated", text, {"../init.src": module})) == [
+        FIXED + "base [1] tool [4]"
+    ]
+    path = tmp_path / "compensated" / "part.src"
+    documents = (Document(path, path.read_bytes().replace(b"COMPENSATED", b"x")),)
+    alone, _ = read_with_siblings(KrlDialect(), documents, ReadingSettings())
+    there, _ = read_with_siblings(KrlDialect(), documents, ReadingSettings(), tmp_path)
+    assert [dump(one)[0][-8:] for one in (alone, there)] == ["tool [1]", "tool [4]"]

@@ -106,7 +106,9 @@ class Dialect(Protocol):
     def companions(self, path: Path) -> list[Path]:
         """Files beside ``path`` that belong to the program and exist (a KRL module's .dat)."""
 
-    def siblings(self, program: Program, settings: ReadingSettings) -> tuple[Document, ...]:
+    def siblings(
+        self, program: Program, settings: ReadingSettings, beside: Path | None = None
+    ) -> tuple[Document, ...]:
         """Files beside the program, not read yet, that say something of what it does not resolve.  Refusal FIL001."""
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
@@ -131,15 +133,16 @@ MOST_ROUNDS = 5
 
 
 def read_with_siblings(
-    dialect: Dialect, documents: tuple[Document, ...], settings: ReadingSettings
+    dialect: Dialect, documents: tuple[Document, ...], settings: ReadingSettings, beside: Path | None = None
 ) -> tuple[Program, ReadingSettings]:
     """A program, read with the files beside it that say what it does not say itself; the settings that name them.
 
+    beside: the folder where these are looked for first; None: that of the program.
     Raises Refusal FIL001 for a file or a folder that cannot be read.
     """
     program = dialect.read(documents, settings)
     for _ in range(MOST_ROUNDS):
-        more = dialect.siblings(program, settings)
+        more = dialect.siblings(program, settings, beside)
         if not more:
             break
         settings = replace(settings, siblings=(*settings.siblings, *more))

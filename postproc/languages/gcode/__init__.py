@@ -56,7 +56,9 @@ class GcodeDialect:
     def companions(self, path: Path) -> list[Path]:
         return []
 
-    def siblings(self, program: Program, settings: ReadingSettings) -> tuple[Document, ...]:
+    def siblings(
+        self, program: Program, settings: ReadingSettings, beside: Path | None = None
+    ) -> tuple[Document, ...]:
         return ()
 
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:

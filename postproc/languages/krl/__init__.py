@@ -60,8 +60,10 @@ class KrlDialect:
             siblings=settings.siblings,
         )
 
-    def siblings(self, program: Program, settings: ReadingSettings) -> tuple[Document, ...]:
-        return siblings.find(program, settings)
+    def siblings(
+        self, program: Program, settings: ReadingSettings, beside: Path | None = None
+    ) -> tuple[Document, ...]:
+        return siblings.find(program, settings, beside)
 
     def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
         return writer.edit_targets(program, plan, writing)

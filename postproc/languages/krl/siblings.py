@@ -24,38 +24,52 @@ _GLOBAL = re.compile(
 )
 
 
-def find(program: Program, settings: ReadingSettings) -> tuple[Document, ...]:
-    """What is not read yet of the files that declare what ``program`` does not resolve.  Raises Refusal FIL001."""
+def find(program: Program, settings: ReadingSettings, beside: Path | None = None) -> tuple[Document, ...]:
+    """What is not read yet of the files that declare what ``program`` does not resolve.
+
+    They lie in its folder, or in ``beside``; those of a program that is compensated may lie above its folder too.
+    Raises Refusal FIL001.
+    """
     wanted = program.unresolved
     if not wanted:
         return ()
     path = program.documents[0].path
+    folders = [beside or path.parent, *([path.parent.parent] if program.marker is not None else [])]
     read = {_place(one.path) for one in (*program.documents, *settings.references, *settings.siblings)}
+    stems = {one.path.stem.lower() for one in (*program.documents, *settings.siblings)}
     names = {name.upper().encode("latin-1") for name in wanted if not name.endswith("()")}
     names = {name for name in names if not name.startswith(DEFAULTS)}
-    found: dict[Path, Document] = {}
+    modules = {name[:-2].lower() for name in wanted if name.endswith("()")} - stems
+    found: list[Document] = []
     if not any("config" in one.path.stem.lower() for one in (*settings.references, *settings.siblings)):
-        found |= {one: _document(one) for one in _configs(path.parent)}
+        found += [_document(one) for one in _configs(folders[0])]
+    for folder in folders:
+        if found_here := _beside(folder, modules, names, stems):
+            found += found_here
+            break
+    return tuple(one for one in found if _place(one.path) not in read and b"\0" not in one.raw)
+
+
+def _beside(folder: Path, modules: set[str], names: set[bytes], stems: set[str]) -> list[Document]:
+    """The files of these modules in a folder, and data lists other than ``stems`` that declare one of the names."""
     try:
-        beside = [one for one in list_folder(path.parent) if one.is_file()]
+        files = [one for one in list_folder(folder) if one.is_file()]
     except FileNotFoundError:
-        beside = []
+        return []
+    for stem in modules - {one.stem.lower() for one in files if one.suffix.lower() == ".src"}:
+        note_absent(folder / f"{stem}.src")
     if names:
-        note_listing(path.parent, ".dat")
-    modules = {name[:-2].lower() for name in wanted if name.endswith("()")}
-    for one in beside:
-        if _place(one) in read or one in found:
-            continue
-        suffix, stem = one.suffix.lower(), one.stem.lower()
+        note_listing(folder, ".dat")
+    found = []
+    for file in files:
+        suffix, stem = file.suffix.lower(), file.stem.lower()
         if stem in modules and suffix in (".src", ".dat"):
-            found[one] = _document(one)
-        elif suffix == ".dat" and names and stem != path.stem.lower():
-            document = _document(one)
+            found.append(_document(file))
+        elif suffix == ".dat" and names and stem not in stems and stem != _CONFIG[:-4]:
+            document = _document(file)
             if _declares(document.raw, names):
-                found[one] = document
-    for stem in modules - {one.stem.lower() for one in beside if one.suffix.lower() == ".src"}:
-        note_absent(path.parent / f"{stem}.src")
-    return tuple(one for path, one in found.items() if _place(path) not in read and b"\0" not in one.raw)
+                found.append(document)
+    return found
 
 
 def _document(path: Path) -> Document:
