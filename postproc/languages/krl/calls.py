@@ -13,7 +13,7 @@ from postproc.languages.krl.external_axes import apart
 from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
 from postproc.languages.krl.modal_state import ELSEWHERE, FrameRegister, ModalState
-from postproc.languages.krl.other_modules import take_exit, visible
+from postproc.languages.krl.other_modules import take_exit
 from postproc.languages.krl.program_structure import Routine, closure
 from postproc.languages.krl.statement_effects import (
     EVERYTHING,
@@ -341,7 +341,7 @@ class Calls(BlockFlow):
     def _after_other(self, item: Statement, name: bytes, words: Set[bytes]) -> None:
         """Takes up what a routine of another module may change."""
         run = self.run
-        effects = visible(run.others.effects[name], run.declarations)
+        effects = run.effects_of_others[name]
         if "point" in effects:
             run.state.sources = run.rows.joined(run.state.sources | {ELSEWHERE})
         run.forget(effects | words, f"after the call of {shown(name)} in line {item.line}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -47,7 +48,8 @@ class ExecutionContext:
     structure is not understood.  ``spline``: the spline block that is open.  ``has_tcp_mode``, ``has_turning``: some
     line names another interpolation mode, or another way of turning the tool, than the usual one.  ``initial``: what
     holds where the program starts.  ``root_set``, ``later_since``: the first lines that set what ``ModalState`` calls
-    so.  ``others``: the modules that are read besides; ``unread``: routines that are called and not read; ``depth``:
+    so.  ``others``: the modules that are read besides; ``effects_of_others``: what their routines
+    change of what this one knows; ``unread``: routines that are called and not read; ``depth``:
     how many calls of other modules lead here.
     """
 
@@ -60,6 +62,7 @@ class ExecutionContext:
     has_turning: bool
     rows: MotionRows
     others: OtherModules
+    effects_of_others: Mapping[bytes, Effects]
     initial: ModalState = field(default_factory=ModalState)
     state: ModalState = field(default_factory=ModalState)
     frames: FrameRegister = field(default_factory=FrameRegister)

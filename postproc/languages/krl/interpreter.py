@@ -77,7 +77,7 @@ def read(
     read_references(declarations, data)
     bind_symbols(declarations, symbols, own)
     others = read_modules(siblings, data, symbols)
-    effects = {name: visible(of, declarations) for name, of in others.effects.items()}
+    effects = visible(others, declarations)
     surveyed = program_structure(
         _statements(code), effects, {**others.directions(), **dict(_directions(code))}
     )
@@ -97,6 +97,7 @@ def read(
             has_turning,
             MotionRows(source),
             others,
+            effects,
         )
         start_with(run, initial, symbols)
         flow = ProgramFlow(run, unfollowed)

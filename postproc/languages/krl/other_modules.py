@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from postproc.base.document import Document
 from postproc.languages.krl.data import (
@@ -31,6 +32,11 @@ MOST_DEPTH = 5
 MOST_STEPS = 100_000
 """Statements of other modules that are followed in all."""
 
+MOST_OUTCOMES = 2000
+"""Calls of other modules with different values or states that are followed in all."""
+MOST_ROUTINES = 200
+"""Routines of other modules; where there are more, none is read: each is followed into all that it calls."""
+
 _MOTION = Statement("motion", b"", b"", 0, 0)
 
 MODAL_FIELDS = (
@@ -52,13 +58,13 @@ class OtherModule:
     sets_root: bool
     apart: bool
 
-    @property
+    @cached_property
     def can_be_followed(self) -> bool:
         """Whether its routines end where their text says."""
         words = {one.word for one in self.code if isinstance(one, Statement)}
         return not self.survey.unclosed and b"RESUME" not in words
 
-    @property
+    @cached_property
     def has_trigger(self) -> bool:
         return any(isinstance(one, Statement) and one.word == b"TRIGGER" for one in self.code)
 
@@ -119,6 +125,8 @@ def read_modules(
                 found.routines[routine.name] = module, routine
     for name in twice:
         del found.routines[name]
+    if len(found.routines) > MOST_ROUTINES:
+        return OtherModules()
     for name in found.routines:
         _settle(found, name)
     return found
@@ -180,10 +188,10 @@ def _settle(found: OtherModules, name: bytes) -> None:
     found.effects[name], found.unread[name] = effects, tuple(unread)
 
 
-def visible(effects: Effects, declarations: Declarations) -> Effects:
-    """The effects of a routine without names that the caller's module declares for itself."""
+def visible(modules: OtherModules, declarations: Declarations) -> dict[bytes, Effects]:
+    """The effects of routines without names that the caller's module declares for itself."""
     own = declarations.types.keys() - declarations.shared
-    return {one for one in effects if one not in own}
+    return {name: effects - own for name, effects in modules.effects.items()}
 
 
 def state_at_entry(state: ModalState, frames: FrameRegister, inner: FrameRegister) -> ModalState:

@@ -24,7 +24,13 @@ from postproc.languages.krl.lexing import (
 from postproc.languages.krl.modal_state import ELSEWHERE, FrameRegister, InlineFormState, ModalState
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.open_blocks import BUDGET
-from postproc.languages.krl.other_modules import MOST_DEPTH, MOST_STEPS, state_at_entry
+from postproc.languages.krl.other_modules import (
+    MOST_DEPTH,
+    MOST_OUTCOMES,
+    MOST_STEPS,
+    state_at_entry,
+    visible,
+)
 from postproc.languages.krl.program_structure import INLINE, LATER, Routine, closure
 from postproc.languages.krl.statement_effects import EVERYTHING, HIDDEN, effects_of
 from postproc.languages.krl.vectorised import Item, VectorisedLines
@@ -87,19 +93,21 @@ class ProgramFlow(Calls):
         key = name, repr((entry, register.refs(), given))
         if key not in others.outcomes:
             others.outcomes[key] = None  # of a call of itself nothing is known
-            if run.depth < MOST_DEPTH and others.steps < MOST_STEPS and module.can_be_followed:
+            few = run.depth < MOST_DEPTH and len(others.outcomes) < MOST_OUTCOMES
+            if few and others.steps < MOST_STEPS and module.can_be_followed:
                 inner = replace(
                     run, document=module.document, code=module.code, survey=module.survey,
                     declarations=module.declarations, variables=module.variables(others),
-                    rows=MotionRows(module.document), initial=entry, state=ModalState(), frames=register,
-                    spline=None, opaque=None, findings=[], mentioned=set(), reported=set(), followed={},
-                    walked_rows=[], unread=set(), walked=False, idle=False, depth=run.depth + 1,
+                    effects_of_others=visible(others, module.declarations), rows=MotionRows(module.document),
+                    initial=entry, state=ModalState(), frames=register, spline=None, opaque=None, findings=[],
+                    mentioned=set(), reported=set(), followed={}, walked_rows=[], unread=set(), walked=False,
+                    idle=False, depth=run.depth + 1,
                 )  # fmt: skip
                 following = ProgramFlow(inner, Unfollowed())
                 with contextlib.suppress(Restart):
                     flow = following.outcome(routine, given)
                     others.outcomes[key] = None if flow is None else (flow.state, register)
-                others.steps += following.steps
+                others.steps += following.steps + len(module.declarations.types)
         return others.outcomes[key]
 
     def _run(self, routine: Routine) -> None:
