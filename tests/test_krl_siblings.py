@@ -103,8 +103,9 @@ def test_the_cell_goes_before_the_files_and_then_none_is_read(tmp_path: Path) ->
     symbols: dict[str, Symbol] = {"FHOME": {"TOOL_NO": 5.0, "BASE_NO": 6.0}}
     program = read(tmp_path, HOME, {"$config.dat": CONFIG}, symbols)
     assert "base [6] tool [5]" in dump(program)[1]
-    program = read(tmp_path, HEAD + f"LIN {FULL}\n", {"$config.dat": CONFIG})
+    program = read(tmp_path, HEAD + f"$BASE=BASE_DATA[2]\nLIN {FULL}\n", {"$config.dat": CONFIG})
     assert said(program) == []
+    assert program.unresolved == frozenset()
 
 
 def test_what_the_last_run_left_in_a_file_is_not_known(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from postproc.languages.krl.data import (
 )
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
-from postproc.languages.krl.lexing import Head, Statement, lines, module_name
+from postproc.languages.krl.lexing import FRAME_TABLES, Head, Statement, lines, module_name
 from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.other_modules import is_module, read_modules, visible
 from postproc.languages.krl.program_flow import ProgramFlow
@@ -135,7 +135,7 @@ def _directions(code: Sequence[Item]) -> Iterator[tuple[bytes, tuple[bool, ...]]
 
 def _unresolved(run: ExecutionContext) -> frozenset[str]:
     """Names that the program asks for and no file that was read declares; routines with ()."""
-    known = {*run.declarations.types, *run.declarations.values, *run.declarations.records}
+    known = {*FRAME_TABLES, *run.declarations.types, *run.declarations.values, *run.declarations.records}
     known |= {name for routine in run.survey.routine_at.values() for name in routine.types}
     names = {name for name in run.variables.asked - known if not name.startswith(b"$")}
     calls = run.unread | {name for of in run.others.unread.values() for name in of}
@@ -145,7 +145,7 @@ def _unresolved(run: ExecutionContext) -> frozenset[str]:
 def _report_siblings(run: ExecutionContext, siblings: Sequence[Document]) -> None:
     """Says which files beside the program are read, and for what."""
     used: dict[str, list[str]] = {}
-    for name in sorted(run.variables.asked & run.declarations.origin.keys()):
+    for name in sorted(run.variables.asked & run.declarations.origin.keys() - set(FRAME_TABLES)):
         used.setdefault(run.declarations.origin[name], []).append(shown(name))
     for name, (module, _) in sorted(run.others.routines.items()):
         used.setdefault(module.document.path.name, []).append(f"{shown(name)}()")
