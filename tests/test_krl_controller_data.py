@@ -76,6 +76,8 @@ def test_a_program_starts_with_the_state_of_the_cell() -> None:
         ("MINE=BASE_DATA[2]\nelsewhere(MINE)\n$BASE=MINE\n", "base ?"),
         ("EXT elsewhere(FRAME:IN)\nMINE=BASE_DATA[2]\nelsewhere(MINE)\n$BASE=MINE\n", "base [2]"),
         ("EXT elsewhere(INT:IN,FRAME:OUT)\nMINE=BASE_DATA[2]\nelsewhere(1,MINE)\n$BASE=MINE\n", "base ?"),
+        ("EXT elsewhere(REAL[,]:IN,FRAME:OUT)\nMINE=BASE_DATA[2]\nelsewhere(n,MINE)\n$BASE=MINE\n", "base ?"),
+        ("EXTFCT INT elsewhere(FRAME:IN)\nMINE=BASE_DATA[2]\nelsewhere(MINE)\n$BASE=MINE\n", "base [2]"),
         ("MINE=BASE_DATA[2]\nelsewhere(MINE.X+1)\n$BASE=MINE\n", "base [2]"),
         ("MINE=BASE_DATA[2]\nLIN MINE\n$BASE=MINE\n", "base [2]"),
     ],

@@ -36,7 +36,7 @@ def dump(program: Program) -> list[str]:
 
 
 def said(program: Program) -> list[str]:
-    return [finding.message for finding in program.findings if finding.code == "KRL032"]
+    return [finding.message for finding in program.findings if finding.code == "KRL033"]
 
 
 def dat(text: str, name: str = "$CONFIG") -> str:

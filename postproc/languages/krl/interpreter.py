@@ -154,7 +154,7 @@ def _report_siblings(run: ExecutionContext, siblings: Sequence[Document]) -> Non
         if names:
             more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
             message = f"{document.path} is read for {', '.join(names[:MOST_NAMES])}{more}"
-            run.findings.append(Finding("KRL032", message, str(run.document.path)))
+            run.findings.append(Finding("KRL033", message, str(run.document.path)))
 
 
 def _statements(code: Sequence[Item]) -> Iterator[tuple[int, Statement]]:

@@ -72,6 +72,7 @@ _INDEX = rb"(?:\[[^\]]*+\][ \t]*+)?"
 _RETURNED = re.compile(
     rb"[ \t]*+(" + NAME + rb")[ \t]*+" + _INDEX + rb"(?:\.[ \t]*+" + NAME + rb"[ \t]*+" + _INDEX + rb")*+\Z"
 )
+_DIMENSIONS = re.compile(rb"\[[^\]\[]*+\]")
 _EXTERNAL = re.compile(
     rb"EXT(?:FCT[ \t]++" + NAME + rb"(?:\[[^\]]*+\])?|P)?+[ \t]++(" + NAME + rb")[ \t]*+\(([^)]*+)\)", re.I
 )
@@ -164,7 +165,8 @@ def declared_external(statement: Statement) -> tuple[bytes, tuple[bool, ...]] | 
 
 def directions(parameters: bytes) -> tuple[bool, ...]:
     """Of each parameter in the head of a routine whether it comes back changed."""
-    return tuple(not part.rstrip().upper().endswith(b"IN") for part in parameters.split(b",")[:50])
+    parts = _DIMENSIONS.sub(b"", parameters).split(b",")[:50]
+    return tuple(not part.rstrip().upper().endswith(b"IN") for part in parts)
 
 
 def returned_by(said: Call, known: Directions) -> frozenset[bytes]:
