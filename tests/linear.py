@@ -71,7 +71,8 @@ KRL_LINES = (
     "FOR I=1 TO 10\nLIN_REL {X 0.1}\nENDFOR\n",
     "FOR I=1 TO 900\nLIN_REL {X 0.1}\nENDFOR\n", "P%d=P1\n", "LIN P1\n", "CIRC {X 1},{X %d}\n", "; a%d\n",
     "TRIGGER WHEN DISTANCE=0 DELAY=0 DO F%d()\n", "WAIT SEC 1\n", "ENUM E%d a,b\n", "STRUC S%d INT a\n",
-    "RETURN\n",
+    "RETURN\n", "REPEAT\nSPL {X 1}\nUNTIL $IN[1]\n", "WHILE $IN[1]\nLIN {X 1}\nENDWHILE\n", "CALL(P%d,1)\n",
+    "EXT F%d(INT:IN)\n", "P%d=BASE_DATA[2]\n$BASE=P1\n",
 )  # fmt: skip
 AROUND = {
     "FOR": ("FOR I=1 TO 1000", "ENDFOR"), "FOR twice": ("FOR I=1 TO 9\nFOR J=1 TO 9", "ENDFOR\nENDFOR"),

@@ -60,3 +60,35 @@ def test_a_program_starts_with_the_state_of_the_cell() -> None:
     assert lines == ["2 LIN X 9 Y 2 Z 3 A 4 B 5 C 6 base [3] tool [2]"]
     part = InitialState(2, 3, {"X": 1.0})
     assert "refused KRL004" in next(read("LIN {X 9}\n", initial=part).toolpath.dump())
+
+
+@pytest.mark.parametrize(
+    ("text", "frames"),
+    [
+        ("MINE=BASE_DATA[2]\n$BASE=MINE\n", "base [2]"),
+        ("n=2\nMINE=BASE_DATA[n+1]\n$BASE=MINE\n", "base [3]"),
+        ("MINE=BASE_DATA[2]\nBASE_DATA[2]={X 7,Y 0,Z 0,A 0,B 0,C 0}\n$BASE=MINE\n", "base ?"),
+        ("BASE_DATA[2]={X 7,Y 0,Z 0,A 0,B 0,C 0}\nMINE=BASE_DATA[2]\n$BASE=MINE\n", "base {7 0 0 0 0 0}"),
+        ("MINE=TOOL_DATA[2]\n$BASE=MINE\n", "base ?"),
+        ("MINE=BASE_DATA[2]\nMINE.X=5\n$BASE=MINE\n", "base ?"),
+        ("IF $IN[1] THEN\nMINE=BASE_DATA[2]\nELSE\nMINE=BASE_DATA[3]\nENDIF\n$BASE=MINE\n", "base ?"),
+        ("IF $IN[1] THEN\nMINE=BASE_DATA[2]\nELSE\nMINE=BASE_DATA[2]\nENDIF\n$BASE=MINE\n", "base [2]"),
+        ("MINE=BASE_DATA[2]\nelsewhere(MINE)\n$BASE=MINE\n", "base ?"),
+        ("EXT elsewhere(FRAME:IN)\nMINE=BASE_DATA[2]\nelsewhere(MINE)\n$BASE=MINE\n", "base [2]"),
+        ("EXT elsewhere(INT:IN,FRAME:OUT)\nMINE=BASE_DATA[2]\nelsewhere(1,MINE)\n$BASE=MINE\n", "base ?"),
+        ("EXT elsewhere(REAL[,]:IN,FRAME:OUT)\nMINE=BASE_DATA[2]\nelsewhere(n,MINE)\n$BASE=MINE\n", "base ?"),
+        ("EXTFCT INT elsewhere(FRAME:IN)\nMINE=BASE_DATA[2]\nelsewhere(MINE)\n$BASE=MINE\n", "base [2]"),
+        ("MINE=BASE_DATA[2]\nelsewhere(MINE.X+1)\n$BASE=MINE\n", "base [2]"),
+        ("MINE=BASE_DATA[2]\nLIN MINE\n$BASE=MINE\n", "base [2]"),
+    ],
+)
+def test_a_copy_of_a_numbered_frame_is_that_frame(text: str, frames: str) -> None:
+    program = read(f"DECL FRAME MINE\nDECL INT n\nBAS(#TOOL,1)\n{text}LIN {FULL}\n")
+    assert f" {frames} tool [1]" in list(program.toolpath.dump())[-1]
+
+
+def test_a_point_that_varies_names_the_lines_that_set_it() -> None:
+    text = "BAS(#BASE,1)\nBAS(#TOOL,1)\nIF $IN[1] THEN\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0}\nELSE\n"
+    program = read(text + "LIN {X 9,Y 2,Z 3,A 0,B 0,C 0}\nENDIF\nLIN {Y 5,Z 3,A 0,B 0,C 0}\n")
+    (refused,) = program.toolpath.constraints.refused.values()
+    assert refused.message == "the point omits X, and the position is not known: it varies: line 5 or line 7"

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from krl_judge.claims import Claim, Tables, read_claims
-from krl_judge.judge import TABLES, Case, align, differs, execute, judge, shrunk
+from krl_judge.judge import TABLES, Case, align, differs, execute, judge, judge_split, shrunk
 from krl_judge.machine import load, run
 from krl_judge.misreadings import MISREADINGS, Misreading
 from krl_judge.motions import Executed, Six
@@ -380,3 +380,15 @@ def test_the_programs_are_worth_judging() -> None:
     verdicts = [judge(Generator(seed).case()) for seed in range(1, 21)]
     assert sum(v.stopped for v in verdicts) < 0.1 * sum(v.runs for v in verdicts)
     assert sum(v.known for v in verdicts) > 0.2 * sum(v.motions for v in verdicts) > 100
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(600_000, 600_040, 10))
+def test_what_other_modules_leave_is_what_they_leave(first: int) -> None:
+    """The same programs with each routine but the first in a module of its own."""
+    known = 0
+    for seed in range(first, first + 10):
+        verdict = judge_split(Generator(seed).case())
+        assert not verdict.disagreements, (seed, verdict.disagreements)
+        known += verdict.known
+    assert known

@@ -182,7 +182,7 @@ def test_a_routine_has_at_most_fifty_parameters_that_are_read() -> None:
 def test_declarations(
     code: bytes, kind: bytes, is_global: bool, items: tuple[tuple[bytes | None, bytes, int], ...]
 ) -> None:
-    assert declaration(code, 100) == Declared(kind, is_global, items)
+    assert declaration(code, 100) == Declared(kind, is_global, items, b"CONST" in code)
 
 
 @pytest.mark.parametrize("code", [b"DECL INTERRUPT x", b"DECL DECL x", b"INT", b"INT 5", b"INT  ", b"x=5"])
@@ -625,7 +625,8 @@ SIX = {"base", "tool", "feed", "apo", "mode", "turning"}
         ("BAS(#FRAMES)", {"base", "tool", "mode"}, ""), ("BAS(#CP_DAT)", {"feed", "apo", "turning"}, ""),
         ("BAS(#PTP_DAT)", {"apo"}, ""),
         ("BAS(#VEL_CP,1)", {"feed"}, ""), ("BAS(#TOOL,1)", {"tool"}, ""), ("BAS(#EX_BASE,1)", {"base"}, ""),
-        ("go(x,y[i])", {b"X", b"Y", b"I"}, "GO"), ("H50(x)", set(), "H50"), ("SR_x(y)", set(), "SR_X"),
+        ("go(x,y[i])", {b"X", b"Y"}, "GO"), ("go(x+1,(y),z.A)", {b"Z"}, "GO"), ("H50(x)", set(), "H50"),
+            ("SR_x(y)", set(), "SR_X"),
         ("FOR i = 1 TO n", {b"I"}, ""), ("FOR 5", set(), ""), ("IF LIN THEN", set(), ""), ("5 LIN P", {"point"}, ""),
         ("5 LINE P", set(), ""), ("WAIT FOR LIN", set(), ""), ("5 $LIN", set(), ""), ("5 #PTP", set(), ""),
         ("l\xe5 x", {"point"}, ""), ("l\xe5 x=1", EVERYTHING, ""), ("l\xe5 (1)", EVERYTHING, ""),

@@ -28,8 +28,8 @@ CASES = Path(__file__).parent / "programs" / "krl"
 GOOD = sorted(CASES.glob("*.src"))
 BAD = sorted((CASES / "bad").glob("*.src"))
 FRAMES = "BAS(#BASE,1)\nBAS(#TOOL,1)\n"
-WRITTEN = {"KRL007", "FIL011"}
-"""Codes that only a writer gives, or who knows the frames."""
+WRITTEN = {"KRL007", "KRL033", "FIL011"}
+"""Codes that only a writer gives, or who knows the frames or the folder."""
 
 FULL = "LIN {X 1,Y 2,Z 3,A 4,B 5,C 6}\n"
 

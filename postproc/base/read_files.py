@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import stat
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
@@ -47,6 +48,16 @@ def list_folder(folder: Path) -> list[Path]:
     except OSError as error:
         message = f"the folder cannot be listed, so a file of the program may be missed: {error.strerror}"
         raise Refusal(Finding("FIL001", message, str(folder))) from None
+
+
+def note_absent(path: Path) -> None:
+    """A file that would have been read is not there: a recorded run counts as changed once it is."""
+    sys.audit("open", str(path), "r", 0)
+
+
+def note_listing(folder: Path, suffix: str) -> None:
+    """It matters which files of this suffix a folder holds: a recorded run counts as changed once others are there."""
+    sys.audit("open", str(folder / f"*{suffix}"), "r", 0)
 
 
 def _read(path: Path, largest: int | None, take: Callable[[BinaryIO], bytes]) -> bytes:

@@ -23,8 +23,13 @@ ABSENT = "absent"
 
 
 def digest_of(path: Path | str) -> str:
-    """SHA-256 of a file, or ``ABSENT``, as of what is no file: a pipe and a device have no end."""
+    """SHA-256 of a file, or ``ABSENT``, as of what is no file: a pipe and a device have no end; of ``folder/*.dat``
+    that of the names of such files."""
+    folder, name = os.path.split(path)
     try:
+        if name.startswith("*.") and not os.path.exists(path):
+            names = sorted(one for one in os.listdir(folder) if one.lower().endswith(name[1:]))
+            return hashlib.sha256("/".join(names).encode(errors="surrogateescape")).hexdigest()
         if not stat.S_ISREG(os.stat(path).st_mode):
             return ABSENT
         with open(path, "rb") as stream:

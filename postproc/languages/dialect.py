@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from codecs import BOM_UTF8
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -27,6 +27,7 @@ class Program:
     ``documents``: the main file first, then the files that travel with it.  ``marker``: the comment that says
     the program is compensated, if it has one.  ``marker_at``: where that comment goes (document 0).
     ``names``: spans of the module's own name, per document, to be renamed with another stem.
+    ``unresolved``: what the program names and nothing that was read declares.
     ``text``: what the dialect knows of the text, for its own writer; nobody else reads it.
     """
 
@@ -38,6 +39,7 @@ class Program:
     marker: Span | None
     marker_at: Span
     names: tuple[Span, ...]
+    unresolved: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +50,7 @@ class ReadingSettings:
     spin about the tool axis is measured from; None where nothing states it.  integer_words: what X10 means where a
     control may count in increments, "mm" or "um", "" where nothing states it.  references: files that are read and
     never written ($config.dat).
+    siblings: files that lie beside the program or above it and say what it does not say itself, read like these.
     symbols: name that only the controller knows (capitals) -> its value, mm and deg where it is a pose; initial: the
     state at the first statement.
     places: what only writing needs is wanted too (``Program.text``); a dialect may give None without.
@@ -56,6 +59,7 @@ class ReadingSettings:
     orientation: Floats | None = None
     integer_words: str = ""
     references: tuple[Document, ...] = ()
+    siblings: tuple[Document, ...] = ()
     symbols: Mapping[str, Symbol] = field(default_factory=dict)
     initial: InitialState = UNSTATED
     places: bool = True
@@ -102,6 +106,11 @@ class Dialect(Protocol):
     def companions(self, path: Path) -> list[Path]:
         """Files beside ``path`` that belong to the program and exist (a KRL module's .dat)."""
 
+    def siblings(
+        self, program: Program, settings: ReadingSettings, beside: Path | None = None
+    ) -> tuple[Document, ...]:
+        """Files beside the program, not read yet, that say something of what it does not resolve.  Refusal FIL001."""
+
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
         """Read a program; never raises on its content: what is not understood becomes a finding."""
 
@@ -117,6 +126,28 @@ class Dialect(Protocol):
 
     def renamed(self, program: Program, stem: str) -> list[Edit]:
         """Edits that give the module another name.  Raises Refusal FIL011 for one that the language does not allow."""
+
+
+MOST_ROUNDS = 5
+"""Times that a program is read again with files that the last reading asked for."""
+
+
+def read_with_siblings(
+    dialect: Dialect, documents: tuple[Document, ...], settings: ReadingSettings, beside: Path | None = None
+) -> tuple[Program, ReadingSettings]:
+    """A program, read with the files beside it that say what it does not say itself; the settings that name them.
+
+    beside: the folder where these are looked for first; None: that of the program.
+    Raises Refusal FIL001 for a file or a folder that cannot be read.
+    """
+    program = dialect.read(documents, settings)
+    for _ in range(MOST_ROUNDS):
+        more = dialect.siblings(program, settings, beside)
+        if not more:
+            break
+        settings = replace(settings, siblings=(*settings.siblings, *more))
+        program = dialect.read(documents, settings)
+    return program, settings
 
 
 def put_mark(program: Program, comment: bytes) -> Edit:

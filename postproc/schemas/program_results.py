@@ -155,7 +155,7 @@ _PROGRAM: dict[str, Schema] = {
         "error plus uncertainty against the tolerance; null for predict", VERDICTS, nullable=True
     ),
     "model": MODEL,
-    "digests": by_name(word("SHA-256, hexadecimal"), "robot, and each file of the program"),
+    "digests": by_name(word("SHA-256, hexadecimal"), "robot, and each file that is read for the program"),
     **ENDING,
 }
 

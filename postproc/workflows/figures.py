@@ -77,7 +77,10 @@ def report_of(
         model=_model(ready),
         digests={
             "robot": ready.robot.digest,
-            **{document.path.name: document.digest for document in ready.program.documents},
+            **{
+                document.path.name: document.digest
+                for document in (*ready.settings.siblings, *ready.program.documents)
+            },
         },
         findings=findings,
         exit=exit_code(findings, request.strict),

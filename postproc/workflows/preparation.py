@@ -22,7 +22,7 @@ from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramped_forces import ASSUMED, add_force_ramps
 from postproc.effects import Conditions
 from postproc.languages import DIALECTS, detect
-from postproc.languages.dialect import Dialect, Program, ReadingSettings
+from postproc.languages.dialect import Dialect, Program, ReadingSettings, read_with_siblings
 from postproc.model import StiffnessModel
 from postproc.process import Wrenches, is_no_force, wrenches
 from postproc.robot.axis_track import (
@@ -67,6 +67,7 @@ class Request:
     no_insert: bool = False
     shared_points: str = "copy-inline"
     config_dat: Path | None = None
+    beside: Path | None = None
     tare: bool = False
     keep_table: bool = False
     stream: Callable[[bytes], object] | None = None
@@ -103,31 +104,30 @@ def silent(_stage: str) -> None:
 
 
 def read_program(
-    path: Path, cell: Cell | None = None, config_dat: Path | None = None
+    path: Path, cell: Cell | None = None, config_dat: Path | None = None, beside: Path | None = None
 ) -> tuple[Dialect, Program, ReadingSettings]:
     """Read a program and what belongs to it, with what the cell states of its language.
 
-    ``config_dat``: instead of the cell's.  Raises Refusal FIL001, FIL002, FIL003, YML004.
+    ``config_dat``: instead of the cell's; ``beside``: the folder of what it calls, where that is not its own.
+    Raises Refusal FIL001, FIL002, FIL003, YML004.
     """
-    main = read_document(path)
-    if not main.raw.strip():
+    if not (main := read_document(path)).raw.strip():
         raise Refusal(Finding("FIL002", "the file is empty", str(path)))
     dialect = _dialect(path, main.raw, cell)
     companions = dialect.companions(path)
     if any(companion.samefile(path) for companion in companions):
-        name = path.with_suffix(".src").name
-        message = f"a {path.suffix} file contains the data of a program; the program is {name}"
-        raise Refusal(Finding("FIL009", message, str(path), help=f"name {name}: its data are read with it"))
+        name, message = path.with_suffix(".src").name, f"a {path.suffix} file contains the data of a program"
+        help = f"name {name}: its data are read with it"
+        raise Refusal(Finding("FIL009", f"{message}; the program is {name}", str(path), help=help))
     documents = (main, *(read_document(companion) for companion in companions))
     if config_dat is None and cell is not None and cell.config_dat is not None:
         config_dat = cell.path.parent / cell.config_dat
     references = () if config_dat is None else (read_document(config_dat),)
     settings = ReadingSettings(references=references)
     if cell is not None:
-        settings = ReadingSettings(
-            cell.orientation, cell.integer_words, references, cell.symbols, cell.program_start
-        )
-    program = dialect.read(documents, settings)
+        stated = cell.orientation, cell.integer_words, references, (), cell.symbols, cell.program_start
+        settings = ReadingSettings(*stated)
+    program, settings = read_with_siblings(dialect, documents, settings, beside)
     if not len(program.toolpath) and cell is not None and cell.dialect is not None:
         _refuse_other_language(path, main.raw, dialect, cell)
     return dialect, program, settings
@@ -185,7 +185,7 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     if not os.path.isfile(request.program):
         read_document(request.program)  # raises the reason
     cell = cell_of(request)
-    dialect, read, settings = read_program(request.program, cell, request.config_dat)
+    dialect, read, settings = read_program(request.program, cell, request.config_dat, request.beside)
     beside = None if request.robot else cell.path.parent
     robot = load_robot(find_robot(cell.robot, beside))
     full = StiffnessModel.from_robot(robot)

@@ -78,7 +78,8 @@ def verify(request: Request, compensated: Path, step: float = STEP, stage: Stage
 
 def _without_force(request: Request, compensated: Path, ready: Prepared) -> Request:
     """The compensated program in the cell of the original; its forces are those of the original's path."""
-    return replace(request, program=compensated, force=None, cell=request.cell or _cell_of(ready))
+    cell = request.cell or _cell_of(ready)
+    return replace(request, program=compensated, force=None, cell=cell, beside=request.program.parent)
 
 
 def _cell_of(ready: Prepared) -> Path | None:

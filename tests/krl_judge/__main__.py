@@ -6,8 +6,9 @@ import argparse
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 
-from .judge import Case, judge, shrunk
+from .judge import Case, Verdict, judge, judge_split, shrunk
 from .programs import Generator
 
 
@@ -18,12 +19,16 @@ def main() -> int:
         "--seed", type=int, default=1, help="of the first program; each next one has the next"
     )
     parser.add_argument("--show", type=int, default=10, help="disagreements that are shrunk and printed")
+    parser.add_argument(
+        "--split", action="store_true", help="all routines but the first in modules of their own"
+    )
     given = parser.parse_args()
+    judged = judge_split if given.split else judge
     total: Counter[str] = Counter()
     start, wrong = time.perf_counter(), 0
     for seed in range(given.seed, given.seed + given.count):
         case = Generator(seed).case()
-        verdict = judge(case)
+        verdict = judged(case)
         total.update(
             {
                 name: getattr(verdict, name)
@@ -33,7 +38,7 @@ def main() -> int:
         if verdict.disagreements:
             wrong += 1
             if wrong <= given.show:
-                show(seed, case, verdict.disagreements[0].word)
+                show(seed, case, verdict.disagreements[0].word, judged)
     print(f"{given.count} programs, {total['runs']} runs, {total['stopped']} of them stopped before the end")
     print(f"{total['motions']} motions executed, claimed known {share(total['known'], total['motions'])}")
     print(
@@ -48,12 +53,12 @@ def share(part: int, whole: int) -> str:
     return f"{part} ({100 * part / max(whole, 1):.1f} %)"
 
 
-def show(seed: int, case: Case, word: str) -> None:
+def show(seed: int, case: Case, word: str, judged: Callable[[Case], Verdict]) -> None:
     """Prints the smallest program that still disagrees in that word."""
-    small = shrunk(case, lambda smaller: any(d.word == word for d in judge(smaller).disagreements))
+    small = shrunk(case, lambda smaller: any(d.word == word for d in judged(smaller).disagreements))
     print(f"--- seed {seed}")
     print(small, end="")
-    for found in judge(small).disagreements:
+    for found in judged(small).disagreements:
         print(f"    line {found.line}: {found.what}")
     print(flush=True)
 

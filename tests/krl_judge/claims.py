@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,7 @@ from .values import FRAME, matrix
 
 Tables = dict[str, dict[int, Six]]
 NEVER_RUNS = "KRL023"
+_ROUTINE = re.compile(r"^[ \t]*(?:GLOBAL[ \t]+)?DEF(?:FCT[ \t]+\w+)?[ \t]+(\w+)", re.I | re.M)
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,25 @@ def read_claims(src: str, dat: str, config: str, tables: Tables) -> list[Claim]:
     references = (Document(Path("$config.dat"), config.encode("latin-1")),) if config else ()
     program = DIALECTS["krl"].read(tuple(documents), ReadingSettings(references=references))
     return [_claim(program.toolpath, row, tables) for row in range(len(program.toolpath))]
+
+
+def read_split_claims(src: str, dat: str, config: str, tables: Tables) -> list[Claim]:
+    """The claims of the first routine alone: each other one is a module of its own, and the .dat belongs to all."""
+    main, modules = split(src)
+    data = "".join(f"{text}\n" for text in (config, dat) if text)
+    others = [("$config.dat", data), *((f"{name}.src", text) for name, text in modules.items())]
+    siblings = tuple(Document(Path(name), text.encode("latin-1")) for name, text in others)
+    document = Document(Path("part.src"), main.encode("latin-1"))
+    program = DIALECTS["krl"].read((document,), ReadingSettings(siblings=siblings))
+    return [_claim(program.toolpath, row, tables) for row in range(len(program.toolpath))]
+
+
+def split(src: str) -> tuple[str, dict[str, str]]:
+    """The first routine of a program, and the others by their names."""
+    starts = [found.start() for found in _ROUTINE.finditer(src)] + [len(src)]
+    texts = [src[start:stop] for start, stop in pairwise(starts[1:])]
+    names = [_ROUTINE.match(text)[1].lower() for text in texts]  # type: ignore[index]
+    return src[: starts[1]], dict(zip(names, texts, strict=True))
 
 
 def _claim(path: Toolpath, row: int, tables: Tables) -> Claim:

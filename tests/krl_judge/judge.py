@@ -115,6 +115,14 @@ def judge(case: Case, reader: Reader | None = None) -> Verdict:
     )
 
 
+def judge_split(case: Case) -> Verdict:
+    """As ``judge``, where every routine but the first is in a module of its own, of which nothing is claimed."""
+    last = claims.split(case.src)[0].count("\n")
+    verdict = judge(case, claims.read_split_claims)
+    own = tuple(one for one in verdict.disagreements if one.line <= last)
+    return replace(verdict, disagreements=own)
+
+
 def wrong_starts(claimed: Sequence[Claim], motions: Sequence[Executed]) -> Iterator[tuple[int, str]]:
     """Motions that are said to start where the one before them in the text ends, and to be the only ones that do, but
     are not; of lines with one row."""

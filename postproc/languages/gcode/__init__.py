@@ -56,6 +56,11 @@ class GcodeDialect:
     def companions(self, path: Path) -> list[Path]:
         return []
 
+    def siblings(
+        self, program: Program, settings: ReadingSettings, beside: Path | None = None
+    ) -> tuple[Document, ...]:
+        return ()
+
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
         control = self.control if self.prepared is None else self.prepared(documents[0].raw)
         return reader.read(documents, control, settings)

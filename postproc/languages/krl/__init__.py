@@ -19,7 +19,7 @@ from postproc.languages.dialect import (
     put_mark,
 )
 from postproc.languages.krl import codes as codes
-from postproc.languages.krl import interpreter, writer
+from postproc.languages.krl import interpreter, siblings, writer
 
 _CLAIM = re.compile(
     rb"^(?:\xef\xbb\xbf)?[ \t]*(?:(?:GLOBAL[ \t]+)?DEF[ \t]+[A-Za-z_$][A-Za-z0-9_$]*[ \t]*(?:\(|;|\r?$)"
@@ -57,7 +57,13 @@ class KrlDialect:
             places=settings.places,
             symbols=settings.symbols,
             initial=settings.initial,
+            siblings=settings.siblings,
         )
+
+    def siblings(
+        self, program: Program, settings: ReadingSettings, beside: Path | None = None
+    ) -> tuple[Document, ...]:
+        return siblings.find(program, settings, beside)
 
     def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
         return writer.edit_targets(program, plan, writing)

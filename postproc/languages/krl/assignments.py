@@ -25,9 +25,11 @@ from postproc.languages.krl.target import (
     AXES,
     COMPONENTS,
     EXTERNAL,
+    FrameEntry,
     KrlTarget,
     UnknownValue,
     fields,
+    known,
     parse,
     shown,
 )
@@ -196,7 +198,7 @@ def _set_speed(run: ExecutionContext, said: Assignment) -> None:
         speed = run.value(found[1].strip()) if found[1].strip() else 0
         state.feed = float(speed) if is_number(speed) else NAN
         if state.feed <= 0:
-            state.feed = _number(run, run.declarations.records.get(found[2].strip().upper()), b"VEL")
+            state.feed = _number(run, run.record(found[2].strip().upper()), b"VEL")
         return
     text = value if said.path else fields(value).get(b"CP", b"")
     # An aggregate without CP leaves it as it was.
@@ -208,7 +210,7 @@ def _set_speed(run: ExecutionContext, said: Assignment) -> None:
 def _set_rounding(run: ExecutionContext, said: Assignment) -> None:
     state, value = run.state, said.value.strip()
     if found := _ROUNDING.match(value):
-        state.blend = _number(run, run.declarations.records.get(found[1].strip().upper()), b"APO_DIST")
+        state.blend = _number(run, run.record(found[1].strip().upper()), b"APO_DIST")
         return
     if said.path:
         state.blend = _number(run, {b"CDIS": value}, b"CDIS")
@@ -268,6 +270,9 @@ def _assigned_frame(
         if b"." not in given and number(given) is None:
             given += b"." + table + b"_NO"
         return _indexed(run, table, _of_record(run, given) or given, line)
+    copied = run.value(value)
+    if isinstance(copied, FrameEntry) and copied.table == name[1:]:
+        return run.frames.known(copied.number, None, line)
     if _EXTERNAL.search(value):
         return UnknownValue("KRL011", f"$BASE is moved by an external kinematic since line {line}")
     target = _value(run, said.value.rstrip(), said.at)
@@ -303,6 +308,23 @@ def numbered_frame(run: ExecutionContext, table: bytes, at: int, line: int) -> F
     return UnknownValue("KRL012", f"{table.decode()}_DATA[{at}] is computed in the program")
 
 
+def _copied_entry(run: ExecutionContext, text: bytes) -> Value | None:
+    """What ``BASE_DATA[2]`` gives a variable: numbers, or the entry where only the cell states them."""
+    found = _DATA.match(text)
+    index = run.value(found[2].strip()) if found else None
+    if found is None or not is_number(index) or index != int(index) or index < 0:
+        return None
+    table = found[1].upper()
+    frame = numbered_frame(run, table, int(index), 0)
+    if isinstance(frame, UnknownValue):
+        return frame
+    number, values = run.frames.key(frame)
+    if values is not None or number is None:
+        return known(values or ZERO)
+    name = f"{table.decode()}_DATA[{number}]"
+    return FrameEntry("KRL002", f"its value is {name}, whose numbers no program states", table, number)
+
+
 def _record(run: ExecutionContext, said: Assignment, before: Record | None) -> Record | None:
     """FDAT_ACT, LDAT_ACT or PDAT_ACT after an assignment; None if not known."""
     value = said.value.strip()
@@ -311,13 +333,13 @@ def _record(run: ExecutionContext, said: Assignment, before: Record | None) -> R
     if value.startswith(b"{"):
         return fields(value)
     name = value.upper()
-    return None if name in run.survey.assigned else run.declarations.records.get(name)
+    return None if name in run.survey.assigned else run.record(name)
 
 
 def _of_record(run: ExecutionContext, text: bytes) -> bytes | None:
     """The entry that ``FP1.BASE_NO`` names."""
     name, _, key = text.strip().upper().partition(b".")
-    record = run.declarations.records.get(name)
+    record = run.record(name)
     if record is None or name in run.survey.assigned or name + b"." + key in run.survey.assigned:
         return None
     return record.get(key)
@@ -326,6 +348,7 @@ def _of_record(run: ExecutionContext, text: bytes) -> bytes | None:
 def _apply_record(run: ExecutionContext, statement: Statement) -> None:
     state, record = run.state, run.state.frames_record
     if record is None:
+        run.variables.asked.add(b"FDAT_ACT")
         why = f"since line {statement.line}: its FDAT is declared elsewhere"
         state.base = UnknownValue("KRL005", f"$BASE is not known {why}")
         state.tool = UnknownValue("KRL005", f"$TOOL is not known {why}")
@@ -405,7 +428,9 @@ def _value(run: ExecutionContext, text: bytes, at: int) -> Value:
     """What a value gives; an aggregate of literals keeps its places, all else is a copy without them."""
     if text.startswith(b"{") and text.endswith(b"}") and text.count(b"{") == 1 and b'"' not in text:
         return parse(text, at, 0, run.value)
-    value = run.value(text)
+    value = _copied_entry(run, text) or run.value(text)
+    if isinstance(value, FrameEntry):
+        return value
     if isinstance(value, KrlTarget):
         return value.detached()
     if isinstance(value, UnknownValue):

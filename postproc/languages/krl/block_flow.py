@@ -9,7 +9,7 @@ from postproc.languages.krl.assignments import with_clause
 from postproc.languages.krl.execution_context import Flow, SplineBlock
 from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.flow_frames import BlockFrame
-from postproc.languages.krl.lexing import NAME, SPLINES, Statement, value_end
+from postproc.languages.krl.lexing import NAME, SPLINES, Statement, kept, value_end
 from postproc.languages.krl.modal_state import ELSEWHERE
 from postproc.languages.krl.open_blocks import BUDGET, OpenBlocks
 from postproc.languages.krl.program_structure import Block
@@ -26,6 +26,17 @@ _FOR = re.compile(
 )
 _THEN = re.compile(rb"(?<![A-Za-z0-9_$])THEN[ \t]*\Z", re.I)
 _WITH = re.compile(rb"(?<![A-Za-z0-9_$])WITH(?![A-Za-z0-9_$])(.*)\Z", re.I | re.S)
+
+
+@kept
+def _head_of_for(code: bytes) -> tuple[bytes, tuple[bytes, ...], tuple[Value, ...]] | None:
+    """Counter of a FOR, the texts of first value, last value and step, and their values where they are digits."""
+    found = _FOR.match(code)
+    if found is None:
+        return None
+    texts = tuple(text.strip() for text in (found[2], found[3], found[4] or b"1"))
+    plain = all(text.isdigit() and len(text) < 19 for text in texts)
+    return found[1].upper(), texts, tuple(map(int, texts)) if plain else ()
 
 
 class BlockFlow(OpenBlocks):
@@ -137,11 +148,11 @@ class BlockFlow(OpenBlocks):
 
     def _bounds(self, item: Statement) -> tuple[bytes, list[Value]] | None:
         """Counter, and first value, last value and step of a FOR."""
-        found = _FOR.match(item.code)
-        if found is None:
+        head = _head_of_for(item.code)
+        if head is None:
             return None
-        texts = (found[2], found[3], found[4] or b"1")
-        return found[1].upper(), [self.run.value(text.strip()) for text in texts]
+        name, texts, constants = head
+        return name, list(constants) or [self.run.value(text) for text in texts]
 
     def _for(self, pc: int, item: Statement, block: Block) -> int | None:
         run = self.run

@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import re
+from abc import abstractmethod
+from collections.abc import Set
 
 from postproc.languages.krl.assignments import command, keep
 from postproc.languages.krl.block_flow import BlockFlow
-from postproc.languages.krl.execution_context import Item
+from postproc.languages.krl.expressions import Value
+from postproc.languages.krl.external_axes import apart
 from postproc.languages.krl.flow_frames import BlockFrame, LabelHead, Restart
 from postproc.languages.krl.lexing import LOOPS, NAME, Call, Statement, identifiers, split_values
-from postproc.languages.krl.modal_state import ELSEWHERE
+from postproc.languages.krl.modal_state import ELSEWHERE, FrameRegister, ModalState
+from postproc.languages.krl.other_modules import take_exit
 from postproc.languages.krl.program_structure import Routine, closure
-from postproc.languages.krl.statement_effects import EVERYTHING, PATH_FROM_FILE, functions_of, is_harmless
+from postproc.languages.krl.statement_effects import (
+    EVERYTHING,
+    PATH_FROM_FILE,
+    functions_of,
+    is_harmless,
+    returned_by,
+)
 from postproc.languages.krl.target import shown
 from postproc.languages.krl.variables import Entry
+from postproc.languages.krl.vectorised import Item
 
 MOST_CALLS = 30
 """Calls inside of one another that are followed."""
@@ -192,10 +203,13 @@ class Calls(BlockFlow):
             command(run, item, said.arguments)
             return pc + 1
         routine = run.survey.routines.get(said.name)
+        if routine is None and said.name in run.others.routines:
+            self._call_other(item, said)
+            return pc + 1
         if routine is not None and self._follows(said.name, routine) and not self._aliased(said, routine):
             return self._enter_call(pc, said, routine)
         run.mentioned |= identifiers(said.arguments)
-        self._called(item, said.name, said.arguments)
+        self._called(item, said.name, returned_by(said, run.survey.directions))
         return pc + 1
 
     def _follows(self, name: bytes, routine: Routine) -> bool:
@@ -274,12 +288,11 @@ class Calls(BlockFlow):
 
     def _call_functions(self, item: Statement) -> None:
         for name in functions_of(item):
-            self._called(item, name, item.code)
+            self._called(item, name, identifiers(item.code))
 
-    def _called(self, item: Statement, name: bytes, given: bytes) -> None:
-        """Takes up that a routine or function ran; the names in ``given`` may come back from it changed."""
+    def _called(self, item: Statement, name: bytes, words: Set[bytes]) -> None:
+        """Takes up that a routine or function ran; ``words``: what may come back from it changed."""
         run = self.run
-        words = identifiers(given)
         called = shown(name)
         why = f"after the call of {called} in line {item.line}"
         routine = run.survey.routines.get(name)
@@ -293,6 +306,10 @@ class Calls(BlockFlow):
             return
         if is_harmless(name):
             return
+        if name in run.others.routines:
+            self._after_other(item, name, words)
+            return
+        run.unread.add(name)
         run.forget({"point", *words}, why)
         if name.startswith(PATH_FROM_FILE):
             run.add_finding(
@@ -302,8 +319,61 @@ class Calls(BlockFlow):
             message = f"{called} is not read: after it the position is not known; base and tool are assumed unchanged"
             run.add_finding("KRL010", message, item)
 
+    def _call_other(self, item: Statement, said: Call) -> None:
+        """A routine of another module: what it leaves is worked out, variables are forgotten."""
+        run = self.run
+        run.mentioned |= identifiers(said.arguments)
+        given = [run.value(text.strip()) if text.strip() else None for text in split_values(said.arguments)]
+        before = run.state.copy()
+        self._after_other(item, said.name, returned_by(said, run.survey.directions))
+        exit = self._exit_of(said.name, before, tuple(given))
+        if exit is not None:
+            state, registers = exit
+            why = f"after the call of {shown(said.name)} in line {item.line}"
+            take_exit(run.state, state, (run.frames, registers), why, item.line)
+
+    @abstractmethod
+    def _exit_of(
+        self, name: bytes, state: ModalState, given: tuple[Value | None, ...]
+    ) -> tuple[ModalState, FrameRegister] | None:
+        """What a routine of another module leaves, called with what holds here; None where that is not followed."""
+
+    def _after_other(self, item: Statement, name: bytes, words: Set[bytes]) -> None:
+        """Takes up what a routine of another module may change."""
+        run = self.run
+        effects = run.effects_of_others[name]
+        if "point" in effects:
+            run.state.sources = run.rows.joined(run.state.sources | {ELSEWHERE})
+        run.forget(effects | words, f"after the call of {shown(name)} in line {item.line}")
+        self._note_other(item, name)
+
+    def _note_other(self, item: Statement, name: bytes) -> None:
+        """Takes up what else another module does, now or at a time of its own."""
+        run, (module, _) = self.run, self.run.others.routines[name]
+        state = run.state
+        if module.sets_root:
+            state.root_set = state.root_set or item.line
+            run.root_set = run.root_set or item.line
+        if module.apart:
+            state.external_apart = state.external_apart | {b"$ASYNC_AXIS"}
+            state.external = apart(state.external)
+        state.triggered = state.triggered or module.has_trigger
+        if not module.survey.later_effects.isdisjoint(("base", "tool", "mode", "turning")):
+            state.later_since = state.later_since or item.line
+            run.later_since = run.later_since or item.line
+        for unread in run.others.unread[name]:
+            file = module.document.path.name
+            message = (
+                f"{shown(unread)}, which {file} calls, is not read: base and tool are assumed unchanged by it"
+            )
+            run.add_finding("KRL010", message, item)
+
     def _unread(self, item: Statement, name: bytes) -> None:
         """Reports a routine that an interrupt or a trigger runs, and that is not in this file."""
-        if not is_harmless(name):
+        run = self.run
+        if name in run.others.routines:
+            self._note_other(item, name)
+        elif not is_harmless(name):
+            run.unread.add(name)
             message = f"{shown(name)} is not read: it runs at a time of its own; base and tool are assumed unchanged"
-            self.run.add_finding("KRL010", message, item)
+            run.add_finding("KRL010", message, item)

@@ -266,5 +266,13 @@ CODES = define(
             action="Set $ORI_TYPE=#VAR and $CIRC_TYPE=#BASE for this cut.",
             example="`$ORI_TYPE = #JOINT` before a LIN that rotates the tool.",
         ),
+        "KRL033": Code(
+            "info",
+            "another file is read too",
+            meaning="Points, records or routines that the program names are declared in files beside it.",
+            consequence="They are read and never written; the result is computed from what they contain.",
+            action="Load the same files on the controller; state in the cell (symbols:) what differs there.",
+            example="$config.dat with FHOME and XHOME, in the folder System beside the program's folder.",
+        ),
     }
 )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 from postproc.base.document import Document, Span
-from postproc.languages.krl.expressions import Value, evaluate
+from postproc.languages.krl.expressions import UntypedNumber, Value, evaluate
 from postproc.languages.krl.lexing import (
     FRAME_TABLES,
     POINT_TYPES,
@@ -26,10 +28,12 @@ from postproc.languages.krl.target import (
     UnknownValue,
     fields,
     parse,
+    shown,
 )
 from postproc.languages.krl.variables import Entry
+from postproc.toolpath.initial_state import Symbol
 
-_DEFAULTS = b"DEF_"
+DEFAULTS = b"DEF_"
 """Begin of the names that KUKA's bas.src takes its defaults from; other numbers of other files may change."""
 
 _POINT_KEYS = frozenset([*COMPONENTS, *AXES, *EXTERNAL, b"S", b"T"])
@@ -41,7 +45,7 @@ class Declarations:
 
     values: points and constants; records: FDAT, LDAT, PDAT (key -> value); types: as they are declared; lines: name of
     a point with its index -> its declaration's line, where another one can be behind; shared: names that other
-    programs know too.
+    programs know too; origin: what only another file declares -> that file.
     """
 
     values: dict[bytes, Entry] = field(default_factory=dict)
@@ -50,6 +54,57 @@ class Declarations:
     lines: dict[bytes, Span] = field(default_factory=dict)
     declared: set[bytes] = field(default_factory=set)
     shared: set[bytes] = field(default_factory=set)
+    origin: dict[bytes, str] = field(default_factory=dict)
+
+
+def read_references(result: Declarations, documents: Iterable[Document]) -> None:
+    """Adds what other files declare for all programs; what two of them declare differently is not known."""
+    own = frozenset([*result.types, *map(_root, result.records)])
+    found: dict[bytes, _Declaration] = {}
+    for document in documents:
+        one = Declarations()
+        read_data(one, document, -1)
+        for root, declaration in _by_root(one, document.path.name).items():
+            before = found.setdefault(root, declaration)
+            if before[:3] != declaration[:3]:
+                why = f"{shown(root)} is declared differently in {before.file} and {declaration.file}"
+                unknown: Entry = {b"": UnknownValue("KRL019", why)}
+                found[root] = before._replace(values=unknown, records={})
+    for root, (kind, values, records, file) in found.items():
+        if root in own:
+            continue  # the module's own goes before
+        result.origin[root] = file
+        result.shared.add(root)
+        if kind:
+            result.types[root] = kind
+        if values:
+            result.values[root] = values
+            result.declared |= {root + path for path in values}
+        result.records |= records
+
+
+class _Declaration(NamedTuple):
+    """What a file declares of one name."""
+
+    kind: bytes
+    values: Entry
+    records: dict[bytes, dict[bytes, bytes]]
+    file: str
+
+
+def _by_root(one: Declarations, file: str) -> dict[bytes, _Declaration]:
+    records: dict[bytes, dict[bytes, dict[bytes, bytes]]] = {}
+    for key, record in one.records.items():
+        records.setdefault(_root(key), {})[key] = record
+    roots = dict.fromkeys([*one.types, *one.values, *records])
+    return {
+        root: _Declaration(one.types.get(root, b""), one.values.get(root, {}), records.get(root, {}), file)
+        for root in roots
+    }
+
+
+def _root(key: bytes) -> bytes:
+    return key.split(b"[")[0]
 
 
 def read_data(result: Declarations, document: Document, file: int) -> None:
@@ -72,29 +127,28 @@ def read_data(result: Declarations, document: Document, file: int) -> None:
         elif isinstance(said, Assignment) and not said.path and everything:
             key = said.key
             if key is not None and said.value.startswith(b"{"):
-                root = key.split(b"[")[0]
+                root = _root(key)
                 if root in FRAME_TABLES:
                     continue
                 if result.types.get(root) in RECORD_TYPES:
                     result.records[key] = fields(said.value)
                 elif result.types.get(root, b"FRAME") in POINT_TYPES:
                     _add(result, key, read_point(said.value.rstrip(), said.at, file, line), span, foreign)
-            elif key is not None and not foreign and result.types.get(key.split(b"[")[0]) in SCALARS:
+            elif key is not None and not foreign and result.types.get(_root(key)) in SCALARS:
                 _add(result, key, _constant(said.value.rstrip()), span, foreign)
 
 
 def _declare(
     result: Declarations, said: Declared, key: bytes, value: bytes, at: int, line: int, span: Span, foreign: bool
 ) -> None:  # fmt: skip
-    root = key.split(b"[")[0]
-    if not (foreign and root in result.types):
-        result.types[root] = said.type
+    root = _root(key)
+    result.types[root] = said.type
     if said.is_global or foreign:
         result.shared.add(root)
     if root in FRAME_TABLES:
         return
     if said.type in RECORD_TYPES:
-        if value.startswith(b"{") and not (foreign and key in result.records):
+        if value.startswith(b"{"):
             result.records[key] = fields(value)
     elif said.type in POINT_TYPES:
         if value:
@@ -104,8 +158,13 @@ def _declare(
             _add(result, key, point, span, foreign)
     elif value.startswith(b"{") and identifiers(value):
         _members(result, root, key[len(root) :], value, line)
-    elif value and said.type in SCALARS and (root.startswith(_DEFAULTS) if foreign else not said.is_global):
+    elif value and said.type in SCALARS and (said.is_constant or _keeps_number(root, said, foreign)):
         _add(result, key, _constant(value), span, foreign)
+
+
+def _keeps_number(root: bytes, said: Declared, foreign: bool) -> bool:
+    """Whether nothing outside of the module assigns a number."""
+    return root.startswith(DEFAULTS) if foreign else not said.is_global
 
 
 def _members(result: Declarations, root: bytes, path: bytes, value: bytes, line: int, depth: int = 0) -> None:
@@ -132,10 +191,10 @@ def _constant(text: bytes) -> Value:
 
 
 def _add(result: Declarations, key: bytes, value: Value, span: Span, foreign: bool) -> None:
-    root = key.split(b"[")[0]
+    root = _root(key)
     if key in result.declared:
-        if foreign:
-            return  # the module's own goes before
+        if foreign and result.values[root].get(key[len(root) :]) == value:
+            return
         value = UnknownValue("KRL019", f"{key.decode('latin-1')} is declared twice in the .dat")
     elif not foreign:
         result.lines[key] = span
@@ -192,3 +251,33 @@ def _kept(value: Value, assigned: set[bytes]) -> Value:
                 return changed
             value = replace(changed, unknown=why)
     return value
+
+
+def bind_symbols(declarations: Declarations, symbols: Mapping[str, Symbol], own: Set[bytes]) -> None:
+    """Gives names the values that the cell states, but those that the module itself declares (``own``)."""
+    for name, symbol in symbols.items():
+        key = name.upper().replace(" ", "").encode("latin-1", "replace")
+        root = key.split(b"[")[0]
+        if key in own:
+            continue
+        declarations.records.pop(key, None)
+        if isinstance(symbol, Mapping):
+            fields = {part.upper().encode("latin-1", "replace"): value for part, value in symbol.items()}
+            if not fields.keys() <= _POINT_KEYS:
+                declarations.records[key] = {part: _literal(value) for part, value in fields.items()}
+                continue
+            text = b",".join(part + b" " + _literal(value) for part, value in fields.items())
+            value: Value = parse(b"{" + text + b"}", 0, -1)
+            if isinstance(value, KrlTarget):
+                value = replace(value.detached(), locked="its value is known to the controller only")
+        elif declarations.types.get(root) == b"INT":
+            value = int(symbol)
+        else:
+            value = float(symbol) if declarations.types.get(root) == b"REAL" else UntypedNumber(symbol)
+        declarations.declared.add(key)
+        declarations.shared.add(root)
+        declarations.values.setdefault(root, {})[key[len(root) :]] = value
+
+
+def _literal(value: float) -> bytes:
+    return b"%d" % value if value == int(value) else repr(value).encode()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -10,15 +11,14 @@ from postproc.base.findings import Finding
 from postproc.languages.krl.data import Declarations
 from postproc.languages.krl.expressions import Value, evaluate
 from postproc.languages.krl.lexing import Statement
-from postproc.languages.krl.modal_state import ZERO, FrameRegister, ModalState, joined
+from postproc.languages.krl.modal_state import ZERO, FrameRegister, ModalState, Record, joined
 from postproc.languages.krl.motion_rows import MotionRows
+from postproc.languages.krl.other_modules import OtherModules
 from postproc.languages.krl.program_structure import Block, ProgramStructure, Routine
 from postproc.languages.krl.statement_effects import Effects
 from postproc.languages.krl.target import UnknownValue, known, shown
 from postproc.languages.krl.variables import VariableFacts, Variables
-from postproc.languages.krl.vectorised import VectorisedLines
-
-Item = Statement | VectorisedLines
+from postproc.languages.krl.vectorised import Item
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,9 @@ class ExecutionContext:
     structure is not understood.  ``spline``: the spline block that is open.  ``has_tcp_mode``, ``has_turning``: some
     line names another interpolation mode, or another way of turning the tool, than the usual one.  ``initial``: what
     holds where the program starts.  ``root_set``, ``later_since``: the first lines that set what ``ModalState`` calls
-    so.
+    so.  ``others``: the modules that are read besides; ``effects_of_others``: what their routines
+    change of what this one knows; ``unread``: routines that are called and not read; ``depth``:
+    how many calls of other modules lead here.
     """
 
     document: Document
@@ -59,6 +61,8 @@ class ExecutionContext:
     has_tcp_mode: bool
     has_turning: bool
     rows: MotionRows
+    others: OtherModules
+    effects_of_others: Mapping[bytes, Effects]
     initial: ModalState = field(default_factory=ModalState)
     state: ModalState = field(default_factory=ModalState)
     frames: FrameRegister = field(default_factory=FrameRegister)
@@ -74,6 +78,8 @@ class ExecutionContext:
     walked_rows: list[tuple[int, int, Routine]] = field(default_factory=list)
     root_set: int = 0
     later_since: int = 0
+    unread: set[bytes] = field(default_factory=set)
+    depth: int = 0
 
     def add_finding(self, code: str, message: str, statement: Statement) -> None:
         """Notes a finding; the same words are reported once, at their first place."""
@@ -117,6 +123,11 @@ class ExecutionContext:
         if name in self.survey.later:
             return UnknownValue("KRL002", f"{shown(name)} is changed by an interrupt or a trigger")
         return value
+
+    def record(self, name: bytes) -> Record | None:
+        """The entries of an FDAT, LDAT or PDAT as it is declared."""
+        self.variables.asked.add(name)
+        return self.declarations.records.get(name)
 
     def value(self, text: bytes) -> Value:
         """The value of an expression in the program."""

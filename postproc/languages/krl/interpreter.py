@@ -11,20 +11,31 @@ from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
 from postproc.languages.dialect import MARK, Program
-from postproc.languages.krl.controller_data import bind_symbols, start_with
-from postproc.languages.krl.data import Declarations, at_the_start, read_data
-from postproc.languages.krl.execution_context import ExecutionContext, Item
+from postproc.languages.krl.controller_data import start_with
+from postproc.languages.krl.data import (
+    Declarations,
+    at_the_start,
+    bind_symbols,
+    read_data,
+    read_references,
+)
+from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
-from postproc.languages.krl.lexing import Statement, lines, module_name
+from postproc.languages.krl.lexing import FRAME_TABLES, Head, Statement, lines, module_name
 from postproc.languages.krl.motion_rows import MotionRows
+from postproc.languages.krl.other_modules import is_module, read_modules, visible
 from postproc.languages.krl.program_flow import ProgramFlow
 from postproc.languages.krl.program_structure import ProgramStructure, program_structure
 from postproc.languages.krl.scan import scan
+from postproc.languages.krl.target import shown
 from postproc.languages.krl.to_toolpath import to_toolpath
 from postproc.languages.krl.variables import Variables
+from postproc.languages.krl.vectorised import Item
 from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
 NO_SYMBOLS: Mapping[str, Symbol] = MappingProxyType({})
+MOST_NAMES = 8
+"""Names that one finding lists."""
 MOST_READINGS = 3
 """Readings in which jumps are followed that turned out to be uncertain; then none is followed."""
 
@@ -49,23 +60,31 @@ def read(
     places: bool = True,
     symbols: Mapping[str, Symbol] = NO_SYMBOLS,
     initial: InitialState = UNSTATED,
+    siblings: Sequence[Document] = (),
 ) -> Program:
     """Reads a program; ``fast=False`` takes the general way for the common lines too, with the same result.
 
     references: files that are read and never written, such as $config.dat; places: whether the program is to be
-    written, else its ``text`` is None; symbols, initial: as of ``ReadingSettings``.
+    written, else its ``text`` is None; symbols, initial, siblings: as of ``ReadingSettings``.
     """
     source = documents[0]
     code = list(scan(source, fast))
-    surveyed = program_structure(_statements(code))
     declarations = Declarations()
     for file, document in enumerate(documents[1:], 1):
         read_data(declarations, document, file)
-    for document in references:
-        read_data(declarations, document, -1)
-    bind_symbols(declarations, symbols)
-    has_tcp = any(_TCP.search(document.raw) for document in documents)
-    has_turning = any(_TURNING.search(document.raw) for document in (*documents, *references))
+    own = frozenset([*declarations.declared, *declarations.records])
+    data = [*references, *(one for one in siblings if not is_module(one))]
+    read_references(declarations, data)
+    bind_symbols(declarations, symbols, own)
+    others = read_modules(siblings, data, symbols)
+    effects = visible(others, declarations)
+    surveyed = program_structure(
+        _statements(code), effects, {**others.directions(), **dict(_directions(code))}
+    )
+    others.share(surveyed)
+    read = (*documents, *references, *siblings)
+    has_tcp = any(_TCP.search(document.raw) for document in read)
+    has_turning = any(_TURNING.search(document.raw) for document in read)
     unfollowed = Unfollowed()
     for reading in range(MOST_READINGS + 1):
         run = ExecutionContext(
@@ -77,8 +96,10 @@ def read(
             has_tcp,
             has_turning,
             MotionRows(source),
+            others,
+            effects,
         )
-        start_with(run, initial)
+        start_with(run, initial, symbols)
         flow = ProgramFlow(run, unfollowed)
         try:
             flow.all()
@@ -87,6 +108,8 @@ def read(
             if reading == MOST_READINGS - 1:
                 unfollowed = _nothing_followed(surveyed)
     _report_structure(run)
+    unresolved = _unresolved(run)
+    _report_siblings(run, siblings)
     marker_at = _marker_at(source, code)
     toolpath, text, refusals = to_toolpath(run, places)
     findings = sorted([*run.findings, *refusals], key=lambda finding: (finding.line, finding.column))
@@ -99,7 +122,39 @@ def read(
         marker=_marker(source.raw),
         marker_at=marker_at,
         names=tuple(_names(documents)),
+        unresolved=unresolved,
     )
+
+
+def _directions(code: Sequence[Item]) -> Iterator[tuple[bytes, tuple[bool, ...]]]:
+    """Name of each routine, and of each of its parameters whether it comes back changed."""
+    for item in code:
+        if isinstance(item, Statement) and isinstance(item.strings, Head):
+            yield item.strings.name, tuple(back for _, back in item.strings.parameters)
+
+
+def _unresolved(run: ExecutionContext) -> frozenset[str]:
+    """Names that the program asks for and no file that was read declares; routines with ()."""
+    known = {*FRAME_TABLES, *run.declarations.types, *run.declarations.values, *run.declarations.records}
+    known |= {name for routine in run.survey.routine_at.values() for name in routine.types}
+    names = {name for name in run.variables.asked - known if not name.startswith(b"$")}
+    calls = run.unread | {name for of in run.others.unread.values() for name in of}
+    return frozenset([*map(shown, names), *(f"{shown(name)}()" for name in calls)])
+
+
+def _report_siblings(run: ExecutionContext, siblings: Sequence[Document]) -> None:
+    """Says which files beside the program are read, and for what."""
+    used: dict[str, list[str]] = {}
+    for name in sorted(run.variables.asked & run.declarations.origin.keys() - set(FRAME_TABLES)):
+        used.setdefault(run.declarations.origin[name], []).append(shown(name))
+    for name, (module, _) in sorted(run.others.routines.items()):
+        used.setdefault(module.document.path.name, []).append(f"{shown(name)}()")
+    for document in siblings:
+        names = used.get(document.path.name)
+        if names:
+            more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+            message = f"{document.path} is read for {', '.join(names[:MOST_NAMES])}{more}"
+            run.findings.append(Finding("KRL033", message, str(run.document.path)))
 
 
 def _statements(code: Sequence[Item]) -> Iterator[tuple[int, Statement]]:

@@ -67,7 +67,7 @@ _ASSIGNMENT = re.compile(
 )
 _CALL = re.compile(rb"(" + NAME + rb")[ \t]*\((.*)\)\Z", re.S)
 _DECLARED = re.compile(
-    rb"(?:GLOBAL[ \t]+)?(?:DECL[ \t]+)?(GLOBAL[ \t]+)?(?:CONST[ \t]+)?(" + NAME + rb")[ \t]+(?=[A-Za-z_$])",
+    rb"(?:GLOBAL[ \t]+)?(?:DECL[ \t]+)?(GLOBAL[ \t]+)?(CONST[ \t]+)?(" + NAME + rb")[ \t]+(?=[A-Za-z_$])",
     re.I,
 )
 _ITEM = re.compile(rb"(" + NAME + rb")[ \t]*(?:\[([^\]]*)\])?[ \t]*(=[ \t]*)?")
@@ -107,6 +107,7 @@ class Declared(NamedTuple):
     type: bytes
     is_global: bool
     items: tuple[tuple[bytes | None, bytes, int], ...]  # key, value or b"", offset of the value
+    is_constant: bool = False
 
 
 class Statement(NamedTuple):
@@ -289,7 +290,7 @@ def assignment(code: bytes, at: int) -> Assignment | None:
 def declaration(code: bytes, at: int) -> Declared | None:
     """``[DECL] [GLOBAL] TYPE NAME[[n]] [= value] {, ...}``; None if the code is none."""
     head = _DECLARED.match(code)
-    if head is None or head[2].upper() in (b"INTERRUPT", b"DECL"):
+    if head is None or head[3].upper() in (b"INTERRUPT", b"DECL"):
         return None
     is_global = head[1] is not None or code[:6].upper() == b"GLOBAL"
     items: list[tuple[bytes | None, bytes, int]] = []
@@ -309,7 +310,7 @@ def declaration(code: bytes, at: int) -> Declared | None:
         if code[place : place + 1] != b",":
             break
         place = _skip(code, place + 1)
-    return Declared(head[2].upper(), is_global, tuple(items)) if items else None
+    return Declared(head[3].upper(), is_global, tuple(items), head[2] is not None) if items else None
 
 
 def _skip(code: bytes, place: int) -> int:

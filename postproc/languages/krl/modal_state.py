@@ -62,6 +62,10 @@ class FrameRegister:
     def values(self, frame: FrameIndex | UnknownValue) -> Numbers | None:
         return self._values[frame.index] if isinstance(frame, FrameIndex) else None
 
+    def key(self, frame: FrameIndex) -> tuple[int | None, Numbers | None]:
+        """Number and pose of a frame, as ``known`` takes them."""
+        return self._refs[frame.index].number, self._values[frame.index]
+
     def refs(self) -> tuple[FrameRef, ...]:
         return tuple(self._refs)
 
@@ -95,8 +99,8 @@ class ModalState:
 
     orientation, arc_frame: $ORI_TYPE and $CIRC_TYPE, modes of OrientationControl and frames of Arcs;
     feed [m/s], blend [mm] ($APO.CDIS): NaN where not known; point: X..C of the last end point [mm, deg], stated in
-    ``point_frames``; axes [deg]: those of the last end point, where it was programmed so; form: the inline form that
-    was entered last; external [mm, deg]: E1..E6; external_apart: what the
+    ``point_frames``, by the motion in ``point_line``; axes [deg]: those of the last end point, where it was
+    programmed so; form: the inline form that was entered last; external [mm, deg]: E1..E6; external_apart: what the
     program has set so that motions do not take them along; triggered: a TRIGGER is between the last motion and here;
     root_set: the line, if any, from which on the program itself states where the robot is in the world; later_since:
     the line, if any, from which on an interrupt or a trigger may change base or tool.
@@ -111,6 +115,7 @@ class ModalState:
     point_frames: PointFrames | None = None
     anchor: Anchor | None = None
     point_unknown: str = "no motion precedes it"
+    point_line: int = 0
     axes: Numbers | None = None
     sources: frozenset[Source] = frozenset([START])
     frames_record: Record | None = None
@@ -196,7 +201,13 @@ def _joined_frames(
 
 _OF_POINT = ("point", "point_frames", "anchor", "point_unknown")
 _POINT_OF = attrgetter(*_OF_POINT)
-VARIES = "it varies with the path that leads here"
+
+
+def _varies(one: ModalState, other: ModalState) -> str:
+    """Why a point is not known that two paths leave differently."""
+    if not (one.point_line and other.point_line) or one.point_line == other.point_line:
+        return "it varies with the path that leads here"
+    return f"it varies: line {one.point_line} or line {other.point_line}"
 
 
 def _joined_points(
@@ -216,8 +227,9 @@ def _joined_points(
         pairs = zip(one.point, other.point, strict=True)
         point = six([a if _same(a, b) else NAN for a, b in pairs])
         if any(value == value for value in point):
-            return point, one.point_frames, one.anchor, VARIES
-    return None, None, None, VARIES
+            why = one.point_unknown if point == one.point else _varies(one, other)
+            return point, one.point_frames, one.anchor, why
+    return None, None, None, _varies(one, other)
 
 
 def _either(one: Any, other: Any) -> Any:
@@ -246,4 +258,5 @@ _JOINS: dict[str, Callable[[Any, Any], object]] = {
     "triggered": _either,
     "root_set": _either,
     "later_since": _either,
+    "point_line": lambda one, other: one,
 }

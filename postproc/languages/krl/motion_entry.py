@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, apart, reached
 from postproc.languages.krl.lexing import Statement
@@ -63,13 +61,13 @@ def enter_motion(
             axes = filled(target.axes, state.axes)
         else:
             reason = reason or RowRefusal("KRL001", "a straight line cannot lead to axis angles")
-        stated = replace(target.detached(), locked="")
+        stated = target.detached()
     else:
         values = filled(target.values, state.point)
         if values is None and state.anchor is not None and state.point_frames == (state.base, state.tool):
             values, anchor = anchored(target.values, state.anchor)
         stated = target
-    partial = stated is not None and bool(stated.missing) and not relative
+    partial = stated is not None and not relative and None in (stated.axes or stated.values)
     if partial and stated is not None and reason is None and anchor is None:
         reason = incomplete(state, stated, axes if kind is Kind.AXIS else values)
         if reason is None and kind is not Kind.AXIS and values is not None:
@@ -86,7 +84,7 @@ def enter_motion(
     if structure is not None and (reason is None or reason.code != "KRL016"):
         reason = structure
     if stated is not None and values is None and anchor is None and stated.axes is None:
-        stated = replace(stated.detached(), locked="")
+        stated = stated.detached()
     external = _external(state, target, relative)
     rows = run.rows
     rows.note_sources(state.sources)
@@ -155,8 +153,10 @@ def _inherits(stated: KrlTarget | None, relative: bool) -> int:
     if stated is None or stated.axes is not None:
         return 0
     if relative:
-        return sum(1 << i for i in range(6) if stated.start[i] < 0)
-    return sum(1 << i for i, value in enumerate(stated.values) if value is None)
+        return sum([1 << i for i in range(6) if stated.start[i] < 0])
+    if None not in stated.values:
+        return 0
+    return sum([1 << i for i, value in enumerate(stated.values) if value is None])
 
 
 def _advance(
@@ -164,6 +164,7 @@ def _advance(
 ) -> None:
     if values is not None:
         state.point, state.point_frames = values, (state.base, state.tool)
+        state.point_line = line
         state.axes = state.anchor = None
     elif axes is not None:
         state.lose_point(f"after the axis motion in line {line}")

@@ -154,12 +154,14 @@ class MotionRows:
     def truncate(self, count: int) -> None:
         """Takes the rows from ``count`` on out again."""
         while self.count > count:
-            chunk = self.chunks.pop()
+            chunk = self.chunks[-1]
             size = len(chunk) if isinstance(chunk, list) else len(chunk.bulk)
-            self.count -= size
-            if self.count < count and isinstance(chunk, list):
-                self.chunks.append(chunk[: count - self.count])
+            if isinstance(chunk, list) and self.count - size < count:
+                del chunk[count - self.count :]  # a copy of what stays would take the time of all of it
                 self.count = count
+            else:
+                self.chunks.pop()
+                self.count -= size
         for sparse in (
             self.anchors, self.reasons, self.variables, self.locked, self.arcs, self.relative, self.whole, self.inline,
             self.approximated, self.arc_blends, self.builds_on, self.passing, self.entries, self.sources_of,

@@ -66,6 +66,7 @@ def move_bulk(run: ExecutionContext, bulk: VectorisedLines) -> None:
         None,
         None,
     )
+    state.point_line = bulk.line + len(bulk) - 1
     state.sources = frozenset([last])
 
 

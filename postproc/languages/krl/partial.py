@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from postproc.languages.krl.modal_state import NOT_TO_TARGET, VARIES, Anchor, ModalState
+from functools import lru_cache
+
+from postproc.languages.krl.modal_state import NOT_TO_TARGET, Anchor, ModalState
 from postproc.languages.krl.motion_rows import RowRefusal
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import KrlTarget, Six, six
@@ -42,7 +44,8 @@ def varying(state: ModalState, target: KrlTarget, values: Numbers) -> RowRefusal
     if not lost or (lost[0] >= 3 and state.orientation in NOT_TO_TARGET):
         return None
     names = ", ".join("XYZABC"[i] for i in lost)
-    return RowRefusal("KRL004", f"the point omits {names}, and the position is not known: {VARIES}", VARIES)
+    why = state.point_unknown
+    return _omits(names, why)
 
 
 def incomplete(state: ModalState, target: KrlTarget, values: Numbers | None) -> RowRefusal | None:
@@ -55,5 +58,10 @@ def incomplete(state: ModalState, target: KrlTarget, values: Numbers | None) -> 
         why = state.point_unknown
         if target.axes is not None and not why.startswith("no motion"):
             why = "the motion before it does not define the axes"
-        return RowRefusal("KRL004", f"the point omits {names}, and the position is not known: {why}", why)
+        return _omits(names, why)
     return None
+
+
+@lru_cache(maxsize=1024)
+def _omits(names: str, why: str) -> RowRefusal:
+    return RowRefusal("KRL004", f"the point omits {names}, and the position is not known: {why}", why)

@@ -2,19 +2,38 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
+from dataclasses import replace
 
 from postproc.languages.krl import motions
 from postproc.languages.krl.assignments import assign, declare
 from postproc.languages.krl.calls import Calls
-from postproc.languages.krl.execution_context import Flow, Item
+from postproc.languages.krl.execution_context import Flow
+from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.external_axes import by_themselves
-from postproc.languages.krl.lexing import Assignment, Call, Declared, Statement, has_foreign_letters
-from postproc.languages.krl.modal_state import ELSEWHERE, InlineFormState, ModalState
+from postproc.languages.krl.flow_frames import Restart, Unfollowed
+from postproc.languages.krl.lexing import (
+    Assignment,
+    Call,
+    Declared,
+    Statement,
+    has_foreign_letters,
+    identifiers,
+)
+from postproc.languages.krl.modal_state import ELSEWHERE, FrameRegister, InlineFormState, ModalState
+from postproc.languages.krl.motion_rows import MotionRows
 from postproc.languages.krl.open_blocks import BUDGET
+from postproc.languages.krl.other_modules import (
+    MOST_DEPTH,
+    MOST_OUTCOMES,
+    MOST_STEPS,
+    state_at_entry,
+    visible,
+)
 from postproc.languages.krl.program_structure import INLINE, LATER, Routine, closure
 from postproc.languages.krl.statement_effects import EVERYTHING, HIDDEN, effects_of
-from postproc.languages.krl.vectorised import VectorisedLines
+from postproc.languages.krl.vectorised import Item, VectorisedLines
 from postproc.toolpath import Annotation
 
 _ANNOTATION = re.compile(rb";[ \t]*(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
@@ -47,6 +66,49 @@ class ProgramFlow(Calls):
                 self._walk(routine)
         self._idle()
         run.rows.comments = list(self.comments.values())
+
+    def outcome(self, routine: Routine, given: tuple[Value | None, ...]) -> Flow | None:
+        """What holds where a routine of another module returns that is called with these values."""
+        run = self.run
+        self.mentioned_from, self.resumes = {}, False
+        run.resume(Flow(run.initial, run.variables.facts))
+        run.routine = routine
+        self.begin()
+        for i, (name, _) in enumerate(routine.parameters):
+            value = given[i] if i < len(given) else None
+            run.variables.replace(name, {} if value is None else {b"": run.converted(name, value)})
+        pc: int | None = routine.start + 1
+        while pc is not None and pc < len(run.code):
+            pc = self._step(pc)
+        return run.merged(self.activations[-1].returned, self._here())
+
+    def _exit_of(
+        self, name: bytes, state: ModalState, given: tuple[Value | None, ...]
+    ) -> tuple[ModalState, FrameRegister] | None:
+        run = self.run
+        others = run.others
+        module, routine = others.routines[name]
+        register = FrameRegister()
+        entry = state_at_entry(state, run.frames, register)
+        key = name, repr((entry, register.refs(), given))
+        if key not in others.outcomes:
+            others.outcomes[key] = None  # of a call of itself nothing is known
+            few = run.depth < MOST_DEPTH and len(others.outcomes) < MOST_OUTCOMES
+            if few and others.steps < MOST_STEPS and module.can_be_followed:
+                inner = replace(
+                    run, document=module.document, code=module.code, survey=module.survey,
+                    declarations=module.declarations, variables=module.variables(others),
+                    effects_of_others=visible(others, module.declarations), rows=MotionRows(module.document),
+                    initial=entry, state=ModalState(), frames=register, spline=None, opaque=None, findings=[],
+                    mentioned=set(), reported=set(), followed={}, walked_rows=[], unread=set(), walked=False,
+                    idle=False, depth=run.depth + 1,
+                )  # fmt: skip
+                following = ProgramFlow(inner, Unfollowed())
+                with contextlib.suppress(Restart):
+                    flow = following.outcome(routine, given)
+                    others.outcomes[key] = None if flow is None else (flow.state, register)
+                others.steps += following.steps + len(module.declarations.types)
+        return others.outcomes[key]
 
     def _run(self, routine: Routine) -> None:
         run = self.run
@@ -136,7 +198,7 @@ class ProgramFlow(Calls):
                 motions.unknown_motion(run, item)
             run.forget(effects_of(item)[0], f"after line {item.line}, which is not understood")
         elif kind == "foreign" and isinstance(said, Call):
-            self._called(item, said.name, said.arguments)
+            self._called(item, said.name, identifiers(said.arguments))
         elif kind == "foreign":
             run.forget(
                 effects_of(item)[0], f"after line {item.line}, which contains letters that KRL does not have"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 from postproc.languages.krl.lexing import (
     BRANCHES,
@@ -22,13 +23,18 @@ from postproc.languages.krl.statement_effects import (
     HERE,
     MODAL,
     SYSTEM,
+    Directions,
     Effect,
     Effects,
+    declared_external,
     effects_of,
     functions_of,
     is_harmless,
     read_by,
 )
+
+NO_EFFECTS: Mapping[bytes, Effects] = MappingProxyType({})
+NO_DIRECTIONS: Directions = MappingProxyType({})
 
 MOST_EFFECTS = 200
 """Variables of one block; where it assigns more, all that the program assigns count as changed."""
@@ -72,6 +78,7 @@ class Routine(Block):
 
     name: bytes = b""
     is_main: bool = False
+    is_global: bool = False
     is_function: bool = False
     parameters: tuple[tuple[bytes, bool], ...] = ()
     types: dict[bytes, bytes] = field(default_factory=dict)
@@ -89,7 +96,8 @@ class ProgramStructure:
     names that run or change at a time of their own (interrupts, triggers); ``later_effects``: what these
     change of base, tool and modes; ``inline``: lines of motions in the fold of an inline form; ``jumps``:
     start of the routine and name of every label that a GOTO names -> first and last index of these;
-    ``effects``: all that the program changes anywhere; ``blocks``: all of them.
+    ``effects``: all that the program changes anywhere; ``blocks``: all of them; ``directions``: name of a routine ->
+    of each parameter whether it comes back changed.
     """
 
     events: dict[int, list[tuple[str, Block]]] = field(default_factory=dict)
@@ -105,6 +113,7 @@ class ProgramStructure:
     effects: Effects = field(default_factory=set)
     inline: set[int] = field(default_factory=set)
     unclosed: list[tuple[int, str]] = field(default_factory=list)
+    directions: dict[bytes, tuple[bool, ...]] = field(default_factory=dict)
 
     @property
     def has_routine(self) -> bool:
@@ -112,8 +121,8 @@ class ProgramStructure:
 
 
 class _Surveyor:
-    def __init__(self) -> None:
-        self.found = ProgramStructure()
+    def __init__(self, directions: Directions) -> None:
+        self.found = ProgramStructure(directions=dict(directions))
         self.blocks: list[Block] = []
         self.stack: list[Block] = []
         self.buried = 0  # blocks deeper than DEEPEST that are open
@@ -184,7 +193,8 @@ class _Surveyor:
         head = statement.strings if isinstance(statement.strings, Head) else Head(b"", ())
         routine = Routine(
             b"DEF", statement.line, index,
-            name=head.name, is_main=not self.found.routine_at, parameters=head.parameters,
+            name=head.name, is_main=not self.found.routine_at, is_global=statement.word == b"GLOBAL",
+            parameters=head.parameters,
             is_function=b"DEFFCT" in statement.code[:40].upper(),
             types={name: b"" for name, _ in head.parameters},
         )  # fmt: skip
@@ -261,13 +271,15 @@ class _Surveyor:
             return
         if len(self.noted) < MOST_NOTED:
             self.noted.add(statement.code)
-        effects, called = effects_of(statement)
+        effects, called = effects_of(statement, found.directions)
         functions = functions_of(statement)
         if not all(map(is_harmless, functions)):
             # What is handed to a function may come back changed.
             effects = effects | identifiers(statement.code)
         _join(found.effects, effects)
         said = statement.strings
+        if statement.word in (b"EXT", b"EXTFCT", b"EXTP") and (declared := declared_external(statement)):
+            found.directions.setdefault(*declared)
         if isinstance(said, Assignment) and said.name in FRAME_TABLES:
             found.table_entries.add(said.key)
         if isinstance(said, Assignment) and said.path and said.element is None and len(effects) == 1:
@@ -288,9 +300,14 @@ class _Surveyor:
                 stack[-1].calls.add(called)
 
 
-def program_structure(statements: Iterable[tuple[int, Statement]]) -> ProgramStructure:
-    """Goes over the statements (index, statement) once."""
-    surveyor = _Surveyor()
+def program_structure(
+    statements: Iterable[tuple[int, Statement]],
+    others: Mapping[bytes, Effects] = NO_EFFECTS,
+    directions: Directions = NO_DIRECTIONS,
+) -> ProgramStructure:
+    """Goes over the statements (index, statement) once; others: what routines of other modules change; directions:
+    how they take their parameters."""
+    surveyor = _Surveyor(directions)
     index = -1
     for index, statement in statements:
         surveyor.take(index, statement)
@@ -304,10 +321,10 @@ def program_structure(statements: Iterable[tuple[int, Statement]]) -> ProgramStr
             for block in labels[name][1]:
                 block.has_labels = True
                 block.is_entered = block.is_entered or not block.start < first <= last < block.end
-    _settle(found, surveyor.blocks)
+    _settle(found, surveyor.blocks, others)
     found.later_effects = {SYSTEM[name] for name in found.later if name in SYSTEM}
-    for name in closure(found, found.later):
-        effects = found.routines[name].effects
+    for name in [*closure(found, found.later), *(found.later & others.keys())]:
+        effects = found.routines[name].effects if name in found.routines else others[name]
         found.later_effects |= {effect for effect in effects if isinstance(effect, str)}
         found.later.update(effect for effect in effects if isinstance(effect, bytes))
         if "all" in effects:
@@ -336,8 +353,11 @@ def _join(into: Effects, more: Iterable[Effect]) -> None:
         into.update(words, ["all"])
 
 
-def _settle(found: ProgramStructure, blocks: Sequence[Block]) -> None:
+def _settle(found: ProgramStructure, blocks: Sequence[Block], others: Mapping[bytes, Effects]) -> None:
     """Brings what the called routines change into the effects of who calls them."""
+    others = {name: of for name, of in others.items() if name not in found.routines}
+    for name in {name for block in blocks for name in block.calls} | found.later:
+        found.assigned.update(effect for effect in others.get(name, ()) if isinstance(effect, bytes))
     if len(found.routines) > MOST_EFFECTS:
         for block in blocks:
             if block.calls:
@@ -347,17 +367,24 @@ def _settle(found: ProgramStructure, blocks: Sequence[Block]) -> None:
     strange = {
         name
         for name, routine in found.routines.items()
-        if any(call not in found.routines and not is_harmless(call) for call in routine.calls)
+        if any(
+            call not in found.routines and call not in others and not is_harmless(call)
+            for call in routine.calls
+        )
     }
     total: dict[bytes, Effects] = {}
     for name, routines in reached.items():
         total[name] = set() if strange.isdisjoint(routines) else {"point"}
         for other in routines:
             _join(total[name], found.routines[other].effects)
+            for call in found.routines[other].calls & others.keys():
+                _join(total[name], others[call])
     for block in blocks:
         for name in block.calls:
             if name in total:
                 _join(block.effects, total[name])
+            elif name in others:
+                _join(block.effects, others[name])
             elif not is_harmless(name):
                 block.effects.add("point")
 

@@ -19,12 +19,11 @@ from postproc.base.arrays import Floats, is_shared
 from postproc.base.batches import in_blocks
 from postproc.base.decimals import literals
 from postproc.base.document import BLOCK, Document, offset_type
-from postproc.languages.krl.execution_context import Item
 from postproc.languages.krl.external_axes import UNSTATED, six
 from postproc.languages.krl.lexing import statement
 from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import COMPONENTS, KrlTarget, parse
-from postproc.languages.krl.vectorised import VectorisedLines
+from postproc.languages.krl.vectorised import Item, VectorisedLines
 
 FEWEST, MOST = 8, 1 << 14
 """Lines of a run that are read together: with fewer it does not pay, with more it takes memory."""

@@ -7,7 +7,8 @@ the program assigns) or the name (bytes) of a variable that is assigned.
 from __future__ import annotations
 
 import re
-from collections.abc import Set
+from collections.abc import Mapping, Set
+from types import MappingProxyType
 
 from postproc.languages.krl.lexing import (
     NAME,
@@ -18,6 +19,7 @@ from postproc.languages.krl.lexing import (
     Statement,
     identifiers,
     kept,
+    split_values,
     without_strings,
 )
 from postproc.languages.krl.target import AXES, COMPONENTS, EXTERNAL
@@ -65,6 +67,15 @@ _CALLING = frozenset(["assignment", "call", "foreign", "open", "close", "return"
 
 _COUNTER = re.compile(rb"FOR[ \t]+(" + NAME + rb")[ \t]*=", re.I)
 _KEYS = frozenset([*COMPONENTS, *AXES, *EXTERNAL, b"S", b"T"])
+
+_INDEX = rb"(?:\[[^\]]*+\][ \t]*+)?"
+_RETURNED = re.compile(
+    rb"[ \t]*+(" + NAME + rb")[ \t]*+" + _INDEX + rb"(?:\.[ \t]*+" + NAME + rb"[ \t]*+" + _INDEX + rb")*+\Z"
+)
+_DIMENSIONS = re.compile(rb"\[[^\]\[]*+\]")
+_EXTERNAL = re.compile(
+    rb"EXT(?:FCT[ \t]++" + NAME + rb"(?:\[[^\]]*+\])?|P)?+[ \t]++(" + NAME + rb")[ \t]*+\(([^)]*+)\)", re.I
+)
 
 _BAS = re.compile(rb"[ \t]*+#[ \t]*+([A-Za-z_][A-Za-z0-9_]*+)[ \t]*+(?:,(.*))?\Z", re.S)
 _BAS_EFFECTS: dict[bytes, Effects] = {
@@ -142,7 +153,34 @@ def read_by(statement: Statement) -> Set[bytes]:
     return identifiers(statement.code)
 
 
-def effects_of(statement: Statement) -> tuple[Effects, bytes]:
+Directions = Mapping[bytes, tuple[bool, ...]]
+"""Name of a routine -> of each parameter whether it comes back changed (OUT)."""
+
+
+def declared_external(statement: Statement) -> tuple[bytes, tuple[bool, ...]] | None:
+    """The routine that an EXT or EXTFCT declares, and of each parameter whether it comes back changed."""
+    found = _EXTERNAL.match(statement.code)
+    return (found[1].upper(), directions(found[2])) if found else None
+
+
+def directions(parameters: bytes) -> tuple[bool, ...]:
+    """Of each parameter in the head of a routine whether it comes back changed."""
+    parts = _DIMENSIONS.sub(b"", parameters).split(b",")[:50]
+    return tuple(not part.rstrip().upper().endswith(b"IN") for part in parts)
+
+
+def returned_by(said: Call, known: Directions) -> frozenset[bytes]:
+    """The variables that a call may give other values: what is no expression and handed over other than as IN."""
+    comes_back = known.get(said.name, ())
+    names = set()
+    for i, text in enumerate(split_values(said.arguments)):
+        found = _RETURNED.match(text)
+        if found and (i >= len(comes_back) or comes_back[i]):
+            names.add(found[1].upper())
+    return frozenset(names)
+
+
+def effects_of(statement: Statement, known: Directions = MappingProxyType({})) -> tuple[Effects, bytes]:
     """What a statement (no motion, no block) may change, and the routine it calls."""
     said = statement.strings
     if isinstance(said, Assignment):
@@ -159,7 +197,7 @@ def effects_of(statement: Statement) -> tuple[Effects, bytes]:
         if said.name == b"BAS":
             command = bas(said.arguments)
             return set(_BAS_EFFECTS.get(command[0], set()) if command else MODAL), b""
-        words: Effects = set() if is_harmless(said.name) else set(identifiers(said.arguments))
+        words: Effects = set() if is_harmless(said.name) else set(returned_by(said, known))
         return words, said.name
     if statement.kind == "open" and statement.word == b"FOR":
         counter = _COUNTER.match(statement.code)

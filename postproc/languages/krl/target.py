@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 from postproc.languages.krl.lexing import NAME, is_number, number, value_end
@@ -23,6 +24,9 @@ _TAGS = frozenset([b"FRAME", b"POS", b"E3POS", b"E6POS", b"AXIS", b"E3AXIS", b"E
 _TAG = re.compile(rb"[ \t]*(" + NAME + rb")[ \t]*:[ \t]*")
 _KEY = re.compile(rb"[ \t]*(" + NAME + rb")((?:[ \t]*\[[^\],]*\])?)[ \t]*")
 
+SHORT = 40
+"""Bytes of an aggregate that is kept as it was read: programs of many short lines repeat them."""
+
 External = tuple[tuple[bytes, float | None, bytes], ...]
 Evaluate = Callable[[bytes], Any]
 """The value of an expression: a number, or whatever else it is."""
@@ -34,6 +38,14 @@ class UnknownValue:
 
     code: str
     message: str
+
+
+@dataclass(frozen=True, slots=True)
+class FrameEntry(UnknownValue):
+    """A copy of an entry of BASE_DATA or TOOL_DATA whose numbers only the cell states."""
+
+    table: bytes = b""
+    number: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +98,34 @@ class KrlTarget:
         """The value without its places: a copy of it."""
         if self.start is NOWHERE and self.home < 0 and not self.locked:
             return self
-        return replace(self, start=NOWHERE, stop=NOWHERE, file=NOWHERE, insert=-1, home=-1, locked="")
+        return KrlTarget(
+            self.values,
+            axes=self.axes,
+            status=self.status,
+            turn=self.turn,
+            external=self.external,
+            unknown=self.unknown,
+        )
+
+    def moved(self, by: int, file: int) -> KrlTarget:
+        """The same target so many bytes further on in another document; it has places and no reason."""
+        start, stop, of = self.start, self.stop, self.file
+        if start != NOWHERE:
+            start = tuple([at + by if at >= 0 else at for at in start])
+            stop = tuple([at + by if at >= 0 else at for at in stop])
+            of = tuple([file if at >= 0 else at for at in of])
+        return KrlTarget(
+            self.values,
+            start,
+            stop,
+            of,
+            self.axes,
+            self.status,
+            self.turn,
+            self.insert + by,
+            file,
+            self.external,
+        )
 
     def component(self, key: bytes) -> float | None:
         """The number of a component, None where it has none."""
@@ -145,6 +184,21 @@ def parse(text: bytes, at: int, file: int, evaluate: Evaluate | None = None) -> 
 
     A component that is no literal is given to ``evaluate``; its place is then unknown.
     """
+    found = _literal(text) if len(text) <= SHORT else None
+    if found is None:
+        return _parse(text, at, file, evaluate)
+    return found.moved(at, file) if isinstance(found, KrlTarget) else found
+
+
+@lru_cache(maxsize=1024)
+def _literal(text: bytes) -> KrlTarget | UnknownValue | None:
+    """The target in ``text`` at byte 0 of document 0; None where a component is no literal."""
+    others: list[bytes] = []
+    found = _parse(text, 0, 0, others.append)
+    return None if others else found
+
+
+def _parse(text: bytes, at: int, file: int, evaluate: Evaluate | None) -> KrlTarget | UnknownValue:
     inner = text[1:-1]
     tag = _TAG.match(inner)
     place = 0

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from postproc.languages.core.persistent_map import KeyNumbers, PersistentMap
 from postproc.languages.krl.expressions import Value, component
-from postproc.languages.krl.target import KrlTarget, UnknownValue, shown
+from postproc.languages.krl.target import FrameEntry, KrlTarget, UnknownValue, shown
 
 Entry = dict[bytes, Value]
 """The values of one name by what follows it: b"" itself, b"[2]", b".F", b"[2].F"."""
@@ -34,12 +34,14 @@ class Variables:
 
     ``fixed``: what no part of the program changes (points of the .dat), found where no variable hides it.
     ``line``: the statement that assigns.  ``mixed``: names whose values once differed where paths meet.
+    ``asked``: names of which it was asked what their declaration says.
     """
 
     def __init__(self, fixed: dict[bytes, Entry]) -> None:
         self.fixed = fixed
         self.line = 0
         self.mixed: set[bytes] = set()
+        self.asked: set[bytes] = set()
         self._paths = KeyNumbers()
         self.facts = VariableFacts(PersistentMap(KeyNumbers()), None)
 
@@ -51,7 +53,7 @@ class Variables:
     def set(self, name: bytes, path: bytes, value: Value) -> None:
         if not path:
             # The value of the whole takes the place of all of its parts.
-            self.replace(name, {b"": value})
+            self._put(name, PersistentMap(self._paths).set(b"", Fact(value, self.line)))
             return
         entry = self.facts.names.get(name)
         if entry is None:
@@ -107,10 +109,10 @@ class Variables:
     def _join(self, name: bytes, path: bytes, left: PersistentMap, right: PersistentMap) -> Fact:
         own: Fact | None = left.get(path)
         a, b = (_found(side, path) for side in (left, right))
-        if own is not None and isinstance(own.value, UnknownValue):
+        if own is not None and isinstance(own.value, UnknownValue) and not isinstance(own.value, FrameEntry):
             return own
         if a is not None and b is not None:
-            if isinstance(b.value, UnknownValue):
+            if isinstance(b.value, UnknownValue) and not isinstance(b.value, FrameEntry):
                 self.mixed.add(name)
                 return Fact(b.value, b.line)
             if _same(a.value, b.value):
@@ -139,6 +141,7 @@ class Variables:
         entry = facts.names.get(name)
         if entry is not None:
             return _found(entry, path)
+        self.asked.add(name)
         values = self.fixed.get(name)
         if values is None:
             return None if facts.unknown is None else Fact(facts.unknown, 0)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from postproc.base.arrays import Bools, Floats
+from postproc.languages.krl.lexing import Statement
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,3 +35,7 @@ class VectorisedLines:
 
     def __len__(self) -> int:
         return len(self.is_line)
+
+
+Item = Statement | VectorisedLines
+"""What a program consists of: statements, and runs of common lines."""

@@ -1,0 +1,229 @@
+"""Modules beside a program: what a call of one of their routines changes that the caller knows too."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from postproc.base.document import Document
+from postproc.languages.krl.data import (
+    Declarations,
+    at_the_start,
+    bind_symbols,
+    read_data,
+    read_references,
+)
+from postproc.languages.krl.lexing import Statement
+from postproc.languages.krl.modal_state import FrameIndex, FrameRegister, ModalState
+from postproc.languages.krl.program_structure import ProgramStructure, Routine, closure, program_structure
+from postproc.languages.krl.scan import scan
+from postproc.languages.krl.statement_effects import Effects, is_harmless
+from postproc.languages.krl.target import UnknownValue
+from postproc.languages.krl.variables import Variables
+from postproc.languages.krl.vectorised import Item
+from postproc.toolpath.initial_state import Symbol
+
+_ROOT = re.compile(rb"\$(?:ROBROOT|WORLD)[ \t]*+(?:\.[ \t]*+[A-Z][ \t]*+)?=(?!=)", re.I)
+_APART = re.compile(rb"\$(?:EX_AX_IGNORE|ASYNC_AXIS)[ \t]*+=|\bASY(?:PTP|CONT)\b", re.I)
+MOST_DEPTH = 5
+"""Calls of modules inside of one another that are followed."""
+MOST_STEPS = 100_000
+"""Statements of other modules that are followed in all."""
+
+MOST_OUTCOMES = 2000
+"""Calls of other modules with different values or states that are followed in all."""
+MOST_ROUTINES = 200
+"""Routines of other modules; where there are more, none is read: each is followed into all that it calls."""
+
+_MOTION = Statement("motion", b"", b"", 0, 0)
+
+MODAL_FIELDS = (
+    "base", "tool", "feed", "blend", "tool_known", "orientation", "arc_frame", "frames_record", "path_record",
+    "axis_record",
+)  # fmt: skip
+"""What a called routine leaves to its caller, besides variables and the position."""
+
+
+@dataclass(eq=False)
+class OtherModule:
+    """A module that is read and never written; sets_root: it states where the robot is in the world; apart: it takes
+    external axes out of the motions."""
+
+    document: Document
+    code: list[Item]
+    survey: ProgramStructure
+    declarations: Declarations
+    sets_root: bool
+    apart: bool
+
+    @cached_property
+    def can_be_followed(self) -> bool:
+        """Whether its routines end where their text says."""
+        words = {one.word for one in self.code if isinstance(one, Statement)}
+        return not self.survey.unclosed and b"RESUME" not in words
+
+    @cached_property
+    def has_trigger(self) -> bool:
+        return any(isinstance(one, Statement) and one.word == b"TRIGGER" for one in self.code)
+
+    def variables(self, others: OtherModules) -> Variables:
+        """What its own names, and those of all modules, hold at any of its calls."""
+        fixed, changing = at_the_start(self.declarations, others.assigned)
+        variables = Variables(fixed)
+        for name, entry in changing.items():
+            variables.replace(name, entry)
+        return variables
+
+
+@dataclass(eq=False)
+class OtherModules:
+    """routines: those that other modules may call; effects: what they and what they call change that others know;
+    unread: what they call that is not here; assigned: names that any of the modules assigns; outcomes: what held at
+    the end of calls that were followed, by the call and what held before; steps: statements
+    that were gone over for these."""
+
+    routines: dict[bytes, tuple[OtherModule, Routine]] = field(default_factory=dict)
+    effects: dict[bytes, Effects] = field(default_factory=dict)
+    unread: dict[bytes, tuple[bytes, ...]] = field(default_factory=dict)
+    assigned: set[bytes] = field(default_factory=set)
+    table_entries: set[bytes | None] = field(default_factory=set)
+    outcomes: dict[tuple[bytes, str], tuple[ModalState, FrameRegister] | None] = field(default_factory=dict)
+    steps: int = 0
+
+    def share(self, survey: ProgramStructure) -> None:
+        """Takes up what the program changes: to the modules, and to it what they change."""
+        self.assigned |= survey.assigned
+        survey.table_entries |= self.table_entries
+        for module, _ in self.routines.values():
+            module.survey.table_entries |= survey.table_entries
+
+    def directions(self) -> dict[bytes, tuple[bool, ...]]:
+        """Name of a routine -> of each parameter whether it comes back changed."""
+        return {
+            name: tuple(back for _, back in routine.parameters)
+            for name, (_, routine) in self.routines.items()
+        }
+
+
+def read_modules(
+    documents: Sequence[Document], references: Sequence[Document], symbols: Mapping[str, Symbol]
+) -> OtherModules:
+    """The modules in ``documents``: each .src with its .dat; references: what declares names for all of them."""
+    data = {_stem(one): one for one in documents if not is_module(one)}
+    found = OtherModules()
+    twice: set[bytes] = set()
+    for document in filter(is_module, documents):
+        module = _module(document, data.get(_stem(document)), references, symbols)
+        found.assigned |= module.survey.assigned
+        found.table_entries |= module.survey.table_entries
+        for routine in module.survey.routines.values():
+            if routine.is_main or routine.is_global:
+                if routine.name in found.routines:
+                    twice.add(routine.name)
+                found.routines[routine.name] = module, routine
+    for name in twice:
+        del found.routines[name]
+    if len(found.routines) > MOST_ROUTINES:
+        return OtherModules()
+    for name in found.routines:
+        _settle(found, name)
+    return found
+
+
+def is_module(document: Document) -> bool:
+    return document.path.suffix.lower() == ".src"
+
+
+def _stem(document: Document) -> str:
+    return document.path.stem.upper()
+
+
+def _module(
+    document: Document,
+    data: Document | None,
+    references: Sequence[Document],
+    symbols: Mapping[str, Symbol],
+) -> OtherModule:
+    declarations = Declarations()
+    if data is not None:
+        read_data(declarations, data, 1)
+    own = frozenset([*declarations.declared, *declarations.records])
+    read_references(declarations, [one for one in references if one is not data])
+    bind_symbols(declarations, symbols, own)
+    code = list(scan(document, True))
+    statements = ((i, one if isinstance(one, Statement) else _MOTION) for i, one in enumerate(code))
+    apart, root = _APART.search(document.raw), _ROOT.search(document.raw)
+    return OtherModule(
+        document, code, program_structure(statements), declarations, root is not None, apart is not None
+    )
+
+
+def _settle(found: OtherModules, name: bytes) -> None:
+    """Notes what a routine, and all that it calls, changes and does not find."""
+    effects: Effects = set()
+    unread: dict[bytes, None] = {}
+    seen: set[bytes] = set()
+    todo = [name]
+    while todo:
+        at = todo.pop()
+        if at in seen:
+            continue
+        seen.add(at)
+        if at not in found.routines:
+            if not is_harmless(at):
+                unread[at] = None
+                effects.add("point")
+            continue
+        module, routine = found.routines[at]
+        own = module.declarations
+        effects |= {
+            effect
+            for effect in routine.effects
+            if isinstance(effect, str) or effect not in own.types or effect in own.shared
+        }
+        called = {call for one in closure(module.survey, [at]) for call in module.survey.routines[one].calls}
+        todo += sorted(called - module.survey.routines.keys())
+    found.effects[name], found.unread[name] = effects, tuple(unread)
+
+
+def visible(modules: OtherModules, declarations: Declarations) -> dict[bytes, Effects]:
+    """The effects of routines without names that the caller's module declares for itself."""
+    own = declarations.types.keys() - declarations.shared
+    return {name: effects - own for name, effects in modules.effects.items()}
+
+
+def state_at_entry(state: ModalState, frames: FrameRegister, inner: FrameRegister) -> ModalState:
+    """What a called routine starts with."""
+    entry = ModalState(**{name: getattr(state, name) for name in MODAL_FIELDS})
+    entry.base, entry.tool = (_moved(one, frames, inner, 0) for one in (state.base, state.tool))
+    return entry
+
+
+def take_exit(
+    state: ModalState, exit: ModalState, registers: tuple[FrameRegister, FrameRegister], why: str, line: int
+) -> None:
+    """Goes on with what a called routine left; registers: of the caller and of the routine."""
+    frames, inner = registers
+    entry = state.base, state.tool
+    for name in MODAL_FIELDS:
+        setattr(state, name, getattr(exit, name))
+    state.base, state.tool = (_moved(one, inner, frames, line) for one in (exit.base, exit.tool))
+    if isinstance(state.base, UnknownValue):
+        state.base = (
+            entry[0] if entry[0] == exit.base else UnknownValue("KRL005", f"$BASE is not known {why}")
+        )
+    if isinstance(state.tool, UnknownValue):
+        state.tool = (
+            entry[1] if entry[1] == exit.tool else UnknownValue("KRL005", f"$TOOL is not known {why}")
+        )
+
+
+def _moved(
+    frame: FrameIndex | UnknownValue, source: FrameRegister, target: FrameRegister, line: int
+) -> FrameIndex | UnknownValue:
+    if isinstance(frame, UnknownValue):
+        return frame
+    number, values = source.key(frame)
+    return target.known(number, values, line)
