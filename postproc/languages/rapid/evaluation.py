@@ -1,0 +1,249 @@
+"""Values of expressions: constants, and Unknown with its reason for everything else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from postproc.base.geometry import rotation_from_vector
+from postproc.base.units import DEG
+from postproc.languages.rapid.data_types import RECORDS, Components
+from postproc.languages.rapid.quaternions import quaternion_from_rotation, rotation_from_quaternion
+from postproc.languages.rapid.syntax_tree import (
+    Aggregate,
+    Argument,
+    Call,
+    Component,
+    Expression,
+    Index,
+    Name,
+    Number,
+    Operation,
+    Star,
+    Text,
+)
+from postproc.languages.rapid.values import (
+    FALSE,
+    TRUE,
+    Group,
+    Leaf,
+    Unknown,
+    Value,
+    number_of,
+    numbers_of,
+    plain,
+    truth_of,
+    unknown_in,
+)
+
+Typed = tuple[Value, bytes]
+"""A value and its type, b"" where that is not known."""
+
+_FUNCTIONS: dict[bytes, Callable[[float], float]] = {
+    b"ABS": abs,
+    b"SQRT": math.sqrt,
+    b"SIN": lambda x: math.sin(x * DEG),
+    b"COS": lambda x: math.cos(x * DEG),
+    b"TAN": lambda x: math.tan(x * DEG),
+    b"ASIN": lambda x: math.asin(x) / DEG,
+    b"ACOS": lambda x: math.acos(x) / DEG,
+    b"ATAN": lambda x: math.atan(x) / DEG,
+}
+_COMPARISONS: dict[bytes, Callable[[float, float], bool]] = {
+    b"<": lambda a, b: a < b,
+    b">": lambda a, b: a > b,
+    b"<=": lambda a, b: a <= b,
+    b">=": lambda a, b: a >= b,
+}
+
+
+@dataclass(frozen=True)
+class Evaluator:
+    """``look``: the value and type of a name; ``records``: further types; ``shadowed``: functions of the program,
+    whose names mean these."""
+
+    look: Callable[[bytes], Typed]
+    records: Mapping[bytes, Components] = field(default_factory=dict)
+    shadowed: frozenset[bytes] = frozenset()
+
+    def value(self, expression: Expression) -> Value:
+        return self.typed(expression)[0]
+
+    def typed(self, expression: Expression) -> Typed:
+        """The value of an expression, and its type."""
+        match expression:
+            case Number():
+                return Leaf(expression.value, expression.start, expression.stop), b"NUM"
+            case Text():
+                return Leaf(expression.value), b"STRING"
+            case Name():
+                if expression.name in (b"TRUE", b"FALSE"):
+                    return (TRUE if expression.name == b"TRUE" else FALSE), b"BOOL"
+                return self.look(expression.name)
+            case Aggregate():
+                return Group(tuple(self.value(item) for item in expression.items)), b""
+            case Component():
+                return self._component(expression)
+            case Index():
+                return self._element(expression)
+            case Operation():
+                return self._operation(expression), b""
+            case Call():
+                return self._call(expression)
+            case Star():
+                return Unknown("its target is stored outside of the text (*)"), b""
+
+    def components(self, kind: bytes) -> Components:
+        """Those of a type, () of one that has none."""
+        return RECORDS.get(kind) or self.records.get(kind, ())
+
+    def _component(self, expression: Component) -> Typed:
+        value, kind = self.typed(expression.base)
+        for place, (name, part) in enumerate(self.components(kind)):
+            if name == expression.name:
+                if isinstance(value, Group) and len(value.items) == len(self.components(kind)):
+                    return value.items[place], part
+                return (value if isinstance(value, Unknown) else Unknown("its component is not known")), part
+        return Unknown(f"{_shown(expression.name)} is no component that is known"), b""
+
+    def _element(self, expression: Index) -> Typed:
+        value, kind = self.typed(expression.base)
+        for index in expression.indices:
+            number = number_of(self.value(index))
+            if number is None or number != int(number):
+                return Unknown("the index of an array is not a constant"), kind
+            if not isinstance(value, Group):
+                return (value if isinstance(value, Unknown) else Unknown("it is not an array")), kind
+            if not 1 <= number <= len(value.items):
+                return Unknown("the index is outside of its array"), kind
+            value = value.items[int(number) - 1]
+        return value, kind
+
+    def _operation(self, expression: Operation) -> Value:
+        values = [self.value(operand) for operand in expression.operands]
+        operator = expression.operator
+        if operator == b"()":
+            return values[0]
+        if operator in (b"AND", b"OR"):
+            truths = [truth_of(value) for value in values]
+            decided = operator == b"OR"
+            if decided in truths:
+                return TRUE if decided else FALSE
+            if None in truths:
+                return next((v for v in values if isinstance(v, Unknown)), Unknown("it is no truth value"))
+            return FALSE if decided else TRUE
+        unknown = next((found for value in values if (found := unknown_in(value)) is not None), None)
+        if unknown is not None:
+            return unknown
+        if operator == b"NOT":
+            truth = truth_of(values[0])
+            return Unknown("it is no truth value") if truth is None else FALSE if truth else TRUE
+        return _combined(operator, values)
+
+    def _call(self, expression: Call) -> Typed:
+        name, arguments = expression.name, expression.arguments
+        if name in self.shadowed:
+            return Unknown(f"{_shown(name)} is computed where the program runs"), b""
+        required = [argument.value for argument in arguments if not argument.name]
+        values = [self.value(one) for one in required if one is not None]
+        for value in values:
+            unknown = unknown_in(value)
+            if unknown is not None:
+                return unknown, b""
+        if name == b"OFFS" and len(required) == len(arguments) == 4:
+            return _offs(values), b"ROBTARGET"
+        if name == b"RELTOOL" and len(required) == 4:
+            return self._rel_tool(values, arguments), b"ROBTARGET"
+        function = _FUNCTIONS.get(name)
+        number = number_of(values[0]) if len(values) == len(arguments) == 1 else None
+        if function is not None and number is not None:
+            try:
+                return Leaf(function(number)), b"NUM"
+            except ValueError:
+                return Unknown(f"{_shown(name)} has no value there"), b"NUM"
+        return Unknown(f"{_shown(name)} is computed where the program runs"), b""
+
+    def _rel_tool(self, values: list[Value], arguments: tuple[Argument, ...]) -> Value:
+        """The target displaced by dx, dy, dz in tool axes, then turned about the tool's x, the new y, the new z axis."""
+        angles = dict.fromkeys((b"RX", b"RY", b"RZ"), 0.0)
+        for argument in arguments:
+            if not argument.name:
+                continue
+            angle = None if argument.value is None else self.value(argument.value)
+            number = None if angle is None else number_of(angle)
+            if argument.name not in angles or number is None:
+                return angle if isinstance(angle, Unknown) else Unknown("an argument of RelTool is not known")
+            angles[argument.name] = number
+        target = values[0]
+        steps = [number_of(value) for value in values[1:]]
+        if not isinstance(target, Group) or len(target.items) != 4 or None in steps:
+            return Unknown("it is no target")
+        position, quaternion = numbers_of(target.items[0], 3), numbers_of(target.items[1], 4)
+        if position is None or quaternion is None:
+            return Unknown("it is no target")
+        rotation = rotation_from_quaternion(np.array([quaternion]))[0]
+        if np.isnan(rotation).any():
+            return Unknown("the length of its quaternion is not 1")
+        moved = np.array(position) + rotation @ np.array(steps, float)
+        turn = np.eye(3)
+        for axis, angle_deg in zip(np.eye(3), angles.values(), strict=True):
+            turn = turn @ rotation_from_vector(axis * angle_deg * DEG)
+        new = quaternion_from_rotation((rotation @ turn)[None], np.array([quaternion]))[0]
+        turned = (
+            Group(tuple(Leaf(float(q)) for q in new)) if any(angles.values()) else plain(target.items[1])
+        )
+        place = Group(tuple(Leaf(float(x)) for x in moved))
+        return Group((place, turned, *map(plain, target.items[2:])))
+
+
+def _offs(values: list[Value]) -> Value:
+    """The target displaced in the axes of its work object."""
+    target, steps = values[0], [number_of(value) for value in values[1:]]
+    if not isinstance(target, Group) or len(target.items) != 4:
+        return Unknown("it is no target")
+    position = numbers_of(target.items[0], 3)
+    if position is None or None in steps:
+        return Unknown("it is no target")
+    place = Group(tuple(Leaf(x + (d or 0.0)) for x, d in zip(position, steps, strict=True)))
+    return Group((place, *map(plain, target.items[1:])))
+
+
+def _combined(operator: bytes, values: list[Value]) -> Value:
+    """Numbers, and sums of positions."""
+    if len(values) == 1:
+        number = number_of(values[0])
+        if number is None:
+            return Unknown("its value is not known")
+        return Leaf(-number if operator == b"-" else number)
+    if operator in (b"=", b"<>"):
+        same = plain(values[0]) == plain(values[1])
+        return TRUE if same == (operator == b"=") else FALSE
+    one, other = (number_of(value) for value in values)
+    if one is not None and other is not None:
+        return _of_numbers(operator, one, other)
+    vectors = [numbers_of(value, 3) for value in values]
+    if operator in (b"+", b"-") and vectors[0] is not None and vectors[1] is not None:
+        sense = 1.0 if operator == b"+" else -1.0
+        pairs = zip(vectors[0], vectors[1], strict=True)
+        return Group(tuple(Leaf(a + sense * b) for a, b in pairs))
+    return Unknown("it is computed")
+
+
+def _of_numbers(operator: bytes, one: float, other: float) -> Value:
+    if operator in _COMPARISONS:
+        return TRUE if _COMPARISONS[operator](one, other) else FALSE
+    if operator in (b"+", b"-", b"*"):
+        value = one + other if operator == b"+" else one - other if operator == b"-" else one * other
+        return Leaf(value) if math.isfinite(value) else Unknown("it is too large")
+    if operator == b"/" and other != 0:
+        return Leaf(one / other)
+    if operator in (b"DIV", b"MOD") and other > 0 and one >= 0 and one == int(one) and other == int(other):
+        return Leaf(float(one // other if operator == b"DIV" else one % other))
+    return Unknown("it is computed")
+
+
+def _shown(name: bytes) -> str:
+    return name.decode("latin-1")[:40]

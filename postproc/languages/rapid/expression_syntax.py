@@ -1,0 +1,191 @@
+"""Expressions of RAPID and the arguments of calls."""
+
+from __future__ import annotations
+
+from postproc.languages.rapid.syntax_tree import (
+    Aggregate,
+    Argument,
+    Call,
+    Component,
+    Expression,
+    Index,
+    Name,
+    Number,
+    Operation,
+    Star,
+    Text,
+)
+from postproc.languages.rapid.tokens import NAME, NUMBER, SIGN, TEXT, Token, Tokens
+
+_LEVELS: tuple[frozenset[bytes], ...] = tuple(
+    frozenset(words)
+    for words in (
+        (b"OR", b"XOR"),
+        (b"AND",),
+        (b"=", b"<>", b"<", b">", b"<=", b">="),
+        (b"+", b"-"),
+        (b"*", b"/", b"DIV", b"MOD"),
+    )
+)
+_SUM = 3
+_NO_NAMES = frozenset(
+    b"THEN DO FROM TO STEP WITH ENDIF ELSE ELSEIF ENDFOR ENDWHILE ENDTEST CASE DEFAULT ENDPROC ENDFUNC"
+    b" ENDTRAP ENDMODULE PROC FUNC TRAP IF FOR WHILE TEST GOTO RETURN OR XOR AND NOT DIV MOD".split()
+)
+DEEPEST = 40
+"""Expressions in each other."""
+
+
+class Problem(Exception):
+    """A token that no rule consumes."""
+
+
+class ExpressionParser:
+    """Takes expressions from tokens; raises Problem where none is."""
+
+    def __init__(self, tokens: Tokens) -> None:
+        self.tokens = tokens
+        self._depth = 0
+
+    @property
+    def next(self) -> Token:
+        """The token that comes."""
+        return self.tokens.next
+
+    def take(self) -> Token:
+        return self.tokens.take()
+
+    def sign(self, text: bytes) -> bool:
+        """Whether the next token is this sign, which is then passed."""
+        if self.next.kind == SIGN and self.next.text == text:
+            self.take()
+            return True
+        return False
+
+    def need(self, text: bytes) -> None:
+        if not self.sign(text):
+            raise Problem
+
+    def word(self, text: bytes) -> None:
+        if self.next.kind != NAME or self.next.text != text:
+            raise Problem
+        self.take()
+
+    def name(self) -> bytes:
+        if self.next.kind != NAME or self.next.text in _NO_NAMES:
+            raise Problem
+        return self.take().text
+
+    def expression(self) -> Expression:
+        """An expression of any kind."""
+        if self._depth >= DEEPEST:
+            raise Problem
+        self._depth += 1
+        try:
+            return self._level(0)
+        finally:
+            self._depth -= 1
+
+    def _level(self, level: int) -> Expression:
+        if level == len(_LEVELS):
+            return self._primary()
+        start = self.next.start
+        left = self._signed(level) if level == _SUM else self._level(level + 1)
+        while self.next.kind in (SIGN, NAME) and self.next.text in _LEVELS[level]:
+            operator = self.take().text
+            right = self._level(level + 1)
+            left = Operation(operator, (left, right), start, self.tokens.before)
+        return left
+
+    def _signed(self, level: int) -> Expression:
+        """A sum, which may have a sign before it; that of a number belongs to the number."""
+        token = self.next
+        if token.kind != SIGN or token.text not in (b"+", b"-"):
+            return self._level(level + 1)
+        self.take()
+        operand = self._level(level + 1)
+        if isinstance(operand, Number):
+            value = -operand.value if token.text == b"-" else operand.value
+            return Number(value, token.start, operand.stop)
+        return Operation(token.text, (operand,), token.start, self.tokens.before)
+
+    def _primary(self) -> Expression:
+        token = self.next
+        if token.kind == NUMBER:
+            self.take()
+            return Number(float(token.text), token.start, token.stop)
+        if token.kind == TEXT:
+            self.take()
+            return Text(token.text[1:-1], token.start, token.stop)
+        if token.kind == NAME and token.text == b"NOT":
+            self.take()
+            if self._depth >= DEEPEST:
+                raise Problem
+            self._depth += 1
+            operand = self._primary()
+            self._depth -= 1
+            return Operation(b"NOT", (operand,), token.start, self.tokens.before)
+        if token.kind == NAME and token.text not in _NO_NAMES:
+            self.take()
+            if self.sign(b"("):
+                arguments = self.arguments(b")")
+                self.need(b")")
+                call = Call(token.text, arguments, token.start, self.tokens.before)
+                return self.suffixes(call)
+            return self.suffixes(Name(token.text, token.start, token.stop))
+        if self.sign(b"("):
+            inner = self.expression()
+            self.need(b")")
+            return Operation(b"()", (inner,), token.start, self.tokens.before)
+        if self.sign(b"["):
+            items = []
+            if not self.sign(b"]"):
+                items.append(self.expression())
+                while self.sign(b","):
+                    items.append(self.expression())
+                self.need(b"]")
+            return Aggregate(tuple(items), token.start, self.tokens.before)
+        raise Problem
+
+    def suffixes(self, base: Expression) -> Expression:
+        """``base`` with the indices and components after it."""
+        start = base.start
+        for _ in range(DEEPEST):
+            if self.sign(b"{"):
+                indices = [self.expression()]
+                while self.sign(b","):
+                    indices.append(self.expression())
+                self.need(b"}")
+                base = Index(base, tuple(indices), start, self.tokens.before)
+            elif self.sign(b"."):
+                base = Component(base, self.name(), start, self.tokens.before)
+            else:
+                return base
+        raise Problem
+
+    def arguments(self, end: bytes) -> tuple[Argument, ...]:
+        """Arguments up to the sign ``end``, which is not passed."""
+        found: list[Argument] = []
+        separated = True
+        while not (self.next.kind == SIGN and self.next.text == end):
+            start = self.next.start
+            if self.sign(b"\\"):
+                name = self.name()
+                value = None
+                if self.sign(b":="):
+                    value = self.expression()
+                elif self.next.text == b"?":
+                    raise Problem
+                found.append(Argument(name, value, start, self.tokens.before))
+            else:
+                if not separated:
+                    raise Problem
+                token = self.next
+                if self.sign(b"*"):
+                    found.append(Argument(b"", Star(token.start, token.stop), start, self.tokens.before))
+                else:
+                    found.append(Argument(b"", self.expression(), start, self.tokens.before))
+            separated = self.sign(b",")
+            if separated and self.next.kind == SIGN and self.next.text == end:
+                raise Problem
+        return tuple(found)
