@@ -29,8 +29,8 @@ from postproc.languages.rapid.values import Value, numbers_of
 from postproc.toolpath import COMPUTED, LOST, Kind
 from postproc.toolpath.initial_state import Symbol
 
-CONFIGURATIONS = 50
-"""Quadrants and configurations from -50 to 49 are kept as numbers."""
+QUADRANTS = 50
+"""Quadrants from -50 to 49 are kept as numbers."""
 
 
 @dataclass(slots=True)
@@ -52,7 +52,8 @@ class ModuleRows:
     vias: Floats = field(default_factory=lambda: np.empty((0, 3)))
     axes: dict[int, tuple[float, ...]] = field(default_factory=dict)
     external: Floats = field(default_factory=lambda: np.empty((0, 6)))
-    configuration: list[int] = field(default_factory=list)
+    quadrants: list[int] = field(default_factory=list)
+    cfx: list[int] = field(default_factory=list)
 
     def __len__(self) -> int:
         return len(self.facts)
@@ -161,7 +162,7 @@ def _place(rows: ModuleRows, frames: ModuleFrames, row: int, fact: MotionFact) -
     """Frames, axes and configuration of a row."""
     line = rows.lines[row]
     tool, base = -1, -1
-    configuration = -1
+    quadrants, cfx = -1, -1
     if row not in rows.problems:
         problem = fact.problem
         if problem is None and (fact.force is VARYING or fact.switch is VARYING):
@@ -176,20 +177,24 @@ def _place(rows: ModuleRows, frames: ModuleFrames, row: int, fact: MotionFact) -
                 rows.refuse(row, *_lost(fact.target))
             else:
                 rows.axes[row] = angles
+                quadrants = _packed(tuple(float(angles[axis] // 90.0) for axis in (0, 3, 5)))
         else:
             _check_target(rows, row, fact)
             for found in (found_tool, found_base):
                 if not isinstance(found, int):
                     rows.refuse(row, *found)
             conf = numbers_of(item_of(fact.target, 2), 4)
-            configuration = -1 if conf is None else _packed(conf)
+            if conf is not None:
+                quadrants = _packed(conf[:3])
+                cfx = int(conf[3]) if conf[3] in range(8) and fact.checked else -1
         tool = found_tool if isinstance(found_tool, int) else -1
         base = found_base if isinstance(found_base, int) else -1
     elif fact.form.kind != Kind.OTHER or fact.problem is None:
         rows.refuse(row, "RAP001", "it is not understood")
     rows.tool.append(tool)
     rows.base.append(base)
-    rows.configuration.append(configuration)
+    rows.quadrants.append(quadrants)
+    rows.cfx.append(cfx)
 
 
 def _check_target(rows: ModuleRows, row: int, fact: MotionFact) -> None:
@@ -209,13 +214,13 @@ def _lost(value: Value) -> Problem:
     return ("RAP003" if "is not declared" in reason else "RAP002"), reason
 
 
-def _packed(conf: tuple[float, ...]) -> int:
-    """cf1, cf4, cf6, cfx as one number that is the same for the same four; -1 where one is none of these."""
+def _packed(quadrants: tuple[float, ...]) -> int:
+    """cf1, cf4, cf6 as one number that is the same for the same three; -1 where one is no quadrant."""
     packed = 0
-    for number in conf:
-        if number != int(number) or not -CONFIGURATIONS <= number < CONFIGURATIONS:
+    for number in quadrants:
+        if number != int(number) or not -QUADRANTS <= number < QUADRANTS:
             return -1
-        packed = packed * 2 * CONFIGURATIONS + int(number) + CONFIGURATIONS
+        packed = packed * 2 * QUADRANTS + int(number) + QUADRANTS
     return packed
 
 

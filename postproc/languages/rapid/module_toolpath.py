@@ -72,7 +72,9 @@ def module_toolpath(
         orientation_control=OrientationControl(
             mode=np.array([fact.orientation for fact in rows.facts], np.int8)
         ),
-        configuration=Configuration({"confdata": np.array(rows.configuration, np.int32)}),
+        configuration=Configuration(
+            {"quadrants": np.array(rows.quadrants, np.int32), "cfx": np.array(rows.cfx, np.int32)}
+        ),
         external=rows.external,
         approximation=zones * MM,
         stops=np.array([fact.stops for fact in rows.facts], np.bool_),
@@ -178,6 +180,8 @@ def _whole(rows: ModuleRows, continues: np.ndarray, refused: Mapping[int, Findin
             whole[row] = "it starts or carries a process whose distances count from its own start"
         elif fact.arguments is not None and b"T" in fact.arguments.options:
             whole[row] = "its time is stated (\\T)"
+        elif fact.checked is not False and not rows.quadrants[row] == rows.quadrants[row - 1] >= 0:
+            whole[row] = "its quadrants (cf1, cf4, cf6) are not those of the motion before, and ConfL is on"
         elif text.target is None or not text.target.words:
             whole[row] = "its configuration or external axes are not known in numbers"
     return whole

@@ -18,7 +18,7 @@ from postproc.languages.rapid.values import (
     truth_of,
     unknown_in,
 )
-from postproc.toolpath import ArcFrame, OrientationMode
+from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 NAN = math.nan
 DIFFERS = "it has different values in several executions of its line"
@@ -38,7 +38,8 @@ class FrameUse:
 @dataclass(frozen=True, slots=True)
 class MotionFact:
     """A motion: ``target``, ``via``: its points (``via`` of an arc alone); speed, zone: [mm/s], [mm], NaN where not
-    known; ``stops``: it ends in a stop point.  ``before``: motions after which it runs."""
+    known; ``stops``: it ends in a stop point.  ``before``: motions after which it runs; ``checked``: the configuration of
+    its target counts, None where that is not known."""
 
     statement: Instruction
     form: MotionForm
@@ -56,6 +57,7 @@ class MotionFact:
     force: Remark | Varying | None
     switch: Remark | Varying | None
     problem: Problem | None
+    checked: bool | None
 
     def joined(self, other: MotionFact) -> MotionFact:
         """What holds in both executions."""
@@ -79,6 +81,7 @@ class MotionFact:
             force=self.force if self.force == other.force else VARYING,
             switch=self.switch if self.switch == other.switch else VARYING,
             problem=self.problem or other.problem,
+            checked=self.checked if self.checked == other.checked else None,
         )
 
 
@@ -119,6 +122,7 @@ def motion_fact(
         state.force,
         state.switch,
         _problem(state, options),
+        state.checks_joint if form.kind == Kind.PTP else state.checks_linear,
     )
 
 
@@ -129,6 +133,7 @@ def not_read(statement: Instruction, form: MotionForm, state: ProgramState, mess
     return MotionFact(
         statement, form, None, unknown, unknown if form.points == 2 else None, nothing, nothing, NAN, NAN,
         False, state.orientation, state.arc, state.last, state.force, state.switch, ("RAP001", message),
+        None,
     )  # fmt: skip
 
 

@@ -38,11 +38,19 @@ class ProgramState:
     arc: ArcFrame = ArcFrame.PATH
     force: Remark | Varying | None = None
     switch: Remark | Varying | None = None
+    checks_linear: bool | None = True
+    checks_joint: bool | None = True
 
     def copy(self) -> ProgramState:
-        new = ProgramState(**{one.name: getattr(self, one.name) for one in fields(self)})
+        new = ProgramState()
+        new.take(self)
         new.values = dict(self.values)
         return new
+
+    def take(self, other: ProgramState) -> None:
+        """Becomes the other one, and shares its values."""
+        for one in fields(self):
+            setattr(self, one.name, getattr(other, one.name))
 
     def join(self, other: ProgramState) -> bool:
         """Takes in what holds where another path meets this one; whether anything changed."""
@@ -64,6 +72,8 @@ class ProgramState:
             else OrientationMode.UNKNOWN,
             "arc": self.arc if self.arc == other.arc else ArcFrame.UNKNOWN,
             "force": self.force if self.force == other.force else VARYING,
+            "checks_linear": self.checks_linear if self.checks_linear == other.checks_linear else None,
+            "checks_joint": self.checks_joint if self.checks_joint == other.checks_joint else None,
             "switch": self.switch if self.switch == other.switch else VARYING,
         }
         for name_, value in merged.items():

@@ -272,6 +272,10 @@ class Propagation:
                 self._note_reading(step.start, state)
         elif name in RESTORING:
             state.displaced -= frozenset(RESTORING[name])
+        elif name in (b"CONFL", b"CONFJ"):
+            given = options & {b"ON", b"OFF"}
+            checks = b"ON" in given if len(given) == len(step.arguments) == 1 else None
+            setattr(state, "checks_linear" if name == b"CONFL" else "checks_joint", checks)
         elif name == b"SINGAREA":
             modes = {frozenset([b"OFF"]): OrientationMode.VAR, frozenset([b"WRIST"]): OrientationMode.JOINT}
             state.orientation = modes.get(frozenset(options), OrientationMode.UNKNOWN)
@@ -348,9 +352,7 @@ class Propagation:
         if after is None:
             state.last = frozenset([ELSEWHERE])
             return
-        state.values = after.values
-        for name in ("last", "displaced", "override", "orientation", "arc", "force", "switch"):
-            setattr(state, name, getattr(after, name))
+        state.take(after)
         changed = self._assigned_by(routine.name)
         self._change(tuple(argument for name, argument in shared if name in changed), state)
 
