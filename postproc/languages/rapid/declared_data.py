@@ -114,7 +114,7 @@ def _zero(kind: bytes, evaluator: Evaluator, depth: int) -> Value:
 
 
 class Usage:
-    """Names in the routines: ``assigned`` anywhere, ``later``: in traps and error handlers, ``read``: otherwise than as
+    """Names in the routines: ``assigned`` anywhere, ``later``: where the flow does not show it, ``read``: otherwise than as
     the point of a motion; ``calls``, ``assigned_in``: routine -> what it may call and assigns; ``moves``: routines in
     which the robot may move."""
 
@@ -127,6 +127,9 @@ class Usage:
         self.moves: set[bytes] = set()
         self._called: set[bytes] = set()
         self._set: set[bytes] = set()
+        self._module_data = {declaration.name for declaration in module.declarations}
+        self._own = {routine.name for routine in module.routines}
+        self._copying = {r.name for r in module.routines if not any(p.mode for p in r.parameters)}
         for one in module.declarations:
             self._expressions(one.value, one.extent)
         for unclear in module.unclear:
@@ -167,6 +170,8 @@ class Usage:
                 self.read |= statement.names
             case For():
                 self._set.add(statement.name)
+                if statement.name in self._module_data:
+                    self.later.add(statement.name)  # the name is not always that of the loop
                 self._expressions(statement.first, statement.last, statement.step)
             case _:
                 self._expressions(*_conditions(statement))
@@ -179,8 +184,9 @@ class Usage:
             self.moves.add(routine.name)
         elif statement.name not in HARMLESS or statement.name in WRITERS:
             self._called.add(statement.name)
-            self._set |= names_in(statement.arguments)
-            if statement.name not in WRITERS:
+            if statement.name not in self._copying:
+                self._set |= names_in(statement.arguments)
+            if statement.name not in WRITERS and statement.name not in self._own:
                 self.moves.add(routine.name)  # it may, or what it calls does
         for argument in statement.arguments:
             if argument in points and is_direct(argument):

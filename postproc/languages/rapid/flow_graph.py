@@ -143,6 +143,7 @@ class FlowGraph:
             test = Operation(b"=", (name, NOTHING), at, at)
             more = Assignment(name, NOTHING, at, at)
         self._loop(test, statement.body, [more])
+        self.blocks[-1].steps.append(Assignment(name, NOTHING, at, at))  # it is of the loop alone
 
     def _test(self, statement: Test) -> None:
         ends: list[Block] = []

@@ -80,6 +80,8 @@ def module_rows(
     n = len(rows)
     numbers = [target_numbers(fact.target) if fact.form.kind != Kind.AXIS else [math.nan] * 7 for fact in rows.facts]
     rows.numbers = np.array(numbers).reshape(n, 7)
+    for part in (rows.numbers[:, :3], rows.numbers[:, 3:]):
+        part[np.isnan(part).any(axis=1)] = np.nan
     rows.vias = np.full((n, 3), np.nan)
     for row, fact in enumerate(rows.facts):
         if fact.via is not None:

@@ -22,6 +22,7 @@ from postproc.toolpath import (
     Arcs,
     Configuration,
     EditConstraints,
+    FrameRef,
     Kind,
     OrientationControl,
     Toolpath,
@@ -157,12 +158,16 @@ def _arc_start(
         return nothing
     if rows.base[start] == rows.base[row] and rows.tool[start] == rows.tool[row]:
         return np.asarray(position[start])
-    poses = [frames.refs[index].pose for index in (rows.base[start], rows.base[row])]
-    if rows.tool[start] != rows.tool[row] or poses[0] is None or poses[1] is None:
-        rows.refuse(row, "RAP012", "it starts in another work object or with another tool")
+    one, other = (_pose(frames.refs[index]) for index in (rows.base[start], rows.base[row]))
+    if rows.tool[start] != rows.tool[row] or one is None or other is None:
+        rows.refuse(row, "RAP012", "it starts with another tool, or in a work object that only the cell states")
         return nothing
-    there = poses[1].inverse() @ poses[0] @ Poses(np.eye(3), position[start])
+    there = other.inverse() @ one @ Poses(np.eye(3), position[start])
     return np.asarray(there.position)
+
+
+def _pose(frame: FrameRef) -> Poses | None:
+    return Poses.identity() if frame.number == 0 else frame.pose
 
 
 def _whole(rows: ModuleRows, continues: np.ndarray, refused: Mapping[int, Finding]) -> dict[int, str]:

@@ -44,6 +44,7 @@ from postproc.languages.rapid.values import Unknown, number_of, plain, replaced,
 from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 OTHER = MotionForm(Kind.OTHER)
+_SETTINGS = frozenset([b"TOOLDATA", b"WOBJDATA", b"SPEEDDATA", b"ZONEDATA"])
 MOST_STEPS = 4_000_000
 """Statements that are followed; each statement of a file counts for four more."""
 DEEPEST = 12
@@ -256,10 +257,12 @@ class Propagation:
         elif name in MOTIONS:
             self._move(step, motion_fact(step, MOTIONS[name], state, self._evaluator(state)), state)
             if name.endswith(b"SYNC"):
-                self._unread_call(step, state, moves=False)
+                self.calls.setdefault(step.name, step.start)
         elif name in OTHER_MOTIONS:
             self._move(step, not_read(step, OTHER, state, "this form of motion is not read"), state)
-            self._change(step.arguments, state)
+            for argument_name in names_in(step.arguments):
+                if self._look(state)(argument_name)[1] not in _SETTINGS:
+                    self._forget(argument_name, state, "an instruction may change it")
         else:
             self._setting(step, state)
 
