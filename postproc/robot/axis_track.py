@@ -14,7 +14,6 @@ from postproc.base.findings import Topic
 from postproc.base.geometry import Placed, Poses, wrapped
 from postproc.base.units import DEG
 from postproc.robot.description import Robot
-from postproc.robot.stated_branches import stated_branches
 from postproc.robot.external_axes import joint_unit, own_column
 from postproc.robot.geometries import KukaLengths, SerialArm
 from postproc.robot.half_turns import (
@@ -32,6 +31,7 @@ from postproc.robot.half_turns import (
 )
 from postproc.robot.inverse import controller_values, inverse, kuka_angles, status_of, turn_of
 from postproc.robot.newton import follow_rows, weakest
+from postproc.robot.stated_branches import stated_branches
 from postproc.toolpath import Kind, Toolpath
 
 SIGN_MARGIN = 0.01 * DEG

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from rapid_judge.machine import Done, _times, _turned
 
 from postproc.languages.dialect import Program
+from rapid_judge.machine import Done, _times, _turned
 
 
 def disagreements(program: Program, done: list[Done]) -> list[str]:
@@ -45,12 +45,12 @@ def _motion(program: Program, row: int, motion: Done) -> list[str]:
         wrong.append(f"position {position} instead of {motion.target[0]}")
     if not np.allclose(rotation, _matrix(motion.target[1]), atol=1e-9):
         wrong.append("another orientation")
-    if motion.speed is not None and np.isfinite(path.feed[row]):
-        if abs(path.feed[row] * 1e3 - motion.speed) > 1e-9:
-            wrong.append(f"speed {path.feed[row]} instead of {motion.speed}")
-    if motion.zone is not None and np.isfinite(path.approximation[row]):
-        if abs(path.approximation[row] * 1e3 - motion.zone) > 1e-9:
-            wrong.append(f"zone {path.approximation[row]} instead of {motion.zone}")
+    for word, claimed, actual in (
+        ("speed", path.feed[row] * 1e3, motion.speed),
+        ("zone", path.approximation[row] * 1e3, motion.zone),
+    ):
+        if actual is not None and np.isfinite(claimed) and abs(claimed - actual) > 1e-9:
+            wrong.append(f"{word} {claimed} instead of {actual}")
     tool = path.frames[path.tool[row]].pose
     if tool is None or not np.allclose(tool.position * 1e3, motion.tool[1][0], atol=1e-9):
         wrong.append("another tool")

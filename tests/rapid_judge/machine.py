@@ -5,6 +5,7 @@ Written from the description of the language; shares no code with the package.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from dataclasses import dataclass
@@ -67,7 +68,7 @@ class Machine:
     def _module(self) -> None:
         i = 0
         while i < len(self.tokens):
-            kind, word, _ = self.tokens[i]
+            word = self.tokens[i][1]
             if word in ("const", "pers", "var"):
                 i = self._declare(i, self.world, self.kinds, [self.world])
             elif word == "proc":
@@ -108,10 +109,8 @@ class Machine:
 
     # -- running
     def run(self, name: str = "main") -> list[Done]:
-        try:
+        with contextlib.suppress(Halt):
             self._call(name, {}, {})
-        except Halt:
-            pass
         return self.done
 
     def _call(self, name: str, own: dict, kinds: dict) -> dict:
@@ -131,9 +130,18 @@ class Machine:
         return own
 
     def _starts(self, i: int) -> bool:
-        return self.tokens[i - 1][1] in (";", ":", ")", "then", "do", "else", "endif", "endwhile", "endfor", "endtest") or (
-            self.tokens[i - 1][0] == "remark"
-        )
+        return self.tokens[i - 1][1] in (
+            ";",
+            ":",
+            ")",
+            "then",
+            "do",
+            "else",
+            "endif",
+            "endwhile",
+            "endfor",
+            "endtest",
+        ) or (self.tokens[i - 1][0] == "remark")
 
     def _body(self, i: int, end: int, labels: dict) -> None:
         """Runs from a token to the end of the routine; loops keep a stack of what they come back to."""
@@ -283,7 +291,7 @@ class Machine:
         elif word in self.routines:
             _, parameters = self.routines[word]
             own, kinds = {}, {}
-            for (mode, kind, name), (value, _) in zip(parameters, required, strict=True):
+            for (_, kind, name), (value, _) in zip(parameters, required, strict=True):
                 own[name], kinds[name] = value, kind
             caller = self.own
             after = self._call(word, own, kinds)
@@ -438,7 +446,9 @@ class Machine:
         if scope is None:
             return self._foreign(word), i + 1
         value = scope[word]
-        type_name = (self.own_kinds if scopes and scope is scopes[0] and len(scopes) > 1 else self.kinds).get(word)
+        type_name = (self.own_kinds if scopes and scope is scopes[0] and len(scopes) > 1 else self.kinds).get(
+            word
+        )
         i += 1
         while self.tokens[i][1] in ("{", "."):
             if self.tokens[i][1] == "{":

@@ -32,7 +32,7 @@ class Writer:
             "PERS tooldata t1:=[TRUE,[[0,0,200],[1,0,0,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];",
             "PERS tooldata t2:=[TRUE,[[10,-5,150.5],[0.70710678,0,0.70710678,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];",
             'PERS wobjdata w1:=[FALSE,TRUE,"",[[1000,0,500],[1,0,0,0]],[[0,10,20],[1,0,0,0]]];',
-            'PERS wobjdata w2:=[FALSE,TRUE,"",[[900,50,0],[0.5,0.5,-0.5,0.5]],[[5,10,20],[0.70710678,0,0,0.70710678]]];',
+            'PERS wobjdata w2:=[FALSE,TRUE,"",[[900,50,0],[0.5,0.5,-0.5,0.5]],[[5,10,20],[0.7071068,0,0,0.7071068]]];',
             f"CONST robtarget p1:={self.target()};",
             f"PERS robtarget p2:={self.target()};",
             f"VAR robtarget p3:={self.target()};",
@@ -99,10 +99,18 @@ class Writer:
         elif kind < 0.6:
             self.lines.append(
                 self.pick(
-                    f"n1:={self.pick('1', '2', '3')};", f"n2:={self.value()};", f"p3:={self.target()};",
-                    "p3:=p1;", f"p3.trans.z:={self.value()};", "p3:=Offs(p3,1,0,0);", "p3.trans:=[1,2,3];",
-                    "Incr n2;", "SetDO do1,1;", "WaitTime 0.5;", f"p2.trans.x:={self.number()};",
-                )  # fmt: skip
+                    f"n1:={self.pick('1', '2', '3')};",
+                    f"n2:={self.value()};",
+                    f"p3:={self.target()};",
+                    "p3:=p1;",
+                    f"p3.trans.z:={self.value()};",
+                    "p3:=Offs(p3,1,0,0);",
+                    "p3.trans:=[1,2,3];",
+                    "Incr n2;",
+                    "SetDO do1,1;",
+                    "WaitTime 0.5;",
+                    f"p2.trans.x:={self.number()};",
+                )
             )
         elif kind < 0.67:
             self.lines.append(self.pick("! FORCE 1 2 3", "! FORCE OFF", "! words", "! FORCE 0 0 5 @tool"))

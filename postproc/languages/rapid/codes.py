@@ -6,9 +6,7 @@ from postproc.base.findings import Code, Topic, define
 
 
 def _warning(title: str, meaning: str, consequence: str, action: str, example: str) -> Code:
-    return Code(
-        "warning", title, meaning=meaning, consequence=consequence, action=action, example=example
-    )
+    return Code("warning", title, meaning=meaning, consequence=consequence, action=action, example=example)
 
 
 _STAYS = "The motion is not corrected and stays as programmed."

@@ -114,8 +114,8 @@ def _zero(kind: bytes, evaluator: Evaluator, depth: int) -> Value:
 
 
 class Usage:
-    """Names in the routines: ``assigned`` anywhere, ``later``: where the flow does not show it, ``read``: otherwise than as
-    the point of a motion; ``calls``, ``assigned_in``: routine -> what it may call and assigns; ``moves``: routines in
+    """Names in the routines: ``assigned`` anywhere, ``later``: where the flow does not show it, ``read``: otherwise than
+    as the point of a motion; ``calls``, ``assigned_in``: routine -> what it may call and assigns; ``moves``: those in
     which the robot may move."""
 
     def __init__(self, module: Module) -> None:

@@ -96,6 +96,24 @@ class Evaluator:
             case Star():
                 return Unknown("its target is stored outside of the text (*)"), b""
 
+    def assigned_place(self, target: Expression) -> tuple[bytes | None, tuple[int, ...]]:
+        """The variable to which an assignment goes, and the indices of the part that it sets, -1 where not known."""
+        parts: list[Index | Component] = []
+        while isinstance(target, Index | Component):
+            parts.insert(0, target)
+            target = target.base
+        if not isinstance(target, Name):
+            return None, ()
+        place: list[int] = []
+        for part in parts:
+            if isinstance(part, Index):
+                numbers = [number_of(self.value(index)) for index in part.indices]
+                place += [-1 if one is None or one != int(one) else int(one) - 1 for one in numbers]
+            else:
+                names = [name for name, _ in self.components(self.typed(part.base)[1])]
+                place.append(names.index(part.name) if part.name in names else -1)
+        return target.name, tuple(place)
+
     def components(self, kind: bytes) -> Components:
         """Those of a type, () of one that has none."""
         return RECORDS.get(kind) or self.records.get(kind, ())
@@ -167,7 +185,7 @@ class Evaluator:
         return Unknown(f"{_shown(name)} is computed where the program runs"), b""
 
     def _rel_tool(self, values: list[Value], arguments: tuple[Argument, ...]) -> Value:
-        """The target displaced by dx, dy, dz in tool axes, then turned about the tool's x, the new y, the new z axis."""
+        """The target displaced by dx, dy, dz in tool axes, then turned about the tool's x, the new y and z axes."""
         angles = dict.fromkeys((b"RX", b"RY", b"RZ"), 0.0)
         for argument in arguments:
             if not argument.name:
@@ -192,9 +210,7 @@ class Evaluator:
         for axis, angle_deg in zip(np.eye(3), angles.values(), strict=True):
             turn = turn @ rotation_from_vector(axis * angle_deg * DEG)
         new = quaternion_from_rotation((rotation @ turn)[None], np.array([quaternion]))[0]
-        turned = (
-            Group(tuple(Leaf(float(q)) for q in new)) if any(angles.values()) else plain(target.items[1])
-        )
+        turned = Group(tuple(Leaf(float(q)) for q in new)) if any(angles.values()) else plain(target.items[1])
         place = Group(tuple(Leaf(float(x)) for x in moved))
         return Group((place, turned, *map(plain, target.items[2:])))
 

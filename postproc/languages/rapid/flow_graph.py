@@ -132,7 +132,12 @@ class FlowGraph:
         """i := first; WHILE i <= last DO ...; i := i + step; ENDWHILE.  Without a step it counts down where the first
         value exceeds the last one; where that is not known, nothing of the loop is."""
         at = statement.start
-        name, first, last, step = Name(statement.name, at, at), statement.first, statement.last, statement.step
+        name, first, last, step = (
+            Name(statement.name, at, at),
+            statement.first,
+            statement.last,
+            statement.step,
+        )
         if step is None and isinstance(first, Number) and isinstance(last, Number):
             step = Number(1.0 if first.value <= last.value else -1.0, at, at)
         self.blocks[-1].steps.append(Assignment(name, first, at, at))

@@ -61,10 +61,8 @@ def _line(task: PlanWriter, motion: int, row: int, text: MotionText, target: byt
         word = b"MoveL"
     else:
         word = {Kind.LIN: b"MoveL", Kind.CIRC: b"MoveC"}.get(Kind(task.path.kind[row]), b"MoveJ")
-    if task.plan.flows[motion]:
-        zone = FLY_BY if task.path.stops[row] else text.zone
-    else:
-        zone = b"fine"
+    passing = FLY_BY if task.path.stops[row] else text.zone
+    zone = passing if task.plan.flows[motion] else b"fine"
     parts = [target, *(b" ".join(part.split()) for part in (text.speed, zone, text.tool))]
     indent = task.raw[start : text.start]
     return indent + word + b" " + b",".join(parts) + b";" + task.program.documents[0].newline

@@ -66,7 +66,10 @@ class ModuleFrames:
             return None
         if not isinstance(symbol, Mapping):
             if symbol != int(symbol) or symbol < 0:
-                return "RAP005", f"the cell states {symbol:g} for {_shown(use)}, which is no number of a frame"
+                return (
+                    "RAP005",
+                    f"the cell states {symbol:g} for {_shown(use)}, which is no number of a frame",
+                )
             return self._index((kind, int(symbol)), FrameRef(int(symbol), None, line))
         if set(symbol) != set(_KEYS):
             return "RAP005", f"the cell does not state X, Y, Z, A, B, C of {_shown(use)}"

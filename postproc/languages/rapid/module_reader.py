@@ -83,7 +83,12 @@ def _structure(document: Document, module: Module, flow: Propagation) -> list[Fi
 def _calls(document: Document, flow: Propagation) -> list[Finding]:
     """Calls of what the file does not contain, once each."""
     return [
-        _finding(document, "RAP010", f"{name.decode('latin-1')[:40]} is not in this file: it may move the robot", at)
+        _finding(
+            document,
+            "RAP010",
+            f"{name.decode('latin-1')[:40]} is not in this file: it may move the robot",
+            at,
+        )
         for name, at in flow.calls.items()
     ]
 

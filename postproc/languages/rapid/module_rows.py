@@ -19,7 +19,6 @@ from postproc.languages.rapid.program_state import ELSEWHERE, START, VARYING, Pr
 from postproc.languages.rapid.propagation import OTHER, Propagation
 from postproc.languages.rapid.syntax_tree import Instruction, Routine
 from postproc.languages.rapid.target_places import (
-
     MotionText,
     PointText,
     point_text,
@@ -78,7 +77,9 @@ def module_rows(
         rows.refuse(len(rows), *problem)
         _add(rows, document, fact)
     n = len(rows)
-    numbers = [target_numbers(fact.target) if fact.form.kind != Kind.AXIS else [math.nan] * 7 for fact in rows.facts]
+    numbers = [
+        target_numbers(fact.target) if fact.form.kind != Kind.AXIS else [math.nan] * 7 for fact in rows.facts
+    ]
     rows.numbers = np.array(numbers).reshape(n, 7)
     for part in (rows.numbers[:, :3], rows.numbers[:, 3:]):
         part[np.isnan(part).any(axis=1)] = np.nan
@@ -168,7 +169,10 @@ def _place(rows: ModuleRows, frames: ModuleFrames, row: int, fact: MotionFact) -
     if row not in rows.problems:
         problem = fact.problem
         if problem is None and (fact.force is VARYING or fact.switch is VARYING):
-            problem = "RAP006", "the FORCE or COMPENSATE comment in force differs with the path of the program"
+            problem = (
+                "RAP006",
+                "the FORCE or COMPENSATE comment in force differs with the path of the program",
+            )
         if problem is not None:
             rows.refuse(row, *problem)
     if fact.arguments is not None:
@@ -208,7 +212,9 @@ def _check_target(rows: ModuleRows, row: int, fact: MotionFact) -> None:
     elif np.abs(numbers[:3]).max() >= 1e7:
         rows.refuse(row, "RAP002", "its target is farther away than 10 km")
     if fact.via is not None and np.isnan(rows.vias[row]).any():
-        rows.refuse(row, "RAP012", f"its auxiliary point is not known: {reason_of(fact.via, 'it is computed')}")
+        rows.refuse(
+            row, "RAP012", f"its auxiliary point is not known: {reason_of(fact.via, 'it is computed')}"
+        )
 
 
 def _lost(value: Value) -> Problem:
@@ -246,5 +252,3 @@ def _external(rows: ModuleRows) -> None:
     for row in np.flatnonzero(unknown).tolist():
         rows.refuse(row, "RAP019", "its external axes are not known")
     rows.external = values
-
-

@@ -81,7 +81,9 @@ def module_toolpath(
         stops=np.array([fact.stops for fact in rows.facts], np.bool_),
         continues=continues,
         predecessors={
-            row: before[row] for row in range(n) if not continues[row] and rows.facts[row].arguments is not None
+            row: before[row]
+            for row in range(n)
+            if not continues[row] and rows.facts[row].arguments is not None
         },
         annotations=remarks.annotations,
         comments=remarks.comments,
@@ -130,7 +132,10 @@ def _arcs(
     vias = rows.vias[at] * MM
     centre, normal, sweep = arc_through(starts, vias, position[at])
     near = np.min(
-        [np.linalg.norm(a - b, axis=1) for a, b in ((starts, vias), (vias, position[at]), (starts, position[at]))],
+        [
+            np.linalg.norm(a - b, axis=1)
+            for a, b in ((starts, vias), (vias, position[at]), (starts, position[at]))
+        ],
         axis=0,
     )
     with np.errstate(invalid="ignore"):
@@ -141,7 +146,8 @@ def _arcs(
     columns = [np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full(n, np.nan)]
     for column, values in zip(columns, (centre, normal, sweep), strict=True):
         column[at] = values
-    return Arcs(*columns, frame=np.array([fact.arc for fact in rows.facts], np.int8))
+    frame = np.array([fact.arc for fact in rows.facts], np.int8)
+    return Arcs(centre=columns[0], normal=columns[1], sweep=columns[2], frame=frame)
 
 
 def _arc_start(
@@ -160,7 +166,9 @@ def _arc_start(
         return np.asarray(position[start])
     one, other = (_pose(frames.refs[index]) for index in (rows.base[start], rows.base[row]))
     if rows.tool[start] != rows.tool[row] or one is None or other is None:
-        rows.refuse(row, "RAP012", "it starts with another tool, or in a work object that only the cell states")
+        rows.refuse(
+            row, "RAP012", "it starts with another tool, or in a work object that only the cell states"
+        )
         return nothing
     there = other.inverse() @ one @ Poses(np.eye(3), position[start])
     return np.asarray(there.position)
@@ -185,7 +193,7 @@ def _whole(rows: ModuleRows, continues: np.ndarray, refused: Mapping[int, Findin
             whole[row] = "it starts or carries a process whose distances count from its own start"
         elif fact.arguments is not None and b"T" in fact.arguments.options:
             whole[row] = "its time is stated (\\T)"
-        elif fact.checked is not False and not rows.quadrants[row] == rows.quadrants[row - 1] >= 0:
+        elif fact.checked is not False and not (row and rows.quadrants[row] == rows.quadrants[row - 1] >= 0):
             whole[row] = "its quadrants (cf1, cf4, cf6) are not those of the motion before, and ConfL is on"
         elif text.target is None or not text.target.words:
             whole[row] = "its configuration or external axes are not known in numbers"

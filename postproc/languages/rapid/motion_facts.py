@@ -38,8 +38,8 @@ class FrameUse:
 @dataclass(frozen=True, slots=True)
 class MotionFact:
     """A motion: ``target``, ``via``: its points (``via`` of an arc alone); speed, zone: [mm/s], [mm], NaN where not
-    known; ``stops``: it ends in a stop point.  ``before``: motions after which it runs; ``checked``: the configuration of
-    its target counts, None where that is not known."""
+    known; ``stops``: it ends in a stop point.  ``before``: motions after which it runs; ``checked``: the configuration
+    of its target counts, None where that is not known."""
 
     statement: Instruction
     form: MotionForm
@@ -102,9 +102,7 @@ def motion_fact(
     points = [_value(argument, evaluator) for argument in arguments.points]
     zone, stops = _zone(arguments, evaluator)
     work_object = options.get(b"WOBJ")
-    base = (
-        FrameUse(b"WOBJ0", Unknown("")) if work_object is None else _frame(work_object, evaluator)
-    )
+    base = FrameUse(b"WOBJ0", Unknown("")) if work_object is None else _frame(work_object, evaluator)
     return MotionFact(
         statement,
         form,
@@ -160,9 +158,7 @@ def _frame(argument: Argument, evaluator: Evaluator) -> FrameUse:
     return FrameUse(name, _value(argument, evaluator))
 
 
-def _speed(
-    arguments: MotionArguments, form: MotionForm, state: ProgramState, evaluator: Evaluator
-) -> float:
+def _speed(arguments: MotionArguments, form: MotionForm, state: ProgramState, evaluator: Evaluator) -> float:
     """[mm/s] of the TCP; NaN where it follows from a time, a process, or is not known."""
     if not form.feed or b"T" in arguments.options or state.override is None:
         return NAN
@@ -212,5 +208,3 @@ def reason_of(value: Value, otherwise: str) -> str:
     """Why a value is not known."""
     unknown = unknown_in(value)
     return otherwise if unknown is None or not unknown.reason else unknown.reason
-
-

@@ -28,19 +28,16 @@ from postproc.languages.rapid.syntax_tree import (
     Argument,
     Assignment,
     Call,
-    Component,
     Declaration,
     Expression,
     For,
-    Index,
     Instruction,
     Module,
-    Name,
     NotUnderstood,
     Remark,
     Routine,
 )
-from postproc.languages.rapid.values import Unknown, number_of, plain, replaced, truth_of
+from postproc.languages.rapid.values import Unknown, Value, number_of, plain, replaced, truth_of
 from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 OTHER = MotionForm(Kind.OTHER)
@@ -338,10 +335,9 @@ class Propagation:
         shared: list[tuple[bytes, Argument]] = []
         inner = state.copy()
         for parameter in routine.parameters:
-            if parameter.optional:
-                argument = named.get(parameter.name)
-            else:
-                argument = required.pop(0) if required else None
+            argument = named.get(parameter.name)
+            if not parameter.optional and required:
+                argument = required.pop(0)
             key = routine.name + b"/" + parameter.name
             given = argument is not None and argument.value is not None
             inner.values[key] = (
@@ -399,31 +395,16 @@ class Propagation:
             if isinstance(one, tuple):
                 pending += one
 
-    def _assign(self, target: Expression, value: object, state: ProgramState) -> None:
-        evaluator = self._evaluator(state)
-        place: list[int] = []
-        parts: list[Index | Component] = []
-        while isinstance(target, Index | Component):
-            parts.insert(0, target)
-            target = target.base
-        if not isinstance(target, Name):
+    def _assign(self, target: Expression, value: Value, state: ProgramState) -> None:
+        variable, place = self._evaluator(state).assigned_place(target)
+        if variable is None:
             return
-        key = self._key(target.name)
-        shown = target.name.decode("latin-1")
-        if key == target.name and (target.name not in self.data or self.data.is_constant(target.name)):
+        key, shown = self._key(variable), variable.decode("latin-1")
+        if key == variable and (variable not in self.data or self.data.is_constant(variable)):
             return
-        old, _ = self._look(state)(target.name)
-        for part in parts:
-            if isinstance(part, Index):
-                for index in part.indices:
-                    number = number_of(evaluator.value(index))
-                    place.append(-1 if number is None or number != int(number) else int(number) - 1)
-            else:
-                names = [name for name, _ in evaluator.components(evaluator.typed(part.base)[1])]
-                place.append(names.index(part.name) if part.name in names else -1)
-        new = value if not isinstance(value, Unknown) else Unknown(f"{shown} is not constant: {value.reason}")
-        reason = f"a part of {shown} is assigned that is not known"
-        state.values[key] = replaced(old, tuple(place), new, reason)  # type: ignore[arg-type]
+        old, _ = self._look(state)(variable)
+        new = Unknown(f"{shown} is not constant: {value.reason}") if isinstance(value, Unknown) else value
+        state.values[key] = replaced(old, place, new, f"a part of {shown} is assigned that is not known")
 
     def _key(self, name: bytes) -> bytes:
         """The name of a variable in the state: that of a routine's own has its routine before it."""
@@ -465,5 +446,3 @@ class Propagation:
 
     def _evaluator(self, state: ProgramState) -> Evaluator:
         return Evaluator(self._look(state), self.module.records, self.data.evaluator.shadowed)
-
-

@@ -95,7 +95,9 @@ def _leaves(value: Value) -> list[tuple[float, int, int]]:
 def point_text(argument: Argument, value: Value, raw: bytes) -> PointText:
     """The places of a point that is an argument of a motion."""
     expression = argument.value
-    start, stop = (argument.start, argument.stop) if expression is None else (expression.start, expression.stop)
+    start, stop = (
+        (argument.start, argument.stop) if expression is None else (expression.start, expression.stop)
+    )
     inline = isinstance(expression, Aggregate)
     direct = is_direct(argument)
     spots = tuple(
@@ -138,12 +140,8 @@ def _spelt(number: float) -> bytes:
     return b"%d" % number if number == int(number) and abs(number) < 1e9 else repr(number).upper().encode()
 
 
-
-
 def decimals_of(literal: bytes) -> int:
     """The decimals that a literal is written with, its exponent considered."""
     mantissa, _, exponent = literal.upper().partition(b"E")
     written = len(mantissa.partition(b".")[2].strip())
     return min(max(written - int(exponent or b"0"), 0), 12)
-
-

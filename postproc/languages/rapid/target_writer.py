@@ -97,9 +97,7 @@ class _Writer:
                     self.hold(row, unfit, "RAP012")
                 yield from self._point(row, text, text.via, numbers)
 
-    def _point(
-        self, row: int, text: MotionText, point: PointText, numbers: PointNumbers
-    ) -> Iterator[Edit]:
+    def _point(self, row: int, text: MotionText, point: PointText, numbers: PointNumbers) -> Iterator[Edit]:
         """The edits of a point: its literals, or a point in numbers in the place of the argument."""
         changed = numbers.changed()
         if not changed:
