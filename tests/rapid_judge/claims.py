@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from postproc.languages.dialect import Program
-from rapid_judge.machine import Done, _times, _turned
+from rapid_judge.machine import Done, multiply, turn_vector
 
 
 def disagreements(program: Program, done: list[Done]) -> list[str]:
@@ -60,10 +60,10 @@ def _motion(program: Program, row: int, motion: Done) -> list[str]:
             wrong.append("a work object instead of wobj0")
     else:
         user, inner = motion.wobj[3], motion.wobj[4]
-        place = [a + b for a, b in zip(user[0], _turned(user[1], inner[0]), strict=True)]
+        place = [a + b for a, b in zip(user[0], turn_vector(user[1], inner[0]), strict=True)]
         if base.pose is None or not np.allclose(base.pose.position * 1e3, place, atol=1e-6):
             wrong.append("another work object")
-        elif not np.allclose(base.pose.rotation, _matrix(_times(user[1], inner[1])), atol=1e-6):
+        elif not np.allclose(base.pose.rotation, _matrix(multiply(user[1], inner[1])), atol=1e-6):
             wrong.append("a work object that is turned otherwise")
     force = None
     for note in path.annotations:
@@ -82,4 +82,4 @@ def _motion(program: Program, row: int, motion: Done) -> list[str]:
 
 def _matrix(q) -> np.ndarray:
     q = np.array(q) / np.linalg.norm(q)
-    return np.array([_turned(list(q), axis) for axis in np.eye(3).tolist()]).T
+    return np.array([turn_vector(list(q), axis) for axis in np.eye(3).tolist()]).T

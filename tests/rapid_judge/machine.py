@@ -496,13 +496,13 @@ class Machine:
         q = target[1]
         size = math.sqrt(sum(c * c for c in q))
         q = [c / size for c in q]
-        step = _turned(q, values[1:])
+        step = turn_vector(q, values[1:])
         target[0] = [a + b for a, b in zip(target[0], step, strict=True)]
         for axis, name in enumerate(("rx", "ry", "rz")):
             half = math.radians(options.get(name, 0.0)) / 2
             part = [math.cos(half), 0.0, 0.0, 0.0]
             part[axis + 1] = math.sin(half)
-            q = _times(q, part)
+            q = multiply(q, part)
         target[1] = q
         return target, i + 1
 
@@ -515,7 +515,7 @@ def _copied(value):
     return [_copied(one) for one in value] if isinstance(value, list) else value
 
 
-def _times(p, q):
+def multiply(p, q):
     a, b, c, d = p
     e, f, g, h = q
     return [
@@ -526,5 +526,5 @@ def _times(p, q):
     ]
 
 
-def _turned(q, v):
-    return _times(_times(q, [0.0, *v]), [q[0], -q[1], -q[2], -q[3]])[1:]
+def turn_vector(q, v):
+    return multiply(multiply(q, [0.0, *v]), [q[0], -q[1], -q[2], -q[3]])[1:]

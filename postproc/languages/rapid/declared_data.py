@@ -7,23 +7,23 @@ from typing import Any
 
 from postproc.languages.rapid.data_types import RECORDS, SPEEDS, ZONES, Components
 from postproc.languages.rapid.evaluation import Evaluator, Typed
-from postproc.languages.rapid.instructions import HARMLESS, MOTIONS, OTHER_MOTIONS, WRITERS, sort_arguments
+from postproc.languages.rapid.instructions import HARMLESS, MOTIONS, WRITERS, is_motion, sort_arguments
 from postproc.languages.rapid.motion_facts import is_direct
 from postproc.languages.rapid.syntax_tree import (
     Argument,
-    Assignment,
-    Call,
+    AssignmentStatement,
     Component,
     Declaration,
     For,
+    FunctionCall,
     Index,
     Instruction,
     Module,
     Name,
     NotUnderstood,
-    Routine,
+    RapidRoutine,
 )
-from postproc.languages.rapid.values import FALSE, TRUE, Group, Leaf, Unknown, Value, number_of
+from postproc.languages.rapid.values import FALSE, TRUE, GroupValue, Leaf, UnknownData, Value, number_of
 
 LARGEST = 200_000
 """Elements of an array without values that are looked at one by one."""
@@ -32,9 +32,9 @@ LARGEST = 200_000
 def _predefined() -> dict[bytes, Typed]:
     found: dict[bytes, Typed] = {}
     for name, speed in SPEEDS.items():
-        found[name] = (Group((Leaf(speed),)), b"")
+        found[name] = (GroupValue((Leaf(speed),)), b"")
     for name, zone in ZONES.items():
-        found[name] = (Group((TRUE if name == b"FINE" else FALSE, Leaf(zone))), b"")
+        found[name] = (GroupValue((TRUE if name == b"FINE" else FALSE, Leaf(zone))), b"")
     return found
 
 
@@ -57,10 +57,10 @@ class DeclaredData:
             self.types[one.name] = one.type
             self.lines[one.name] = one.start
             if twice:
-                self._values[one.name] = Unknown(f"{_shown(one.name)} is declared twice")
+                self._values[one.name] = UnknownData(f"{_shown(one.name)} is declared twice")
         for unclear in module.unclear:
             for name in unclear.names & self._declarations.keys():
-                self._values[name] = Unknown(f"a line with {_shown(name)} is not understood")
+                self._values[name] = UnknownData(f"a line with {_shown(name)} is not understood")
 
     def __contains__(self, name: bytes) -> bool:
         return name in self._declarations
@@ -74,9 +74,11 @@ class DeclaredData:
         if declaration is None:
             if name in PREDEFINED:
                 return PREDEFINED[name]
-            return Unknown(f"{_shown(name)} is not declared in this file" if name else "it is computed"), b""
+            return UnknownData(
+                f"{_shown(name)} is not declared in this file" if name else "it is computed"
+            ), b""
         if name not in self._values:
-            self._values[name] = Unknown(f"{_shown(name)} depends on itself")
+            self._values[name] = UnknownData(f"{_shown(name)} depends on itself")
             self._values[name] = first_value(declaration, self.evaluator)
         return self._values[name], declaration.type
 
@@ -87,15 +89,15 @@ def first_value(declaration: Declaration, evaluator: Evaluator) -> Value:
         return evaluator.value(declaration.value)
     shown = _shown(declaration.name)
     if declaration.kind != b"VAR":
-        return Unknown(f"{shown} has no value in this file")
+        return UnknownData(f"{shown} has no value in this file")
     value = _zero(declaration.type, evaluator, 0)
     size = 1.0
     for extent in reversed(declaration.extent):
         count = number_of(evaluator.value(extent))
         if count is None or not 1 <= count <= LARGEST or count != int(count) or size * count > LARGEST:
-            return Unknown(f"the size of {shown} is not known")
+            return UnknownData(f"the size of {shown} is not known")
         size *= count
-        value = Group((value,) * int(count))
+        value = GroupValue((value,) * int(count))
     return value
 
 
@@ -109,14 +111,14 @@ def _zero(kind: bytes, evaluator: Evaluator, depth: int) -> Value:
         return Leaf(b"")
     parts = RECORDS.get(kind) or evaluator.records.get(kind)
     if parts is None or depth > 8:
-        return Unknown(f"the type {_shown(kind)} is not known")
-    return Group(tuple(_zero(part, evaluator, depth + 1) for _, part in parts))
+        return UnknownData(f"the type {_shown(kind)} is not known")
+    return GroupValue(tuple(_zero(part, evaluator, depth + 1) for _, part in parts))
 
 
 class Usage:
-    """Names in the routines: ``assigned`` anywhere, ``later``: where the flow does not show it, ``read``: otherwise than
-    as the point of a motion; ``calls``, ``assigned_in``: routine -> what it may call and assigns; ``moves``: those in
-    which the robot may move."""
+    """Names in the routines: ``assigned`` anywhere, ``later``: not shown by the flow, ``read``: otherwise than
+    as the point of a motion; ``calls``, ``assigned_in``: routine -> what it may call and assigns; ``moves``: routines
+    in which the robot may move."""
 
     def __init__(self, module: Module) -> None:
         self.assigned: set[bytes] = set()
@@ -149,11 +151,11 @@ class Usage:
             self.assigned_in.setdefault(routine.name, set()).update(self._set)
             self.assigned |= self._set
 
-    def _statement(self, statement: Any, routine: Routine) -> None:
+    def _statement(self, statement: Any, routine: RapidRoutine) -> None:
         match statement:
             case Declaration():
                 self._expressions(statement.value, statement.extent)
-            case Assignment():
+            case AssignmentStatement():
                 target = statement.target
                 while isinstance(target, Index | Component):
                     if isinstance(target, Index):
@@ -165,7 +167,7 @@ class Usage:
             case Instruction():
                 self._instruction(statement, routine)
             case NotUnderstood():
-                if statement.first not in MOTIONS and statement.first not in OTHER_MOTIONS:
+                if not is_motion(statement.first):
                     self._set |= statement.names
                 self.read |= statement.names
             case For():
@@ -176,11 +178,11 @@ class Usage:
             case _:
                 self._expressions(*_conditions(statement))
 
-    def _instruction(self, statement: Instruction, routine: Routine) -> None:
+    def _instruction(self, statement: Instruction, routine: RapidRoutine) -> None:
         form = MOTIONS.get(statement.name)
         sorted_arguments = None if form is None else sort_arguments(form, statement.arguments)
         points = () if sorted_arguments is None else sorted_arguments.points
-        if form is not None or statement.name in OTHER_MOTIONS:
+        if is_motion(statement.name):
             self.moves.add(routine.name)
         elif statement.name not in HARMLESS or statement.name in WRITERS:
             self._called.add(statement.name)
@@ -204,7 +206,7 @@ class Usage:
             one = pending.pop()
             if isinstance(one, Name):
                 self.read.add(one.name)
-            elif isinstance(one, Call):
+            elif isinstance(one, FunctionCall):
                 self._called.add(one.name)
                 pending += one.arguments
             elif isinstance(one, tuple):

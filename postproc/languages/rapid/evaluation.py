@@ -1,4 +1,4 @@
-"""Values of expressions: constants, and Unknown with its reason for everything else."""
+"""Values of expressions: constants, and UnknownData with its reason for everything else."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from postproc.languages.rapid.quaternions import quaternion_from_rotation, rotat
 from postproc.languages.rapid.syntax_tree import (
     Aggregate,
     Argument,
-    Call,
     Component,
     Expression,
+    FunctionCall,
     Index,
     Name,
-    Number,
-    Operation,
+    NumberLiteral,
+    OperatorExpression,
     Star,
-    Text,
+    StringLiteral,
 )
 from postproc.languages.rapid.values import (
     FALSE,
     TRUE,
-    Group,
+    GroupValue,
     Leaf,
-    Unknown,
+    UnknownData,
     Value,
     number_of,
     numbers_of,
@@ -75,26 +75,26 @@ class Evaluator:
     def typed(self, expression: Expression) -> Typed:
         """The value of an expression, and its type."""
         match expression:
-            case Number():
+            case NumberLiteral():
                 return Leaf(expression.value, expression.start, expression.stop), b"NUM"
-            case Text():
+            case StringLiteral():
                 return Leaf(expression.value), b"STRING"
             case Name():
                 if expression.name in (b"TRUE", b"FALSE"):
                     return (TRUE if expression.name == b"TRUE" else FALSE), b"BOOL"
                 return self.look(expression.name)
             case Aggregate():
-                return Group(tuple(self.value(item) for item in expression.items)), b""
+                return GroupValue(tuple(self.value(item) for item in expression.items)), b""
             case Component():
                 return self._component(expression)
             case Index():
                 return self._element(expression)
-            case Operation():
+            case OperatorExpression():
                 return self._operation(expression), b""
-            case Call():
+            case FunctionCall():
                 return self._call(expression)
             case Star():
-                return Unknown("its target is stored outside of the text (*)"), b""
+                return UnknownData("its target is stored outside of the text (*)"), b""
 
     def assigned_place(self, target: Expression) -> tuple[bytes | None, tuple[int, ...]]:
         """The variable to which an assignment goes, and the indices of the part that it sets, -1 where not known."""
@@ -122,25 +122,27 @@ class Evaluator:
         value, kind = self.typed(expression.base)
         for place, (name, part) in enumerate(self.components(kind)):
             if name == expression.name:
-                if isinstance(value, Group) and len(value.items) == len(self.components(kind)):
+                if isinstance(value, GroupValue) and len(value.items) == len(self.components(kind)):
                     return value.items[place], part
-                return (value if isinstance(value, Unknown) else Unknown("its component is not known")), part
-        return Unknown(f"{_shown(expression.name)} is no component that is known"), b""
+                return (
+                    value if isinstance(value, UnknownData) else UnknownData("its component is not known")
+                ), part
+        return UnknownData(f"{_shown(expression.name)} is no component that is known"), b""
 
     def _element(self, expression: Index) -> Typed:
         value, kind = self.typed(expression.base)
         for index in expression.indices:
             number = number_of(self.value(index))
             if number is None or number != int(number):
-                return Unknown("the index of an array is not a constant"), kind
-            if not isinstance(value, Group):
-                return (value if isinstance(value, Unknown) else Unknown("it is not an array")), kind
+                return UnknownData("the index of an array is not a constant"), kind
+            if not isinstance(value, GroupValue):
+                return (value if isinstance(value, UnknownData) else UnknownData("it is not an array")), kind
             if not 1 <= number <= len(value.items):
-                return Unknown("the index is outside of its array"), kind
+                return UnknownData("the index is outside of its array"), kind
             value = value.items[int(number) - 1]
         return value, kind
 
-    def _operation(self, expression: Operation) -> Value:
+    def _operation(self, expression: OperatorExpression) -> Value:
         values = [self.value(operand) for operand in expression.operands]
         operator = expression.operator
         if operator == b"()":
@@ -151,20 +153,22 @@ class Evaluator:
             if decided in truths:
                 return TRUE if decided else FALSE
             if None in truths:
-                return next((v for v in values if isinstance(v, Unknown)), Unknown("it is no truth value"))
+                return next(
+                    (v for v in values if isinstance(v, UnknownData)), UnknownData("it is no truth value")
+                )
             return FALSE if decided else TRUE
         unknown = next((found for value in values if (found := unknown_in(value)) is not None), None)
         if unknown is not None:
             return unknown
         if operator == b"NOT":
             truth = truth_of(values[0])
-            return Unknown("it is no truth value") if truth is None else FALSE if truth else TRUE
+            return UnknownData("it is no truth value") if truth is None else FALSE if truth else TRUE
         return _combined(operator, values)
 
-    def _call(self, expression: Call) -> Typed:
+    def _call(self, expression: FunctionCall) -> Typed:
         name, arguments = expression.name, expression.arguments
         if name in self.shadowed:
-            return Unknown(f"{_shown(name)} is computed where the program runs"), b""
+            return UnknownData(f"{_shown(name)} is computed where the program runs"), b""
         required = [argument.value for argument in arguments if not argument.name]
         values = [self.value(one) for one in required if one is not None]
         for value in values:
@@ -181,8 +185,8 @@ class Evaluator:
             try:
                 return Leaf(function(number)), b"NUM"
             except ValueError:
-                return Unknown(f"{_shown(name)} has no value there"), b"NUM"
-        return Unknown(f"{_shown(name)} is computed where the program runs"), b""
+                return UnknownData(f"{_shown(name)} has no value there"), b"NUM"
+        return UnknownData(f"{_shown(name)} is computed where the program runs"), b""
 
     def _rel_tool(self, values: list[Value], arguments: tuple[Argument, ...]) -> Value:
         """The target displaced by dx, dy, dz in tool axes, then turned about the tool's x, the new y and z axes."""
@@ -193,38 +197,44 @@ class Evaluator:
             angle = None if argument.value is None else self.value(argument.value)
             number = None if angle is None else number_of(angle)
             if argument.name not in angles or number is None:
-                return angle if isinstance(angle, Unknown) else Unknown("an argument of RelTool is not known")
+                return (
+                    angle
+                    if isinstance(angle, UnknownData)
+                    else UnknownData("an argument of RelTool is not known")
+                )
             angles[argument.name] = number
         target = values[0]
         steps = [number_of(value) for value in values[1:]]
-        if not isinstance(target, Group) or len(target.items) != 4 or None in steps:
-            return Unknown("it is no target")
+        if not isinstance(target, GroupValue) or len(target.items) != 4 or None in steps:
+            return UnknownData("it is no target")
         position, quaternion = numbers_of(target.items[0], 3), numbers_of(target.items[1], 4)
         if position is None or quaternion is None:
-            return Unknown("it is no target")
+            return UnknownData("it is no target")
         rotation = rotation_from_quaternion(np.array([quaternion]))[0]
         if np.isnan(rotation).any():
-            return Unknown("the length of its quaternion is not 1")
+            return UnknownData("the length of its quaternion is not 1")
         moved = np.array(position) + rotation @ np.array(steps, float)
         turn = np.eye(3)
         for axis, angle_deg in zip(np.eye(3), angles.values(), strict=True):
             turn = turn @ rotation_from_vector(axis * angle_deg * DEG)
         new = quaternion_from_rotation((rotation @ turn)[None], np.array([quaternion]))[0]
-        turned = Group(tuple(Leaf(float(q)) for q in new)) if any(angles.values()) else plain(target.items[1])
-        place = Group(tuple(Leaf(float(x)) for x in moved))
-        return Group((place, turned, *map(plain, target.items[2:])))
+        turned = (
+            GroupValue(tuple(Leaf(float(q)) for q in new)) if any(angles.values()) else plain(target.items[1])
+        )
+        place = GroupValue(tuple(Leaf(float(x)) for x in moved))
+        return GroupValue((place, turned, *map(plain, target.items[2:])))
 
 
 def _offs(values: list[Value]) -> Value:
     """The target displaced in the axes of its work object."""
     target, steps = values[0], [number_of(value) for value in values[1:]]
-    if not isinstance(target, Group) or len(target.items) != 4:
-        return Unknown("it is no target")
+    if not isinstance(target, GroupValue) or len(target.items) != 4:
+        return UnknownData("it is no target")
     position = numbers_of(target.items[0], 3)
     if position is None or None in steps:
-        return Unknown("it is no target")
-    place = Group(tuple(Leaf(x + (d or 0.0)) for x, d in zip(position, steps, strict=True)))
-    return Group((place, *map(plain, target.items[1:])))
+        return UnknownData("it is no target")
+    place = GroupValue(tuple(Leaf(x + (d or 0.0)) for x, d in zip(position, steps, strict=True)))
+    return GroupValue((place, *map(plain, target.items[1:])))
 
 
 def _combined(operator: bytes, values: list[Value]) -> Value:
@@ -232,7 +242,7 @@ def _combined(operator: bytes, values: list[Value]) -> Value:
     if len(values) == 1:
         number = number_of(values[0])
         if number is None:
-            return Unknown("its value is not known")
+            return UnknownData("its value is not known")
         return Leaf(-number if operator == b"-" else number)
     if operator in (b"=", b"<>"):
         same = plain(values[0]) == plain(values[1])
@@ -244,8 +254,8 @@ def _combined(operator: bytes, values: list[Value]) -> Value:
     if operator in (b"+", b"-") and vectors[0] is not None and vectors[1] is not None:
         sense = 1.0 if operator == b"+" else -1.0
         pairs = zip(vectors[0], vectors[1], strict=True)
-        return Group(tuple(Leaf(a + sense * b) for a, b in pairs))
-    return Unknown("it is computed")
+        return GroupValue(tuple(Leaf(a + sense * b) for a, b in pairs))
+    return UnknownData("it is computed")
 
 
 def _of_numbers(operator: bytes, one: float, other: float) -> Value:
@@ -253,12 +263,12 @@ def _of_numbers(operator: bytes, one: float, other: float) -> Value:
         return TRUE if _COMPARISONS[operator](one, other) else FALSE
     if operator in (b"+", b"-", b"*"):
         value = one + other if operator == b"+" else one - other if operator == b"-" else one * other
-        return Leaf(value) if math.isfinite(value) else Unknown("it is too large")
+        return Leaf(value) if math.isfinite(value) else UnknownData("it is too large")
     if operator == b"/" and other != 0:
         return Leaf(one / other)
     if operator in (b"DIV", b"MOD") and other > 0 and one >= 0 and one == int(one) and other == int(other):
         return Leaf(float(one // other if operator == b"DIV" else one % other))
-    return Unknown("it is computed")
+    return UnknownData("it is computed")
 
 
 def _shown(name: bytes) -> str:

@@ -5,15 +5,15 @@ from __future__ import annotations
 from postproc.languages.rapid.syntax_tree import (
     Aggregate,
     Argument,
-    Call,
     Component,
     Expression,
+    FunctionCall,
     Index,
     Name,
-    Number,
-    Operation,
+    NumberLiteral,
+    OperatorExpression,
     Star,
-    Text,
+    StringLiteral,
 )
 from postproc.languages.rapid.tokens import NAME, NUMBER, SIGN, TEXT, Token, Tokens
 
@@ -36,12 +36,12 @@ DEEPEST = 40
 """Expressions in each other."""
 
 
-class Problem(Exception):
+class SyntaxProblem(Exception):
     """A token that no rule consumes."""
 
 
-class ExpressionParser:
-    """Takes expressions from tokens; raises Problem where none is."""
+class RapidExpressionParser:
+    """Takes expressions from tokens; raises SyntaxProblem where none is."""
 
     def __init__(self, tokens: Tokens) -> None:
         self.tokens = tokens
@@ -63,23 +63,26 @@ class ExpressionParser:
         return False
 
     def need(self, text: bytes) -> None:
+        """Passes this sign.  Raises SyntaxProblem for another token."""
         if not self.sign(text):
-            raise Problem
+            raise SyntaxProblem
 
     def word(self, text: bytes) -> None:
+        """Passes this word.  Raises SyntaxProblem for another token."""
         if self.next.kind != NAME or self.next.text != text:
-            raise Problem
+            raise SyntaxProblem
         self.take()
 
     def name(self) -> bytes:
+        """A name, which is passed.  Raises SyntaxProblem for another token."""
         if self.next.kind != NAME or self.next.text in _NO_NAMES:
-            raise Problem
+            raise SyntaxProblem
         return self.take().text
 
     def expression(self) -> Expression:
-        """An expression of any kind."""
+        """An expression of any kind.  Raises SyntaxProblem where none is."""
         if self._depth >= DEEPEST:
-            raise Problem
+            raise SyntaxProblem
         self._depth += 1
         try:
             return self._level(0)
@@ -94,7 +97,7 @@ class ExpressionParser:
         while self.next.kind in (SIGN, NAME) and self.next.text in _LEVELS[level]:
             operator = self.take().text
             right = self._level(level + 1)
-            left = Operation(operator, (left, right), start, self.tokens.before)
+            left = OperatorExpression(operator, (left, right), start, self.tokens.before)
         return left
 
     def _signed(self, level: int) -> Expression:
@@ -104,39 +107,39 @@ class ExpressionParser:
             return self._level(level + 1)
         self.take()
         operand = self._level(level + 1)
-        if isinstance(operand, Number):
+        if isinstance(operand, NumberLiteral):
             value = -operand.value if token.text == b"-" else operand.value
-            return Number(value, token.start, operand.stop)
-        return Operation(token.text, (operand,), token.start, self.tokens.before)
+            return NumberLiteral(value, token.start, operand.stop)
+        return OperatorExpression(token.text, (operand,), token.start, self.tokens.before)
 
     def _primary(self) -> Expression:
         token = self.next
         if token.kind == NUMBER:
             self.take()
-            return Number(float(token.text), token.start, token.stop)
+            return NumberLiteral(float(token.text), token.start, token.stop)
         if token.kind == TEXT:
             self.take()
-            return Text(token.text[1:-1], token.start, token.stop)
+            return StringLiteral(token.text[1:-1], token.start, token.stop)
         if token.kind == NAME and token.text == b"NOT":
             self.take()
             if self._depth >= DEEPEST:
-                raise Problem
+                raise SyntaxProblem
             self._depth += 1
             operand = self._primary()
             self._depth -= 1
-            return Operation(b"NOT", (operand,), token.start, self.tokens.before)
+            return OperatorExpression(b"NOT", (operand,), token.start, self.tokens.before)
         if token.kind == NAME and token.text not in _NO_NAMES:
             self.take()
             if self.sign(b"("):
                 arguments = self.arguments(b")")
                 self.need(b")")
-                call = Call(token.text, arguments, token.start, self.tokens.before)
+                call = FunctionCall(token.text, arguments, token.start, self.tokens.before)
                 return self.suffixes(call)
             return self.suffixes(Name(token.text, token.start, token.stop))
         if self.sign(b"("):
             inner = self.expression()
             self.need(b")")
-            return Operation(b"()", (inner,), token.start, self.tokens.before)
+            return OperatorExpression(b"()", (inner,), token.start, self.tokens.before)
         if self.sign(b"["):
             items = []
             if not self.sign(b"]"):
@@ -145,10 +148,10 @@ class ExpressionParser:
                     items.append(self.expression())
                 self.need(b"]")
             return Aggregate(tuple(items), token.start, self.tokens.before)
-        raise Problem
+        raise SyntaxProblem
 
     def suffixes(self, base: Expression) -> Expression:
-        """``base`` with the indices and components after it."""
+        """``base`` with the indices and components after it.  Raises SyntaxProblem for too many."""
         start = base.start
         for _ in range(DEEPEST):
             if self.sign(b"{"):
@@ -161,10 +164,10 @@ class ExpressionParser:
                 base = Component(base, self.name(), start, self.tokens.before)
             else:
                 return base
-        raise Problem
+        raise SyntaxProblem
 
     def arguments(self, end: bytes) -> tuple[Argument, ...]:
-        """Arguments up to the sign ``end``, which is not passed."""
+        """Arguments up to the sign ``end``, which is not passed.  Raises SyntaxProblem where they are none."""
         found: list[Argument] = []
         separated = True
         while not (self.next.kind == SIGN and self.next.text == end):
@@ -175,11 +178,11 @@ class ExpressionParser:
                 if self.sign(b":="):
                     value = self.expression()
                 elif self.next.text == b"?":
-                    raise Problem
+                    raise SyntaxProblem
                 found.append(Argument(name, value, start, self.tokens.before))
             else:
                 if not separated:
-                    raise Problem
+                    raise SyntaxProblem
                 token = self.next
                 if self.sign(b"*"):
                     found.append(Argument(b"", Star(token.start, token.stop), start, self.tokens.before))
@@ -187,5 +190,5 @@ class ExpressionParser:
                     found.append(Argument(b"", self.expression(), start, self.tokens.before))
             separated = self.sign(b",")
             if separated and self.next.kind == SIGN and self.next.text == end:
-                raise Problem
+                raise SyntaxProblem
         return tuple(found)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from postproc.languages.rapid.syntax_tree import (
-    Assignment,
+    AssignmentStatement,
     Declaration,
     Expression,
     For,
@@ -16,8 +16,8 @@ from postproc.languages.rapid.syntax_tree import (
     Leave,
     Name,
     NotUnderstood,
-    Number,
-    Operation,
+    NumberLiteral,
+    OperatorExpression,
     Remark,
     Statement,
     Test,
@@ -27,12 +27,12 @@ from postproc.languages.rapid.syntax_tree import (
 NOTHING = Name(b"", 0, 0)
 """A name that nothing has: its value is not known."""
 
-Step = Declaration | Assignment | Instruction | Remark | NotUnderstood
+Step = Declaration | AssignmentStatement | Instruction | Remark | NotUnderstood
 """A statement that goes on with the next one."""
 
 
 @dataclass(slots=True)
-class Block:
+class FlowBlock:
     """``condition``: None goes on with ``follow``; else with ``follow`` where it holds and ``otherwise`` where not.
 
     follow: the next block, -1 for the end of the routine, -2 for what does not come back.
@@ -48,10 +48,10 @@ class FlowGraph:
     """The blocks of a routine; the first one is where it starts.  ``missing``: a label that no statement has."""
 
     def __init__(self, body: tuple[Statement, ...]) -> None:
-        self.blocks: list[Block] = [Block()]
+        self.blocks: list[FlowBlock] = [FlowBlock()]
         self.missing = False
         self._labels: dict[bytes, int] = {}
-        self._jumps: list[tuple[Block, bytes]] = []
+        self._jumps: list[tuple[FlowBlock, bytes]] = []
         self._body(body)
         for block, label in self._jumps:
             block.follow = self._labels.get(label, -2)
@@ -67,7 +67,7 @@ class FlowGraph:
         )
 
     def _new(self) -> int:
-        self.blocks.append(Block())
+        self.blocks.append(FlowBlock())
         return len(self.blocks) - 1
 
     def _go_on(self) -> int:
@@ -102,7 +102,7 @@ class FlowGraph:
                     self.blocks[-1].steps.append(statement)
 
     def _if(self, statement: If) -> None:
-        ends: list[Block] = []
+        ends: list[FlowBlock] = []
         for condition, body in statement.branches:
             head = self.blocks[-1]
             head.condition = condition
@@ -113,7 +113,7 @@ class FlowGraph:
         self._body(statement.otherwise)
         self._meet(ends)
 
-    def _meet(self, ends: list[Block]) -> None:
+    def _meet(self, ends: list[FlowBlock]) -> None:
         after = self._go_on()
         for block in ends:
             block.follow = after
@@ -138,26 +138,26 @@ class FlowGraph:
             statement.last,
             statement.step,
         )
-        if step is None and isinstance(first, Number) and isinstance(last, Number):
-            step = Number(1.0 if first.value <= last.value else -1.0, at, at)
-        self.blocks[-1].steps.append(Assignment(name, first, at, at))
-        if isinstance(step, Number) and step.value:
-            test = Operation(b"<=" if step.value > 0 else b">=", (name, last), at, at)
-            more = Assignment(name, Operation(b"+", (name, step), at, at), at, at)
+        if step is None and isinstance(first, NumberLiteral) and isinstance(last, NumberLiteral):
+            step = NumberLiteral(1.0 if first.value <= last.value else -1.0, at, at)
+        self.blocks[-1].steps.append(AssignmentStatement(name, first, at, at))
+        if isinstance(step, NumberLiteral) and step.value:
+            test = OperatorExpression(b"<=" if step.value > 0 else b">=", (name, last), at, at)
+            more = AssignmentStatement(name, OperatorExpression(b"+", (name, step), at, at), at, at)
         else:
-            test = Operation(b"=", (name, NOTHING), at, at)
-            more = Assignment(name, NOTHING, at, at)
+            test = OperatorExpression(b"=", (name, NOTHING), at, at)
+            more = AssignmentStatement(name, NOTHING, at, at)
         self._loop(test, statement.body, [more])
-        self.blocks[-1].steps.append(Assignment(name, NOTHING, at, at))  # it is of the loop alone
+        self.blocks[-1].steps.append(AssignmentStatement(name, NOTHING, at, at))  # it is of the loop alone
 
     def _test(self, statement: Test) -> None:
-        ends: list[Block] = []
+        ends: list[FlowBlock] = []
         for values, body in statement.cases:
             at = statement.start
-            condition: Expression = Operation(b"=", (statement.value, values[0]), at, at)
+            condition: Expression = OperatorExpression(b"=", (statement.value, values[0]), at, at)
             for value in values[1:]:
-                other = Operation(b"=", (statement.value, value), at, at)
-                condition = Operation(b"OR", (condition, other), at, at)
+                other = OperatorExpression(b"=", (statement.value, value), at, at)
+                condition = OperatorExpression(b"OR", (condition, other), at, at)
             head = self.blocks[-1]
             head.condition = condition
             head.follow = self._new()

@@ -19,7 +19,10 @@ BLOCK = 1 << 14
 
 
 def insertions(task: PlanWriter) -> tuple[list[Edit], dict[int, str]]:
-    """The edits that insert motions, and the rows before which one cannot be written, with the reason."""
+    """The edits that insert motions, and the rows before which one cannot be written, with the reason.
+
+    Raises ValueError where a row has no target: a defect of the caller.
+    """
     chosen = np.flatnonzero(task.plan.role != Role.ORIGINAL)
     edits: list[Edit] = []
     unfit: dict[int, str] = {}

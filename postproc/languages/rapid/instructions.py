@@ -114,6 +114,11 @@ READERS = frozenset([b"CROBT", b"CJOINTT", b"CPOS", b"PDISPON", b"EOFFSON"])
 """What reads where the robot is."""
 
 
+def is_motion(word: bytes) -> bool:
+    """Whether an instruction moves the robot."""
+    return word in MOTIONS or word in OTHER_MOTIONS
+
+
 def sort_arguments(form: MotionForm, arguments: tuple[Argument, ...]) -> MotionArguments | None:
     """The arguments of a motion by their role; None where one has none, is missing or occurs twice."""
     required = [argument for argument in arguments if not argument.name]

@@ -10,7 +10,7 @@ from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.languages.rapid.motion_facts import FrameUse, Problem, item_of, reason_of
 from postproc.languages.rapid.quaternions import rotation_from_quaternion
-from postproc.languages.rapid.values import Leaf, Unknown, Value, numbers_of, truth_of
+from postproc.languages.rapid.values import Leaf, UnknownData, Value, numbers_of, truth_of
 from postproc.toolpath import FrameRef
 from postproc.toolpath.initial_state import Symbol
 
@@ -62,7 +62,7 @@ class ModuleFrames:
     def _bound(self, kind: str, use: FrameUse, line: int) -> int | Problem | None:
         """The frame that the cell states for a name that the file does not declare."""
         symbol = self._symbols.get(use.name.decode("latin-1")) if use.name else None
-        if symbol is None or use.name in self._lines or not isinstance(use.value, Unknown):
+        if symbol is None or use.name in self._lines or not isinstance(use.value, UnknownData):
             return None
         if not isinstance(symbol, Mapping):
             if symbol != int(symbol) or symbol < 0:

@@ -9,7 +9,7 @@ from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
 from postproc.languages.dialect import EditSyntax, Program, ReadingSettings
 from postproc.languages.rapid.module_toolpath import module_toolpath
-from postproc.languages.rapid.parsing import Parser
+from postproc.languages.rapid.parsing import ModuleParser
 from postproc.languages.rapid.propagation import Propagation, TooLong
 from postproc.languages.rapid.remarks import find_marker
 from postproc.languages.rapid.syntax_tree import Module
@@ -23,7 +23,7 @@ SHOWN = 20
 def read(documents: tuple[Document, ...], settings: ReadingSettings) -> Program:
     """The program of a file; never raises on its content."""
     document = documents[0]
-    module = Parser(document.raw).file()
+    module = ModuleParser(document.raw).file()
     flow = Propagation(module)
     findings: list[Finding] = []
     try:

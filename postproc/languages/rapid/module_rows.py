@@ -17,7 +17,7 @@ from postproc.languages.rapid.module_frames import ModuleFrames
 from postproc.languages.rapid.motion_facts import MotionFact, Problem, item_of, not_read, reason_of
 from postproc.languages.rapid.program_state import ELSEWHERE, START, VARYING, ProgramState
 from postproc.languages.rapid.propagation import OTHER, Propagation
-from postproc.languages.rapid.syntax_tree import Instruction, Routine
+from postproc.languages.rapid.syntax_tree import Instruction, RapidRoutine
 from postproc.languages.rapid.target_places import (
     MotionText,
     PointText,
@@ -149,7 +149,7 @@ def _never_run(flow: Propagation) -> Iterator[tuple[MotionFact, Problem]]:
         yield fact, problem
 
 
-def _why(flow: Propagation, routine: Routine, handlers: bool) -> Problem:
+def _why(flow: Propagation, routine: RapidRoutine, handlers: bool) -> Problem:
     name = routine.name.decode("latin-1")
     if flow.is_unclear(routine):
         return "RAP007", f"the structure of {name} is not understood"

@@ -11,7 +11,7 @@ from postproc.languages.rapid.program_state import VARYING, ProgramState, Varyin
 from postproc.languages.rapid.syntax_tree import Argument, Index, Instruction, Name, Remark
 from postproc.languages.rapid.values import (
     Leaf,
-    Unknown,
+    UnknownData,
     Value,
     joined,
     number_of,
@@ -63,7 +63,7 @@ class MotionFact:
         """What holds in both executions."""
         via = self.via
         if via is not None:
-            via = Unknown(DIFFERS) if other.via is None else joined(via, other.via, DIFFERS)
+            via = UnknownData(DIFFERS) if other.via is None else joined(via, other.via, DIFFERS)
         return replace(
             self,
             target=joined(self.target, other.target, DIFFERS),
@@ -102,7 +102,7 @@ def motion_fact(
     points = [_value(argument, evaluator) for argument in arguments.points]
     zone, stops = _zone(arguments, evaluator)
     work_object = options.get(b"WOBJ")
-    base = FrameUse(b"WOBJ0", Unknown("")) if work_object is None else _frame(work_object, evaluator)
+    base = FrameUse(b"WOBJ0", UnknownData("")) if work_object is None else _frame(work_object, evaluator)
     return MotionFact(
         statement,
         form,
@@ -126,7 +126,7 @@ def motion_fact(
 
 def not_read(statement: Instruction, form: MotionForm, state: ProgramState, message: str) -> MotionFact:
     """A motion of which only its place is known."""
-    unknown = Unknown(message)
+    unknown = UnknownData(message)
     nothing = FrameUse(b"", unknown)
     return MotionFact(
         statement, form, None, unknown, unknown if form.points == 2 else None, nothing, nothing, NAN, NAN,
@@ -149,7 +149,7 @@ def _problem(state: ProgramState, options: dict[bytes, Argument]) -> Problem | N
 
 
 def _value(argument: Argument, evaluator: Evaluator) -> Value:
-    return Unknown("it has no value") if argument.value is None else evaluator.value(argument.value)
+    return UnknownData("it has no value") if argument.value is None else evaluator.value(argument.value)
 
 
 def _frame(argument: Argument, evaluator: Evaluator) -> FrameUse:
@@ -190,10 +190,10 @@ def first_of(value: Value) -> Value:
 def item_of(value: Value, at: int) -> Value:
     """An item of a group, unknown where it has none."""
     if isinstance(value, Leaf):
-        return Unknown("it is no aggregate")
-    if isinstance(value, Unknown):
+        return UnknownData("it is no aggregate")
+    if isinstance(value, UnknownData):
         return value
-    return value.items[at] if at < len(value.items) else Unknown("a component is missing")
+    return value.items[at] if at < len(value.items) else UnknownData("a component is missing")
 
 
 def is_direct(argument: Argument) -> bool:

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from codecs import BOM_UTF8
 
-from postproc.languages.rapid.expression_syntax import ExpressionParser, Problem
+from postproc.languages.rapid.expression_syntax import RapidExpressionParser, SyntaxProblem
 from postproc.languages.rapid.syntax_tree import (
-    Assignment,
+    AssignmentStatement,
     Component,
     Declaration,
     For,
@@ -23,9 +23,9 @@ from postproc.languages.rapid.syntax_tree import (
     Module,
     Name,
     NotUnderstood,
-    Parameter,
+    RapidRoutine,
     Remark,
-    Routine,
+    RoutineParameter,
     Statement,
     Test,
     While,
@@ -44,7 +44,7 @@ DEEPEST = 60
 """Blocks in each other."""
 
 
-class Parser(ExpressionParser):
+class ModuleParser(RapidExpressionParser):
     """Reads one file."""
 
     def __init__(self, raw: bytes) -> None:
@@ -87,7 +87,7 @@ class Parser(ExpressionParser):
                     self.sign(b",")
             if self.module.name_stop < 0:
                 self.module.name_stop = self.tokens.before
-        except Problem:
+        except SyntaxProblem:
             self.module.unclear.append(self._skip(start))
 
     def _item(self) -> None:
@@ -101,7 +101,7 @@ class Parser(ExpressionParser):
         if word in _KINDS:
             try:
                 self.module.declarations.append(self._declaration(start))
-            except Problem:
+            except SyntaxProblem:
                 self.module.unclear.append(self._skip(start))
         elif word in (b"PROC", b"FUNC", b"TRAP"):
             self._routine(local)
@@ -113,7 +113,7 @@ class Parser(ExpressionParser):
         try:
             name = self.name()
             if word == b"ALIAS":
-                raise Problem
+                raise SyntaxProblem
             parts = []
             while self._word() != b"ENDRECORD":
                 kind = self.name()
@@ -121,13 +121,13 @@ class Parser(ExpressionParser):
                 self.need(b";")
             self.take()
             self.module.records[name] = tuple(parts)
-        except Problem:
+        except SyntaxProblem:
             self.module.unclear.append(self._skip(start))
 
     def _routine(self, local: bool) -> None:
         start, kind = self.next.start, self.take().text
         self._broken = -1
-        parameters: tuple[Parameter, ...] = ()
+        parameters: tuple[RoutineParameter, ...] = ()
         name = b""
         try:
             if kind == b"FUNC":
@@ -135,7 +135,7 @@ class Parser(ExpressionParser):
             name = self.name()
             if kind != b"TRAP":
                 parameters = self._parameters()
-        except Problem:
+        except SyntaxProblem:
             self._broken = start
         handlers: list[Statement] = []
         body = self._block(0)
@@ -158,18 +158,18 @@ class Parser(ExpressionParser):
         else:
             self._break()
         self.module.routines.append(
-            Routine(kind, name, parameters, tuple(body), tuple(handlers), local, start, self._broken)
+            RapidRoutine(kind, name, parameters, tuple(body), tuple(handlers), local, start, self._broken)
         )
 
-    def _parameters(self) -> tuple[Parameter, ...]:
-        found: list[Parameter] = []
+    def _parameters(self) -> tuple[RoutineParameter, ...]:
+        found: list[RoutineParameter] = []
         self.need(b"(")
         while not self.sign(b")"):
             optional = self.sign(b"\\")
             mode = self.take().text if self._word() in (b"INOUT", b"VAR", b"PERS") else b""
             if self._word() == b"SWITCH":
                 self.take()
-                found.append(Parameter(b"", b"SWITCH", self.name(), True))
+                found.append(RoutineParameter(b"", b"SWITCH", self.name(), True))
             else:
                 kind = self.name()
                 name = self.name()
@@ -177,11 +177,11 @@ class Parser(ExpressionParser):
                     while not self.sign(b"}"):
                         self.need(b"*")
                         self.sign(b",")
-                found.append(Parameter(mode, kind, name, optional))
+                found.append(RoutineParameter(mode, kind, name, optional))
             if self.sign(b"|"):
-                raise Problem
+                raise SyntaxProblem
             if not self.sign(b",") and not (self.next.text == b"\\") and self.next.text != b")":
-                raise Problem
+                raise SyntaxProblem
         return tuple(found)
 
     def _block(self, depth: int) -> list[Statement]:
@@ -196,7 +196,7 @@ class Parser(ExpressionParser):
             at = len(found)
             try:
                 found.append(self._statement(word, depth))
-            except Problem:
+            except SyntaxProblem:
                 found.append(self._skip(start))
             # A comment in the line of a statement is of that statement.
             for remark in self._drain(self.next.start):
@@ -213,7 +213,7 @@ class Parser(ExpressionParser):
         if word in (b"IF", b"FOR", b"WHILE", b"TEST"):
             if depth >= DEEPEST:
                 self._break()
-                raise Problem
+                raise SyntaxProblem
             self.take()
             if word == b"IF":
                 return self._if(start, depth + 1)
@@ -243,7 +243,7 @@ class Parser(ExpressionParser):
     def _simple(self, start: int) -> Statement:
         """An assignment, a label, or an instruction."""
         if self.next.kind != NAME or self.next.text in _RESERVED:
-            raise Problem
+            raise SyntaxProblem
         name = self.take()
         if self.next.text == b":":
             self.take()
@@ -251,11 +251,11 @@ class Parser(ExpressionParser):
         if self.next.text in (b":=", b"{", b"."):
             target = self.suffixes(Name(name.text, name.start, name.stop))
             if not isinstance(target, Name | Index | Component):
-                raise Problem
+                raise SyntaxProblem
             self.need(b":=")
             value = self.expression()
             self.need(b";")
-            return Assignment(target, value, start, self.tokens.before)
+            return AssignmentStatement(target, value, start, self.tokens.before)
         arguments = self.arguments(b";")
         self.need(b";")
         return Instruction(name.text, arguments, start, self.tokens.before)
@@ -278,7 +278,7 @@ class Parser(ExpressionParser):
         condition = self.expression()
         if self._word() != b"THEN":  # the short form: one statement
             if self._word() in (b"IF", b"FOR", b"WHILE", b"TEST") or self._word() in _KINDS:
-                raise Problem
+                raise SyntaxProblem
             return If(((condition, (self._statement(self._word(), depth),)),), (), start)
         self.take()
         branches = [(condition, tuple(self._block(depth)))]

@@ -45,6 +45,7 @@ class PlanWriter:
     of each row."""
 
     def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
+        """Raises ValueError where the plan has not one motion with the text of every row."""
         self.program, self.plan, self.writing = program, plan, writing
         self.path: Toolpath = program.toolpath
         self.places: RapidSourceMap = program.text

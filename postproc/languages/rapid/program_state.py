@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields
 from enum import IntEnum
 
 from postproc.languages.rapid.syntax_tree import Remark
-from postproc.languages.rapid.values import Unknown, Value, joined
+from postproc.languages.rapid.values import UnknownData, Value, joined
 from postproc.toolpath import ArcFrame, OrientationMode
 
 START, ELSEWHERE = -1, -2
@@ -59,7 +59,7 @@ class ProgramState:
             one, two = self.values.get(name), other.values.get(name)
             shown = name.rpartition(b"/")[2].decode("latin-1")
             reason = f"{shown} has different values on several paths of the program"
-            new = Unknown(reason) if one is None or two is None else joined(one, two, reason)
+            new = UnknownData(reason) if one is None or two is None else joined(one, two, reason)
             if new != one:
                 self.values[name] = new
                 changed = True

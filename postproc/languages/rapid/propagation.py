@@ -21,23 +21,24 @@ from postproc.languages.rapid.instructions import (
     RESTORING,
     WRITERS,
     MotionForm,
+    is_motion,
 )
 from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read
 from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState
 from postproc.languages.rapid.syntax_tree import (
     Argument,
-    Assignment,
-    Call,
+    AssignmentStatement,
     Declaration,
     Expression,
     For,
+    FunctionCall,
     Instruction,
     Module,
     NotUnderstood,
+    RapidRoutine,
     Remark,
-    Routine,
 )
-from postproc.languages.rapid.values import Unknown, Value, number_of, plain, replaced, truth_of
+from postproc.languages.rapid.values import UnknownData, Value, number_of, plain, replaced, truth_of
 from postproc.toolpath import ArcFrame, Kind, OrientationMode
 
 OTHER = MotionForm(Kind.OTHER)
@@ -46,11 +47,6 @@ MOST_STEPS = 4_000_000
 """Statements that are followed; each statement of a file counts for four more."""
 DEEPEST = 12
 """Calls in each other."""
-
-
-def is_motion(step: NotUnderstood) -> bool:
-    """Whether a statement that is not understood starts as a motion does, which changes no data."""
-    return step.first in MOTIONS or step.first in OTHER_MOTIONS
 
 
 class TooLong(Exception):
@@ -65,7 +61,7 @@ class Propagation:
 
     def __init__(self, module: Module) -> None:
         self.module = module
-        self.routines: dict[bytes, Routine] = {}
+        self.routines: dict[bytes, RapidRoutine] = {}
         self.ambiguous: set[bytes] = set()
         for routine in module.routines:
             if routine.name in self.routines:
@@ -81,7 +77,7 @@ class Propagation:
         self.unread: dict[int, NotUnderstood] = {}
         self._graphs: dict[bytes, FlowGraph] = {}
         self._locals: dict[bytes, dict[bytes, tuple[bytes, bytes]]] = {}
-        self._active: list[Routine] = []
+        self._active: list[RapidRoutine] = []
         self._steps = MOST_STEPS + 4 * sum(1 for r in module.routines for _ in walk(r.body))
         self._recording = False
 
@@ -101,22 +97,22 @@ class Propagation:
             if not self.is_unclear(routine):
                 self._enter(routine, routine is main)
 
-    def is_unclear(self, routine: Routine) -> bool:
+    def is_unclear(self, routine: RapidRoutine) -> bool:
         """Whether the structure of a routine is not understood, or its name is that of several."""
         return routine.broken >= 0 or routine.name in self.ambiguous or self._graph(routine).missing
 
-    def _graph(self, routine: Routine) -> FlowGraph:
+    def _graph(self, routine: RapidRoutine) -> FlowGraph:
         graph = self._graphs.get(routine.name)
         if graph is None:
             graph = self._graphs[routine.name] = FlowGraph(routine.body)
         return graph
 
-    def _enter(self, routine: Routine, is_main: bool) -> None:
+    def _enter(self, routine: RapidRoutine, is_main: bool) -> None:
         state = ProgramState(last=frozenset([START if is_main else ELSEWHERE]))
         for name in self.usage.assigned:
             if name in self.data and not self.data.is_constant(name):
                 shown = name.decode("latin-1")
-                value = self.data.look(name)[0] if is_main else Unknown(f"{shown} is assigned elsewhere")
+                value = self.data.look(name)[0] if is_main else UnknownData(f"{shown} is assigned elsewhere")
                 state.values[name] = value
         if is_main and state.values:  # main starts again with what its last run left
             for _ in range(8):
@@ -129,10 +125,10 @@ class Propagation:
                     break
                 state.values = again.values
             else:
-                state.values = {name: Unknown("it differs between runs") for name in state.values}
+                state.values = {name: UnknownData("it differs between runs") for name in state.values}
         self._routine(routine, state, True)
 
-    def _routine(self, routine: Routine, state: ProgramState, recording: bool) -> ProgramState | None:
+    def _routine(self, routine: RapidRoutine, state: ProgramState, recording: bool) -> ProgramState | None:
         """The state after a routine; None where it does not come back."""
         graph = self._graph(routine)
         self._active.append(routine)
@@ -205,7 +201,7 @@ class Propagation:
         match step:
             case Instruction():
                 self._instruction(step, state)
-            case Assignment():
+            case AssignmentStatement():
                 self._functions(step.value, state)
                 self._assign(step.target, self._evaluator(state).value(step.value), state)
             case Declaration():
@@ -214,7 +210,7 @@ class Propagation:
                 value = first_value(step, self._evaluator(state))
                 key = self._key(step.name)
                 if step.kind == b"PERS" and step.name in self.usage.assigned:
-                    value = Unknown(f"{step.name.decode('latin-1')} is kept between calls")
+                    value = UnknownData(f"{step.name.decode('latin-1')} is kept between calls")
                 state.values[key] = value
             case Remark():
                 self._remark(step, state)
@@ -224,7 +220,7 @@ class Propagation:
     def _lose(self, step: NotUnderstood, state: ProgramState) -> None:
         """What a statement that is not understood may change."""
         self.unread.setdefault(step.start, step)
-        if is_motion(step):
+        if is_motion(step.first):
             moved = Instruction(step.first, (), step.start, step.stop)
             self._move(moved, not_read(moved, OTHER, state, "it is not understood"), state)
             return
@@ -321,9 +317,9 @@ class Propagation:
     def _forget(self, name: bytes, state: ProgramState, reason: str) -> None:
         key = self._key(name)
         if key != name or (name in self.data and not self.data.is_constant(name)):
-            state.values[key] = Unknown(f"{name.decode('latin-1')}: {reason}")
+            state.values[key] = UnknownData(f"{name.decode('latin-1')}: {reason}")
 
-    def _call(self, routine: Routine, step: Instruction, state: ProgramState) -> None:
+    def _call(self, routine: RapidRoutine, step: Instruction, state: ProgramState) -> None:
         """Runs a routine of the file with its arguments."""
         if routine in self._active or len(self._active) >= DEEPEST or self.is_unclear(routine):
             self._unread_call(step, state, moves=True)
@@ -343,7 +339,7 @@ class Propagation:
             inner.values[key] = (
                 plain(evaluator.value(argument.value))
                 if given and argument is not None and argument.value is not None
-                else Unknown(f"{parameter.name.decode('latin-1')} is not given")
+                else UnknownData(f"{parameter.name.decode('latin-1')} is not given")
             )
             if parameter.mode and argument is not None:
                 shared.append((parameter.name, argument))
@@ -384,13 +380,13 @@ class Propagation:
         pending: list[object] = [expression]
         while pending:
             one = pending.pop()
-            if isinstance(one, Call) and one.name not in PURE:
+            if isinstance(one, FunctionCall) and one.name not in PURE:
                 self._change(one.arguments, state)
                 reached = self._reached(one.name)
                 self._forget_all(self._assigned_by(one.name), state)
                 if reached & self.usage.moves:
                     state.last = frozenset([ELSEWHERE])
-            if isinstance(one, Call) and one.name in READERS:
+            if isinstance(one, FunctionCall) and one.name in READERS:
                 self._note_reading(one.start, state)
             if isinstance(one, tuple):
                 pending += one
@@ -403,7 +399,11 @@ class Propagation:
         if key == variable and (variable not in self.data or self.data.is_constant(variable)):
             return
         old, _ = self._look(state)(variable)
-        new = Unknown(f"{shown} is not constant: {value.reason}") if isinstance(value, Unknown) else value
+        new = (
+            UnknownData(f"{shown} is not constant: {value.reason}")
+            if isinstance(value, UnknownData)
+            else value
+        )
         state.values[key] = replaced(old, place, new, f"a part of {shown} is assigned that is not known")
 
     def _key(self, name: bytes) -> bytes:
@@ -413,7 +413,7 @@ class Propagation:
             return name if own is None else own[0]
         return name
 
-    def _own(self, routine: Routine) -> dict[bytes, tuple[bytes, bytes]]:
+    def _own(self, routine: RapidRoutine) -> dict[bytes, tuple[bytes, bytes]]:
         """The routine's own names -> key in the state, type."""
         names = self._locals.get(routine.name)
         if names is None:
@@ -429,12 +429,12 @@ class Propagation:
     def _look(self, state: ProgramState) -> Callable[[bytes], Typed]:
         def look(name: bytes) -> Typed:
             if name in self.usage.later:
-                return Unknown(f"{name.decode('latin-1')} is assigned in a trap or an error handler"), b""
+                return UnknownData(f"{name.decode('latin-1')} is assigned in a trap or an error handler"), b""
             key = self._key(name)
             if key in state.values:
                 return state.values[key], self._type(name, key)
             if key != name:
-                return Unknown(f"{name.decode('latin-1')} has no value yet"), b""
+                return UnknownData(f"{name.decode('latin-1')} has no value yet"), b""
             return self.data.look(name)
 
         return look

@@ -18,12 +18,14 @@ _SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
 _MARKER = re.compile(rb"[ \t]*![ \t]*" + MARK.encode() + rb"[^\r\n]*")
 
 
-class Remarks(NamedTuple):
+class PlacedRemarks(NamedTuple):
     annotations: tuple[Annotation, ...]
     comments: tuple[Annotation, ...]
 
 
-def put_remarks(document: Document, flow: Propagation, rows: ModuleRows) -> tuple[Remarks, list[Finding]]:
+def put_remarks(
+    document: Document, flow: Propagation, rows: ModuleRows
+) -> tuple[PlacedRemarks, list[Finding]]:
     """The comments at the rows before which they are run first.
 
     A motion that runs with another FORCE or COMPENSATE comment than the row before it has, gets that comment again;
@@ -53,7 +55,7 @@ def put_remarks(document: Document, flow: Propagation, rows: ModuleRows) -> tupl
     notes.sort(key=lambda note: note[:2])
     annotations = tuple(note for _, _, note in notes)
     comments, findings = _others(document, flow, rows)
-    return Remarks(annotations, comments), findings
+    return PlacedRemarks(annotations, comments), findings
 
 
 def _annotation(document: Document, row: int, remark: Remark) -> Annotation:

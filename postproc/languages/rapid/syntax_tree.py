@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 
-class Number(NamedTuple):
+class NumberLiteral(NamedTuple):
     value: float
     start: int
     stop: int
 
 
-class Text(NamedTuple):
+class StringLiteral(NamedTuple):
     """A string; its value without the quotes."""
 
     value: bytes
@@ -57,14 +57,14 @@ class Argument(NamedTuple):
     stop: int
 
 
-class Call(NamedTuple):
+class FunctionCall(NamedTuple):
     name: bytes
     arguments: tuple[Argument, ...]
     start: int
     stop: int
 
 
-class Operation(NamedTuple):
+class OperatorExpression(NamedTuple):
     """One or two operands."""
 
     operator: bytes
@@ -80,7 +80,17 @@ class Star(NamedTuple):
     stop: int
 
 
-Expression = Number | Text | Name | Index | Component | Aggregate | Call | Operation | Star
+Expression = (
+    NumberLiteral
+    | StringLiteral
+    | Name
+    | Index
+    | Component
+    | Aggregate
+    | FunctionCall
+    | OperatorExpression
+    | Star
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +107,7 @@ class Declaration:
 
 
 @dataclass(frozen=True, slots=True)
-class Assignment:
+class AssignmentStatement:
     target: Expression
     value: Expression
     start: int
@@ -188,7 +198,7 @@ class NotUnderstood:
 
 Statement = (
     Declaration
-    | Assignment
+    | AssignmentStatement
     | Instruction
     | If
     | For
@@ -202,7 +212,7 @@ Statement = (
 )
 
 
-class Parameter(NamedTuple):
+class RoutineParameter(NamedTuple):
     """``mode``: b"" (a copy), INOUT, VAR or PERS (the caller's own); ``optional``: written with a backslash."""
 
     mode: bytes
@@ -212,13 +222,13 @@ class Parameter(NamedTuple):
 
 
 @dataclass(slots=True)
-class Routine:
+class RapidRoutine:
     """``kind``: PROC, FUNC or TRAP; ``handlers``: statements after ERROR, BACKWARD and UNDO; ``broken``: offset at
     which its structure is not understood, -1 where it is."""
 
     kind: bytes
     name: bytes
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[RoutineParameter, ...]
     body: tuple[Statement, ...]
     handlers: tuple[Statement, ...]
     local: bool
@@ -232,7 +242,7 @@ class Module:
     -1 without one; ``unclear``: places between routines that are not understood."""
 
     declarations: list[Declaration] = field(default_factory=list)
-    routines: list[Routine] = field(default_factory=list)
+    routines: list[RapidRoutine] = field(default_factory=list)
     records: dict[bytes, tuple[tuple[bytes, bytes], ...]] = field(default_factory=dict)
     remarks: list[Remark] = field(default_factory=list)
     unclear: list[NotUnderstood] = field(default_factory=list)

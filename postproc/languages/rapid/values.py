@@ -13,19 +13,19 @@ class Leaf(NamedTuple):
     stop: int = -1
 
 
-class Group(NamedTuple):
+class GroupValue(NamedTuple):
     """An aggregate or an array."""
 
     items: tuple[Value, ...]
 
 
-class Unknown(NamedTuple):
+class UnknownData(NamedTuple):
     """``reason`` completes "... because"."""
 
     reason: str
 
 
-Value = Leaf | Group | Unknown
+Value = Leaf | GroupValue | UnknownData
 
 TRUE, FALSE = Leaf(True), Leaf(False)
 
@@ -34,8 +34,8 @@ def plain(value: Value) -> Value:
     """The value without places: a copy of it."""
     if isinstance(value, Leaf):
         return value if value.start < 0 else Leaf(value.value)
-    if isinstance(value, Group):
-        return Group(tuple(map(plain, value.items)))
+    if isinstance(value, GroupValue):
+        return GroupValue(tuple(map(plain, value.items)))
     return value
 
 
@@ -47,17 +47,17 @@ def joined(one: Value, other: Value, reason: str) -> Value:
         same = one.value == other.value and isinstance(one.value, bytes | bool) == isinstance(
             other.value, bytes | bool
         )
-        return Leaf(one.value) if same else Unknown(reason)
-    if isinstance(one, Group) and isinstance(other, Group) and len(one.items) == len(other.items):
-        return Group(tuple(joined(a, b, reason) for a, b in zip(one.items, other.items, strict=True)))
-    return one if isinstance(one, Unknown) else Unknown(reason)
+        return Leaf(one.value) if same else UnknownData(reason)
+    if isinstance(one, GroupValue) and isinstance(other, GroupValue) and len(one.items) == len(other.items):
+        return GroupValue(tuple(joined(a, b, reason) for a, b in zip(one.items, other.items, strict=True)))
+    return one if isinstance(one, UnknownData) else UnknownData(reason)
 
 
-def unknown_in(value: Value) -> Unknown | None:
+def unknown_in(value: Value) -> UnknownData | None:
     """The first part that is not known."""
-    if isinstance(value, Unknown):
+    if isinstance(value, UnknownData):
         return value
-    if isinstance(value, Group):
+    if isinstance(value, GroupValue):
         for item in value.items:
             found = unknown_in(item)
             if found is not None:
@@ -74,7 +74,7 @@ def number_of(value: Value) -> float | None:
 
 def numbers_of(value: Value, count: int) -> tuple[float, ...] | None:
     """``count`` numbers of a group, None where it is none."""
-    if not isinstance(value, Group) or len(value.items) != count:
+    if not isinstance(value, GroupValue) or len(value.items) != count:
         return None
     found = tuple(number_of(item) for item in value.items)
     return None if None in found else tuple(number for number in found if number is not None)
@@ -89,8 +89,8 @@ def replaced(value: Value, place: tuple[int, ...], new: Value, reason: str) -> V
     """``value`` with ``new`` at the indices of ``place``."""
     if not place:
         return new
-    if not isinstance(value, Group) or not 0 <= place[0] < len(value.items):
-        return Unknown(reason)
+    if not isinstance(value, GroupValue) or not 0 <= place[0] < len(value.items):
+        return UnknownData(reason)
     at = place[0]
     part = replaced(value.items[at], place[1:], new, reason)
-    return Group((*value.items[:at], part, *value.items[at + 1 :]))
+    return GroupValue((*value.items[:at], part, *value.items[at + 1 :]))
