@@ -14,6 +14,7 @@ from postproc.base.geometry import rotation_from_abc
 from postproc.base.units import DEG, MM
 from postproc.languages import DIALECTS, detect
 from postproc.languages.dialect import Program, ReadingSettings, WritingSettings
+from postproc.languages.rapid.parsing import ModuleParser
 from postproc.languages.rapid.quaternions import quaternion_from_rotation, rotation_from_quaternion
 from postproc.toolpath import Plan
 
@@ -93,6 +94,16 @@ def test_spelling_does_not_matter(path: Path, name: str) -> None:
         pytest.skip("the header is no statement")
     varied = [re.sub(r"\bnan\b", "NAN", line) for line in read(VARIANTS[name](raw)).toolpath.dump()]
     assert varied == list(read(raw).toolpath.dump())
+
+
+@pytest.mark.parametrize("path", [*GOOD, *BAD], ids=lambda path: path.stem)
+def test_lists_of_numbers_are_taken_as_the_general_rules_take_them(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    raw = path.read_bytes()
+    fast = ModuleParser(raw).file()
+    monkeypatch.setattr("postproc.languages.rapid.expression_syntax.NUMBER_LIST", re.compile(rb"(?!)"))
+    assert ModuleParser(raw).file() == fast
 
 
 APPENDED = (" foo", ",foo", "\\Foo", "+1", "[1]", " @", "{1}", ".x", " 5", "\\Foo:=3")

@@ -184,7 +184,7 @@ class Evaluator:
         if function is not None and number is not None:
             try:
                 return Leaf(function(number)), b"NUM"
-            except ValueError:
+            except (ValueError, OverflowError):
                 return UnknownData(f"{_shown(name)} has no value there"), b"NUM"
         return UnknownData(f"{_shown(name)} is computed where the program runs"), b""
 
@@ -264,7 +264,7 @@ def _of_numbers(operator: bytes, one: float, other: float) -> Value:
     if operator in (b"+", b"-", b"*"):
         value = one + other if operator == b"+" else one - other if operator == b"-" else one * other
         return Leaf(value) if math.isfinite(value) else UnknownData("it is too large")
-    if operator == b"/" and other != 0:
+    if operator == b"/" and other != 0 and math.isfinite(one / other):
         return Leaf(one / other)
     if operator in (b"DIV", b"MOD") and other > 0 and one >= 0 and one == int(one) and other == int(other):
         return Leaf(float(one // other if operator == b"DIV" else one % other))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import re
+
 from postproc.languages.rapid.syntax_tree import (
     Aggregate,
     Argument,
@@ -32,6 +35,10 @@ _NO_NAMES = frozenset(
     b"THEN DO FROM TO STEP WITH ENDIF ELSE ELSEIF ENDFOR ENDWHILE ENDTEST CASE DEFAULT ENDPROC ENDFUNC"
     b" ENDTRAP ENDMODULE PROC FUNC TRAP IF FOR WHILE TEST GOTO RETURN OR XOR AND NOT DIV MOD".split()
 )
+_DIGITS = rb"[-+]?(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:[eE][-+]?[0-9]++)?+"
+NUMBER_LIST = re.compile(rb"\[" + _DIGITS + rb"(?:," + _DIGITS + rb")*+\]")
+"""An aggregate of numbers without blanks, which is taken at once; the general rules give the same."""
+_ITEM = re.compile(rb"[^\[\],]++")
 DEEPEST = 40
 """Expressions in each other."""
 
@@ -116,6 +123,8 @@ class RapidExpressionParser:
         token = self.next
         if token.kind == NUMBER:
             self.take()
+            if not math.isfinite(float(token.text)):
+                raise SyntaxProblem
             return NumberLiteral(float(token.text), token.start, token.stop)
         if token.kind == TEXT:
             self.take()
@@ -140,6 +149,9 @@ class RapidExpressionParser:
             inner = self.expression()
             self.need(b")")
             return OperatorExpression(b"()", (inner,), token.start, self.tokens.before)
+        numbers = self._numbers() if token.text == b"[" else None
+        if numbers is not None:
+            return numbers
         if self.sign(b"["):
             items = []
             if not self.sign(b"]"):
@@ -149,6 +161,21 @@ class RapidExpressionParser:
                 self.need(b"]")
             return Aggregate(tuple(items), token.start, self.tokens.before)
         raise SyntaxProblem
+
+    def _numbers(self) -> Aggregate | None:
+        """An aggregate of numbers in the common spelling, which is passed; None for any other."""
+        start = self.next.start
+        found = NUMBER_LIST.match(self.tokens.raw, start)
+        if found is None:
+            return None
+        items = tuple(
+            NumberLiteral(float(item[0]), *item.span())
+            for item in _ITEM.finditer(self.tokens.raw, start, found.end())
+        )
+        if not all(math.isfinite(item.value) for item in items):
+            return None
+        self.tokens.jump(found.end())
+        return Aggregate(items, start, found.end())
 
     def suffixes(self, base: Expression) -> Expression:
         """``base`` with the indices and components after it.  Raises SyntaxProblem for too many."""
