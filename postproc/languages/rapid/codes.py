@@ -37,7 +37,7 @@ CODES = define(
         "RAP004": _warning(
             "quaternion is not of length 1",
             "The length of the quaternion of the target differs from 1 by more than 0.01.",
-            "The controller refuses it, or the orientation is not the one that is meant.",
+            "The controller refuses it, or runs another orientation.",
             "Write a quaternion whose squares add up to 1.",
             "`[0,0,0,0]` of a target that was never set.",
         ),
@@ -66,8 +66,8 @@ CODES = define(
         "RAP008": _warning(
             "target is displaced",
             "A displacement, an offset, a sensor or soft servos are in force at the motion.",
-            "The robot is not where the text says, so the motion is not corrected.",
-            "End the displacement before the cut (PDispOff, EOffsOff), or check these motions by other means.",
+            "The robot goes elsewhere than to the target of the text, so the motion is not corrected.",
+            "Remove the displacement before the cut (PDispOff, EOffsOff), or check these motions by other means.",
             "`PDispSet offset;` before the cut.",
         ),
         "RAP009": _warning(
@@ -100,7 +100,7 @@ CODES = define(
         ),
         "RAP013": _warning(
             "stationary tool",
-            "The robot holds the work object, and the tool is fixed in the cell (robhold).",
+            "The work object is on the robot, and the tool is fixed in the cell (robhold).",
             _STAYS,
             "Check these motions by other means; this version corrects programs with the tool on the robot.",
             "`PERS tooldata tFixed := [FALSE,...];`.",
@@ -122,8 +122,8 @@ CODES = define(
         "RAP016": _warning(
             "comment has no effect",
             "A FORCE or COMPENSATE comment is where no statement is run.",
-            "It holds for no motion.",
-            "Write it in a routine, before the motion from which on it holds.",
+            "It applies to no motion.",
+            "Write it in a routine, before the first motion to which it applies.",
             "`! FORCE 0 100 0` between two routines.",
         ),
         "RAP017": _warning(

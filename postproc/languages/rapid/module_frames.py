@@ -51,7 +51,7 @@ class ModuleFrames:
         held, fixed = (truth_of(item_of(use.value, at)) for at in (0, 1))
         unit = item_of(use.value, 2)
         if held:
-            return "RAP013", "the robot holds its work object (robhold is TRUE)"
+            return "RAP013", "its work object is on the robot (robhold is TRUE)"
         if fixed is False or (isinstance(unit, Leaf) and unit.value != b""):
             return "RAP011", "its work object moves with a mechanical unit"
         user, within = (_pose(item_of(use.value, at)) for at in (3, 4))
