@@ -15,6 +15,7 @@ from postproc.identification import codes as identification
 from postproc.languages import codes as dialects
 from postproc.languages.gcode import codes as gcode
 from postproc.languages.krl import codes as krl
+from postproc.languages.rapid import codes as rapid
 from postproc.measurements import codes as measurements
 from postproc.model import codes as model
 from postproc.output import atomic_write
@@ -32,6 +33,7 @@ TABLES: tuple[Mapping[str, Code], ...] = tuple(
         dialects,
         krl,
         gcode,
+        rapid,
         robot,
         model,
         forces,

@@ -9,8 +9,9 @@ from postproc.languages import codes as codes
 from postproc.languages.dialect import Dialect
 from postproc.languages.gcode import DIALECTS as GCODE
 from postproc.languages.krl import KrlDialect
+from postproc.languages.rapid import RapidDialect
 
-DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (*GCODE, KrlDialect())}
+DIALECTS: dict[str, Dialect] = {dialect.name: dialect for dialect in (RapidDialect(), *GCODE, KrlDialect())}
 """Name -> dialect; the first that claims a file reads it."""
 
 
@@ -18,8 +19,6 @@ _OTHER_FILES = {
     ".yaml": "a YAML file states a cell, a robot or a process: name the program, and this file with its option",
     ".yml": "a YAML file states a cell, a robot or a process: name the program, and this file with its option",
     ".csv": "a CSV file states forces or readings: name the program, and this file with --force",
-    ".mod": "RAPID is not read yet",
-    ".prg": "RAPID is not read yet",
     ".ls": "Fanuc TP programs are not read yet",
     ".tp": "Fanuc TP programs are not read yet",
 }

@@ -25,7 +25,7 @@ CODES = define(
                 "Check that the file is a robot or CNC program, and name its language in the cell: "
                 "dialect: {name: ...}."
             ),
-            example="A RAPID module is given.",
+            example="A Fanuc TP program is given.",
         ),
     }
 )

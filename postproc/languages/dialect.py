@@ -21,6 +21,15 @@ MARK = "COMPENSATED by compensate "
 
 
 @dataclass(frozen=True)
+class EditSyntax:
+    """What edits are checked by where the language has no addresses: the sign with which a comment starts, and the
+    signs after which a number of a target is.  Empty: comments after ; or in (), numbers after X, Y, Z, ..."""
+
+    comment: bytes = b""
+    numbers_after: bytes = b""
+
+
+@dataclass(frozen=True)
 class Program:
     """A program that was read.
 
@@ -40,6 +49,7 @@ class Program:
     marker_at: Span
     names: tuple[Span, ...]
     unresolved: frozenset[str] = frozenset()
+    edit_syntax: EditSyntax = EditSyntax()
 
 
 @dataclass(frozen=True, eq=False)

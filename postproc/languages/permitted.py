@@ -11,7 +11,7 @@ from postproc.base.arrays import Bools, Ints
 from postproc.base.batches import in_blocks
 from postproc.base.document import Document, Edits
 from postproc.base.findings import Finding, Refusal
-from postproc.languages.dialect import Program
+from postproc.languages.dialect import EditSyntax, Program
 from postproc.toolpath import Toolpath
 
 EDITS = 1 << 15
@@ -44,12 +44,14 @@ def refuse_other(program: Program, edits: Edits, letters: bytes) -> None:
     - a number in the place of a number, or of an expression, after the address of a coordinate, outside of comments;
     - in the line of a motion, outside of comments: words and targets, of the dialect's ``letters``;
     - whole lines of such words before the line of a motion or a spline block, or whole lines in a companion.
+
+    Where the language has no addresses (``EditSyntax``), the number of a coordinate is one in a list.
     """
     words = _table(_TARGET + letters + letters.lower())
     for index, document in enumerate(program.documents):
         own = edits.of(index)
         moving = _lines_of_motions(program.toolpath, document) if index == 0 else None
-        look = _Look(document, own, words, moving)
+        look = _Look(document, own, words, moving, program.edit_syntax)
         for wrong in in_blocks(look.first_wrong, len(own), EDITS):
             if wrong >= 0:
                 edit = own[wrong]
@@ -77,7 +79,10 @@ def _lines_of_motions(path: Toolpath, document: Document) -> Bools:
 class _Look:
     """Of the edits of a document; ``moving``: lines with a motion, None in a companion, where none are."""
 
-    def __init__(self, document: Document, edits: Edits, words: Bools, moving: Bools | None) -> None:
+    def __init__(
+        self, document: Document, edits: Edits, words: Bools, moving: Bools | None, syntax: EditSyntax
+    ) -> None:
+        self.syntax = syntax
         self.raw = np.frombuffer(document.raw, np.uint8)
         self.texts = np.frombuffer(edits.texts, np.uint8)
         self.begins, self.edits, self.words, self.moving = document.line_starts, edits, words, moving
@@ -98,14 +103,16 @@ class _Look:
         filled = to > at
         number = filled & (ends[1:] > ends[:-1]) & ~_any(~_NUMBER[texts], ends[:-1], ends[1:])
         wrong = _any(~self.words[raw], at, to)
-        wrong |= number & ~self._addressed(start)
+        placed = self._listed(start) if self.syntax.numbers_after else self._addressed(start)
+        wrong |= number & ~placed
         starts = self.begins[low:high] - region.start
         if self.head and low == 0:
             starts[0] = self.head
         other = ~number
         if other.any():
             wrong |= other & self._other(raw, at, to, texts, ends, starts, low)
-        wrong |= filled & _commented(raw, at)
+        mark = self.syntax.comment
+        wrong |= filled & (_after_mark(raw, at, mark) if mark else _commented(raw, at))
         return part.start + int(np.argmax(wrong)) if wrong.any() else -1
 
     def _addressed(self, start: Ints) -> Bools:
@@ -131,6 +138,14 @@ class _Look:
             pair = (before | 32 == ord("c")) & np.isin(letter | 32, list(b"ar")) & ~_NAMED[first]
             good &= ~named | pair
         return np.asarray(good & _COORDINATE[letter] & (at >= 0))
+
+    def _listed(self, start: Ints) -> Bools:
+        """(K,) whether a sign of a list is before, with nothing but blanks and line ends between."""
+        at = start - 1
+        empty = _BLANK | _table(b"\r\n")
+        while (blank := empty[self.raw[at]] & (at > 0)).any():
+            at = at - blank
+        return np.asarray(_table(self.syntax.numbers_after)[self.raw[at]] & (at >= 0))
 
     def _back(self, at: Ints) -> Ints:
         """From ``at`` (K,) back over blanks."""
@@ -183,3 +198,15 @@ def _commented(raw: Bytes, at: Ints) -> Bools:
         last = opens[np.searchsorted(opens, at[inside]) - 1]
         wrong[inside] |= _any(~_BLANK[raw], last + 1, at[inside])
     return wrong
+
+
+def _after_mark(raw: Bytes, at: Ints, mark: bytes) -> Bools:
+    """(K,) whether a comment that starts with ``mark``, outside of a string, has begun before in the line."""
+    feeds = np.append(-1, np.flatnonzero((raw == _LF) | (raw == _CR)))
+    line = feeds[np.searchsorted(feeds, at) - 1]
+    marks = np.flatnonzero(raw == mark[0])
+    wrong = np.searchsorted(marks, at) > np.searchsorted(marks, line)
+    for k in np.flatnonzero(wrong).tolist():
+        before = raw[line[k] + 1 : at[k]].tobytes()
+        wrong[k] = mark in b"".join(before.split(b'"')[::2])
+    return np.asarray(wrong)

@@ -31,6 +31,7 @@ from postproc.robot.half_turns import (
 )
 from postproc.robot.inverse import controller_values, inverse, kuka_angles, status_of, turn_of
 from postproc.robot.newton import follow_rows, weakest
+from postproc.robot.stated_branches import stated_branches
 from postproc.toolpath import Kind, Toolpath
 
 SIGN_MARGIN = 0.01 * DEG
@@ -122,7 +123,7 @@ def follow_axes(
 
 def status_matches(toolpath: Toolpath, track: AxisTrack) -> Bools:
     """(N,) the stated S, if there is one, is that of the branch taken."""
-    stated = toolpath.configuration["status"]
+    stated = stated_branches(toolpath.configuration)
     return np.asarray((stated < 0) | (track.status < 0) | (stated & 7 == track.status))
 
 
@@ -195,7 +196,8 @@ def _branches(
 ) -> Ints:
     """(N,) the branch in force at each motion; ``axes`` (R, n): of the motions ``on_axes``."""
     jump = np.isin(toolpath.kind, (Kind.PTP, Kind.AXIS))
-    stated = jump & cartesian & (toolpath.configuration["status"] >= 0)
+    branch = stated_branches(toolpath.configuration)
+    stated = jump & cartesian & (branch >= 0)
     if isinstance(robot.nominal, SerialArm):
         stated = np.zeros_like(stated)
     # A path motion keeps its branch wherever it leads; only a jump to an unknown place loses it.
@@ -209,7 +211,7 @@ def _branches(
     value = np.full(len(toolpath) + 1, -1, np.int8)
     value[0] = -1 if start is None else status_of(robot.nominal, start[None])[0]
     value[1:][on_axes] = status_of(robot.nominal, axes)
-    value[1:][stated] = toolpath.configuration["status"][stated] & 7
+    value[1:][stated] = branch[stated] & 7
     value[1:][home] = value[0]
     sets = np.concatenate([[True], on_axes | stated | lost])
     meets = np.flatnonzero(~toolpath.continues & ~sets[1:])

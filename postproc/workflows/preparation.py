@@ -277,7 +277,7 @@ def _disagreeing(program: Path, path: Toolpath, track: AxisTrack) -> list[Findin
     findings = []
     for mask, message in (
         (~track.turn_matches, "the stated T (Turn) is not that of this pose"),
-        (elsewhere, "the stated S (Status) is not the configuration in which the robot reaches this pose"),
+        (elsewhere, "the stated configuration (S, cfx) is not the one in which the robot reaches this pose"),
     ):
         rows = np.flatnonzero(mask)
         if len(rows):

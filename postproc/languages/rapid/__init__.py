@@ -1,0 +1,58 @@
+"""RAPID, the language of ABB robots: modules in .mod, .prg and .sys files."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from postproc.base.document import Document, Edit
+from postproc.languages.dialect import (
+    MARK,
+    PLAIN,
+    EditedTargets,
+    Plan,
+    Program,
+    ReadingSettings,
+    WritingSettings,
+    put_mark,
+)
+from postproc.languages.rapid import codes as codes
+from postproc.languages.rapid import module_reader, target_writer
+
+_MODULE = re.compile(
+    rb"^(?:\xef\xbb\xbf)?[ \t]*+MODULE[ \t]++[A-Za-z][A-Za-z0-9_]*+[ \t]*+(?:\(|!|\r?$)", re.I | re.M
+)
+_ROUTINE = re.compile(rb"^[ \t]*+(?:LOCAL[ \t]++)?PROC[ \t]++[A-Za-z][A-Za-z0-9_]*+[ \t]*+\(", re.I | re.M)
+_SUFFIXES = frozenset([".mod", ".modx", ".prg", ".sys", ".sysx"])
+BEGIN = 65536
+"""Bytes from the start of a file that are looked at."""
+
+
+class RapidDialect:
+    """RAPID as a ``Dialect``."""
+
+    name = "rapid"
+    family = "RAPID"
+    letters = b"ABCDEFGHIJKLMNOPQRSTUVWXYZ\\;"  # of inserted motions, and of Offs and RelTool
+
+    def claims(self, path: Path, raw: bytes) -> bool:
+        start = raw[:BEGIN]
+        if _MODULE.search(start) is not None:
+            return True
+        return path.suffix.lower() in _SUFFIXES and _ROUTINE.search(start) is not None
+
+    def companions(self, path: Path) -> list[Path]:
+        return []
+
+    def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
+        return module_reader.read(documents, settings)
+
+    def edit_targets(self, program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
+        return target_writer.edit_targets(program, plan, writing)
+
+    def marked(self, program: Program, text: str) -> Edit:
+        return put_mark(program, f"!{MARK}{text}".encode("latin-1", "replace"))
+
+    def renamed(self, program: Program, stem: str) -> list[Edit]:
+        """Nothing: a module keeps its name in a file of any name."""
+        return []

@@ -1,0 +1,251 @@
+"""The data that a module declares, before its routines run, and who reads or assigns it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from postproc.languages.rapid.data_types import RECORDS, SPEEDS, ZONES, Components
+from postproc.languages.rapid.evaluation import Evaluator, Typed
+from postproc.languages.rapid.instructions import HARMLESS, MOTIONS, WRITERS, is_motion, sort_arguments
+from postproc.languages.rapid.motion_facts import is_direct
+from postproc.languages.rapid.syntax_tree import (
+    Argument,
+    AssignmentStatement,
+    Component,
+    Declaration,
+    For,
+    FunctionCall,
+    Index,
+    Instruction,
+    Module,
+    Name,
+    NotUnderstood,
+    RapidRoutine,
+)
+from postproc.languages.rapid.values import FALSE, TRUE, GroupValue, Leaf, UnknownData, Value, number_of
+
+LARGEST = 200_000
+"""Elements of an array without values that are looked at one by one."""
+
+
+def _predefined() -> dict[bytes, Typed]:
+    found: dict[bytes, Typed] = {}
+    for name, speed in SPEEDS.items():
+        found[name] = (GroupValue((Leaf(speed),)), b"")
+    for name, zone in ZONES.items():
+        found[name] = (GroupValue((TRUE if name == b"FINE" else FALSE, Leaf(zone))), b"")
+    return found
+
+
+PREDEFINED: Mapping[bytes, Typed] = _predefined()
+
+
+class DeclaredData:
+    """Names of the module level: type, and value where it is a constant or before anything is assigned."""
+
+    def __init__(self, module: Module, shadowed: frozenset[bytes]) -> None:
+        self.types: dict[bytes, bytes] = {}
+        self.lines: dict[bytes, int] = {}
+        self._declarations: dict[bytes, Declaration] = {}
+        self._values: dict[bytes, Value] = {}
+        self.evaluator = Evaluator(self.look, module.records, shadowed)
+        self.records: Mapping[bytes, Components] = module.records
+        for one in module.declarations:
+            twice = one.name in self._declarations
+            self._declarations[one.name] = one
+            self.types[one.name] = one.type
+            self.lines[one.name] = one.start
+            if twice:
+                self._values[one.name] = UnknownData(f"{_shown(one.name)} is declared twice")
+        for unclear in module.unclear:
+            for name in unclear.names & self._declarations.keys():
+                self._values[name] = UnknownData(f"a line with {_shown(name)} is not understood")
+
+    def __contains__(self, name: bytes) -> bool:
+        return name in self._declarations
+
+    def is_constant(self, name: bytes) -> bool:
+        return self._declarations[name].kind == b"CONST"
+
+    def look(self, name: bytes) -> Typed:
+        """Value and type of a name of the module, or of the controller."""
+        declaration = self._declarations.get(name)
+        if declaration is None:
+            if name in PREDEFINED:
+                return PREDEFINED[name]
+            return UnknownData(
+                f"{_shown(name)} is not declared in this file" if name else "it is computed"
+            ), b""
+        if name not in self._values:
+            self._values[name] = UnknownData(f"{_shown(name)} depends on itself")
+            self._values[name] = first_value(declaration, self.evaluator)
+        return self._values[name], declaration.type
+
+
+def first_value(declaration: Declaration, evaluator: Evaluator) -> Value:
+    """The value of a declaration."""
+    if declaration.value is not None:
+        return evaluator.value(declaration.value)
+    shown = _shown(declaration.name)
+    if declaration.kind != b"VAR":
+        return UnknownData(f"{shown} has no value in this file")
+    value = _zero(declaration.type, evaluator, 0)
+    size = 1.0
+    for extent in reversed(declaration.extent):
+        count = number_of(evaluator.value(extent))
+        if count is None or not 1 <= count <= LARGEST or count != int(count) or size * count > LARGEST:
+            return UnknownData(f"the size of {shown} is not known")
+        size *= count
+        value = GroupValue((value,) * int(count))
+    return value
+
+
+def _zero(kind: bytes, evaluator: Evaluator, depth: int) -> Value:
+    """What a variable of a type is without a value."""
+    if kind in (b"NUM", b"DNUM"):
+        return Leaf(0.0)
+    if kind == b"BOOL":
+        return FALSE
+    if kind == b"STRING":
+        return Leaf(b"")
+    parts = RECORDS.get(kind) or evaluator.records.get(kind)
+    if parts is None or depth > 8:
+        return UnknownData(f"the type {_shown(kind)} is not known")
+    return GroupValue(tuple(_zero(part, evaluator, depth + 1) for _, part in parts))
+
+
+class Usage:
+    """Names in the routines: ``assigned`` anywhere, ``later``: not shown by the flow, ``read``: otherwise than
+    as the point of a motion; ``calls``, ``assigned_in``: routine -> what it may call and assigns; ``moves``: routines
+    in which the robot may move."""
+
+    def __init__(self, module: Module) -> None:
+        self.assigned: set[bytes] = set()
+        self.later: set[bytes] = set()
+        self.read: set[bytes] = set()
+        self.calls: dict[bytes, set[bytes]] = {}
+        self.assigned_in: dict[bytes, set[bytes]] = {}
+        self.moves: set[bytes] = set()
+        self._called: set[bytes] = set()
+        self._set: set[bytes] = set()
+        self._module_data = {declaration.name for declaration in module.declarations}
+        self._own = {routine.name for routine in module.routines}
+        self._copying = {r.name for r in module.routines if not any(p.mode for p in r.parameters)}
+        for one in module.declarations:
+            self._expressions(one.value, one.extent)
+        for unclear in module.unclear:
+            self.read |= unclear.names
+        for routine in module.routines:
+            self._called, self._set = set(), set()
+            for statement in walk(routine.body):
+                self._statement(statement, routine)
+            if routine.kind == b"TRAP":
+                self.later |= self._set
+            own, self._set = self._set, set()
+            for statement in walk(routine.handlers):
+                self._statement(statement, routine)
+            self.later |= self._set
+            self._set |= own
+            self.calls.setdefault(routine.name, set()).update(self._called)
+            self.assigned_in.setdefault(routine.name, set()).update(self._set)
+            self.assigned |= self._set
+
+    def _statement(self, statement: Any, routine: RapidRoutine) -> None:
+        match statement:
+            case Declaration():
+                self._expressions(statement.value, statement.extent)
+            case AssignmentStatement():
+                target = statement.target
+                while isinstance(target, Index | Component):
+                    if isinstance(target, Index):
+                        self._expressions(*target.indices)
+                    target = target.base
+                if isinstance(target, Name):
+                    self._set.add(target.name)
+                self._expressions(statement.value)
+            case Instruction():
+                self._instruction(statement, routine)
+            case NotUnderstood():
+                if not is_motion(statement.first):
+                    self._set |= statement.names
+                self.read |= statement.names
+            case For():
+                self._set.add(statement.name)
+                if statement.name in self._module_data:
+                    self.later.add(statement.name)  # the name is not always that of the loop
+                self._expressions(statement.first, statement.last, statement.step)
+            case _:
+                self._expressions(*_conditions(statement))
+
+    def _instruction(self, statement: Instruction, routine: RapidRoutine) -> None:
+        form = MOTIONS.get(statement.name)
+        sorted_arguments = None if form is None else sort_arguments(form, statement.arguments)
+        points = () if sorted_arguments is None else sorted_arguments.points
+        if is_motion(statement.name):
+            self.moves.add(routine.name)
+        elif statement.name not in HARMLESS or statement.name in WRITERS:
+            self._called.add(statement.name)
+            if statement.name not in self._copying:
+                self._set |= names_in(statement.arguments)
+            if statement.name not in WRITERS and statement.name not in self._own:
+                self.moves.add(routine.name)  # it may, or what it calls does
+        for argument in statement.arguments:
+            if argument in points and is_direct(argument):
+                expression = argument.value
+                while isinstance(expression, Index):
+                    self._expressions(*expression.indices)
+                    expression = expression.base
+            else:
+                self._expressions(argument.value)
+
+    def _expressions(self, *values: Any) -> None:
+        """Takes up the names of expressions, which are read, and functions, which are called."""
+        pending = list(values)
+        while pending:
+            one = pending.pop()
+            if isinstance(one, Name):
+                self.read.add(one.name)
+            elif isinstance(one, FunctionCall):
+                self._called.add(one.name)
+                pending += one.arguments
+            elif isinstance(one, tuple):
+                pending += one
+
+
+def _conditions(statement: Any) -> Iterator[Any]:
+    for name in ("condition", "value"):
+        if hasattr(statement, name):
+            yield getattr(statement, name)
+    for condition, _ in getattr(statement, "branches", ()):
+        yield condition
+    for values, _ in getattr(statement, "cases", ()):
+        yield values
+
+
+def walk(body: tuple[Any, ...]) -> Iterator[Any]:
+    """All statements of a body, with those of its blocks."""
+    for statement in body:
+        yield statement
+        for _, inner in getattr(statement, "branches", ()):
+            yield from walk(inner)
+        for _, inner in getattr(statement, "cases", ()):
+            yield from walk(inner)
+        yield from walk(getattr(statement, "otherwise", ()))
+        yield from walk(getattr(statement, "body", ()))
+
+
+def names_in(arguments: tuple[Argument, ...]) -> set[bytes]:
+    """Variables that a call may change: those that are arguments themselves, or of which a part is."""
+    found = set()
+    for argument in arguments:
+        expression = argument.value
+        while isinstance(expression, Index | Component):
+            expression = expression.base
+        if isinstance(expression, Name):
+            found.add(expression.name)
+    return found
+
+
+def _shown(name: bytes) -> str:
+    return name.decode("latin-1")[:40]

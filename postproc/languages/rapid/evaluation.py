@@ -1,0 +1,275 @@
+"""Values of expressions: constants, and UnknownData with its reason for everything else."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from postproc.base.geometry import rotation_from_vector
+from postproc.base.units import DEG
+from postproc.languages.rapid.data_types import RECORDS, Components
+from postproc.languages.rapid.quaternions import quaternion_from_rotation, rotation_from_quaternion
+from postproc.languages.rapid.syntax_tree import (
+    Aggregate,
+    Argument,
+    Component,
+    Expression,
+    FunctionCall,
+    Index,
+    Name,
+    NumberLiteral,
+    OperatorExpression,
+    Star,
+    StringLiteral,
+)
+from postproc.languages.rapid.values import (
+    FALSE,
+    TRUE,
+    GroupValue,
+    Leaf,
+    UnknownData,
+    Value,
+    number_of,
+    numbers_of,
+    plain,
+    truth_of,
+    unknown_in,
+)
+
+Typed = tuple[Value, bytes]
+"""A value and its type, b"" where that is not known."""
+
+_FUNCTIONS: dict[bytes, Callable[[float], float]] = {
+    b"ABS": abs,
+    b"SQRT": math.sqrt,
+    b"SIN": lambda x: math.sin(x * DEG),
+    b"COS": lambda x: math.cos(x * DEG),
+    b"TAN": lambda x: math.tan(x * DEG),
+    b"ASIN": lambda x: math.asin(x) / DEG,
+    b"ACOS": lambda x: math.acos(x) / DEG,
+    b"ATAN": lambda x: math.atan(x) / DEG,
+}
+_COMPARISONS: dict[bytes, Callable[[float, float], bool]] = {
+    b"<": lambda a, b: a < b,
+    b">": lambda a, b: a > b,
+    b"<=": lambda a, b: a <= b,
+    b">=": lambda a, b: a >= b,
+}
+
+
+@dataclass(frozen=True)
+class Evaluator:
+    """``look``: the value and type of a name; ``records``: further types; ``shadowed``: functions of the program,
+    whose names mean these."""
+
+    look: Callable[[bytes], Typed]
+    records: Mapping[bytes, Components] = field(default_factory=dict)
+    shadowed: frozenset[bytes] = frozenset()
+
+    def value(self, expression: Expression) -> Value:
+        return self.typed(expression)[0]
+
+    def typed(self, expression: Expression) -> Typed:
+        """The value of an expression, and its type."""
+        match expression:
+            case NumberLiteral():
+                return Leaf(expression.value, expression.start, expression.stop), b"NUM"
+            case StringLiteral():
+                return Leaf(expression.value), b"STRING"
+            case Name():
+                if expression.name in (b"TRUE", b"FALSE"):
+                    return (TRUE if expression.name == b"TRUE" else FALSE), b"BOOL"
+                return self.look(expression.name)
+            case Aggregate():
+                return GroupValue(tuple(self.value(item) for item in expression.items)), b""
+            case Component():
+                return self._component(expression)
+            case Index():
+                return self._element(expression)
+            case OperatorExpression():
+                return self._operation(expression), b""
+            case FunctionCall():
+                return self._call(expression)
+            case Star():
+                return UnknownData("its target is stored outside of the text (*)"), b""
+
+    def assigned_place(self, target: Expression) -> tuple[bytes | None, tuple[int, ...]]:
+        """The variable to which an assignment goes, and the indices of the part that it sets, -1 where not known."""
+        parts: list[Index | Component] = []
+        while isinstance(target, Index | Component):
+            parts.insert(0, target)
+            target = target.base
+        if not isinstance(target, Name):
+            return None, ()
+        place: list[int] = []
+        for part in parts:
+            if isinstance(part, Index):
+                numbers = [number_of(self.value(index)) for index in part.indices]
+                place += [-1 if one is None or one != int(one) else int(one) - 1 for one in numbers]
+            else:
+                names = [name for name, _ in self.components(self.typed(part.base)[1])]
+                place.append(names.index(part.name) if part.name in names else -1)
+        return target.name, tuple(place)
+
+    def components(self, kind: bytes) -> Components:
+        """Those of a type, () of one that has none."""
+        return RECORDS.get(kind) or self.records.get(kind, ())
+
+    def _component(self, expression: Component) -> Typed:
+        value, kind = self.typed(expression.base)
+        for place, (name, part) in enumerate(self.components(kind)):
+            if name == expression.name:
+                if isinstance(value, GroupValue) and len(value.items) == len(self.components(kind)):
+                    return value.items[place], part
+                return (
+                    value if isinstance(value, UnknownData) else UnknownData("its component is not known")
+                ), part
+        return UnknownData(f"{_shown(expression.name)} is no component that is known"), b""
+
+    def _element(self, expression: Index) -> Typed:
+        value, kind = self.typed(expression.base)
+        for index in expression.indices:
+            number = number_of(self.value(index))
+            if number is None or number != int(number):
+                return UnknownData("the index of an array is not a constant"), kind
+            if not isinstance(value, GroupValue):
+                return (value if isinstance(value, UnknownData) else UnknownData("it is not an array")), kind
+            if not 1 <= number <= len(value.items):
+                return UnknownData("the index is outside of its array"), kind
+            value = value.items[int(number) - 1]
+        return value, kind
+
+    def _operation(self, expression: OperatorExpression) -> Value:
+        values = [self.value(operand) for operand in expression.operands]
+        operator = expression.operator
+        if operator == b"()":
+            return values[0]
+        if operator in (b"AND", b"OR"):
+            truths = [truth_of(value) for value in values]
+            decided = operator == b"OR"
+            if decided in truths:
+                return TRUE if decided else FALSE
+            if None in truths:
+                return next(
+                    (v for v in values if isinstance(v, UnknownData)), UnknownData("it is no truth value")
+                )
+            return FALSE if decided else TRUE
+        unknown = next((found for value in values if (found := unknown_in(value)) is not None), None)
+        if unknown is not None:
+            return unknown
+        if operator == b"NOT":
+            truth = truth_of(values[0])
+            return UnknownData("it is no truth value") if truth is None else FALSE if truth else TRUE
+        return _combined(operator, values)
+
+    def _call(self, expression: FunctionCall) -> Typed:
+        name, arguments = expression.name, expression.arguments
+        if name in self.shadowed:
+            return UnknownData(f"{_shown(name)} is computed where the program runs"), b""
+        required = [argument.value for argument in arguments if not argument.name]
+        values = [self.value(one) for one in required if one is not None]
+        for value in values:
+            unknown = unknown_in(value)
+            if unknown is not None:
+                return unknown, b""
+        if name == b"OFFS" and len(required) == len(arguments) == 4:
+            return _offs(values), b"ROBTARGET"
+        if name == b"RELTOOL" and len(required) == 4:
+            return self._rel_tool(values, arguments), b"ROBTARGET"
+        function = _FUNCTIONS.get(name)
+        number = number_of(values[0]) if len(values) == len(arguments) == 1 else None
+        if function is not None and number is not None:
+            try:
+                return Leaf(function(number)), b"NUM"
+            except (ValueError, OverflowError):
+                return UnknownData(f"{_shown(name)} has no value there"), b"NUM"
+        return UnknownData(f"{_shown(name)} is computed where the program runs"), b""
+
+    def _rel_tool(self, values: list[Value], arguments: tuple[Argument, ...]) -> Value:
+        """The target displaced by dx, dy, dz in tool axes, then turned about the tool's x, the new y and z axes."""
+        angles = dict.fromkeys((b"RX", b"RY", b"RZ"), 0.0)
+        for argument in arguments:
+            if not argument.name:
+                continue
+            angle = None if argument.value is None else self.value(argument.value)
+            number = None if angle is None else number_of(angle)
+            if argument.name not in angles or number is None:
+                return (
+                    angle
+                    if isinstance(angle, UnknownData)
+                    else UnknownData("an argument of RelTool is not known")
+                )
+            angles[argument.name] = number
+        target = values[0]
+        steps = [number_of(value) for value in values[1:]]
+        if not isinstance(target, GroupValue) or len(target.items) != 4 or None in steps:
+            return UnknownData("it is no target")
+        position, quaternion = numbers_of(target.items[0], 3), numbers_of(target.items[1], 4)
+        if position is None or quaternion is None:
+            return UnknownData("it is no target")
+        rotation = rotation_from_quaternion(np.array([quaternion]))[0]
+        if np.isnan(rotation).any():
+            return UnknownData("the length of its quaternion is not 1")
+        moved = np.array(position) + rotation @ np.array(steps, float)
+        turn = np.eye(3)
+        for axis, angle_deg in zip(np.eye(3), angles.values(), strict=True):
+            turn = turn @ rotation_from_vector(axis * angle_deg * DEG)
+        new = quaternion_from_rotation((rotation @ turn)[None], np.array([quaternion]))[0]
+        turned = (
+            GroupValue(tuple(Leaf(float(q)) for q in new)) if any(angles.values()) else plain(target.items[1])
+        )
+        place = GroupValue(tuple(Leaf(float(x)) for x in moved))
+        return GroupValue((place, turned, *map(plain, target.items[2:])))
+
+
+def _offs(values: list[Value]) -> Value:
+    """The target displaced in the axes of its work object."""
+    target, steps = values[0], [number_of(value) for value in values[1:]]
+    if not isinstance(target, GroupValue) or len(target.items) != 4:
+        return UnknownData("it is no target")
+    position = numbers_of(target.items[0], 3)
+    if position is None or None in steps:
+        return UnknownData("it is no target")
+    place = GroupValue(tuple(Leaf(x + (d or 0.0)) for x, d in zip(position, steps, strict=True)))
+    return GroupValue((place, *map(plain, target.items[1:])))
+
+
+def _combined(operator: bytes, values: list[Value]) -> Value:
+    """Numbers, and sums of positions."""
+    if len(values) == 1:
+        number = number_of(values[0])
+        if number is None:
+            return UnknownData("its value is not known")
+        return Leaf(-number if operator == b"-" else number)
+    if operator in (b"=", b"<>"):
+        same = plain(values[0]) == plain(values[1])
+        return TRUE if same == (operator == b"=") else FALSE
+    one, other = (number_of(value) for value in values)
+    if one is not None and other is not None:
+        return _of_numbers(operator, one, other)
+    vectors = [numbers_of(value, 3) for value in values]
+    if operator in (b"+", b"-") and vectors[0] is not None and vectors[1] is not None:
+        sense = 1.0 if operator == b"+" else -1.0
+        pairs = zip(vectors[0], vectors[1], strict=True)
+        return GroupValue(tuple(Leaf(a + sense * b) for a, b in pairs))
+    return UnknownData("it is computed")
+
+
+def _of_numbers(operator: bytes, one: float, other: float) -> Value:
+    if operator in _COMPARISONS:
+        return TRUE if _COMPARISONS[operator](one, other) else FALSE
+    if operator in (b"+", b"-", b"*"):
+        value = one + other if operator == b"+" else one - other if operator == b"-" else one * other
+        return Leaf(value) if math.isfinite(value) else UnknownData("it is too large")
+    if operator == b"/" and other != 0 and math.isfinite(one / other):
+        return Leaf(one / other)
+    if operator in (b"DIV", b"MOD") and other > 0 and one >= 0 and one == int(one) and other == int(other):
+        return Leaf(float(one // other if operator == b"DIV" else one % other))
+    return UnknownData("it is computed")
+
+
+def _shown(name: bytes) -> str:
+    return name.decode("latin-1")[:40]

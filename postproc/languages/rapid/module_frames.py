@@ -1,0 +1,106 @@
+"""Tools and work objects of motions as frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from postproc.base.geometry import Poses
+from postproc.base.units import DEG, MM
+from postproc.languages.rapid.motion_facts import FrameUse, Problem, item_of, reason_of
+from postproc.languages.rapid.quaternions import rotation_from_quaternion
+from postproc.languages.rapid.values import Leaf, UnknownData, Value, numbers_of, truth_of
+from postproc.toolpath import FrameRef
+from postproc.toolpath.initial_state import Symbol
+
+_KEYS = ("X", "Y", "Z", "A", "B", "C")
+
+
+class ModuleFrames:
+    """The frames that motions use, each once.  ``symbols``: what the cell states of names that the file does not
+    declare: the number of a tool or base of the cell, or a pose."""
+
+    def __init__(self, symbols: Mapping[str, Symbol], lines: Mapping[bytes, int]) -> None:
+        self.refs: list[FrameRef] = []
+        self._symbols, self._lines = symbols, lines
+        self._known: dict[tuple[object, ...], int] = {}
+
+    def tool(self, use: FrameUse, line: int) -> int | Problem:
+        """Index of a tool, or why it is not known."""
+        if use.name == b"TOOL0":
+            return self._index(("tool", 0), FrameRef(0, None, line))
+        bound = self._bound("tool", use, line)
+        if bound is not None:
+            return bound
+        held = truth_of(item_of(use.value, 0))
+        if held is False:
+            return "RAP013", "its tool is fixed in the cell (robhold is FALSE)"
+        pose = _pose(item_of(use.value, 1))
+        if held is None or pose is None:
+            return "RAP005", f"its tool is not known: {_reason(use)}"
+        return self._posed("tool", pose, self._lines.get(use.name, line))
+
+    def base(self, use: FrameUse, line: int) -> int | Problem:
+        """Index of a work object: user frame x object frame; or why it is not known."""
+        if use.name == b"WOBJ0":
+            return self._index(("base", 0), FrameRef(0, None, line))
+        bound = self._bound("base", use, line)
+        if bound is not None:
+            return bound
+        held, fixed = (truth_of(item_of(use.value, at)) for at in (0, 1))
+        unit = item_of(use.value, 2)
+        if held:
+            return "RAP013", "its work object is on the robot (robhold is TRUE)"
+        if fixed is False or (isinstance(unit, Leaf) and unit.value != b""):
+            return "RAP011", "its work object moves with a mechanical unit"
+        user, within = (_pose(item_of(use.value, at)) for at in (3, 4))
+        if held is None or fixed is None or not isinstance(unit, Leaf) or user is None or within is None:
+            return "RAP005", f"its work object is not known: {_reason(use)}"
+        return self._posed("base", user @ within, self._lines.get(use.name, line))
+
+    def _bound(self, kind: str, use: FrameUse, line: int) -> int | Problem | None:
+        """The frame that the cell states for a name that the file does not declare."""
+        symbol = self._symbols.get(use.name.decode("latin-1")) if use.name else None
+        if symbol is None or use.name in self._lines or not isinstance(use.value, UnknownData):
+            return None
+        if not isinstance(symbol, Mapping):
+            if symbol != int(symbol) or symbol < 0:
+                return (
+                    "RAP005",
+                    f"the cell states {symbol:g} for {_shown(use)}, which is no number of a frame",
+                )
+            return self._index((kind, int(symbol)), FrameRef(int(symbol), None, line))
+        if set(symbol) != set(_KEYS):
+            return "RAP005", f"the cell does not state X, Y, Z, A, B, C of {_shown(use)}"
+        values = np.array([symbol[key] for key in _KEYS])
+        return self._posed(kind, Poses.from_abc(values[:3] * MM, values[3:] * DEG), 0)
+
+    def _posed(self, kind: str, pose: Poses, line: int) -> int:
+        key = (kind, *pose.position.tolist(), *pose.rotation.ravel().tolist())
+        return self._index(key, FrameRef(None, pose, line))
+
+    def _index(self, key: tuple[object, ...], frame: FrameRef) -> int:
+        if key not in self._known:
+            self._known[key] = len(self.refs)
+            self.refs.append(frame)
+        return self._known[key]
+
+
+def _pose(value: Value) -> Poses | None:
+    """A pose in m; None where it is not known, or its quaternion is not of length 1."""
+    position, quaternion = numbers_of(item_of(value, 0), 3), numbers_of(item_of(value, 1), 4)
+    if position is None or quaternion is None:
+        return None
+    rotation = rotation_from_quaternion(np.array([quaternion]))[0]
+    if np.isnan(rotation).any():
+        return None
+    return Poses(rotation, np.array(position) * MM)
+
+
+def _reason(use: FrameUse) -> str:
+    return reason_of(use.value, "its declaration is not understood")
+
+
+def _shown(use: FrameUse) -> str:
+    return use.name.decode("latin-1")[:40]

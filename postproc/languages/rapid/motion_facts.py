@@ -1,0 +1,210 @@
+"""What a motion statement says in one execution, and in all of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from postproc.languages.rapid.evaluation import Evaluator
+from postproc.languages.rapid.instructions import MotionArguments, MotionForm, sort_arguments, switch_value
+from postproc.languages.rapid.program_state import VARYING, ProgramState, Varying
+from postproc.languages.rapid.syntax_tree import Argument, Index, Instruction, Name, Remark
+from postproc.languages.rapid.values import (
+    Leaf,
+    UnknownData,
+    Value,
+    joined,
+    number_of,
+    truth_of,
+    unknown_in,
+)
+from postproc.toolpath import ArcFrame, Kind, OrientationMode
+
+NAN = math.nan
+DIFFERS = "it has different values in several executions of its line"
+
+Problem = tuple[str, str]
+"""Code and message of why a motion cannot be corrected."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameUse:
+    """A tool or a work object: the name it has in the motion, "" for an expression, and its value."""
+
+    name: bytes
+    value: Value
+
+
+@dataclass(frozen=True, slots=True)
+class MotionFact:
+    """A motion: ``target``, ``via``: its points (``via`` of an arc alone); speed, zone: [mm/s], [mm], NaN where not
+    known; ``stops``: it ends in a stop point.  ``before``: motions after which it runs; ``checked``: the configuration
+    of its target counts, None where that is not known."""
+
+    statement: Instruction
+    form: MotionForm
+    arguments: MotionArguments | None
+    target: Value
+    via: Value | None
+    tool: FrameUse
+    base: FrameUse
+    speed: float
+    zone: float
+    stops: bool
+    orientation: OrientationMode
+    arc: ArcFrame
+    before: frozenset[int]
+    force: Remark | Varying | None
+    switch: Remark | Varying | None
+    problem: Problem | None
+    checked: bool | None
+
+    def joined(self, other: MotionFact) -> MotionFact:
+        """What holds in both executions."""
+        via = self.via
+        if via is not None:
+            via = UnknownData(DIFFERS) if other.via is None else joined(via, other.via, DIFFERS)
+        return replace(
+            self,
+            target=joined(self.target, other.target, DIFFERS),
+            via=via,
+            tool=_of_both(self.tool, other.tool),
+            base=_of_both(self.base, other.base),
+            speed=self.speed if self.speed == other.speed else NAN,
+            zone=self.zone if self.zone == other.zone else NAN,
+            stops=self.stops and other.stops,
+            orientation=self.orientation
+            if self.orientation == other.orientation
+            else OrientationMode.UNKNOWN,
+            arc=self.arc if self.arc == other.arc else ArcFrame.UNKNOWN,
+            before=self.before | other.before,
+            force=self.force if self.force == other.force else VARYING,
+            switch=self.switch if self.switch == other.switch else VARYING,
+            problem=self.problem or other.problem,
+            checked=self.checked if self.checked == other.checked else None,
+        )
+
+
+def _of_both(one: FrameUse, other: FrameUse) -> FrameUse:
+    if one == other:
+        return one
+    return FrameUse(one.name if one.name == other.name else b"", joined(one.value, other.value, DIFFERS))
+
+
+def motion_fact(
+    statement: Instruction, form: MotionForm, state: ProgramState, evaluator: Evaluator
+) -> MotionFact:
+    """The motion in ``state``."""
+    arguments = sort_arguments(form, statement.arguments)
+    if arguments is None:
+        return not_read(statement, form, state, "its arguments are not understood")
+    options = arguments.options
+    points = [_value(argument, evaluator) for argument in arguments.points]
+    zone, stops = _zone(arguments, evaluator)
+    work_object = options.get(b"WOBJ")
+    base = FrameUse(b"WOBJ0", UnknownData("")) if work_object is None else _frame(work_object, evaluator)
+    return MotionFact(
+        statement,
+        form,
+        arguments,
+        points[-1],
+        points[0] if form.points == 2 else None,
+        _frame(arguments.tool, evaluator),
+        base,
+        _speed(arguments, form, state, evaluator),
+        zone,
+        stops,
+        state.orientation,
+        state.arc,
+        state.last,
+        state.force,
+        state.switch,
+        _problem(state, options),
+        state.checks_joint if form.kind == Kind.PTP else state.checks_linear,
+    )
+
+
+def not_read(statement: Instruction, form: MotionForm, state: ProgramState, message: str) -> MotionFact:
+    """A motion of which only its place is known."""
+    unknown = UnknownData(message)
+    nothing = FrameUse(b"", unknown)
+    return MotionFact(
+        statement, form, None, unknown, unknown if form.points == 2 else None, nothing, nothing, NAN, NAN,
+        False, state.orientation, state.arc, state.last, state.force, state.switch, ("RAP001", message),
+        None,
+    )  # fmt: skip
+
+
+def _problem(state: ProgramState, options: dict[bytes, Argument]) -> Problem | None:
+    if state.displaced:
+        names = ", ".join(sorted(name.decode("latin-1") for name in state.displaced))
+        return "RAP008", f"its target is displaced, or the arm is soft ({names})"
+    if b"CORR" in options:
+        return "RAP008", "corrections of a sensor are added to its path (\\Corr)"
+    if b"ID" in options:
+        return "RAP014", "it is synchronised with another robot or positioner (\\ID)"
+    if state.force is VARYING or state.switch is VARYING:
+        return "RAP006", "the FORCE or COMPENSATE comment in force differs with the path of the program"
+    return None
+
+
+def _value(argument: Argument, evaluator: Evaluator) -> Value:
+    return UnknownData("it has no value") if argument.value is None else evaluator.value(argument.value)
+
+
+def _frame(argument: Argument, evaluator: Evaluator) -> FrameUse:
+    expression = argument.value
+    name = expression.name if isinstance(expression, Name) else b""
+    return FrameUse(name, _value(argument, evaluator))
+
+
+def _speed(arguments: MotionArguments, form: MotionForm, state: ProgramState, evaluator: Evaluator) -> float:
+    """[mm/s] of the TCP; NaN where it follows from a time, a process, or is not known."""
+    if not form.feed or b"T" in arguments.options or state.override is None:
+        return NAN
+    own = switch_value(arguments.options.get(b"V"))
+    if own is not None:
+        value = number_of(evaluator.value(own))
+    else:
+        value = number_of(first_of(_value(arguments.speed, evaluator)))
+    return NAN if value is None or not 0 < value < 1e6 else value * state.override
+
+
+def _zone(arguments: MotionArguments, evaluator: Evaluator) -> tuple[float, bool]:
+    """[mm] by which the TCP may leave its path before the target, and whether the robot stops there."""
+    value = _value(arguments.zone, evaluator)
+    stops = truth_of(first_of(value))
+    own = switch_value(arguments.options.get(b"Z"))
+    if stops is None:
+        return NAN, False
+    if stops:
+        return 0.0, True
+    size = number_of(evaluator.value(own)) if own is not None else number_of(item_of(value, 1))
+    return (NAN if size is None or size < 0 else size), False
+
+
+def first_of(value: Value) -> Value:
+    return item_of(value, 0)
+
+
+def item_of(value: Value, at: int) -> Value:
+    """An item of a group, unknown where it has none."""
+    if isinstance(value, Leaf):
+        return UnknownData("it is no aggregate")
+    if isinstance(value, UnknownData):
+        return value
+    return value.items[at] if at < len(value.items) else UnknownData("a component is missing")
+
+
+def is_direct(argument: Argument) -> bool:
+    """Whether a point is a variable or an element of an array, and not computed."""
+    expression = argument.value
+    while isinstance(expression, Index):
+        expression = expression.base
+    return isinstance(expression, Name)
+
+
+def reason_of(value: Value, otherwise: str) -> str:
+    """Why a value is not known."""
+    unknown = unknown_in(value)
+    return otherwise if unknown is None or not unknown.reason else unknown.reason

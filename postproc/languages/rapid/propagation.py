@@ -1,0 +1,448 @@
+"""Constants, frames and what is in force, propagated over the flow of all routines.
+
+Every statement is run with what holds on all paths that lead to it; calls of routines of the file are followed into
+them.  A motion has one fact, which holds in all of its executions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from postproc.languages.rapid.declared_data import DeclaredData, Usage, first_value, names_in, walk
+from postproc.languages.rapid.evaluation import Evaluator, Typed
+from postproc.languages.rapid.flow_graph import FlowGraph, Step
+from postproc.languages.rapid.instructions import (
+    DISPLACING,
+    HARMLESS,
+    MOTIONS,
+    OTHER_MOTIONS,
+    PURE,
+    READERS,
+    RESTORING,
+    WRITERS,
+    MotionForm,
+    is_motion,
+)
+from postproc.languages.rapid.motion_facts import MotionFact, motion_fact, not_read
+from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramState
+from postproc.languages.rapid.syntax_tree import (
+    Argument,
+    AssignmentStatement,
+    Declaration,
+    Expression,
+    For,
+    FunctionCall,
+    Instruction,
+    Module,
+    NotUnderstood,
+    RapidRoutine,
+    Remark,
+)
+from postproc.languages.rapid.values import UnknownData, Value, number_of, plain, replaced, truth_of
+from postproc.toolpath import ArcFrame, Kind, OrientationMode
+
+OTHER = MotionForm(Kind.OTHER)
+_SETTINGS = frozenset([b"TOOLDATA", b"WOBJDATA", b"SPEEDDATA", b"ZONEDATA"])
+MOST_STEPS = 4_000_000
+"""Statements that are followed; each statement of a file counts for four more."""
+DEEPEST = 12
+"""Calls in each other."""
+
+
+class TooLong(Exception):
+    """The flow is too long to follow."""
+
+
+class Propagation:
+    """Runs a module.  ``facts``: offset of a motion -> its fact, in the order in which they run first; ``passed``:
+    comments in that order with the number of facts before each; ``calls``: name of what is not in the file -> offset
+    of its first call; ``reads``: where the place of the robot is read -> the motions after which; ``unread``:
+    statements that are not understood."""
+
+    def __init__(self, module: Module) -> None:
+        self.module = module
+        self.routines: dict[bytes, RapidRoutine] = {}
+        self.ambiguous: set[bytes] = set()
+        for routine in module.routines:
+            if routine.name in self.routines:
+                self.ambiguous.add(routine.name)
+            self.routines[routine.name] = routine
+        functions = frozenset(r.name for r in module.routines if r.kind == b"FUNC")
+        self.data = DeclaredData(module, functions)
+        self.usage = Usage(module)
+        self.facts: dict[int, MotionFact] = {}
+        self.passed: dict[int, tuple[Remark, int]] = {}
+        self.calls: dict[bytes, int] = {}
+        self.reads: dict[int, frozenset[int]] = {}
+        self.unread: dict[int, NotUnderstood] = {}
+        self._graphs: dict[bytes, FlowGraph] = {}
+        self._locals: dict[bytes, dict[bytes, tuple[bytes, bytes]]] = {}
+        self._active: list[RapidRoutine] = []
+        self._steps = MOST_STEPS + 4 * sum(1 for r in module.routines for _ in walk(r.body))
+        self._recording = False
+
+    def run(self) -> None:
+        """Follows the program from main, and every routine that nothing in the file calls.  Raises TooLong."""
+        called = set().union(*self.usage.calls.values()) if self.usage.calls else set()
+        entries = [
+            routine
+            for routine in self.module.routines
+            if routine.kind == b"PROC" and (routine.name not in called or routine.name == b"MAIN")
+        ]
+        main = self.routines.get(b"MAIN")
+        if main is None and len(entries) == 1:
+            main = entries[0]
+        entries.sort(key=lambda routine: routine is not main)
+        for routine in entries:
+            if not self.is_unclear(routine):
+                self._enter(routine, routine is main)
+
+    def is_unclear(self, routine: RapidRoutine) -> bool:
+        """Whether the structure of a routine is not understood, or its name is that of several."""
+        return routine.broken >= 0 or routine.name in self.ambiguous or self._graph(routine).missing
+
+    def _graph(self, routine: RapidRoutine) -> FlowGraph:
+        graph = self._graphs.get(routine.name)
+        if graph is None:
+            graph = self._graphs[routine.name] = FlowGraph(routine.body)
+        return graph
+
+    def _enter(self, routine: RapidRoutine, is_main: bool) -> None:
+        state = ProgramState(last=frozenset([START if is_main else ELSEWHERE]))
+        for name in self.usage.assigned:
+            if name in self.data and not self.data.is_constant(name):
+                shown = name.decode("latin-1")
+                value = self.data.look(name)[0] if is_main else UnknownData(f"{shown} is assigned elsewhere")
+                state.values[name] = value
+        if is_main and state.values:  # main starts again with what its last run left
+            for _ in range(8):
+                after = self._routine(routine, state.copy(), False)
+                again = state.copy()
+                if after is not None:
+                    again.join(after)
+                again.last = state.last
+                if again.values == state.values:
+                    break
+                state.values = again.values
+            else:
+                state.values = {name: UnknownData("it differs between runs") for name in state.values}
+        self._routine(routine, state, True)
+
+    def _routine(self, routine: RapidRoutine, state: ProgramState, recording: bool) -> ProgramState | None:
+        """The state after a routine; None where it does not come back."""
+        graph = self._graph(routine)
+        self._active.append(routine)
+        before, self._recording = self._recording, False
+        try:
+            if graph.has_loops:
+                starts = self._fixpoint(graph, state)
+                self._recording = recording
+                return self._once(graph, starts)
+            self._recording = recording
+            return self._once(graph, {0: state})
+        finally:
+            self._active.pop()
+            self._recording = before
+
+    def _fixpoint(self, graph: FlowGraph, state: ProgramState) -> dict[int, ProgramState]:
+        """The states at the starts of the blocks that are reached."""
+        starts, pending = {0: state}, [0]
+        while pending:
+            at = min(pending)
+            pending.remove(at)
+            for there, after in self._after(graph, at, starts[at].copy()):
+                if there < 0:
+                    continue
+                if there not in starts:
+                    starts[there] = after.copy()
+                elif not starts[there].join(after):
+                    continue
+                if there not in pending:
+                    pending.append(there)
+        return starts
+
+    def _once(self, graph: FlowGraph, starts: dict[int, ProgramState]) -> ProgramState | None:
+        """Runs each block that is reached once; those that are not in ``starts`` when a block before leads there."""
+        end: ProgramState | None = None
+        given = len(starts) > 1 or graph.has_loops
+        for at in range(len(graph.blocks)):
+            if at not in starts:
+                continue
+            for there, after in self._after(graph, at, starts[at].copy()):
+                if there == -1:
+                    if end is None:
+                        end = after.copy()
+                    else:
+                        end.join(after)
+                elif there >= 0 and not given:
+                    if there in starts:
+                        starts[there].join(after)
+                    else:
+                        starts[there] = after.copy()
+        return end
+
+    def _after(self, graph: FlowGraph, at: int, state: ProgramState) -> list[tuple[int, ProgramState]]:
+        """Where a block leads, and what holds there."""
+        block = graph.blocks[at]
+        for step in block.steps:
+            self._step(step, state)
+        if block.condition is None:
+            return [(block.follow, state)]
+        self._functions(block.condition, state)
+        holds = truth_of(self._evaluator(state).value(block.condition))
+        if holds is None:
+            return [(block.follow, state), (block.otherwise, state)]
+        return [(block.follow if holds else block.otherwise, state)]
+
+    def _step(self, step: Step, state: ProgramState) -> None:
+        self._steps -= 1
+        if self._steps < 0:
+            raise TooLong
+        match step:
+            case Instruction():
+                self._instruction(step, state)
+            case AssignmentStatement():
+                self._functions(step.value, state)
+                self._assign(step.target, self._evaluator(state).value(step.value), state)
+            case Declaration():
+                if step.value is not None:
+                    self._functions(step.value, state)
+                value = first_value(step, self._evaluator(state))
+                key = self._key(step.name)
+                if step.kind == b"PERS" and step.name in self.usage.assigned:
+                    value = UnknownData(f"{step.name.decode('latin-1')} is kept between calls")
+                state.values[key] = value
+            case Remark():
+                self._remark(step, state)
+            case NotUnderstood():
+                self._lose(step, state)
+
+    def _lose(self, step: NotUnderstood, state: ProgramState) -> None:
+        """What a statement that is not understood may change."""
+        self.unread.setdefault(step.start, step)
+        if is_motion(step.first):
+            moved = Instruction(step.first, (), step.start, step.stop)
+            self._move(moved, not_read(moved, OTHER, state, "it is not understood"), state)
+            return
+        for name in step.names:
+            self._forget(name, state, "a statement that is not understood may change it")
+        state.last = frozenset([ELSEWHERE])
+        if step.names & (DISPLACING | RESTORING.keys()):
+            state.displaced |= {b"a statement that is not understood"}
+
+    def _remark(self, step: Remark, state: ProgramState) -> None:
+        if self._recording:
+            self.passed.setdefault(step.start, (step, len(self.facts)))
+        word = step.text.split(" ")[0].split("\t")[0].split(",")[0].upper()
+        if word == "FORCE":
+            state.force = step
+        elif word == "COMPENSATE":
+            state.switch = step
+
+    def _instruction(self, step: Instruction, state: ProgramState) -> None:
+        name = step.name
+        for argument in step.arguments:
+            if argument.value is not None:
+                self._functions(argument.value, state)
+        routine = self.routines.get(name)
+        if routine is not None and routine.kind == b"PROC" and name not in MOTIONS:
+            self._call(routine, step, state)
+        elif name in MOTIONS:
+            self._move(step, motion_fact(step, MOTIONS[name], state, self._evaluator(state)), state)
+            if name.endswith(b"SYNC"):
+                self.calls.setdefault(step.name, step.start)
+        elif name in OTHER_MOTIONS:
+            self._move(step, not_read(step, OTHER, state, "this form of motion is not read"), state)
+            for argument_name in names_in(step.arguments):
+                if self._look(state)(argument_name)[1] not in _SETTINGS:
+                    self._forget(argument_name, state, "an instruction may change it")
+        else:
+            self._setting(step, state)
+
+    def _setting(self, step: Instruction, state: ProgramState) -> None:
+        name = step.name
+        options = {argument.name for argument in step.arguments}
+        if name in DISPLACING:
+            state.displaced |= {name}
+            if name in READERS:
+                self._note_reading(step.start, state)
+        elif name in RESTORING:
+            state.displaced -= frozenset(RESTORING[name])
+        elif name in (b"CONFL", b"CONFJ"):
+            given = options & {b"ON", b"OFF"}
+            checks = b"ON" in given if len(given) == len(step.arguments) == 1 else None
+            setattr(state, "checks_linear" if name == b"CONFL" else "checks_joint", checks)
+        elif name == b"SINGAREA":
+            modes = {frozenset([b"OFF"]): OrientationMode.VAR, frozenset([b"WRIST"]): OrientationMode.JOINT}
+            state.orientation = modes.get(frozenset(options), OrientationMode.UNKNOWN)
+        elif name == b"CIRPATHMODE":
+            arcs = {frozenset([b"PATHFRAME"]): ArcFrame.PATH, frozenset([b"OBJECTFRAME"]): ArcFrame.BASE}
+            state.arc = arcs.get(frozenset(options), ArcFrame.UNKNOWN)
+        elif name == b"VELSET":
+            state.override = self._override(step.arguments, state)
+        elif name in WRITERS:
+            self._change(step.arguments, state)
+        elif name in (b"ACTUNIT", b"DEACTUNIT"):
+            pass
+        elif name not in HARMLESS:
+            self._unread_call(step, state, moves=True)
+        elif name.startswith(b"WAIT"):
+            self._change(tuple(a for a in step.arguments if a.name), state)
+
+    def _override(self, arguments: tuple[Argument, ...], state: ProgramState) -> float | None:
+        """The factor of VelSet; a limit below usual speeds makes them unknown."""
+        values = [self._evaluator(state).value(a.value) for a in arguments if a.value is not None]
+        numbers = [number_of(value) for value in values]
+        if len(numbers) != 2 or numbers[0] is None or numbers[1] is None or numbers[1] < 5000:
+            return None
+        return numbers[0] / 100.0
+
+    def _move(self, step: Instruction, fact: MotionFact, state: ProgramState) -> None:
+        if self._recording:
+            known = self.facts.get(step.start)
+            self.facts[step.start] = fact if known is None else known.joined(fact)
+        state.last = frozenset([step.start])
+
+    def _unread_call(self, step: Instruction, state: ProgramState, moves: bool) -> None:
+        if self._recording:
+            self.calls.setdefault(step.name, step.start)
+        self._change(step.arguments, state)
+        if moves:
+            state.last = frozenset([ELSEWHERE])
+
+    def _change(self, arguments: tuple[Argument, ...], state: ProgramState) -> None:
+        for name in names_in(arguments):
+            self._forget(name, state, "an instruction or a call may change it")
+
+    def _forget(self, name: bytes, state: ProgramState, reason: str) -> None:
+        key = self._key(name)
+        if key != name or (name in self.data and not self.data.is_constant(name)):
+            state.values[key] = UnknownData(f"{name.decode('latin-1')}: {reason}")
+
+    def _call(self, routine: RapidRoutine, step: Instruction, state: ProgramState) -> None:
+        """Runs a routine of the file with its arguments."""
+        if routine in self._active or len(self._active) >= DEEPEST or self.is_unclear(routine):
+            self._unread_call(step, state, moves=True)
+            self._forget_all(self._assigned_by(routine.name), state)
+            return
+        evaluator = self._evaluator(state)
+        required = [argument for argument in step.arguments if not argument.name]
+        named = {argument.name: argument for argument in step.arguments if argument.name}
+        shared: list[tuple[bytes, Argument]] = []
+        inner = state.copy()
+        for parameter in routine.parameters:
+            argument = named.get(parameter.name)
+            if not parameter.optional and required:
+                argument = required.pop(0)
+            key = routine.name + b"/" + parameter.name
+            given = argument is not None and argument.value is not None
+            inner.values[key] = (
+                plain(evaluator.value(argument.value))
+                if given and argument is not None and argument.value is not None
+                else UnknownData(f"{parameter.name.decode('latin-1')} is not given")
+            )
+            if parameter.mode and argument is not None:
+                shared.append((parameter.name, argument))
+        after = self._routine(routine, inner, self._recording)
+        if after is None:
+            state.last = frozenset([ELSEWHERE])
+            return
+        state.take(after)
+        changed = self._assigned_by(routine.name)
+        self._change(tuple(argument for name, argument in shared if name in changed), state)
+
+    def _reached(self, name: bytes) -> set[bytes]:
+        """The routine and those that it calls."""
+        seen: set[bytes] = set()
+        pending = [name]
+        while pending:
+            one = pending.pop()
+            if one not in seen:
+                seen.add(one)
+                pending += self.usage.calls.get(one, ())
+        return seen
+
+    def _assigned_by(self, name: bytes) -> set[bytes]:
+        """Names that a routine or those that it calls assign."""
+        return set().union(*(self.usage.assigned_in.get(one, set()) for one in self._reached(name)))
+
+    def _note_reading(self, at: int, state: ProgramState) -> None:
+        """The program reads where the robot is."""
+        if self._recording:
+            self.reads[at] = self.reads.get(at, frozenset()) | state.last
+
+    def _forget_all(self, names: set[bytes], state: ProgramState) -> None:
+        for name in names:
+            self._forget(name, state, "a function or a call may change it")
+
+    def _functions(self, expression: Expression, state: ProgramState) -> None:
+        """What the functions in an expression change: those of the program."""
+        pending: list[object] = [expression]
+        while pending:
+            one = pending.pop()
+            if isinstance(one, FunctionCall) and one.name not in PURE:
+                self._change(one.arguments, state)
+                reached = self._reached(one.name)
+                self._forget_all(self._assigned_by(one.name), state)
+                if reached & self.usage.moves:
+                    state.last = frozenset([ELSEWHERE])
+            if isinstance(one, FunctionCall) and one.name in READERS:
+                self._note_reading(one.start, state)
+            if isinstance(one, tuple):
+                pending += one
+
+    def _assign(self, target: Expression, value: Value, state: ProgramState) -> None:
+        variable, place = self._evaluator(state).assigned_place(target)
+        if variable is None:
+            return
+        key, shown = self._key(variable), variable.decode("latin-1")
+        if key == variable and (variable not in self.data or self.data.is_constant(variable)):
+            return
+        old, _ = self._look(state)(variable)
+        new = (
+            UnknownData(f"{shown} is not constant: {value.reason}")
+            if isinstance(value, UnknownData)
+            else value
+        )
+        state.values[key] = replaced(old, place, new, f"a part of {shown} is assigned that is not known")
+
+    def _key(self, name: bytes) -> bytes:
+        """The name of a variable in the state: that of a routine's own has its routine before it."""
+        if self._active:
+            own = self._own(self._active[-1]).get(name)
+            return name if own is None else own[0]
+        return name
+
+    def _own(self, routine: RapidRoutine) -> dict[bytes, tuple[bytes, bytes]]:
+        """The routine's own names -> key in the state, type."""
+        names = self._locals.get(routine.name)
+        if names is None:
+            before = routine.name + b"/"
+            names = {one.name: (before + one.name, one.type) for one in routine.parameters}
+            for statement in walk(routine.body):
+                if isinstance(statement, Declaration | For):
+                    kind = statement.type if isinstance(statement, Declaration) else b"NUM"
+                    names[statement.name] = (before + statement.name, kind)
+            self._locals[routine.name] = names
+        return names
+
+    def _look(self, state: ProgramState) -> Callable[[bytes], Typed]:
+        def look(name: bytes) -> Typed:
+            if name in self.usage.later:
+                return UnknownData(f"{name.decode('latin-1')} is assigned in a trap or an error handler"), b""
+            key = self._key(name)
+            if key in state.values:
+                return state.values[key], self._type(name, key)
+            if key != name:
+                return UnknownData(f"{name.decode('latin-1')} has no value yet"), b""
+            return self.data.look(name)
+
+        return look
+
+    def _type(self, name: bytes, key: bytes) -> bytes:
+        if key == name:
+            return self.data.types.get(name, b"")
+        return self._own(self._active[-1])[name][1]
+
+    def _evaluator(self, state: ProgramState) -> Evaluator:
+        return Evaluator(self._look(state), self.module.records, self.data.evaluator.shadowed)

@@ -1,0 +1,98 @@
+"""Comments: what speaks to this tool, and the mark of a compensated program."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from postproc.base.document import Document, Span
+from postproc.base.findings import Finding
+from postproc.languages.dialect import MARK
+from postproc.languages.rapid.declared_data import walk
+from postproc.languages.rapid.module_rows import ModuleRows
+from postproc.languages.rapid.propagation import Propagation
+from postproc.languages.rapid.syntax_tree import Remark
+from postproc.toolpath import Annotation
+
+_SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
+_MARKER = re.compile(rb"[ \t]*![ \t]*" + MARK.encode() + rb"[^\r\n]*")
+
+
+class PlacedRemarks(NamedTuple):
+    annotations: tuple[Annotation, ...]
+    comments: tuple[Annotation, ...]
+
+
+def put_remarks(
+    document: Document, flow: Propagation, rows: ModuleRows
+) -> tuple[PlacedRemarks, list[Finding]]:
+    """The comments at the rows before which they are run first.
+
+    A motion that runs with another FORCE or COMPENSATE comment than the row before it has, gets that comment again;
+    one that runs without any after such a row is refused.
+    """
+    notes: list[tuple[int, int, Annotation]] = []
+    for order, (remark, row) in enumerate(flow.passed.values()):
+        if _SPEAKS.match(remark.text):
+            notes.append((row, order, _annotation(document, row, remark)))
+    shown: dict[str, Remark | None] = {"FORCE": None, "COMPENSATE": None}
+    passed = iter(flow.passed.values())
+    coming = next(passed, None)
+    for row, fact in enumerate(rows.facts):
+        while coming is not None and coming[1] <= row:
+            word = _SPEAKS.match(coming[0].text)
+            if word is not None:
+                shown[word[0].upper()] = coming[0]
+            coming = next(passed, None)
+        for word_, remark_or_none in (("FORCE", fact.force), ("COMPENSATE", fact.switch)):
+            if row in rows.problems or remark_or_none is shown[word_]:
+                continue
+            if isinstance(remark_or_none, Remark):
+                notes.append((row, len(flow.passed) + row, _annotation(document, row, remark_or_none)))
+                shown[word_] = remark_or_none
+            else:
+                rows.refuse(row, "RAP006", f"no {word_} comment is in force, after motions with one")
+    notes.sort(key=lambda note: note[:2])
+    annotations = tuple(note for _, _, note in notes)
+    comments, findings = _others(document, flow, rows)
+    return PlacedRemarks(annotations, comments), findings
+
+
+def _annotation(document: Document, row: int, remark: Remark) -> Annotation:
+    return Annotation(row, remark.text, document.place(remark.start)[0])
+
+
+def _others(
+    document: Document, flow: Propagation, rows: ModuleRows
+) -> tuple[tuple[Annotation, ...], list[Finding]]:
+    """Comments that say nothing to this tool, in the order of the text, and those that do but are never run."""
+    found = list(flow.module.remarks)
+    for routine in flow.module.routines:
+        for statement in (*walk(routine.body), *walk(routine.handlers)):
+            if isinstance(statement, Remark):
+                found.append(statement)
+    comments, findings = [], []
+    for remark in sorted(found, key=lambda one: one.start):
+        line, column = document.place(remark.start)
+        if _SPEAKS.match(remark.text):
+            if remark.start not in flow.passed:
+                message = f"the comment {remark.text[:40]!r} is where no statement is run"
+                findings.append(Finding("RAP016", message, str(document.path), line, column))
+        elif remark.alone and remark.text and not remark.text.startswith(MARK):
+            row = flow.passed.get(remark.start, (remark, 0))[1]
+            comments.append(Annotation(row, remark.text, line))
+    return tuple(comments), findings
+
+
+def find_marker(raw: bytes) -> Span | None:
+    """The first line that is the comment of a compensated program."""
+    mark = MARK.encode()
+    at = raw.find(mark)
+    while at >= 0:
+        start = max(raw.rfind(b"\n", 0, at), raw.rfind(b"\r", 0, at)) + 1
+        found = _MARKER.match(raw, start)
+        if found:
+            blank = len(found[0]) - len(found[0].lstrip(b" \t"))
+            return Span(0, start + blank, found.end())
+        at = raw.find(mark, at + len(mark))
+    return None

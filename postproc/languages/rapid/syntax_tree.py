@@ -1,0 +1,250 @@
+"""What a RAPID module is made of: expressions, statements and routines, each with its place in the bytes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+
+class NumberLiteral(NamedTuple):
+    value: float
+    start: int
+    stop: int
+
+
+class StringLiteral(NamedTuple):
+    """A string; its value without the quotes."""
+
+    value: bytes
+    start: int
+    stop: int
+
+
+class Name(NamedTuple):
+    """A name in capitals."""
+
+    name: bytes
+    start: int
+    stop: int
+
+
+class Index(NamedTuple):
+    base: Expression
+    indices: tuple[Expression, ...]
+    start: int
+    stop: int
+
+
+class Component(NamedTuple):
+    base: Expression
+    name: bytes
+    start: int
+    stop: int
+
+
+class Aggregate(NamedTuple):
+    items: tuple[Expression, ...]
+    start: int
+    stop: int
+
+
+class Argument(NamedTuple):
+    """``name``: of an optional argument (\\WObj), b"" of a required one; ``value``: None of a switch."""
+
+    name: bytes
+    value: Expression | None
+    start: int
+    stop: int
+
+
+class FunctionCall(NamedTuple):
+    name: bytes
+    arguments: tuple[Argument, ...]
+    start: int
+    stop: int
+
+
+class OperatorExpression(NamedTuple):
+    """One or two operands."""
+
+    operator: bytes
+    operands: tuple[Expression, ...]
+    start: int
+    stop: int
+
+
+class Star(NamedTuple):
+    """A target that is stored where the text does not show it."""
+
+    start: int
+    stop: int
+
+
+Expression = (
+    NumberLiteral
+    | StringLiteral
+    | Name
+    | Index
+    | Component
+    | Aggregate
+    | FunctionCall
+    | OperatorExpression
+    | Star
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Declaration:
+    """``kind``: CONST, PERS or VAR; ``extent``: of an array, () for others."""
+
+    kind: bytes
+    type: bytes
+    name: bytes
+    extent: tuple[Expression, ...]
+    value: Expression | None
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True, slots=True)
+class AssignmentStatement:
+    target: Expression
+    value: Expression
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True, slots=True)
+class Instruction:
+    """A motion, a setting, or the call of a procedure."""
+
+    name: bytes
+    arguments: tuple[Argument, ...]
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True, slots=True)
+class If:
+    branches: tuple[tuple[Expression, tuple[Statement, ...]], ...]
+    otherwise: tuple[Statement, ...]
+    start: int
+
+
+@dataclass(frozen=True, slots=True)
+class For:
+    name: bytes
+    first: Expression
+    last: Expression
+    step: Expression | None
+    body: tuple[Statement, ...]
+    start: int
+
+
+@dataclass(frozen=True, slots=True)
+class While:
+    condition: Expression
+    body: tuple[Statement, ...]
+    start: int
+
+
+@dataclass(frozen=True, slots=True)
+class Test:
+    value: Expression
+    cases: tuple[tuple[tuple[Expression, ...], tuple[Statement, ...]], ...]
+    otherwise: tuple[Statement, ...]
+    start: int
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    name: bytes
+    start: int
+
+
+@dataclass(frozen=True, slots=True)
+class Goto:
+    name: bytes
+    start: int
+
+
+@dataclass(frozen=True, slots=True)
+class Leave:
+    """RETURN, or with ``ends`` what ends the program or the error handler: EXIT, RAISE, RETRY, TRYNEXT."""
+
+    value: Expression | None
+    ends: bool
+    start: int
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """A comment; ``alone`` on its line."""
+
+    text: str
+    alone: bool
+    start: int
+
+
+@dataclass(frozen=True, slots=True)
+class NotUnderstood:
+    """A statement of which a token is consumed by no rule; ``names``: that occur in it; ``first``: its first token."""
+
+    names: frozenset[bytes]
+    first: bytes
+    start: int
+    stop: int
+
+
+Statement = (
+    Declaration
+    | AssignmentStatement
+    | Instruction
+    | If
+    | For
+    | While
+    | Test
+    | Label
+    | Goto
+    | Leave
+    | Remark
+    | NotUnderstood
+)
+
+
+class RoutineParameter(NamedTuple):
+    """``mode``: b"" (a copy), INOUT, VAR or PERS (the caller's own); ``optional``: written with a backslash."""
+
+    mode: bytes
+    type: bytes
+    name: bytes
+    optional: bool
+
+
+@dataclass(slots=True)
+class RapidRoutine:
+    """``kind``: PROC, FUNC or TRAP; ``handlers``: statements after ERROR, BACKWARD and UNDO; ``broken``: offset at
+    which its structure is not understood, -1 where it is."""
+
+    kind: bytes
+    name: bytes
+    parameters: tuple[RoutineParameter, ...]
+    body: tuple[Statement, ...]
+    handlers: tuple[Statement, ...]
+    local: bool
+    start: int
+    broken: int = -1
+
+
+@dataclass(slots=True)
+class Module:
+    """What a file declares.  ``records``: type -> (component, type); ``name_stop``: where the line of MODULE goes on,
+    -1 without one; ``unclear``: places between routines that are not understood."""
+
+    declarations: list[Declaration] = field(default_factory=list)
+    routines: list[RapidRoutine] = field(default_factory=list)
+    records: dict[bytes, tuple[tuple[bytes, bytes], ...]] = field(default_factory=dict)
+    remarks: list[Remark] = field(default_factory=list)
+    unclear: list[NotUnderstood] = field(default_factory=list)
+    name_stop: int = -1
+    unclosed: int = -1

@@ -1,0 +1,146 @@
+"""A plan as edits: literals of targets where they serve one motion, targets in numbers elsewhere, inserted motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Ints, differs
+from postproc.base.decimals import fixed_one
+from postproc.base.document import Edit, Edits, Span
+from postproc.base.findings import Finding
+from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
+from postproc.languages.rapid.inserted_lines import insertions
+from postproc.languages.rapid.plan_writer import PlanWriter, PointNumbers, aggregate
+from postproc.languages.rapid.target_places import MotionText, PointText
+from postproc.toolpath import Kind
+
+HELP = "Give each motion its own point in numbers."
+_OPERAND = frozenset(b"0123456789 \t.,:+-*/'=#_$[]{}()\\ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz")
+
+
+def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
+    """The edits after which the program makes the motions of ``plan``.
+
+    Raises ValueError if a row is asked to move, or to be divided, that cannot: a defect of the caller.
+    """
+    return _Writer(program, plan, writing).edited()
+
+
+class _Writer:
+    def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
+        self.task = PlanWriter(program, plan, writing)
+        self.held: dict[int, Finding] = {}
+
+    def edited(self) -> EditedTargets:
+        task = self.task
+        touched, way = self._touched()
+        self._refuse_forbidden(touched, way)
+        edits = list(self._in_text(np.flatnonzero(touched | way)))
+        inserted, unfit = insertions(task)
+        for row, why in unfit.items():
+            self.hold(row, why, "RAP012")
+        if self.held:
+            return EditedTargets((), self.held)
+        return EditedTargets(Edits.joined(edits, inserted))
+
+    def _touched(self) -> tuple[Bools, Bools]:
+        """(N,) rows whose end is another one, and arcs whose path is."""
+        path, plan, own = self.task.path, self.task.plan, self.task.own
+        n = len(path)
+        touched, way = np.zeros(n, np.bool_), np.zeros(n, np.bool_)
+        for at in range(0, n, 1 << 14):
+            rows = np.arange(at, min(at + (1 << 14), n))
+            there = own[rows]
+            touched[rows] = differs(plan.position[there], path.position[rows]).any(axis=1)
+            touched[rows] |= differs(plan.rotation[there], path.rotation[rows]).any(axis=(1, 2))
+        arcs = np.flatnonzero(path.kind == Kind.CIRC)
+        there = own[arcs]
+        way[arcs] = differs(plan.centre[there], path.arcs.centre[arcs]).any(axis=1)
+        way[arcs] |= differs(plan.normal[there], path.arcs.normal[arcs]).any(axis=1)
+        way[arcs] |= differs(plan.sweep[there], path.arcs.sweep[arcs])
+        return touched, way
+
+    def _refuse_forbidden(self, touched: Bools, way: Bools) -> None:
+        path, plan = self.task.path, self.task.plan
+        fixed = path.constraints
+        moved = {row for row in (*fixed.refused, *fixed.locked) if touched[row]}
+        moved |= {row for row in fixed.refused if way[row]}
+        moved |= set(np.flatnonzero(touched & (path.kind == Kind.AXIS)).tolist())
+        if moved:
+            raise ValueError(f"motions that cannot be corrected are moved: rows {sorted(moved)[:5]}")
+        divided = set(plan.source[plan.role != Role.ORIGINAL].tolist())
+        wrong = divided & {*fixed.refused, *fixed.no_insert_before}
+        if wrong:
+            raise ValueError(f"motions that cannot be divided are divided: rows {sorted(wrong)[:5]}")
+
+    def _in_text(self, rows: Ints) -> Iterator[Edit]:
+        """Edits of the targets of ``rows`` (K,), and of the auxiliary points of arcs."""
+        task = self.task
+        there = task.own[rows]
+        wanted, vias = task.wanted(rows, there), task.vias(there)
+        for k, row in enumerate(rows.tolist()):
+            text = task.text(row)
+            if text.target is None:
+                raise ValueError(f"row {row} has no target")
+            own = task.places.numbers[row].tolist()
+            numbers = PointNumbers(own, wanted[k].tolist(), task.decimals(text.target, 7))
+            yield from self._point(row, text, text.target, numbers)
+            if text.via is None:
+                continue
+            own = task.places.vias[row].tolist()
+            numbers = PointNumbers(own, vias[k].tolist(), task.decimals(text.via, 3))
+            if numbers.changed():
+                unfit = task.unfit_arc(int(there[k]))
+                if unfit:
+                    self.hold(row, unfit, "RAP012")
+                yield from self._point(row, text, text.via, numbers)
+
+    def _point(self, row: int, text: MotionText, point: PointText, numbers: PointNumbers) -> Iterator[Edit]:
+        """The edits of a point: its literals, or a point in numbers in the place of the argument."""
+        changed = numbers.changed()
+        if not changed:
+            return
+        spots = [point.spots[i] for i in changed]
+        why = self._why_not_in_place(point, spots)
+        if not why:
+            for i, (start, stop) in zip(changed, spots, strict=True):
+                yield Edit(Span(0, start, stop), fixed_one(numbers.wanted[i], numbers.decimals[i]))
+            return
+        raw, (start, stop) = self.task.raw, point.operand
+        if self.task.writing.shared_points == "keep":
+            self.hold(row, why)
+        elif not point.words:
+            self.hold(row, f"{why}, and its configuration or external axes are not known in numbers")
+        elif b"\n" in raw[text.start : stop] or b"\r" in raw[text.start : stop]:
+            self.hold(row, f"{why}, and its statement runs over several lines")
+        elif not set(raw[start:stop]) <= _OPERAND:
+            self.hold(row, f"{why}, and its target contains other signs than numbers and names")
+        else:
+            texts = self.task.spelt(point, numbers)
+            if len(texts) == 3:
+                texts += self._orientation(row)
+            yield Edit(Span(0, start, stop), aggregate(texts, point.words))
+
+    def _orientation(self, row: int) -> list[bytes]:
+        """q1..q4 that an auxiliary point gets in numbers: those of the target, which count for nothing."""
+        least = self.task.least[3:]
+        pairs = zip(self.task.places.numbers[row, 3:].tolist(), least, strict=True)
+        return [fixed_one(value, count) for value, count in pairs]
+
+    def _why_not_in_place(self, point: PointText, spots: list[tuple[int, int]]) -> str:
+        """Why the literals of a point cannot be edited; "" where they can."""
+        shown = point.name.decode("latin-1")[:40]
+        if any(start < 0 for start, _ in spots):
+            return "its target is computed"
+        if point.name and point.name in self.task.places.read:
+            return f"other code reads {shown} too"
+        if any(self.task.places.uses[start] > 1 for start, _ in spots):
+            return f"{shown or 'its target'} is shared by several motions"
+        return ""
+
+    def hold(self, row: int, why: str, code: str = "RAP015") -> None:
+        document = self.task.program.documents[0]
+        place = document.place(self.task.text(row).start)
+        self.held.setdefault(row, Finding(code, why, str(document.path), *place, HELP))

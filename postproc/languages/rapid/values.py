@@ -1,0 +1,96 @@
+"""Values of RAPID as they are known before the program runs, with the places of their literals."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Leaf(NamedTuple):
+    """A number, a truth value or a string; ``start``, ``stop``: its literal, -1 where it is computed."""
+
+    value: float | bool | bytes
+    start: int = -1
+    stop: int = -1
+
+
+class GroupValue(NamedTuple):
+    """An aggregate or an array."""
+
+    items: tuple[Value, ...]
+
+
+class UnknownData(NamedTuple):
+    """``reason`` completes "... because"."""
+
+    reason: str
+
+
+Value = Leaf | GroupValue | UnknownData
+
+TRUE, FALSE = Leaf(True), Leaf(False)
+
+
+def plain(value: Value) -> Value:
+    """The value without places: a copy of it."""
+    if isinstance(value, Leaf):
+        return value if value.start < 0 else Leaf(value.value)
+    if isinstance(value, GroupValue):
+        return GroupValue(tuple(map(plain, value.items)))
+    return value
+
+
+def joined(one: Value, other: Value, reason: str) -> Value:
+    """What holds where both may be: the value where they are equal, else unknown for ``reason``."""
+    if one is other or one == other:
+        return one
+    if isinstance(one, Leaf) and isinstance(other, Leaf):
+        same = one.value == other.value and isinstance(one.value, bytes | bool) == isinstance(
+            other.value, bytes | bool
+        )
+        return Leaf(one.value) if same else UnknownData(reason)
+    if isinstance(one, GroupValue) and isinstance(other, GroupValue) and len(one.items) == len(other.items):
+        return GroupValue(tuple(joined(a, b, reason) for a, b in zip(one.items, other.items, strict=True)))
+    return one if isinstance(one, UnknownData) else UnknownData(reason)
+
+
+def unknown_in(value: Value) -> UnknownData | None:
+    """The first part that is not known."""
+    if isinstance(value, UnknownData):
+        return value
+    if isinstance(value, GroupValue):
+        for item in value.items:
+            found = unknown_in(item)
+            if found is not None:
+                return found
+    return None
+
+
+def number_of(value: Value) -> float | None:
+    """A number, None for anything else."""
+    if isinstance(value, Leaf) and not isinstance(value.value, bytes | bool):
+        return value.value
+    return None
+
+
+def numbers_of(value: Value, count: int) -> tuple[float, ...] | None:
+    """``count`` numbers of a group, None where it is none."""
+    if not isinstance(value, GroupValue) or len(value.items) != count:
+        return None
+    found = tuple(number_of(item) for item in value.items)
+    return None if None in found else tuple(number for number in found if number is not None)
+
+
+def truth_of(value: Value) -> bool | None:
+    """A truth value, None for anything else."""
+    return value.value if isinstance(value, Leaf) and isinstance(value.value, bool) else None
+
+
+def replaced(value: Value, place: tuple[int, ...], new: Value, reason: str) -> Value:
+    """``value`` with ``new`` at the indices of ``place``."""
+    if not place:
+        return new
+    if not isinstance(value, GroupValue) or not 0 <= place[0] < len(value.items):
+        return UnknownData(reason)
+    at = place[0]
+    part = replaced(value.items[at], place[1:], new, reason)
+    return GroupValue((*value.items[:at], part, *value.items[at + 1 :]))

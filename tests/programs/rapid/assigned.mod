@@ -1,0 +1,15 @@
+MODULE part
+PERS tooldata t:=[TRUE,[[0,0,200],[1,0,0,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];
+TASK PERS wobjdata w:=[FALSE,TRUE,"",[[1000,0,500],[1,0,0,0]],[[0,10,20],[1,0,0,0]]];
+VAR robtarget p;
+PROC main()
+p:=[[1,2,3],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+MoveL p,v100,z10,t\WObj:=w;
+p.trans.z:=7;
+MoveL p,v100,z10,t\WObj:=w;
+p.trans:=[9,8,7];
+MoveL p,v100,z10,t\WObj:=w;
+p:=Offs(p,0,0,1);
+MoveL p,v100,z10,t\WObj:=w;
+ENDPROC
+ENDMODULE

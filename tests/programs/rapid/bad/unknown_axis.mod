@@ -1,0 +1,10 @@
+! RAP019
+MODULE part
+PERS tooldata t:=[TRUE,[[0,0,200],[1,0,0,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];
+TASK PERS wobjdata w:=[FALSE,TRUE,"",[[1000,0,500],[1,0,0,0]],[[0,10,20],[1,0,0,0]]];
+VAR extjoint e;
+PROC main()
+e.eax_a:=ai1;
+MoveL [[1,0,0],[0,0,1,0],[0,0,0,0],e],v100,z1,t;
+ENDPROC
+ENDMODULE

@@ -1,0 +1,9 @@
+! RAP004
+MODULE part
+PERS tooldata t:=[TRUE,[[0,0,200],[1,0,0,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];
+TASK PERS wobjdata w:=[FALSE,TRUE,"",[[1000,0,500],[1,0,0,0]],[[0,10,20],[1,0,0,0]]];
+VAR robtarget p;
+PROC main()
+MoveL p,v100,z10,t\WObj:=w;
+ENDPROC
+ENDMODULE

@@ -1,0 +1,20 @@
+MODULE part
+PERS tooldata t:=[TRUE,[[0,0,200],[1,0,0,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];
+TASK PERS wobjdata w:=[FALSE,TRUE,"",[[1000,0,500],[1,0,0,0]],[[0,10,20],[1,0,0,0]]];
+PROC main()
+cut 5;
+MoveL [[1,0,0],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z10,t\WObj:=w;
+cut 5;
+deep;
+ENDPROC
+PROC cut(num h)
+MoveL [[1,2,h],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z10,t\WObj:=w;
+ENDPROC
+PROC deep()
+cut 5;
+other;
+ENDPROC
+PROC other()
+MoveL [[7,7,7],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,z10,t\WObj:=w;
+ENDPROC
+ENDMODULE

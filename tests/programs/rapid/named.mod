@@ -1,0 +1,11 @@
+MODULE part
+PERS tooldata t:=[TRUE,[[0,0,200],[1,0,0,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];
+TASK PERS wobjdata w:=[FALSE,TRUE,"",[[1000,0,500],[1,0,0,0]],[[0,10,20],[1,0,0,0]]];
+CONST robtarget p10:=[[1,2,3],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+PERS robtarget p20:=[[4,5,6],[0,0,1,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+PROC main()
+MoveL p10,v100,z10,t\WObj:=w;
+MoveL P20,v100,z10,t\WObj:=w;
+MoveL p10,v100,z10,t\WObj:=w;
+ENDPROC
+ENDMODULE

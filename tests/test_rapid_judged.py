@@ -1,0 +1,79 @@
+"""What the reader claims of RAPID, held against an interpreter that runs the programs with random inputs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rapid_judge.claims import disagreements
+from rapid_judge.machine import Machine
+from rapid_judge.programs import Writer
+
+from postproc.base.document import Document
+from postproc.languages import DIALECTS
+from postproc.languages.dialect import Program
+
+RUNS = 4
+
+
+def read(text: str) -> Program:
+    return DIALECTS["rapid"].read((Document(Path("part.mod"), text.encode()),))
+
+
+def judged(seed: int, shown=lambda text: text) -> tuple[Program, list[str]]:
+    """The program of a seed as the reader sees it ``shown``, and what its executions say against it."""
+    text = Writer(np.random.default_rng(seed)).program()
+    program = read(shown(text))
+    wrong = []
+    for run in range(RUNS):
+        wrong += disagreements(program, Machine(text, np.random.default_rng([seed, run])).run())
+    return program, wrong
+
+
+def held(seeds: range) -> tuple[int, int]:
+    """How many motions there are, and how many of them the reader claims to know."""
+    motions = known = 0
+    for seed in seeds:
+        program, wrong = judged(seed)
+        assert not wrong, (seed, wrong[:3])
+        motions += len(program.toolpath)
+        known += len(program.toolpath) - len(program.toolpath.constraints.refused)
+    return motions, known
+
+
+def test_every_claim_holds_in_every_execution() -> None:
+    motions, known = held(range(20))
+    assert known > 0.25 * motions
+
+
+@pytest.mark.slow
+def test_every_claim_holds_in_every_execution_of_many_programs() -> None:
+    motions, known = held(range(1000, 1200))
+    assert motions > 1200
+    assert known > 0.25 * motions
+
+
+MISREADINGS = {
+    "a zone": ("z10", "z15"),
+    "a speed": ("v50,", "v60,"),
+    "a force": ("FORCE 1 2 3", "FORCE 1 2 4"),
+    "a displacement": ("PDispSet d1;", "WaitTime 1;"),
+    "an assignment": ("n1:=", "n2:="),
+    "a component": (".trans.x", ".trans.y"),
+    "an index": ("pa{1}", "pa{2}"),
+    "a sense of rotation": ("\\Rx:=10", "\\Rx:=-10"),
+    "a work object": ("\\WObj:=w1", "\\WObj:=w2"),
+    "a tool": (",t1", ",t2"),
+    "a condition": ("n1>1", "n1>2"),
+    "a call": ("sub2;", "WaitTime 1;"),
+    "an order": ("Offs(p3,1,0,0)", "p3"),
+    "a step": ("1 TO 3", "1 TO 0 STEP 1"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MISREADINGS)
+def test_a_misreading_is_found(name: str) -> None:
+    old, new = MISREADINGS[name]
+    assert any(judged(seed, lambda text: text.replace(old, new))[1] for seed in range(60))

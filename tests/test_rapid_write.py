@@ -1,0 +1,367 @@
+"""What is written of RAPID: literals in place, targets in numbers, inserted motions; and the same as in KRL."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import postproc
+from postproc.base.document import Document, Edit, Edits, Span, apply
+from postproc.base.findings import Refusal
+from postproc.base.geometry import Poses, rotation_from_abc, rotation_from_vector
+from postproc.base.units import DEG, MM
+from postproc.languages import DIALECTS
+from postproc.languages.dialect import EditedTargets, Program, ReadingSettings, WritingSettings
+from postproc.languages.permitted import refuse_other
+from postproc.languages.rapid.quaternions import quaternion_from_rotation
+from postproc.robot.axis_track import follow_axes, nominal_flange
+from postproc.robot.description import find_robot, load_robot
+from postproc.toolpath import Kind, Plan, Role
+
+RAPID, KRL = DIALECTS["rapid"], DIALECTS["krl"]
+WRITING = WritingSettings(mm=3, deg=3)
+EXTRA = "[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]"
+HEAD = "MODULE part\nPERS tooldata t:=[TRUE,[[0,0,200],[1,0,0,0]],[5,[0,0,80],[1,0,0,0],0,0,0]];\n"
+
+
+def target(x: float, y: float, z: float, q: str = "[0,0,1,0]", extra: str = EXTRA) -> str:
+    return f"[[{x},{y},{z}],{q},{extra}]"
+
+
+def read(text: str) -> Program:
+    return RAPID.read((Document(Path("part.mod"), text.encode()),))
+
+
+def module(body: str, data: str = "") -> Program:
+    return read(f"{HEAD}{data}PROC main()\n{body}ENDPROC\nENDMODULE\n")
+
+
+def plan_of(program: Program, moved: dict[int, tuple[float, float, float]], turn: float = 0.0) -> Plan:
+    """Rows moved by so many mm, and turned by ``turn`` [rad] about z."""
+    path = program.toolpath
+    position, rotation = path.position.copy(), path.rotation.copy()
+    for row, step in moved.items():
+        position[row] += np.array(step) * MM
+        rotation[row] = rotation[row] @ rotation_from_vector(np.array([0.0, 0.0, turn]))
+    n = len(path)
+    arcs = path.arcs
+    return Plan(np.arange(n), np.zeros(n), position, rotation, arcs.centre, arcs.normal, arcs.sweep)
+
+
+def edited(program: Program, plan: Plan, shared: str = "copy-inline") -> EditedTargets:
+    found = RAPID.edit_targets(program, plan, WritingSettings(3, 3, shared))
+    refuse_other(program, Edits.joined(found.edits), RAPID.letters)
+    return found
+
+
+def written(program: Program, plan: Plan, shared: str = "copy-inline") -> str:
+    found = edited(program, plan, shared)
+    assert not found.unwritten
+    text = apply(program.documents[0], found.edits).decode()
+    back = read(text).toolpath
+    assert back.position / MM == pytest.approx(plan.position[:] / MM, abs=0.00051)
+    return text
+
+
+def test_only_the_numbers_that_change_are_edited() -> None:
+    program = module(f"MoveL {target('1.00', '+2', '-3')},v100,z1,t; ! MoveL 1.00\n")
+    text = written(program, plan_of(program, {0: (0.01, 0, 0)}))
+    assert f"MoveL {target('1.010', '+2', '-3')},v100,z1,t; ! MoveL 1.00\n" in text
+
+
+def test_a_number_keeps_its_decimals_and_a_shift_below_half_of_the_last_one_is_none() -> None:
+    program = module(f"MoveL {target('1.00000', '2', '3')},v100,z1,t;\n")
+    assert "[[1.00001,2,3]" in written(program, plan_of(program, {0: (0.00001, 0.0004, 0)}))
+
+
+def test_a_turn_writes_a_quaternion_of_length_1_with_the_digits_of_the_file() -> None:
+    program = module(f"MoveL {target(1, 2, 3, '[0.7071068,0.0,0.7071068,0]')},v100,z1,t;\n")
+    plan = plan_of(program, {0: (0, 0, 0)}, turn=0.01)
+    text = written(program, plan)
+    numbers = re.search(r"MoveL \[\[1,2,3\],\[([^\]]*)\]", text)
+    assert numbers is not None
+    parts = numbers[1].split(",")
+    assert [len(part.partition(".")[2]) for part in parts] == [7, 5, 7, 5]
+    assert np.linalg.norm([float(part) for part in parts]) == pytest.approx(1.0, abs=1e-5)
+    back = read(text).toolpath.rotation[0]
+    angle = np.arccos(np.clip((np.trace(back.T @ plan.rotation[0]) - 1) / 2, -1, 1))
+    assert angle < 1.5e-3 * DEG
+
+
+def test_a_named_point_of_one_motion_is_edited_where_it_is_declared() -> None:
+    program = module(
+        "MoveL p1,v100,z1,t;\nMoveL p{2},v100,z1,t;\n",
+        f"CONST robtarget p1:={target(1, 2, 3)};\nPERS robtarget p{{2}}:=[{target(4, 5, 6)},\n{target(7, 8, 9)}];\n",
+    )
+    text = written(program, plan_of(program, {0: (1, 0, 0), 1: (0, 1, 0)}))
+    assert f"CONST robtarget p1:={target('2.000', 2, 3)};" in text
+    assert f"[{target(4, 5, 6)},\n{target(7, '9.000', 9)}]" in text
+    assert "MoveL p1,v100,z1,t;\nMoveL p{2},v100,z1,t;\n" in text
+
+
+SHARED = [
+    ("MoveL p1,v100,z1,t;\nMoveL p1,v100,z1,t;\n", "is shared by several motions"),
+    ("MoveL p1,v100,z1,t;\nMoveL Offs(p1,0,0,0),v100,z1,t;\n", "other code reads"),
+    ("MoveL Offs(p1,0,0,0),v100,z1,t;\nMoveL p1,v100,z1,t;\n", "its target is computed"),
+    ("MoveL RelTool(p1,0,0,0\\Rx:=0),v100,z1,t;\nMoveL p1,v100,z1,t;\n", "its target is computed"),
+    ("MoveL p1,v100,z1,t;\nx:=p1.trans.x;\nMoveL p1,v100,z1,t;\n", "other code reads"),
+]
+
+
+@pytest.mark.parametrize(("body", "why"), SHARED)
+def test_a_shared_or_computed_point_becomes_a_target_in_numbers(body: str, why: str) -> None:
+    data = f"VAR num x;\nCONST robtarget p1:={target(1, 2, 3)};\n"
+    program = module(body, data)
+    plan = plan_of(program, {0: (1, 0, 0)})
+    text = written(program, plan)
+    assert (
+        f"MoveL {target('2.000', '2.000' if 'computed' in why else 2, '3.000' if 'computed' in why else 3)}"
+        in (re.sub(r"(?<=\],\[)[0.,1]{9,}(?=\],\[0,0,0,0\])", "0,0,1,0", text))
+    )
+    assert data in text
+    kept = edited(program, plan, "keep")
+    assert not len(kept.edits)
+    assert {row: finding.code for row, finding in kept.unwritten.items()} == {0: "RAP015"}
+    assert why in kept.unwritten[0].message
+
+
+def test_a_point_in_a_statement_of_several_lines_is_not_replaced() -> None:
+    program = module("MoveL\nOffs(p1,0,0,0),v100,z1,t;\n", f"CONST robtarget p1:={target(1, 2, 3)};\n")
+    assert list(edited(program, plan_of(program, {0: (1, 0, 0)})).unwritten) == [0]
+
+
+def divided(program: Program, row: int, role: Role, flows: bool, external=None) -> Plan:
+    """A motion in the middle of, or before, a row."""
+    path = program.toolpath
+    n = len(path)
+    at = np.arange(n + 1) - (np.arange(n + 1) > row)
+    roles = np.zeros(n + 1)
+    roles[row] = role
+    position, rotation = path.position[at].copy(), path.rotation[at].copy()
+    centre, normal, sweep = (
+        path.arcs.centre[at].copy(),
+        path.arcs.normal[at].copy(),
+        path.arcs.sweep[at].copy(),
+    )
+    if path.kind[row] == Kind.CIRC and role == Role.INTERMEDIATE:
+        sweep[[row, row + 1]] /= 2
+        half = rotation_from_vector(-sweep[row] * normal[row])
+        position[row] = centre[row] + half @ (position[row + 1] - centre[row])
+    else:
+        position[row] = (path.position[row] + path.position[max(row - 1, 0)]) / 2
+        if role == Role.TRANSITION:
+            centre[row], normal[row], sweep[row] = np.nan, np.nan, np.nan
+    flowing = np.zeros(n + 1, bool)
+    flowing[row] = flows
+    share = np.ones(n + 1)
+    share[row] = 0.5
+    return Plan(at, roles, position, rotation, centre, normal, sweep, flowing, share, external)
+
+
+INSERTED = [
+    ("v100,fine,t", Role.INTERMEDIATE, True, "v100,z0,t"),
+    ("v100,z5,t", Role.INTERMEDIATE, True, "v100,z5,t"),
+    (
+        "v100\\V:=20,z5\\Z:=2\\Inpos:=i,t\\WObj:=w",
+        Role.INTERMEDIATE,
+        True,
+        "v100\\V:=20,z5\\Z:=2,t\\WObj:=w",
+    ),
+    ("v100 , z5, t", Role.TRANSITION, False, "v100,fine,t"),
+    ("v100,fine,t", Role.TRANSITION, True, "v100,z0,t"),
+]
+
+
+@pytest.mark.parametrize(("tail", "role", "flows", "new"), INSERTED)
+def test_an_inserted_motion_has_the_words_of_its_source(tail: str, role: Role, flows: bool, new: str) -> None:
+    data = 'PERS wobjdata w:=[FALSE,TRUE,"",[[1000,0,500],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];\n'
+    program = module(
+        f"  MoveL {target(0, 0, 0)},v100,z1,t\\WObj:=w;\n  MoveL {target(10, 0, 0)},{tail};\n", data
+    )
+    text = written(program, divided(program, 1, role, flows))
+    assert f"  MoveL {target('5.000', 0, 0)},{new};\n  MoveL {target(10, 0, 0)},{tail};\n" in text
+
+
+def test_an_arc_is_divided_into_arcs_on_the_same_circle() -> None:
+    program = module(
+        f"MoveL {target(0, 0, 0)},v100,z1,t;\nMoveC {target(10, 10, 0)},{target(20, 0, 0)},v50,z1,t;\n"
+    )
+    text = written(program, divided(program, 1, Role.INTERMEDIATE, True))
+    arcs = read(text).toolpath.arcs
+    assert arcs.centre[1:] / MM == pytest.approx(np.array([[10, 0, 0], [10, 0, 0]]), abs=0.002)
+    assert arcs.sweep[1:] / DEG == pytest.approx([90, 90], abs=0.01)
+    assert text.count("MoveC") == 2
+
+
+def test_an_arc_that_is_too_short_for_the_controller_is_refused() -> None:
+    program = module(
+        f"MoveL {target(0, 0, 0)},v100,z1,t;\nMoveC {target('0.1', '0.1', 0)},{target('0.2', 0, 0)},v50,z1,t;\n"
+    )
+    found = edited(program, divided(program, 1, Role.INTERMEDIATE, True))
+    assert not len(found.edits)
+    assert {row: why.code for row, why in found.unwritten.items()} == {1: "RAP012"}
+
+
+def test_inserted_motions_take_their_external_axes_along() -> None:
+    extra = ["[0,0,0,0],[100,9E9,9E9,9E9,9E9,9E9]", "[0,0,0,0],[200,9E9,9E9,9E9,9E9,9E9]"]
+    program = module("".join(f"MoveL {target(10 * k, 0, 0, extra=extra[k])},v100,z1,t;\n" for k in range(2)))
+    external = np.full((3, 6), np.nan)
+    external[:, 0] = [100, 150, 200]
+    text = written(program, divided(program, 1, Role.INTERMEDIATE, True, external))
+    assert "[0,0,0,0],[150.000,9E9,9E9,9E9,9E9,9E9]],v100" in text
+
+
+def test_what_may_not_move_raises() -> None:
+    program = module(f"MoveL pOther,v100,z1,t;\nMoveL {target(1, 2, 3)},v100,z1,t;\n")
+    plan = plan_of(program, {})
+    position = plan.position[:].copy()
+    position[0] = 1.0
+    moved = Plan(plan.source, plan.role, position, plan.rotation, plan.centre, plan.normal, plan.sweep)
+    with pytest.raises(ValueError, match="cannot be corrected"):
+        RAPID.edit_targets(program, moved, WRITING)
+    with pytest.raises(ValueError, match="cannot be divided"):
+        RAPID.edit_targets(program, divided(program, 1, Role.INTERMEDIATE, True), WRITING)
+
+
+FORBIDDEN = [
+    ("v100", "v200"), ("! said", "! done"), ("SetDO do1,1", "SetDO do1,0"), ("MoveL p1", "MoveJ p1;\nReset do1;"),
+    ('"a!"', '"b!"'), ("PROC main", "PROC other"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new"), FORBIDDEN)
+def test_edits_of_anything_else_are_refused(old: str, new: str) -> None:
+    program = module(
+        'TPWrite "a!"; SetDO do1,1;\nMoveL p1,v100,z1,t;\n! said\n',
+        f"CONST robtarget p1:={target(1, 2, 3)};\n",
+    )
+    raw = program.documents[0].raw
+    at = raw.index(old.encode())
+    edit = Edit(Span(0, at, at + len(old)), new.encode())
+    allowed = old.startswith(("v100",))  # in the line of a motion; the read-back check compares its speed
+    if allowed:
+        refuse_other(program, Edits.joined([edit]), RAPID.letters)
+    else:
+        with pytest.raises(Refusal):
+            refuse_other(program, Edits.joined([edit]), RAPID.letters)
+
+
+def test_a_number_after_a_string_with_an_exclamation_mark_is_no_comment() -> None:
+    program = module(f'TPWrite "hi!"; MoveL {target(1, 2, 3)},v100,z1,t;\n')
+    assert "[[2.000,2,3]" in written(program, plan_of(program, {0: (1, 0, 0)}))
+    said = module(f"! MoveL {target(1, 2, 3)}\nMoveL {target(1, 2, 3)},v100,z1,t;\n")
+    raw = said.documents[0].raw
+    at = raw.index(b"[[1,") + 2
+    with pytest.raises(Refusal):
+        refuse_other(said, Edits.joined([Edit(Span(0, at, at + 1), b"2")]), RAPID.letters)
+
+
+CELL = """\
+robot: kuka_kr270
+tools: {1: {x: 120, y: 0, z: 250, a: 0, b: 30, c: 0, axis: +z}}
+bases: {1: {x: 1450, y: -100, z: 600, a: 0, b: 0, c: 0}}
+start: [0, -90, 90, 0, 45, 0]
+symbols: {tSpindle: 1, wPart: 1}
+tolerance: 0.02
+max_growth: 6
+"""
+
+
+def two_programs(folder: Path, seed: int) -> tuple[Path, Path]:
+    """One path, with lines, arcs and turns of the tool, as KRL and as RAPID."""
+    random = np.random.default_rng(seed)
+    krl = ["DEF part()", "$BASE=BASE_DATA[1]", "$TOOL=TOOL_DATA[1]", "$VEL.CP=0.05", "$CIRC_TYPE=#PATH"]
+    krl += ["PTP {A1 0,A2 -90,A3 90,A4 0,A5 45,A6 0}"]
+    rapid = ["MODULE part", "PROC main()", "ConfL\\Off;"]
+    rapid += ["MoveAbsJ [[0,-90,90,0,45,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v1000,fine,tSpindle\\WObj:=wPart;"]
+    position, abc = np.array([0.0, 0.0, -5.0]), np.array([0.0, 0.0, 180.0])
+
+    def spelt(position, abc) -> tuple[str, str]:
+        q = quaternion_from_rotation(rotation_from_abc(abc * DEG)[None], np.array([[1.0, 0, 0, 0]]))[0]
+        numbers = [f"{value:.4f}" for value in position]
+        one = ",".join(f"{k} {v}" for k, v in zip("XYZ", numbers, strict=True))
+        one += "," + ",".join(f"{k} {v:.7f}" for k, v in zip("ABC", abc, strict=True))
+        return "{" + one + "}", f"[[{','.join(numbers)}],[{','.join(f'{v:.9f}' for v in q)}],{EXTRA}]"
+
+    for _ in range(int(random.integers(6, 14))):
+        abc = abc + random.uniform(-3, 3, 3)
+        via = spelt(position + np.array([8.0, 6.0, 0.5]), abc)
+        position = position + random.uniform([10, -10, -0.5], [20, 10, 0.5])
+        end = spelt(position, abc)
+        if random.random() < 0.25 and len(krl) > 7:
+            krl.append(f"CIRC {via[0]},{end[0]}")
+            rapid.append(f"MoveC {via[1]},{end[1]},v50,fine,tSpindle\\WObj:=wPart;")
+        else:
+            krl.append(f"LIN {end[0]}")
+            rapid.append(f"MoveL {end[1]},v50,fine,tSpindle\\WObj:=wPart;")
+    one, other = folder / "part.src", folder / "part.mod"
+    one.write_text("\n".join([*krl, "END"]) + "\n")
+    other.write_text("\n".join([*rapid, "ENDPROC", "ENDMODULE"]) + "\n")
+    (folder / "cell.yaml").write_text(CELL)
+    return one, other
+
+
+def same_as_krl(folder: Path, seed: int) -> int:
+    """Holds the corrected poses of one path written in both languages to be the same; how many there are."""
+    folder.mkdir()
+    paths, exits = [], []
+    for program, dialect in zip(two_programs(folder, seed), (KRL, RAPID), strict=True):
+        report = postproc.compensate(program, force="40,360,560@base", output=folder / "out" / program.name)
+        exits.append(report.exit)
+        out = folder / "out" / program.name
+        settings = ReadingSettings(symbols={"TSPINDLE": 1.0, "WPART": 1.0})
+        paths.append(dialect.read((Document(out, out.read_bytes()),), settings).toolpath)
+    assert exits[0] == exits[1]
+    one, other = paths
+    assert one.kind.tolist() == other.kind.tolist()
+    moving = one.kind != Kind.AXIS
+    assert one.position[moving] / MM == pytest.approx(other.position[moving] / MM, abs=0.0003)
+    turns = np.einsum("nij,nij->n", one.rotation[moving], other.rotation[moving])
+    assert np.degrees(np.arccos(np.clip((turns - 1) / 2, -1, 1))).max() < 1e-3
+    assert one.arcs.sweep == pytest.approx(other.arcs.sweep, abs=1e-3, nan_ok=True)
+    return int(moving.sum()) if exits[0] == 0 else 0
+
+
+def test_a_path_in_rapid_is_corrected_as_the_same_path_in_krl(tmp_path: Path) -> None:
+    assert same_as_krl(tmp_path / "one", 1) > 5
+
+
+@pytest.mark.slow
+def test_many_paths_in_rapid_are_corrected_as_the_same_paths_in_krl(tmp_path: Path) -> None:
+    assert sum(same_as_krl(tmp_path / str(seed), seed) for seed in range(10, 18)) > 40
+
+
+def test_cfx_names_the_branch_that_the_robot_is_in(tmp_path: Path) -> None:
+    """A MoveJ goes to the branch of its cfx, whatever the robot starts in; forward kinematics of other joint values
+    that reach the target in each of the eight branches say which it is."""
+    robot = load_robot(find_robot("abb_irb6700", None))
+    start = np.radians([0.0, 0, 0, 0, 30, 0])
+    flange = nominal_flange(robot, np.radians([[20.0, 10, 15, 30, 40, 50]]))
+    seen = {}
+    for cfx in range(8):
+        q = quaternion_from_rotation(flange.rotation, np.array([[1.0, 0, 0, 0]]))[0]
+        place = ",".join(f"{value:.9f}" for value in flange.position[0] / MM)
+        turn = ",".join(f"{value:.12f}" for value in q)
+        program = read(
+            f"MODULE m\nPROC main()\nMoveJ [[{place}],[{turn}],[0,0,0,{cfx}],{EXTRA[10:]}],v9,fine,tool0;\n"
+            "ENDPROC\nENDMODULE\n"
+        )
+        path = program.toolpath
+        flanges = Poses(path.rotation, path.position)
+        track = follow_axes(robot, path, flanges, start)
+        if not track.reachable[0]:
+            continue
+        seen[cfx] = q = track.q[0]
+        assert nominal_flange(robot, track.q).position == pytest.approx(flange.position, abs=1e-6)
+        lengths = robot.nominal.lengths
+        reach = lengths.a1 + lengths.a2 * np.sin(q[1])
+        elbow = q[1] + q[2]  # of the forearm below the level
+        wrist = reach + lengths.d4 * np.cos(elbow) + lengths.a3 * np.sin(elbow)
+        assert (wrist < 0) == bool(cfx & 4)
+        assert (q[4] < 0) == bool(cfx & 1)
+        ahead = np.cos(q[2]) * lengths.d4 + np.sin(q[2]) * lengths.a3  # of the lower arm's own line
+        assert (ahead < 0) == bool(cfx & 2)
+    assert len(seen) >= 4
