@@ -246,7 +246,7 @@ def test_what_an_effect_moves_is_what_the_model_without_it_would_leave(spring):
         campaign.expected(campaign.predicted(model), start)[0]
         - campaign.expected(campaign.predicted(without), start)[0]
     )
-    np.testing.assert_allclose(moved(spring.diagnosis.search, named), by, atol=1e-9)
+    np.testing.assert_allclose(moved(spring.diagnosis.search.final, named), by, atol=1e-9)
     size = spring.moved[named.candidate.key]
     assert size.rms == pytest.approx(np.sqrt(np.mean(np.sum(by**2, axis=1))), rel=1e-6)
     assert size.max == pytest.approx(np.linalg.norm(by, axis=1).max(), rel=1e-6)
@@ -265,7 +265,7 @@ def test_what_the_tracker_takes_up_is_not_moved(spring):
         named = Named(
             spring.verdict.named[0].candidate, (), fitted.estimates, spring.verdict.named[0].evidence
         )
-        by = moved(replace(spring.diagnosis.search, final=fitted), named)
+        by = moved(fitted, named)
         sizes[number] = np.sqrt(np.mean(by**2))
     assert sizes[1] < 1e-3 * sizes[2]
     assert sizes[2] > 1e-4

@@ -11,7 +11,7 @@ from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses
 from postproc.identification.campaign import SCALE, Campaign, Nuisances
 from postproc.identification.fit import Fit
-from postproc.identification.least_squares import at, descended
+from postproc.identification.least_squares import at, bounded_step, descended, prior_equations, reach
 from postproc.identification.registration import registered
 
 SEED = 20260101
@@ -38,20 +38,30 @@ def folds_of(campaign: Campaign, folds: int, seed: int = SEED) -> Ints:
 def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
     """(R, 3) [m] residuals of every reading, robot base axes, by a fit without its fold; NaN where it does not count.
 
-    Each fold's fit starts from the one of all readings and keeps its columns: what is reported is to first order, as
-    the residuals that leverages give (PRESS; Allen, Technometrics 16 (1974)).  Where the readings of the other folds
-    hardly determine a parameter, a fit of its own might run far away along it, which describes more the fold than of
-    the model.
+    Each fold's fit is one step from the one of all readings, with its columns and within the bounds: to first order,
+    as the residuals that leverages give (PRESS; Allen, Technometrics 16 (1974)).  Where the readings of the other
+    folds hardly determine a parameter, a fit of its own might run far away along it, which describes more the fold than
+    of the model.
     """
-    campaign = fitted.campaign
+    campaign, point = fitted.campaign, fitted.point
     fold = folds_of(campaign, folds)
-    residuals = np.full((len(campaign), 3), np.nan)
+    own, nuisance = (np.nan_to_num(part) for part in point.taken)
+    columns = np.concatenate([own, nuisance], axis=2)
+    # the rows of a fold as so many as there are columns, with the same information
+    tall = np.column_stack([fitted.weights(columns), fitted.weights(point.residual)])
+    part = np.repeat(fold, len(tall) // len(fold))
+    reduced = [np.linalg.qr(tall[part == k], mode="r") for k in range(folds)]
+    rows, asked = prior_equations(campaign, point, fitted.unknowns, fitted.factor)
+    low, high = reach(campaign, point, fitted.unknowns)
+    away = np.empty_like(point.residual)
     for k in range(folds):
-        rows = fold == k
-        weights = fitted.weights.times((~rows).astype(float))
-        point = descended(campaign, fitted.point, fitted.unknowns, weights, True, factor=fitted.factor)
-        residuals[rows] = campaign.in_base(point.residual, point.given)[rows, :3]
+        rest = np.concatenate(
+            [*(block for j, block in enumerate(reduced) if j != k), np.column_stack([rows, asked])]
+        )
+        step = bounded_step(rest[:, :-1], rest[:, -1], low, high, own.shape[2])
+        away[fold == k] = point.residual[fold == k] - columns[fold == k] @ step
         progress(k + 1, folds)
+    residuals = campaign.in_base(away, point.given)[:, :3]
     residuals[~counted(fitted)] = np.nan
     return residuals
 

@@ -133,7 +133,7 @@ def _named(result: Diagnosed) -> Iterator[str]:
 
 
 def _ambiguous(result: Diagnosed) -> Iterator[str]:
-    anew = ", with its parameters refitted," if result.diagnosis.search.base.unknowns else ""
+    anew = ", with its parameters refitted," if result.diagnosis.base.unknowns else ""
     yield (
         f"An effect is missing: the residual of the robot file{anew} is {_mm(result.rms['refitted'])} mm RMS"
         f"{_against_scatter(result)}."
@@ -287,7 +287,7 @@ def with_interval(estimate: Estimate) -> str:
 
 def _attributed(result: Diagnosed) -> Iterator[str]:
     """The contribution of the effects, apart from that of refitted parameters."""
-    if result.diagnosis.search.base.unknowns:
+    if result.diagnosis.base.unknowns:
         several = "these effects" if len(result.verdict.named) > 1 else "this effect"
         yield (
             f"The residual of the robot file is {_mm(result.rms['before'])} mm RMS,"
