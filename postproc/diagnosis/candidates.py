@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.effects import EFFECTS, Effect
+from postproc.effects import EFFECTS, ComplianceLaw, Effect
+from postproc.effects.gravity_sag import GravitySag
 from postproc.identification.campaign import Campaign, Nuisances
 from postproc.identification.noise import Weighting
 from postproc.identification.sensitivities import columns
@@ -109,6 +110,8 @@ def candidates(
             continue  # the registration itself
         if by_direction and not effect.by_direction:
             continue
+        if name == GravitySag.name and any(isinstance(term.effect, ComplianceLaw) for term in model.terms):
+            continue  # weights show by themselves
         known = [index for index, term in enumerate(model.terms) if term.effect.name == name]
         for term in known:
             missing = [

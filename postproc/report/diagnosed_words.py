@@ -22,6 +22,7 @@ NOUNS = {
     "tool_compliance": "compliance of the tool: cutter, holder and spindle deflect",
     "gravity_compensator": "a gravity compensator across {joints}: a spring whose torque follows the angle",
     "link_gravity": "the arm's own weight beyond {joints}: it deflects the arm",
+    "gravity_sag": "sag of {joints} under the arm's own weight: weight times compliance, of which neither is known",
     "payload": "a weight on the flange: it deflects the arm",
     "base_compliance": "compliance of the foundation: the whole robot tilts under load",
     "link_compliance": "compliance of {joints} across the axis: bearings and links tilt under load",
@@ -401,8 +402,6 @@ def _course(result: Diagnosed, candidate: Candidate) -> str:
             and alternative.margin < -MARGIN
         ):
             what = f"{course.about} {alternative.candidate.joint}".strip()
-            if course.advice:
-                return f"; {what} explains clearly more: {course.advice}"
             return (
                 f"; {what}, no effect of the library, has a likelihood gain {-alternative.margin:.0f} higher"
             )
