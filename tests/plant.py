@@ -92,8 +92,8 @@ class Hardware:
     compliance of base (6,), tilts (12,) and the tip across and along the spindle; cubic (6,) [N m/rad3] of the joints;
     links: mass and centre of each; hung: mass on the flange and centre in its axes; gap (6,) [rad] whole; width (6,)
     [rad] of hysteresis; zero (6,) [rad]; wave: (joint, harmonic, sine, cosine); ratio: (joint, of joint) -> share;
-    sag: (joint, link) -> (2,) [rad] of a moment across the link's axis; growth: joint -> [m/K or m/s]; shift: joint -> (2,) [m] of its axis; turn (12,) [rad] of the axes; base and tool
-    offset (6,); gauge: gain and bias (7,).
+    sag: (joint, link) -> (2,) [rad] of a moment across the link's axis; growth: joint -> [m/K or m/s]; shift: joint ->
+    (2,) [m] of its axis; turn (12,) [rad] of the axes; base and tool offset (6,); gauge: gain and bias (7,).
     """
 
     base: np.ndarray = field(default_factory=lambda: NONE[:6])

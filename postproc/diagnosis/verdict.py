@@ -52,7 +52,13 @@ TOLERATED = 0.15
 EXPLAINS = 0.9
 """Share of the variance beyond scatter that a name must take away where some remains."""
 
-EVERY_ARM = {"joint_offset": 0.5, "link_geometry": 0.5, "joint_compliance": 0.75, "link_gravity": 0.75, "gravity_sag": 0.75}
+EVERY_ARM = {
+    "joint_offset": 0.5,
+    "link_geometry": 0.5,
+    "joint_compliance": 0.75,
+    "link_gravity": 0.75,
+    "gravity_sag": 0.75,
+}
 """The same of what every arm has: a geometry that is not quite the nominal one, weight and gears that deflect."""
 
 WORST = 1.1

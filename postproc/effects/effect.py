@@ -131,8 +131,9 @@ class Effect:
 
     ``family``: what a controller may already correct (``geometric``, ``weight``), or ``elastic``, ``gear``.
     ``coordinates``: extra coordinates of the chain that it needs.  ``by_direction``: it asks how joints came to their
-    place, ``by_gravity``: where down is.  ``whole``: an arm that was never calibrated has it in all of its joints.  ``apart``: it may be there on one
-    joint and not on another.  ``zero_without_load``: without a wrench it moves nothing.
+    place, ``by_gravity``: where down is.  ``whole``: an arm that was never calibrated has it in all of its joints.
+    ``apart``: it may be there on one joint and not on another.  ``zero_without_load``: without a wrench it moves
+    nothing.
     """
 
     name: ClassVar[str]

@@ -305,7 +305,9 @@ def soft(number: int, seed: int) -> Trial:
     accept = {("gravity_sag", "*"), ("link_gravity", "*"), ("joint_compliance", "*"), *GEOMETRY}
     needed = frozenset({("joint_compliance", "*") if loaded else ("gravity_sag", "*")})
     words = f"own weight, {name}{', one weight hung' if loaded else ''}"
-    return Trial("soft", number, files_of(raw, readings), frozenset(accept), needed, scene, design, sigma, words)
+    return Trial(
+        "soft", number, files_of(raw, readings), frozenset(accept), needed, scene, design, sigma, words
+    )
 
 
 def remainder(number: int, seed: int) -> Trial:
