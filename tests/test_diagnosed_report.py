@@ -355,6 +355,7 @@ KEYS = {
     "residual_patterns",
     "gap",
     "next_poses",
+    "next_poses_beyond",
     "robot_file",
 }
 KEYS |= {
@@ -592,6 +593,9 @@ def test_what_is_said_of_doubt(spring):
     planned = replace(result, next_poses=next_poses(spring))
     assert "Measure these 2 poses: there gravity_compensator on A2" in paragraph(planned)
     assert "by 4.2 standard deviations" in paragraph(planned)
+    assert "ranges measured so far" not in paragraph(planned)
+    far = replace(planned, next_poses=replace(planned.next_poses, beyond=("A2", "A4")))
+    assert "They leave the ranges measured so far of A2 and A4" in paragraph(far)
     near = replace(planned, next_poses=replace(planned.next_poses, separation=(9.0, 0.4)))
     assert "would not distinguish them: there gravity_compensator on A2" in paragraph(near)
     assert "differ by 0.4 standard deviations, 3.2 are required" in paragraph(near)

@@ -123,8 +123,8 @@ class Mechanics:
         )
 
     def completed(self, q: Floats, conditions: Conditions) -> Conditions:
-        """The conditions, with senses of approach from the order of ``q`` (N, n) and where down is, where these are asked
-        for."""
+        """The conditions, with senses of approach from the order of ``q`` (N, n) and where down is, where effects ask
+        for these."""
         if conditions.direction is None and self.by_direction:
             conditions = replace(conditions, direction=approach(q))
         if conditions.down is None and self.by_gravity:

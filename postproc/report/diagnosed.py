@@ -43,11 +43,13 @@ USUAL = 10.0
 class NextPoses:
     """Poses worth measuring next: they distinguish the explanations ``between``.  readings: still to be taken;
     separation: standard deviations by which they show that the first is no case of the second, and vice
-    versa."""
+    versa; ``beyond``: the axes that leave the ranges measured so far, because within these nothing distinguishes
+    them."""
 
     readings: Readings
     between: tuple[Candidate, Candidate]
     separation: tuple[float, float]
+    beyond: tuple[str, ...] = ()
 
     @property
     def poses(self) -> list[dict[str, float]]:
@@ -302,6 +304,7 @@ class Diagnosed(Result):
             "next_poses_separation": None
             if self.next_poses is None
             else [_finite(separation) for separation in self.next_poses.separation],
+            "next_poses_beyond": None if self.next_poses is None else list(self.next_poses.beyond),
             "stations": [_placed(one, "session") for one in stations(self.final)],
             "target_places": [_placed(one, "target") for one in targets(self.final)],
             "tracker_scale": None if (scale := tracker_scale(self.final)) is None else scale[0],

@@ -183,6 +183,11 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
         f"Measure these {count(len(planned.poses), 'pose')}{where}: there {first} and {second} differ by {apart:.1f}"
         " standard deviations. Then diagnose all readings together."
     )
+    if planned.beyond:
+        yield (
+            f"They leave the ranges measured so far of {listed(planned.beyond)}, within which nothing distinguishes"
+            " the two: check that the arm, its cables and the target are free there."
+        )
 
 
 def _unknown(result: Diagnosed) -> Iterator[str]:
