@@ -92,8 +92,8 @@ class Hardware:
     compliance of base (6,), tilts (12,) and the tip across and along the spindle; cubic (6,) [N m/rad3] of the joints;
     links: mass and centre of each; hung: mass on the flange and centre in its axes; gap (6,) [rad] whole; width (6,)
     [rad] of hysteresis; zero (6,) [rad]; wave: (joint, harmonic, sine, cosine); ratio: (joint, of joint) -> share;
-    growth: joint -> [m/K or m/s]; shift: joint -> (2,) [m] of its axis; turn (12,) [rad] of the axes; base and tool
-    offset (6,); gauge: gain and bias (7,).
+    sag: (joint, link) -> (2,) [rad] of a moment across the link's axis; growth: joint -> [m/K or m/s]; shift: joint ->
+    (2,) [m] of its axis; turn (12,) [rad] of the axes; base and tool offset (6,); gauge: gain and bias (7,).
     """
 
     base: np.ndarray = field(default_factory=lambda: NONE[:6])
@@ -108,6 +108,7 @@ class Hardware:
     zero: np.ndarray = field(default_factory=lambda: NONE[:6])
     wave: tuple[tuple[int, float, float, float], ...] = ()
     ratio: Mapping[tuple[int, int], float] = field(default_factory=dict)
+    sag: Mapping[tuple[int, int], np.ndarray] = field(default_factory=dict)
     growth: Mapping[int, float] = field(default_factory=dict)
     by_time: bool = False
     shift: Mapping[int, np.ndarray] = field(default_factory=dict)
@@ -243,6 +244,14 @@ class Plant:
             stand[joint] += sine * np.sin(phase) + cosine * np.cos(phase)
         for (joint, other), share in have.ratio.items():
             stand[joint] += share * motors[other]
+        if have.sag:
+            self.place(self.coordinates_of(motors), self.coordinates_of(motors))
+            for (joint, link), (x, y) in have.sag.items():
+                turned = self.data.body(f"link{link + 1}").xmat.reshape(3, 3)
+                along, across = (np.array(axis.split(), float) for axis in ACROSS[link])
+                moment = turned @ (x * along + y * across)
+                axis = self.data.joint(MOTORS[joint]).xaxis
+                stand[joint] += axis @ np.cross(moment, [0.0, 0.0, -1.0])
         if direction is not None:
             stand = stand - 0.5 * have.width * direction
         whole = self.coordinates_of(stand)
@@ -341,6 +350,13 @@ PARTS = {
         "wave": tuple(
             (i, h, v[f"s{i + 1}_{h:g}"], v[f"c{i + 1}_{h:g}"]) for i in range(6) for h in e.harmonics
         )
+    },
+    "gravity_sag": lambda v, e: {
+        "sag": {
+            (int(s[2]) - 1, int(s[4]) - 1): np.array([v[f"s{a}{s[2:]}"] for a in "xy"])
+            for s in v
+            if s[1] == "x"
+        }
     },
     "joint_coupling": lambda v, e: {"ratio": {(int(r[1]) - 1, int(r[2]) - 1): x for r, x in v.items()}},
     "thermal_growth": lambda v, e: {

@@ -185,6 +185,16 @@ def undecided(found, monkeypatch):
     monkeypatch.setattr(workflow, "CANDIDATES", 100)
 
 
+@pytest.mark.parametrize("command", [("diagnose",), ("identify", "--effects", "joint_compliance")])
+@pytest.mark.parametrize(("name", "kind"), [("part.src", "a program (krl)"), ("arm.yaml", "a YAML file")])
+def test_a_program_in_the_place_of_readings_is_refused(compensate, tmp_path, command, name, kind):
+    (tmp_path / name).write_text("DEF part()\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0}\nEND\n")
+    done = compensate(command[0], tmp_path / name, *command[1:], "-o", tmp_path / "new.yaml")
+    assert done.code == 1
+    assert f"MEA013 this is {kind}" in done.err
+    assert not (tmp_path / "new.yaml").exists()
+
+
 @pytest.mark.slow
 def test_what_can_not_be_told_apart_is_planned(compensate, shop, tmp_path, undecided, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -200,6 +210,15 @@ def test_what_can_not_be_told_apart_is_planned(compensate, shop, tmp_path, undec
     q = np.degrees(read_measurements(tmp_path / "filled.csv", joints).q)
     told = [[pose[name] for name, _ in joints] for pose in found["next_poses"]]
     np.testing.assert_allclose(q, told, atol=1e-4)
+    measured_q = np.degrees(read_measurements(shop / "loads.csv", joints).q)
+    room = 0.05 * np.ptp(measured_q, axis=0) + 1e-6
+    outside = ((q < measured_q.min(axis=0) - room) | (q > measured_q.max(axis=0) + room)).any(axis=0)
+    assert found["next_poses_beyond"] == [f"A{k + 1}" for k in np.flatnonzero(outside)]
+    assert (
+        max(pose["load_kg"] for pose in found["next_poses"])
+        <= np.linalg.norm(read_measurements(shop / "loads.csv", joints).wrench[:, :3], axis=1).max() / 9.8
+        + 0.1
+    )
     assert f"({plan.name})" in done.out
     # without a name for it, it is shown and not written
     alone = compensate(*words_for(shop))

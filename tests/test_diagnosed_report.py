@@ -246,7 +246,7 @@ def test_what_an_effect_moves_is_what_the_model_without_it_would_leave(spring):
         campaign.expected(campaign.predicted(model), start)[0]
         - campaign.expected(campaign.predicted(without), start)[0]
     )
-    np.testing.assert_allclose(moved(spring.diagnosis.search, named), by, atol=1e-9)
+    np.testing.assert_allclose(moved(spring.diagnosis.search.final, named), by, atol=1e-9)
     size = spring.moved[named.candidate.key]
     assert size.rms == pytest.approx(np.sqrt(np.mean(np.sum(by**2, axis=1))), rel=1e-6)
     assert size.max == pytest.approx(np.linalg.norm(by, axis=1).max(), rel=1e-6)
@@ -265,7 +265,7 @@ def test_what_the_tracker_takes_up_is_not_moved(spring):
         named = Named(
             spring.verdict.named[0].candidate, (), fitted.estimates, spring.verdict.named[0].evidence
         )
-        by = moved(replace(spring.diagnosis.search, final=fitted), named)
+        by = moved(fitted, named)
         sizes[number] = np.sqrt(np.mean(by**2))
     assert sizes[1] < 1e-3 * sizes[2]
     assert sizes[2] > 1e-4
@@ -355,6 +355,7 @@ KEYS = {
     "residual_patterns",
     "gap",
     "next_poses",
+    "next_poses_beyond",
     "robot_file",
 }
 KEYS |= {
@@ -592,6 +593,9 @@ def test_what_is_said_of_doubt(spring):
     planned = replace(result, next_poses=next_poses(spring))
     assert "Measure these 2 poses: there gravity_compensator on A2" in paragraph(planned)
     assert "by 4.2 standard deviations" in paragraph(planned)
+    assert "ranges measured so far" not in paragraph(planned)
+    far = replace(planned, next_poses=replace(planned.next_poses, beyond=("A2", "A4")))
+    assert "They leave the ranges measured so far of A2 and A4" in paragraph(far)
     near = replace(planned, next_poses=replace(planned.next_poses, separation=(9.0, 0.4)))
     assert "would not distinguish them: there gravity_compensator on A2" in paragraph(near)
     assert "differ by 0.4 standard deviations, 3.2 are required" in paragraph(near)

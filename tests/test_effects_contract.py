@@ -27,7 +27,7 @@ from postproc.robot.chain import Chain
 from postproc.robot.description import Value
 
 NAMES = """
-joint_compliance tool_compliance gravity_compensator link_gravity payload base_compliance link_compliance
+joint_compliance tool_compliance gravity_compensator link_gravity gravity_sag payload base_compliance link_compliance
 joint_stiffening backlash hysteresis transmission_error joint_offset link_geometry joint_coupling
 tool_offset base_offset thermal_growth force_sensor
 """

@@ -309,6 +309,7 @@ def test_flags_are_said_where_they_hold():
     said = {
         "whole": {"joint_compliance", "joint_offset", "link_geometry"},
         "by_direction": {"backlash", "hysteresis"},
+        "by_gravity": {"gravity_sag"},
     }
     for flag, those in said.items():
         assert {name for name, effect in EFFECTS.items() if getattr(effect, flag)} == those

@@ -210,7 +210,7 @@ def test_a_warm_start_gives_the_same_in_fewer_steps(build):
         warm = model.equilibrium(q, wrench, tool, given, start)
         assert warm.converged.all()
         assert np.abs(warm.coordinates - cold.coordinates).max() < 2e-13
-        assert np.abs(warm.pose.position - cold.pose.position).max() < 4e-13
+        assert np.abs(warm.pose.position - cold.pose.position).max() < 6e-13
         assert warm.steps <= most
 
 

@@ -73,7 +73,7 @@ def find_alternatives(
         def scaled(g: int) -> Floats:
             return given.matrix[:, given.places[g]] * given.size[given.places[g]]
 
-        signal = _signal(given, rest, last, group)
+        signal, beyond = _signal(given, rest, last, group), linear.basis_with(rest.groups)
         own, of_mine = paid(scaled(group)), []
         against = [
             *enumerate(linear.candidates),
@@ -83,7 +83,7 @@ def find_alternatives(
             if other in last.groups or candidate.contains(mine) or mine.contains(candidate):
                 continue
             if candidate.nonlinear:
-                instead, squares, columns = _instead(campaign, fitted, linear, rest, mine, candidate)
+                instead, squares, columns = _instead(campaign, fitted, linear, rest, beyond, mine, candidate)
             else:
                 instead, squares = candidate, explained(given, (*rest.groups, other)).squares
                 columns = scaled(other)
@@ -126,14 +126,19 @@ def _predicts(columns: Floats, signal: Floats, variance: float) -> bool:
 
 
 def _instead(
-    campaign: Campaign, fitted: Fit, linear: Linear, rest: Explained, mine: Candidate, other: Candidate
+    campaign: Campaign,
+    fitted: Fit,
+    linear: Linear,
+    rest: Explained,
+    beyond: Floats,
+    mine: Candidate,
+    other: Candidate,
 ) -> tuple[Candidate, float, Floats]:
     """``other``, that is not linear in its size, as large as explains the most in the place of ``mine`` beside
-    ``rest``; the squares that then remain, and its columns outside of what is explained anyway."""
+    ``rest``, whose basis is ``beyond`` (n, r); the squares that then remain, and its columns outside of what is
+    explained anyway."""
     without = point_without(campaign, fitted, [mine])
     model, unknowns = composed(without.model, [other])
-    basis = basis_of(linear.common)
-    beyond = basis_of(np.concatenate([linear.common, *(linear.columns[g] for g in rest.groups)], axis=1))
 
     def readings(columns: Floats) -> Floats:
         below = np.zeros((linear.priors, columns.shape[2]))
@@ -144,4 +149,4 @@ def _instead(
     )
     gain = float(large.target @ large.target - large.remaining @ large.remaining)
     alternative = replace(other, columns=large.columns, start=tuple(large.values.tolist()))
-    return alternative, rest.squares - gain, outside(basis, readings(large.columns))
+    return alternative, rest.squares - gain, outside(linear.basis, readings(large.columns))

@@ -10,8 +10,11 @@ import numpy as np
 
 from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding
+from postproc.diagnosis.candidates import candidates
 from postproc.diagnosis.diagnosis import Diagnosis, diagnose
 from postproc.diagnosis.residual_patterns import patterns
+from postproc.diagnosis.sample import sample_of
+from postproc.diagnosis.selection import basis_of, outside
 from postproc.identification.campaign import Campaign
 from postproc.model import StiffnessModel
 
@@ -23,6 +26,10 @@ BIT = 2.0 * np.log(2.0)
 
 SMALLER = 0.9
 """Share of the residual that must remain at most where sides of approach are taken from somewhere."""
+
+WORTH_TRYING = 0.08
+"""Share of the remaining squares that effects of approach must explain together before sides are tried; ``SMALLER``
+asks for 0.19."""
 
 JOINTS = 2
 """Of the joints whose sides the residuals show best, so many are tried."""
@@ -45,20 +52,42 @@ def diagnose_sides(
     if done.verdict.word in SOUND and not done.verdict.conditional:
         return done, ()
     stage("trying sides of approach")
-    other = diagnose(campaign, model)
-    if _is_better(other, done):
-        return other, (_finding(readings.where(0)[0], "they are taken from the order of the rows"),)
+    if _may_explain(campaign, done):
+        other = diagnose(campaign, model)
+        if _is_better(other, done):
+            return other, (_finding(readings.where(0)[0], "they are taken from the order of the rows"),)
     if done.verdict.conditional or done.verdict.word in SOUND:
         return done, ()
     for joint, sides in _shown(done):
         direction = np.zeros_like(readings.q)
         direction[:, joint] = sides
-        tried = diagnose(Campaign(replace(readings, direction=direction), campaign.stated_tool), model)
+        sided = Campaign(replace(readings, direction=direction), campaign.stated_tool)
+        if not _may_explain(sided, done):
+            continue
+        tried = diagnose(sided, model)
         if tried.verdict.word in (*SOUND, "ambiguous") and _is_better(tried, done):
             name = readings.joints[joint][0]
             words = f"those of {name} are taken from the residuals, which lie on two sides"
             return tried, (_finding(readings.where(0)[0], words),)
     return done, ()
+
+
+def _may_explain(campaign: Campaign, done: Diagnosis) -> bool:
+    """Whether all effects of the sides of approach of ``campaign`` together, beside what was chosen without them,
+    explain enough of the residual for a diagnosis of its own."""
+    fitted = done.search.final
+    sample = sample_of(campaign)
+    found = candidates(sample, fitted.model, fitted.point.given, by_direction=True)
+    if any(c.nonlinear and c.columns.any() for c in found):
+        return True  # what they do does not show in their columns
+    weights = fitted.plain_weights
+    basis = basis_of(np.nan_to_num(np.concatenate([weights(part) for part in fitted.point.taken], axis=1)))
+    columns = [weights(np.nan_to_num(c.columns)) for c in found if c.columns.any()]
+    if not columns:
+        return False
+    more = basis_of(outside(basis, np.concatenate(columns, axis=1)))
+    residual = outside(basis, weights(fitted.point.residual)[:, None])[:, 0]
+    return float(((more.T @ residual) ** 2).sum()) > WORTH_TRYING * float(residual @ residual)
 
 
 def _finding(file: str, words: str) -> Finding:
@@ -77,14 +106,14 @@ def _is_better(other: Diagnosis, done: Diagnosis) -> bool:
         for candidate in [n.candidate for n in other.verdict.named]
         + [c for one in other.verdict.alternatives for c in one]
     )
-    rms = [float(np.sqrt(np.nanmean(one.search.final.residual**2))) for one in (other, done)]
+    rms = [float(np.sqrt(np.nanmean(one.search.confirmed.residual**2))) for one in (other, done)]
     return by_direction and rms[0] < SMALLER * rms[1]
 
 
 def _shown(done: Diagnosis) -> list[tuple[int, Floats]]:
     """Joints whose turn by one width, to one side or the other at each visit, explains the residual best, and the
     sides (R,): -1 where the joint stopped above its place."""
-    fitted = done.search.base
+    fitted = done.base
     campaign = fitted.campaign
     weight = fitted.plain_weights.weight[:, :3] ** 2
     visit = _visits(campaign.pose)

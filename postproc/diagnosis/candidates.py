@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.effects import EFFECTS, Effect
+from postproc.effects import EFFECTS, ComplianceLaw, Effect
+from postproc.effects.gravity_sag import GravitySag
 from postproc.identification.campaign import Campaign, Nuisances
 from postproc.identification.noise import Weighting
 from postproc.identification.sensitivities import columns
@@ -98,13 +99,19 @@ class Candidate:
         return f"{words} on {self.joint}" if self.joint else words
 
 
-def candidates(campaign: Campaign, model: StiffnessModel, given: Nuisances) -> tuple[Candidate, ...]:
+def candidates(
+    campaign: Campaign, model: StiffnessModel, given: Nuisances, by_direction: bool = False
+) -> tuple[Candidate, ...]:
     """All that may be missing in ``model``, with what it would move in ``campaign``; also what would move nothing
-    there."""
+    there.  ``by_direction``: only what depends on the sense of approach."""
     entries: list[Candidate] = []
     for name, effect in EFFECTS.items():
         if name == "base_offset" and campaign.tracked:
             continue  # the registration itself
+        if by_direction and not effect.by_direction:
+            continue
+        if name == GravitySag.name and any(isinstance(term.effect, ComplianceLaw) for term in model.terms):
+            continue  # weights show by themselves
         known = [index for index, term in enumerate(model.terms) if term.effect.name == name]
         for term in known:
             missing = [

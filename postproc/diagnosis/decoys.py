@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from postproc.base.arrays import Floats
-from postproc.base.geometry import Poses
 from postproc.diagnosis.candidates import Candidate
 from postproc.effects import (
     ChainState,
@@ -24,7 +23,7 @@ from postproc.effects.thermal_growth import ThermalGrowth
 from postproc.effects.transmission_error import TransmissionError
 from postproc.identification.unknowns import unknowns_of
 from postproc.model import StiffnessModel
-from postproc.robot.chain import Chain, weight_about
+from postproc.robot.chain import Chain
 from postproc.robot.geometries import Joint
 
 HAS_DECOYS = ("gravity_compensator",)
@@ -38,7 +37,6 @@ class AlternativeForm(Effect):
     """A course that has no name; ``about``: in words, up to the joint."""
 
     about: str
-    advice: str = ""
 
 
 class VaryingCompliance(AlternativeForm, ComplianceLaw):
@@ -79,42 +77,6 @@ class OtherWave(AlternativeForm, TransmissionError):
         self.about = f"an error that comes back {' and '.join(f'{h:g}' for h in harmonics)} times a turn of"
 
 
-class GravitySag(AlternativeForm, ComplianceLaw):
-    """theta_i = z_i . (M x g / |g|), M = R_i s_i + R_k s_k [rad] with k the turning joint after i: weight times
-    compliance of joint i, which shows although neither does.  s in axes of the base at the zero pose, R the turn of a
-    link from there."""
-
-    name = "link_gravity"
-    family = "weight"
-    about = "the sag under its own weight of"
-    advice = "state joint_compliance in the robot file, so that link_gravity can be found"
-
-    def __init__(self, joints: Sequence[Joint], joint: int = 0) -> None:
-        self.links = [joint, *[k for k in range(joint + 1, len(joints)) if joints[k].kind == "revolute"][:1]]
-        self.joint = joint
-        self.parameters = tuple(
-            Parameter(f"s{k}{axis}", "rad", 0.0, source="weight times compliance", joint=joints[joint].name)
-            for k in self.links
-            for axis in "xyz"
-        )
-        chain = Chain(joints, Poses.identity())
-        at_zero = chain.evaluate(np.zeros((len(joints), 1)), Poses.identity())
-        self._frames = [np.stack([c[:, 0] for c in columns], axis=1) for columns in at_zero.links]
-
-    def described(self) -> dict[str, object]:
-        return {"varies": "with the weight"}
-
-    def add_displacement(
-        self, values: Values, state: ChainState, force: Floats, displacement: Floats, slope: Floats
-    ) -> None:
-        row = state.chain.motor_rows[self.joint]
-        down = state.gravity / np.linalg.norm(state.gravity)
-        for k in self.links:
-            own = self._frames[k].T @ np.array([values[f"s{k}{axis}"] for axis in "xyz"])
-            moment = sum(part * axis for part, axis in zip(own, state.swept.links[k], strict=True))
-            displacement[row] += weight_about(state.swept.axes[row], moment, down)[0]
-
-
 class DriftingBase(AlternativeForm, Offset):
     """Robot and tracker that move apart, by x, y, z [m/K, m/s] times the temperature over that of the start or the
     time since then: a stand that creeps, a foundation that warms up."""
@@ -145,8 +107,7 @@ def decoys(model: StiffnessModel, q: Floats, mine: Candidate) -> list[Candidate]
     """What ``mine`` has to be distinguished from, in a ``model`` measured at ``q`` (R, n); started at the null."""
     joints = model.robot.joints
     if mine.name == TransmissionError.name:
-        waves = [_decoy(model, q, OtherWave(joints, (order,)), mine.joint) for order in ORDERS]
-        return waves + _sags(model, q, mine)
+        return [_decoy(model, q, OtherWave(joints, (order,)), mine.joint) for order in ORDERS]
     if mine.name == ThermalGrowth.name:
         return [_decoy(model, q, DriftingBase(joints, str(mine.effect.described()["variable"])), "")]
     if mine.name not in HAS_DECOYS:
@@ -154,17 +115,6 @@ def decoys(model: StiffnessModel, q: Floats, mine: Candidate) -> list[Candidate]
     joint = next(i for i, one in enumerate(joints) if one.name == mine.joint)
     middle = float(np.mean([q[:, joint].min(), q[:, joint].max()]))
     return [_decoy(model, q, VaryingCompliance(joints, joint, middle), mine.joint)]
-
-
-def _sags(model: StiffnessModel, q: Floats, mine: Candidate) -> list[Candidate]:
-    """The sag of the joint of ``mine``, where the robot file states no compliance that a weight could act on."""
-    if any(isinstance(term.effect, ComplianceLaw) for term in model.terms):
-        return []
-    joints = model.robot.joints
-    joint = next((i for i, one in enumerate(joints) if one.name == mine.joint), None)
-    if joint is None or joints[joint].kind != "revolute":
-        return []
-    return [_decoy(model, q, GravitySag(joints, joint), mine.joint)]
 
 
 def _decoy(model: StiffnessModel, q: Floats, effect: AlternativeForm, joint: str) -> Candidate:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,9 @@ import numpy as np
 from postproc.base.findings import Finding, Refusal
 from postproc.diagnosis.agreement import AGREES, largest_disagreement, without_effects
 from postproc.diagnosis.candidate_fits import with_effects
+from postproc.diagnosis.candidates import Candidate
 from postproc.diagnosis.residual_patterns import ResidualPattern, residual_patterns
+from postproc.diagnosis.sample import sample_of
 from postproc.diagnosis.search import model_unknowns, search
 from postproc.diagnosis.search_result import Search
 from postproc.diagnosis.verdict import OTHER_COURSE, SIZE_UNDETERMINED, Verdict, judge, refitted
@@ -28,15 +30,16 @@ AGAIN = 3
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
     """stated: the robot file as it is, tracker and targets found; where: patterns in its residuals; search, verdict;
-    final: the final model, of what is named, or of its own parameters refitted; disagreement [m]: the largest over the
-    workspace of what explanations predict that cannot be distinguished, one of each set; ``agreed``: it is so small
-    that the correction is the same."""
+    final: the final model, of what is named, or of its own parameters refitted (``base``); disagreement [m]: the
+    largest over the workspace of what explanations predict that cannot be distinguished, one of each set; ``agreed``:
+    it is so small that the correction is the same."""
 
     stated: Fit
     where: tuple[ResidualPattern, ...]
     search: Search
     verdict: Verdict
     final: Fit
+    base: Fit
     disagreement: tuple[float, ...] = ()
     agreed: bool = False
 
@@ -54,39 +57,42 @@ def diagnose(
                 help="`compensate plan` proposes poses to measure",
             )
         )
-    every = np.ones(len(campaign), bool)
+    every, own = np.ones(len(campaign), bool), model_unknowns(model)
     stage("comparing")
     stated = fit(campaign, model, (), every)
     stage("fitting the model's own parameters")
-    base = fit(campaign, model, model_unknowns(model), every, given=stated.point.given)
+    sample = sample_of(campaign)
+    base = fit(sample, model, own, given=stated.point.given)
     stage("looking for what is missing")
-    result = search(campaign, base)
+    result = search(sample, base)
     verdict = judge(result)
     rejected = list(verdict.rejected)
     for _ in range(AGAIN):
         # of what has no form that is known others would only be imitations
         if not verdict.rejected or any(why == OTHER_COURSE for _, why in verdict.rejected):
             break
-        result = search(campaign, base, [candidate.key for candidate, _ in rejected])
+        result = search(sample, base, [candidate.key for candidate, _ in rejected])
         verdict = judge(result)
         rejected += verdict.rejected
+    if sample is not campaign:
+        stage("fitting all readings")
+        base = _fitted_to(campaign, base)
+        result = replace(result, whole=_fitted_to(campaign, result.final) if result.chosen else base)
+        verdict = judge(result)
     if verdict.word == "nothing_missing" and any(why == SIZE_UNDETERMINED for _, why in rejected):
         verdict = replace(verdict, word="unknown")
     # zeros that belong to the geometry of the whole arm are fitted with it
     names = [
         named.candidate for named in verdict.named if named.candidate.key in {c.key for c in result.chosen}
     ]
-    final = result.base
+    final = _of_names(base, result.confirmed, result, names)
     disagreement: tuple[float, ...] = ()
     agreed = False
-    if names:
-        final = (
-            result.final if len(names) == len(result.chosen) else with_effects(campaign, result.base, names)
-        )
     if verdict.alternatives:
         stage("comparing the explanations over the workspace")
+        searched = _of_names(result.base, result.final, result, names)
         disagreement = tuple(
-            largest_disagreement(campaign, result.base, final, names, one) for one in verdict.alternatives
+            largest_disagreement(sample, result.base, searched, names, one) for one in verdict.alternatives
         )
         scatter = np.sqrt(3 * np.mean(final.noise.sigma**2) * (1.0 if final.noise.known else final.factor))
         differ = [
@@ -100,5 +106,18 @@ def diagnose(
     # where an effect is missing in a model its own parameters compensate for that
     moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()
     verdict = replace(verdict, rejected=tuple(rejected), refitted=moved)
-    where = residual_patterns(stated, result.final)
-    return Diagnosis(stated, where, result, verdict, final, disagreement, agreed)
+    where = residual_patterns(stated, result.confirmed)
+    return Diagnosis(stated, where, result, verdict, final, base, disagreement, agreed)
+
+
+def _fitted_to(campaign: Campaign, fitted: Fit) -> Fit:
+    """A fit of some readings, fitted to all of them; what those do not give keeps its value."""
+    found = fit(campaign, fitted.model, fitted.unknowns, given=fitted.point.given, near=True)
+    return replace(found, asked=fitted.asked, dropped=(*fitted.dropped, *found.dropped))
+
+
+def _of_names(base: Fit, chosen: Fit, result: Search, names: Sequence[Candidate]) -> Fit:
+    """The fit with those effects of ``result`` that are named: ``base`` without any, ``chosen`` with all."""
+    if not names:
+        return base
+    return chosen if len(names) == len(result.chosen) else with_effects(base.campaign, base, names)

@@ -12,6 +12,7 @@ from postproc.diagnosis.candidates import Candidate
 from postproc.diagnosis.search_result import Search
 from postproc.diagnosis.selection import CHANCE, EXCEEDED, WORTH, explained, scatter
 from postproc.diagnosis.verdict import Named
+from postproc.identification.fit import Fit
 from postproc.identification.least_squares import at
 
 SURELY = 0.95
@@ -56,10 +57,9 @@ def _needed(search: Search, rank: int) -> float:
     return max(by_chance, WORTH / (1.0 - WORTH) * max(1, given.freedom - last.rank))
 
 
-def moved(search: Search, named: Named) -> Floats:
-    """(R, 3) [m] what the effect, as it was found, moves of each reading beyond what tracker and targets that were
+def moved(final: Fit, named: Named) -> Floats:
+    """(R, 3) [m] what the effect, as ``final`` has it, moves of each reading beyond what tracker and targets that were
     elsewhere would; axes of the robot base."""
-    final = search.final
     nulls = {e.unknown.key: e.unknown.parameter.null for e in named.estimates}
     without = at(final.campaign, final.model.with_values(nulls), final.point.given)
     by = without.residual - final.point.residual
@@ -110,8 +110,14 @@ def smallest(search: Search) -> tuple[Smallest, ...]:
 
 
 def _off_centre(rank: int, limit: float) -> float:
-    """How far off its centre chi2(``rank``) must be to exceed ``limit`` with probability ``SURELY``."""
-    from scipy.optimize import brentq
+    """How far off its centre chi2(``rank``) must be to exceed ``limit`` with probability ``SURELY``; by bisection."""
     from scipy.special import chndtr
 
-    return float(brentq(lambda away: 1.0 - chndtr(limit, rank, away) - SURELY, 1e-6, 10.0 * limit + 100.0))
+    low, high = 1e-6, 10.0 * limit + 100.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if 1.0 - chndtr(limit, rank, middle) < SURELY:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.identification.bounded import bounded_least_squares
 from postproc.identification.campaign import Campaign
 from postproc.identification.least_squares import Point, at, scales, with_columns
 from postproc.identification.unknowns import Unknown
@@ -48,8 +49,6 @@ def evaluate_at_size(
     Gauss-Newton from the usual size within the bounds, on what is outside of what is explained anyway; then
     ``whole``, so that columns times values are what the effect does.
     """
-    from scipy.optimize import lsq_linear
-
     scale, null = scales(unknowns), np.array([u.parameter.null for u in unknowns])
     low = (np.array([u.parameter.lower for u in unknowns]) - null) / scale
     high = (np.array([u.parameter.upper for u in unknowns]) - null) / scale
@@ -68,10 +67,7 @@ def evaluate_at_size(
     for _ in range(STEPS):
         there = with_columns(campaign, there, unknowns)
         matrix = outside(np.nan_to_num(there.taken[0]))
-        damping = DAMPING * np.diag(np.linalg.norm(matrix, axis=0) + 1e-9)
-        tall, aim = np.concatenate([matrix, damping]), np.concatenate([remaining, np.zeros(len(x))])
-        bounds = np.minimum(low - x, 0.0), np.maximum(high - x, 1e-300)
-        step, before = lsq_linear(tall, aim, bounds, "bvls").x, remaining @ remaining
+        step, before = _step(matrix, remaining, low - x, high - x), remaining @ remaining
         for _ in range(6):
             trial = np.clip(x + step, low, high)
             moved, did = taken(trial, there.predicted.displacement)
@@ -89,6 +85,19 @@ def evaluate_at_size(
     return NonlinearColumns(
         null + x * scale, whole(np.nan_to_num(there.taken[0]), does, x), target, remaining
     )
+
+
+def _step(matrix: Floats, remaining: Floats, low: Floats, high: Floats) -> Floats:
+    """(P,) least squares of ``matrix`` (n, P) @ step - ``remaining`` (n,) between ``low`` and ``high`` (P,)."""
+    damping = DAMPING * np.diag(np.linalg.norm(matrix, axis=0) + 1e-9)
+    tall = np.block([[matrix, remaining[:, None]], [damping, np.zeros((len(low), 1))]])
+    # many rows to as many as there are columns, with the same information
+    reduced = np.asarray(np.linalg.qr(tall, mode="r"))
+    step = np.linalg.lstsq(reduced[:-1, :-1], reduced[:-1, -1], rcond=None)[0]
+    if np.any(step < low) or np.any(step > high):
+        low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
+        step = bounded_least_squares(reduced[:-1, :-1], reduced[:-1, -1], low, high)
+    return np.asarray(step)
 
 
 def whole(columns: Floats, does: Floats, values: Floats) -> Floats:

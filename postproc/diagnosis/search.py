@@ -181,7 +181,10 @@ def _linear(
     basis = basis_of(common)
     current = _as_fitted(campaign, fitted, chosen, shown)
     with_chosen = [readings(c.columns) for c in current if c.only]
-    beyond = basis_of(np.concatenate([common, *with_chosen], axis=1)) if with_chosen else basis
+    beyond = basis
+    if with_chosen:
+        more = basis_of(outside(basis, np.concatenate(with_chosen, axis=1)))
+        beyond = np.concatenate([basis, more], axis=1)
     current = tuple(
         _as_grown(campaign, fitted, c, lambda columns: outside(beyond, readings(columns)))
         if c.nonlinear and not c.only and not (c.start and chosen)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.diagnosis.candidates import Candidate
@@ -10,6 +14,8 @@ from postproc.diagnosis.decoys import AlternativeForm
 from postproc.diagnosis.selection import (
     Explained,
     Problem,
+    basis_of,
+    outside,
 )
 from postproc.identification.fit import Fit
 from postproc.identification.noise import Weighting
@@ -31,6 +37,18 @@ class Linear:
     columns: tuple[Floats, ...]
     priors: int
     weights: Weighting
+
+    @cached_property
+    def basis(self) -> Floats:
+        """(n, r) of what is explained anyway."""
+        return basis_of(self.common)
+
+    def basis_with(self, groups: Sequence[int]) -> Floats:
+        """(n, r) of what is explained anyway and by ``groups``."""
+        if not groups:
+            return self.basis
+        more = np.concatenate([self.columns[g] for g in groups], axis=1)
+        return np.concatenate([self.basis, basis_of(outside(self.basis, more))], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +86,7 @@ class Search:
 
     base: the model as it is, its own parameters refitted; final: with what was ``chosen``; untestable: candidates
     that these readings cannot show; linear, explained: the last choice; rivals: those of
-    what was chosen, nearest first.
+    what was chosen, nearest first; whole: as ``final``, fitted to all readings where the search was in a part of them.
     """
 
     base: Fit
@@ -78,3 +96,9 @@ class Search:
     linear: Linear
     explained: Explained
     rivals: tuple[Alternative, ...]
+    whole: Fit | None = None
+
+    @property
+    def confirmed(self) -> Fit:
+        """What was chosen, fitted to all readings."""
+        return self.final if self.whole is None else self.whole

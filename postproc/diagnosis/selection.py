@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.identification.bounded import bounded_least_squares
 
 WORTH = 0.19
 """Share of the remaining squares that an effect must explain where more than scatter remains, a tenth of the root mean
@@ -137,11 +138,9 @@ def explained(given: Problem, groups: Sequence[int]) -> Explained:
 
 def _bounded(value: Floats, vector: Floats, aim: Floats, low: Floats, high: Floats) -> Floats:
     """min x^T G x - 2 aim^T x within bounds, of G by its eigenvalues, hardly observable directions fixed."""
-    from scipy.optimize import lsq_linear
-
     root = np.sqrt(np.maximum(value, (0.1 * APART) ** 2))
     matrix, right = root[:, None] * vector.T, (vector.T @ aim) / root
-    return np.asarray(lsq_linear(matrix, right, (np.minimum(low, 0.0), np.maximum(high, 1e-300)), "bvls").x)
+    return bounded_least_squares(matrix, right, np.minimum(low, 0.0), np.maximum(high, 0.0))
 
 
 def beside(given: Problem, rest: Explained, columns: Floats) -> Floats:

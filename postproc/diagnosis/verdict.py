@@ -52,7 +52,13 @@ TOLERATED = 0.15
 EXPLAINS = 0.9
 """Share of the variance beyond scatter that a name must take away where some remains."""
 
-EVERY_ARM = {"joint_offset": 0.5, "link_geometry": 0.5, "joint_compliance": 0.75, "link_gravity": 0.75}
+EVERY_ARM = {
+    "joint_offset": 0.5,
+    "link_geometry": 0.5,
+    "joint_compliance": 0.75,
+    "link_gravity": 0.75,
+    "gravity_sag": 0.75,
+}
 """The same of what every arm has: a geometry that is not quite the nominal one, weight and gears that deflect."""
 
 WORST = 1.1
@@ -129,7 +135,7 @@ def judge(search: Search) -> Verdict:
     groups: list[int] = []
     for g in last.groups:
         candidate, its = linear.candidates[g], _evidence(search, last, g)
-        estimates = _estimates(search.final, candidate, search)
+        estimates = _estimates(search.confirmed, candidate, search)
         bounded = all(e.at_bound for e in estimates)
         several = ambiguity_set(search, g, not bounded and _is_observable(candidate, estimates))
         if _of_another_course(search, candidate):
@@ -143,14 +149,17 @@ def judge(search: Search) -> Verdict:
         elif bounded and len(several) == 1:
             rejected.append((candidate, "its parameters would have to lie at their bounds"))
         else:
-            joints, fixed = _joints(candidate, estimates), _fixed_values(search.final, candidate, estimates)
+            joints, fixed = (
+                _joints(candidate, estimates),
+                _fixed_values(search.confirmed, candidate, estimates),
+            )
             named.append(Named(candidate, joints, estimates, its, fixed))
             groups.append(g)
             aliases.append(several)
             if has_zeros(candidate):
                 zeros.append((candidate, its))
     chi2, unexplained = reduced_chi2_of(search, last)
-    patterns = residual_patterns(search.final, chance=STRUCTURE)
+    patterns = residual_patterns(search.confirmed, chance=STRUCTURE)
     unexplained = unexplained or bool(patterns)
     bare, _ = reduced_chi2_of(search, explained(linear.problem, ()))
     # two forms of one effect on one joint do not make its name uncertain
@@ -210,7 +219,7 @@ def _zeros_of(search: Search, named: Sequence[Named], its: Evidence) -> list[Nam
         return []
     whole = [c for c in search.linear.candidates if (c.name, c.joint) == (JointOffset.name, EVERY)]
     for candidate in whole:
-        estimates = _estimates(search.final, candidate, search)
+        estimates = _estimates(search.confirmed, candidate, search)
         joints = _joints(candidate, estimates)
         if joints:
             return [Named(candidate, joints, estimates, its)]

@@ -18,6 +18,7 @@ from postproc.effects.effect import (
 )
 from postproc.effects.force_sensor import ForceSensor
 from postproc.effects.gravity_compensator import GravityCompensator
+from postproc.effects.gravity_sag import GravitySag
 from postproc.effects.hysteresis import Hysteresis
 from postproc.effects.joint_compliance import JointCompliance
 from postproc.effects.joint_coupling import JointCoupling
@@ -39,6 +40,7 @@ EFFECTS: dict[str, type[Effect]] = {
         ToolCompliance,
         GravityCompensator,
         LinkGravity,
+        GravitySag,
         Payload,
         BaseCompliance,
         LinkCompliance,

@@ -79,7 +79,8 @@ class Conditions:
     spindle (N, 3): unit vector of the spindle, tip-ward, in tool axes; direction (N, n): how far each motor is ahead
     of its joint, -1..1, as a share of half the gap; -1, 0, 1 where only the sense in which it came is known;
     temperature (N,) [K] over that of the calibration; time (N,) [s] since then; payload_mass (N,) [kg] and payload_com
-    (N, 3) [m, flange axes]: what is mounted on the flange.
+    (N, 3) [m, flange axes]: what is mounted on the flange; down (N, 3): unit vector of gravity, axes of the robot base,
+    of which only an effect ``by_gravity`` is told; straight down where it is None.
     """
 
     spindle: Floats | None = None
@@ -88,6 +89,7 @@ class Conditions:
     time: Floats | None = None
     payload_mass: Floats | None = None
     payload_com: Floats | None = None
+    down: Floats | None = None
 
     def part(self, rows: Any) -> Conditions:
         """The conditions of some states."""
@@ -129,13 +131,15 @@ class Effect:
 
     ``family``: what a controller may already correct (``geometric``, ``weight``), or ``elastic``, ``gear``.
     ``coordinates``: extra coordinates of the chain that it needs.  ``by_direction``: it asks how joints came to their
-    place.  ``whole``: an arm that was never calibrated has it in all of its joints.  ``apart``: it may be there on one
-    joint and not on another.  ``zero_without_load``: without a wrench it moves nothing.
+    place, ``by_gravity``: where down is.  ``whole``: an arm that was never calibrated has it in all of its joints.
+    ``apart``: it may be there on one joint and not on another.  ``zero_without_load``: without a wrench it moves
+    nothing.
     """
 
     name: ClassVar[str]
     family: ClassVar[str]
     by_direction: ClassVar[bool] = False
+    by_gravity: ClassVar[bool] = False
     whole: ClassVar[bool] = False
     apart: ClassVar[bool] = True
     zero_without_load: bool = False

@@ -13,6 +13,8 @@ from postproc.base.findings import Finding, Refusal
 from postproc.identification.campaign import Campaign, Nuisances
 from postproc.identification.identifiable import Dropped, Identifiability, basis, identifiability
 from postproc.identification.least_squares import (
+    CLOSE,
+    MAX_STEPS,
     Point,
     at,
     descended,
@@ -35,6 +37,12 @@ ROUNDING = 1e-3
 PRIOR_ROUNDS, SAME_FACTOR = 5, 0.1
 """How often the variance of the readings is estimated again, because priors count against it, and the logarithm of its
 change from which on."""
+
+NEAR_STEPS, NEAR = 6, 0.03
+"""Of a fit that starts near its end: steps, and the last one of these, in standard deviations of a reading."""
+
+MANY = 20
+"""Rows for each column from which on they are reduced first."""
 
 AT_BOUND = 1e-9
 """Of a parameter's size."""
@@ -114,13 +122,15 @@ def fit(
     rows: Bools | None = None,
     robust: bool = False,
     given: Nuisances | None = None,
+    near: bool = False,
 ) -> Fit:
     """The weighted least squares of the readings ``rows`` (R,) (all without it) over the unknowns and nuisances.
 
     Unknowns that the readings cannot give stay as they are and are named.  Intervals come from the covariance of the
     linearized problem at the solution; where the residuals are clearly larger than the stated scatter, or none is
     stated, they are as wide as the residuals ask for.  ``robust``: readings far off are weighed down (Huber).
-    ``given``: tracker and targets to start with, where they are about known.
+    ``given``: tracker and targets to start with, where they are about known; ``near``: so is the model, the columns
+    at which serve all through.
 
     Raises Refusal IDN002 with fewer readings than unknowns, IDN003 where the model to start with has no rest.
     """
@@ -141,19 +151,20 @@ def fit(
     _enough(campaign, weights, unknowns)
     point = _influential(campaign, point, unknowns)
     start_point = point
+    steps, close = (NEAR_STEPS, NEAR) if near else (MAX_STEPS, CLOSE)
     free, dropped = list(unknowns), list[Dropped]()
     factor, again = 1.0, PRIOR_ROUNDS if any(u.prior is not None for u in unknowns) else 0
     while True:
-        point = descended(campaign, point, free, plain, factor=factor)
+        point = descended(campaign, point, free, plain, near, steps, factor, close)
         updated = _with_turns(campaign, point, noise, plain)
         together = np.concatenate(point.taken, axis=2)
         updated = replace(updated, shared=shared_error(point.residual, updated, together, noise.known))
         if updated.shared != plain.shared or updated.weight is not plain.weight:
-            plain, point = updated, descended(campaign, point, free, updated, factor=factor)
+            plain, point = updated, descended(campaign, point, free, updated, near, steps, factor, close)
         weights = plain
         if robust:
             point, weights = _robust(campaign, point, free, plain, rows, factor, noise.known)
-        if not point.settled:
+        if not (point.settled or near):
             point = with_columns(campaign, point, free)
         analysis, before = _insight(campaign, point, free, weights, factor), factor
         factor, exceeded, freedom, quantile = _variance(
@@ -275,6 +286,10 @@ def _insight(
     campaign: Campaign, point: Point, free: Sequence[Unknown], weights: Weighting, factor: float
 ) -> Identifiability:
     columns, nuisance = (np.nan_to_num(weights(part)) for part in point.taken)
+    if len(columns) > MANY * (columns.shape[1] + nuisance.shape[1]):
+        # as many rows as there are columns, with the same information
+        reduced = np.asarray(np.linalg.qr(np.concatenate([columns, nuisance], axis=1), mode="r"))
+        columns, nuisance = reduced[:, : columns.shape[1]], reduced[:, columns.shape[1] :]
     known = campaign.nuisance_prior(point.given)[0] * prior_weight(factor)
     columns = np.concatenate([columns, np.zeros((len(known), columns.shape[1]))])
     nuisance = np.concatenate([nuisance, known])

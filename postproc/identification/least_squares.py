@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from postproc.base.arrays import Floats
+from postproc.identification.bounded import bounded_least_squares
 from postproc.identification.campaign import LARGEST_SCALE, Campaign, Nuisances, PredictedReadings
 from postproc.identification.noise import Weighting
 from postproc.identification.sensitivities import columns
@@ -91,6 +92,60 @@ def prior_weight(factor: float) -> float:
     return float(np.sqrt(max(factor, EXACT)))
 
 
+def reach(campaign: Campaign, point: Point, unknowns: Sequence[Unknown]) -> tuple[Floats, Floats]:
+    """(P + U,) each: the lowest and the highest step of unknowns, in their scales, and of nuisances from ``point``."""
+    scale, values = scales(unknowns), point.values(unknowns)
+    low = np.concatenate(
+        [
+            (np.array([u.parameter.lower for u in unknowns]) - values) / scale,
+            np.full(len(campaign.nuisance_names), -np.inf),
+        ]
+    )
+    high = np.concatenate(
+        [
+            (np.array([u.parameter.upper for u in unknowns]) - values) / scale,
+            np.full(len(campaign.nuisance_names), np.inf),
+        ]
+    )
+    if campaign.scaled:
+        low[-1], high[-1] = -LARGEST_SCALE - point.given.scale, LARGEST_SCALE - point.given.scale
+    return low, high
+
+
+def prior_equations(
+    campaign: Campaign, point: Point, unknowns: Sequence[Unknown], factor: float
+) -> tuple[Floats, Floats]:
+    """Rows (k, P + U) of the priors of unknowns and nuisances, and what they ask for from ``point`` (k,), in standard
+    deviations; ``factor`` as of ``descended``."""
+    prior, scale = prior_rows(unknowns), scales(unknowns)
+    known, offset = campaign.nuisance_prior(point.given)
+    wanted = np.array([u.value for u in unknowns])
+    rows = np.block(
+        [[prior, np.zeros((len(prior), known.shape[1]))], [np.zeros((len(known), len(prior))), known]]
+    )
+    asked = np.concatenate([prior @ ((wanted - point.values(unknowns)) / scale), offset])
+    return rows * prior_weight(factor), asked * prior_weight(factor)
+
+
+def bounded_step(
+    matrix: Floats, target: Floats, low: Floats, high: Floats, parameters: int, careful: float = 0.0
+) -> Floats:
+    """(k,) least squares of ``matrix`` (n, k) @ step - ``target`` (n,) between ``low`` and ``high`` (k,), damped by a
+    share of each column's length; the first ``parameters`` of k are not tracker and targets."""
+    length = np.linalg.norm(matrix, axis=0)
+    length[length == 0] = 1.0
+    damping = np.maximum(np.repeat([DAMPING, LOOSE], [parameters, len(length) - parameters]), careful)
+    # many rows to as many as there are columns, with the same information
+    tall = np.block([[matrix / length, target[:, None]], [np.diag(damping), np.zeros((len(length), 1))]])
+    reduced = np.asarray(np.linalg.qr(tall, mode="r"))
+    system, right = reduced[:-1, :-1], reduced[:-1, -1]
+    step = np.linalg.lstsq(system, right, rcond=None)[0]
+    low, high = low * length, high * length
+    if np.any(step < low) or np.any(step > high):
+        step = bounded_least_squares(system, right, np.minimum(low, 0.0), np.maximum(high, 0.0))
+    return np.asarray(step / length)
+
+
 def descended(
     campaign: Campaign,
     point: Point,
@@ -99,63 +154,48 @@ def descended(
     keep_columns: bool = False,
     max_steps: int = MAX_STEPS,
     factor: float = 1.0,
+    close: float = CLOSE,
 ) -> Point:
     """The least squares of ``weights(residual)`` and the priors, from ``point``.
 
     ``keep_columns``: those of ``point`` serve all through, for fits that end close by.  ``factor``: variance of the
     readings over the one of ``weights``; priors count the more against it.  Each linear problem is solved
-    within the bounds (scipy's lsq_linear); steps are halved until the squares fall.
+    within the bounds; steps are halved until the squares fall.  ``close``: step that is the last, in standard
+    deviations of a reading.
     """
-    from scipy.optimize import lsq_linear
-
-    scale, prior = scales(unknowns), prior_rows(unknowns) * prior_weight(factor)
-    known = campaign.nuisance_prior(point.given)[0] * prior_weight(factor)
-    lower = np.array([u.parameter.lower for u in unknowns]) / scale
-    upper = np.array([u.parameter.upper for u in unknowns]) / scale
-    wanted = np.array([u.value for u in unknowns]) / scale
-    loose = np.full(len(campaign.nuisance_names), np.inf)
+    scale = scales(unknowns)
 
     def residuals(candidate: Point) -> tuple[Floats, int]:
-        x = candidate.values(unknowns) / scale
-        of_nuisances = campaign.nuisance_prior(candidate.given)[1] * prior_weight(factor)
-        weighted = np.concatenate([weights(candidate.residual), prior @ (wanted - x), of_nuisances])
+        asked = prior_equations(campaign, candidate, unknowns, factor)[1]
         lost = (weights.weight > 0) & ~np.isfinite(candidate.residual)
-        return weighted, int(lost.sum())
+        return np.concatenate([weights(candidate.residual), asked]), int(lost.sum())
 
     residual, lost = residuals(point)
     fresh, careful = point.columns is not None, 0.0
+    whitened = rotation = np.empty((0, 0))
     for _ in range(max_steps):
-        if not fresh:
-            point, fresh = with_columns(campaign, point, unknowns), True
-        x = point.values(unknowns) / scale
-        matrix = np.concatenate([weights(part) for part in point.taken], axis=1)
-        extra = np.block([[prior, np.zeros((len(x), len(loose)))], [np.zeros((len(known), len(x))), known]])
-        matrix = np.nan_to_num(np.concatenate([matrix, extra]))
+        if not fresh or not len(whitened):
+            point = point if fresh else with_columns(campaign, point, unknowns)
+            fresh = True
+            whitened = np.nan_to_num(np.concatenate([weights(part) for part in point.taken], axis=1))
+            # columns that serve all through are reduced once
+            rotation, reduced = np.linalg.qr(whitened) if keep_columns else (rotation, whitened)
+        rows = prior_equations(campaign, point, unknowns, factor)[0]
+        matrix = np.concatenate([whitened, rows])
         if matrix.shape[1] == 0:
             return replace(point, settled=True)
-        length = np.linalg.norm(matrix, axis=0)
         # a column of nothing may grow with the others, however straight their path is
-        awake = length > 0
-        length[~awake] = 1.0
-        # many rows to as many as there are columns, with the same information
-        damping = np.maximum(np.repeat([DAMPING, LOOSE], [len(x), len(loose)]), careful)
-        tall = np.block(
-            [[matrix / length, residual[:, None]], [np.diag(damping), np.zeros((len(length), 1))]]
-        )
-        reduced = np.asarray(np.linalg.qr(tall, mode="r"))
-        system, right = reduced[:-1, :-1], reduced[:-1, -1]
-        if campaign.scaled:
-            below, above = loose.copy(), loose.copy()
-            below[-1], above[-1] = LARGEST_SCALE + point.given.scale, LARGEST_SCALE - point.given.scale
-        else:
-            below = above = loose
-        low, high = np.concatenate([lower - x, -below]) * length, np.concatenate([upper - x, above]) * length
-        whole = np.linalg.lstsq(system, right, rcond=None)[0]
-        if np.any(whole < low) or np.any(whole > high):
-            whole = lsq_linear(system, right, (np.minimum(low, 0.0), np.maximum(high, 0.0)), "bvls").x
-        whole = whole / length
+        awake = matrix[:, : len(scale)].any(axis=0)
+        system, target = matrix, residual
+        if keep_columns:
+            system = np.concatenate([reduced, rows])
+            target = np.concatenate([rotation.T @ residual[: len(whitened)], residual[len(whitened) :]])
+        whole = bounded_step(system, target, *reach(campaign, point, unknowns), len(scale), careful)
         share, moved, after, gone = 1.0, point, residual, lost
-        for _ in range(12):
+        freedom = max(1, len(residual) - matrix.shape[1])
+        # where there is nothing to gain no part of the step is tried either
+        ending = np.linalg.norm(matrix @ whole) < close * np.sqrt(residual @ residual / freedom)
+        for _ in range(1 if ending else 12):
             moved = _stepped(campaign, point, unknowns, share * whole, scale)
             after, gone = residuals(moved)
             if gone <= lost and after @ after <= residual @ residual * (1 + 1e-12):
@@ -166,13 +206,13 @@ def descended(
         foreseen = matrix @ (share * whole)
         size = float(np.linalg.norm(foreseen))
         astray = float(np.linalg.norm(residual - foreseen - after))
-        fresh = keep_columns or (share == 1.0 and astray < STRAIGHT * size and bool(awake[: len(x)].all()))
+        fresh = keep_columns or (share == 1.0 and astray < STRAIGHT * size and bool(awake.all()))
         # a step that went astray went too far along what is hardly observable (Levenberg)
         curved = share < 1.0 or astray > CURVED * size
         careful = min(max(30.0 * careful, CAREFUL), 0.1) if curved else careful / 10.0
-        scatter = np.sqrt(after @ after / max(1, len(after) - len(length)))
+        scatter = np.sqrt(after @ after / freedom)
         point, residual, lost = moved, after, gone
-        if share == 1.0 and (size < CLOSE * scatter or size <= 1e-9):
+        if share == 1.0 and (size < close * scatter or size <= 1e-9):
             return replace(point, settled=True)
     return point
 

@@ -10,9 +10,13 @@ import numpy as np
 from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding
 from postproc.base.units import MM
+from postproc.effects.joint_offset import JointOffset
+from postproc.effects.link_geometry import LinkGeometry
 from postproc.identification.campaign import Campaign, Nuisances
 from postproc.identification.least_squares import at
 from postproc.identification.registration import registered
+from postproc.identification.sensitivities import columns
+from postproc.identification.unknowns import unknowns_of
 from postproc.measurements import Readings
 from postproc.model import StiffnessModel
 
@@ -83,23 +87,51 @@ def _moved_targets(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
     _, before = _registered(campaign, model)
     other = Campaign(changed, campaign.stated_tool)
     given, after = _registered(other, model)
-    if _rms(after) > LEFT * _rms(before):
-        return readings, []
+    sizes = _rms(before), _rms(after)
+    if sizes[1] > LEFT * sizes[0]:
+        # what a wrong geometry leaves may be more than targets that moved
+        sizes = _beside_geometry(campaign, model), _beside_geometry(other, model)
+        if not sizes[1] <= LEFT * sizes[0]:
+            return readings, []
     words = []
     for k, name in enumerate(names):
         places = [given.places[split.index(anew[k, s])] for s in range(sessions) if (k, s) in anew]
         if len(places) > 1:
             by = max(float(np.linalg.norm(place - places[0])) for place in places[1:])
-            if by > CLEAR * _rms(after) / np.sqrt(len(after) / sessions):
+            if by > CLEAR * sizes[1] / np.sqrt(len(after) / sessions):
                 words.append(f"{name} by {by / MM:.2g} mm")
     if not words:
         return readings, []
     message = (
         f"the reflector was mounted anew between sessions ({', '.join(words)}): one place leaves"
-        f" {_rms(before) / MM:.3g} mm RMS, one for each session {_rms(after) / MM:.3g} mm; it counts as another"
+        f" {sizes[0] / MM:.3g} mm RMS, one for each session {sizes[1] / MM:.3g} mm; it counts as another"
         " reflector in each session"
     )
     return changed, [Finding("IDN032", message, *readings.where(0)[:1])]
+
+
+def _beside_geometry(campaign: Campaign, model: StiffnessModel) -> float:
+    """[m] root mean square of what tracker, targets and any geometry of the arm leave, to first order, for its degrees
+    of freedom; infinite where it has none."""
+    for effect in (LinkGeometry, JointOffset):
+        if all(term.effect.name != effect.name for term in model.terms):
+            model = model.with_effect(effect(model.robot.joints))
+    unknowns = [
+        unknown
+        for k, term in enumerate(model.terms)
+        if term.effect.name in (LinkGeometry.name, JointOffset.name)
+        for unknown in unknowns_of(model, k)
+    ]
+    given, residual = _registered(campaign, model)
+    there = at(campaign, model, given).predicted
+    own = columns(campaign, model, unknowns, there, given)
+    matrix = np.concatenate([own, campaign.nuisance_columns(there, given)], axis=2)[:, :3]
+    target = residual.reshape(-1)
+    known = np.isfinite(target)
+    basis = _basis(np.nan_to_num(matrix.reshape(len(target), -1)[known]))
+    target = target[known] - basis @ (basis.T @ target[known])
+    freedom = len(target) - basis.shape[1]
+    return float(np.sqrt(3 * target @ target / freedom)) if freedom > 0 else np.inf
 
 
 def _moved_tracker(campaign: Campaign, model: StiffnessModel) -> tuple[Readings, list[Finding]]:
@@ -108,8 +140,8 @@ def _moved_tracker(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
     given, before = _registered(campaign, model)
     if not np.isfinite(before).all():
         return readings, []
-    columns = campaign.nuisance_columns(at(campaign, model, given).predicted, given)[:, :3]
-    common = columns.reshape(3 * len(campaign), -1)
+    moves = campaign.nuisance_columns(at(campaign, model, given).predicted, given)[:, :3]
+    common = moves.reshape(3 * len(campaign), -1)
     basis, target = _basis(common), before.reshape(-1)
     whole = float(target @ target)
     best, moment, of = whole, -1, -1
@@ -121,7 +153,7 @@ def _moved_tracker(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
         inner = changes[FEWEST - 1 : len(changes) - FEWEST + 1]
         tried = np.unique(inner[np.linspace(0, len(inner) - 1, MOMENTS).round().astype(int)])
         while len(tried):
-            sizes = [_after(columns, basis, target, own, row, s) for row in tried.tolist()]
+            sizes = [_after(moves, basis, target, own, row, s) for row in tried.tolist()]
             least = int(np.argmin(sizes))
             if sizes[least] < best:
                 best, moment, of = sizes[least], int(tried[least]), s
@@ -148,11 +180,11 @@ def _moved_tracker(campaign: Campaign, model: StiffnessModel) -> tuple[Readings,
     return changed, [Finding("IDN033", message, readings.where(0)[0], line)]
 
 
-def _after(columns: Floats, basis: Floats, target: Floats, own: Ints, row: int, session: int) -> float:
+def _after(moves: Floats, basis: Floats, target: Floats, own: Ints, row: int, session: int) -> float:
     """Squares that remain where the tracker of a session is elsewhere from ``row`` on."""
     later = own[own >= row]
-    more = np.zeros((len(columns), 3, 6))
-    more[later] = columns[later][:, :, 6 * session : 6 * session + 6]
+    more = np.zeros((len(moves), 3, 6))
+    more[later] = moves[later][:, :, 6 * session : 6 * session + 6]
     flat = more.reshape(len(target), 6)
     flat = _basis(flat - basis @ (basis.T @ flat))
     return float(target @ target - ((flat.T @ target) ** 2).sum())

@@ -16,6 +16,10 @@ CLEARLY = 0.2
 """With an explanation at most this share remains of what there is without it."""
 
 
+MANY = 2000
+"""Readings from which on no robust fit is needed to detect a few outliers."""
+
+
 @dataclass(frozen=True)
 class Outlier:
     """A reading ``distance`` [m] from where it should be, ``sigmas`` of its scatter; ``what`` it may be, in words."""
@@ -41,7 +45,10 @@ def outliers(fitted: Fit, rows: Bools) -> tuple[tuple[Outlier, ...], Fit]:
     if not np.any(rows & (length > max(0.7, 1.0 - 5.0 * share) * limit)):
         return (), fitted
     campaign = fitted.campaign
-    robust = fit(campaign, fitted.start, fitted.asked, rows, robust=True, given=fitted.point.given)
+    # thousands of readings a few do not pull
+    robust = fitted
+    if len(campaign) <= MANY:
+        robust = fit(campaign, fitted.start, fitted.asked, rows, robust=True, given=fitted.point.given)
     length, level, limit = _lengths(robust, rows)
     entries = []
     for row in np.flatnonzero(rows & (length > limit)):

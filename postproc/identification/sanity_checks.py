@@ -16,7 +16,7 @@ from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import DEG, MM
 from postproc.identification.campaign import Campaign
-from postproc.identification.least_squares import at, descended
+from postproc.identification.least_squares import at, bounded_step, descended, reach, with_columns
 from postproc.identification.noise import noise_of, weighting
 from postproc.identification.registration import registered
 from postproc.identification.unknowns import Unknown
@@ -62,6 +62,9 @@ ENOUGH = 300
 
 LOOKED_AT = 60
 """Readings that alternatives are tried on."""
+
+FOLLOWED = 4
+"""Changes to the data that are fitted on after their first step."""
 
 PART, SHIFT_TRIED = 12, 5000
 """Readings that show that a part of a file belongs to other rows, and how many a file may have to be checked."""
@@ -179,9 +182,15 @@ def check_fit(campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unkn
         some = np.arange(len(campaign))
     few = campaign.readings.part(some)
     here, _ = _remaining_share(Campaign(few, campaign.stated_tool), model, unknowns)
+    tried = [
+        (words, Campaign(changed, campaign.stated_tool)) for words, changed in _alternatives(few, campaign)
+    ]
+    # the linear problem shows which changes may help
+    sizes = [_remaining_share(changed, model, unknowns, linear=True)[0] for _, changed in tried]
+    nearest = [tried[k] for k in np.argsort(sizes, kind="stable")[:FOLLOWED]]
     best, word = np.inf, ""
-    for words, changed in _alternatives(few, campaign):
-        there = _remaining_share(Campaign(changed, campaign.stated_tool), model, unknowns)[0]
+    for words, changed in nearest:
+        there = _remaining_share(changed, model, unknowns)[0]
         if there < best:
             best, word = there, words
     file = str(campaign.readings.files[0]) if campaign.readings.files else ""
@@ -301,16 +310,27 @@ def _badly(campaign: Campaign, remaining: float, signal: float, share: float) ->
 
 
 def _remaining_share(
-    campaign: Campaign, model: StiffnessModel, unknowns: Sequence[Unknown], fitted: bool = False
+    campaign: Campaign,
+    model: StiffnessModel,
+    unknowns: Sequence[Unknown],
+    fitted: bool = False,
+    linear: bool = False,
 ) -> tuple[float, float]:
     """[m] root mean square of what a fit leaves (of absolute readings, unless ``fitted``, a registration alone), and of
-    what was measured."""
+    what was measured; ``linear``: as it is foreseen of the first step."""
     rows = np.ones(len(campaign), bool)
     point = at(campaign, model, campaign.start())
     given = registered(campaign, point.predicted, rows)
     point = replace(point, given=given, residual=campaign.residual(point.predicted, given))
     if campaign.readings.deflection or fitted:
         weights = weighting(campaign, noise_of(campaign.readings), point.residual)
+        if linear:
+            point = with_columns(campaign, point, unknowns)
+            columns = np.nan_to_num(np.concatenate(point.taken, axis=2))
+            step = bounded_step(
+                weights(columns), weights(point.residual), *reach(campaign, point, unknowns), len(unknowns)
+            )
+            return _rms(point.residual - columns @ step), _rms(campaign.readings.value)
         point = descended(campaign, point, unknowns, weights, max_steps=3)
     return _rms(point.residual), _rms(campaign.readings.value)
 

@@ -10,11 +10,14 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.geometry import Poses
 from postproc.identification.campaign import SCALE, Campaign, Nuisances
-from postproc.identification.fit import Fit
-from postproc.identification.least_squares import at, descended
+from postproc.identification.fit import NEAR, Fit
+from postproc.identification.least_squares import at, bounded_step, descended, prior_equations, reach
 from postproc.identification.registration import registered
 
 SEED = 20260101
+
+MANY = 2000
+"""Readings from which on a fold that is left out hardly moves a fit."""
 
 OTHER_STATION = 3.0
 """A registration that leaves so many times more than one of its own does not hold for other readings."""
@@ -41,19 +44,47 @@ def held_out(fitted: Fit, folds: int, progress: Progress = nothing) -> Floats:
     Each fold's fit starts from the one of all readings and keeps its columns: what is reported is to first order, as
     the residuals that leverages give (PRESS; Allen, Technometrics 16 (1974)).  Where the readings of the other folds
     hardly determine a parameter, a fit of its own might run far away along it, which describes more the fold than of
-    the model.
+    the model.  Of thousands of readings, where a fold hardly moves the fit, one linear step does.
     """
     campaign = fitted.campaign
     fold = folds_of(campaign, folds)
-    residuals = np.full((len(campaign), 3), np.nan)
-    for k in range(folds):
-        rows = fold == k
-        weights = fitted.weights.times((~rows).astype(float))
-        point = descended(campaign, fitted.point, fitted.unknowns, weights, True, factor=fitted.factor)
-        residuals[rows] = campaign.in_base(point.residual, point.given)[rows, :3]
-        progress(k + 1, folds)
+    if len(campaign) > MANY:
+        away = _linear_steps(fitted, fold, folds)
+        residuals = campaign.in_base(away, fitted.point.given)[:, :3]
+        progress(folds, folds)
+    else:
+        residuals = np.full((len(campaign), 3), np.nan)
+        for k in range(folds):
+            rows = fold == k
+            weights = fitted.weights.times((~rows).astype(float))
+            point = descended(
+                campaign, fitted.point, fitted.unknowns, weights, True, factor=fitted.factor, close=NEAR
+            )
+            residuals[rows] = campaign.in_base(point.residual, point.given)[rows, :3]
+            progress(k + 1, folds)
     residuals[~counted(fitted)] = np.nan
     return residuals
+
+
+def _linear_steps(fitted: Fit, fold: Ints, folds: int) -> Floats:
+    """(R, 3 or 6) residuals of each ``fold`` (R,) after one step to the least squares of the others."""
+    campaign, point = fitted.campaign, fitted.point
+    own, nuisance = (np.nan_to_num(part) for part in point.taken)
+    columns = np.concatenate([own, nuisance], axis=2)
+    # the rows of a fold as so many as there are columns, with the same information
+    tall = np.column_stack([fitted.weights(columns), fitted.weights(point.residual)])
+    part = np.repeat(fold, len(tall) // len(fold))
+    reduced = [np.linalg.qr(tall[part == k], mode="r") for k in range(folds)]
+    rows, asked = prior_equations(campaign, point, fitted.unknowns, fitted.factor)
+    low, high = reach(campaign, point, fitted.unknowns)
+    away = np.empty_like(point.residual)
+    for k in range(folds):
+        rest = np.concatenate(
+            [*(block for j, block in enumerate(reduced) if j != k), np.column_stack([rows, asked])]
+        )
+        step = bounded_step(rest[:, :-1], rest[:, -1], low, high, own.shape[2])
+        away[fold == k] = point.residual[fold == k] - columns[fold == k] @ step
+    return away
 
 
 def counted(fitted: Fit) -> Bools:

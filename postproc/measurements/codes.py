@@ -105,5 +105,13 @@ CODES = define(
             action="Name each file once, and remove copies of rows.",
             example="A file and a copy of it with another comment.",
         ),
+        "MEA013": Code(
+            "error",
+            "no measurements",
+            meaning="The file is a program or a YAML file, in the place of measurements.",
+            consequence="There is nothing to identify or diagnose in it.",
+            action="Give a CSV of readings; `compensate plan` writes one to fill in.",
+            example="`compensate diagnose part.src`.",
+        ),
     }
 )

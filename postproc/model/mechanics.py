@@ -63,6 +63,11 @@ class Mechanics:
         return any(term.effect.by_direction for term in self.terms)
 
     @cached_property
+    def by_gravity(self) -> bool:
+        """Whether an offset asks where down is."""
+        return any(term.effect.by_gravity for term in self.terms)
+
+    @cached_property
     def gaps(self) -> Floats:
         """(n,) [rad, m] lost motion of each joint at a reversal: what is in series adds up."""
         total = np.zeros(len(self.robot.joints))
@@ -118,9 +123,13 @@ class Mechanics:
         )
 
     def completed(self, q: Floats, conditions: Conditions) -> Conditions:
-        """The conditions, with the senses of approach from the order of ``q`` (N, n) where they are asked for."""
+        """The conditions, with senses of approach from the order of ``q`` (N, n) and where down is, where effects ask
+        for these."""
         if conditions.direction is None and self.by_direction:
-            return replace(conditions, direction=approach(q))
+            conditions = replace(conditions, direction=approach(q))
+        if conditions.down is None and self.by_gravity:
+            down = self.gravity / np.linalg.norm(self.gravity)
+            conditions = replace(conditions, down=np.broadcast_to(down, (len(q), 3)))
         return conditions
 
     def rest(self, motors: Floats, conditions: Conditions) -> Floats:

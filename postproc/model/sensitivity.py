@@ -39,12 +39,13 @@ def compute_sensitivity(
             moved = gives.T * moved
         elif isinstance(effect, Offset):
             if by_rest is None:
-                by_rest = gives.T[:, :, None] * compute_curvature(model, state, tool, every, of_rest=True)
+                by_rest = gives.T[:, :, None] * compute_curvature(model, state, tool, every, True, force)
             moved = moved + (by_rest @ moved[:, :, None])[:, :, 0]
         own[:, :, k] = moved
     # what is neither compliant nor moved by a parameter stays where it is
     free = np.flatnonzero(gives.any(axis=1) | own.any(axis=(0, 2)))
-    inner = np.eye(len(free)) - (gives.T[:, :, None] * compute_curvature(model, state, tool, free))[:, free]
+    curvature = compute_curvature(model, state, tool, free, force=force)
+    inner = np.eye(len(free)) - (gives.T[:, :, None] * curvature)[:, free]
     own[:, free] = np.linalg.solve(inner, own[:, free])
     return own
 
@@ -62,23 +63,31 @@ def _alone(model: Mechanics, effect: Effect, values: Values, state: ChainState, 
 
 
 def compute_curvature(
-    model: Mechanics, state: ChainState, tool: Poses, columns: Ints, of_rest: bool = False
+    model: Mechanics,
+    state: ChainState,
+    tool: Poses,
+    columns: Ints,
+    of_rest: bool = False,
+    force: Floats | None = None,
 ) -> Floats:
     """H (N, m, k): derivative of the generalized forces by the coordinates ``columns`` (k,), or by the coordinates
-    without load where those stay; central differences, many at once."""
+    without load where those stay; central differences, many at once.  With the ``force`` (m, N) [N m, N] at ``state``
+    the differences are forward ones, of half the work: a part in a million of H."""
     size, count, step = model.chain.size, state.motors.shape[1], 1e-6
+    sides = 2 if force is None else 1
     h = np.empty((count, size, len(columns)))
-    at_once = max(1, CHUNK // max(1, 2 * count))
+    at_once = max(1, CHUNK // max(1, sides * count))
     for start in range(0, len(columns), at_once):
         part = columns[start : start + at_once]
-        rows = np.tile(np.arange(count), 2 * len(part))
+        rows = np.tile(np.arange(count), sides * len(part))
         many = state.part(rows)
-        moved = (many.rest if of_rest else many.coordinates).reshape(size, len(part), 2, count)
+        moved = (many.rest if of_rest else many.coordinates).reshape(size, len(part), sides, count)
         moved[part, np.arange(len(part)), 0] += step
-        moved[part, np.arange(len(part)), 1] -= step
+        if force is None:
+            moved[part, np.arange(len(part)), 1] -= step
         at = tool if tool.position.ndim == 1 else tool[rows]
         swept = model.chain.evaluate(many.coordinates, at, many.conditions.spindle)
-        force = model.forces(replace(many, swept=swept))[0].reshape(size, len(part), 2, count)
-        slope = (force[:, :, 0] - force[:, :, 1]) / (2 * step)
+        there = model.forces(replace(many, swept=swept))[0].reshape(size, len(part), sides, count)
+        slope = (there[:, :, 0] - (there[:, :, 1] if force is None else force[:, None])) / (sides * step)
         h[:, :, start : start + len(part)] = np.moveaxis(slope, 2, 0)
     return h

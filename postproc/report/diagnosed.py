@@ -43,11 +43,13 @@ USUAL = 10.0
 class NextPoses:
     """Poses worth measuring next: they distinguish the explanations ``between``.  readings: still to be taken;
     separation: standard deviations by which they show that the first is no case of the second, and vice
-    versa."""
+    versa; ``beyond``: the axes that leave the ranges measured so far, because within these nothing distinguishes
+    them."""
 
     readings: Readings
     between: tuple[Candidate, Candidate]
     separation: tuple[float, float]
+    beyond: tuple[str, ...] = ()
 
     @property
     def poses(self) -> list[dict[str, float]]:
@@ -165,14 +167,14 @@ class Diagnosed(Result):
     def lengths(self) -> dict[str, Floats]:
         """(R,) [m] lengths of residuals: under the names that ``gap`` starts with, and of two more fits.  ``refitted``:
         the robot file's own parameters refitted; ``explained``: with all that was chosen, named or not."""
-        search, measured = self.diagnosis.search, np.isfinite(self.final.campaign.readings.value)
+        measured = np.isfinite(self.final.campaign.readings.value)
         residuals = {
             "before": self.diagnosis.stated.residual,
             "after": self.final.residual,
             "held_out_before": self.held_out_before,
             "held_out_after": self.held_out_after,
-            "refitted": search.base.residual,
-            "explained": search.final.residual,
+            "refitted": self.diagnosis.base.residual,
+            "explained": self.diagnosis.search.confirmed.residual,
         }
         return {
             name: np.where(self.counts, lengths_of(values, measured), np.nan)
@@ -208,7 +210,9 @@ class Diagnosed(Result):
     def moved(self) -> dict[Key, Sizes | None]:
         """How much of what was measured each named effect moves, by the key of its candidate."""
         measured = np.isfinite(self.final.campaign.readings.value)
-        several = {named.candidate.key: moved(self.diagnosis.search, named) for named in self.verdict.named}
+        several = {
+            named.candidate.key: moved(self.diagnosis.search.confirmed, named) for named in self.verdict.named
+        }
         return {
             key: Sizes.of(np.where(self.counts, lengths_of(one, measured), np.nan))
             for key, one in several.items()
@@ -241,7 +245,7 @@ class Diagnosed(Result):
     @cached_property
     def patterns(self) -> tuple[ResidualPattern, ...]:
         """Patterns in the residuals of the robot file with its own parameters refitted: signs of a missing effect."""
-        return residual_patterns(self.diagnosis.search.base, self.diagnosis.search.final)
+        return residual_patterns(self.diagnosis.base, self.diagnosis.search.confirmed)
 
     def table(self) -> Columns:
         """One row a parameter of the named effects: effect, joints, parameter, value, ci95, unit."""
@@ -300,6 +304,7 @@ class Diagnosed(Result):
             "next_poses_separation": None
             if self.next_poses is None
             else [_finite(separation) for separation in self.next_poses.separation],
+            "next_poses_beyond": None if self.next_poses is None else list(self.next_poses.beyond),
             "stations": [_placed(one, "session") for one in stations(self.final)],
             "target_places": [_placed(one, "target") for one in targets(self.final)],
             "tracker_scale": None if (scale := tracker_scale(self.final)) is None else scale[0],

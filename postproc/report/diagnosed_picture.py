@@ -104,8 +104,7 @@ def _handles(axes: Axes) -> list[Any]:
 
 def series(result: Diagnosed) -> list[str]:
     """The residuals that are drawn: each fit once."""
-    search = result.diagnosis.search
-    same = {"refitted": search.base, "explained": search.final}
+    same = {"refitted": result.diagnosis.base, "explained": result.diagnosis.search.confirmed}
     return [name for name in _NAMES if same.get(name) is not result.final]
 
 
@@ -147,11 +146,10 @@ class Betrayal(NamedTuple):
 def betrayals(result: Diagnosed) -> list[Betrayal]:
     """The variables that what is missing goes with, those of the joints that are named first; without any the order of
     the readings.  Before: the robot file, its own parameters refitted; after: with all that was chosen."""
-    search = result.diagnosis.search
     joints = {joint for named in result.verdict.named for joint in named.joints}
     several = sorted(result.patterns, key=lambda one: one.variable.partition(" ")[0] not in joints)
     shares = {one.variable: one.share for one in several[:PANELS]} or {"order": np.nan}
-    before, after = _along(search.base), _along(search.final)
+    before, after = _along(result.diagnosis.base), _along(result.diagnosis.search.confirmed)
     return [
         Betrayal(before[name][0], before[name][1], after[name][1], before[name][2], share)
         for name, share in shares.items()

@@ -175,7 +175,7 @@ def _residuals(result: Diagnosed, _verbose: bool) -> Table:
         "held_out_before": "held-out poses, robot file",
         "held_out_after": "held-out poses, final model",
     }
-    if not result.diagnosis.search.base.unknowns:
+    if not result.diagnosis.base.unknowns:
         del rows["refitted"]
     add_sizes(table, {words: result.lengths[name] for name, words in rows.items()})
     for one in result.validation:

@@ -22,6 +22,7 @@ NOUNS = {
     "tool_compliance": "compliance of the tool: cutter, holder and spindle deflect",
     "gravity_compensator": "a gravity compensator across {joints}: a spring whose torque follows the angle",
     "link_gravity": "the arm's own weight beyond {joints}: it deflects the arm",
+    "gravity_sag": "sag of {joints} under the arm's own weight: weight times compliance, of which neither is known",
     "payload": "a weight on the flange: it deflects the arm",
     "base_compliance": "compliance of the foundation: the whole robot tilts under load",
     "link_compliance": "compliance of {joints} across the axis: bearings and links tilt under load",
@@ -133,7 +134,7 @@ def _named(result: Diagnosed) -> Iterator[str]:
 
 
 def _ambiguous(result: Diagnosed) -> Iterator[str]:
-    anew = ", with its parameters refitted," if result.diagnosis.search.base.unknowns else ""
+    anew = ", with its parameters refitted," if result.diagnosis.base.unknowns else ""
     yield (
         f"An effect is missing: the residual of the robot file{anew} is {_mm(result.rms['refitted'])} mm RMS"
         f"{_against_scatter(result)}."
@@ -182,6 +183,11 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
         f"Measure these {count(len(planned.poses), 'pose')}{where}: there {first} and {second} differ by {apart:.1f}"
         " standard deviations. Then diagnose all readings together."
     )
+    if planned.beyond:
+        yield (
+            f"They leave the ranges measured so far of {listed(planned.beyond)}, within which nothing distinguishes"
+            " the two: check that the arm, its cables and the target are free there."
+        )
 
 
 def _unknown(result: Diagnosed) -> Iterator[str]:
@@ -287,7 +293,7 @@ def with_interval(estimate: Estimate) -> str:
 
 def _attributed(result: Diagnosed) -> Iterator[str]:
     """The contribution of the effects, apart from that of refitted parameters."""
-    if result.diagnosis.search.base.unknowns:
+    if result.diagnosis.base.unknowns:
         several = "these effects" if len(result.verdict.named) > 1 else "this effect"
         yield (
             f"The residual of the robot file is {_mm(result.rms['before'])} mm RMS,"
@@ -401,8 +407,6 @@ def _course(result: Diagnosed, candidate: Candidate) -> str:
             and alternative.margin < -MARGIN
         ):
             what = f"{course.about} {alternative.candidate.joint}".strip()
-            if course.advice:
-                return f"; {what} explains clearly more: {course.advice}"
             return (
                 f"; {what}, no effect of the library, has a likelihood gain {-alternative.margin:.0f} higher"
             )

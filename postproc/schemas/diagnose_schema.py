@@ -150,6 +150,9 @@ def diagnose_schema() -> Schema:
                 "expected separation, both ways",
                 nullable=True,
             ),
+            "next_poses_beyond": array(
+                word("name of the joint"), "axes that leave the ranges measured so far", nullable=True
+            ),
             "stations": array(
                 record(
                     {

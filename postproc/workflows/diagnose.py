@@ -31,6 +31,7 @@ from postproc.measurements import Readings, measurements_csv, read_measurements
 from postproc.model import STANDARD_GRAVITY, approach
 from postproc.output.atomic_write import write_atomically
 from postproc.report.diagnosed import Diagnosed, NextPoses, ValidatedFile, diagnosed_csv
+from postproc.report.diagnosed_words import SETTLES
 from postproc.report.report import json_bytes
 from postproc.report.residuals import Sizes, lengths_of
 from postproc.workflows.identify import Measured, measured_of
@@ -59,6 +60,9 @@ WILD, FEW = 10.0, 0.05
 
 TRIED = 2
 """Explanations of a set that the first is told from."""
+
+WIDER = 0.05
+"""Share of the range of an axis by which next poses may leave what was measured."""
 
 CANDIDATES = 300
 """Poses to choose from."""
@@ -194,11 +198,34 @@ def _spare_inputs(request: DiagnoseRequest) -> None:
 def _next_poses(measured: Measured, diagnosis: Diagnosis) -> NextPoses | None:
     """Poses, of those loads and targets that were used, at which the explanations disagree most; None where none do."""
     offer = _offer(measured, diagnosis.search.base)
+    # where the arm was it can go again
+    narrow = replace(offer, limits=_measured_ranges(measured.readings.q, offer.limits))
     if measured.readings.deflection and not len(hung_weights(measured.readings)):
         return None  # only pulls: what can be pulled where is not known
     pairs = [(first, other) for first, *others in diagnosis.verdict.alternatives for other in others[:TRIED]]
-    plans = [_discriminating_poses(measured, diagnosis, offer, one, other) for one, other in pairs]
-    return max((plan for plan in plans if plan), key=lambda plan: min(plan.separation), default=None)
+    for offered in (narrow, offer):
+        tried = [_discriminating_poses(measured, diagnosis, offered, one, other) for one, other in pairs]
+        plans = [plan for plan in tried if plan]
+        best = max(plans, key=lambda plan: min(plan.separation), default=None)
+        if best is not None and (min(best.separation) >= SETTLES or offered is offer):
+            return replace(best, beyond=_beyond(measured, best, narrow.limits))
+    return None
+
+
+def _measured_ranges(q: Floats, limits: Floats) -> Floats:
+    """(n, 2) [rad, m] the ranges of ``q`` (R, n), a little widened, within the ``limits`` (n, 2)."""
+    low, high = q.min(axis=0), q.max(axis=0)
+    wider = WIDER * (high - low)
+    return np.stack(
+        [np.clip(low - wider, *limits.T), np.maximum(np.clip(high + wider, *limits.T), limits[:, 0])], axis=1
+    )
+
+
+def _beyond(measured: Measured, plan: NextPoses, ranges: Floats) -> tuple[str, ...]:
+    """Names of the joints that a plan moves out of ``ranges`` (n, 2) [rad, m]."""
+    q = plan.readings.q
+    out = np.flatnonzero(((q < ranges[:, 0] - 1e-9) | (q > ranges[:, 1] + 1e-9)).any(axis=0))
+    return tuple(measured.robot.joints[i].name for i in out)
 
 
 def _discriminating_poses(

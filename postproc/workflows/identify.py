@@ -27,6 +27,7 @@ from postproc.output.atomic_write import write_atomically
 from postproc.report.identified import STRONG, Identified, identified_csv
 from postproc.report.report import json_bytes
 from postproc.robot.description import Robot, find_robot, load_robot, robot_files
+from postproc.workflows.kinds import check_kind
 from postproc.workflows.preparation import Stage, silent
 from postproc.workflows.robot_files import new_robot_file
 
@@ -157,6 +158,8 @@ def measured_of(
     data: Sequence[Path], robot: str | None, tool_mm_deg: Sequence[float] | None = None
 ) -> Measured:
     """Readings of files, and the robot: the one named, or else the one that the first file names.  Raises Refusal."""
+    for path in data:
+        check_kind(path)
     named = robot_named(data[0])
     described = load_robot(find_robot(robot or _known(named, data[0])))
     joints = [(joint.name, joint.kind != "revolute") for joint in described.joints]
