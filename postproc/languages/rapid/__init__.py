@@ -44,6 +44,11 @@ class RapidDialect:
     def companions(self, path: Path) -> list[Path]:
         return []
 
+    def siblings(
+        self, program: Program, settings: ReadingSettings, beside: Path | None = None
+    ) -> tuple[Document, ...]:
+        return ()
+
     def read(self, documents: tuple[Document, ...], settings: ReadingSettings = PLAIN) -> Program:
         return module_reader.read(documents, settings)
 
