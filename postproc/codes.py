@@ -18,6 +18,7 @@ from postproc.languages.krl import codes as krl
 from postproc.measurements import codes as measurements
 from postproc.model import codes as model
 from postproc.output import atomic_write
+from postproc.part import codes as part
 from postproc.process import codes as forces
 from postproc.robot import codes as robot
 from postproc.workflows import codes as workflows
@@ -37,6 +38,7 @@ TABLES: tuple[Mapping[str, Code], ...] = tuple(
         forces,
         measurements,
         compensation,
+        part,
         identification,
         diagnosis,
         experiments,

@@ -47,22 +47,23 @@ class Stock(NamedTuple):
     near: Ints
 
 
-def build_stock(blank: Blank, sweeps: Floats, cutters: Floats) -> tuple[Stock, Floats]:
+def build_stock(blank: Blank, sweeps: Floats, cutters: Floats, reach: float = 0.0) -> tuple[Stock, Floats]:
     """The stock of sweeps (M, 22) by cutters (T, 6), and heights (M, 2) [m] for each sweep.
 
     The heights are the lowest and highest above its tip at which it may meet stock, inf and -inf where it meets none.
+    ``reach`` [m]: distances are known so far at least.
     """
     low, high = corners_of(blank)
     span = high - low
     radius = float(cutters[:, RADIUS].min()) if len(cutters) else LARGEST_CELL
     size = min(max(CELL * radius, SMALLEST_CELL), LARGEST_CELL)
-    size = max(size, float(np.cbrt(np.prod(span) / MOST_CELLS)))
+    size = max(size, reach, float(np.cbrt(np.prod(span) / MOST_CELLS)))
     while np.prod(np.ceil(span / size)) > 2 * MOST_CELLS:  # thin blanks
         size *= 1.2
     shape = np.maximum(np.ceil(span / size).astype(np.int64), 1)
     cells = int(np.prod(shape))
     none = np.zeros(1, np.int32)
-    grid = np.array([size, 0.5 * size, *shape], float)
+    grid = np.array([size, max(0.5 * size, reach), *shape], float)
     stock = Stock(blank, sweeps, cutters, grid, np.zeros(1, np.int64), none)
     count, covered = np.zeros(cells, np.int64), np.full(cells, np.iinfo(np.int32).max, np.int32)
     _mark_outside(stock, covered)
@@ -168,11 +169,21 @@ def _list(stock: Stock, count: Ints, covered: Ints, live: Floats, near: Ints, fi
 @compiled
 def stock_distance(stock: Stock, x: float, y: float, z: float, time: int) -> float:
     """Of a point [m] to what is left of the blank before the sweep ``time``, positive inside, up to ``reach``."""
+    return nearest_sweep(stock, x, y, z, time, 0.0)[0]
+
+
+@compiled
+def nearest_sweep(stock: Stock, x: float, y: float, z: float, time: int, depth: float) -> tuple[float, int]:
+    """As ``stock_distance``, and the sweep whose surface is that near; -1 where it is that of the blank, or none is.
+
+    Below zero it is no more than a bound, but down to ``depth`` [m] how far the point is in the sweep it is most in.
+    """
     grid = stock.grid
     size, reach = grid[0], grid[1]
+    owner = -1
     best = blank_distance(stock.blank, x, y, z)
     if best <= 0.0:
-        return max(best, -reach)
+        return max(best, -reach), owner
     best = min(best, reach)
     frame = stock.blank.frame
     i = min(int((x - frame[1]) / size), int(grid[2]) - 1)
@@ -189,9 +200,9 @@ def stock_distance(stock: Stock, x: float, y: float, z: float, time: int) -> flo
             high = middle
     for place in range(low - 1, start - 1, -1):
         # on the positive side only a smaller distance counts
-        d = swept_distance(stock.sweeps, stock.cutters, stock.near[place], x, y, z, max(best, 0.0))
+        d = swept_distance(stock.sweeps, stock.cutters, stock.near[place], x, y, z, max(best, depth))
         if d < best:
-            best = d
+            best, owner = d, int(stock.near[place])
             if best <= -reach:
-                return -reach
-    return best
+                return -reach, owner
+    return best, owner

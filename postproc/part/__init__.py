@@ -1,0 +1,1 @@
+"""The surface that a program leaves on the part, and its error before and after the correction."""
