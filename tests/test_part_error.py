@@ -18,7 +18,7 @@ BOX = block([-50, -40, -20], [50, 40, 0])
 
 
 def in_circle(radius, centre, points, direction, shift):
-    """How far along ``direction`` (K, 2), away from the middle, a circle lies that is shifted; points (K, 2) are on it."""
+    """How far along ``direction`` (K, 2) a circle is that is shifted, from points (K, 2) on it."""
     u = (points - centre) / radius
     side = u @ shift
     along = np.sum(u * direction, axis=1)  # 1 outward, -1 inward
@@ -33,7 +33,7 @@ def pocket():
 
 
 def test_walls_floor_and_fillets_of_a_pocket_that_is_shifted():
-    """A constant shift of all tools moves walls and floor by its share along their normals, and each fillet as a whole."""
+    """A constant shift moves walls and floor by its share along their normals, and each fillet as a whole."""
     points, normals, error = errors_of(pocket(), BOX, constant(SHIFT), FLAT)
     straight = (np.abs(points[:, 0]) < 29) & (np.abs(points[:, 1]) < 14)
     floor = straight & (normals[:, 2] > 0.999) & (points[:, 2] < -4)
@@ -74,7 +74,7 @@ def test_a_wave_along_a_wall_is_that_of_the_parallel_curve():
 
 @pytest.mark.parametrize("tilt", [2e-3, -1e-2])
 def test_a_tool_that_is_turned_about_its_feed_leaves_a_sloping_floor(tilt):
-    """Its bottom lies in a plane; the side that is lower cuts too deep by the distance from the path times the tangent."""
+    """Its bottom lies in a plane; beside the path it is off by the distance from there times the tangent."""
     path = path_through([[-60, 0, -5], [60, 0, -5]])
     points, normals, error = errors_of(path, BOX, constant(turn=(tilt, 0, 0)), FLAT)
     floor = (normals[:, 2] > 0.999) & (np.abs(points[:, 1]) < 7.9) & (np.abs(points[:, 0]) < 40)
@@ -82,6 +82,7 @@ def test_a_tool_that_is_turned_about_its_feed_leaves_a_sloping_floor(tilt):
     assert error[floor] == pytest.approx(points[floor, 1] * np.tan(tilt), abs=NEAR)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("along", [False, True])
 def test_a_round_boss(along):
     """A full circle around a boss, shifted as a whole, or always outward."""
@@ -107,6 +108,7 @@ def test_a_round_boss(along):
     assert error[boss] == pytest.approx(np.broadcast_to(true, boss.sum()), abs=NEAR)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tilt", [0.0, 25.0])
 def test_grooves_of_a_ball_in_three_and_five_axes(tilt):
     """Across its path a ball leaves a circle, however its axis stands; a shift along the path leaves nothing."""
@@ -116,7 +118,7 @@ def test_grooves_of_a_ball_in_three_and_five_axes(tilt):
     # the tip of a tilted ball is beside its lowest point; its middle stays where it is
     tips = np.array(ends) + 5 * np.array([0, 0, 1.0]) - 5 * lean
     path = path_through(tips, axes=np.tile(lean, (len(tips), 1)))
-    points, normals, error = errors_of(path, BOX, constant(SHIFT), BALL)
+    points, _, error = errors_of(path, BOX, constant(SHIFT), BALL)
     nearest = rows[np.argmin(np.abs(points[:, 1:2] - rows), axis=1)]
     groove = (np.abs(points[:, 1] - nearest) < 0.9) & (np.abs(points[:, 1]) < 10) & (points[:, 2] < -1.5)
     groove &= np.abs(points[:, 0]) < 45

@@ -93,8 +93,11 @@ def _moved(motion: Ints, share: Floats, owner: Ints, part: Floats, displacement:
 
 
 def displaced_rows(rows: Floats, part: Floats, first: Floats, last: Floats, lever: float) -> Floats:
-    """The parts (K, 2) of sweeps ``rows`` (K, ROW) as sweeps of their own, whose ends are displaced by ``first`` and
-    ``last`` (K, 6), shift [m] and turn [rad]; ``lever`` [m]: a turn that moves no point within it is left out."""
+    """(K, ROW) the parts (K, 2) of sweeps ``rows`` (K, ROW) as sweeps of their own.
+
+    Their ends are displaced by ``first`` and ``last`` (K, 6), shift [m] and turn [rad]; a turn that moves no point
+    within ``lever`` [m] is omitted.
+    """
     out = np.zeros((len(rows), ROW))
     out[:, MODE:] = rows[:, MODE:]
     tips = [tips_of(rows, part[:, side]) + (first, last)[side][:, :3] for side in (0, 1)]

@@ -18,12 +18,12 @@ from postproc.part.displacement import Displacements
 from postproc.part.part_figures import (
     FEATURES,
     ErrorFigures,
-    Group,
     PartError,
     PartFigures,
     PartSide,
     SideFigures,
     Surface,
+    SurfaceGroup,
     WorstPoint,
 )
 from postproc.part.surface import POINTS, find_surface
@@ -198,7 +198,7 @@ def _groups(
     nominal: _Nominal,
     sides: Sequence[PartSide],
     task: CompensationProblem,
-) -> tuple[Group, ...]:
+) -> tuple[SurfaceGroup, ...]:
     """The figures of the groups of points (K,) that have any."""
     area = nominal.surface.area[nominal.own]
     groups = []
@@ -209,7 +209,7 @@ def _groups(
         line = task.toolpath.line[nominal.made_by[at]]
         figures = [ErrorFigures.of(side.error[at], area[at], task.tolerance) for side in sides]
         groups.append(
-            Group(
+            SurfaceGroup(
                 name,
                 (int(line.min()), int(line.max())),
                 float(area[at].sum() / area.sum()),

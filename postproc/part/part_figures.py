@@ -61,7 +61,7 @@ class SideFigures:
 
 
 @dataclass(frozen=True)
-class Group:
+class SurfaceGroup:
     """Points with a feature or an operation in common: its name, the lines from and to, share of the area; figures as
     posted and as compensated, None where nothing is."""
 
@@ -83,8 +83,8 @@ class PartFigures:
     tolerance: float
     before: SideFigures
     after: SideFigures | None
-    features: tuple[Group, ...]
-    operations: tuple[Group, ...]
+    features: tuple[SurfaceGroup, ...]
+    operations: tuple[SurfaceGroup, ...]
 
     @property
     def sides(self) -> tuple[tuple[str, SideFigures], ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from postproc.base.units import MM
 from postproc.compensation.uncertainty import Uncertainty
-from postproc.part.part_figures import ErrorFigures, Group, PartFigures, SideFigures
+from postproc.part.part_figures import ErrorFigures, PartFigures, SideFigures, SurfaceGroup
 from postproc.report.formatting import two_digits
 
 SIDES = {"before": "part before", "after": "part after"}
@@ -56,7 +56,7 @@ def _side(side: SideFigures) -> dict[str, object]:
     }
 
 
-def _groups(groups: Sequence[Group]) -> list[dict[str, object]]:
+def _groups(groups: Sequence[SurfaceGroup]) -> list[dict[str, object]]:
     return [
         {
             "name": group.name,

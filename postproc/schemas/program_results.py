@@ -122,7 +122,7 @@ _PART_SIDE: dict[str, Schema] = {
     "ci95": quantity("mm", "half width of the 95 % interval of the largest error", nullable=True),
     "worst": record(
         {
-            "line": integer("line of the motion that left the surface there", nullable=True),
+            "line": integer("line of the motion that made the surface there", nullable=True),
             "error": quantity("mm", "error with its sign, excess above zero"),
             "feature": word("kind of surface", FEATURES),
             "position": array(quantity("mm", "coordinate"), "X Y Z in the base of the stock"),
