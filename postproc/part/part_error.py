@@ -60,7 +60,7 @@ class _Nominal(NamedTuple):
     lever: float
 
 
-class _Unknown(Exception):
+class _UnknownDisplacement(Exception):
     """The displacement of the motions ``args[0]`` (L,) is not known."""
 
 
@@ -79,12 +79,12 @@ def find_part_error(
     try:
         lost = cutting[~task.desired_path.traceable[cutting]]
         if len(lost):
-            raise _Unknown(lost)
+            raise _UnknownDisplacement(lost)
         sides = [
             _side(nominal, Displacements(task, run.sweeps.in_stock, posted))
             for posted in ([None] if division is None else [None, division])
         ]
-    except _Unknown as unknown:
+    except _UnknownDisplacement as unknown:
         lost = unknown.args[0]
         message = f"the displacement of the tool is not known in {len(lost)} motions that reach the part"
         return Finding("PRT001", message, task.file, int(path.line[lost[0]]))
@@ -139,7 +139,7 @@ def _near(run: StockRun) -> Bools:
 
 
 def _side(nominal: _Nominal, displacement: Displacement) -> PartSide:
-    """The errors with displaced tools.  Raises _Unknown."""
+    """The errors with displaced tools.  Raises _UnknownDisplacement."""
     largest, lost = 0.0, np.zeros(0, np.int64)
 
     def moved(motion: Ints, share: Floats) -> tuple[Floats, Floats]:
@@ -153,7 +153,7 @@ def _side(nominal: _Nominal, displacement: Displacement) -> PartSide:
 
     rows, owner, share = deflect(nominal.rows, nominal.motion, nominal.share, nominal.lever, moved)
     if len(lost):
-        raise _Unknown(lost)
+        raise _UnknownDisplacement(lost)
     surface, own = nominal.surface, nominal.own
     found = find_errors(
         nominal.run.engagement.stock,

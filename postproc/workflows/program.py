@@ -75,7 +75,9 @@ def predict(request: Request, stage: Stage = silent) -> Report:
     _not_over_inputs(ready, report.outputs)
     if shown:
         links = beside(shown, {"deflections (CSV)": names[0], "result (JSON)": pages[-1]})
-        files[shown] = program_page(page_data(ready.task, result, report, ready.program.documents), links)
+        files[shown] = program_page(
+            page_data(ready.task, result, report, ready.program.documents), links, part
+        )
     ready.inputs.refuse_changed()
     write_atomically({**files, **dict.fromkeys(pages, json_bytes(report))}, still=ready.inputs.refuse_changed)
     return report
@@ -181,6 +183,7 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
                     "compensated program": target,
                 },
             ),
+            part,
         ),
         **dict.fromkeys(names[4:], json_bytes(report)),
     }
