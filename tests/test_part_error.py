@@ -141,6 +141,30 @@ def test_a_tilted_flank_is_a_plane_that_is_shifted():
     assert error[flank] == pytest.approx(np.full(flank.sum(), inward @ SHIFT), abs=0.01 * UM)
 
 
+def test_a_line_in_pieces_is_one_line():
+    """Distances to what is left do not depend on how a straight motion is divided, at any time of it."""
+    from part_cases import sweeps_of
+
+    from postproc.process.stock.cells import nearest_sweep, stock_distance
+
+    x = np.linspace(-30, 30, 61)
+    short = sweeps_of(path_through(np.column_stack([x, 0.3 * x, 0 * x - 5])), BOX, FLAT)[1]
+    assert (short.head < np.arange(len(short.head))).mean() > 0.5
+    rng = np.random.default_rng(2)
+    points = rng.uniform([-45, -20, -10], [45, 20, -0.1], (400, 3)) * MM
+    for time in (1, 17, 60):
+        end = path_through([[x[0], 0.3 * x[0], -5], [x[time], 0.3 * x[time], -5]])
+        whole = sweeps_of(end, BOX, FLAT)[1]
+        pieces = [stock_distance(short, *point, time) for point in points]
+        one = [stock_distance(whole, *point, 99) for point in points]
+        reach = min(short.grid[1], whole.grid[1])
+        assert np.sign(pieces) == pytest.approx(np.sign(one))
+        outside = np.array(one) > 0
+        assert np.minimum(pieces, reach)[outside] == pytest.approx(np.minimum(one, reach)[outside], abs=1e-12)
+    # of the pieces the one beside the point
+    assert nearest_sweep(short, 0.0105, 0.0105 * 0.3, -5e-3, 60, 1e-3)[1] == 40
+
+
 def test_points_lie_on_the_surface_and_the_mesh_holds_its_volume():
     """A slot of known walls: points to 1 nm; the mesh is closed and has the volume of the part to 0.1 %."""
     from part_cases import sweeps_of

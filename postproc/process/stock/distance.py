@@ -175,6 +175,32 @@ def _straight(sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: fl
 
 
 @compiled
+def line_distance(
+    sweeps: Floats, cutters: Floats, first: int, last: int, x: float, y: float, z: float, enough: float
+) -> float:
+    """``swept_distance`` of the sweeps ``first`` to ``last``, one line across the spindle.  sweeps (M, 22), cutters (T,
+    6)."""
+    c = int(sweeps[first, CUTTER])
+    wx, wy, wz = (
+        x - sweeps[first, TIP_POINT],
+        y - sweeps[first, TIP_POINT + 1],
+        z - sweeps[first, TIP_POINT + 2],
+    )
+    ax, ay, az = sweeps[first, AXIS], sweeps[first, AXIS + 1], sweeps[first, AXIS + 2]
+    height = wx * ax + wy * ay + wz * az
+    beyond = max(-height, height - cutters[c, LENGTH])
+    if beyond > enough:
+        return beyond
+    dx = sweeps[last, TIP_POINT] + sweeps[last, STEP] - sweeps[first, TIP_POINT]
+    dy = sweeps[last, TIP_POINT + 1] + sweeps[last, STEP + 1] - sweeps[first, TIP_POINT + 1]
+    dz = sweeps[last, TIP_POINT + 2] + sweeps[last, STEP + 2] - sweeps[first, TIP_POINT + 2]
+    ux, uy, uz = wx - height * ax, wy - height * ay, wz - height * az
+    uu, ud, dd = ux * ux + uy * uy + uz * uz, ux * dx + uy * dy + uz * dz, dx * dx + dy * dy + dz * dz
+    t = min(max(ud / dd, 0.0), 1.0)
+    return cutter_distance(cutters, c, np.sqrt(max(uu - t * (2.0 * ud - t * dd), 0.0)), height)
+
+
+@compiled
 def _round(sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: float, enough: float) -> float:
     """``swept_distance`` of a sweep in an arc about its spindle, of less than half a turn: nearest is the place at the
     angle of the point, or an end."""
