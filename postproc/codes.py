@@ -19,6 +19,7 @@ from postproc.languages.rapid import codes as rapid
 from postproc.measurements import codes as measurements
 from postproc.model import codes as model
 from postproc.output import atomic_write
+from postproc.part import codes as part
 from postproc.process import codes as forces
 from postproc.robot import codes as robot
 from postproc.workflows import codes as workflows
@@ -39,6 +40,7 @@ TABLES: tuple[Mapping[str, Code], ...] = tuple(
         forces,
         measurements,
         compensation,
+        part,
         identification,
         diagnosis,
         experiments,

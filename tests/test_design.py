@@ -24,6 +24,7 @@ ROOMS = {
     "output": 8,
     "diagnosis": 7,
     "verification": 7,
+    "part": 7,
     "identification": 6,
     "experiments": 6,
     "placement": 6,

@@ -258,3 +258,46 @@ def test_a_plunge_has_its_force_in_the_main_job(folder):
     chip = 0.01 / 600  # m: 600 mm/min, 600 teeth a second
     thrust = 3 * 0.008 * (168.8e6 * chip + 26.6e3)
     assert json.loads(result.stdout)["force"]["max_n"] == pytest.approx(thrust, rel=0.01)
+
+
+def test_the_main_job_reports_the_error_of_the_part(folder):
+    """A slot: its floor and walls as posted and as compensated; the files of the mesh say the same."""
+    result = CliRunner().invoke(main, ["program", str(folder / "part.ngc"), "--force=", "--json", "-"])
+    assert result.exit_code in (0, 3), result.output
+    report = json.loads(result.stdout)
+    jsonschema.validate(report, schema_of("report"))
+    part = report["part_error_mm"]
+    across = report["across_feed_mm"]["before"]["max"]
+    assert part["area_mm2"] == pytest.approx(100 * (16 + 2 * 5), rel=0.1)
+    assert {group["name"] for group in part["features"]} >= {"floor", "wall"}
+    before, after = part["before"], part["after"]
+    largest = max(before["gouge_max"], before["excess_max"])
+    assert 0.1 * across < largest < 1.1 * report["error_before_mm"]["max"]
+    # the force of the slot pushes the tool to one side: one wall keeps what the other loses
+    wall = next(group for group in part["features"] if group["name"] == "wall")["before"]
+    assert wall["gouge_max"] == pytest.approx(wall["excess_max"], rel=0.1)
+    assert abs(before["worst"]["error"]) == pytest.approx(largest)
+    assert before["worst"]["line"] in (5, 6)
+    assert before["ci95"] == pytest.approx(0.47 * largest, rel=0.1)
+    assert max(after["gouge_max"], after["excess_max"]) < report["tolerance_mm"]
+    assert after["out_of_tolerance"] == 0 < before["out_of_tolerance"]
+    ply = (folder / "compensated" / "part.part.ply").read_bytes()
+    head, _, body = ply.partition(b"end_header\n")
+    vertices = int(head.split(b"element vertex ")[1].split()[0])
+    rows = np.frombuffer(body, [("at", "<f4", 3), ("colour", "u1", 4), ("quality", "<f4")], vertices)
+    assert (rows["at"].min(axis=0) > [-0.01, -0.01, -30.01]).all()
+    error = rows["quality"][np.isfinite(rows["quality"])]
+    assert np.abs(error).max() == pytest.approx(max(after["gouge_max"], after["excess_max"]), rel=1e-3)
+    faces = int(head.split(b"element face ")[1].split()[0])
+    assert len(body) == vertices * rows.dtype.itemsize + 13 * faces
+    glb = (folder / "compensated" / "part.part.glb").read_bytes()
+    magic, version, size, length = struct.unpack("<4sIII", glb[:16])
+    assert (magic, version, size) == (b"glTF", 2, len(glb))
+    scene = json.loads(glb[20 : 20 + length])
+    assert scene["accessors"][0]["count"] == vertices
+    assert scene["accessors"][2]["count"] == 3 * faces
+
+
+def test_without_a_stock_there_is_no_part(folder):
+    result = CliRunner().invoke(main, ["predict", str(folder / "part.ngc"), "--force=0,100,0", "--json", "-"])
+    assert json.loads(result.stdout)["part_error_mm"] is None

@@ -89,6 +89,16 @@ class PathSegments:
         """The parts of motions that the segments replace."""
         return MotionParts(self.rows, self.first, self.last, self.start.rotation, self.end.rotation)
 
+    def along(self, share: Floats) -> Floats:
+        """(K,) the shares of the paths of the motions at the shares (K,) of the segments."""
+        return np.asarray(self.first + share * (self.last - self.first))
+
+    def commands(self, task: CompensationProblem, share: Floats) -> Poses:
+        """Commands (K) at the shares (K,) of the segments, with the orientations that the controller makes."""
+        commands = self.at(share, task.toolpath.arcs.turns_along[self.rows])
+        task.desired_path.turn(self.parts, share, commands)
+        return commands
+
     def at(self, share: Floats, along: Bools | None = None) -> Poses:
         """Commands (K) at the shares (K,) of the segments; ``along`` (K,): arcs with which the tool turns."""
         commands = interpolate_poses(self.start, self.end, share)
@@ -176,13 +186,11 @@ def _errors(
     shown: bool,
 ) -> tuple[Floats, Floats]:
     """As ``path_errors``, at one share of each segment."""
-    rows = segments.rows
-    along = segments.first + share * (segments.last - segments.first)
+    rows, shares = segments.rows, np.broadcast_to(share, len(segments))
+    along = segments.along(shares)
     wanted = task.desired_path.at(rows, along)
     wrench = task.force.along(rows, along)
-    shares = np.broadcast_to(share, len(rows))
-    command = segments.at(shares, task.toolpath.arcs.turns_along[rows])
-    task.desired_path.turn(segments.parts, shares, command)
+    command = segments.commands(task, shares)
     real = task.simulated(rows, command, wrench, share=along, corrected=True)
     goal = task.goal(rows, wanted, along)
     shift, turn = _beside(task, rows, along, real.pose, wanted, goal, shown)

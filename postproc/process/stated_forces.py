@@ -35,7 +35,7 @@ class StatedForces:
     in between.  Of the motions: ``ci95`` (N,), half width of the 95 % interval of the force as a share of it; ``peak``
     (N,) [N], the largest force along the path.  NaN where not known, None where known of no motion.  ``error`` (N,)
     [N]: standard error of the force at the ends, where it was measured.  ``radius`` (N,) [m]: of the cutter, where the
-    process states it.
+    process states it.  ``stock``: the ``StockRun`` that they were computed in, if any; its type needs numba.
     """
 
     values: Floats
@@ -46,6 +46,7 @@ class StatedForces:
     peak: Floats | None = None
     error: Floats | None = None
     radius: Floats | None = None
+    stock: object = None
 
     def __post_init__(self) -> None:
         k, n = len(self.values), len(self.row)

@@ -44,7 +44,8 @@ class Wrenches:
     steps (N,): it carries force, and the wrench does not go over from the motion before: a cut starts, the path turns
     by SMOOTH_TURN or more, or the force jumps.  ramps: how it goes over where it would step inside a cut.
     measured: the forces are a log's, whose steps are what was measured.
-    ci95, peak, radius (N,): as of ``Stated``.  undirected (N,): as of ``FeedFrames``, None where all are False.
+    ci95, peak, radius (N,), stock: as of ``StatedForces``.  undirected (N,): as of ``FeedFrames``, None where all are
+    False.
     """
 
     values: Floats
@@ -60,6 +61,7 @@ class Wrenches:
     measured: bool = False
     radius: Floats | None = None
     undirected: Bools | None = None
+    stock: object = None
 
     def __post_init__(self) -> None:
         n = len(self.values)
@@ -286,6 +288,7 @@ def turn_to_robot_axes(
         measured=stated.error is not None,
         radius=stated.radius,
         undirected=None if feed is None or not feed.undirected.any() else frozen(feed.undirected),
+        stock=stated.stock,
     )
 
 

@@ -25,6 +25,7 @@ from postproc import __version__
 from postproc.base.findings import CODES, Finding
 from postproc.base.system import relative_path
 from postproc.compensation.correct import MotionOutcome
+from postproc.part.part_figures import PartError
 from postproc.report.page_data import PageData
 from postproc.report.page_words import (
     badge,
@@ -35,6 +36,7 @@ from postproc.report.page_words import (
     program_verdict,
     reasons,
 )
+from postproc.report.part_page import part_data, part_section
 from postproc.toolpath import Kind
 
 FOLDER = Path(__file__).parent / "html"
@@ -48,12 +50,16 @@ STYLE = "page.css"
 _SEVERITY = {"info": ("i", "note"), "warning": ("!", "warning"), "error": ("x", "error")}
 
 
-def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
+def program_page(data: PageData, links: Mapping[str, str], part: PartError | None = None) -> bytes:
     """The page of one program.  links: what is beside it, words -> relative path."""
     report = data.report
+    shown = None
+    if part is not None:
+        shown = {**part_section(part, report.uncertainty), "data": embedded(part_data(part))}
     return rendered(
         "program.html.j2",
-        script=_script(SCRIPTS),
+        script=_script(SCRIPTS if part is None else (*SCRIPTS, "part.js")),
+        part=shown,
         title=Path(report.program).name,
         what="compensation" if data.corrected else "prediction",
         verdict=program_verdict(data),

@@ -14,6 +14,8 @@ from postproc.base.findings import SEVERITIES, Finding
 from postproc.base.units import MM
 from postproc.compensation.path_comparison import Transitions
 from postproc.compensation.uncertainty import Uncertainty
+from postproc.part.part_figures import PartFigures
+from postproc.report.part_report import part_json
 from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
 
@@ -98,7 +100,7 @@ class PathFigures:
 class Report(Result):
     """One program.  ``after``, ``path_error`` (between the points) and ``correction`` are None where nothing was to be
     corrected (predict).  ``uncorrected``: motions that stay as they were although they need a correction.
-    ``tolerance`` [m] of the cell; ``motion_table``: see ``table``."""
+    ``tolerance`` [m] of the cell; ``motion_table``: see ``table``; ``part``: None without a stock."""
 
     headline = (
         "program",
@@ -143,6 +145,7 @@ class Report(Result):
     path_error_deg: float | None = None
     tolerance: float = np.inf
     motion_table: Columns | None = None
+    part: PartFigures | None = None
 
     def table(self) -> Columns:
         """One row a motion of the input, the columns of corrections.csv.  Raises ValueError where they were not kept:
@@ -204,6 +207,7 @@ class Report(Result):
             if self.angle_after_deg is None
             else {"max": _finite(self.angle_after_deg)},
             "path_error_deg": None if self.path_error_deg is None else {"max": _finite(self.path_error_deg)},
+            "part_error_mm": None if self.part is None else part_json(self.part),
             "uncertainty": self._uncertainty(),
             "tolerance_mm": _finite(self.tolerance / MM),
             "verdict": self.verdict,

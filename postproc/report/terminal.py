@@ -16,6 +16,7 @@ from postproc.base.units import MM
 from postproc.compensation.uncertain_inputs import DIRECTION, FORCE
 from postproc.compensation.uncertainty import Uncertainty
 from postproc.report.formatting import two_digits
+from postproc.report.part_report import part_rows
 from postproc.report.program_verdict import verdict_sentence
 from postproc.report.report import PathFigures, Report, Spread
 
@@ -65,6 +66,7 @@ def _rows(report: Report) -> Iterable[tuple[str, str]]:
             turned = report.path_error_deg
             angle = "" if turned is None or math.isnan(turned) else f", orientation {_deg(turned)}"
             yield "path error", f"{_spread(report.path_error)}{angle}, between the points as written"
+        yield from part_rows(report.part, report.uncertainty)
         if report.path is not None:
             yield "across feed", _before_after(report.path.across_before, report.path.across_after)
             yield "along feed", _before_after(report.path.along_before, report.path.along_after)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from postproc.batching.job_file import FOLDER
 from postproc.cell import MODES
 from postproc.compensation.correct import MotionOutcome
+from postproc.part.part_figures import FEATURES
 from postproc.report.batched import STATES, WORDS_OF_SUMMARY
 from postproc.report.corrections_csv import STATE_NAMES
 from postproc.report.report import VERDICTS
@@ -109,6 +110,51 @@ _PATH_FIGURES: dict[str, Schema] = {
     ),
 }
 
+_PART_ERRORS: dict[str, Schema] = {
+    "gouge_max": quantity("mm", "largest gouge: material that is missing"),
+    "excess_max": quantity("mm", "largest excess: material that remains"),
+    "rms": quantity("mm", "root mean square by area"),
+    "p95": quantity("mm", "95 % of the area have less"),
+    "out_of_tolerance": quantity("1", "share of the area with more than the tolerance"),
+}
+_PART_SIDE: dict[str, Schema] = {
+    **_PART_ERRORS,
+    "ci95": quantity("mm", "half width of the 95 % interval of the largest error", nullable=True),
+    "worst": record(
+        {
+            "line": integer("line of the motion that made the surface there", nullable=True),
+            "error": quantity("mm", "error with its sign, excess above zero"),
+            "feature": word("kind of surface", FEATURES),
+            "position": array(quantity("mm", "coordinate"), "X Y Z in the base of the stock"),
+        },
+        "the point with the largest error",
+    ),
+}
+_PART_GROUPS = record(
+    {
+        "name": word("kind of surface, or tool"),
+        "lines": array(integer("line"), "first and last line of the motions that make it"),
+        "area_share": quantity("1", "share of the area"),
+        "before": record(_PART_ERRORS, "as posted"),
+        "after": record(_PART_ERRORS, "as compensated", nullable=True),
+    },
+    "a part of the surface",
+)
+_PART_ERROR = record(
+    {
+        "points": integer("points of the surface that the program makes"),
+        "spacing": quantity("mm", "spacing of the grid that chooses them"),
+        "area_mm2": quantity("mm2", "area of the surface that the program makes"),
+        "tolerance": quantity("mm", "tolerance of the cell"),
+        "before": record(_PART_SIDE, "as posted"),
+        "after": record(_PART_SIDE, "as compensated", nullable=True),
+        "features": array(_PART_GROUPS, "by the angle of the surface to the spindle"),
+        "operations": array(_PART_GROUPS, "by tool, in the order of the program"),
+    },
+    "signed normal error of the surface of the part; null where the process states no stock",
+    nullable=True,
+)
+
 _PROGRAM: dict[str, Schema] = {
     "program": word("path of the program"),
     "dialect": word("language of the program"),
@@ -149,6 +195,7 @@ _PROGRAM: dict[str, Schema] = {
     "path_error_deg": record(
         _LARGEST, "orientation error between points after the correction", nullable=True
     ),
+    "part_error_mm": _PART_ERROR,
     "uncertainty": _UNCERTAINTY,
     "tolerance_mm": quantity("mm", "tolerance of the cell", nullable=True),
     "verdict": word(

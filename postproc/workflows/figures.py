@@ -15,6 +15,7 @@ from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import Subdivision, subdivided_motions
 from postproc.compensation.uncertainty import evaluate_uncertainty
 from postproc.output.write import WrittenProgram
+from postproc.part.part_figures import PartFigures
 from postproc.report.report import (
     PathFigures,
     Report,
@@ -34,6 +35,7 @@ def report_of(
     result: CorrectionResult,
     findings: tuple[Finding, ...],
     written: WrittenProgram | None = None,
+    part: PartFigures | None = None,
 ) -> Report:
     task, corrected = ready.task, written is not None
     scope = result.scope
@@ -86,6 +88,7 @@ def report_of(
         exit=exit_code(findings, request.strict),
         tolerance=ready.cell.tolerance,
         path=_path_figures(task, result, written) if written else None,
+        part=part,
     )
 
 

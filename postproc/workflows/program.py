@@ -33,14 +33,17 @@ from postproc.output.write import (
     write,
     writing_settings,
 )
+from postproc.part.part_figures import PartFigures
 from postproc.process import not_requested
 from postproc.report.corrections_csv import correction_table, corrections_csv
 from postproc.report.diff import unified_diff
 from postproc.report.page import beside, program_page
 from postproc.report.page_data import page_data
+from postproc.report.part_mesh import MESHES, part_mesh
 from postproc.report.report import Report, in_order_of_place, json_bytes
 from postproc.workflows.closing_findings import closing_findings
 from postproc.workflows.figures import report_of
+from postproc.workflows.part import part_error_of
 from postproc.workflows.preparation import Prepared, Request, Stage, completed, prepare, silent
 
 NEAREST = 0.3 * MM
@@ -55,8 +58,9 @@ def predict(request: Request, stage: Stage = silent) -> Report:
     ready = prepare(request)
     stage("predicting")
     result = correct(replace(ready.task, gain=0.0))
-    findings = in_order_of_place([*ready.findings, *result.findings])
-    report = report_of(request, ready, result, findings)
+    part, of_part = part_error_of(ready, None)
+    findings = in_order_of_place([*ready.findings, *result.findings, *of_part])
+    report = report_of(request, ready, result, findings, part=None if part is None else part.figures)
     if request.keep_table:
         report = replace(report, motion_table=correction_table(ready.task, result))
     files: dict[Path, Content] = {}
@@ -71,7 +75,9 @@ def predict(request: Request, stage: Stage = silent) -> Report:
     _not_over_inputs(ready, report.outputs)
     if shown:
         links = beside(shown, {"deflections (CSV)": names[0], "result (JSON)": pages[-1]})
-        files[shown] = program_page(page_data(ready.task, result, report, ready.program.documents), links)
+        files[shown] = program_page(
+            page_data(ready.task, result, report, ready.program.documents), links, part
+        )
     ready.inputs.refuse_changed()
     write_atomically({**files, **dict.fromkeys(pages, json_bytes(report))}, still=ready.inputs.refuse_changed)
     return report
@@ -131,6 +137,11 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         *division.findings,
         *closing_findings(request, ready, written),
     ]
+    if ready.task.force.stock is not None:
+        stage("cutting the part")
+    part, of_part = part_error_of(ready, division)
+    findings += of_part
+    shown = None if part is None else part.figures
     paths = _output_paths(program, target)
     outputs = dict(zip(paths, written.contents, strict=True))
     stem = target.stem
@@ -138,13 +149,14 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     names = [folder / f"{stem}.{end}" for end in ("report.json", "corrections.csv", "diff", "report.html")]
     names += [] if request.json is None else [request.json]
     if request.stream is not None:
-        return _streamed(request, ready, written, in_order_of_place(findings))
+        return _streamed(request, ready, written, in_order_of_place(findings), shown)
     stage("reporting")
     release_free_memory()
-    report = report_of(request, ready, result, in_order_of_place(findings), written)
+    report = report_of(request, ready, result, in_order_of_place(findings), written, shown)
     if report.exit == 1:
         raise Refusal(*report.findings)
-    report = replace(report, outputs=tuple(str(path) for path in (*paths, *names)))
+    meshes = {} if part is None else {folder / f"{stem}.part.{end}": end for end in MESHES}
+    report = replace(report, outputs=tuple(str(path) for path in (*paths, *names, *meshes)))
     if request.keep_table:
         table = correction_table(task, result, written.division, written.path_error)
         report = replace(report, motion_table=table)
@@ -171,9 +183,12 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
                     "compensated program": target,
                 },
             ),
+            part,
         ),
         **dict.fromkeys(names[4:], json_bytes(report)),
     }
+    if part is not None:
+        files |= {path: part_mesh(part, end) for path, end in meshes.items()}
     ready.inputs.refuse_changed()
     release_free_memory()
     write_atomically(files, target, ready.inputs.refuse_changed)  # writing takes its time as well
@@ -181,7 +196,11 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
 
 
 def _streamed(
-    request: Request, ready: Prepared, written: WrittenProgram, findings: tuple[Finding, ...]
+    request: Request,
+    ready: Prepared,
+    written: WrittenProgram,
+    findings: tuple[Finding, ...],
+    part: PartFigures | None,
 ) -> Report:
     """The report of a program whose bytes go to the request's stream; its reports only where a folder is named."""
     documents, contents = ready.program.documents, written.contents
@@ -189,7 +208,7 @@ def _streamed(
         if content != document.raw:
             message = f"{document.path.name} changes with the program, and a stream has no second file"
             raise Refusal(Finding("FIL012", message, str(document.path), help="name a folder with -o"))
-    report = report_of(request, ready, written.result, findings, written)
+    report = report_of(request, ready, written.result, findings, written, part)
     if report.exit == 1:
         raise Refusal(*report.findings)
     pages = [] if request.json is None else [request.json]

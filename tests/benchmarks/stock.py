@@ -1,6 +1,6 @@
 """What the simulation of the stock costs: processor time and memory of programs of short motions in a block.
 
-    python -m tests.benchmarks.stock --sizes 1000,4000,16000 [--stock 1,2,4]
+    python -m tests.benchmarks.stock --sizes 1000,4000,16000 [--stock 1,2,4] [--part 100000]
 
 Zigzag in levels of 2 mm of 4 mm between the rows, motions of 1 mm, a cutter of 16 mm; every level ends with a rapid.
 ``--stock``: the block of the last size made so many times larger in each direction of the plane.
@@ -18,7 +18,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from part_cases import constant, sweeps_of
 from stock_cases import FLAT, block, path_through, run
+
+from postproc.part.deflected_sweeps import deflect
+from postproc.part.surface import find_surface
+from postproc.part.surface_error import find_errors
 
 LENGTH, WIDTH, LEVEL = 200.0, 100.0, 2.0
 
@@ -51,11 +56,42 @@ def measure(count: int, larger: float = 1.0) -> tuple[float, float, int]:
     return used, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6, int(cut.cuts.sum())
 
 
+def measure_part(count: int, points: int) -> tuple[float, ...]:
+    """Motions, points, those of the program, processor seconds of surface, deflected sweeps and errors, memory [GB]."""
+    sweeps, stock = sweeps_of(
+        path_through(*program(count)[:1], kinds=program(count)[1]),
+        block([0, 0, -60], [LENGTH, WIDTH, 0]),
+        FLAT,
+    )
+    times = [time.process_time()]
+    surface = find_surface(stock, points)
+    times.append(time.process_time())
+    shift = constant((3e-5, -2e-5, 1e-5), (1e-4, 2e-4, 0.0))
+    rows, _, _ = deflect(sweeps.rows, sweeps.motion, sweeps.share, 0.05, shift)
+    times.append(time.process_time())
+    own = surface.sweep >= 0
+    find_errors(stock, rows, 1e-4, surface.points[own], surface.normals[own])
+    times.append(time.process_time())
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+    return count, len(own), int(own.sum()), *np.diff(times).tolist(), memory
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--sizes", default="1000,4000,16000")
     parser.add_argument("--stock", default="1")
+    parser.add_argument("--part", type=int, default=0, help="measure the part instead, at so many points")
     given = parser.parse_args()
+    if given.part:
+        measure_part(50, 1000)
+        print("motions  points   own    CPU s surface  deflected  errors  GB")
+        for word in given.sizes.split(","):
+            print(
+                "{:7}  {:6}  {:5}  {:13.2f}  {:9.2f}  {:6.2f}  {:.2f}".format(
+                    *measure_part(int(word), given.part)
+                )
+            )
+        return
     measure(50)  # compiles
     sizes = [int(word) for word in given.sizes.split(",")]
     rows = [(size, 1.0) for size in sizes]

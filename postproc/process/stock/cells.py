@@ -10,17 +10,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints
 from postproc.process.stock.blank import Blank, blank_distance, corners_of
 from postproc.process.stock.compiled import compiled
 from postproc.process.stock.distance import (
+    ACROSS,
     ANGLE,
+    AXIS,
     CUTTER,
     LENGTH,
+    MODE,
     RADIUS,
     REMOVES,
+    STEP,
+    TIP_POINT,
     arc_of,
     axis_at,
+    line_distance,
     swept_distance,
     tip_at,
     turn_of,
@@ -29,6 +35,7 @@ from postproc.process.stock.distance import (
 CELL = 0.125  # radii of the smallest cutter
 MOST_CELLS = 4_000_000
 LARGEST_CELL, SMALLEST_CELL = 4e-3, 0.25e-3  # m
+_SAME = 1e-12  # m, and of unit vectors
 
 
 class Stock(NamedTuple):
@@ -36,7 +43,8 @@ class Stock(NamedTuple):
 
     blank: see ``Blank``; sweeps (M, ROW), cutters (T, 6): see ``distance``; grid (5,): size [m] of the cells, how far
     distances are known [m], and the numbers of cells from the blank's lowest corner; first (C + 1,) and near
-    (E,): the sweeps that come that near to each cell, ascending.
+    (E,): the sweeps that come that near to each cell, ascending; head (E,): where in ``near`` the straight line starts
+    that each of them goes on, sweep after sweep.
     """
 
     blank: Blank
@@ -45,25 +53,27 @@ class Stock(NamedTuple):
     grid: Floats
     first: Ints
     near: Ints
+    head: Ints
 
 
-def build_stock(blank: Blank, sweeps: Floats, cutters: Floats) -> tuple[Stock, Floats]:
+def build_stock(blank: Blank, sweeps: Floats, cutters: Floats, reach: float = 0.0) -> tuple[Stock, Floats]:
     """The stock of sweeps (M, 22) by cutters (T, 6), and heights (M, 2) [m] for each sweep.
 
     The heights are the lowest and highest above its tip at which it may meet stock, inf and -inf where it meets none.
+    ``reach`` [m]: distances are known so far at least.
     """
     low, high = corners_of(blank)
     span = high - low
     radius = float(cutters[:, RADIUS].min()) if len(cutters) else LARGEST_CELL
     size = min(max(CELL * radius, SMALLEST_CELL), LARGEST_CELL)
-    size = max(size, float(np.cbrt(np.prod(span) / MOST_CELLS)))
+    size = max(size, reach, float(np.cbrt(np.prod(span) / MOST_CELLS)))
     while np.prod(np.ceil(span / size)) > 2 * MOST_CELLS:  # thin blanks
         size *= 1.2
     shape = np.maximum(np.ceil(span / size).astype(np.int64), 1)
     cells = int(np.prod(shape))
     none = np.zeros(1, np.int32)
-    grid = np.array([size, 0.5 * size, *shape], float)
-    stock = Stock(blank, sweeps, cutters, grid, np.zeros(1, np.int64), none)
+    grid = np.array([size, max(0.5 * size, reach), *shape], float)
+    stock = Stock(blank, sweeps, cutters, grid, np.zeros(1, np.int64), none, none)
     count, covered = np.zeros(cells, np.int64), np.full(cells, np.iinfo(np.int32).max, np.int32)
     _mark_outside(stock, covered)
     live = np.full((len(sweeps), 2), [np.inf, -np.inf])
@@ -72,7 +82,33 @@ def build_stock(blank: Blank, sweeps: Floats, cutters: Floats) -> tuple[Stock, F
     np.cumsum(count, out=first[1:])
     near = np.zeros(max(int(first[-1]), 1), np.int32)
     _list(stock, first[:-1].copy(), covered, live, near, True)
-    return stock._replace(first=first, near=near), live
+    head = np.zeros(len(near), np.int32)
+    _join(first, near, _go_on(sweeps), head)
+    return stock._replace(first=first, near=near, head=head), live
+
+
+def _go_on(sweeps: Floats) -> Bools:
+    """(M,) sweeps that go on along the line of the one before, with the same cutter, across the spindle."""
+    joins = np.zeros(len(sweeps), bool)
+    step, tip = sweeps[:, STEP : STEP + 3], sweeps[:, TIP_POINT : TIP_POINT + 3]
+    size = np.linalg.norm(step, axis=1)
+    across = np.linalg.norm(np.cross(step[1:], step[:-1]), axis=1)
+    joins[1:] = (
+        np.all(sweeps[1:, [MODE, CUTTER, REMOVES]] == sweeps[:-1, [MODE, CUTTER, REMOVES]], axis=1)
+        & np.all(np.abs(sweeps[1:, AXIS : AXIS + 3] - sweeps[:-1, AXIS : AXIS + 3]) < _SAME, axis=1)
+        & np.all(np.abs(tip[1:] - tip[:-1] - step[:-1]) < _SAME, axis=1)
+        & (across <= 1e-9 * size[1:] * size[:-1])
+        & (np.einsum("mi,mi->m", step[1:], step[:-1]) > 0.0)
+    )
+    return joins & (sweeps[:, MODE] == ACROSS)
+
+
+@compiled
+def _join(first: Ints, near: Ints, joins: Bools, head: Ints) -> None:
+    for cell in range(len(first) - 1):
+        for place in range(first[cell], first[cell + 1]):
+            goes_on = place > first[cell] and near[place - 1] == near[place] - 1 and joins[near[place]]
+            head[place] = head[place - 1] if goes_on else place
 
 
 @compiled
@@ -168,11 +204,38 @@ def _list(stock: Stock, count: Ints, covered: Ints, live: Floats, near: Ints, fi
 @compiled
 def stock_distance(stock: Stock, x: float, y: float, z: float, time: int) -> float:
     """Of a point [m] to what is left of the blank before the sweep ``time``, positive inside, up to ``reach``."""
+    return _nearest(stock, x, y, z, time, 0.0)[0]
+
+
+@compiled
+def nearest_sweep(stock: Stock, x: float, y: float, z: float, time: int, depth: float) -> tuple[float, int]:
+    """As ``stock_distance``, and the sweep whose surface is that near; -1 where it is that of the blank, or none is.
+
+    Below zero it is no more than a bound, but down to ``depth`` [m] how far the point is in the sweep it is most in.
+    """
+    d, low, high = _nearest(stock, x, y, z, time, depth)
+    sweeps = stock.sweeps
+    while low < high:  # of a line the sweep beside the point
+        middle = (low + high + 1) // 2
+        ahead = 0.0
+        for k, at in enumerate((x, y, z)):
+            ahead += (at - sweeps[middle, TIP_POINT + k]) * sweeps[middle, STEP + k]
+        if ahead >= 0.0:
+            low = middle
+        else:
+            high = middle - 1
+    return d, low
+
+
+@compiled
+def _nearest(stock: Stock, x: float, y: float, z: float, time: int, depth: float) -> tuple[float, int, int]:
+    """As ``nearest_sweep``, with the first and the last sweep of the line that is that near."""
     grid = stock.grid
     size, reach = grid[0], grid[1]
+    owner, end = -1, -1
     best = blank_distance(stock.blank, x, y, z)
     if best <= 0.0:
-        return max(best, -reach)
+        return max(best, -reach), owner, end
     best = min(best, reach)
     frame = stock.blank.frame
     i = min(int((x - frame[1]) / size), int(grid[2]) - 1)
@@ -187,11 +250,18 @@ def stock_distance(stock: Stock, x: float, y: float, z: float, time: int) -> flo
             low = middle + 1
         else:
             high = middle
-    for place in range(low - 1, start - 1, -1):
+    place = low - 1
+    while place >= start:
         # on the positive side only a smaller distance counts
-        d = swept_distance(stock.sweeps, stock.cutters, stock.near[place], x, y, z, max(best, 0.0))
+        head, last = int(stock.head[place]), int(stock.near[place])
+        first = int(stock.near[head])
+        if first == last:
+            d = swept_distance(stock.sweeps, stock.cutters, last, x, y, z, max(best, depth))
+        else:
+            d = line_distance(stock.sweeps, stock.cutters, first, last, x, y, z, max(best, depth))
         if d < best:
-            best = d
+            best, owner, end = d, first, last
             if best <= -reach:
-                return -reach
-    return best
+                return -reach, owner, end
+        place = head - 1
+    return best, owner, end

@@ -25,7 +25,7 @@ def compiled(function: Function) -> Function:
     config, njit = numba.config, numba.njit
     options = {"nogil": True, "error_model": "numpy"}
     before = config.CACHE_DIR
-    config.CACHE_DIR = str(_folder())
+    config.CACHE_DIR = str(_folder(Path(function.__code__.co_filename).parent))
     try:
         return cast(Function, njit(function, cache=True, **options))
     except (RuntimeError, OSError):
@@ -35,10 +35,11 @@ def compiled(function: Function) -> Function:
 
 
 @cache
-def _folder() -> Path:
-    """Of the user, one for each state of the sources: numba compares the file of a function, not of those it calls."""
+def _folder(room: Path) -> Path:
+    """Of the user, one for each state of the sources of this folder and of ``room``: numba compares the file of a
+    function, not of those it calls."""
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    for source in sorted({*Path(__file__).parent.glob("*.py"), *room.glob("*.py")}):
         digest.update(source.read_bytes())
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(home) / "postproc" / f"compiled-{digest.hexdigest()[:16]}"

@@ -12,8 +12,8 @@ import numpy as np
 from postproc.base.arrays import Floats
 from postproc.process.stock.compiled import compiled
 
-ACROSS, STRAIGHT, GENERAL = 0, 1, 2
-"""Straight across the spindle; straight; an arc, or one that turns the spindle."""
+ACROSS, STRAIGHT, GENERAL, ROUND = 0, 1, 2, 3
+"""Straight across the spindle; straight; any other; an arc about the spindle that does not rise."""
 
 RADIUS, CORNER, LENGTH, TIP, TAPER, COSINE = range(6)
 """Columns of the rows of cutters (T, 6): radius, corner radius, length [m], radius at the tip [m], tangent of the half
@@ -28,7 +28,7 @@ TIP_POINT, STEP, AXIS, TURN, CENTRE, NORMAL, ANGLE, MODE, CUTTER, REMOVES = 0, 3
 
 TIP_POINT and STEP (3 each) [m]: where the tip starts, and from there to its end; AXIS (3): unit vector of the
 spindle at the start, from the tip back to the spindle; TURN (3) [rad]: rotation vector by which it turns; CENTRE
-(3) [m], NORMAL (3), ANGLE [rad]: of arcs, see ``Arcs``, angle 0 for lines; MODE: ACROSS, STRAIGHT or GENERAL;
+(3) [m], NORMAL (3), ANGLE [rad]: of arcs, see ``Arcs``, angle 0 for lines; MODE: ACROSS, STRAIGHT, GENERAL or ROUND;
 CUTTER: row of the cutters; REMOVES: 1 where it cuts, 0 for a rapid motion.  One array, because each array that a
 compiled function is given costs.
 """
@@ -175,6 +175,63 @@ def _straight(sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: fl
 
 
 @compiled
+def line_distance(
+    sweeps: Floats, cutters: Floats, first: int, last: int, x: float, y: float, z: float, enough: float
+) -> float:
+    """``swept_distance`` of the sweeps ``first`` to ``last``, one line across the spindle.  sweeps (M, 22), cutters (T,
+    6)."""
+    c = int(sweeps[first, CUTTER])
+    wx, wy, wz = (
+        x - sweeps[first, TIP_POINT],
+        y - sweeps[first, TIP_POINT + 1],
+        z - sweeps[first, TIP_POINT + 2],
+    )
+    ax, ay, az = sweeps[first, AXIS], sweeps[first, AXIS + 1], sweeps[first, AXIS + 2]
+    height = wx * ax + wy * ay + wz * az
+    beyond = max(-height, height - cutters[c, LENGTH])
+    if beyond > enough:
+        return beyond
+    dx = sweeps[last, TIP_POINT] + sweeps[last, STEP] - sweeps[first, TIP_POINT]
+    dy = sweeps[last, TIP_POINT + 1] + sweeps[last, STEP + 1] - sweeps[first, TIP_POINT + 1]
+    dz = sweeps[last, TIP_POINT + 2] + sweeps[last, STEP + 2] - sweeps[first, TIP_POINT + 2]
+    ux, uy, uz = wx - height * ax, wy - height * ay, wz - height * az
+    uu, ud, dd = ux * ux + uy * uy + uz * uz, ux * dx + uy * dy + uz * dz, dx * dx + dy * dy + dz * dz
+    t = min(max(ud / dd, 0.0), 1.0)
+    return cutter_distance(cutters, c, np.sqrt(max(uu - t * (2.0 * ud - t * dd), 0.0)), height)
+
+
+@compiled
+def _round(sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: float, enough: float) -> float:
+    """``swept_distance`` of a sweep in an arc about its spindle, of less than half a turn: nearest is the place at the
+    angle of the point, or an end."""
+    c = int(sweeps[j, CUTTER])
+    ax, ay, az = sweeps[j, AXIS], sweeps[j, AXIS + 1], sweeps[j, AXIS + 2]
+    px, py, pz = sweeps[j, TIP_POINT], sweeps[j, TIP_POINT + 1], sweeps[j, TIP_POINT + 2]
+    height = (x - px) * ax + (y - py) * ay + (z - pz) * az
+    beyond = max(-height, height - cutters[c, LENGTH])
+    if beyond > enough:
+        return beyond
+    cx, cy, cz = sweeps[j, CENTRE], sweeps[j, CENTRE + 1], sweeps[j, CENTRE + 2]
+    nx, ny, nz = sweeps[j, NORMAL], sweeps[j, NORMAL + 1], sweeps[j, NORMAL + 2]
+    rx, ry, rz = px - cx, py - cy, pz - cz
+    along = rx * nx + ry * ny + rz * nz
+    rx, ry, rz = rx - along * nx, ry - along * ny, rz - along * nz
+    ux, uy, uz = x - cx, y - cy, z - cz
+    along = ux * nx + uy * ny + uz * nz
+    ux, uy, uz = ux - along * nx, uy - along * ny, uz - along * nz
+    turned = rx * ux + ry * uy + rz * uz
+    side = nx * (ry * uz - rz * uy) + ny * (rz * ux - rx * uz) + nz * (rx * uy - ry * ux)
+    angle = sweeps[j, ANGLE]
+    if 0.0 <= np.arctan2(side, turned) <= angle:
+        radius = np.sqrt(rx * rx + ry * ry + rz * rz)
+        return cutter_distance(cutters, c, abs(np.sqrt(ux * ux + uy * uy + uz * uz) - radius), height)
+    ex, ey, ez = rotated(rx, ry, rz, nx, ny, nz, angle)
+    first = (ux - rx) ** 2 + (uy - ry) ** 2 + (uz - rz) ** 2
+    last = (ux - ex) ** 2 + (uy - ey) ** 2 + (uz - ez) ** 2
+    return cutter_distance(cutters, c, np.sqrt(min(first, last)), height)
+
+
+@compiled
 def swept_distance(
     sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: float, enough: float
 ) -> float:
@@ -182,6 +239,8 @@ def swept_distance(
 
     sweeps (M, 22), cutters (T, 6).
     """
+    if sweeps[j, MODE] == ROUND:
+        return _round(sweeps, cutters, j, x, y, z, enough)
     if sweeps[j, MODE] != GENERAL:
         return _straight(sweeps, cutters, j, x, y, z, enough)
     middle = pose_distance(sweeps, cutters, j, 0.5, x, y, z)

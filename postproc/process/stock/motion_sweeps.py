@@ -23,6 +23,7 @@ from postproc.process.stock.distance import (
     MODE,
     NORMAL,
     REMOVES,
+    ROUND,
     ROW,
     STEP,
     STRAIGHT,
@@ -113,7 +114,10 @@ def find_sweeps(
     rows[:, ANGLE] = (angle / parts)[owner]
     along = np.einsum("mi,mi->m", rows[:, STEP : STEP + 3], axes[0])
     general = (rows[:, ANGLE] > 0) | rows[:, TURN : TURN + 3].any(axis=1)
-    rows[:, MODE] = np.where(general, GENERAL, np.where(np.abs(along) < 1e-12, ACROSS, STRAIGHT))
+    level = np.abs(along) < 1e-12
+    about = np.abs(np.einsum("mi,mi->m", rows[:, NORMAL : NORMAL + 3], axes[0])) > 1.0 - 1e-15
+    plane = level & about & ~rows[:, TURN : TURN + 3].any(axis=1)
+    rows[:, MODE] = np.where(general, np.where(plane, ROUND, GENERAL), np.where(level, ACROSS, STRAIGHT))
     rows[:, CUTTER] = which[row][owner]
     cuts = on_path[row] & ~(toolpath.feed[row] >= process.rapid)
     rows[:, REMOVES] = cuts[owner]

@@ -124,6 +124,7 @@ def stock_forces(
         ci95=run.ci95,
         peak=peak,
         radius=radius,
+        stock=run,
     )
     return stated, (*_summaries(run, toolpath, path), *run.findings)
 

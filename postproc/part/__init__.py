@@ -1,0 +1,3 @@
+"""The surface that a program leaves on the part, and its error before and after the correction."""
+
+from postproc.part import codes as codes

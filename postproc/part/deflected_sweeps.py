@@ -1,0 +1,151 @@
+"""What deflected tools sweep: the sweeps of a program with displaced poses, in parts that are displaced linearly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from postproc.base.arrays import Floats, Ints
+from postproc.base.geometry import lengths, rotation_from_vector
+from postproc.base.units import DEG, MM
+from postproc.process.stock.distance import (
+    ANGLE,
+    AXIS,
+    CENTRE,
+    GENERAL,
+    MODE,
+    NORMAL,
+    ROW,
+    STEP,
+    STRAIGHT,
+    TIP_POINT,
+    TURN,
+)
+
+Displacement = Callable[[Ints, Floats], tuple[Floats, Floats]]
+"""Of motions (K,) at the shares (K,) of their paths: shift of the tip (K, 3) [m] and turn of the tool (K, 3) [rad]."""
+
+EVEN = 0.02e-6
+"""[m] By how much a displacement between two nodes may differ from linear."""
+
+_HALVINGS = 12
+_SHORTEST = 0.02 * MM
+_SMALL_ARC = 1.0 * DEG  # of an arc whose ends move otherwise
+
+
+def deflect(
+    rows: Floats, motion: Ints, share: Floats, lever: float, displacement: Displacement
+) -> tuple[Floats, Ints, Floats]:
+    """The sweeps ``rows`` (M, ROW), of motions ``motion`` (M,) from and to the shares (M, 2) of their paths, with
+    displaced tools: rows (K, ROW), whose they are (K,) of the M, shares (K, 2) of the motions.
+
+    lever [m]: how far from the tip a turn of the tool counts.
+    """
+    owner, part = np.arange(len(rows)), np.broadcast_to([0.0, 1.0], (len(rows), 2)).copy()
+    owner, part = _short_arcs(rows, owner, part)
+    ends = [_moved(motion, share, owner, part[:, side], displacement) for side in (0, 1)]
+    long = lengths(rows[:, STEP : STEP + 3])
+    done: list[tuple[Ints, Floats, Floats, Floats]] = []
+    for halving in range(_HALVINGS + 1):
+        off = np.zeros(len(owner))
+        middle = 0.5 * (ends[0] + ends[1])
+        for weight in (0.25, 0.5, 0.75):
+            here = _moved(motion, share, owner, part @ [1 - weight, weight], displacement)
+            middle = here if weight == 0.5 else middle
+            bent = here - (1 - weight) * ends[0] - weight * ends[1]
+            off = np.maximum(off, lengths(bent[:, :3]) + lever * lengths(bent[:, 3:]))
+        width = (part[:, 1] - part[:, 0]) * long[owner]
+        split = (off > EVEN) & (width > _SHORTEST) & (halving < _HALVINGS)
+        done.append((owner[~split], part[~split], ends[0][~split], ends[1][~split]))
+        if not split.any():
+            break
+        half = part[split].mean(axis=1)
+        owner = np.concatenate([owner[split], owner[split]])
+        part = np.concatenate(
+            [np.column_stack([part[split, 0], half]), np.column_stack([half, part[split, 1]])]
+        )
+        ends = [
+            np.concatenate([ends[0][split], middle[split]]),
+            np.concatenate([middle[split], ends[1][split]]),
+        ]
+    owner, part, first, last = (np.concatenate(values) for values in zip(*done, strict=True))
+    order = np.lexsort((part[:, 0], owner))
+    owner, part, first, last = owner[order], part[order], first[order], last[order]
+    whole = share[owner]
+    shares = whole[:, :1] + part * (whole[:, 1:] - whole[:, :1])
+    return displaced_rows(rows[owner], part, first, last, lever), owner, shares
+
+
+def _short_arcs(rows: Floats, owner: Ints, part: Floats) -> tuple[Ints, Floats]:
+    """Arcs in parts of ``_SMALL_ARC`` at most: an arc whose ends move otherwise is no longer round."""
+    parts = np.maximum(np.ceil(rows[:, ANGLE] / _SMALL_ARC), 1).astype(np.int64)
+    owner = np.repeat(owner, parts)
+    place = np.arange(len(owner)) - np.repeat(np.cumsum(parts) - parts, parts)
+    return owner, np.stack([place, place + 1], axis=1) / parts[owner, None]
+
+
+def _moved(motion: Ints, share: Floats, owner: Ints, part: Floats, displacement: Displacement) -> Floats:
+    """(K, 6) shift and turn at the parts (K,) of the sweeps ``owner`` (K,)."""
+    whole = share[owner]
+    at = whole[:, 0] + part * (whole[:, 1] - whole[:, 0])
+    return np.concatenate(displacement(motion[owner], at), axis=1)
+
+
+def displaced_rows(rows: Floats, part: Floats, first: Floats, last: Floats, lever: float) -> Floats:
+    """(K, ROW) the parts (K, 2) of sweeps ``rows`` (K, ROW) as sweeps of their own.
+
+    Their ends are displaced by ``first`` and ``last`` (K, 6), shift [m] and turn [rad]; a turn that moves no point
+    within ``lever`` [m] is omitted.
+    """
+    out = np.zeros((len(rows), ROW))
+    out[:, MODE:] = rows[:, MODE:]
+    tips = [tips_of(rows, part[:, side]) + (first, last)[side][:, :3] for side in (0, 1)]
+    axes = [
+        (rotation_from_vector((first, last)[side][:, 3:]) @ axes_of(rows, part[:, side])[..., None])[..., 0]
+        for side in (0, 1)
+    ]
+    out[:, TIP_POINT : TIP_POINT + 3], out[:, STEP : STEP + 3] = tips[0], tips[1] - tips[0]
+    across = np.cross(axes[0], axes[1])
+    sine = lengths(across)
+    angle = np.arctan2(sine, np.einsum("ki,ki->k", axes[0], axes[1]))
+    turns = lever * angle > EVEN
+    out[:, TURN : TURN + 3] = np.where(
+        turns[:, None], across * (angle / np.maximum(sine, 1e-300))[:, None], 0.0
+    )
+    both = axes[0] + axes[1]
+    out[:, AXIS : AXIS + 3] = np.where(turns[:, None], axes[0], both / lengths(both)[:, None])
+    angle = rows[:, ANGLE] * (part[:, 1] - part[:, 0])
+    out[:, ANGLE], out[:, NORMAL : NORMAL + 3] = angle, rows[:, NORMAL : NORMAL + 3]
+    arcs = np.flatnonzero(angle > 0)
+    if len(
+        arcs
+    ):  # the circle in the plane of the old one that goes through both displaced ends by the same angle
+        normal = rows[arcs, NORMAL : NORMAL + 3]
+        chord = out[arcs, STEP : STEP + 3]
+        chord = chord - np.einsum("ki,ki->k", chord, normal)[:, None] * normal
+        centre = tips[0][arcs] + 0.5 * chord
+        out[arcs, CENTRE : CENTRE + 3] = centre + np.cross(normal, chord) / (
+            2 * np.tan(0.5 * angle[arcs, None])
+        )
+    out[:, MODE] = np.where((angle > 0) | turns, GENERAL, STRAIGHT)
+    return out
+
+
+def tips_of(rows: Floats, share: Floats) -> Floats:
+    """(K, 3) [m] the tips at the shares (K,) of sweeps ``rows`` (K, ROW)."""
+    start, step = rows[:, TIP_POINT : TIP_POINT + 3], rows[:, STEP : STEP + 3]
+    tips = start + share[:, None] * step
+    arcs = np.flatnonzero(rows[:, ANGLE] > 0)
+    if len(arcs):
+        normal, centre = rows[arcs, NORMAL : NORMAL + 3], rows[arcs, CENTRE : CENTRE + 3]
+        turn = rotation_from_vector((share[arcs] * rows[arcs, ANGLE])[:, None] * normal)
+        rise = share[arcs] * np.einsum("ki,ki->k", step[arcs], normal)
+        tips[arcs] = centre + (turn @ (start[arcs] - centre)[..., None])[..., 0] + rise[:, None] * normal
+    return np.asarray(tips)
+
+
+def axes_of(rows: Floats, share: Floats) -> Floats:
+    """(K, 3) the spindle axes at the shares (K,) of sweeps ``rows`` (K, ROW)."""
+    turn = rotation_from_vector(share[:, None] * rows[:, TURN : TURN + 3])
+    return np.asarray((turn @ rows[:, AXIS : AXIS + 3, None])[..., 0])

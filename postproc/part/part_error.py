@@ -1,0 +1,220 @@
+"""The error of the part's surface as posted and as compensated, from the predicted displacement of the tools."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.findings import Finding
+from postproc.base.geometry import lengths
+from postproc.base.units import DEG, MM
+from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.subdivision import Subdivision
+from postproc.part.deflected_sweeps import Displacement, axes_of, deflect, tips_of
+from postproc.part.displacement import Displacements
+from postproc.part.part_figures import (
+    FEATURES,
+    ErrorFigures,
+    PartError,
+    PartFigures,
+    PartSide,
+    SideFigures,
+    Surface,
+    SurfaceGroup,
+    WorstPoint,
+)
+from postproc.part.surface import POINTS, find_surface
+from postproc.part.surface_error import find_errors
+from postproc.process.stock.blank import corners_of
+from postproc.process.stock.distance import AXIS, REMOVES
+from postproc.process.stock.simulation import StockRun
+from postproc.toolpath import Toolpath
+
+_FLOOR, _WALL = np.cos(10 * DEG), np.sin(10 * DEG)
+_SURE = 1.05  # of the largest displacement that was seen
+_LEAST_REACH = 0.01 * MM
+_BESIDE = 5 * MM
+_LONGEST = 0.2  # m: edges whose length is not stated
+
+
+class _Nominal(NamedTuple):
+    """What is known of a program before its tools are displaced.
+
+    Its surface and the points of it that are ``own`` (K,), with the motion (K,) that made them and the feature (K,)
+    that they belong to; its sweeps ``rows`` (M, ROW) that may reach the part, of motions (M,) and shares (M, 2); the
+    sweeps of earlier programs; lever [m]: how far an edge is from the tip at most.
+    """
+
+    run: StockRun
+    surface: Surface
+    own: Ints
+    made_by: Ints
+    feature: Ints
+    rows: Floats
+    motion: Ints
+    share: Floats
+    earlier: Floats
+    lever: float
+
+
+class _UnknownDisplacement(Exception):
+    """The displacement of the motions ``args[0]`` (L,) is not known."""
+
+
+def find_part_error(
+    task: CompensationProblem, run: StockRun, division: Subdivision | None, count: int = POINTS
+) -> PartError | Finding:
+    """The error of the part that ``task`` leaves in the stock of ``run``, at about ``count`` points.
+
+    As posted, and with ``division`` as compensated.  PRT001 where it is not known, and why.
+    """
+    nominal = _nominal(run, count)
+    if not len(nominal.own):
+        return Finding("PRT001", "the program leaves no surface of its own on the part", task.file)
+    path = task.toolpath
+    cutting = np.unique(nominal.motion[run.engagement.cuts[nominal.motion]])
+    try:
+        lost = cutting[~task.desired_path.traceable[cutting]]
+        if len(lost):
+            raise _UnknownDisplacement(lost)
+        sides = [
+            _side(nominal, Displacements(task, run.sweeps.in_stock, posted))
+            for posted in ([None] if division is None else [None, division])
+        ]
+    except _UnknownDisplacement as unknown:
+        lost = unknown.args[0]
+        message = f"the displacement of the tool is not known in {len(lost)} motions that reach the part"
+        return Finding("PRT001", message, task.file, int(path.line[lost[0]]))
+    area = nominal.surface.area[nominal.own]
+    whole = [_figures(nominal, side, path, task.tolerance) for side in sides]
+    figures = PartFigures(
+        len(nominal.own),
+        nominal.surface.spacing,
+        float(area.sum()),
+        task.tolerance,
+        whole[0],
+        None if division is None else whole[1],
+        _groups(FEATURES, nominal.feature, nominal, sides, task),
+        _groups(*_operations(nominal), nominal, sides, task),
+    )
+    return PartError(figures, nominal.surface, nominal.own, sides[0], None if division is None else sides[1])
+
+
+def _nominal(run: StockRun, count: int) -> _Nominal:
+    surface = find_surface(run.engagement.stock, count)
+    earlier = run.engagement.stock.sweeps[: 0 if run.before is None else len(run.before.rows)]
+    own = np.flatnonzero(surface.sweep >= len(earlier))
+    sweep = surface.sweep[own] - len(earlier)
+    slope = np.abs(np.einsum("ki,ki->k", surface.normals[own], run.sweeps.rows[sweep, AXIS : AXIS + 3]))
+    near = _near(run)
+    return _Nominal(
+        run,
+        surface,
+        own,
+        run.sweeps.motion[sweep],
+        np.where(slope >= _FLOOR, 0, np.where(slope <= _WALL, 1, 2)),
+        run.sweeps.rows[near],
+        run.sweeps.motion[near],
+        run.sweeps.share[near],
+        earlier,
+        max(min(cutter.edge_length, _LONGEST) + cutter.radius for cutter in run.sweeps.cutters),
+    )
+
+
+def _near(run: StockRun) -> Bools:
+    """(M,) the sweeps of the program that remove material and are not beside the blank."""
+    rows = run.sweeps.rows
+    low, high = corners_of(run.blank)
+    wide = max(cutter.radius for cutter in run.sweeps.cutters) + _BESIDE
+    top = np.array([cutter.edge_length for cutter in run.sweeps.cutters])[run.sweeps.which]
+    places = [np.full(len(rows), share) for share in (0.0, 0.5, 1.0)]
+    tips = [tips_of(rows, place) for place in places]
+    tops = [tip + top[:, None] * axes_of(rows, place) for tip, place in zip(tips, places, strict=True)]
+    ends = np.stack([*tips, *tops])
+    apart = np.any((ends.max(axis=0) + wide < low) | (ends.min(axis=0) - wide > high), axis=1)
+    return np.asarray((rows[:, REMOVES] > 0) & ~apart)
+
+
+def _side(nominal: _Nominal, displacement: Displacement) -> PartSide:
+    """The errors with displaced tools.  Raises _UnknownDisplacement."""
+    largest, lost = 0.0, np.zeros(0, np.int64)
+
+    def moved(motion: Ints, share: Floats) -> tuple[Floats, Floats]:
+        nonlocal largest, lost
+        shift, turn = displacement(motion, share)
+        unknown = ~np.isfinite(shift[:, 0])
+        lost = np.union1d(lost, motion[unknown])
+        shift[unknown], turn[unknown] = 0.0, 0.0
+        largest = max(largest, float((lengths(shift) + nominal.lever * lengths(turn)).max(initial=0.0)))
+        return shift, turn
+
+    rows, owner, share = deflect(nominal.rows, nominal.motion, nominal.share, nominal.lever, moved)
+    if len(lost):
+        raise _UnknownDisplacement(lost)
+    surface, own = nominal.surface, nominal.own
+    found = find_errors(
+        nominal.run.engagement.stock,
+        np.concatenate([nominal.earlier, rows]),
+        max(_SURE * largest, _LEAST_REACH),
+        surface.points[own],
+        surface.normals[own],
+    )
+    sweep = found.sweep - len(nominal.earlier)
+    at = np.maximum(sweep, 0)
+    motion = np.where(sweep >= 0, nominal.motion[owner[at]], -1)
+    place = share[at, 0] + found.share * (share[at, 1] - share[at, 0])
+    arm = surface.points[own] - tips_of(rows[at], np.nan_to_num(found.share))
+    return PartSide(found.error, motion, place, arm)
+
+
+def _figures(nominal: _Nominal, side: PartSide, path: Toolpath, tolerance: float) -> SideFigures:
+    worst = int(np.argmax(np.abs(side.error)))
+    x, y, z = nominal.surface.points[nominal.own[worst]].tolist()
+    point = WorstPoint(
+        (x, y, z),
+        int(path.line[side.motion[worst]]) if side.motion[worst] >= 0 else 0,
+        float(side.error[worst]),
+        FEATURES[nominal.feature[worst]],
+    )
+    return SideFigures(ErrorFigures.of(side.error, nominal.surface.area[nominal.own], tolerance), point)
+
+
+def _operations(nominal: _Nominal) -> tuple[list[str], Ints]:
+    """Names of the operations, runs of motions with one tool; and which one each point (K,) belongs to."""
+    sweeps = nominal.run.sweeps
+    motions, first = np.unique(sweeps.motion, return_index=True)
+    tool = sweeps.which[first]
+    starts = np.append(True, tool[1:] != tool[:-1])
+    names = [f"tool {sweeps.cutters[index].number}" for index in tool[starts]]
+    return names, (np.cumsum(starts) - 1)[np.searchsorted(motions, nominal.made_by)]
+
+
+def _groups(
+    names: Sequence[str],
+    group: Ints,
+    nominal: _Nominal,
+    sides: Sequence[PartSide],
+    task: CompensationProblem,
+) -> tuple[SurfaceGroup, ...]:
+    """The figures of the groups of points (K,) that have any."""
+    area = nominal.surface.area[nominal.own]
+    groups = []
+    for index, name in enumerate(names):
+        at = np.flatnonzero(group == index)
+        if not len(at):
+            continue
+        line = task.toolpath.line[nominal.made_by[at]]
+        figures = [ErrorFigures.of(side.error[at], area[at], task.tolerance) for side in sides]
+        groups.append(
+            SurfaceGroup(
+                name,
+                (int(line.min()), int(line.max())),
+                float(area[at].sum() / area.sum()),
+                figures[0],
+                figures[1] if len(figures) > 1 else None,
+            )
+        )
+    return tuple(groups)

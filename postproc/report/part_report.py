@@ -1,0 +1,93 @@
+"""The error of a part as JSON and as lines on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from postproc.base.units import MM
+from postproc.compensation.uncertainty import Uncertainty
+from postproc.part.part_figures import ErrorFigures, PartFigures, SideFigures, SurfaceGroup
+from postproc.report.formatting import two_digits
+
+SIDES = {"before": "part before", "after": "part after"}
+
+
+def part_json(part: PartFigures) -> dict[str, object]:
+    """The key ``part_error_mm``; lengths in mm, areas in mm2, excess above zero."""
+    return {
+        "points": part.points,
+        "spacing": _mm(part.spacing),
+        "area_mm2": round(part.area / MM**2, 3),
+        "tolerance": _mm(part.tolerance),
+        "before": _side(part.before),
+        "after": None if part.after is None else _side(part.after),
+        "features": _groups(part.features),
+        "operations": _groups(part.operations),
+    }
+
+
+def _mm(length: float) -> float | None:
+    return round(length / MM, 7) if np.isfinite(length) else None
+
+
+def _errors(figures: ErrorFigures) -> dict[str, float | None]:
+    return {
+        "gouge_max": _mm(figures.gouge_max),
+        "excess_max": _mm(figures.excess_max),
+        "rms": _mm(figures.rms),
+        "p95": _mm(figures.p95),
+        "out_of_tolerance": round(figures.out, 6),
+    }
+
+
+def _side(side: SideFigures) -> dict[str, object]:
+    worst = side.worst
+    return {
+        **_errors(side.whole),
+        "ci95": _mm(side.ci95),
+        "worst": {
+            "line": worst.line or None,
+            "error": _mm(worst.error),
+            "feature": worst.feature,
+            "position": [_mm(value) for value in worst.position],
+        },
+    }
+
+
+def _groups(groups: Sequence[SurfaceGroup]) -> list[dict[str, object]]:
+    return [
+        {
+            "name": group.name,
+            "lines": list(group.lines),
+            "area_share": round(group.area, 6),
+            "before": _errors(group.before),
+            "after": None if group.after is None else _errors(group.after),
+        }
+        for group in groups
+    ]
+
+
+def part_rows(part: PartFigures | None, uncertainty: Uncertainty) -> Iterator[tuple[str, str]]:
+    """A line a side: largest gouge and excess, their interval, rms, what is out of tolerance, and the worst place."""
+    if part is None:
+        return
+    for name, side in part.sides:
+        yield SIDES[name], side_sentence(side, part.tolerance, uncertainty)
+
+
+def side_sentence(side: SideFigures, tolerance: float, uncertainty: Uncertainty) -> str:
+    """The figures of a side in words."""
+    whole, worst = side.whole, side.worst
+    interval = ""
+    if not np.isnan(side.ci95) and not uncertainty.unknown:
+        least = "at least " if uncertainty.lower_bound else ""
+        interval = f" +- {least}{two_digits(side.ci95 / MM)} (95 %)"
+    where = f"line {worst.line}" if worst.line else "what the blank keeps"
+    sign = "excess" if worst.error > 0 else "gouge"
+    return (
+        f"gouge {whole.gouge_max / MM:.4f}, excess {whole.excess_max / MM:.4f} mm{interval}, rms {whole.rms / MM:.4f}"
+        f" mm; {100 * whole.out:.1f} % of the surface beyond {tolerance / MM:g} mm; worst: {sign}, {worst.feature},"
+        f" {where}"
+    )

@@ -1,0 +1,29 @@
+"""The error of the part of a program whose process states a stock."""
+
+from __future__ import annotations
+
+from postproc.base.findings import Finding
+from postproc.compensation.subdivision import Subdivision
+from postproc.part.part_figures import PartError
+from postproc.workflows.preparation import Prepared
+
+
+def part_error_of(
+    ready: Prepared, division: Subdivision | None
+) -> tuple[PartError | None, tuple[Finding, ...]]:
+    """The error of the part as posted, and with ``division`` as compensated, and the findings of it; None without a
+    stock, or where it is not known."""
+    task = ready.task
+    if task.force.stock is None:
+        return None, ()
+    from postproc.part.part_error import find_part_error  # numba: only where there is a stock
+    from postproc.part.part_uncertainty import StatedIntervals, with_uncertainty
+    from postproc.process.stock.simulation import StockRun
+
+    run = task.force.stock
+    assert isinstance(run, StockRun)
+    part = find_part_error(task, run, division)
+    if isinstance(part, Finding):
+        return None, (part,)
+    stated = StatedIntervals(ready.cell.force_ci95, ready.cell.force_vector)
+    return with_uncertainty(part, task, run, division, stated), ()
