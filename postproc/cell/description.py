@@ -10,7 +10,7 @@ from postproc.base.arrays import Floats, frozen
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
-from postproc.cell.room import StatedRoom
+from postproc.cell.stated_room import StatedRoom
 from postproc.robot.external_axes import ExternalAxis
 from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 

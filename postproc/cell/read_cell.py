@@ -20,7 +20,7 @@ from postproc.base.yaml_section import YamlSection, load
 from postproc.cell.controller_state import read_program_start, read_symbols
 from postproc.cell.description import MODES, Cell, Controller, ForceVectorInterval, Tool
 from postproc.cell.implausible import implausible
-from postproc.cell.room import read_room
+from postproc.cell.stated_room import read_room
 from postproc.robot.read_external_axes import read_external
 
 NAME = "cell.yaml"

@@ -24,10 +24,10 @@ class PartMotions:
     own base; track (3,): by how much that moves with each metre of a track that is not a joint.  status (R,) branch, q
     (R, n) [rad, m] joint values now.  head (R,): the place by which the turns of A1, A4 and A6 are chosen; anchor (R,
     n) [rad, m]: joint values before a head that goes on from axis positions, NaN where its T chooses; sign (R, n): of
-    each axis as T states it, 0 without.  scored (R,): ends of motions under force,
-    under_force (R,): places of such motions; force, moment (R, 3) [N, N m] there,
-    tangent (R, 3): of the feed, world axes; world (R,): a force that does not turn with the part.  conditions (R).
-    origin (3,) [m]: of the base in $WORLD now.
+    each axis as T states it, 0 without.  scored (R,): ends of motions under force, under_force (R,): places of such
+    motions; force, moment (R, 3) [N, N m] there, tangent (R, 3): of the feed, world axes; start (R, 3) [m]: of a
+    straight scored motion that does not start on the part, in the robot's own base, NaN elsewhere; world (R,): a force
+    that does not turn with the part.  conditions (R).  origin (3,) [m]: of the base in $WORLD now.
     """
 
     program: Ints
@@ -47,6 +47,7 @@ class PartMotions:
     force: Floats
     moment: Floats
     tangent: Floats
+    start: Floats
     world: Bools
     conditions: Conditions
     origin: Floats
@@ -112,6 +113,16 @@ class PartMotions:
 
     def _turned_tools(self, angle: Floats) -> Poses:
         return self._rows(np.arange(len(self)))._turned_tools(angle)
+
+    def positions(self, places: Floats, rows: Ints) -> Floats:
+        """(P, K, 3) [m] the TCP in the robot's own base at the moving motions ``rows`` (K,), with the part at
+        ``places`` (P, 6); a turn of the tool does not move it."""
+        turned_about = self.in_robot(
+            places, rows, self.target.position[rows] - self.origin, np.zeros(len(rows), np.bool_)
+        )
+        shift = np.einsum("rij,pj->pri", self.before.rotation[rows], places[:, :3])
+        track = ((places[:, TRACK] - self.track_now)[:, None] * self.track)[:, None]
+        return np.asarray(turned_about + shift + self.before.position[rows] + track)
 
     def in_robot(self, places: Floats, rows: Ints, vectors: Floats, fixed: Bools) -> Floats:
         """(P, K, 3) ``vectors`` (K, 3) of world axes at the motions ``rows`` (K,), which turn with the part at

@@ -49,11 +49,9 @@ def refine_place(room: Room, scoring: Scoring, score: Callable[[Floats], Scores]
         share = np.clip(room.shares(here.places)[0] + step, 0.0, 1.0)
         trial = score(room.places(share[None]))
         if _better(trial, here):
-            gained = here.value[0] - trial.value[0]
-            here, trust = trial, min(2.0 * trust, 0.2)
+            little = trial.value[0] > (1.0 - 1e-5) * here.value[0]
+            here, trust = trial, min(2.0 * trust, 0.2) * (0.25 if little else 1.0)
             visited.append(here)
-            if gained < 1e-5 * here.value[0] and np.isfinite(gained):
-                trust *= 0.25
         else:
             trust *= 0.3
         if trust < LAST:
@@ -79,7 +77,8 @@ def _step(
     def slope(name: str) -> tuple[Floats, Floats]:
         """Values (M,) here, and their derivatives (M, D)."""
         values, there = getattr(here, name)[0].ravel(), getattr(around, name).reshape(free, -1)
-        return values, ((there - values) / side[:, None]).T
+        with np.errstate(invalid="ignore"):  # out of reach
+            return values, ((there - values) / side[:, None]).T
 
     error, by_share = slope("error")
     sets = here.error.shape[2] if here.error is not None else 1

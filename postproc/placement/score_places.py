@@ -68,10 +68,11 @@ class Scoring:
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Of P placements: violation (P,) [rad], 0 where every motion is feasible; values (P, K) [m]: the objective under
-    each set of forces, infinite where a motion is not feasible unless in detail; in detail: lack (P, R) [rad] by which
-    each place falls short of its margins; error (P, R, K) [m]: of each scored place under each set of forces, 0
-    elsewhere; limit, singular (P, R) [rad]: distances from the next axis limit and singularity, -inf out of reach."""
+    """Of P placements, places (P, 6): violation (P,) [rad], 0 where every motion is feasible; values (P, K) [m]: the
+    objective under each set of forces, infinite where a motion is not feasible unless in detail; in detail: lack (P, R)
+    [rad] by which each place falls short of its margins; error (P, R, K) [m]: of each scored place under each set of
+    forces, 0 elsewhere; limit, singular (P, R) [rad]: distances from the next axis limit and singularity, -inf out of
+    reach."""
 
     places: Floats
     violation: Floats
@@ -196,6 +197,7 @@ def _values(
     state = model.state(angles, np.zeros((len(angles), 6)), motions.tool[chosen], given)
     moment = _flat(motions.in_robot(places, rows, motions.moment[rows], motions.world[rows]))
     tangent = _flat(motions.in_robot(places, rows, motions.tangent[rows], ~motions.moves[rows]))
+    _turn_approaches(motions, places, rows, tangent)
     lines = [_lever(state.swept, i) for i in range(model.chain.size)]
     turns = [axis if turn else None for axis, turn in zip(state.swept.axes, state.swept.turns, strict=True)]
     gives = model.compliance(state).T
@@ -225,6 +227,15 @@ def _values(
         values[:, k] = np.percentile(each, 95, axis=1) if scoring.objective == P95 else each.max(axis=1)
         error[:, rows, k] = each
     return values, error
+
+
+def _turn_approaches(motions: PartMotions, places: Floats, rows: Ints, tangent: Floats) -> None:
+    """Sets in ``tangent`` (3, P K) of the motions ``rows`` (K,) those that start where the part does not move."""
+    some = np.flatnonzero(np.isfinite(motions.start[rows, 0]))
+    if len(some):
+        feed = motions.positions(places, rows[some]) - motions.start[rows[some]]
+        feed /= np.maximum(np.linalg.norm(feed, axis=2, keepdims=True), 1e-9)
+        tangent.reshape(3, len(places), len(rows))[:, :, some] = np.moveaxis(feed, 2, 0)
 
 
 def _half_width(

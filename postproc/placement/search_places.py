@@ -89,7 +89,8 @@ def search_places(
             return score_places(model, part, room, some, places, detailed=True)
 
         known = score(start_places(room)) if pool is None else score(pool.places[:AGAIN])
-        pool = Scores.join([known, evolve(room, score, known, NICHES if round_number == 1 else NICHES // 3)])
+        niches = NICHES if pool is None and len(room.free) > 2 else NICHES // 3
+        pool = Scores.join([known, evolve(room, score, known, niches)])
         if scoring.objective != P95:
             pool = _refined(room, part_scoring, detailed, pool)
         looked += len(pool.places)

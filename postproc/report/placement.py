@@ -111,7 +111,7 @@ class FeedTurn:
 
 @dataclass(frozen=True, eq=False)
 class ScoreGrid:
-    """The objective (X, Y) [m] over x (X,) and y (Y,) [m], NaN where a motion is not feasible."""
+    """x (X,), y (Y,) [m] and value (X, Y) [m]: the objective there, NaN where a motion is not feasible."""
 
     x: Floats
     y: Floats

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from postproc.cell import AXES, KEYS, MODES
-from postproc.cell.room import RANGES
+from postproc.cell.stated_room import RANGES
 from postproc.robot.external_axes import FIXED, NAMES, POSITIONER, TRACK
 from postproc.robot.read_external_axes import DIRECTIONS
 from postproc.schemas.parts import Schema, flag, known, listed, mapping, number, numbers, text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from postproc.cell.room import RANGES
+from postproc.cell.stated_room import RANGES
 from postproc.placement.room import FREEDOMS
 from postproc.placement.score_places import OBJECTIVES
 from postproc.report.placement import KEYS

@@ -43,10 +43,10 @@ def _place(request: PlaceRequest, inputs: Inputs, stage: Stage) -> Placement:
     stage("predicting the best places")
     problem = replace(problem, few=result.few)
     present = exact_figures(problem, None)
-    assert present is not None
+    assert isinstance(present, PlacedFigures)
     ranked, dropped = _ranked(problem, result)
     if not ranked:
-        raise Refusal(_no_place(problem, result))
+        raise Refusal(_no_place(problem, result, dropped))
     best = ranked[0]
     stage("comparing freedoms")
     findings = [*_findings(problem, present, best, dropped)]
@@ -74,36 +74,41 @@ def _place(request: PlaceRequest, inputs: Inputs, stage: Stage) -> Placement:
     return _written(problem, done, inputs)
 
 
-def _ranked(problem: PlaceProblem, result: SearchResult) -> tuple[list[PlacedFigures], int]:
-    """The best places that are apart and hold for every motion, best first, and how many were dropped."""
+def _ranked(problem: PlaceProblem, result: SearchResult) -> tuple[list[PlacedFigures], list[Finding]]:
+    """The best places that are apart and hold for every motion, best first; why others were dropped."""
     request, room = problem.request, problem.room
     pool = result.pool.part(np.flatnonzero(result.pool.violation == 0))
     if not len(pool.places):
-        return [], 0
+        return [], []
     whole = len(problem.motions) <= EXACT
     chosen = distinct(room, pool.places, 2 * request.top if whole else request.top + 2)
     places = np.unique(room.rounded(pool.places[chosen]), axis=0)
     full = score_places(problem.model, problem.motions, room, problem.scoring, places)
     regret = regret_of(problem, places, pool.places[:: max(1, len(pool.places) // POOL)])
     ranked: list[PlacedFigures] = []
-    dropped = 0
+    dropped: list[Finding] = []
     for at in full.order().tolist():
         if full.violation[at] > 0 or len(ranked) == request.top:
             continue
-        figures = exact_figures(problem, full.places[at]) if whole or not ranked else None
-        if figures is None and (whole or not ranked):
-            dropped += 1
-            continue
-        if figures is None:
-            figures = PlacedFigures(full.places[at], exact=False)
+        figures = PlacedFigures(full.places[at], exact=False)
+        if whole or not ranked:
+            exact = exact_figures(problem, full.places[at])
+            if isinstance(exact, Finding):
+                dropped.append(exact)
+                continue
+            figures = exact
         score = float(full.value[at])
         ranked.append(replace(figures, score=score, regret=float(regret[at])))
     return ranked, dropped
 
 
-def _no_place(problem: PlaceProblem, result: SearchResult) -> Finding:
-    """PLC002: which motion and which limit is nearest to feasible."""
+def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding]) -> Finding:
+    """PLC002: which motion and which limit is nearest to feasible; ``dropped``: why the best places are not."""
     request, room = problem.request, problem.room
+    if dropped:
+        return replace(
+            dropped[0], message=f"none of {result.looked} places is feasible: {dropped[0].message}"
+        )
     near = result.pool.places[result.pool.order()[:1]]
     whole = score_places(problem.model, problem.motions, room, problem.scoring, near, detailed=True)
     assert whole.lack is not None
@@ -126,7 +131,7 @@ def _no_place(problem: PlaceProblem, result: SearchResult) -> Finding:
     elif singular < request.singularity_margin:
         what = f"comes to {singular:.1f} deg from a singularity (margin {request.singularity_margin:g} deg)"
     else:
-        what = "fails the check of its path"
+        what = "cannot be followed"
     count = int((whole.lack[0] > 0).sum())
     message = (
         f"none of {result.looked} places is feasible; at the one nearest to it ({where}) this motion {what}"
@@ -136,7 +141,7 @@ def _no_place(problem: PlaceProblem, result: SearchResult) -> Finding:
 
 
 def _findings(
-    problem: PlaceProblem, present: PlacedFigures, best: PlacedFigures, dropped: int
+    problem: PlaceProblem, present: PlacedFigures, best: PlacedFigures, dropped: list[Finding]
 ) -> list[Finding]:
     request, cell = problem.request, str(problem.moved.cell.path)
     found = [Finding("PLC001", "collisions are not checked", str(request.programs[0]))]
@@ -151,9 +156,10 @@ def _findings(
     if edges:
         found.append(Finding("PLC007", f"the best place is at the edge of: {', '.join(edges)}", cell))
     if dropped:
-        found.append(
-            Finding("PLC009", f"{dropped} places fail the check of every path and are not listed", cell)
+        message = (
+            f"{len(dropped)} places fail the check of every path and are not listed: {dropped[0].message}"
         )
+        found.append(Finding("PLC009", message, dropped[0].file, dropped[0].line))
     if best.figure(request.objective) > 0.99 * present.figure(request.objective):
         found.append(Finding("PLC010", "no place of the room is better than the present one", cell))
     if not problem.prepared[0].task.process:

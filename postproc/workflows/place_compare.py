@@ -91,6 +91,7 @@ def feed_turns(problem: PlaceProblem, place: Floats) -> tuple[FeedTurn, ...]:
         turned = replace(
             part,
             tangent=part.tangent @ turn.T,
+            start=np.full_like(part.start, np.nan),
             moment=np.where(fixed, part.moment, part.moment @ turn.T),
         )
         some = replace(scoring, forces=np.where(fixed, forces, forces @ turn.T))

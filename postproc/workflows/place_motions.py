@@ -30,8 +30,9 @@ MOST_INNER = 400
 
 @dataclass(frozen=True)
 class MotionMargins:
-    """Of all places that a program leads to: distances (M,) [rad] from the next axis limit and the next singularity,
-    -inf out of reach, and the rows (M,) they belong to; wrong (K,): rows whose configuration is not the stated one."""
+    """Of all places that a program leads to: limit (M,), singular (M,) [rad]: distances from the next axis limit and
+    the next singularity, -inf out of reach, and the rows (M,) they belong to; wrong (K,): rows whose configuration is
+    not the stated one."""
 
     limit: Floats
     singular: Floats
@@ -108,7 +109,7 @@ def build_motions(ready: Prepared, base: int, turned_tools: bool, track: str | N
     moving_row = np.isin(path.base, frames)
     inner, share = inner_points(task.desired_path, ends)
     # of a motion that starts elsewhere only its end moves with the part: its path is checked at the places found
-    rigid = moving_row[inner] & moving_row[np.maximum(inner - 1, 0)] & path.known[np.maximum(inner - 1, 0)]
+    rigid = (moving_row & _starts_on_part(task, moving_row))[inner]
     inner, share = inner[rigid], share[rigid]
     rows = np.concatenate([ends, inner])
     shares = np.concatenate([np.ones(len(ends)), share])
@@ -139,6 +140,7 @@ def build_motions(ready: Prepared, base: int, turned_tools: bool, track: str | N
     tangent = np.where(
         scored[:, None], task.desired_path.tangent(rows, np.ones(len(rows))), 0.0
     )  # in the axes of the path
+    start = _fixed_starts(task, rows, scored & ~_starts_on_part(task, moving_row)[rows])
     to_world = np.swapaxes(before.rotation, 1, 2)
     if placed is not None:
         to_world = to_world @ placed.rotation
@@ -165,6 +167,7 @@ def build_motions(ready: Prepared, base: int, turned_tools: bool, track: str | N
         force=np.einsum("nij,nj->ni", to_world, wrench[:, :3]),
         moment=np.einsum("nij,nj->ni", to_world, wrench[:, 3:]),
         tangent=np.einsum("nij,nj->ni", to_world, tangent),
+        start=start,
         world=np.zeros(len(rows), np.bool_),
         conditions=task.conditions.part(rows),
         origin=np.array(cell.bases[base].position),
@@ -172,6 +175,23 @@ def build_motions(ready: Prepared, base: int, turned_tools: bool, track: str | N
         track_now=now,
         track_joint=joint,
     )
+
+
+def _starts_on_part(task: CompensationProblem, moves: Bools) -> Bools:
+    """(N,) the motion starts at a place that ``moves`` (N,) with the part."""
+    path = task.toolpath
+    return np.append(False, (moves & path.known)[:-1])
+
+
+def _fixed_starts(task: CompensationProblem, rows: Ints, fixed: Bools) -> Floats:
+    """(R, 3) [m] where the straight ones of ``rows`` (R,) start that are ``fixed`` (R,), in the robot's own base."""
+    starts = np.full((len(rows), 3), np.nan)
+    some = np.flatnonzero(fixed & (task.toolpath.kind[rows] == Kind.LIN) & task.desired_path.traceable[rows])
+    if len(some):
+        there = task.desired_path.start[rows[some]]
+        placed = task.robot_from_path(rows[some], np.zeros(len(some)))
+        starts[some] = there.position if placed is None else (placed @ there).position
+    return starts
 
 
 def _before(ready: Prepared, rows: Ints, shares: Floats, world: Poses) -> Poses:

@@ -14,6 +14,9 @@ from postproc.base.yaml_section import YamlSection
 RANGES = {"x": "mm", "y": "mm", "z": "mm", "turn": "deg", "tool_turn": "deg", "track": "mm"}
 """The keys of ranges, and their units."""
 
+NEAR = 1e-6
+"""[m] Corners that are nearer to each other, or to a side, touch."""
+
 
 @dataclass(frozen=True, eq=False)
 class StatedRoom:
@@ -61,15 +64,22 @@ def polygon_problem(corners: Floats) -> str:
         return f"has {count} corners where at least 3 are needed"
     following = np.roll(corners, -1, axis=0)
     for one in range(count):
-        if np.allclose(corners[one], following[one], atol=1e-9):
-            return f"corners {one + 1} and {(one + 1) % count + 1} are the same place"
-        for other in range(one + 1, count):
-            adjacent = other == one + 1 or (one == 0 and other == count - 1)
-            if not adjacent and _cross(corners[one], following[one], corners[other], following[other]):
-                sides = f"the side from corner {one + 1} and that from corner {other + 1}"
-                return f"crosses itself: {sides} meet"
-    area = 0.5 * abs(float(np.sum(corners[:, 0] * following[:, 1] - following[:, 0] * corners[:, 1])))
-    return "" if area > 1e-6 else "has no area: its corners lie on a line"
+        for other in range(count):
+            if other > one and np.allclose(corners[one], corners[other], atol=NEAR, rtol=0.0):
+                return f"corners {one + 1} and {other + 1} are the same place"
+            ends = (other, (other + 1) % count)
+            if one not in ends and _distance(corners[one], corners[other], following[other]) < NEAR:
+                return f"touches itself: corner {one + 1} is on the side from corner {other + 1}"
+        for other in range(one + 2, count - (one == 0)):
+            if _cross(corners[one], following[one], corners[other], following[other]):
+                return f"crosses itself: the side from corner {one + 1} meets that from corner {other + 1}"
+    return ""
+
+
+def _distance(point: Floats, start: Floats, end: Floats) -> float:
+    side = end - start
+    share = np.clip(float((point - start) @ side) / max(float(side @ side), 1e-30), 0.0, 1.0)
+    return float(np.linalg.norm(point - start - share * side))
 
 
 def _cross(a: Floats, b: Floats, c: Floats, d: Floats) -> bool:
