@@ -459,3 +459,53 @@ def test_without_force_nothing_is_placed(job, compensate):
     with pytest.raises(Refusal) as refusal:
         place(request(job.folder, force="0,0,0"))
     assert refusal.value.findings[0].code == "PLC005"
+
+
+RAIL = "  rail: +y\n  kuka: {unit: mm, d1"
+
+
+def rail_robot(folder: Path) -> None:
+    """The KR 270 on a linear axis E1 of its own."""
+    text = (ROOT / "robots" / "kuka_kr270.yaml").read_text().replace("  kuka: {unit: mm, d1", RAIL)
+    text = text.replace(
+        "  A1: [-185", "  E1: {kind: prismatic, limits: [-1500, 1500], unit: mm}\n  A1: [-185"
+    )
+    for joint in range(6, 0, -1):
+        text = text.replace(f"      c{joint}:", f"      c{joint + 1}:")
+    (folder / "rail.yaml").write_text(text)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("own_joint", [False, True], ids=["track of the cell", "joint of the robot"])
+def test_a_track_is_a_freedom(job, own_joint):
+    """The score is what the main job predicts with the track there; the cell file says where it is."""
+    cell = (job.folder / "cell.yaml").read_text()
+    if own_joint:
+        rail_robot(job.folder)
+        cell = cell.replace("kuka_kr270", "rail.yaml").replace("[0, -90", "[200, 0, -90")
+    else:
+        cell += "robot_base: {x: 100, y: 0, z: 50, a: 30, b: 5, c: 0}\n"
+        cell += "external_axes:\n  E1: {kind: track, direction: +y, limits: [-1500, 1500], start: 200}\n"
+    job.cell(cell)
+    ranges = {"track": (-1400.0, 1400.0), "turn": (-30.0, 30.0), "tool_turn": (-50.0, 50.0)}
+    done = place(request(job.folder, ranges=ranges, top=2, output=job.folder / "new.yaml"))
+    for one in done.places:
+        assert one.score == pytest.approx(one.across.max, rel=5e-3)
+    assert done.best.across.max < 0.9 * done.present.across.max
+    new = yaml.safe_load((job.folder / "new.yaml").read_text())
+    there = new["start"][0] if own_joint else new["external_axes"]["E1"]["start"]
+    assert there == pytest.approx(done.best.place[5] * 1e3, abs=1e-6)
+    assert abs(there - 200) > 10
+
+
+def test_a_track_that_the_program_moves_is_no_freedom(job):
+    job.cell(
+        (job.folder / "cell.yaml").read_text()
+        + "external_axes:\n  E1: {kind: track, direction: +y, limits: [-1500, 1500]}\n"
+    )
+    text = job.program.read_text(encoding="latin-1")
+    job.program.write_text(text.replace("A6 0}", "A6 0,E1 0}"), encoding="latin-1")
+    with pytest.raises(Refusal) as refusal:
+        place(request(job.folder, ranges={"track": (0.0, 100.0)}))
+    assert refusal.value.findings[0].code == "PLC003"
+    assert "E1" in refusal.value.findings[0].message

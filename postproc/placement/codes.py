@@ -35,7 +35,7 @@ CODES = define(
             "programs do not share a part",
             meaning="The programs are in different cells, or cut in different bases.",
             consequence="One place cannot be chosen for them.",
-            action="Name programs that are cut at one place, or use --assign for several parts and places.",
+            action="Name programs that are cut at one place, in one cell.",
             example="Two programs with BASE_DATA[1] and BASE_DATA[2].",
         ),
         "PLC005": Code(

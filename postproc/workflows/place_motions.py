@@ -267,10 +267,10 @@ def _track(ready: Prepared, name: str | None) -> tuple[float, Floats]:
     return now, -np.asarray(cell.robot_base.inverse().rotation @ axis.direction)
 
 
-def track_of(ready: Prepared) -> tuple[str, float, float] | None:
+def track_of(ready: Prepared, stated: Bools) -> tuple[str, float, float] | None:
     """Name and limits [m] of the linear track that the cell, and not the program, puts in its place; None without one.
-    Raises Refusal PLC003 where the program moves it."""
-    path, robot, cell = ready.program.toolpath, ready.robot, ready.cell
+    ``stated`` (N, 6): where the text states the external axes.  Raises Refusal PLC003 where it states this one."""
+    robot, cell = ready.robot, ready.cell
     found: tuple[str, float, float] | None = None
     column = own_column(robot)
     if column is not None and robot.external is not None:
@@ -282,7 +282,7 @@ def track_of(ready: Prepared) -> tuple[str, float, float] | None:
             found, column = (axis.name, axis.lower * MM, axis.upper * MM), axis.column
     if found is None:
         return None
-    if path.moves_external[column]:
+    if stated[:, column].any():
         message = f"the program states {found[0]} itself, so a cell file does not move it"
         raise Refusal(Finding("PLC003", message, ready.task.file, help="leave --track out"))
     return found

@@ -24,7 +24,7 @@ from postproc.process.force_sources import not_requested
 from postproc.robot.external_axes import own_column
 from postproc.workflows.place_cell import MovedCell
 from postproc.workflows.place_motions import base_of_cuts, build_motions, cell_of_all, track_of
-from postproc.workflows.preparation import Prepared, Request, prepare
+from postproc.workflows.preparation import Prepared, Request, prepare, read_program
 
 PROBE = 1 * DEG
 """Turn of the part by which forces in world axes are told from others."""
@@ -84,7 +84,7 @@ def place_problem(request: PlaceRequest) -> PlaceProblem:
             raise Refusal(not_requested(path, one.program.toolpath, cell))
     base = base_of_cuts(first)
     ranges = {**({} if cell.room is None else cell.room.ranges), **request.ranges}
-    track = track_of(first) if "track" in ranges else None
+    track = _track(request, prepared) if "track" in ranges else None
     if "track" in ranges and track is None:
         message = "neither the robot nor the cell has a linear track whose place the cell states"
         raise Refusal(Finding("PLC003", message, str(cell.path), help="leave --track out"))
@@ -110,6 +110,15 @@ def place_problem(request: PlaceRequest) -> PlaceProblem:
     )
     room = _room(request, prepared, motions, ranges, track)
     return PlaceProblem(request, prepared, moved, room, motions, _scoring(request, prepared, motions))
+
+
+def _track(request: PlaceRequest, prepared: tuple[Prepared, ...]) -> tuple[str, float, float] | None:
+    """As of ``track_of``, of all programs as they are written."""
+    found = None
+    for path, ready in zip(request.programs, prepared, strict=True):
+        _, read, _ = read_program(path, ready.cell, request.config_dat)
+        found = track_of(ready, ~np.isnan(read.toolpath.external))
+    return found
 
 
 def _cell_bytes(path: Path) -> bytes:
