@@ -509,3 +509,25 @@ def test_a_track_that_the_program_moves_is_no_freedom(job):
         place(request(job.folder, ranges={"track": (0.0, 100.0)}))
     assert refusal.value.findings[0].code == "PLC003"
     assert "E1" in refusal.value.findings[0].message
+
+
+@pytest.mark.slow
+def test_a_program_that_does_not_fit_where_it_is(job):
+    """Out of reach now, and placed all the same; what the present place would cut is not known."""
+    job.cell((job.folder / "cell.yaml").read_text().replace("x: 1500", "x: 2600"))
+    done = place(request(job.folder, top=1))
+    assert np.isnan(done.reduction)
+    assert done.best.across.max > 0
+    (lost,) = (one for one in done.findings if one.code == "PLC006" and "no figures" in one.message)
+    assert "out of reach" in lost.message
+    assert done.to_dict()["reduction"] is None
+    assert all(np.isnan(one.ratio) for one in done.alone)
+
+
+@pytest.mark.slow
+def test_a_bound_for_a_tool_that_turns_along_the_path(job):
+    """No constant turn of the tool is below it, wherever it is feasible."""
+    done = place(request(job.folder, top=1))
+    assert done.spin <= done.best.score * (1 + 1e-9)
+    still = place(request(job.folder, top=1, ranges={"x": (1300.0, 1700.0)}))
+    assert np.isnan(still.spin)

@@ -122,7 +122,9 @@ class ScoreGrid:
 class Placement(Result):
     """The result of ``compensate place``.  base: number of the one that moves; looked: placements scored; searched,
     checked: places on the paths that the search compared by, and that all listed placements were checked on; margins
-    [deg] from limits and singularities; direction [deg]: half width over which the force's direction was averaged."""
+    [deg] from limits and singularities; direction [deg]: half width over which the force's direction was averaged;
+    spin [m]: the least that the objective could become if the tool turned about its spindle along the path, NaN where
+    that is not asked for."""
 
     headline = ("cell", "base", "objective", "present.score_mm", "best.score_mm", "exit")
 
@@ -143,6 +145,7 @@ class Placement(Result):
     places: tuple[PlacedFigures, ...]
     alone: tuple[SingleFreedom, ...]
     feed: tuple[FeedTurn, ...]
+    spin: float
     grid: ScoreGrid | None
     findings: tuple[Finding, ...] = ()
     outputs: tuple[str, ...] = ()
@@ -182,7 +185,7 @@ class Placement(Result):
             "direction_deg": self.direction,
             "present": self.present.as_json(),
             "best": self.best.as_json(),
-            "reduction": round(self.reduction, 5),
+            "reduction": _known(self.reduction, 5),
             "places": [one.as_json() for one in self.places],
             "alone": {
                 one.name: {"value": _known(one.value / _unit(one.name), 4), "ratio": _known(one.ratio, 4)}
@@ -199,6 +202,7 @@ class Placement(Result):
                 }
                 for one in self.feed
             ],
+            "spin_bound_mm": _mm(self.spin),
             "findings": [finding.as_json() for finding in self.findings],
             "outputs": list(self.outputs),
             "exit": self.exit,
@@ -247,6 +251,8 @@ def show_placement(console: Console, done: Placement, verbose: bool = False) -> 
 def verdict(done: Placement) -> str:
     """One sentence: from where to where, and what it brings."""
     here, best = (one.figure(done.objective) / MM for one in (done.present, done.best))
+    if math.isnan(here):
+        return f"{OBJECTIVE_WORDS[done.objective]} {best:.3f} mm at the best place; the present one cannot be predicted"
     share = f"{done.reduction:.0%} less" if done.reduction > 0 else "no better"
     return f"{OBJECTIVE_WORDS[done.objective]} {here:.3f} mm at the present place, {best:.3f} mm at the best: {share}"
 
@@ -281,6 +287,8 @@ def facts(done: Placement) -> Iterator[tuple[str, str]]:
         "search",
         f"{done.looked} placements by {done.searched} places of the paths; the listed ones on all {done.checked}",
     )
+    if words := spin_words(done):
+        yield "tool turn", words
     yield "result", verdict(done)
 
 
@@ -306,8 +314,9 @@ def _places(done: Placement) -> Table:
     for name, one in rows:
         place = [f"{one.place[i] / UNITS[i]:.{2 if UNITS[i] == DEG else 1}f}" for i in free]
         bound = ">" if one.lower_bound else ""
+        rough = "-" if math.isnan(one.score) else f"~{one.score / MM:.3f}"
         cells = [
-            _cell(one.across.max / MM, 3) if one.exact else f"~{one.score / MM:.3f}",
+            _cell(one.across.max / MM, 3) if one.exact else rough,
             _cell(one.error.max / MM, 3),
             _cell(one.error.rms / MM, 3),
             bound + _cell(one.uncertainty / MM, 3),
@@ -346,6 +355,18 @@ def _feed(done: Placement) -> Table:
             angle = f"{one.angle / DEG:+.0f}"
             table.add_row(escape(name + what), angle, f"{one.before / MM:.3f}", f"{one.after / MM:.3f}")
     return table
+
+
+def spin_words(done: Placement) -> str:
+    """What turning the tool about its spindle along the path could bring at the best place; "" where not asked for."""
+    if math.isnan(done.spin):
+        return ""
+    if not math.isfinite(done.spin) or done.spin > WORTH * done.best.score:
+        return "a tool that turns about its spindle along the path is not worth it"
+    least, now = done.spin / MM, done.best.score / MM
+    return (
+        f"a tool that turns about its spindle along the path could bring {now:.3f} to {least:.3f} mm at most"
+    )
 
 
 def _cell(value: float, decimals: int) -> str:

@@ -88,10 +88,17 @@ def place_schema() -> Schema:
             "direction_deg": quantity("deg", "interval of the forces' direction that was averaged over"),
             "present": place,
             "best": place,
-            "reduction": quantity("1", "share of the objective that the best place takes away"),
+            "reduction": quantity(
+                "1", "share of the objective that the best place takes away", nullable=True
+            ),
             "places": array(place, "places, best first"),
             "alone": by_name(alone, "what each freedom brings alone"),
             "feed_turns": array(turn, "what turning the feed at the best place brings"),
+            "spin_bound_mm": quantity(
+                "mm",
+                "least that the objective could become with a tool that turns about its spindle along the path",
+                nullable=True,
+            ),
             **ENDING,
         },
     )

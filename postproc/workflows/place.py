@@ -17,7 +17,7 @@ from postproc.placement.search_places import SearchResult, distinct, search_plac
 from postproc.report.placement import PlacedFigures, Placement
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.workflows.place_cell import refuse_same_file
-from postproc.workflows.place_compare import compare_freedoms, feed_turns, regret_of, score_grid
+from postproc.workflows.place_compare import compare_freedoms, feed_turns, regret_of, score_grid, spin_bound
 from postproc.workflows.place_exact import exact_figures
 from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, place_problem, stated_direction
 from postproc.workflows.preparation import Stage, silent
@@ -42,14 +42,13 @@ def _place(request: PlaceRequest, inputs: Inputs, stage: Stage) -> Placement:
     result = search_places(problem.model, problem.motions, problem.room, problem.scoring, stage)
     stage("predicting the best places")
     problem = replace(problem, few=result.few)
-    present = exact_figures(problem, None)
-    assert isinstance(present, PlacedFigures)
+    present, lost = _present(problem)
     ranked, dropped = _ranked(problem, result)
     if not ranked:
         raise Refusal(_no_place(problem, result, dropped))
     best = ranked[0]
     stage("comparing freedoms")
-    findings = [*_findings(problem, present, best, dropped)]
+    findings = [*lost, *_findings(problem, present, best, dropped)]
     done = Placement(
         programs=tuple(str(path) for path in request.programs),
         robot=problem.prepared[0].robot.name,
@@ -68,10 +67,24 @@ def _place(request: PlaceRequest, inputs: Inputs, stage: Stage) -> Placement:
         places=tuple(ranked),
         alone=compare_freedoms(problem),
         feed=feed_turns(problem, best.place),
+        spin=spin_bound(problem, best.place),
         grid=score_grid(problem, best.place),
         findings=tuple(in_order_of_place(findings)),
     )
     return _written(problem, done, inputs)
+
+
+def _present(problem: PlaceProblem) -> tuple[PlacedFigures, list[Finding]]:
+    """The figures of the present place; without figures, and why, where the main job cannot predict it."""
+    try:
+        figures = exact_figures(problem, None)
+    except Refusal as refusal:
+        figures = refusal.findings[0]
+    if isinstance(figures, PlacedFigures):
+        return figures, []
+    message = f"the present place has no figures: {figures.message}"
+    lost = Finding("PLC006", message, figures.file, figures.line)
+    return PlacedFigures(problem.room.present, exact=False), [lost]
 
 
 def _ranked(problem: PlaceProblem, result: SearchResult) -> tuple[list[PlacedFigures], list[Finding]]:
@@ -164,7 +177,7 @@ def _findings(
         found.append(Finding("PLC010", "no place of the room is better than the present one", cell))
     if not problem.prepared[0].task.process:
         found.append(Finding("PLC011", "the search compares places by a linear model", cell))
-    if present.lower_bound:
+    if best.lower_bound:
         found.append(
             Finding("PLC008", "not every figure that the uncertainty depends on has an interval", cell)
         )

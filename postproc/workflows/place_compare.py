@@ -9,8 +9,8 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.base.units import DEG
 from postproc.placement.force_turns import SCENARIOS, turned_forces
-from postproc.placement.room import FREEDOMS, X, Y
-from postproc.placement.score_places import score_places
+from postproc.placement.room import FREEDOMS, TOOL_TURN, X, Y
+from postproc.placement.score_places import P95, score_places
 from postproc.report.placement import FeedTurn, ScoreGrid, SingleFreedom
 from postproc.workflows.place_problem import PlaceProblem
 
@@ -30,6 +30,9 @@ FEED_STEP = 15
 """[deg]"""
 
 SHOWN_CUTS = 5
+
+SPIN_STEP, MOST_SPUN = 10, 4000
+"""[deg] Turns of the tool that are looked at, and motions."""
 
 
 def regret_of(problem: PlaceProblem, places: Floats, pool: Floats) -> Floats:
@@ -64,7 +67,9 @@ def compare_freedoms(problem: PlaceProblem) -> tuple[SingleFreedom, ...]:
         )
         one = 1 + int(np.argmin(whole.value[1:]))
         feasible = bool(np.isfinite(whole.value[one]))
-        ratio = float(whole.value[one] / whole.values[0].mean())
+        assert whole.limit is not None
+        reached = bool(np.isfinite(whole.limit[0]).all())
+        ratio = float(whole.value[one] / whole.values[0].mean()) if reached else np.nan
         found.append(
             SingleFreedom(
                 FREEDOMS[at],
@@ -139,6 +144,27 @@ def _turn_of(
         float(angles[best]) * DEG,
         float(worst[best]),
     )
+
+
+def spin_bound(problem: PlaceProblem, place: Floats) -> float:
+    """[m] the least that the objective could become if the tool turned about its spindle along the path, each motion as
+    it is best for it: no smooth turn brings more.  NaN where the tool may not be turned.  The part stays at ``place``
+    (6,)."""
+    if TOOL_TURN not in problem.room.free:
+        return np.nan
+    rows = np.flatnonzero(problem.motions.scored)
+    rows = rows[:: max(1, len(rows) // MOST_SPUN)]
+    few = problem.motions.with_heads(rows)
+    part, some = problem.motions.take(few), problem.scoring.take(few)
+    angles = np.append(place[TOOL_TURN], np.arange(-180, 180, SPIN_STEP) * DEG)
+    places = np.tile(place, (len(angles), 1))
+    places[:, TOOL_TURN] = angles
+    scores = score_places(problem.model, part, problem.room, some, places, detailed=True)
+    assert scores.error is not None
+    assert scores.lack is not None
+    error = np.where(scores.lack > 0, np.inf, scores.error.mean(axis=2))[:, part.scored]
+    each = error.min(axis=0)
+    return float(np.percentile(each, 95) if some.objective == P95 else each.max())
 
 
 def _about_z(angle: float) -> Floats:
