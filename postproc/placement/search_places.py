@@ -38,8 +38,8 @@ FAR = 0.2
 
 SEED = 20260101
 
-AGAIN = 1024
-"""Of the best placements of a round that are scored again in the next."""
+AGAIN, SPREAD = 512, 200
+"""Of the best placements of a round that are scored again in the next, and of the best that are apart."""
 
 FEW = 64
 """Motions that the search starts with."""
@@ -88,7 +88,7 @@ def search_places(
         def detailed(places: Floats, part: PartMotions = part, some: Scoring = part_scoring) -> Scores:
             return score_places(model, part, room, some, places, detailed=True)
 
-        known = score(start_places(room)) if pool is None else score(pool.places[:AGAIN])
+        known = score(start_places(room) if pool is None else _kept(room, pool))
         niches = NICHES if pool is None and len(room.free) > 2 else NICHES // 3
         pool = Scores.join([known, evolve(room, score, known, niches)])
         if scoring.objective != P95:
@@ -105,6 +105,13 @@ def search_places(
         few = motions.with_heads(np.union1d(few, added))
     assert pool is not None
     return SearchResult(few, pool, looked, round_number)
+
+
+def _kept(room: Room, pool: Scores) -> Floats:
+    """(P, 6) of the ``pool``, best first, what the next round goes on with: the best, and others that are apart."""
+    return pool.places[
+        np.union1d(np.arange(min(AGAIN, len(pool.places))), distinct(room, pool.places, SPREAD))
+    ]
 
 
 def _refined(room: Room, scoring: Scoring, score: Score, pool: Scores) -> Scores:
