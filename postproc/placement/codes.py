@@ -27,7 +27,7 @@ CODES = define(
             "part cannot be moved by the cell",
             meaning="The place of the part, or a frame of its tool, is not a number of the cell file.",
             consequence="A new cell file would not move the cut.",
-            action="Let the program use a numbered base of the cell, or leave out the freedom that the message names.",
+            action="Let the program use a numbered base of the cell, or omit the freedom that the message names.",
             example="`$BASE = {X 1250, Y 450, ...}` in the program.",
         ),
         "PLC004": Code(

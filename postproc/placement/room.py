@@ -37,7 +37,7 @@ class Room:
         for name in ("lower", "upper", "present"):
             object.__setattr__(self, name, frozen(getattr(self, name), (6,)))
         if (self.lower > self.upper).any():
-            raise ValueError("a range of the room descends")
+            raise ValueError("a range of the room is not ascending")
 
     @property
     def free(self) -> Ints:

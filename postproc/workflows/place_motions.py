@@ -248,7 +248,7 @@ def _tool_axes(ready: Prepared, rows: Ints, frames: Ints) -> Floats:
         if path.frames[frame].pose is not None or number is None or number not in ready.cell.tools:
             line = int(path.line[np.argmax(task.carries & (path.tool == frame))])
             message = "the program states the tool of this cut itself, so a cell file does not turn it"
-            raise Refusal(Finding("PLC003", message, task.file, line, help="leave --tool-turn out"))
+            raise Refusal(Finding("PLC003", message, task.file, line, help="omit --tool-turn"))
         axes[frame] = ready.cell.tools[number].axis
     return np.asarray(axes[path.tool[rows]])
 
@@ -284,7 +284,7 @@ def track_of(ready: Prepared, stated: Bools) -> tuple[str, float, float] | None:
         return None
     if stated[:, column].any():
         message = f"the program states {found[0]} itself, so a cell file does not move it"
-        raise Refusal(Finding("PLC003", message, ready.task.file, help="leave --track out"))
+        raise Refusal(Finding("PLC003", message, ready.task.file, help="omit --track"))
     return found
 
 

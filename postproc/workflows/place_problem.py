@@ -87,7 +87,7 @@ def place_problem(request: PlaceRequest) -> PlaceProblem:
     track = _track(request, prepared) if "track" in ranges else None
     if "track" in ranges and track is None:
         message = "neither the robot nor the cell has a linear track whose place the cell states"
-        raise Refusal(Finding("PLC003", message, str(cell.path), help="leave --track out"))
+        raise Refusal(Finding("PLC003", message, str(cell.path), help="omit --track"))
     turned = "tool_turn" in ranges
     parts = [build_motions(one, base, turned, None if track is None else track[0]) for one in prepared]
     motions = join_motions(parts)
