@@ -11,7 +11,7 @@ CODES = define(
             "collisions are not checked",
             meaning="Reach, axis limits and singularities of every motion are checked, collisions are not.",
             consequence="The arm may hit the part, the table or itself at the new place.",
-            action="Simulate the program at the new place, and run it first in T1.",
+            action="Check the program at the new place in a simulation, and run it first in T1.",
             example="Any run of `compensate place` without collision shapes.",
         ),
         "PLC002": Code(
@@ -19,7 +19,7 @@ CODES = define(
             "no place in the room is feasible",
             meaning="At every place that was looked at a motion is out of reach, or too close to a limit.",
             consequence="There is no place to propose.",
-            action="Enlarge the room, lower --limit-margin or --singularity-margin, or turn the part or the tool.",
+            action="Increase the room, reduce --limit-margin or --singularity-margin, or turn the part or the tool.",
             example="A room of 100 mm at the edge of the reach.",
         ),
         "PLC003": Code(
@@ -57,7 +57,7 @@ CODES = define(
         "PLC007": Code(
             "info",
             "best place is at the edge of the room",
-            meaning="The winner lies at the edge of a freedom's range.",
+            meaning="The best place is at the edge of a freedom's range.",
             consequence="A larger room would contain a better place.",
             action="Enlarge the range if the cell permits it.",
             example="x 1649.9 of --x 850:1650.",
@@ -73,7 +73,7 @@ CODES = define(
         "PLC009": Code(
             "info",
             "candidates were dropped",
-            meaning="Places that the search proposed failed the check of the whole program, path by path.",
+            meaning="The check of the whole program, path by path, excludes places that the search proposed.",
             consequence="They are not listed.",
             action="None is needed.",
             example="An approach from the home position that leads through a singularity.",

@@ -64,8 +64,9 @@ def _check(ready: Prepared, request: PlaceRequest) -> None:
         at = int(values.argmin())
         if values[at] < least * DEG:
             angle = values[at] / DEG
-            reach = f"comes to {angle:.1f} deg from {what} (margin {least:g} deg)"
-            message = f"this motion {reach if np.isfinite(angle) else 'is out of reach'}"
+            message = f"this motion comes to {angle:.1f} deg from {what} (margin {least:g} deg)"
+            if not np.isfinite(angle):
+                message = "this motion is out of reach"
             line = int(task.toolpath.line[margins.rows[at]])
             raise Refusal(Finding("PLC002", message, task.file, line))
     if len(margins.wrong):
