@@ -140,9 +140,9 @@ def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding
     if not np.isfinite(limit):
         what = "is out of reach"
     elif limit < request.limit_margin:
-        what = f"comes to {limit:.1f} deg from the limit of an axis (margin {request.limit_margin:g} deg)"
+        what = f"is {limit:.1f} deg from the limit of an axis (margin {request.limit_margin:g} deg)"
     elif singular < request.singularity_margin:
-        what = f"comes to {singular:.1f} deg from a singularity (margin {request.singularity_margin:g} deg)"
+        what = f"is {singular:.1f} deg from a singularity (margin {request.singularity_margin:g} deg)"
     else:
         what = "cannot be followed"
     count = int((whole.lack[0] > 0).sum())

@@ -64,7 +64,7 @@ def _check(ready: Prepared, request: PlaceRequest) -> None:
         at = int(values.argmin())
         if values[at] < least * DEG:
             angle = values[at] / DEG
-            message = f"this motion comes to {angle:.1f} deg from {what} (margin {least:g} deg)"
+            message = f"this motion is {angle:.1f} deg from {what} (margin {least:g} deg)"
             if not np.isfinite(angle):
                 message = "this motion is out of reach"
             line = int(task.toolpath.line[margins.rows[at]])
