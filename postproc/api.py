@@ -21,6 +21,7 @@ from postproc.report.diagnosed import Diagnosed
 from postproc.report.engaged import Engaged
 from postproc.report.identified import Identified
 from postproc.report.mapped import Mapped
+from postproc.report.placement import Placement
 from postproc.report.planned import Planned
 from postproc.report.report import Report
 from postproc.report.verified import Verified
@@ -29,6 +30,7 @@ from postproc.workflows.option_names import SHARED_POINTS, accept_former_names
 from postproc.workflows.preparation import Request
 
 PathLike: TypeAlias = str | os.PathLike[str]
+PlaceRange: TypeAlias = tuple[float, float] | None
 
 __all__ = [
     "Batched",
@@ -38,6 +40,7 @@ __all__ = [
     "Finding",
     "Identified",
     "Mapped",
+    "Placement",
     "Planned",
     "Refusal",
     "Report",
@@ -49,6 +52,7 @@ __all__ = [
     "engage",
     "identify",
     "map",
+    "place",
     "plan",
     "predict",
     "verify",
@@ -225,6 +229,75 @@ def engage(
             config_dat=_path(config_dat),
             csv=_path(csv),
             stock_out=_path(stock_out),
+            strict=strict,
+        )
+    )
+
+
+def place(
+    paths: PathLike | Sequence[PathLike],
+    *,
+    force: bool | str = False,
+    x: PlaceRange = None,
+    y: PlaceRange = None,
+    z: PlaceRange = None,
+    turn: PlaceRange = None,
+    tool_turn: PlaceRange = None,
+    track: PlaceRange = None,
+    objective: Literal["across", "max", "p95", "uncertainty"] = "across",
+    direction: float | None = None,
+    limit_margin: float = 5.0,
+    singularity_margin: float = 5.0,
+    top: int = 10,
+    cell: PathLike | None = None,
+    robot: str | None = None,
+    output: PathLike | None = None,
+    picture: PathLike | None = None,
+    page: PathLike | None = None,
+    config_dat: PathLike | None = None,
+    tare: bool = False,
+    strict: bool = False,
+) -> Placement:
+    """Where a part should lie, as ``compensate place`` does.
+
+    paths: one program, or several that share a base; x, y, z: ranges of the base's origin in $WORLD, mm; turn,
+    tool_turn: of part and tool against the present, deg; track: of the linear track, mm; None: as ``room`` of the cell
+    states, or as it is; objective: what is small at a good place; direction: interval of the forces' direction over
+    which it is averaged, deg [the cell's]; limit_margin, singularity_margin: deg; top: places to list; output: the new
+    cell file.  Raises ValueError for ranges that do not ascend.
+
+    >>> import postproc
+    >>> sample = "samples/kr270_taught/taught.src"
+    >>> placed = postproc.place(sample, force=True, x=(1300, 1600), y=(-300, 100), top=3)
+    >>> placed.best.across.max < placed.present.across.max, len(placed.places)
+    (True, 3)
+    """
+    from postproc.workflows.place import place as run
+    from postproc.workflows.place_problem import PlaceRequest
+
+    stated = {"x": x, "y": y, "z": z, "turn": turn, "tool_turn": tool_turn, "track": track}
+    ranges = {name: (float(ends[0]), float(ends[1])) for name, ends in stated.items() if ends is not None}
+    for name, (low, high) in ranges.items():
+        if not low < high:
+            raise ValueError(f"{name} is (from, to) with from < to, and is ({low:g}, {high:g})")
+    several = (paths,) if isinstance(paths, (str, os.PathLike)) else tuple(paths)
+    return run(
+        PlaceRequest(
+            programs=tuple(Path(path) for path in several),
+            force=_force(force),
+            ranges=ranges,
+            objective=objective,
+            direction=direction,
+            limit_margin=limit_margin,
+            singularity_margin=singularity_margin,
+            top=top,
+            cell=_path(cell),
+            robot=robot,
+            config_dat=_path(config_dat),
+            tare=tare,
+            output=_path(output),
+            picture=_path(picture),
+            page=_path(page),
             strict=strict,
         )
     )

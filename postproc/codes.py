@@ -20,6 +20,7 @@ from postproc.measurements import codes as measurements
 from postproc.model import codes as model
 from postproc.output import atomic_write
 from postproc.part import codes as part
+from postproc.placement import codes as placement
 from postproc.process import codes as forces
 from postproc.robot import codes as robot
 from postproc.workflows import codes as workflows
@@ -44,6 +45,7 @@ TABLES: tuple[Mapping[str, Code], ...] = tuple(
         identification,
         diagnosis,
         experiments,
+        placement,
         workflows,
         batch,
     )

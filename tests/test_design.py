@@ -75,6 +75,7 @@ SAME_MODULE_NAMES = {
         "engage": {"cli", "workflows"},
         "identify": {"cli", "workflows"},
         "map": {"cli", "workflows"},
+        "place": {"cli", "workflows"},
         "plan": {"cli", "workflows"},
         "program": {"cli", "workflows"},
         "verify": {"cli", "workflows"},

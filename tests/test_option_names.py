@@ -26,6 +26,7 @@ WORDS = {
     "program": ["a.src"],
     "predict": ["a.src"],
     "verify": ["a.src", "b.src"],
+    "place": ["a.src"],
     "batch": ["a.src"],
     "watch": ["."],
 }

@@ -32,6 +32,7 @@ RUNS = {
     "verify": ["verify", "taught.src", "compensated/taught.src", "--force"],
     "map": ["map", *MAP, "--z", "500:900", "--force", "0,360,560"],
     "map, out of reach": ["map", *MAP, "--z", "9000", "--force", "0,360,560"],
+    "place": ["place", "taught.src", "--force", "--x", "1400:1500", "--y=-150:-50", "--top", "2"],
     "identify": [
         "identify", "loads.csv", "--effects", "joint_compliance,gravity_compensator", "--validate", "check.csv",
         "--bootstrap", "20",
@@ -57,6 +58,7 @@ FAILING = {
     "check": ["check", "none.src"],
     "verify": ["verify", "none.src", "none.src"],
     "map": ["map", *MAP, "--z", "0", "--force", "0,0,9", "--robot", "none.yaml"],
+    "place": ["place", "none.src", "--force", "--x", "1400:1500"],
     "identify": ["identify", "none.csv", "--effects", "backlash"],
     "plan": ["plan", "--effects", "none", *PLAN],
     "diagnose": ["diagnose", "none.csv"],

@@ -52,6 +52,7 @@ tolerance_deg: 1e-2
 max_correction: 10
 min_segment: 1.0
 max_growth: 2
+room: {x: [850, 1650], turn: [-90, 90], polygon: [[0, 0], [900, 0], [0, 900]]}
 controller: {absolute_accuracy: true, gravity_compensated: false, cycle_ms: 4}
 dialect: {integer_words: um}
 """

@@ -10,6 +10,7 @@ from postproc.base.arrays import Floats, frozen
 from postproc.base.findings import Finding
 from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
+from postproc.cell.stated_room import StatedRoom
 from postproc.robot.external_axes import ExternalAxis
 from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
@@ -69,6 +70,7 @@ class Cell:
     base -> (K, 3) [m] places in it at which it was touched off, None for the one base that a program uses;
     ``touch_line`` is where they are.  ``temperature`` [degC] of the robot.
     ``symbols``: values of names that only the controller knows; ``program_start``: the state at the first statement;
+    ``room``: where a part may be placed, None where nothing is stated;
     ``findings``: what is implausible in the file.
     """
 
@@ -106,6 +108,7 @@ class Cell:
     external_axes: tuple[ExternalAxis, ...] = ()
     symbols: Mapping[str, Symbol] = field(default_factory=dict)
     program_start: InitialState = UNSTATED
+    room: StatedRoom | None = None
     findings: tuple[Finding, ...] = ()
 
     @property

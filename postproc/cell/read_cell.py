@@ -20,6 +20,7 @@ from postproc.base.yaml_section import YamlSection, load
 from postproc.cell.controller_state import read_program_start, read_symbols
 from postproc.cell.description import MODES, Cell, Controller, ForceVectorInterval, Tool
 from postproc.cell.implausible import implausible
+from postproc.cell.stated_room import read_room
 from postproc.robot.read_external_axes import read_external
 
 NAME = "cell.yaml"
@@ -45,6 +46,7 @@ KEYS = (
     "external_axes",
     "symbols",
     "program_start",
+    "room",
     "orientation",
     "tolerance",
     "tolerance_deg",
@@ -142,6 +144,7 @@ def load_cell(path: Path) -> Cell:
         external_axes=read_external(top),
         symbols=read_symbols(top),
         program_start=read_program_start(top),
+        room=read_room(top),
     )
     return replace(cell, findings=implausible(top, cell))
 

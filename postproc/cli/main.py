@@ -18,6 +18,7 @@ from postproc.cli.diagnose import diagnose
 from postproc.cli.engage import engage
 from postproc.cli.identify import identify
 from postproc.cli.map import map_
+from postproc.cli.place import place
 from postproc.cli.plan import plan
 from postproc.cli.predict import predict
 from postproc.cli.program import program
@@ -35,6 +36,7 @@ COMMANDS = {
     "predict": predict,
     "verify": verify,
     "map": map_,
+    "place": place,
     "engage": engage,
     "identify": identify,
     "plan": plan,
@@ -63,6 +65,7 @@ def main() -> None:
       compensate verify panel.src compensated/panel.src --force     the path error of both programs
       compensate engage panel.ngc                     what it cuts of its stock, and with which force
       compensate map --robot kuka_kr270 ...           the deflection over the workspace
+      compensate place panel.src --force --x 850:1650 where the part deflects the robot least
       compensate identify loads.csv --effects ...     parameters of the robot from measurements
       compensate plan --effects ... --poses 15 ...    the poses and loads worth measuring
       compensate diagnose loads.csv                   the effects that the robot file misses

@@ -13,6 +13,7 @@ RESULTS = (
     "check",
     "verify",
     "map",
+    "place",
     "identify",
     "engage",
     "plan",

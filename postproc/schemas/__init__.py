@@ -15,6 +15,7 @@ from postproc.schemas.identify_schema import identify_schema
 from postproc.schemas.job_schema import job_schema
 from postproc.schemas.map_schema import map_schema
 from postproc.schemas.parts import Schema
+from postproc.schemas.place_schema import place_schema
 from postproc.schemas.plan_schema import plan_schema
 from postproc.schemas.program_results import (
     batch_schema,
@@ -36,6 +37,7 @@ RESULT_SCHEMAS: dict[str, Callable[[], Schema]] = {
     "check": check_schema,
     "verify": verify_schema,
     "map": map_schema,
+    "place": place_schema,
     "identify": identify_schema,
     "engage": engage_schema,
     "plan": plan_schema,

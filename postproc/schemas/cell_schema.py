@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from postproc.cell import AXES, KEYS, MODES
+from postproc.cell.stated_room import RANGES
 from postproc.robot.external_axes import FIXED, NAMES, POSITIONER, TRACK
 from postproc.robot.read_external_axes import DIRECTIONS
 from postproc.schemas.parts import Schema, flag, known, listed, mapping, number, numbers, text
@@ -123,6 +124,15 @@ CELL: dict[str, Schema] = {
             **{word: number("deg") for word in "abc"},
         },
         about="the state at the first statement, where the program does not state it",
+    ),
+    "room": mapping(
+        {
+            **{key: numbers(2, 2, f"from, to, {unit}") for key, unit in RANGES.items()},
+            "polygon": listed(numbers(2, 2), "corners x y of the area of the base's origin, mm", least=3),
+        },
+        about="where a part may be placed: the base's origin in $WORLD, turns of part and tool against the present, the"
+        " linear track",
+        minProperties=1,
     ),
     "orientation": mapping(_ABC, about="of the tool in the base, for programs that state none, deg"),
     "tolerance": number("path error that may remain, mm [0.02]", above=0.0),

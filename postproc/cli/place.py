@@ -1,0 +1,184 @@
+"""``compensate place``: where a part should lie."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from postproc.cli.common import (
+    FAR,
+    ROBOT,
+    Out,
+    ending,
+    language_options,
+    number,
+    page_option,
+    result_options,
+    tare_option,
+)
+from postproc.cli.decimal_option import Decimal
+
+Range = tuple[float, float]
+_Command = TypeVar("_Command", bound=Callable[..., Any])
+
+
+def _range(_context: click.Context, _option: click.Parameter, text: str | None) -> Range | None:
+    """``a:b`` in mm or deg."""
+    if text is None:
+        return None
+    words = text.split(":")
+    if len(words) != 2:
+        raise click.BadParameter(f"{text[:40]!r} is no range a:b; without the option it stays where it is")
+    low, high = (number(word.strip(), FAR) for word in words)
+    if not low < high:
+        raise click.BadParameter(
+            f"the range {text[:40]!r} has no width: {low:g} is not below {high:g}; without the option it stays as it is"
+        )
+    return low, high
+
+
+def _range_option(name: str, about: str) -> Callable[[_Command], _Command]:
+    return click.option(f"--{name}", metavar="A:B", callback=_range, help=about)
+
+
+@click.command("place")
+@click.argument("programs", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--force",
+    metavar="[SPEC]",
+    default=None,
+    help="Machining force, as in the main job.",
+)
+@_range_option("x", "Range of the base's origin in $WORLD, mm.")
+@_range_option("y", "The same for y.")
+@_range_option("z", "The same for z.")
+@_range_option(
+    "turn", "Turn of the part about the vertical through that origin, deg, against the present one."
+)
+@_range_option("tool-turn", "Turn of the tool about its spindle, deg, against the present one.")
+@_range_option("track", "Range of the linear track that the cell puts in its place, mm.")
+@click.option(
+    "--objective",
+    type=click.Choice(["across", "max", "p95", "uncertainty"]),
+    default="across",
+    show_default=True,
+    help="What is small at a good place: the largest error across the feed, which marks the part; the largest error; "
+    "the 95th percentile of all errors; the uncertainty after compensation.",
+)
+@click.option(
+    "--direction",
+    type=Decimal(0.0, 90.0),
+    metavar="DEG",
+    help="Average the objective over force directions within this interval [force_ci95: direction_deg of the cell].",
+)
+@click.option(
+    "--limit-margin",
+    type=Decimal(0.0, 90.0),
+    default=5.0,
+    show_default=True,
+    metavar="DEG",
+    help="Distance of every turning axis from its limits.",
+)
+@click.option(
+    "--singularity-margin",
+    type=Decimal(0.0, 60.0),
+    default=5.0,
+    show_default=True,
+    metavar="DEG",
+    help="Distance from singularities, as an angle of A5.",
+)
+@click.option("--top", type=click.IntRange(1, 100), default=10, show_default=True, help="Places to list.")
+@click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cell's.")
+@language_options
+@tare_option
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="CELL.yaml",
+    callback=ending(".yaml", ".yml"),
+    help="Write the cell file with the best place, comments kept [only report].",
+)
+@click.option(
+    "--picture",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.png|svg",
+    callback=ending(".png", ".svg"),
+    help="Draw the objective over x and y, with the present and the best place.",
+)
+@page_option
+@click.option("--strict", is_flag=True, help="Treat warnings as errors: then nothing is written.")
+@result_options
+def place(
+    programs: tuple[Path, ...],
+    force: str | None,
+    x: Range | None,
+    y: Range | None,
+    z: Range | None,
+    turn: Range | None,
+    tool_turn: Range | None,
+    track: Range | None,
+    objective: str,
+    direction: float | None,
+    limit_margin: float,
+    singularity_margin: float,
+    top: int,
+    robot: str | None,
+    cell: Path | None,
+    config_dat: Path | None,
+    tare: bool,
+    output: Path | None,
+    picture: Path | None,
+    page: Path | None,
+    strict: bool,
+    json_to: str | None,
+    quiet: bool,
+    verbose: bool,
+) -> None:
+    """Find where a part should lie: where PROGRAMS deflect the robot least, before any correction.
+
+    No byte of the programs changes: the base moves in the cell file (`bases`), and the tool frame turns (`tools`). The
+    ranges of `room:` in the cell hold where no option states one. Collisions are not checked.
+
+    \b
+    Examples:
+      compensate place panel.src --force --x 850:1650 --y 50:850
+      compensate place panel.src --force --x 850:1650 --y 50:850 --z 600:1000 --turn=-90:90 -o placed.yaml
+      compensate place first.src second.src --force --x 850:1650 --tool-turn=-180:180 --page place.html
+
+    Exit codes: 0 done; 3 something needs review; 1 failed, no place is feasible; 2 wrong command line.
+    """
+    from postproc.report.placement import show_placement
+    from postproc.workflows.place import place as run
+    from postproc.workflows.place_problem import PlaceRequest
+
+    out = Out(json_to, quiet, verbose)
+    stated = {"x": x, "y": y, "z": z, "turn": turn, "tool_turn": tool_turn, "track": track}
+    request = PlaceRequest(
+        programs=programs,
+        force=force,
+        ranges={name: ends for name, ends in stated.items() if ends is not None},
+        objective=objective,
+        direction=direction,
+        limit_margin=limit_margin,
+        singularity_margin=singularity_margin,
+        top=top,
+        cell=cell,
+        robot=robot,
+        config_dat=config_dat,
+        tare=tare,
+        output=output,
+        picture=picture,
+        page=page,
+        json=out.json_file,
+        strict=strict,
+    )
+    with out.refusals(str(programs[0])), out.stages() as stage:
+        done = run(request, stage)
+    out.result(done.as_json(), written=True)
+    if not out.quiet:
+        show_placement(out.console(), done, verbose)
+    raise SystemExit(done.exit)

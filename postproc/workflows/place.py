@@ -1,0 +1,215 @@
+"""Where a part should lie: the placement of programs, on paths."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from postproc.base.findings import Finding, Refusal
+from postproc.base.input_files import Inputs, noted
+from postproc.base.units import DEG
+from postproc.output.atomic_write import write_atomically
+from postproc.placement.room import FREEDOMS, UNITS
+from postproc.placement.score_places import score_places
+from postproc.placement.search_places import SearchResult, distinct, search_places
+from postproc.report.placement import PlacedFigures, Placement
+from postproc.report.report import exit_code, in_order_of_place, json_bytes
+from postproc.workflows.place_cell import refuse_same_file
+from postproc.workflows.place_compare import compare_freedoms, feed_turns, regret_of, score_grid, spin_bound
+from postproc.workflows.place_exact import exact_figures
+from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, place_problem, stated_direction
+from postproc.workflows.preparation import Stage, silent
+
+POOL = 1500
+"""Places that the regret is taken against."""
+
+EXACT = 20_000
+"""Places on paths up to which every listed place is predicted as the main job does; of more, the best one and the
+present."""
+
+
+def place(request: PlaceRequest, stage: Stage = silent) -> Placement:
+    """The places of a room by what the programs would cut there.  Raises Refusal, and has then written nothing."""
+    with noted() as inputs:
+        return _place(request, inputs, stage)
+
+
+def _place(request: PlaceRequest, inputs: Inputs, stage: Stage) -> Placement:
+    stage("reading")
+    problem = place_problem(request)
+    result = search_places(problem.model, problem.motions, problem.room, problem.scoring, stage)
+    stage("predicting the best places")
+    problem = replace(problem, few=result.few)
+    present, lost = _present(problem)
+    ranked, dropped = _ranked(problem, result)
+    if not ranked:
+        raise Refusal(_no_place(problem, result, dropped))
+    best = ranked[0]
+    stage("comparing freedoms")
+    findings = [*lost, *_findings(problem, present, best, dropped)]
+    done = Placement(
+        programs=tuple(str(path) for path in request.programs),
+        robot=problem.prepared[0].robot.name,
+        digest=problem.prepared[0].robot.digest,
+        cell=str(problem.moved.cell.path),
+        base=problem.moved.base,
+        objective=request.objective,
+        motions=sum(len(one.task.toolpath) for one in problem.prepared),
+        looked=result.looked,
+        searched=len(result.few),
+        checked=len(problem.motions),
+        room=problem.room,
+        margins=(request.limit_margin, request.singularity_margin),
+        direction=stated_direction(problem.prepared[0], request),
+        present=present,
+        places=tuple(ranked),
+        alone=compare_freedoms(problem),
+        feed=feed_turns(problem, best.place),
+        spin=spin_bound(problem, best.place),
+        grid=score_grid(problem, best.place),
+        findings=tuple(in_order_of_place(findings)),
+    )
+    return _written(problem, done, inputs)
+
+
+def _present(problem: PlaceProblem) -> tuple[PlacedFigures, list[Finding]]:
+    """The figures of the present place; without figures, and why, where the main job cannot predict it."""
+    try:
+        figures = exact_figures(problem, None)
+    except Refusal as refusal:
+        figures = refusal.findings[0]
+    if isinstance(figures, PlacedFigures):
+        return figures, []
+    message = f"the present place has no figures: {figures.message}"
+    lost = Finding("PLC006", message, figures.file, figures.line)
+    return PlacedFigures(problem.room.present, exact=False), [lost]
+
+
+def _ranked(problem: PlaceProblem, result: SearchResult) -> tuple[list[PlacedFigures], list[Finding]]:
+    """The best places that are apart and hold for every motion, best first; why others were dropped."""
+    request, room = problem.request, problem.room
+    pool = result.pool.part(np.flatnonzero(result.pool.violation == 0))
+    if not len(pool.places):
+        return [], []
+    whole = len(problem.motions) <= EXACT
+    chosen = distinct(room, pool.places, 2 * request.top if whole else request.top + 2)
+    places = np.unique(room.rounded(pool.places[chosen]), axis=0)
+    full = score_places(problem.model, problem.motions, room, problem.scoring, places)
+    regret = regret_of(problem, places, pool.places[:: max(1, len(pool.places) // POOL)])
+    ranked: list[PlacedFigures] = []
+    dropped: list[Finding] = []
+    for at in full.order().tolist():
+        if full.violation[at] > 0 or len(ranked) == request.top:
+            continue
+        figures = PlacedFigures(full.places[at], exact=False)
+        if whole or not ranked:
+            exact = exact_figures(problem, full.places[at])
+            if isinstance(exact, Finding):
+                dropped.append(exact)
+                continue
+            figures = exact
+        score = float(full.value[at])
+        ranked.append(replace(figures, score=score, regret=float(regret[at])))
+    return ranked, dropped
+
+
+def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding]) -> Finding:
+    """PLC002: which motion and which limit is nearest to feasible; ``dropped``: why the best places are not."""
+    request, room = problem.request, problem.room
+    if dropped:
+        return replace(
+            dropped[0], message=f"none of {result.looked} places is feasible: {dropped[0].message}"
+        )
+    near = result.pool.places[result.pool.order()[:1]]
+    whole = score_places(problem.model, problem.motions, room, problem.scoring, near, detailed=True)
+    assert whole.lack is not None
+    assert whole.limit is not None
+    assert whole.singular is not None
+    at = int(whole.lack[0].argmax())
+    line, limit, singular = (
+        int(problem.motions.line[at]),
+        float(whole.limit[0, at] / DEG),
+        float(whole.singular[0, at] / DEG),
+    )
+    file = str(request.programs[int(problem.motions.program[at])])
+    where = ", ".join(
+        f"{name} {near[0, i] / UNITS[i]:.1f}" for i, name in enumerate(FREEDOMS) if i in room.free
+    )
+    if not np.isfinite(limit):
+        what = "is out of reach"
+    elif limit < request.limit_margin:
+        what = f"is {limit:.1f} deg from the limit of an axis (margin {request.limit_margin:g} deg)"
+    elif singular < request.singularity_margin:
+        what = f"is {singular:.1f} deg from a singularity (margin {request.singularity_margin:g} deg)"
+    else:
+        what = "cannot be followed"
+    count = int((whole.lack[0] > 0).sum())
+    message = (
+        f"none of {result.looked} places is feasible; at the one nearest to it ({where}) this motion {what}"
+        + (f", and {count - 1} more places of the programs lack too" if count > 1 else "")
+    )
+    return Finding("PLC002", message, file, line)
+
+
+def _findings(
+    problem: PlaceProblem, present: PlacedFigures, best: PlacedFigures, dropped: list[Finding]
+) -> list[Finding]:
+    request, cell = problem.request, str(problem.moved.cell.path)
+    found = [Finding("PLC001", "collisions are not checked", str(request.programs[0]))]
+    lacks = present.limit_deg < request.limit_margin or present.singular_deg < request.singularity_margin
+    if lacks:
+        message = (
+            f"at the present place the nearest axis limit is {present.limit_deg:.1f} deg away, the nearest"
+            f" singularity {present.singular_deg:.1f} deg"
+        )
+        found.append(Finding("PLC006", message, str(request.programs[0]), present.limit_line))
+    edges = problem.room.at_edge(best.place)
+    if edges:
+        found.append(Finding("PLC007", f"the best place is at the edge of: {', '.join(edges)}", cell))
+    if dropped:
+        message = (
+            f"{len(dropped)} places fail the check of every path and are not listed: {dropped[0].message}"
+        )
+        found.append(Finding("PLC009", message, dropped[0].file, dropped[0].line))
+    if best.figure(request.objective) > 0.99 * present.figure(request.objective):
+        found.append(Finding("PLC010", "no place of the room is better than the present one", cell))
+    if not problem.prepared[0].task.process:
+        found.append(Finding("PLC011", "the search compares places by a linear model", cell))
+    if best.lower_bound:
+        found.append(
+            Finding("PLC008", "not every figure that the uncertainty depends on has an interval", cell)
+        )
+    return found
+
+
+def _written(problem: PlaceProblem, done: Placement, inputs: Inputs) -> Placement:
+    """Writes cell file, picture, page and result together."""
+    request = problem.request
+    done = replace(done, exit=exit_code(done.findings, request.strict))
+    if done.exit == 1:
+        raise Refusal(*done.findings)
+    files: dict[Path, bytes] = {}
+    if request.output is not None:
+        refuse_same_file(problem.moved.cell, request.output)
+        raw = problem.moved.at(done.places[0].place)
+        files[request.output] = problem.moved.in_folder(raw, request.output)
+    if request.picture is not None:
+        from postproc.report.placement_picture import placement_picture
+
+        files[request.picture] = placement_picture(done, request.picture.suffix[1:].lower())
+    names = [*files, *(path for path in (request.json, request.page) if path is not None)]
+    done = replace(done, outputs=tuple(str(path) for path in names))
+    if request.page is not None:
+        from postproc.report.page import beside
+        from postproc.report.placement_page import placement_page
+
+        links = {"cell file": request.output, "picture": request.picture, "result (JSON)": request.json}
+        files[request.page] = placement_page(done, beside(request.page, links))
+    if request.json is not None:
+        files[request.json] = json_bytes(done)
+    inputs.refuse_outputs(names)
+    inputs.refuse_changed()
+    write_atomically(files, still=inputs.refuse_changed)
+    return done
