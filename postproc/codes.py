@@ -15,6 +15,7 @@ from postproc.identification import codes as identification
 from postproc.languages import codes as dialects
 from postproc.languages.gcode import codes as gcode
 from postproc.languages.krl import codes as krl
+from postproc.learning import codes as learning
 from postproc.measurements import codes as measurements
 from postproc.model import codes as model
 from postproc.output import atomic_write
@@ -40,6 +41,7 @@ TABLES: tuple[Mapping[str, Code], ...] = tuple(
         identification,
         diagnosis,
         experiments,
+        learning,
         workflows,
         batch,
     )

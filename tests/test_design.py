@@ -22,6 +22,8 @@ ROOMS = {
     "workflows": 10,
     "report": 9,
     "output": 8,
+    "learning": 8,
+    "part": 7,
     "diagnosis": 7,
     "verification": 7,
     "identification": 6,
@@ -73,10 +75,17 @@ SAME_MODULE_NAMES = {
         "diagnose": {"cli", "workflows"},
         "engage": {"cli", "workflows"},
         "identify": {"cli", "workflows"},
+        "learn": {"cli", "workflows"},
         "map": {"cli", "workflows"},
         "plan": {"cli", "workflows"},
         "program": {"cli", "workflows"},
         "verify": {"cli", "workflows"},
+    },
+    "where a tool touches: the cells of a stock, a point of the surface": {
+        "contact": {"process/stock", "part"},
+    },
+    "effects that a model may miss: of readings of a robot, of a part": {
+        "candidates": {"diagnosis", "learning"}
     },
     "what a file of this kind says, in SI": {"description": {"cell", "robot"}},
     "each room has its own": {"codes": {"*"}},

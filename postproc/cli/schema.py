@@ -17,6 +17,7 @@ RESULTS = (
     "engage",
     "plan",
     "diagnose",
+    "learn",
     "batch",
     "robots",
     "corrections",

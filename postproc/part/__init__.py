@@ -1,0 +1,1 @@
+"""The surface of the part: which motion leaves which place of it."""
