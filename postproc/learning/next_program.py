@@ -30,13 +30,15 @@ _SIDE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class ForceFactors:
-    """By operation: ``factor`` of its force, ``turn`` (2,) [rad] about the axes across it; ``corner``: share added
-    where the feed turns."""
+    """By operation: ``factor`` of its force, ``turn`` (2,) [rad] about the axes across it, ``ci95``: half width of
+    the 95 % interval of the factor as a share; ``common``: factor of all others; ``corner``: share added where the feed
+    turns."""
 
     factor: Mapping[str, float]
     turn: Mapping[str, tuple[float, float]]
     common: float = 1.0
     corner: float = 0.0
+    ci95: Mapping[str, float] = field(default_factory=dict)
 
     def acting(
         self, forces: Wrenches, operations: OperationNames, base: Floats, corner: Floats | None = None
@@ -57,7 +59,10 @@ class ForceFactors:
             rotation = rotation_from_vector(turns[:, :1] * first + turns[:, 1:] * second)
             moved[:, :3] = turned(rotation, moved[:, :3])
             ends.append(moved)
-        return replace(forces, values=ends[0], start=ends[1])
+        known = np.array([self.ci95.get(name, np.nan) for name in operations.names])[operations.which]
+        if forces.ci95 is not None:
+            known = np.where(np.isnan(known), forces.ci95, known)
+        return replace(forces, values=ends[0], start=ends[1], ci95=None if np.isnan(known).all() else known)
 
 
 def force_factors(result: Attribution) -> ForceFactors:

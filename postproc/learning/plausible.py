@@ -9,7 +9,7 @@ from postproc.base.findings import Finding
 from postproc.base.units import MM
 from postproc.learning.attribution import Attribution
 from postproc.learning.causes import CauseKind, CausePrediction
-from postproc.learning.covariance import Explanation, Layout, Surface, choose_surface
+from postproc.learning.covariance import FIELDS, WHITES, Explanation, Layout, Surface, choose_surface
 from postproc.learning.measured_part import MeasuredPart
 
 LIKELIER = 3.0
@@ -89,6 +89,14 @@ def check_explained(result: Attribution, file: str) -> list[Finding]:
             if cause.kind is CauseKind.SHIFT and cause.parameter == "radius":
                 message += "; the radius of the probe may still be in the deviations"
             findings.append(Finding("LRN004", message, file))
+    surface = result.surface
+    if surface.size >= FIELDS[-1] or surface.white >= WHITES[-1]:
+        kind = "smooth error" if surface.size >= FIELDS[-1] else "error of each point for itself"
+        message = (
+            f"they need a {kind} of {max(surface.size, surface.white) / MM:.2f} mm or more, which nothing in a"
+            " cell makes: rows may be in another order, or the radius of the probe is still in the deviations"
+        )
+        findings.append(Finding("LRN004", message, file))
     rest = result.explained.left_out()
     own = result.explained
     alone = Explanation(

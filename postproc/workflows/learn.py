@@ -201,7 +201,7 @@ def _published(
     robot_path = folder / f"{stem}_learned.yaml"
     gap = {"before_rms_mm": learned.promise.before / MM, "after_rms_mm": learned.residual_rms / MM}
     content = learned_robot_file(result, robot, parts, gap, robot_path)
-    factors = force_factor_lines(result, parts)
+    factors = force_factor_lines(result, parts, job.ready.cell)
     files: dict[Path, bytes] = {}
     if content is not None:
         files[robot_path] = content

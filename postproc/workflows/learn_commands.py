@@ -19,7 +19,7 @@ def commands_at(
 ) -> tuple[Poses, Bools]:
     """Poses (K) that program ``other`` commands where the original is at ``share`` (K,) of motions ``row`` (K,), and
     (K,) whether that is not known: the place of the paired cut, about as far along its path, that is nearest to where
-    the model would send the controller.  A correction is longer than what two models differ by, and leads round corners."""
+    the model would send the controller.  A correction is longer than what two models differ by."""
     task, run = ready.task, other.task
     wanted = task.desired_path.at(row, share)
     wrench = task.force.along(row, share)

@@ -32,11 +32,11 @@ from postproc.learning.next_program import corners
 from postproc.learning.plausible import check_contacts, check_nominal
 from postproc.learning.touched_points import TouchedPoints, touched_points
 from postproc.part.contact import Contacts, CuttingMotions, find_contacts
-from postproc.process.operation_names import OperationNames, name_operations
-from postproc.process.process_file import Operation, read_process
+from postproc.process.operation_names import OperationNames
 from postproc.process.stock.cutters import Cutter
 from postproc.process.stock.stock_section import has_stock, read_stock_process
 from postproc.verification.pairing import Different, Pairing, pair_motions
+from postproc.workflows.cell_force_factors import operations_of
 from postproc.workflows.learn_commands import commands_at
 from postproc.workflows.preparation import Prepared, Request, prepare
 
@@ -128,7 +128,7 @@ def read_job(request: Request) -> CutProgram:
     time = np.cumsum(duration)
     return CutProgram(
         ready,
-        name_operations(path, _operations(ready)),
+        operations_of(cell, ready.wrenches, path),
         numbers,
         np.nan_to_num(frames.spindle_in_tool[np.arange(len(path))]),
         corners(desired, path, radius),
@@ -137,16 +137,6 @@ def read_job(request: Request) -> CutProgram:
         tuple(cutter.number for cutter in cutters if cutter.shape == "ball"),
         findings,
     )
-
-
-def _operations(ready: Prepared) -> tuple[Operation, ...]:
-    """The operations of the process file, where the forces come from it."""
-    if ready.cell.process is None:
-        return ()
-    path = ready.cell.path.parent / ready.cell.process
-    if has_stock(path) or path.name not in ready.wrenches.source:
-        return ()
-    return read_process(path)
 
 
 def _cutters(ready: Prepared, used: Ints, program: str) -> tuple[tuple[Cutter, ...], tuple[Finding, ...]]:

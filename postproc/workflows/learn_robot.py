@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from postproc import __version__
+from postproc.cell import Cell
+from postproc.cell.description import OTHERS, ForceFactor
 from postproc.learning.attribution import Attribution
 from postproc.learning.causes import Cause, CauseKind
 from postproc.learning.measured_part import MeasuredPart
@@ -86,8 +88,9 @@ def learned_robot_file(
     return robot_file(robot, written, run, destination)
 
 
-def force_factor_lines(result: Attribution, parts: Sequence[MeasuredPart]) -> bytes:
-    """``force_factors:`` for the cell: the factor of the force of each operation, with its 95 % interval as a share."""
+def force_factor_lines(result: Attribution, parts: Sequence[MeasuredPart], cell: Cell) -> bytes:
+    """``force_factors:`` for the cell: the factor of the force of each operation, with its 95 % interval as a share;
+    those of ``cell`` are in it."""
     common = next((i for i, c in enumerate(result.causes) if c.name == "force"), None)
     if common is None:
         return b""
@@ -98,23 +101,25 @@ def force_factor_lines(result: Attribution, parts: Sequence[MeasuredPart]) -> by
         "# about the axis that lifts it and the one that swings it. Another operation has the factor of `others`.",
         "force_factors:",
     ]
+    others = cell.force_factors.get(OTHERS, ForceFactor(1.0))
     own = [
         (i, c)
         for i, c in enumerate(result.causes)
         if c.group == "force" and c.kind is CauseKind.FORCE and c.place
     ]
     for i, cause in own:
-        factor = float(np.exp(result.x[common] + result.x[i]))
+        stated = cell.force_factors.get(cause.place, others)
+        factor = stated.factor * float(np.exp(result.x[common] + result.x[i]))
         pick = np.zeros(len(result.x))
         pick[[common, i]] = 1.0
         width = COVERAGE * float(np.sqrt(pick @ result.covariance @ pick))
         turns = [
-            float(np.rad2deg(result.x[j]))
+            float(np.rad2deg(result.x[j] + stated.turn[0 if c.kind is CauseKind.TURN_1 else 1]))
             for j, c in enumerate(result.causes)
             if c.place == cause.place and c.kind in (CauseKind.TURN_1, CauseKind.TURN_2)
         ]
         words = ", ".join(f"{turn:.3f}" for turn in turns)
         lines.append(f'  "{cause.place}": {{factor: {factor:.4f}, ci95: {width:.4f}, turn: [{words}]}}')
     width = COVERAGE * float(result.deviations[common])
-    lines.append(f"  others: {{factor: {np.exp(result.x[common]):.4f}, ci95: {width:.4f}}}")
+    lines.append(f"  others: {{factor: {others.factor * np.exp(result.x[common]):.4f}, ci95: {width:.4f}}}")
     return ("\n".join(lines) + "\n").encode()

@@ -38,6 +38,7 @@ from postproc.robot.geometries import SerialArm
 from postproc.robot.orientation_modes import as_run
 from postproc.robot.read_external_axes import fill_external_axes, follow_external_axes
 from postproc.toolpath import Toolpath
+from postproc.workflows.cell_force_factors import factored
 from postproc.workflows.correction_mode import corrected_model, mode_findings, temperature_rise, touch_off
 from postproc.workflows.reading_findings import configuration_findings, reader_findings
 
@@ -220,6 +221,7 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     base, tool, start = frames.base_in_robot, frames.tool_in_flange, _start(cell, robot)
     path, orientation_findings = as_run(path, base, tool, robot, start, str(request.program))
     force = wrenches(request.program, path, frames, cell, request.force, request.tare)
+    force = factored(cell, force, path, base[np.arange(len(path))].rotation)
     if learned is not None:
         force = learned.forces(force)
     _missing_points(program, force)
