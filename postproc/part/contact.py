@@ -26,7 +26,7 @@ TOUCH = 0.06 * MM
 _SLOPE = 12 * DEG
 _NEAR = 3 * MM
 _BLOCK, _PAIRS = 64, 1 << 21
-_SHARES, _ROUNDS = 9, 4
+_SHARES, _ROUNDS = 9, 9
 _EDGE = 60 * MM  # of a cutter for which no length of the edges is stated
 
 
