@@ -38,6 +38,14 @@ from postproc.cli.decimal_option import Decimal
     callback=ending(".csv"),
     help="Measured, explained and remaining deviation of every point, one row each.",
 )
+@click.option(
+    "--plan",
+    "plan_points",
+    type=click.IntRange(6, 500),
+    metavar="N",
+    help="Choose the N most telling points of one file, in which DEV may be missing, and write them to --csv"
+    " [<stem>.measure.csv beside the file].",
+)
 @click.option("--dry-run", is_flag=True, help="Report only, write nothing.")
 def learn(
     program: Path,
@@ -53,6 +61,7 @@ def learn(
     gain: float,
     known_force: float | None,
     csv_to: Path | None,
+    plan_points: int | None,
     dry_run: bool,
     strict: bool,
     json_to: str | None,
@@ -68,6 +77,7 @@ def learn(
     Examples:
       compensate learn panel.src part1.csv
       compensate learn panel.src part1.csv part2.csv -o next
+      compensate learn panel.src points.csv --plan 30 --csv measure.csv
       compensate learn panel.src part1.csv --known-force 0.1 --csv part1.points.csv
 
     Exit codes: 0 done; 3 done, and something needs review; 1 failed, nothing written; 2 wrong command line.
@@ -99,6 +109,20 @@ def learn(
         strict=strict,
         dry_run=dry_run,
     )
+    if plan_points is not None:
+        if json_to is not None or dry_run or output is not None:
+            raise click.UsageError("--plan writes --csv only, and excludes --json, --output and --dry-run")
+        from postproc.workflows.learn_plan import plan
+
+        with out.refusals(str(program)), out.stages() as stage:
+            chosen = plan(request, plan_points, stage)
+        if not out.quiet:
+            click.echo(
+                f"{chosen.points} of {chosen.offered} points: the errors of the surface may be"
+                f" {chosen.before_mm:.3f} mm RMS before they are measured, {chosen.after_mm:.3f} mm after"
+            )
+            click.echo(f"wrote {chosen.path}")
+        return
     with out.refusals(str(program)), out.stages() as stage:
         done = run(request, stage)
     out.result(done.as_json(), written=done.exit != 1 and not dry_run)

@@ -77,6 +77,19 @@ class MeasuredPart:
         return len(self.deviation)
 
 
+def read_planned_points(path: Path) -> tuple[Floats, Floats, tuple[str, ...]]:
+    """Points (K, 3) [m], normals (K, 3) and features of a file without deviations, from a drawing or a measuring plan.
+
+    Raises Refusal: FIL001..FIL003 (no text), LRN001 (the header or rows are wrong).
+    """
+    table = _named(read_table(path, "LRN001"), PLACE + NORMAL)
+    point, normal = _block(table, PLACE), _block(table, NORMAL)
+    every = np.arange(len(table))
+    _check_sizes(table, point, normal, np.full(len(table), 1.0), every)
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+    return point * MM, normal, _texts(table, "feature", every)
+
+
 def read_measured_part(path: Path) -> MeasuredPart:
     """Reads the CSV of a measured part.
 
@@ -132,8 +145,8 @@ def read_measured_part(path: Path) -> MeasuredPart:
     )
 
 
-def _named(table: CsvTable) -> CsvTable:
-    """The table with its units checked and taken off the names of its columns."""
+def _named(table: CsvTable, needed: Sequence[str] = (*PLACE, *NORMAL, "dev")) -> CsvTable:
+    """The table with its units checked and taken off the names of its columns; ``needed``: names that must be there."""
     columns: dict[str, object] = {}
     for head, column in table.columns.items():
         unit = _UNIT.match(head)
@@ -147,7 +160,7 @@ def _named(table: CsvTable) -> CsvTable:
             help = "columns: " + ", ".join(name.upper() for name in COLUMNS)
             raise table.header_error(f"column {head[:40]!r} is unknown{nearest(name, COLUMNS)}", help)
         columns[name] = column
-    for name in (*PLACE, *NORMAL, "dev"):
+    for name in needed:
         if name not in columns:
             help = "X,Y,Z (nominal point, mm), NX,NY,NZ (outward normal) and DEV (mm) are needed"
             raise table.header_error(f"column {name.upper()!r} is missing", help)

@@ -24,8 +24,11 @@ LOUD = 3.0
 UNEXPLAINED = 0.85
 """Share of the deviations of left-out points that may remain."""
 
-COPIED = 0.9
-"""Correlation of deviations with the distances of points from the nominal surface."""
+COPIED, SAME = 0.6, 5e-6
+"""Share of points that lie off the nominal surface by their own deviation, to [m]."""
+
+TOUCHED = 0.75
+"""Share of points that tools of the program have to touch."""
 
 
 def check_sign(prediction: CausePrediction, deviation: Floats, layout: Layout, file: str) -> list[Finding]:
@@ -59,13 +62,13 @@ def check_nominal(part: MeasuredPart, distance: Floats) -> list[Finding]:
     """Whether X, Y, Z are measured places: then they lie off the nominal surface by what DEV says; distance (K,) [m] of
     the points to the tool, NaN where none touches."""
     known = np.isfinite(distance)
-    if known.sum() < 6 or np.std(part.deviation[known]) < 1e-9 or np.std(distance[known]) < 5e-6:
+    if known.sum() < 6 or float(np.median(np.abs(part.deviation))) < 2 * SAME:
         return []
-    relation = float(np.corrcoef(part.deviation[known], distance[known])[0, 1])
-    if abs(relation) < COPIED:
+    share = float(np.mean(np.abs(part.deviation - np.where(known, distance, np.inf)) < SAME))
+    if share < COPIED:
         return []
     message = (
-        f"the points lie off the nominal surface by their own deviations (correlation {relation:+.2f}): X, Y, Z are"
+        f"the points lie off the nominal surface by their own deviations ({100 * share:.0f} % of them): X, Y, Z are"
         " the measured places"
     )
     return [
@@ -122,7 +125,7 @@ def _word(unit: str) -> str:
 def check_contacts(part: MeasuredPart, touched: Bools) -> list[Finding]:
     """Whether most points lie on the surface of this part: those that are ``touched`` (K,)."""
     share = float(touched.mean())
-    if share >= 0.5:
+    if share >= TOUCHED:
         return []
     message = f"the program has tools that touch {int(touched.sum())} of {len(part)} points"
     help = (

@@ -54,7 +54,7 @@ def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
     parts = [read_measured_part(path) for path in request.measured]
     _check_parts(parts)
     job = read_job(main)
-    known = _known(request, job)
+    known = known_before(request, job)
     stage("matching points to motions")
     matched = match(main, job, parts, known)
     prediction = CausePrediction(matched.points, job.ready.model, matched.causes)
@@ -104,7 +104,8 @@ def _check_parts(parts: Sequence[MeasuredPart]) -> None:
             raise Refusal(Finding("LRN001", message, str(part.file), help="name each part once"))
 
 
-def _known(request: LearnRequest, job: CutProgram) -> PriorKnowledge:
+def known_before(request: LearnRequest, job: CutProgram) -> PriorKnowledge:
+    """What the command, the cell or the process states of the forces."""
     cell = job.ready.cell
     own = cell.force_ci95 if request.known_force is None else request.known_force
     if own is None and job.ready.wrenches.ci95 is not None:

@@ -28,6 +28,8 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "same20": {"count": 20},
     "same50": {"count": 50},
     "same100": {"count": 100},
+    "planned30": {"count": 30, "planned": True},
+    "same30": {"count": 30},
     "same300": {"count": 300},
     "noise03": {"count": 100, "noise": 3e-5},
     "noise06": {"count": 100, "noise": 6e-5},
@@ -103,6 +105,8 @@ def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dic
     first = shop / "compensated" / "part.src"
     programs: list[Path] = [shop / "part.src" if options.get("wrong") == "sign" else first]
     chosen = rng.choice(total, count, replace=False)
+    if options.get("planned"):
+        chosen = _planned(home, count)
     before = cut(home, truth, plant, None if programs[0].parent == shop else programs[0], rng)
     answer: dict[str, Any] = {
         "row": row,
@@ -150,6 +154,20 @@ def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dic
     if options.get("place"):
         answer |= _elsewhere(shops, (point, normal, feature), truth, plant, rng, told, out, learner)
     return answer
+
+
+def _planned(home: Surface, count: int) -> np.ndarray:
+    """(count,) the points that ``compensate learn --plan`` chooses from all."""
+    from postproc.workflows.learn import LearnRequest
+    from postproc.workflows.learn_plan import plan
+
+    offered, measure = home.folder / "points.csv", home.folder / "measure.csv"
+    rows = np.column_stack([home.point, home.normal])
+    text = [",".join(f"{one:.7f}" for one in row) for row in rows]
+    offered.write_text("\n".join(["X,Y,Z,NX,NY,NZ", *text]) + "\n")
+    plan(LearnRequest(home.request, (offered,), csv=measure), count)
+    places = np.array([line.split(",")[:3] for line in measure.read_text().splitlines()[6:]], float)
+    return np.argmin(((places[:, None] - home.point[None]) ** 2).sum(axis=2), axis=1)
 
 
 def _covered(causes: dict[str, list[float]], truth: Any) -> list[int]:
