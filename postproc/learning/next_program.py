@@ -197,21 +197,43 @@ def _sides(result: Attribution, path: DesiredPath, operations: OperationNames) -
     return sides
 
 
-def corners(path: DesiredPath, toolpath: Toolpath, radius: Floats) -> Floats:
-    """(N,) 0..1 how far the feed turns (1: 90 deg) within the radius (N,) [m] of the cutter before the end of each
-    motion."""
-    count = len(toolpath)
-    rows = np.arange(count)
-    first, last = path.tangent(rows, np.zeros(count)), path.tangent(rows, np.ones(count))
-    known = (np.abs(first).sum(axis=1) > 0) & (np.abs(last).sum(axis=1) > 0)
-    inner = np.arccos(np.clip(np.sum(first * last, axis=1), -1.0, 1.0))
-    sweep = np.abs(np.nan_to_num(path.sweep))
-    turn = np.where(known, np.maximum(inner, np.minimum(sweep, np.pi)), 0.0)
-    linked = known & np.append(False, known[:-1]) & toolpath.continues
-    before = np.clip(np.sum(first * np.roll(last, 1, axis=0), axis=1), -1.0, 1.0)
-    turn += np.where(linked, np.arccos(before), 0.0)
-    station = np.cumsum(np.maximum(path.length, 1e-6 * MM))
-    total = np.cumsum(turn)
-    back = np.searchsorted(station, station - np.maximum(radius, MM), side="left")
-    within = total - np.where(back > 0, total[np.maximum(back - 1, 0)], 0.0)
-    return np.clip(within / (0.5 * np.pi), 0.0, 1.0)
+@dataclass(frozen=True, eq=False)
+class Corners:
+    """Where the feed turns.  station (V,) [m] along the program of each vertex; ``turned`` (V,) [rad]: the sum of all
+    turns up to it; end (N,) [m]: station of the end of each motion; length (N,) [m]."""
+
+    station: Floats
+    turned: Floats
+    end: Floats
+    length: Floats
+
+    @staticmethod
+    def of(path: DesiredPath, toolpath: Toolpath) -> Corners:
+        """Of a program: vertices, and arcs by their whole angle at their middle."""
+        count = len(toolpath)
+        rows = np.arange(count)
+        first, last = path.tangent(rows, np.zeros(count)), path.tangent(rows, np.ones(count))
+        known = (np.abs(first).sum(axis=1) > 0) & (np.abs(last).sum(axis=1) > 0)
+        linked = known & np.append(False, known[:-1]) & toolpath.continues
+        cosine = np.clip(np.sum(first * np.roll(last, 1, axis=0), axis=1), -1.0, 1.0)
+        turn = np.where(linked, np.arccos(cosine), 0.0)
+        end = np.cumsum(np.maximum(path.length, 1e-6 * MM))
+        start = np.append(0.0, end[:-1])
+        sweep = np.minimum(np.abs(np.nan_to_num(path.sweep)), np.pi)
+        station = np.stack([start, 0.5 * (start + end)], axis=1).ravel()
+        return Corners(station, np.cumsum(np.stack([turn, sweep], axis=1).ravel()), end, path.length)
+
+    def at(self, rows: Ints, share: Floats, radius: Floats) -> Floats:
+        """(K,) 0..1 how far the feed turns (1: 90 deg) within the radius (K,) [m] of the cutter of the places at the
+        shares (K,) of motions ``rows`` (K,)."""
+        place = self.end[rows] - (1.0 - share) * self.length[rows]
+        turned = np.append(0.0, self.turned)
+        low = turned[np.searchsorted(self.station, place - radius, side="left")]
+        high = turned[np.searchsorted(self.station, place + radius, side="right")]
+        return np.asarray(np.clip((high - low) / (0.5 * np.pi), 0.0, 1.0))
+
+    def of_motions(self, radius: Floats) -> Floats:
+        """(N,) 0..1 of motions as a whole: those that lie inside of a corner, of cutters of this radius (N,) [m]."""
+        rows = np.arange(len(self.end))
+        short = self.length <= 2 * radius
+        return np.where(short, self.at(rows, np.full(len(rows), 0.5), radius), 0.0)

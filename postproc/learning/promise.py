@@ -16,7 +16,7 @@ from postproc.base.arrays import Floats
 from postproc.learning.attribution import Attribution
 from postproc.learning.covariance import SCATTER
 
-HOPE, UPPER, LOWER = 1.25, 2.4, 0.5
+HOPE, UPPER, LOWER = 1.1, 3.0, 0.38
 """Ratios: what remains to what the covariance says, and the ends of its 95 % interval."""
 
 

@@ -170,7 +170,7 @@ def _learned_inputs(
     base = task.base[np.arange(len(task.toolpath))].rotation
 
     def forces(stated: Wrenches) -> Wrenches:
-        return factors.acting(stated, job.operations, base, job.corner)
+        return factors.acting(stated, job.operations, base, job.corners.of_motions(job.radius))
 
     error = learned_error(
         result,

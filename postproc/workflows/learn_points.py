@@ -28,7 +28,7 @@ from postproc.learning.causes import (
 )
 from postproc.learning.covariance import FREE_SHIFT, FREE_TURN, Layout
 from postproc.learning.measured_part import FREEDOMS, MeasuredPart
-from postproc.learning.next_program import corners
+from postproc.learning.next_program import Corners
 from postproc.learning.plausible import check_contacts, check_nominal
 from postproc.learning.touched_points import TouchedPoints, touched_points
 from postproc.part.contact import Contacts, CuttingMotions, find_contacts
@@ -49,14 +49,16 @@ DEEPER = 0.02 * MM
 
 @dataclass(frozen=True, eq=False)
 class CutProgram:
-    """A program that was cut, with all that belongs to its surface.  tool (N,): numbers; operations; spindle (N, 3) in
-    tool axes; corner, time (N,) 0..1; motions: those that may leave a surface; ball: tools with a ball."""
+    """A program that was cut, with all that belongs to its surface. tool (N,): numbers; operations; spindle (N,
+    3) in tool axes; corners: where the feed turns; radius (N,) [m] of the cutter; time (N,) 0..1; motions:
+    those that may leave a surface; ball: tools with a ball."""
 
     ready: Prepared
     operations: OperationNames
     tool: Ints
     spindle: Floats
-    corner: Floats
+    corners: Corners
+    radius: Floats
     time: Floats
     motions: CuttingMotions
     ball: tuple[int, ...]
@@ -131,7 +133,8 @@ def read_job(request: Request) -> CutProgram:
         operations_of(cell, ready.wrenches, path),
         numbers,
         np.nan_to_num(frames.spindle_in_tool[np.arange(len(path))]),
-        corners(desired, path, radius),
+        Corners.of(desired, path),
+        radius,
         time / max(float(time[-1]), 1e-9),
         motions,
         tuple(cutter.number for cutter in cutters if cutter.shape == "ball"),
@@ -211,7 +214,8 @@ def match(request: Request, job: CutProgram, parts: Sequence[MeasuredPart], know
     row = points.row
     before = np.maximum(row - 1, 0)
     around = Circumstances(
-        job.corner[row], job.time[before] + points.share * (job.time[row] - job.time[before])
+        job.corners.at(row, points.share, job.radius[row]),
+        job.time[before] + points.share * (job.time[row] - job.time[before]),
     )
     return Matched(
         points,
