@@ -242,6 +242,7 @@ def learn(
     robot: str | None = None,
     gain: float = 1.0,
     known_force: float | None = None,
+    push: PathLike | None = None,
     output: PathLike | None = None,
     csv: PathLike | None = None,
     config_dat: PathLike | None = None,
@@ -251,7 +252,8 @@ def learn(
     """Learn from measured parts of a program, as ``compensate learn`` does.
 
     path: the original program; measured: CSVs of deviations; known_force: half width of the 95 % interval of all forces
-    as a share; output: folder of the next program, the robot file and the force factors; csv: one row a point.
+    as a share; push: readings of a push test; output: folder of the next program, robot file and force factors; csv:
+    one row a point.
     """
     from postproc.workflows.learn import LearnRequest
     from postproc.workflows.learn import learn as run
@@ -271,6 +273,7 @@ def learn(
             main,
             tuple(Path(one) for one in several),
             known_force=known_force,
+            push=_path(push),
             output=_path(output),
             csv=_path(csv),
             strict=strict,

@@ -31,6 +31,13 @@ from postproc.cli.decimal_option import Decimal
     help="Half width of the 95 % interval of all forces, as a gauge showed it: 0.1 for 10 % [the cell's].",
 )
 @click.option(
+    "--push",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.csv",
+    help="Push test: joint values, FX,FY,FZ at the tool centre point and its displacement DX,DY,DZ, as `identify` reads"
+    " them; it separates compliances from forces.",
+)
+@click.option(
     "--csv",
     "csv_to",
     type=click.Path(path_type=Path, dir_okay=False),
@@ -60,6 +67,7 @@ def learn(
     output: Path | None,
     gain: float,
     known_force: float | None,
+    push: Path | None,
     csv_to: Path | None,
     plan_points: int | None,
     dry_run: bool,
@@ -103,6 +111,7 @@ def learn(
         ),
         measured=measured,
         known_force=known_force,
+        push=push,
         output=output,
         csv=csv_to,
         json=out.json_file,

@@ -110,9 +110,8 @@ def attribute(
     prediction: CausePrediction, deviation: Floats, layout: Layout, around: Circumstances, search: bool = True
 ) -> Attribution:
     """The causes of deviations (K,) [m]; ``search``: for effects that the model misses."""
-    count = len(prediction.causes)
     kept = np.ones(len(deviation), bool)
-    x, kept = _settle(prediction, deviation, layout, np.zeros(count), kept, outliers=True)
+    x, kept = _settle(prediction, deviation, layout, prediction.before[0].copy(), kept, outliers=True)
     explained = _explained(prediction, deviation, layout, x, kept)
     named: list[Likelier] = []
     joined: list[MissingEffect] = []
@@ -149,7 +148,7 @@ def attribute(
         explained = _explained(prediction, deviation, layout, x, kept)
     verdict = _verdict(verdict, bool(named), explained)
     mean, covariance = explained.causes()
-    scale = prediction.deviations
+    root = prediction.before[1]
     standardised = np.full(len(deviation), np.nan)
     standardised[kept] = explained.standardised()
     return Attribution(
@@ -157,8 +156,8 @@ def attribute(
         deviation,
         layout,
         kept,
-        prediction.bounded(mean * scale),
-        covariance * np.outer(scale, scale),
+        prediction.causes_at(mean),
+        root @ covariance @ root.T,
         explained,
         tuple(named),
         tuple(joined),
@@ -217,10 +216,11 @@ def _linearised(
     part, own = prediction.part(rows), layout.part(rows)
     columns = part.columns(x)
     errors = part.errors(x)
-    rest = deviation[rows] - errors + columns @ x
+    mean, root = prediction.before
+    rest = deviation[rows] - errors + columns @ (x - mean)
     if not np.isfinite(rest).all() or not np.isfinite(columns).all():
         raise np.linalg.LinAlgError("a point has no equilibrium with these causes")
-    return Explanation(own, surface, rest, columns * part.deviations, _by_force(part, columns))
+    return Explanation(own, surface, rest, columns @ root, _by_force(part, columns))
 
 
 def _by_force(part: CausePrediction, columns: Floats) -> Floats:
@@ -247,7 +247,7 @@ def _settle(
                 explained = explained.part(np.setdiff1d(np.arange(len(explained.rest)), out))
         explained = choose_surface(explained, 1)
         surface = explained.surface
-        new = prediction.bounded(explained.causes()[0] * scale)
+        new = prediction.causes_at(explained.causes()[0])
         moved = float(np.max(np.abs(new - x) / scale, initial=0.0))
         x = new
         if moved < SETTLED and turn > 0:

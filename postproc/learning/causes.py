@@ -81,11 +81,27 @@ class Cause:
 
 @dataclass(frozen=True, eq=False)
 class CausePrediction:
-    """What P causes do to K points."""
+    """What P causes do to K points.  ``mean`` (P,) and ``root`` (P, P): what is known of the causes before the part is
+    measured is mean + root u with independent u of deviation 1; empty: zero, and each cause's own deviation."""
 
     points: TouchedPoints
     model: StiffnessModel
     causes: tuple[Cause, ...]
+    mean: Floats = field(default_factory=lambda: np.zeros(0))
+    root: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+
+    @cached_property
+    def before(self) -> tuple[Floats, Floats]:
+        """``mean`` (P,) and ``root`` (P, P), causes that joined later included."""
+        known, size = len(self.mean), len(self.causes)
+        mean, root = np.zeros(size), np.diag(self.deviations)
+        mean[:known], root[:known, :known] = self.mean, self.root
+        return mean, root
+
+    def causes_at(self, u: Floats) -> Floats:
+        """(P,) causes in their own units, of ``u`` (P,) in deviations, within what can be meant."""
+        mean, root = self.before
+        return self.bounded(mean + root @ u)
 
     @cached_property
     def deviations(self) -> Floats:
@@ -94,13 +110,12 @@ class CausePrediction:
 
     def part(self, rows: Ints) -> CausePrediction:
         """Of some points (J,)."""
-        return CausePrediction(
-            self.points.part(rows), self.model, tuple(cause.part(rows) for cause in self.causes)
-        )
+        causes = tuple(cause.part(rows) for cause in self.causes)
+        return CausePrediction(self.points.part(rows), self.model, causes, self.mean, self.root)
 
     def with_causes(self, more: Sequence[Cause], model: StiffnessModel | None = None) -> CausePrediction:
         """With further causes, of effects of another model."""
-        return CausePrediction(self.points, model or self.model, (*self.causes, *more))
+        return CausePrediction(self.points, model or self.model, (*self.causes, *more), self.mean, self.root)
 
     def model_at(self, x: Floats) -> StiffnessModel:
         """The model with the values of the causes ``x`` (P,)."""

@@ -33,9 +33,9 @@ TOUCHED = 0.75
 
 def check_sign(prediction: CausePrediction, deviation: Floats, layout: Layout, file: str) -> list[Finding]:
     """Whether the deviations (K,) [m] are far likelier with the other sign."""
-    zero = np.zeros(len(prediction.causes))
-    columns, errors = prediction.columns(zero), prediction.errors(zero)
-    scaled = columns * prediction.deviations
+    mean, root = prediction.before
+    columns, errors = prediction.columns(mean), prediction.errors(mean)
+    scaled = columns @ root
     by_force = next(
         (columns[:, i] for i, cause in enumerate(prediction.causes) if cause.name == "force"), 0 * errors
     )

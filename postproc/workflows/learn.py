@@ -17,7 +17,9 @@ from postproc.learning.measured_part import MeasuredPart, read_measured_part
 from postproc.learning.next_program import force_factors, learned_error
 from postproc.learning.plausible import check_explained, check_sign
 from postproc.learning.promise import Promise, promise
+from postproc.learning.push_test import with_push_test
 from postproc.learning.unobserved import indistinct
+from postproc.measurements import read_measurements
 from postproc.output.atomic_write import write_atomically
 from postproc.process import Wrenches
 from postproc.report.learned import Learned, learned_csv
@@ -35,11 +37,12 @@ SHOWN = 5
 class LearnRequest:
     """What the user asked for.  ``main``: the program, its cell, force and how it is written; ``measured``: files of
     parts that it cut; ``known_force``: half width of the 95 % interval of all forces as a share, as a gauge showed
-    it."""
+    it; ``push``: readings of a push test."""
 
     main: Request
     measured: tuple[Path, ...]
     known_force: float | None = None
+    push: Path | None = None
     output: Path | None = None
     csv: Path | None = None
     json: Path | None = None
@@ -58,6 +61,9 @@ def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
     stage("matching points to motions")
     matched = match(main, job, parts, known)
     prediction = CausePrediction(matched.points, job.ready.model, matched.causes)
+    if request.push is not None:
+        joints = [(joint.name, joint.kind != "revolute") for joint in job.ready.robot.joints]
+        prediction = with_push_test(prediction, read_measurements(request.push, joints))
     file = str(parts[0].file)
     wrong = check_sign(prediction, matched.deviation, matched.layout, file)
     if wrong:
@@ -210,7 +216,7 @@ def _published(
         files[folder / f"{main.program.stem}.force_factors.yaml"] = factors
     own = folder / f"{main.program.stem}.learned.json"
     extra = [path for path in (request.csv, request.json) if path is not None]
-    _spare(job, parts, [*files, own, *extra])
+    _spare(request, job, [*files, own, *extra])
     inputs = _learned_inputs(request, job, matched, result)
     if content is not None:
         inputs = replace(inputs, robot=robot_of(content, robot_path))
@@ -240,8 +246,9 @@ def _published(
     return learned
 
 
-def _spare(job: CutProgram, parts: Sequence[MeasuredPart], outputs: Sequence[Path]) -> None:
+def _spare(request: LearnRequest, job: CutProgram, outputs: Sequence[Path]) -> None:
     """Raises Refusal FIL007 for an output that is an input, or that is named twice."""
-    job.ready.inputs.refuse_outputs(outputs, [part.file for part in parts])
+    push = [] if request.push is None else [request.push]
+    job.ready.inputs.refuse_outputs(outputs, [*request.measured, *push])
     if len({place(path) for path in outputs}) < len(outputs):
         raise Refusal(Finding("FIL007", "two results have the same name", str(outputs[0])))
