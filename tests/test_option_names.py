@@ -26,6 +26,7 @@ WORDS = {
     "program": ["a.src"],
     "predict": ["a.src"],
     "verify": ["a.src", "b.src"],
+    "learn": ["a.src", "b.csv"],
     "batch": ["a.src"],
     "watch": ["."],
 }

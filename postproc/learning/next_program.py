@@ -198,7 +198,7 @@ def _sides(result: Attribution, path: DesiredPath, operations: OperationNames) -
 
 
 @dataclass(frozen=True, eq=False)
-class Corners:
+class FeedTurns:
     """Where the feed turns.  station (V,) [m] along the program of each vertex; ``turned`` (V,) [rad]: the sum of all
     turns up to it; end (N,) [m]: station of the end of each motion; length (N,) [m]."""
 
@@ -208,7 +208,7 @@ class Corners:
     length: Floats
 
     @staticmethod
-    def of(path: DesiredPath, toolpath: Toolpath) -> Corners:
+    def of(path: DesiredPath, toolpath: Toolpath) -> FeedTurns:
         """Of a program: vertices, and arcs by their whole angle at their middle."""
         count = len(toolpath)
         rows = np.arange(count)
@@ -221,7 +221,7 @@ class Corners:
         start = np.append(0.0, end[:-1])
         sweep = np.minimum(np.abs(np.nan_to_num(path.sweep)), np.pi)
         station = np.stack([start, 0.5 * (start + end)], axis=1).ravel()
-        return Corners(station, np.cumsum(np.stack([turn, sweep], axis=1).ravel()), end, path.length)
+        return FeedTurns(station, np.cumsum(np.stack([turn, sweep], axis=1).ravel()), end, path.length)
 
     def at(self, rows: Ints, share: Floats, radius: Floats) -> Floats:
         """(K,) 0..1 how far the feed turns (1: 90 deg) within the radius (K,) [m] of the cutter of the places at the

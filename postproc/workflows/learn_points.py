@@ -28,7 +28,7 @@ from postproc.learning.causes import (
 )
 from postproc.learning.covariance import FREE_SHIFT, FREE_TURN, Layout
 from postproc.learning.measured_part import FREEDOMS, MeasuredPart
-from postproc.learning.next_program import Corners
+from postproc.learning.next_program import FeedTurns
 from postproc.learning.plausible import check_contacts, check_nominal
 from postproc.learning.touched_points import TouchedPoints, touched_points
 from postproc.part.contact import Contacts, CuttingMotions, find_contacts
@@ -57,7 +57,7 @@ class CutProgram:
     operations: OperationNames
     tool: Ints
     spindle: Floats
-    corners: Corners
+    corners: FeedTurns
     radius: Floats
     time: Floats
     motions: CuttingMotions
@@ -133,7 +133,7 @@ def read_job(request: Request) -> CutProgram:
         operations_of(cell, ready.wrenches, path),
         numbers,
         np.nan_to_num(frames.spindle_in_tool[np.arange(len(path))]),
-        Corners.of(desired, path),
+        FeedTurns.of(desired, path),
         radius,
         time / max(float(time[-1]), 1e-9),
         motions,
