@@ -20,6 +20,7 @@ from postproc.report.checked import Checked
 from postproc.report.diagnosed import Diagnosed
 from postproc.report.engaged import Engaged
 from postproc.report.identified import Identified
+from postproc.report.learned import Learned
 from postproc.report.mapped import Mapped
 from postproc.report.placement import Placement
 from postproc.report.planned import Planned
@@ -39,6 +40,7 @@ __all__ = [
     "Engaged",
     "Finding",
     "Identified",
+    "Learned",
     "Mapped",
     "Placement",
     "Planned",
@@ -51,6 +53,7 @@ __all__ = [
     "diagnose",
     "engage",
     "identify",
+    "learn",
     "map",
     "place",
     "plan",
@@ -299,6 +302,55 @@ def place(
             picture=_path(picture),
             page=_path(page),
             strict=strict,
+        )
+    )
+
+
+def learn(
+    path: PathLike,
+    measured: PathLike | Sequence[PathLike],
+    *,
+    force: bool | str = True,
+    cell: PathLike | None = None,
+    robot: str | None = None,
+    gain: float = 1.0,
+    known_force: float | None = None,
+    push: PathLike | None = None,
+    output: PathLike | None = None,
+    csv: PathLike | None = None,
+    config_dat: PathLike | None = None,
+    strict: bool = False,
+    dry_run: bool = False,
+) -> Learned:
+    """Learn from measured parts of a program, as ``compensate learn`` does.
+
+    path: the original program; measured: CSVs of deviations; known_force: half width of the 95 % interval of all forces
+    as a share; push: readings of a push test; output: folder of the next program, robot file and force factors; csv:
+    one row a point.
+    """
+    from postproc.workflows.learn import LearnRequest
+    from postproc.workflows.learn import learn as run
+
+    several = [measured] if isinstance(measured, (str, os.PathLike)) else list(measured)
+    main = Request(
+        program=Path(path),
+        force=_force(force),
+        cell=_path(cell),
+        robot=robot,
+        gain=_share(gain),
+        config_dat=_path(config_dat),
+        strict=strict,
+    )
+    return run(
+        LearnRequest(
+            main,
+            tuple(Path(one) for one in several),
+            known_force=known_force,
+            push=_path(push),
+            output=_path(output),
+            csv=_path(csv),
+            strict=strict,
+            dry_run=dry_run,
         )
     )
 

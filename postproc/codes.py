@@ -16,6 +16,7 @@ from postproc.languages import codes as dialects
 from postproc.languages.gcode import codes as gcode
 from postproc.languages.krl import codes as krl
 from postproc.languages.rapid import codes as rapid
+from postproc.learning import codes as learning
 from postproc.measurements import codes as measurements
 from postproc.model import codes as model
 from postproc.output import atomic_write
@@ -46,6 +47,7 @@ TABLES: tuple[Mapping[str, Code], ...] = tuple(
         diagnosis,
         experiments,
         placement,
+        learning,
         workflows,
         batch,
     )

@@ -27,6 +27,7 @@ WORDS = {
     "predict": ["a.src"],
     "verify": ["a.src", "b.src"],
     "place": ["a.src"],
+    "learn": ["a.src", "b.csv"],
     "batch": ["a.src"],
     "watch": ["."],
 }

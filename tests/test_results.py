@@ -46,12 +46,13 @@ RUNS = {
     ],
     "diagnose": ["diagnose", "loads.csv", "--robot", "kr270_plain.yaml", "-o", "new.yaml"],
     "engage": ["engage", "part.ngc"],
+    "learn": ["learn", "part.src", "part1.csv"],
     "batch": ["batch", ".", "--force", "-j", "1"],
     "robots": ["robots"],
     "robots, one": ["robots", "kr270_shop.yaml"],
 }  # fmt: skip
-LONG = {"plan, two effects"}
-SAMPLE = {"identify": CAMPAIGN, "diagnose": MISSING, "engage": "kr270_stock"}
+LONG = {"plan, two effects", "learn"}
+SAMPLE = {"identify": CAMPAIGN, "diagnose": MISSING, "engage": "kr270_stock", "learn": "kr270_second_part"}
 FAILING = {
     "report": ["none.src", "--force"],
     "predict": ["predict", "none.src"],
@@ -63,6 +64,7 @@ FAILING = {
     "plan": ["plan", "--effects", "none", *PLAN],
     "diagnose": ["diagnose", "none.csv"],
     "engage": ["engage", "none.ngc"],
+    "learn": ["learn", "none.src", "none.csv"],
     "batch": ["batch", "none"],
     "robots": ["robots", "none"],
 }

@@ -55,6 +55,21 @@ class ForceVectorInterval:
     components: Floats | None = None
 
 
+@dataclass(frozen=True)
+class ForceFactor:
+    """What was learnt of the force of an operation: ``factor`` of what is stated; ``ci95``: half width of its 95 %
+    interval as a share, None without; ``turn`` [rad] of its direction about two axes across it: the one that lifts it
+    and the one that swings it."""
+
+    factor: float
+    ci95: float | None = None
+    turn: tuple[float, float] = (0.0, 0.0)
+
+
+OTHERS = "others"
+"""Key of the factor of all operations that have none of their own."""
+
+
 @dataclass(frozen=True, eq=False)
 class Cell:
     """One checked cell file.
@@ -65,7 +80,8 @@ class Cell:
     in it is relative to the cell file; ``force_line`` is where it is.  ``force_ci95``: half width of the 95 %
     interval of all forces, as a share of them; None where nothing is stated.  ``dialect``: name of the programs'
     language, where their names and contents do not identify it; ``config_dat``: the controller's $config.dat, relative
-    to the cell file.  ``force_vector``: intervals of the forces besides their scale; ``force_ramp`` [m]: the path over
+    to the cell file.  ``force_vector``: intervals of the forces besides their scale; ``force_factors``: operation ->
+    what was learnt of its force; ``force_ramp`` [m]: the path over
     which a force changes, None where it is not stated.  ``correct``: one of ``MODES``; ``touch_points``: number of a
     base -> (K, 3) [m] places in it at which it was touched off, None for the one base that a program uses;
     ``touch_line`` is where they are.  ``temperature`` [degC] of the robot.
@@ -101,6 +117,7 @@ class Cell:
     config_dat: str | None = None
     force_vector: ForceVectorInterval | None = None
     force_ramp: float | None = None
+    force_factors: Mapping[str, ForceFactor] = field(default_factory=dict)
     touch_points: dict[int | None, Floats] = field(default_factory=dict)
     touch_line: int = 0
     temperature: float | None = None

@@ -18,7 +18,7 @@ from postproc.base.geometry import Poses
 from postproc.base.units import DEG, MM
 from postproc.base.yaml_section import YamlSection, load
 from postproc.cell.controller_state import read_program_start, read_symbols
-from postproc.cell.description import MODES, Cell, Controller, ForceVectorInterval, Tool
+from postproc.cell.description import MODES, OTHERS, Cell, Controller, ForceFactor, ForceVectorInterval, Tool
 from postproc.cell.implausible import implausible
 from postproc.cell.stated_room import read_room
 from postproc.robot.read_external_axes import read_external
@@ -38,6 +38,7 @@ KEYS = (
     "force",
     "force_ci95",
     "force_ramp",
+    "force_factors",
     "process",
     "correct",
     "touch_points",
@@ -134,6 +135,7 @@ def load_cell(path: Path) -> Cell:
         dialect_line=dialect.line_of("name") if "name" in dialect else 0,
         config_dat=_word(dialect, "config_dat") if "config_dat" in dialect else None,
         force_vector=vector,
+        force_factors=_force_factors(top),
         force_ramp=top.number("force_ramp", low=0.0, unit="mm") * MM if "force_ramp" in top else None,
         touch_points=_touch_points(top, correct),
         touch_line=top.line_of("touch_points") if "touch_points" in top else 0,
@@ -210,6 +212,27 @@ def _orientation(top: YamlSection) -> Floats | None:
     section = top.section("orientation")
     section.only("a", "b", "c")
     return frozen([section.number(key, 0.0, unit="deg") * DEG for key in "abc"], (3,))
+
+
+def _force_factors(top: YamlSection) -> dict[str, ForceFactor]:
+    """Operation, in upper case -> its factor."""
+    factors = {}
+    section = top.section("force_factors", {})
+    for key in section:
+        one = section.section(key)
+        one.only("factor", "ci95", "turn")
+        name = key if key == OTHERS else " ".join(key.split()).upper()
+        if name in factors:
+            raise section.error("YML004", f"the operation {name!r} occurs twice", key)
+        turn = one.numbers("turn", 2, unit="deg") if "turn" in one else [0.0, 0.0]
+        if max(abs(angle) for angle in turn) > 90:
+            raise one.error("YML004", "the turn exceeds 90 deg", "turn")
+        factors[name] = ForceFactor(
+            one.number("factor", low=0.1, high=10.0),
+            one.number("ci95", low=0.0, high=2.0) if "ci95" in one else None,
+            (turn[0] * DEG, turn[1] * DEG),
+        )
+    return factors
 
 
 def _force_interval(top: YamlSection) -> tuple[float | None, ForceVectorInterval | None]:

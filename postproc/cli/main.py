@@ -17,6 +17,7 @@ from postproc.cli.completion import Commands, completion
 from postproc.cli.diagnose import diagnose
 from postproc.cli.engage import engage
 from postproc.cli.identify import identify
+from postproc.cli.learn import learn
 from postproc.cli.map import map_
 from postproc.cli.place import place
 from postproc.cli.plan import plan
@@ -41,6 +42,7 @@ COMMANDS = {
     "identify": identify,
     "plan": plan,
     "diagnose": diagnose,
+    "learn": learn,
     "batch": batch,
     "watch": watch,
     "robots": robots,
@@ -69,6 +71,7 @@ def main() -> None:
       compensate identify loads.csv --effects ...     parameters of the robot from measurements
       compensate plan --effects ... --poses 15 ...    the poses and loads worth measuring
       compensate diagnose loads.csv                   the effects that the robot file misses
+      compensate learn panel.src part1.csv            from a measured part to a better next program
       compensate batch parts --force                  many programs in parallel
       compensate watch outbox --force                 every program that arrives in a folder
     """

@@ -18,6 +18,7 @@ RESULTS = (
     "engage",
     "plan",
     "diagnose",
+    "learn",
     "batch",
     "robots",
     "corrections",

@@ -12,6 +12,7 @@ from postproc.base.geometry import Placed, Poses, product, rotation_from_vector,
 from postproc.compensation import orientations
 from postproc.compensation.desired_path import DesiredPath
 from postproc.compensation.gap_sides import GapSides, LostMotion, Reversals
+from postproc.compensation.known_error import KnownError
 from postproc.compensation.load_case import LoadCase
 from postproc.compensation.mirror import Correction, Prediction, initial_guess, mirror, pose_error, predict
 from postproc.compensation.touched_off import TouchedOff
@@ -36,7 +37,8 @@ class CompensationProblem:
     contains that, but for the lost motion of its gears: no base can lie on both sides of a gap); else everything is
     corrected, but for the rigid motion that ``touched_off`` bases contain.  ``max_correction``, ``tolerance`` [m],
     ``tolerance_angle`` [rad].  ``ramp`` [m]: over which a force that steps inside a cut goes over at least.
-    ``lost_motion``: on which side of its gap each axis lies, None where the model does not ask.
+    ``lost_motion``: on which side of its gap each axis lies, None where the model does not ask.  ``known_error``: what
+    is known of the error beside the model.
 
     Wherever something is asked for along the path of motions ``rows`` (K,), ``share`` (K,) states where: 0 at their
     start, 1 at their end, which is what it is without.
@@ -60,6 +62,7 @@ class CompensationProblem:
     touched_off: TouchedOff | None = None
     lost_motion: LostMotion | None = None
     external: External | None = None
+    known_error: KnownError | None = None
 
     @property
     def wrench(self) -> Floats:
@@ -165,7 +168,13 @@ class CompensationProblem:
     def goal(self, rows: Ints, wanted: Poses, share: Floats | None = None) -> Poses:
         """Where the tool is to be in motions ``rows`` (K,), at ``share`` (K,) of their paths or at their ends: the
         wanted poses (K), or where the robot without force takes it in the middle of its gaps, or where a base that was
-        touched off puts them."""
+        touched off puts them; before what is known of the error beside the model."""
+        goal = self._goal_of_model(rows, wanted, share)
+        if self.known_error is None:
+            return goal
+        return Poses(goal.rotation, goal.position - self.known_error.at(rows, wanted, share))
+
+    def _goal_of_model(self, rows: Ints, wanted: Poses, share: Floats | None) -> Poses:
         if self.model.zero_without_load or (not self.process and self.touched_off is None):
             return wanted
         if self.process or self.touched_off is None:

@@ -12,7 +12,7 @@ import numpy as np
 from postproc.base.arrays import Floats, frozen
 from postproc.base.yaml_section import YamlSection
 
-COMMANDS = ("identify", "diagnose")
+COMMANDS = ("identify", "diagnose", "learn")
 GAP = ("before_rms_mm", "after_rms_mm", "noise_mm", "held_out_before_rms_mm", "held_out_after_rms_mm")
 FORMER_GAP = {key.replace("held_out", "heldout"): key for key in GAP if "held_out" in key}
 """Former name of a key, still read -> the key."""

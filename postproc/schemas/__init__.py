@@ -13,6 +13,7 @@ from postproc.schemas.diagnose_schema import diagnose_schema
 from postproc.schemas.engage_schema import engage_schema
 from postproc.schemas.identify_schema import identify_schema
 from postproc.schemas.job_schema import job_schema
+from postproc.schemas.learn_schema import learn_schema
 from postproc.schemas.map_schema import map_schema
 from postproc.schemas.parts import Schema
 from postproc.schemas.place_schema import place_schema
@@ -42,6 +43,7 @@ RESULT_SCHEMAS: dict[str, Callable[[], Schema]] = {
     "engage": engage_schema,
     "plan": plan_schema,
     "diagnose": diagnose_schema,
+    "learn": learn_schema,
     "batch": batch_schema,
     "robots": robots_schema,
     "corrections": corrections_schema,

@@ -92,6 +92,20 @@ CELL: dict[str, Schema] = {
     "bases": mapping({}, about="by number, from 1: BASE_DATA; G54 is 1", patterns={_NUMBERED: _FRAME}),
     "force": text("fx,fy,fz[,mx,my,mz][@base|world|tool|feed] in N and N m, or a CSV"),
     "force_ci95": _FORCE_INTERVAL,
+    "force_factors": mapping(
+        {},
+        about="operation, or others -> what `learn` found of its force",
+        patterns={
+            ".+": mapping(
+                {
+                    "factor": number("of the stated force", 0.1, 10.0),
+                    "ci95": number("half width of its 95 % interval, as a share", 0.0, 2.0),
+                    "turn": numbers(2, 2, "of its direction, deg: lift and swing"),
+                },
+                required=("factor",),
+            )
+        },
+    ),
     "force_ramp": number("path over which a force changes, mm [the tool's radius, where it is known]", 0.0),
     "process": text("process file (YAML)"),
     "correct": text(

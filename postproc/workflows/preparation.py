@@ -17,6 +17,7 @@ from postproc.base.input_files import Inputs, noted
 from postproc.base.read_files import read_text_file
 from postproc.base.units import DEG, MM
 from postproc.cell import Cell, MotionFrames, find_cell, frames_of, load_cell
+from postproc.compensation.known_error import KnownError
 from postproc.compensation.lost_motion import add_lost_motion
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.ramped_forces import ASSUMED, add_force_ramps
@@ -26,23 +27,33 @@ from postproc.languages.dialect import Dialect, Program, ReadingSettings, read_w
 from postproc.model import StiffnessModel
 from postproc.process import Wrenches, is_no_force, wrenches
 from postproc.robot.axis_track import (
-    AxisTrack,
     all_axes,
     external_joint,
     follow_axes,
     nominal_flange,
-    status_matches,
 )
 from postproc.robot.description import Robot, find_robot, load_robot
 from postproc.robot.external_axes import External
 from postproc.robot.geometries import SerialArm
 from postproc.robot.orientation_modes import as_run
 from postproc.robot.read_external_axes import fill_external_axes, follow_external_axes
-from postproc.toolpath import Kind, Toolpath
+from postproc.toolpath import Toolpath
+from postproc.workflows.cell_force_factors import factored
 from postproc.workflows.correction_mode import corrected_model, mode_findings, temperature_rise, touch_off
+from postproc.workflows.reading_findings import configuration_findings, reader_findings
 
 Stage = Callable[[str], None]
 """Is told the name of each stage as it starts."""
+
+
+@dataclass(frozen=True)
+class LearnedInputs:
+    """What was learnt of a part of this program: its ``forces`` from those that are stated, errors that are known
+    beside those of the model, and the ``robot``, where it is another."""
+
+    forces: Callable[[Wrenches], Wrenches]
+    known_error: KnownError
+    robot: Robot | None = None
 
 
 @dataclass(frozen=True)
@@ -51,7 +62,7 @@ class Request:
     ``tare``: the mean of a force log in air is subtracted; ``allow_compensated``: a program that carries the mark of an
     earlier compensation is accepted; ``no_insert``: no motion is inserted; ``shared_points``: as of ``Writing``;
     ``keep_table``: the report keeps the table of its motions; ``stream``: takes the bytes of the compensated program
-    instead of a file; reports are then written only where ``report`` names a folder."""
+    instead of a file; reports are then written only where ``report`` names a folder; ``learned``: of a part."""
 
     program: Path
     force: str | None = None
@@ -71,6 +82,7 @@ class Request:
     tare: bool = False
     keep_table: bool = False
     stream: Callable[[bytes], object] | None = None
+    learned: LearnedInputs | None = None
 
 
 @dataclass(frozen=True)
@@ -187,7 +199,11 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     cell = cell_of(request)
     dialect, read, settings = read_program(request.program, cell, request.config_dat, request.beside)
     beside = None if request.robot else cell.path.parent
-    robot = load_robot(find_robot(cell.robot, beside))
+    learned = request.learned
+    if learned is not None and learned.robot is not None:
+        robot = learned.robot
+    else:
+        robot = load_robot(find_robot(cell.robot, beside))
     full = StiffnessModel.from_robot(robot)
     gravity = cell.robot_base.rotation.T @ full.gravity
     model = replace(corrected_model(full, cell), gravity=gravity)
@@ -205,6 +221,9 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
     base, tool, start = frames.base_in_robot, frames.tool_in_flange, _start(cell, robot)
     path, orientation_findings = as_run(path, base, tool, robot, start, str(request.program))
     force = wrenches(request.program, path, frames, cell, request.force, request.tare)
+    force = factored(cell, force, path, base[np.arange(len(path))].rotation)
+    if learned is not None:
+        force = learned.forces(force)
     _missing_points(program, force)
     _missing_orientation(request, path, force, cell)
     _other_carrier(request, path, force, external)
@@ -233,13 +252,14 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
         tolerance=cell.tolerance,
         tolerance_angle=cell.tolerance_angle,
         external=external,
+        known_error=None if learned is None else learned.known_error,
     )
     task = add_force_ramps(task, _ramp(cell, path, force))
     spacing = np.maximum(cell.min_segment, 1e-3 * cell.cycle_ms * np.nan_to_num(path.feed))
     task = add_lost_motion(task, start, spacing)
     findings = [
         *cell.findings,
-        *_read_findings(program, path),
+        *reader_findings(program, path),
         *orientation_findings,
         *force.findings,
         *model.plausibility_findings(),
@@ -255,35 +275,8 @@ def _prepared(request: Request, inputs: Inputs) -> Prepared:
             Finding("MOD003", f"{robot.name} has no compliance: this force deflects nothing", str(robot.path))
         )
     if not isinstance(robot.nominal, SerialArm):
-        findings += _disagreeing(request.program, path, track)
+        findings += configuration_findings(request.program, path, track)
     return Prepared(program, dialect, settings, cell, robot, model, force, task, tuple(findings), inputs)
-
-
-def _read_findings(program: Program, path: Toolpath) -> list[Finding]:
-    """The findings of the reader, but for the external axes: what they carry, the cell has stated by now; and the
-    motions at which one of them is not known."""
-    findings = [finding for finding in program.findings if finding.topic is not Topic.EXTERNAL_AXES]
-    lost = [finding for finding in path.constraints.refused.values() if finding.code == "EXT004"]
-    if lost:
-        more = f" ({len(lost)} motions)" if len(lost) > 1 else ""
-        findings.append(replace(lost[0], message=lost[0].message + more))
-    return findings
-
-
-def _disagreeing(program: Path, path: Toolpath, track: AxisTrack) -> list[Finding]:
-    """Where the stated configuration of a motion and the axes that bring the robot there disagree (KIN007)."""
-    # A path motion keeps the branch that the robot is in, whatever its target states.
-    elsewhere = ~status_matches(path, track) & path.known & np.isin(path.kind, (Kind.LIN, Kind.CIRC))
-    findings = []
-    for mask, message in (
-        (~track.turn_matches, "the stated T (Turn) is not that of this pose"),
-        (elsewhere, "the stated configuration (S, cfx) is not the one in which the robot reaches this pose"),
-    ):
-        rows = np.flatnonzero(mask)
-        if len(rows):
-            more = f" ({len(rows)} motions, to line {path.line[rows[-1]]})" if len(rows) > 1 else ""
-            findings.append(Finding("KIN007", message + more, str(program), int(path.line[rows[0]])))
-    return findings
 
 
 def cell_of(request: Request) -> Cell:

@@ -1,0 +1,144 @@
+"""Effects that a model may miss, as columns: what each of them would do to the measured points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Floats
+from postproc.base.units import MM
+from postproc.effects import EFFECTS
+from postproc.learning.causes import Cause, CauseKind, CausePrediction
+from postproc.model import StiffnessModel
+
+SIZES = {
+    "hysteresis": 4e-5,
+    "backlash": 6e-5,
+    "base_compliance": 3e-8,
+    "tool_compliance": 1e-8,
+}
+"""Effect -> standard deviation of its parameters (SI) on a heavy arm."""
+
+CORNER, ENGAGEMENT, DRIFT = 0.3, 1.5, 0.05 * MM
+"""Share of the force added in corners; change of the force per mm of error, as a share; [m] over the whole program."""
+
+FACTORS = (0.5, 1.0, 2.0)
+"""Sizes that are tried, in standard deviations."""
+
+_SEEN = 0.3
+"""An effect that nowhere does as much as this share of the noise is not looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class MissingEffect:
+    """``name``; ``causes``: those that it adds; ``model``: with its effect; ``columns`` (K, Q) [m per standard
+    deviation]; ``transfers``: it holds at another place too."""
+
+    name: str
+    causes: tuple[Cause, ...]
+    model: StiffnessModel
+    columns: Floats
+    transfers: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Circumstances:
+    """Of K points: ``corner`` (K,) 0..1, how far the feed turns within the cutter's radius; ``time`` (K,) 0..1, when
+    they were cut."""
+
+    corner: Floats
+    time: Floats
+
+
+def candidates(
+    prediction: CausePrediction, x: Floats, around: Circumstances, noise: float, named: Sequence[str] = ()
+) -> list[MissingEffect]:
+    """Effects that the model does not have, or that ``named`` has not named, with what they would do at the causes
+    ``x`` (P,); ``noise`` [m]: of a point."""
+    found = []
+    for name, size in SIZES.items():
+        for candidate in _of_effect(prediction, x, name, size):
+            found.append(candidate)
+    found += _of_process(prediction, x, around)
+    return [
+        candidate
+        for candidate in found
+        if candidate.name not in named
+        and np.isfinite(candidate.columns).all()
+        and np.abs(candidate.columns).max(initial=0.0) * max(FACTORS) > _SEEN * noise
+    ]
+
+
+def _of_effect(prediction: CausePrediction, x: Floats, name: str, size: float) -> list[MissingEffect]:
+    """One candidate a joint, or one for all parameters of an effect that has none."""
+    model = prediction.model
+    if any(term.effect.name == name for term in model.terms):
+        return []
+    effect = EFFECTS[name](model.robot.joints)
+    extended, term = model.with_effect(effect), len(model.terms)
+    groups: dict[str, list[Cause]] = {}
+    for parameter in effect.parameters:
+        label = f"{name} of {parameter.joint}" if parameter.joint else name
+        if name == "base_compliance" and parameter.unit != "rad/(N m)":
+            continue  # shifts of the foot are far smaller than what its tilts do at the tool
+        scale = size if parameter.unit != "rad/(N m)" or name != "base_compliance" else 5e-9
+        groups.setdefault(label, []).append(
+            Cause(
+                f"{name}.{parameter.name}",
+                "effect",
+                CauseKind.VALUE,
+                scale,
+                parameter.unit,
+                term,
+                parameter.name,
+                place=label,
+            )
+        )
+    found = []
+    for label, causes in groups.items():
+        alone = CausePrediction(prediction.points, extended, (*prediction.causes, *causes))
+        columns = _own_columns(alone, np.append(x, np.zeros(len(causes))), len(causes))
+        found.append(
+            MissingEffect(
+                label, tuple(causes), extended, columns * [c.deviation for c in causes], transfers=True
+            )
+        )
+    return found
+
+
+def _own_columns(prediction: CausePrediction, x: Floats, count: int) -> Floats:
+    """(K, count) derivatives by the last ``count`` causes, by one-sided differences from their null."""
+    base = prediction.errors(x)
+    columns = []
+    for number in range(len(x) - count, len(x)):
+        moved = x.copy()
+        moved[number] = prediction.causes[number].deviation
+        columns.append((prediction.errors(moved) - base) / moved[number])
+    return np.stack(columns, axis=1)
+
+
+def _of_process(prediction: CausePrediction, x: Floats, around: Circumstances) -> list[MissingEffect]:
+    """Forces in corners, a force that changes with the error, and a drift with time."""
+    model, points = prediction.model, prediction.points
+    found = []
+    for name, size, weight in (
+        ("corner_force", CORNER, around.corner),
+        ("engagement", ENGAGEMENT, -prediction.errors(x) / MM),
+    ):
+        cause = Cause(
+            name, "effect", CauseKind.FORCE, size, "1" if name == "corner_force" else "1/mm", weight=weight
+        )
+        one = CausePrediction(points, model, (*prediction.causes, cause))
+        columns = _own_columns(one, np.append(x, 0.0), 1) * size
+        found.append(MissingEffect(name, (cause,), model, columns, transfers=True))
+    if np.ptp(around.time) > 0.05:
+        drifts = [
+            Cause(f"drift {axis}", "effect", CauseKind.SHIFT, DRIFT, "m", weight=points.normal[:, i] * around.time,
+                  parameter="xyz"[i], place="drift")
+            for i, axis in enumerate("xyz")
+        ]  # fmt: skip
+        columns = np.stack([cause.weight * cause.deviation for cause in drifts], axis=1)
+        found.append(MissingEffect("drift", tuple(drifts), model, columns, transfers=False))
+    return found

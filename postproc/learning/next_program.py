@@ -1,0 +1,239 @@
+"""What was learnt, as the correction of the next program needs it: factors of the forces, and errors that are known.
+
+The robot's parameters are in its new file.  A factor acts on the force of its operation.  The rest is a displacement of
+the surface, which the goal of the correction takes into account: a longer tool along the spindle, a larger radius
+towards the material (where all measured points of an operation say on which side that is), a base that was off, and,
+at this place only, the smooth displacement that no cause explains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from postproc.base.arrays import Floats, Ints
+from postproc.base.geometry import Poses, rotation_from_vector, turned
+from postproc.base.units import MM
+from postproc.compensation.desired_path import DesiredPath
+from postproc.compensation.known_error import KnownError
+from postproc.learning.attribution import Attribution
+from postproc.learning.causes import CauseKind, axes_across
+from postproc.process import Wrenches
+from postproc.process.operation_names import OperationNames
+from postproc.toolpath import Toolpath
+
+_SIDE = 0.9
+"""Share of the points of an operation that have to lie on one side of the feed."""
+
+
+@dataclass(frozen=True, eq=False)
+class ForceFactors:
+    """By operation: ``factor`` of its force, ``turn`` (2,) [rad] about the axes across it, ``ci95``: half width of
+    the 95 % interval of the factor as a share; ``common``: factor of all others; ``corner``: share added where the feed
+    turns."""
+
+    factor: Mapping[str, float]
+    turn: Mapping[str, tuple[float, float]]
+    common: float = 1.0
+    corner: float = 0.0
+    ci95: Mapping[str, float] = field(default_factory=dict)
+
+    def acting(
+        self, forces: Wrenches, operations: OperationNames, base: Floats, corner: Floats | None = None
+    ) -> Wrenches:
+        """Forces (N) with these factors; base (N, 3, 3): axes of the programmed base; corner (N,) 0..1."""
+        if not forces.any:
+            return forces
+        count = len(forces)
+        rows = np.arange(count)
+        scale = np.array([self.factor.get(name, self.common) for name in operations.names])[operations.which]
+        if corner is not None and self.corner:
+            scale = scale * np.exp(self.corner * corner)
+        turns = np.array([self.turn.get(name, (0.0, 0.0)) for name in operations.names])[operations.which]
+        ends = []
+        for side in (forces.values[rows], forces.start[rows]):
+            moved = side * scale[:, None]
+            first, second = axes_across(side[:, :3], base)
+            rotation = rotation_from_vector(turns[:, :1] * first + turns[:, 1:] * second)
+            moved[:, :3] = turned(rotation, moved[:, :3])
+            ends.append(moved)
+        known = np.array([self.ci95.get(name, np.nan) for name in operations.names])[operations.which]
+        if forces.ci95 is not None:
+            known = np.where(np.isnan(known), forces.ci95, known)
+        return replace(forces, values=ends[0], start=ends[1], ci95=None if np.isnan(known).all() else known)
+
+
+def force_factors(result: Attribution) -> ForceFactors:
+    """The factors of an attribution; of an operation that was not measured, what all have in common."""
+    common, corner = 0.0, 0.0
+    own: dict[str, float] = {}
+    turns: dict[str, list[float]] = {}
+    for cause, value in zip(result.causes, result.x.tolist(), strict=True):
+        if cause.kind is CauseKind.FORCE and cause.name == "force":
+            common = value
+        elif cause.kind is CauseKind.FORCE and cause.group == "force":
+            own[cause.place] = value
+        elif cause.name == "corner_force":
+            corner = value
+        elif cause.kind is CauseKind.TURN_1:
+            turns.setdefault(cause.place, [0.0, 0.0])[0] = value
+        elif cause.kind is CauseKind.TURN_2:
+            turns.setdefault(cause.place, [0.0, 0.0])[1] = value
+    factor = {name: float(np.exp(common + value)) for name, value in own.items()}
+    return ForceFactors(factor, {k: (v[0], v[1]) for k, v in turns.items()}, float(np.exp(common)), corner)
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedError(KnownError):
+    """What was learnt of a part beside robot and forces.
+
+    spindle (N, 3): unit vectors, tip-ward, in tool axes; tool (N,): its number; length: number of a tool -> [m]
+    by which it is longer; radius: (operation -> side of the feed, -1 or 1) and tool
+    -> [m]; base (6,): shift [m] and turn [rad] about ``centre`` (3,) in the axes (3, 3) of the base; drift (3,) [m]
+    over the whole program, with ``time`` (N,) 0..1."""
+
+    result: Attribution
+    path: DesiredPath
+    spindle: Floats
+    tool: Ints
+    operations: OperationNames
+    side: Mapping[str, int]
+    length: Mapping[int, float] = field(default_factory=dict)
+    radius: Mapping[int, float] = field(default_factory=dict)
+    base: Floats = field(default_factory=lambda: np.zeros(6))
+    centre: Floats = field(default_factory=lambda: np.zeros(3))
+    axes: Floats = field(default_factory=lambda: np.eye(3))
+    drift: Floats = field(default_factory=lambda: np.zeros(3))
+    time: Floats = field(default_factory=lambda: np.zeros(0))
+
+    def at(self, rows: Ints, wanted: Poses, share: Floats | None = None) -> Floats:
+        """(K, 3) [m] of motions ``rows`` (K,) at ``wanted`` (K) poses, at ``share`` (K,) of their paths."""
+        along = np.ones(len(rows)) if share is None else share
+        moved = self.result.field_at(wanted.position)
+        axis = turned(wanted.rotation, self.spindle[rows])
+        tool = self.tool[rows]
+        for number, size in self.length.items():
+            moved += np.where(tool == number, size, 0.0)[:, None] * axis
+        if self.radius and self.side:
+            moved += self._radial(rows, along, axis, tool)
+        if self.base.any():
+            place = (wanted.position - self.centre) @ self.axes
+            moved += (self.base[:3] + np.cross(self.base[3:], place)) @ self.axes.T
+        if self.drift.any():
+            before = self.time[np.maximum(rows - 1, 0)]
+            moved += (before + along * (self.time[rows] - before))[:, None] * self.drift
+        return np.nan_to_num(moved)
+
+    def _radial(self, rows: Ints, along: Floats, axis: Floats, tool: Ints) -> Floats:
+        """(K, 3) [m] a larger radius lies deeper in the material, on its side of the feed."""
+        side = np.array([self.side.get(name, 0) for name in self.operations.names])[
+            self.operations.which[rows]
+        ]
+        size = np.zeros(len(rows))
+        for number, radius in self.radius.items():
+            size += np.where(tool == number, radius, 0.0)
+        across = np.cross(axis, self.path.tangent(rows, along))
+        long = np.linalg.norm(across, axis=1, keepdims=True)
+        return np.asarray((side * size)[:, None] * np.where(long > 0.1, across / np.maximum(long, 0.1), 0.0))
+
+
+def learned_error(
+    result: Attribution,
+    path: DesiredPath,
+    spindle: Floats,
+    tool: Ints,
+    operations: OperationNames,
+    rigid: tuple[Floats, Floats],
+    time: Floats,
+) -> LearnedError:
+    """The known error of an attribution; spindle (N, 3) in tool axes; tool (N,): numbers; rigid: centre (3,) [m] and
+    axes (3, 3) of the base; time (N,) 0..1."""
+    length: dict[int, float] = {}
+    radius: dict[int, float] = {}
+    base, drift = np.zeros(6), np.zeros(3)
+    for cause, value in zip(result.causes, result.x.tolist(), strict=True):
+        if cause.kind is not CauseKind.SHIFT:
+            continue
+        if cause.group == "tool":
+            (radius if cause.parameter == "radius" else length)[int(cause.place.split()[-1])] = value
+        elif cause.group == "base":
+            base["xyzuvw".index(cause.parameter)] = value
+        elif cause.place == "drift":
+            drift["xyz".index(cause.parameter)] = value
+    return LearnedError(
+        result,
+        path,
+        spindle,
+        tool,
+        operations,
+        _sides(result, path, operations),
+        length,
+        radius,
+        base,
+        *rigid,
+        drift,
+        time,
+    )
+
+
+def _sides(result: Attribution, path: DesiredPath, operations: OperationNames) -> dict[str, int]:
+    """Operation -> side of the feed, seen along the spindle, on which its measured walls lie, where that is one."""
+    points = result.prediction.points
+    tangent = path.tangent(points.row, points.share)
+    across = np.cross(points.spindle, tangent)
+    # the material is where the outward normal comes from
+    towards = -np.sum(across * points.normal, axis=1)
+    wall = np.abs(towards) > 0.5
+    sides = {}
+    for index, name in enumerate(operations.names):
+        own = wall & (operations.which[points.row] == index)
+        if own.any():
+            sign = np.sign(towards[own])
+            mean = float(sign.mean())
+            if abs(mean) >= 2 * _SIDE - 1:
+                sides[name] = 1 if mean > 0 else -1
+    return sides
+
+
+@dataclass(frozen=True, eq=False)
+class FeedTurns:
+    """Where the feed turns.  station (V,) [m] along the program of each vertex; ``turned`` (V,) [rad]: the sum of all
+    turns up to it; end (N,) [m]: station of the end of each motion; length (N,) [m]."""
+
+    station: Floats
+    turned: Floats
+    end: Floats
+    length: Floats
+
+    @staticmethod
+    def of(path: DesiredPath, toolpath: Toolpath) -> FeedTurns:
+        """Of a program: vertices, and arcs by their whole angle at their middle."""
+        count = len(toolpath)
+        rows = np.arange(count)
+        first, last = path.tangent(rows, np.zeros(count)), path.tangent(rows, np.ones(count))
+        known = (np.abs(first).sum(axis=1) > 0) & (np.abs(last).sum(axis=1) > 0)
+        linked = known & np.append(False, known[:-1]) & toolpath.continues
+        cosine = np.clip(np.sum(first * np.roll(last, 1, axis=0), axis=1), -1.0, 1.0)
+        turn = np.where(linked, np.arccos(cosine), 0.0)
+        end = np.cumsum(np.maximum(path.length, 1e-6 * MM))
+        start = np.append(0.0, end[:-1])
+        sweep = np.minimum(np.abs(np.nan_to_num(path.sweep)), np.pi)
+        station = np.stack([start, 0.5 * (start + end)], axis=1).ravel()
+        return FeedTurns(station, np.cumsum(np.stack([turn, sweep], axis=1).ravel()), end, path.length)
+
+    def at(self, rows: Ints, share: Floats, radius: Floats) -> Floats:
+        """(K,) 0..1 how far the feed turns (1: 90 deg) within the radius (K,) [m] of the cutter of the places at the
+        shares (K,) of motions ``rows`` (K,)."""
+        place = self.end[rows] - (1.0 - share) * self.length[rows]
+        turned = np.append(0.0, self.turned)
+        low = turned[np.searchsorted(self.station, place - radius, side="left")]
+        high = turned[np.searchsorted(self.station, place + radius, side="right")]
+        return np.asarray(np.clip((high - low) / (0.5 * np.pi), 0.0, 1.0))
+
+    def of_motions(self, radius: Floats) -> Floats:
+        """(N,) 0..1 of motions as a whole: those that lie inside of a corner, of cutters of this radius (N,) [m]."""
+        rows = np.arange(len(self.end))
+        short = self.length <= 2 * radius
+        return np.where(short, self.at(rows, np.full(len(rows), 0.5), radius), 0.0)

@@ -1,0 +1,254 @@
+"""``compensate learn``: a measured part to causes, a robot file, force factors and the next program, on paths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from postproc.base.findings import Finding, Refusal
+from postproc.base.input_files import place
+from postproc.base.units import MM
+from postproc.learning.attribution import Attribution, attribute
+from postproc.learning.causes import CausePrediction, PriorKnowledge
+from postproc.learning.measured_part import MeasuredPart, read_measured_part
+from postproc.learning.next_program import force_factors, learned_error
+from postproc.learning.plausible import check_explained, check_sign
+from postproc.learning.promise import Promise, promise
+from postproc.learning.push_test import with_push_test
+from postproc.learning.unobserved import indistinct
+from postproc.measurements import read_measurements
+from postproc.output.atomic_write import write_atomically
+from postproc.process import Wrenches
+from postproc.report.learned import Learned, learned_csv
+from postproc.report.report import exit_code, in_order_of_place, json_bytes
+from postproc.robot.description import robot_of
+from postproc.workflows.learn_points import CutProgram, Matched, match, read_job
+from postproc.workflows.learn_robot import force_factor_lines, learned_robot_file
+from postproc.workflows.preparation import LearnedInputs, Request, Stage, silent
+from postproc.workflows.program import compensate
+
+SHOWN = 5
+
+
+@dataclass(frozen=True)
+class LearnRequest:
+    """What the user asked for.  ``main``: the program, its cell, force and how it is written; ``measured``: files of
+    parts that it cut; ``known_force``: half width of the 95 % interval of all forces as a share, as a gauge showed
+    it; ``push``: readings of a push test."""
+
+    main: Request
+    measured: tuple[Path, ...]
+    known_force: float | None = None
+    push: Path | None = None
+    output: Path | None = None
+    csv: Path | None = None
+    json: Path | None = None
+    strict: bool = False
+    dry_run: bool = False
+
+
+def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
+    """Causes, values and the next program.  Raises Refusal, and has then written nothing."""
+    main = request.main
+    stage("reading")
+    parts = [read_measured_part(path) for path in request.measured]
+    _check_parts(parts)
+    job = read_job(main)
+    known = known_before(request, job)
+    stage("matching points to motions")
+    matched = match(main, job, parts, known)
+    prediction = CausePrediction(matched.points, job.ready.model, matched.causes)
+    if request.push is not None:
+        joints = [(joint.name, joint.kind != "revolute") for joint in job.ready.robot.joints]
+        prediction = with_push_test(prediction, read_measurements(request.push, joints))
+    file = str(parts[0].file)
+    wrong = check_sign(prediction, matched.deviation, matched.layout, file)
+    if wrong:
+        raise Refusal(*wrong)
+    stage("attributing")
+    try:
+        result = attribute(prediction, matched.deviation, matched.layout, matched.around)
+    except np.linalg.LinAlgError as error:
+        message = f"the deviations determine no causes: {error}"
+        raise Refusal(Finding("LRN004", message, file, help="check DEV and the base of the points")) from None
+    wrong = check_explained(result, file)
+    if wrong:
+        raise Refusal(*wrong)
+    promised = promise(result, main.gain)
+    findings = [*(f for part in parts for f in part.findings), *job.findings, *matched.findings]
+    findings += _findings(parts, matched, result, promised)
+    learned = Learned(
+        program=str(main.program),
+        robot=job.ready.robot.name,
+        data=tuple((part.file.name, part.digest) for part in parts),
+        measured=matched.measured,
+        attribution=result,
+        feature=matched.feature,
+        line=matched.line,
+        file=matched.file,
+        operation=tuple(job.operations.names[i] for i in matched.operation.tolist()),
+        program_line=job.ready.task.toolpath.line[matched.points.row],
+        in_base=(matched.points.point - job.ready.task.base[matched.points.row[:1]].position) @ matched.axes,
+        promise=promised,
+        gain=main.gain,
+        findings=in_order_of_place(findings),
+        exit=exit_code(findings, request.strict),
+    )
+    return _published(request, job, matched, parts, learned, stage)
+
+
+def _check_parts(parts: Sequence[MeasuredPart]) -> None:
+    """A part that is named twice would count twice.  Raises Refusal LRN001."""
+    seen: dict[str, MeasuredPart] = {}
+    for part in parts:
+        other = seen.setdefault(part.digest, part)
+        if other is not part:
+            message = f"{part.file.name} has the same content as {other.file.name}"
+            raise Refusal(Finding("LRN001", message, str(part.file), help="name each part once"))
+
+
+def known_before(request: LearnRequest, job: CutProgram) -> PriorKnowledge:
+    """What the command, the cell or the process states of the forces."""
+    cell = job.ready.cell
+    own = cell.force_ci95 if request.known_force is None else request.known_force
+    if own is None and job.ready.wrenches.ci95 is not None:
+        stated = job.ready.wrenches.ci95[job.ready.wrenches.carries]
+        own = None if np.isnan(stated).any() or not len(stated) else float(stated.max())
+    vector = cell.force_vector
+    return PriorKnowledge(own, 0.0 if vector is None else vector.direction)
+
+
+def _findings(
+    parts: Sequence[MeasuredPart], matched: Matched, result: Attribution, promised: Promise
+) -> list[Finding]:
+    findings = []
+    file = str(parts[0].file)
+    out = np.flatnonzero(~result.kept)
+    for number in out[:SHOWN].tolist():
+        message = f"the deviation {matched.deviation[number] / MM:+.3f} mm is an outlier, and is excluded"
+        findings.append(
+            Finding("LRN006", message, str(parts[matched.file[number]].file), int(matched.line[number]))
+        )
+    if len(out) > SHOWN:
+        findings.append(
+            Finding("LRN006", f"{len(out) - SHOWN} more points are outliers, and are excluded", file)
+        )
+    if any(not part.cut_with for part in parts):
+        message = (
+            "a part was cut by the uncompensated program: its forces are those of the engagement that it had"
+        )
+        findings.append(Finding("LRN014", message, file))
+    for one in result.named:
+        findings.append(
+            Finding("LRN012", f"{one.name} is named: exp({one.gain:.1f}) times likelier than without", file)
+        )
+    if (
+        result.verdict in ("ambiguous", "partly_named")
+        and len(result.rivals) > 1
+        and result.rivals[0].gain > 4.6
+    ):
+        names = " and ".join(one.name for one in result.rivals[:2])
+        findings.append(Finding("LRN013", f"{names} explain the rest about as well", file))
+    if result.verdict in ("unknown", "partly_named") and result.surface.size > 0:
+        size = float(np.sqrt(np.mean(result.by_field**2)))
+        message = f"a smooth error of {size / MM:.3f} mm RMS has no name; it is corrected at this place only"
+        findings.append(Finding("LRN010", message, file))
+    words = indistinct(result)
+    if words:
+        findings.append(Finding("LRN008", words, file))
+    if not promised.better:
+        message = (
+            f"the next part would have {promised.after / MM:.3f} mm RMS where this one has"
+            f" {promised.before / MM:.3f} mm: the next program is not written"
+        )
+        findings.append(Finding("LRN009", message, file))
+    return findings
+
+
+def _learned_inputs(
+    request: LearnRequest, job: CutProgram, matched: Matched, result: Attribution
+) -> LearnedInputs:
+    """What the main job is given beside the robot file."""
+    task, factors = job.ready.task, force_factors(result)
+    base = task.base[np.arange(len(task.toolpath))].rotation
+
+    def forces(stated: Wrenches) -> Wrenches:
+        return factors.acting(stated, job.operations, base, job.corners.of_motions(job.radius))
+
+    error = learned_error(
+        result,
+        task.desired_path,
+        job.spindle,
+        job.tool,
+        job.operations,
+        (matched.centre, matched.axes),
+        job.time,
+    )
+    return LearnedInputs(forces, error)
+
+
+def _published(
+    request: LearnRequest,
+    job: CutProgram,
+    matched: Matched,
+    parts: Sequence[MeasuredPart],
+    learned: Learned,
+    stage: Stage,
+) -> Learned:
+    """Writes the next program by the main job, then what was learnt."""
+    if learned.exit == 1:
+        return learned
+    main, result = request.main, learned.attribution
+    folder = request.output or main.program.parent / "learned"
+    robot = job.ready.robot
+    stem = robot.path.stem.removesuffix("_learned")
+    robot_path = folder / f"{stem}_learned.yaml"
+    gap = {"before_rms_mm": learned.promise.before / MM, "after_rms_mm": learned.residual_rms / MM}
+    content = learned_robot_file(result, robot, parts, gap, robot_path)
+    factors = force_factor_lines(result, parts, job.ready.cell)
+    files: dict[Path, bytes] = {}
+    if content is not None:
+        files[robot_path] = content
+    if factors:
+        files[folder / f"{main.program.stem}.force_factors.yaml"] = factors
+    own = folder / f"{main.program.stem}.learned.json"
+    extra = [path for path in (request.csv, request.json) if path is not None]
+    _spare(request, job, [*files, own, *extra])
+    inputs = _learned_inputs(request, job, matched, result)
+    if content is not None:
+        inputs = replace(inputs, robot=robot_of(content, robot_path))
+    if learned.promise.better:
+        stage("compensating the next program")
+        report = compensate(
+            replace(
+                main, output=folder / main.program.name, learned=inputs, dry_run=request.dry_run, json=None
+            ),
+            stage,
+        )
+        findings = in_order_of_place([*learned.findings, *report.findings])
+        learned = replace(
+            learned, next_program=report, findings=findings, exit=exit_code(findings, request.strict)
+        )
+    if request.dry_run:
+        return learned
+    outputs = () if learned.next_program is None else learned.next_program.outputs
+    learned = replace(learned, outputs=(*outputs, *map(str, [*files, own, *extra])))
+    files[own] = json_bytes(learned)
+    if request.csv is not None:
+        files[request.csv] = learned_csv(learned)
+    if request.json is not None:
+        files[request.json] = json_bytes(learned)
+    job.ready.inputs.refuse_changed()
+    write_atomically(files, last=own)
+    return learned
+
+
+def _spare(request: LearnRequest, job: CutProgram, outputs: Sequence[Path]) -> None:
+    """Raises Refusal FIL007 for an output that is an input, or that is named twice."""
+    push = [] if request.push is None else [request.push]
+    job.ready.inputs.refuse_outputs(outputs, [*request.measured, *push])
+    if len({place(path) for path in outputs}) < len(outputs):
+        raise Refusal(Finding("FIL007", "two results have the same name", str(outputs[0])))

@@ -1,0 +1,40 @@
+"""What is reported of a program as it was read: of its text, and of stated configurations."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from postproc.base.findings import Finding, Topic
+from postproc.languages.dialect import Program
+from postproc.robot.axis_track import AxisTrack, status_matches
+from postproc.toolpath import Kind, Toolpath
+
+
+def reader_findings(program: Program, path: Toolpath) -> list[Finding]:
+    """The findings of the reader, but for the external axes: what they carry, the cell has stated by now; and the
+    motions at which one of them is not known."""
+    findings = [finding for finding in program.findings if finding.topic is not Topic.EXTERNAL_AXES]
+    lost = [finding for finding in path.constraints.refused.values() if finding.code == "EXT004"]
+    if lost:
+        more = f" ({len(lost)} motions)" if len(lost) > 1 else ""
+        findings.append(replace(lost[0], message=lost[0].message + more))
+    return findings
+
+
+def configuration_findings(program: Path, path: Toolpath, track: AxisTrack) -> list[Finding]:
+    """Where the stated configuration of a motion and the axes that bring the robot there disagree (KIN007)."""
+    # A path motion keeps the branch that the robot is in, whatever its target states.
+    elsewhere = ~status_matches(path, track) & path.known & np.isin(path.kind, (Kind.LIN, Kind.CIRC))
+    findings = []
+    for mask, message in (
+        (~track.turn_matches, "the stated T (Turn) is not that of this pose"),
+        (elsewhere, "the stated configuration (S, cfx) is not the one in which the robot reaches this pose"),
+    ):
+        rows = np.flatnonzero(mask)
+        if len(rows):
+            more = f" ({len(rows)} motions, to line {path.line[rows[-1]]})" if len(rows) > 1 else ""
+            findings.append(Finding("KIN007", message + more, str(program), int(path.line[rows[0]])))
+    return findings

@@ -1,0 +1,181 @@
+"""A part cut by the plant: the errors at points of its surface, and what a probe measures of them."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from plant import Plant
+
+from postproc.base.geometry import Poses
+from postproc.effects import Conditions
+from postproc.learning.measured_part import FREEDOMS, MeasuredPart
+from postproc.learning.touched_points import touched_points
+from postproc.part.contact import find_contacts
+from postproc.workflows.learn_commands import commands_at
+from postproc.workflows.learn_points import CutProgram, cutting_program, read_job
+from postproc.workflows.preparation import Request
+
+from .shop import RADIUS
+from .truth import SCATTER, Truth
+
+CORNER = 8.0
+"""[mm] from a corner of the path within which the cutter is in it."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A shop's program and K points of its surface, in mm in the base, with their motions."""
+
+    folder: Path
+    program: CutProgram
+    point: np.ndarray
+    normal: np.ndarray
+    feature: list[str]
+    row: np.ndarray
+    share: np.ndarray
+
+    @property
+    def request(self) -> Request:
+        return Request(self.folder / "part.src", force="")
+
+
+def surface_of(folder: Path, point: np.ndarray, normal: np.ndarray, feature: list[str]) -> Surface:
+    """Points that one motion of the program cuts."""
+    job = read_job(Request(folder / "part.src", force=""))
+    base = job.ready.task.base[job.motions.rows[:1]]
+    place = base.position + 1e-3 * point @ base.rotation[0].T
+    contacts = find_contacts(job.motions, place, normal @ base.rotation[0].T)
+    assert contacts.touched.all(), "a point of the benchmark is touched by no tool"
+    return Surface(folder, job, point, normal, feature, contacts.last.row, contacts.last.share)
+
+
+def commands(surface: Surface, program: Path | None) -> Poses | None:
+    """Where the controller is sent at the points by a compensated program."""
+    if program is None:
+        return None
+    raw = program.read_bytes()
+    part = MeasuredPart(
+        surface.folder / "x.csv", "", surface.point, surface.normal, np.zeros(0), np.zeros(0), (), (), np.zeros(0, int),
+        np.zeros(0, int), np.zeros(0), np.zeros(0, int), FREEDOMS, str(program), hashlib.sha256(raw).hexdigest(), False,
+        None, (),
+    )  # fmt: skip
+    other, pairing = cutting_program(surface.request, surface.program, part)
+    assert other is not None
+    assert pairing is not None
+    poses, lost = commands_at(surface.program.ready, other, pairing, surface.row, surface.share)
+    assert not lost.any()
+    return poses
+
+
+def cut(
+    surface: Surface, truth: Truth, plant: Plant, program: Path | None, rng: np.random.Generator
+) -> np.ndarray:
+    """(K,) [m] errors along the normals of a part that ``program`` cut, None the original."""
+    job = surface.program
+    task = job.ready.task
+    base = task.base[job.motions.rows[:1]]
+    rotation = base.rotation[0]
+    point = base.position + 1e-3 * surface.point @ rotation.T
+    normal = surface.normal @ rotation.T
+    states = touched_points(
+        task, job.spindle, (surface.row, surface.share), (point, normal), commands(surface, program)
+    )
+    scatter = {name: 1 + SCATTER * rng.normal() for name in job.operations.names}
+    errors = np.empty(len(point))
+    corner = _corners(surface)
+    sense = np.sign(states.direction)
+    tcp = task.tool[surface.row]
+    for k in range(len(point)):
+        name = job.operations.names[job.operations.which[surface.row[k]]]
+        scale = truth.factor[name] * scatter[name] * (1 + truth.corner * corner[k])
+        force = states.wrench[k].copy() * scale
+        force[:3] = _turned(force[:3], rotation[:, 2], truth.turn[name])
+        came = Conditions(direction=sense[k][None])
+        tool = Poses(tcp.rotation[k], tcp.position[k])
+        loaded = plant.rest(states.q[k], force, tool, came)
+        still = plant.rest(states.q_goal[k], np.zeros(6), tool, Conditions(direction=0 * sense[k][None]))
+        lever = tool.rotation.T @ (states.tool.position[k] - tool.position)
+        shift = loaded.position - still.position + (loaded.rotation - still.rotation) @ lever
+        spindle = states.spindle[k]
+        along = normal[k] @ spindle
+        wave = truth.wobble[:, 0] * np.sin(surface.point[k] @ _WAVES.T + truth.wobble[:, 1])
+        errors[k] = (
+            normal[k] @ (shift + wave) + truth.length * along - truth.radius * np.sqrt(max(1 - along**2, 0.0))
+        )
+    return errors
+
+
+_WAVES = np.array([[1.0, 0.4, 0.0], [-0.3, 1.0, 0.0], [0.7, 0.7, 0.0]]) * 2 * np.pi / 400.0
+"""[1/mm]"""
+
+
+def _corners(surface: Surface) -> np.ndarray:
+    """(K,) 1 where the cutter is in a corner of a pocket when it cuts the point."""
+    path = surface.program.ready.task.desired_path
+    tip = path.at(surface.row, surface.share).position
+    near = np.zeros(len(tip))
+    for row in range(1, len(surface.program.tool)):
+        if surface.program.ready.task.carries[row] and surface.program.ready.task.carries[row - 1]:
+            one, other = path.tangent(np.array([row - 1, row]), np.array([1.0, 0.0]))
+            if one @ other < 0.7:
+                start = path.start[np.array([row])].position[0]
+                near[np.linalg.norm(tip - start, axis=1) < 1e-3 * max(CORNER, RADIUS)] = 1.0
+    return near
+
+
+def _turned(force: np.ndarray, up: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """A force turned about the vertical (swing) and about the horizontal across it (lift), by Rodrigues."""
+    unit = force / np.linalg.norm(force)
+    across = np.cross(unit, up)
+    across /= np.linalg.norm(across)
+    for axis, one in ((across, angle[0]), (np.cross(unit, across), angle[1])):
+        force = (
+            force * np.cos(one)
+            + np.cross(axis, force) * np.sin(one)
+            + axis * (axis @ force) * (1 - np.cos(one))
+        )
+    return force
+
+
+def probe(
+    surface: Surface, errors: np.ndarray, chosen: np.ndarray, noise: float, rng: np.random.Generator
+) -> np.ndarray:
+    """(J,) [m] deviations of the points ``chosen`` (J,), measured after a free alignment."""
+    place = 1e-3 * surface.point[chosen]
+    columns = np.concatenate(
+        [surface.normal[chosen], np.cross(place - place.mean(axis=0), surface.normal[chosen])], axis=1
+    )
+    seen = errors[chosen] + rng.normal(0, noise, len(chosen))
+    best = np.linalg.lstsq(columns, seen, rcond=None)[0]
+    return seen - columns @ best
+
+
+def aligned_rms(surface: Surface, errors: np.ndarray) -> float:
+    """[m] of errors (K,) after the best alignment."""
+    place = 1e-3 * surface.point
+    columns = np.concatenate([surface.normal, np.cross(place - place.mean(axis=0), surface.normal)], axis=1)
+    best = np.linalg.lstsq(columns, errors, rcond=None)[0]
+    return float(np.sqrt(np.mean((errors - columns @ best) ** 2)))
+
+
+def write_csv(
+    path: Path, surface: Surface, chosen: np.ndarray, deviation: np.ndarray, program: Path, noise: float
+) -> None:
+    """The file of a measured part."""
+    original = program.name == "part.src" and program.parent == surface.folder
+    name = "original" if original else str(program.relative_to(surface.folder))
+    lines = [
+        "# positive: material_left",
+        "# alignment: free",
+        f"# cut_with: {name}",
+        f"# sha256: {hashlib.sha256(program.read_bytes()).hexdigest()}",
+        f"# sigma_mm: {1e3 * noise:g}",
+        "X,Y,Z,NX,NY,NZ,DEV,FEATURE",
+    ]
+    for k, value in zip(chosen.tolist(), deviation.tolist(), strict=True):
+        numbers = [*surface.point[k], *surface.normal[k], 1e3 * value]
+        lines.append(",".join([*(f"{one:.5f}" for one in numbers), surface.feature[k]]))
+    path.write_text("\n".join(lines) + "\n")

@@ -1,0 +1,257 @@
+"""The rows of the benchmark, and one draw of each."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from postproc.learning.causes import CausePrediction, PriorKnowledge, force_causes, robot_causes, tool_causes
+from postproc.learning.touched_points import touched_points
+
+from .cutting import Surface, aligned_rms, cut, probe, surface_of, write_csv
+from .mirrors import interpolated, smoothed
+from .shop import AWAY, surface_points, write_shop
+from .truth import HIDDEN, draw_truth
+
+POINTS = 140
+"""Points of the surface at which parts are compared; the measured ones are some of them, or more are drawn."""
+
+NOISE = 1e-5
+OPTIONS: dict[str, dict[str, Any]] = {
+    "same20": {"count": 20},
+    "same50": {"count": 50},
+    "same100": {"count": 100},
+    "planned30": {"count": 30, "planned": True},
+    "same30": {"count": 30},
+    "same300": {"count": 300},
+    "noise03": {"count": 100, "noise": 3e-5},
+    "noise06": {"count": 100, "noise": 6e-5},
+    "outliers": {"count": 100, "outliers": 0.03},
+    "smooth": {"count": 100, "smooth": 3e-5},
+    "place": {"count": 100, "place": True},
+    "third": {"count": 100, "parts": 3},
+    **{name: {"count": 120, "hidden": (name,)} for name in HIDDEN},
+    "two": {"count": 120, "hidden": 2},
+    "sign": {"count": 100, "wrong": "sign"},
+    "swapped": {"count": 100, "wrong": "swapped"},
+    "program": {"count": 100, "wrong": "program"},
+    "radius": {"count": 100, "wrong": "radius"},
+}
+
+
+class Learner:
+    """The other process."""
+
+    def __init__(self) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "tests.blind_parts.worker"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def ask(self, folder: Path, measured: Sequence[str], output: str, **options: Any) -> dict[str, Any]:
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        task = {"folder": str(folder), "measured": list(measured), "output": output, "options": options}
+        self.process.stdin.write(json.dumps(task) + "\n")
+        self.process.stdin.flush()
+        line = self.process.stdout.readline()
+        if not line:
+            raise RuntimeError("the process that learns has ended")
+        return json.loads(line)
+
+    def close(self) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.close()
+        self.process.wait(30)
+
+
+def prepare_shops(folder: Path) -> tuple[Path, Path]:
+    """Two shops with the same part at two places, each with its program compensated by the shipped robot file."""
+    from postproc.workflows.preparation import Request
+    from postproc.workflows.program import compensate
+
+    places = []
+    for name, base in (("home", None), ("away", AWAY)):
+        program = write_shop(folder / name, **({} if base is None else {"base": base}))
+        compensate(Request(program, force=""))
+        places.append(program.parent)
+    return places[0], places[1]
+
+
+def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dict[str, Any]:
+    """One part of one truth, what is learnt of it, and the part after it."""
+    options = OPTIONS[row]
+    rng = np.random.default_rng([seed, 4711])
+    noise, count = options.get("noise", NOISE), options["count"]
+    total = max(POINTS, count)
+    point, normal, feature = surface_points(total, rng)
+    home = surface_of(shops[0], point, normal, feature)
+    operations = [name for name in home.program.operations.names if name != "tool 1"]
+    hidden = options.get("hidden", ())
+    if hidden == 2:
+        hidden = tuple(rng.choice(HIDDEN, 2, replace=False).tolist())
+    truth = draw_truth(rng, operations, hidden, options.get("smooth", 0.0))
+    plant = truth.plant()
+    shop = home.folder
+    first = shop / "compensated" / "part.src"
+    programs: list[Path] = [shop / "part.src" if options.get("wrong") == "sign" else first]
+    chosen = rng.choice(total, count, replace=False)
+    if options.get("planned"):
+        chosen = _planned(home, count)
+    before = cut(home, truth, plant, None if programs[0].parent == shop else programs[0], rng)
+    answer: dict[str, Any] = {
+        "row": row,
+        "seed": seed,
+        "before": aligned_rms(home, before),
+        "hidden": list(hidden),
+    }
+    deviation = probe(home, before, chosen, noise, rng)
+    if "outliers" in options:
+        bad = rng.choice(count, max(1, round(options["outliers"] * count)), replace=False)
+        deviation[bad] += 0.3e-3 * rng.choice([-1.0, 1.0], len(bad))
+    written = _spoilt(options.get("wrong", ""), deviation, home, chosen, rng)
+    name = f"{row}.csv"
+    write_csv(shop / name, home, chosen, written, programs[0], noise)
+    if options.get("wrong") == "program":
+        text = (shop / name).read_text().splitlines()
+        text[3] = "# sha256: " + "0123456789ab" * 4
+        (shop / name).write_text("\n".join(text) + "\n")
+    out = f"learned_{row}"
+    shutil.rmtree(shop / out, ignore_errors=True)
+    told = learner.ask(shop, [name], out)
+    answer |= told
+    if not told["refused"]:
+        answer["covered"] = _covered(told["causes"], truth)
+    if told["refused"] or "wrong" in options:
+        return answer
+    measured = [name]
+    after, parts = before, []
+    for number in range(2, options.get("parts", 2) + 1):
+        following = shop / out / "part.src" if told["written"] else programs[-1]
+        kept = shop / f"{row}_part{number}.src"
+        shutil.copy(following, kept)
+        after = cut(home, truth, plant, kept, rng)
+        parts.append(aligned_rms(home, after))
+        if number < options.get("parts", 2):
+            name = f"{row}_{number}.csv"
+            write_csv(shop / name, home, chosen, probe(home, after, chosen, noise, rng), kept, noise)
+            measured.append(name)
+            told = learner.ask(shop, measured, out)
+            if told["refused"]:
+                break
+    answer["after"], answer["parts"] = parts[-1], parts
+    again = cut(home, truth, plant, programs[0], rng)
+    answer |= _others(home, again, chosen, deviation, noise, told)
+    if options.get("place"):
+        answer |= _elsewhere(shops, (point, normal, feature), truth, plant, rng, told, out, learner)
+    return answer
+
+
+def _planned(home: Surface, count: int) -> np.ndarray:
+    """(count,) the points that ``compensate learn --plan`` chooses from all."""
+    from postproc.workflows.learn import LearnRequest
+    from postproc.workflows.learn_plan import plan
+
+    offered, measure = home.folder / "points.csv", home.folder / "measure.csv"
+    rows = np.column_stack([home.point, home.normal])
+    text = [",".join(f"{one:.7f}" for one in row) for row in rows]
+    offered.write_text("\n".join(["X,Y,Z,NX,NY,NZ", *text]) + "\n")
+    plan(LearnRequest(home.request, (offered,), csv=measure), count)
+    places = np.array([line.split(",")[:3] for line in measure.read_text().splitlines()[6:]], float)
+    return np.argmin(((places[:, None] - home.point[None]) ** 2).sum(axis=2), axis=1)
+
+
+def _covered(causes: dict[str, list[float]], truth: Any) -> list[int]:
+    """Whether the true compliances and dimensions of the tool lie in their intervals; a force of an operation is
+    the sum of two causes, of which no interval is stated."""
+    from .truth import filed_compliances
+
+    true = {
+        f"joint_compliance.c{i}": float(np.log(c / filed))
+        for i, (c, filed) in enumerate(zip(truth.compliance, filed_compliances(), strict=True), 1)
+    }
+    true |= {
+        "gravity_compensator.K_c": float(np.log(truth.spring)),
+        "radius of tool 1": truth.radius,
+        "length of tool 1": truth.length,
+    }
+    found = [(causes[name], value) for name, value in true.items() if name in causes]
+    return [int(abs(mean - value) <= 1.96 * deviation) for (mean, deviation), value in found]
+
+
+def _spoilt(
+    how: str, deviation: np.ndarray, home: Surface, chosen: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
+    if how == "sign":
+        return -deviation
+    if how == "radius":
+        return deviation + 1e-3
+    if how == "swapped":
+        return np.roll(deviation, len(deviation) // 3)
+    return deviation
+
+
+def _others(
+    home: Surface, again: np.ndarray, chosen: np.ndarray, deviation: np.ndarray, noise: float,
+    told: dict[str, Any],
+) -> dict[str, float]:  # fmt: skip
+    """RMS [m] of the next part with the mirror of the deviation and with the causes alone: what they would correct is
+    taken off the errors ``again`` (K,) of another part that the same program cut."""
+    place, normal = home.point[chosen], home.normal[chosen]
+    return {
+        "mirror": aligned_rms(home, again - interpolated(place, normal, deviation, home.point, home.normal)),
+        "mirror_gp": aligned_rms(
+            home, again - smoothed(place, normal, deviation, home.point, home.normal, noise)
+        ),
+        "alone": aligned_rms(home, again - _explained(home, told["alone"])),
+    }
+
+
+def _explained(home: Surface, alone: dict[str, float]) -> np.ndarray:
+    """(K,) [m] what causes explain at all points of the surface."""
+    from .cutting import commands
+
+    job = home.program
+    task = job.ready.task
+    base = task.base[job.motions.rows[:1]]
+    rotation = base.rotation[0]
+    surface = (base.position + 1e-3 * home.point @ rotation.T, home.normal @ rotation.T)
+    sent = commands(home, home.folder / "compensated" / "part.src")
+    states = touched_points(task, job.spindle, (home.row, home.share), surface, sent)
+    causes = robot_causes(job.ready.model)
+    causes += force_causes(job.operations.which[home.row], job.operations.names, PriorKnowledge())
+    causes += tool_causes(states, job.tool[home.row], job.ball, False)
+    x = np.array([alone.get(cause.name, 0.0) for cause in causes])
+    return CausePrediction(states, job.ready.model, tuple(causes)).errors(x)
+
+
+def _elsewhere(
+    shops: tuple[Path, Path], points: Any, truth: Any, plant: Any, rng: np.random.Generator, told: dict[str, Any],
+    out: str, learner: Learner,
+) -> dict[str, float]:  # fmt: skip
+    """RMS [m] at another place: with the shipped robot file, and with what was learnt at home."""
+    from postproc.workflows.preparation import Request
+    from postproc.workflows.program import compensate
+
+    away = surface_of(shops[1], *points)
+    before = aligned_rms(away, cut(away, truth, plant, shops[1] / "compensated" / "part.src", rng))
+    learned = list((shops[0] / out).glob("*_learned.yaml"))
+    factors = (shops[0] / out / "part.force_factors.yaml").read_text()
+    cell = shops[1] / "cell_learned.yaml"
+    cell.write_text((shops[1] / "cell.yaml").read_text() + factors)
+    request = Request(
+        shops[1] / "part.src", force="", cell=cell, robot=str(learned[0]) if learned else None,
+        output=shops[1] / "transferred" / "part.src",
+    )  # fmt: skip
+    compensate(request)
+    after = aligned_rms(away, cut(away, truth, plant, shops[1] / "transferred" / "part.src", rng))
+    return {"place_before": before, "place_after": after}
