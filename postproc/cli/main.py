@@ -19,6 +19,7 @@ from postproc.cli.engage import engage
 from postproc.cli.identify import identify
 from postproc.cli.map import map_
 from postproc.cli.plan import plan
+from postproc.cli.posts import posts
 from postproc.cli.predict import predict
 from postproc.cli.program import program
 from postproc.cli.robots import robots
@@ -42,6 +43,7 @@ COMMANDS = {
     "batch": batch,
     "watch": watch,
     "robots": robots,
+    "posts": posts,
     "schema": schema,
     "completion": completion,
 }
@@ -68,6 +70,7 @@ def main() -> None:
       compensate diagnose loads.csv                   the effects that the robot file misses
       compensate batch parts --force                  many programs in parallel
       compensate watch outbox --force                 every program that arrives in a folder
+      compensate posts freecad -o DIR                 post and compensate in one step, from a CAM system
     """
 
 
