@@ -42,7 +42,9 @@ FOLDER = Path(__file__).parent / "html"
 FINDINGS = 300
 """A page shows so many findings at most; all are in the JSON."""
 
-SCRIPTS = ("figures.js", "space.js", "hands.js", "chart.js", "program.js")
+SCRIPTS = ("figures.js", "space.js", "hands.js", "chart.js", "listing.js", "program.js", "tables.js")
+TABLES = ("tables.js",)
+"""Scripts of a page of a program, and of every other."""
 STYLE = "page.css"
 
 _SEVERITY = {"info": ("i", "note"), "warning": ("!", "warning"), "error": ("x", "error")}
@@ -53,8 +55,9 @@ def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
     report = data.report
     return rendered(
         "program.html.j2",
-        script=_script(SCRIPTS),
+        scripts=SCRIPTS,
         title=Path(report.program).name,
+        program=report.program,
         what="compensation" if data.corrected else "prediction",
         verdict=program_verdict(data),
         badge=badge(report.exit, report.corrected if data.corrected else None),
@@ -62,6 +65,8 @@ def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
         uncorrected=reasons(data),
         facts=program_facts(report),
         places=_places(data),
+        listing=data.listing,
+        listed={row.number for row in data.listing},
         inserted=report.inserted,
         transition_moves=[(move.line, f"{move.length_mm:.3f}") for move in report.transition_moves],
         findings=finding_rows(report.findings),
@@ -80,21 +85,22 @@ def program_page(data: PageData, links: Mapping[str, str]) -> bytes:
     )
 
 
-def rendered(template: str, script: Markup | None = None, **what: Any) -> bytes:
+def rendered(template: str, scripts: tuple[str, ...] = TABLES, **what: Any) -> bytes:
     """The bytes of a page, of ``template`` with the style sheet of all pages.
 
-    what: for the base of all pages title, what, verdict, badge, findings (``finding_rows``), more_findings, links
+    scripts: files of ``html/``.  what: for the base of all pages
+    title, what, verdict, badge, findings (``finding_rows``), more_findings, links
     (``linked``), and goes: whether a finding's line can be shown in a figure; for the template what else it names.
     """
+    script = _script(scripts)
     style = Markup((FOLDER / STYLE).read_text(encoding="utf-8"))
-    sources = f"'sha256-{_digest(script)}'" if script else "'none'"
     policy = (
-        f"default-src 'none'; script-src {sources}; style-src 'sha256-{_digest(style)}'; img-src data:;"
-        " base-uri 'none'; form-action 'none'"
+        f"default-src 'none'; script-src 'sha256-{_digest(script)}'; style-src 'sha256-{_digest(style)}';"
+        " img-src data:; base-uri 'none'; form-action 'none'"
     )
     page = _templates().get_template(template)
     always = {"style": style, "script": script, "policy": policy, "version": __version__}
-    text = page.render({"goes": False, **what, **always})
+    text = page.render({"goes": False, "listed": (), "program": None, **what, **always})
     return text.encode("utf-8", "replace")
 
 
@@ -122,6 +128,7 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, object]]:
                 "title": code.title,
                 "place": finding.place,
                 "line": finding.line,
+                "file": finding.file,
                 "message": finding.message,
                 "help": finding.advice,
             }

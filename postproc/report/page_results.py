@@ -24,6 +24,7 @@ from postproc.report.mapped import _rows as map_rows
 from postproc.report.page import FINDINGS, finding_rows, linked, rendered
 from postproc.report.page_words import badge
 from postproc.report.picture import picture
+from postproc.report.picture_colours import follow_colours
 
 
 @dataclass(frozen=True)
@@ -162,7 +163,9 @@ def result_page(
         facts=list(facts),
         tables=[one for one in map(shown, tables) if one.rows],
         notes=list(notes),
-        drawing=Markup("data:image/svg+xml;base64," + base64.b64encode(drawing).decode("ascii"))
+        drawing=Markup(
+            "data:image/svg+xml;base64," + base64.b64encode(follow_colours(drawing)).decode("ascii")
+        )
         if drawing
         else "",
         seen=seen,
