@@ -132,7 +132,7 @@ def test_a_stated_force_needs_nothing_of_the_operations(posted):
         ("no_material", ["the force of Pocket is not known without: --material"]),
         ("no_speed", ["spindle speed of its tool controller"]),
         ("no_command", ["'/nowhere/compensate' does not start", "--compensate"]),
-        ("no_robot", ["exit code 1", "no_such_robot"]),
+        ("no_robot", ["exit code of the command is 1", "no_such_robot"]),
         ("misspelt", ["linuxcnc_post does not take", "--metarial"]),
     ],
 )

@@ -109,7 +109,9 @@ def export(objectslist: list[Any], filename: str, argstring: str) -> str:
 
 def _post(objectslist: list[Any], posted: Path, others: list[str]) -> str:
     if "--no-comments" in others:
-        raise ValueError("--no-comments takes the names of the operations away: leave it out")
+        raise ValueError(
+            "--no-comments is not possible: comments state which lines belong to which operation"
+        )
     posted.parent.mkdir(parents=True, exist_ok=True)
     posted.unlink(missing_ok=True)
     words = " ".join(shlex.quote(word) for word in [*others, "--no-show-editor"])
@@ -136,7 +138,7 @@ def _compensate(posted: Path, target: Path, force: str, options: Any) -> str:
         raise ValueError(f"{words[0]!r} does not start ({error}): state its path by --compensate") from error
     printed = (done.stdout + done.stderr).decode("utf-8", "replace")
     if done.returncode not in (0, 3) or not target.exists():
-        raise ValueError(f"the command ends with exit code {done.returncode}:\n{printed}")
+        raise ValueError(f"the exit code of the command is {done.returncode}:\n{printed}")
     console = FreeCAD.Console
     (console.PrintWarning if done.returncode else console.PrintMessage)(printed)
     return target.read_bytes().decode("utf-8", "replace")
