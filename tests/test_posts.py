@@ -50,6 +50,13 @@ def test_no_folder_is_made_for_a_post(compensate, tmp_path):
     assert not (tmp_path / "macros").exists()
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="no folder that takes no file")
+def test_a_folder_that_takes_no_file_is_told(compensate):
+    done = compensate("posts", "freecad", "-o", "/proc")
+    assert done.code == 1
+    assert "nothing is written" in done.err
+
+
 # FreeCAD.
 
 

@@ -8,6 +8,7 @@ has removed the file that it waited for, which a library that locks open handles
 from __future__ import annotations
 
 import contextlib
+import os
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -33,6 +34,8 @@ def lock_file(path: Path, waits: Callable[[], None] = lambda: None) -> Iterator[
         try:
             lock.acquire(blocking=False)
         except Timeout:
+            # the library waits for a folder that takes no file (/proc) as for another holder: this raises OSError then
+            os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o644))
             waits()
             lock.acquire()
     try:

@@ -10,7 +10,7 @@ from postproc.posts import POSTS
 
 
 @click.command()
-@click.argument("system", type=click.Choice(tuple(POSTS)), required=False)
+@click.argument("system", type=click.Choice(tuple(POSTS), case_sensitive=False), required=False)
 @click.option(
     "-o",
     "--output",
