@@ -37,6 +37,14 @@ class Window:
         wait = "n => new Promise(done => { const f = () => (n-- ? requestAnimationFrame(f) : done()); f(); })"
         self.page.evaluate(wait, count)
 
+    def violations(self):
+        """What axe-core finds of the page as it is, in words; the page must be open without its policy."""
+        axe = pytest.importorskip("axe_playwright_python", reason="axe-playwright-python is not installed")
+        self.page.evaluate((Path(axe.__file__).parent / "axe.min.js").read_text(encoding="utf-8"))
+        found = self.page.evaluate("axe.run()")
+        assert len(found["passes"]) > 20
+        return [f"{one['id']}: {one['help']}: {one['nodes'][0]['html'][:200]}" for one in found["violations"]]
+
     def pixels(self, selector):
         """(H, W, 3) of an element, as it is seen."""
         import io

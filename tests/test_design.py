@@ -38,6 +38,7 @@ ROOMS = {
     "languages": 2,
     "measurements": 1,
     "toolpath": 1,
+    "posts": 0,
     "base": 0,
     "__init__": 0,
 }

@@ -39,9 +39,10 @@ def begun_anew(folder, files) -> None:
 
 
 def tidy(job) -> None:
-    """Nothing is left half-written; old files that a signal kept from being taken away are gone after the next run."""
+    """Nothing is left half-written; old files and a lock that a signal kept from being taken away are gone after the
+    next run."""
     left = stray(job.folder)
-    assert all(name.endswith(".tmp.old") for name in left), left
+    assert all(name.endswith((".tmp.old", ".lock")) for name in left), left
     if left:
         assert Child([job.program, NEW, "-q"], job.folder).end() in (0, 3)
         assert stray(job.folder) == []

@@ -57,6 +57,17 @@ def test_programs_are_compensated_and_moved(compensate, hot):
     assert (hot / "compensated" / "one.report.html").exists()
 
 
+def test_a_forgotten_force_ends_the_watch_and_the_programs_stay(compensate, hot):
+    for name in ("one", "two"):
+        (hot / f"{name}.src").write_bytes(named(name))
+    done = compensate("watch", hot, "--settle", "0", "--once")
+    assert done.code == 1
+    assert "FRC030" in done.err
+    assert {path.name for path in hot.iterdir() if path.is_file()} == {"cell.yaml", "one.src", "two.src"}
+    assert not (hot / "failed").exists()
+    assert compensate(*words(hot)).code == 0
+
+
 def test_the_same_name_again_keeps_the_earlier_one(compensate, hot):
     for _ in range(2):
         (hot / "one.src").write_bytes(named("one"))

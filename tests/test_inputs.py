@@ -265,6 +265,9 @@ def test_a_run_inside_of_another_has_its_own_inputs(tmp_path):
 READERS = {"read_bytes", "read_text", "open"}
 ELSEWHERE = (
     "batching/",
+    "posts/",
+    "cli/posts.py",
+    "base/locks.py",
     "output/atomic_write.py",
     "base/read_files.py",
     "cli/streams.py",
@@ -274,7 +277,7 @@ ELSEWHERE = (
     "robot/write_robot_file.py",
 )
 """What is read there is no input: standard streams, sources of the package, records, locks, heads of files that a batch
-looks at, parts of a page, results."""
+looks at, parts of a page, results, files of other systems."""
 
 
 @pytest.mark.slow

@@ -608,3 +608,25 @@ def test_a_folder_that_can_not_be_written(compensate, tmp_path):
 
 def test_map_is_a_command():
     assert "map" in COMMANDS
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (
+            ["--x", "0.8:2.2", "--y=-1:1", "--z", "0.5", "--tool", "0,0,300"],
+            ["--x, --y and --z", "2.2 m is 2200 mm"],
+        ),
+        (
+            ["--x", "800:2200", "--y=-100:100", "--z", "500", "--tool", "0,0,0.3"],
+            ["--tool", "0.3 m is 300 mm"],
+        ),
+        (["--x", "800:2200", "--y=-100:100", "--z", "0.5"], []),
+    ],
+)
+def test_lengths_in_metres_are_told(compensate, options, words):
+    done = compensate("map", "--robot", "kuka_kr270", *options, "--force=0,0,-500", "--grid", 3, "-v")
+    assert ("MAP008" in done.out + done.err) == bool(words)
+    assert done.code == (3 if words else 0)
+    for word in words:
+        assert word in done.out

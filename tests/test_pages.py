@@ -28,6 +28,7 @@ from postproc.compensation.correct import MotionOutcome, correct
 from postproc.compensation.subdivision import Subdivision
 from postproc.report.page import FOLDER, embedded, finding_rows, linked, program_page
 from postproc.report.page_data import WorstPlace, page_data, source_texts
+from postproc.report.page_listing import AROUND, WHOLE, lines_to_list
 from postproc.report.page_rows import SHOWN, rows_to_draw, worst_rows
 from postproc.report.page_words import badge, program_verdict, reasons
 from postproc.report.report import Spread
@@ -324,12 +325,27 @@ def test_the_lines_before_and_after_are_those_of_the_files(tmp_path):
     report, page = written(tmp_path)
     before = (tmp_path / "part.src").read_text().splitlines()
     after = (tmp_path / "compensated" / "part.src").read_text().splitlines()
-    old = [_plain(text) for text in re.findall(r'<code class="old">(.*?)</code>', page)]
-    new = [_plain(text) for text in re.findall(r'<code class="new">(.*?)</code>', page)]
+    places, listing = page.split('id="listing"')
+    old = [_plain(text) for text in re.findall(r'<code class="old">(.*?)</code>', places)]
+    new = [_plain(text) for text in re.findall(r'<code class="new">(.*?)</code>', places)]
     assert len(old) == len(new) == 5
     for one, other in zip(old, new, strict=True):
         assert after[before.index(one) + 1] == other  # one line more: the mark
     assert report.corrected == 5
+    # the program in the page: without what is new it is that before, without what is old that after
+    shown = re.findall(r'<code class="(old|new|same)">(.*?)</code>', listing)
+    assert [_plain(text) for kind, text in shown if kind != "new"] == before
+    assert [_plain(text) for kind, text in shown if kind != "old"] == after
+    assert sum(kind == "old" for kind, _ in shown) > 5  # and the air moves around them
+    assert re.findall(r'<li id="L(\d+)">', listing) == [str(k + 1) for k in range(len(before))]
+
+
+def test_of_a_long_program_the_lines_are_listed_that_are_spoken_of():
+    assert lines_to_list(WHOLE, []) == list(range(1, WHOLE + 1))
+    few = lines_to_list(WHOLE + 1, [5, 2000, 2010])
+    assert few == [*range(1, 5 + AROUND + 1), *range(2000 - AROUND, 2010 + AROUND + 1)]
+    assert len(lines_to_list(10**6, range(1, 10**6, 100))) <= WHOLE
+    assert lines_to_list(10**6, [10**6])[-1] == 10**6
 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r\n"])

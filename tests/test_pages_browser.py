@@ -184,7 +184,7 @@ def test_without_a_mouse(window, done, rows):
     page.fill("#line", str(order[2]))
     page.keyboard.press("Tab")
     assert line() == order[2]
-    button = page.locator("table.places button").first
+    button = page.locator("table.places tbody button").first
     button.focus()
     page.keyboard.press("Enter")
     assert line() == int(button.inner_text())

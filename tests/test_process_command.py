@@ -68,6 +68,36 @@ def test_a_process_as_the_value_of_the_option(compensate, milling):
     assert "FRC015" in [f["code"] for f in report["findings"]]
 
 
+LITERAL = "$TOOL={FRAME: X 120.0,Y 0.0,Z 250.0,A 0.0,B 30.0,C 0.0}"
+
+
+@pytest.mark.parametrize(
+    ("edit", "joined"),
+    [
+        (lambda cell: cell, True),
+        (lambda cell: cell.replace("  1: {x: 120", "  4: {x: 120"), False),
+        (
+            lambda cell: cell.replace(
+                "bases:", "  3: {x: 120, y: 0, z: 250, a: 0, b: 30, c: 0, axis: +z}\nbases:"
+            ),
+            False,
+        ),
+    ],
+    ids=["same pose", "another number", "two of that pose"],
+)
+def test_a_literal_tool_is_the_cells_tool_of_its_pose(compensate, milling, edit, joined):
+    """Its cutting process belongs to it, where it is the only one of that pose."""
+    milling.program.write_text(milling.program.read_text().replace("$TOOL=TOOL_DATA[1]", LITERAL))
+    (milling.folder / "milling.yaml").write_text(PROCESS.replace("name: POCKET", "tool: 1"))
+    milling.cell(edit(CELL))
+    done = compensate("predict", milling.program, "--force", milling.folder / "milling.yaml", "--json", "-")
+    if joined:
+        assert done.json["cutting"] == 6
+    else:
+        assert done.code == 1
+        assert "FRC011" in done.err
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

@@ -13,11 +13,12 @@ from pathlib import Path
 import jsonschema
 import pytest
 from click.testing import CliRunner
+from valid_results import complete_result, faults_of
 
 import postproc
 from postproc.cli.main import main, normalized
 from postproc.cli.schema import FILES, RESULTS
-from postproc.report.result_keys import FORMER_KEYS, SCHEMA_VERSION, complete_result
+from postproc.report.result_keys import FORMER_KEYS, SCHEMA_VERSION
 from postproc.schemas import RESULT_SCHEMAS, SCHEMAS, schema_of
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -300,6 +301,14 @@ def test_every_key_says_what_it_is_and_every_number_its_unit(name):
             ending = re.search("(?<!_per)_(mm|deg|kg)$", path)
             if ending and not one.get("deprecated"):
                 assert one["unit"] in (ending[1], "as in name"), path
+
+
+def test_a_result_that_its_schema_does_not_take_is_told(compensate, job):
+    """Every test holds what it makes against the schemas (``valid_results``)."""
+    result = compensate(job.program, "--force", "--json", "-").json
+    assert faults_of(result) == []
+    assert faults_of({key: value for key, value in result.items() if key != "motions"})
+    assert faults_of({**result, "motions": "many"})
 
 
 def test_names_of_schemas():

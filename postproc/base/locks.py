@@ -8,6 +8,7 @@ has removed the file that it waited for, which a library that locks open handles
 from __future__ import annotations
 
 import contextlib
+import os
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -28,24 +29,27 @@ def lock_file(path: Path, waits: Callable[[], None] = lambda: None) -> Iterator[
     symbolic link of this name is not followed.  Raises OSError where the folder takes no file.
     """
     lock = FileLock(path, poll_interval=POLL)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # that it locks by the file's existence is not the user's concern
-        try:
-            lock.acquire(blocking=False)
-        except Timeout:
-            waits()
-            lock.acquire()
     try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # that it locks by the file's existence is not the user's concern
+            try:
+                lock.acquire(blocking=False)
+            except Timeout:
+                # a folder that takes no file (/proc) looks to the library like another holder: this raises OSError
+                os.close(os.open(path, os.O_RDWR | os.O_CREAT, 0o644))
+                waits()
+                lock.acquire()
         yield
     finally:
-        # Elsewhere than on Windows while it is held: a lock on a file without a name keeps nobody out, and whoever gets
-        # one sees that and takes another.
-        if not WINDOWS:
-            _remove(path)
-        with contextlib.suppress(OSError):  # what was done under it is done
-            lock.release()
-        if WINDOWS:
-            _remove(path)
+        if lock.is_locked:  # a signal may have come before
+            # Elsewhere than on Windows while it is held: a lock on a file without a name keeps nobody out, and whoever
+            # gets one sees that and takes another.
+            if not WINDOWS:
+                _remove(path)
+            with contextlib.suppress(OSError):  # what was done under it is done
+                lock.release()
+            if WINDOWS:
+                _remove(path)
 
 
 def _remove(path: Path) -> None:

@@ -32,6 +32,8 @@ ARCHIVE, REFUSED = "done", "failed"
 COMPANIONS = (".dat", ".force.csv")
 TRANSIENT = frozenset(["FIL001", "FIL010", "BAT008"])
 """Findings of a program that is still being written, or of a system that is short of something: it is tried again."""
+MISTAKES = frozenset(["FRC030"])
+"""Findings of the command line, not of a program: the watch ends with them, and the programs stay."""
 
 Listen = Callable[[Outcome], None]
 """Gets every outcome, after its program was moved."""
@@ -75,7 +77,8 @@ class HotFolder:
         return bool(self._programs())
 
     def step(self, listen: Listen = lambda outcome: None, now: float | None = None) -> int:
-        """Compensates and moves every program that is whole; gives how many."""
+        """Compensates and moves every program that is whole; gives how many.  Raises Refusal where no program can be
+        compensated as the options say (FRC030)."""
         ready = list(self._whole(time.monotonic() if now is None else now))
         return sum(self._take(program, listen) for program in ready)
 
@@ -115,6 +118,8 @@ class HotFolder:
         except (Refusal, ValueError):
             return 0  # it is gone
         outcome = run_item(BatchItem(job, code_digest()))
+        if outcome.state == FAILED and (mistakes := [f for f in outcome.findings if f.code in MISTAKES]):
+            raise Refusal(*mistakes)  # every program would fail by it, and be moved away
         if outcome.state == FAILED and any(finding.code in TRANSIENT for finding in outcome.findings):
             if before is not None:
                 self._waits[program] = before  # until it changes

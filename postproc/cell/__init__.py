@@ -2,7 +2,7 @@
 
 from postproc.cell import codes as codes
 from postproc.cell.description import MODES, Cell, Controller, ForceVectorInterval, Tool
-from postproc.cell.motion_frames import MotionFrames, frames_of
+from postproc.cell.motion_frames import MotionFrames, frames_of, number_literal_tools
 from postproc.cell.read_cell import AXES, KEYS, NAME, find_cell, load_cell
 
 __all__ = [
@@ -18,4 +18,5 @@ __all__ = [
     "find_cell",
     "frames_of",
     "load_cell",
+    "number_literal_tools",
 ]

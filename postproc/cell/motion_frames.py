@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +65,20 @@ def frames_of(
         _rows(np.array([*axes, np.full(3, np.nan)]), toolpath.tool),
         external,
     )
+
+
+def number_literal_tools(cell: Cell, toolpath: Toolpath) -> Toolpath:
+    """The toolpath with the number of the cell's tool for each ``$TOOL = {...}`` that has the pose of exactly one: its
+    mass, cutter and cutting process belong to it.  The pose stays that of the program."""
+    used = set(np.unique(toolpath.tool).tolist()) - {-1}
+    frames = list(toolpath.frames)
+    for index in used:
+        frame = frames[index]
+        if frame.number is None and frame.pose is not None:
+            numbers = [number for number, tool in cell.tools.items() if _same(tool.pose, frame.pose)]
+            if len(numbers) == 1:
+                frames[index] = replace(frame, number=numbers[0])
+    return toolpath if frames == list(toolpath.frames) else replace(toolpath, frames=tuple(frames))
 
 
 def _pose(frame: FrameRef, numbered: dict[int, Poses]) -> Poses:

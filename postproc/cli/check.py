@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Out, language_options, result_options
+from postproc.cli.common import Out, language_options, page_option, result_options
 
 
 @click.command()
@@ -15,6 +15,7 @@ from postproc.cli.common import Out, language_options, result_options
 @click.option("--list-codes", is_flag=True, help="List the codes of all findings.")
 @click.option("--explain", metavar="CODE", help="Explain the code of a finding.")
 @language_options
+@page_option
 @result_options
 def check(
     program: Path | None,
@@ -23,6 +24,7 @@ def check(
     dump: bool,
     list_codes: bool,
     explain: str | None,
+    page: Path | None,
     json_to: str | None,
     quiet: bool,
     verbose: bool,
@@ -59,8 +61,8 @@ def check(
     from postproc.workflows.listing import check as run
 
     out = Out(json_to, quiet, verbose)
-    with out.refusals(str(program), writes=False):
-        done = run(program, cell, config_dat)
+    with out.refusals(str(program), writes=page is not None):
+        done = run(program, cell, config_dat, page)
         out.result(done.as_json())
     if dump and json_to != "-":
         click.echo("\n".join(done.toolpath.dump()))
@@ -69,4 +71,6 @@ def check(
         show_findings(console, done.findings)
         for line in done.summary():
             console.print(line, markup=False)
+        if page is not None:
+            click.echo(f"wrote {page}")
     raise SystemExit(done.exit)

@@ -21,6 +21,7 @@ from postproc.cli.learn import learn
 from postproc.cli.map import map_
 from postproc.cli.place import place
 from postproc.cli.plan import plan
+from postproc.cli.posts import posts
 from postproc.cli.predict import predict
 from postproc.cli.program import program
 from postproc.cli.robots import robots
@@ -46,6 +47,7 @@ COMMANDS = {
     "batch": batch,
     "watch": watch,
     "robots": robots,
+    "posts": posts,
     "schema": schema,
     "completion": completion,
 }
@@ -74,6 +76,7 @@ def main() -> None:
       compensate learn panel.src part1.csv            from a measured part to a better next program
       compensate batch parts --force                  many programs in parallel
       compensate watch outbox --force                 every program that arrives in a folder
+      compensate posts freecad -o DIR                 post and compensate in one step, from a CAM system
     """
 
 

@@ -7,7 +7,18 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import FAR, ROBOT, Numbers, Out, ending, number, numbers, result_options, tool_place
+from postproc.cli.common import (
+    FAR,
+    ROBOT,
+    Numbers,
+    Out,
+    ending,
+    number,
+    numbers,
+    page_option,
+    result_options,
+    tool_place,
+)
 from postproc.cli.decimal_option import Decimal
 from postproc.cli.identify import _words
 
@@ -229,6 +240,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     show_default=True,
     help="Seed of the random poses.",
 )
+@page_option
 @result_options
 def plan(
     robot: str,
@@ -255,6 +267,7 @@ def plan(
     measured: tuple[Path, ...],
     discriminate: tuple[str, str] | None,
     seed: int,
+    page: Path | None,
     json_to: str | None,
     quiet: bool,
     verbose: bool,
@@ -319,6 +332,7 @@ def plan(
         discriminate=discriminate,
         seed=seed,
         json=out.json_file,
+        page=page,
     )
     with out.refusals(), out.stages() as stage:
         done = run(request, stage)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import ROBOT, Out, language_options, result_options, tare_option
+from postproc.cli.common import ROBOT, Out, language_options, page_option, result_options, tare_option
 from postproc.cli.decimal_option import Decimal
 
 
@@ -28,6 +28,7 @@ from postproc.cli.decimal_option import Decimal
     help="Distance of the first samples along the path; samples are doubled until the errors no longer change.",
 )
 @click.option("--strict", is_flag=True, help="Treat warnings as errors.")
+@page_option
 @result_options
 def verify(
     original: Path,
@@ -39,6 +40,7 @@ def verify(
     config_dat: Path | None,
     step: float,
     strict: bool,
+    page: Path | None,
     json_to: str | None,
     quiet: bool,
     verbose: bool,
@@ -74,8 +76,10 @@ def verify(
         config_dat=config_dat,
     )
     with out.refusals(str(original)), out.stages() as stage:
-        done = run(request, compensated, step * MM, stage)
+        done = run(request, compensated, step * MM, stage, page)
     out.result(done.as_json(), written=True)
     if not out.quiet:
         show(out.console(), done, verbose)
+        if page is not None:
+            click.echo(f"wrote {page}")
     raise SystemExit(done.exit)

@@ -238,7 +238,9 @@ def _offers(operation: Operation, toolpath: Toolpath) -> str:
     if operation.tool:
         used = {toolpath.frames[index].number for index in np.unique(toolpath.tool) if index >= 0}
         numbers = ", ".join(str(number) for number in sorted(n for n in used if n))
-        return f"the program uses the tools {numbers}" if numbers else "no tool of the program has a number"
+        if numbers:
+            return f"the program uses the tools {numbers}"
+        return "no tool of the program has a number, and its $TOOL has the pose of no tool of the cell"
     return "write the lines of motions in the program, from 1"
 
 

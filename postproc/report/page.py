@@ -44,7 +44,9 @@ FOLDER = Path(__file__).parent / "html"
 FINDINGS = 300
 """A page shows so many findings at most; all are in the JSON."""
 
-SCRIPTS = ("figures.js", "space.js", "hands.js", "chart.js", "program.js")
+SCRIPTS = ("figures.js", "space.js", "hands.js", "chart.js", "listing.js", "program.js", "tables.js")
+TABLES = ("tables.js",)
+"""Scripts of a page of a program, and of every other."""
 STYLE = "page.css"
 
 _SEVERITY = {"info": ("i", "note"), "warning": ("!", "warning"), "error": ("x", "error")}
@@ -58,9 +60,10 @@ def program_page(data: PageData, links: Mapping[str, str], part: PartError | Non
         shown = {**part_section(part, report.uncertainty), "data": embedded(part_data(part))}
     return rendered(
         "program.html.j2",
-        script=_script(SCRIPTS if part is None else (*SCRIPTS, "part.js")),
+        scripts=SCRIPTS if part is None else (*SCRIPTS, "part.js"),
         part=shown,
         title=Path(report.program).name,
+        program=report.program,
         what="compensation" if data.corrected else "prediction",
         verdict=program_verdict(data),
         badge=badge(report.exit, report.corrected if data.corrected else None),
@@ -68,6 +71,8 @@ def program_page(data: PageData, links: Mapping[str, str], part: PartError | Non
         uncorrected=reasons(data),
         facts=program_facts(report),
         places=_places(data),
+        listing=data.listing,
+        listed={row.number for row in data.listing},
         inserted=report.inserted,
         transition_moves=[(move.line, f"{move.length_mm:.3f}") for move in report.transition_moves],
         findings=finding_rows(report.findings),
@@ -86,21 +91,22 @@ def program_page(data: PageData, links: Mapping[str, str], part: PartError | Non
     )
 
 
-def rendered(template: str, script: Markup | None = None, **what: Any) -> bytes:
+def rendered(template: str, scripts: tuple[str, ...] = TABLES, **what: Any) -> bytes:
     """The bytes of a page, of ``template`` with the style sheet of all pages.
 
-    what: for the base of all pages title, what, verdict, badge, findings (``finding_rows``), more_findings, links
+    scripts: files of ``html/``.  what: for the base of all pages
+    title, what, verdict, badge, findings (``finding_rows``), more_findings, links
     (``linked``), and goes: whether a finding's line can be shown in a figure; for the template what else it names.
     """
+    script = _script(scripts)
     style = Markup((FOLDER / STYLE).read_text(encoding="utf-8"))
-    sources = f"'sha256-{_digest(script)}'" if script else "'none'"
     policy = (
-        f"default-src 'none'; script-src {sources}; style-src 'sha256-{_digest(style)}'; img-src data:;"
-        " base-uri 'none'; form-action 'none'"
+        f"default-src 'none'; script-src 'sha256-{_digest(script)}'; style-src 'sha256-{_digest(style)}';"
+        " img-src data:; base-uri 'none'; form-action 'none'"
     )
     page = _templates().get_template(template)
     always = {"style": style, "script": script, "policy": policy, "version": __version__}
-    text = page.render({"goes": False, **what, **always})
+    text = page.render({"goes": False, "listed": (), "program": None, **what, **always})
     return text.encode("utf-8", "replace")
 
 
@@ -128,6 +134,7 @@ def finding_rows(findings: Sequence[Finding]) -> list[dict[str, object]]:
                 "title": code.title,
                 "place": finding.place,
                 "line": finding.line,
+                "file": finding.file,
                 "message": finding.message,
                 "help": finding.advice,
             }

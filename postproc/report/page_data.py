@@ -17,6 +17,7 @@ from postproc.base.units import MM
 from postproc.compensation.correct import CorrectionResult, MotionOutcome
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import Subdivision
+from postproc.report.page_listing import ListedLine, lines_of_findings, lines_to_list
 from postproc.report.page_rows import SHOWN, rows_to_draw, worst_rows
 from postproc.report.report import Report
 
@@ -91,6 +92,7 @@ class PageData:
     widths: Floats
     evaluated: int
     places: tuple[WorstPlace, ...]
+    listing: tuple[ListedLine, ...] = ()
 
 
 def page_data(
@@ -117,7 +119,8 @@ def page_data(
     quantities = [(1, before), (-1, before), (1, after), (-1, after), (1, between), (1, size)]
     rows = rows_to_draw(n, [row for row, _ in worst], turns, quantities, limit)
     lines = [int(path.line[row]) for row, _ in worst]
-    texts = source_texts(documents[0], lines, () if output is None else output.edits)
+    edits = () if output is None else output.edits
+    texts = source_texts(documents[0], lines, edits)
     arcs, arc_points = _arc_points(task, rows)
     return PageData(
         report=report,
@@ -143,6 +146,7 @@ def page_data(
         inserted=first[rows + 1] - first[rows] - 1,
         widths=np.where(scope[rows, None], _widths(report, rows), np.nan),
         evaluated=len(report.uncertainty.expanded),
+        listing=_listing(documents[0], [*lines, *lines_of_findings(report.findings, task.file)], edits),
         places=tuple(
             WorstPlace(int(np.searchsorted(rows, row)), why, source, () if output is None else written)
             for (row, why), (source, written) in zip(worst, texts, strict=True)
@@ -173,6 +177,17 @@ def _arc_points(task: CompensationProblem, rows: Ints) -> tuple[Ints, Floats]:
         return task.desired_path.at(np.repeat(arcs, each), np.tile(shares, len(arcs))).position / MM
 
     return places, _by_blocks(points, rows[places], each).reshape(len(places), each, 3)
+
+
+def _listing(document: Document, spoken_of: Sequence[int], edits: Iterable[Edit]) -> tuple[ListedLine, ...]:
+    total = len(document.line_starts) - document.raw.endswith(b"\n")
+    numbers = lines_to_list(total, spoken_of)
+    texts = source_texts(document, numbers, edits)
+    before = [0, *numbers]
+    return tuple(
+        ListedLine(number, source, written, number != last + 1)
+        for number, last, (source, written) in zip(numbers, before, texts, strict=False)
+    )
 
 
 def source_texts(

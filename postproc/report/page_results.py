@@ -1,4 +1,4 @@
-"""Pages of an identification, a diagnosis and a map: the text of the terminal, and the picture."""
+"""Pages of results that are tables: the text of the terminal, and the picture where there is one."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from postproc.report.mapped import _rows as map_rows
 from postproc.report.page import FINDINGS, finding_rows, linked, rendered
 from postproc.report.page_words import badge
 from postproc.report.picture import picture
+from postproc.report.picture_colours import follow_colours
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ def shown(table: Table) -> PageTable:
 
 def identified_page(result: Identified, links: Mapping[str, str]) -> bytes:
     """The page of an identification."""
-    return _page(
+    return result_page(
         "identification",
         result.robot,
         verdict(result),
@@ -81,7 +82,7 @@ def diagnosed_page(result: Diagnosed, links: Mapping[str, str]) -> bytes:
         terminal._residuals,
         terminal._next_poses,
     )
-    return _page(
+    return result_page(
         "diagnosis",
         result.robot,
         headline(result),
@@ -117,7 +118,7 @@ def mapped_page(mapped: Mapped, links: Mapping[str, str]) -> bytes:
             f" least at {_place(mapped, extremes[0].row)}, most at {_place(mapped, extremes[1].row)} mm."
         )
     )
-    return _page(
+    return result_page(
         "map",
         mapped.robot,
         verdict,
@@ -134,7 +135,7 @@ def mapped_page(mapped: Mapped, links: Mapping[str, str]) -> bytes:
     )
 
 
-def _page(
+def result_page(
     what: str,
     title: str,
     verdict: str,
@@ -149,6 +150,8 @@ def _page(
     digests: Mapping[str, str],
     links: Mapping[str, str],
 ) -> bytes:
+    """A page: what it is of, its title and verdict in words, facts, tables, notes, a picture with what is ``seen`` on
+    it, findings, and digests of its inputs."""
     return rendered(
         "result.html.j2",
         goes=False,
@@ -160,7 +163,9 @@ def _page(
         facts=list(facts),
         tables=[one for one in map(shown, tables) if one.rows],
         notes=list(notes),
-        drawing=Markup("data:image/svg+xml;base64," + base64.b64encode(drawing).decode("ascii"))
+        drawing=Markup(
+            "data:image/svg+xml;base64," + base64.b64encode(follow_colours(drawing)).decode("ascii")
+        )
         if drawing
         else "",
         seen=seen,

@@ -23,6 +23,7 @@ from postproc.base.arrays import Floats
 from postproc.base.sanitize import sanitize
 from postproc.base.units import MM
 from postproc.report.mapped import Mapped, MappedQuantity, slices_shown
+from postproc.report.picture_colours import ON_DATA
 
 DPI = 100
 COLOURS = {"deflection_mm": "viridis", "compensator_difference_mm": "cividis"}
@@ -174,7 +175,9 @@ def _contours(axes: Axes, across: Floats, up: Floats, values: Floats) -> None:
     lines = axes.contour(
         across, up, np.ma.masked_invalid(values), levels=levels, colors=colours, linewidths=0.7
     )
-    axes.clabel(lines, fmt="%g", fontsize=7.5, inline_spacing=3)
+    lines.set_gid(f"{ON_DATA}-contours")
+    for number, label in enumerate(axes.clabel(lines, fmt="%g", fontsize=7.5, inline_spacing=3)):
+        label.set_gid(f"{ON_DATA}-level-{number}")
 
 
 def _mark(axes: Axes, mapped: Mapped, quantity: MappedQuantity, ranged: list[int]) -> None:
@@ -191,6 +194,7 @@ def _mark(axes: Axes, mapped: Mapped, quantity: MappedQuantity, ranged: list[int
             markeredgecolor="black",
             clip_on=False,
             zorder=5,
+            gid=f"{ON_DATA}-{marker}",
         )
 
 

@@ -156,18 +156,19 @@ def show_plan(console: Console, planned: Planned, verbose: bool = False) -> None
     head = Table(box=None, show_header=False, pad_edge=False)
     head.add_column(style="bold")
     head.add_column()
-    for key, value in _rows(planned):
+    for key, value in plan_facts(planned):
         head.add_row(key, Text(value))
     console.print(head)
-    console.print(_intervals(planned))
+    console.print(interval_table(planned))
     if planned.rivals is not None:
-        console.print(_separations(planned))
+        console.print(separation_table(planned))
     show_findings(console, planned.findings, verbose)
     for path in planned.outputs:
         console.print(Text(f"wrote {path}"), soft_wrap=True)
 
 
-def _rows(planned: Planned) -> Iterator[tuple[str, str]]:
+def plan_facts(planned: Planned) -> Iterator[tuple[str, str]]:
+    """What was asked for, and of what was chosen."""
     offer = planned.setups_offered
     yield "robot", f"{planned.robot}, effects: {', '.join(planned.effects)}"
     yield "plan", f"{planned.poses} poses, {planned.loads_in_words}: {planned.readings} readings"
@@ -193,7 +194,7 @@ def _rows(planned: Planned) -> Iterator[tuple[str, str]]:
     )
 
 
-def _intervals(planned: Planned) -> Table:
+def interval_table(planned: Planned) -> Table:
     """One row a parameter: the predicted half widths by number of poses."""
     table = Table(
         title="predicted 95 % intervals", title_justify="left", title_style="bold", box=None, pad_edge=False
@@ -227,7 +228,8 @@ def _intervals(planned: Planned) -> Table:
     return table
 
 
-def _separations(planned: Planned) -> Table:
+def separation_table(planned: Planned) -> Table:
+    """How far the two effects are apart, by number of poses."""
     assert planned.rivals is not None
     title = "expected separation, standard deviations"
     table = Table(title=title, title_justify="left", title_style="bold", box=None, pad_edge=False)

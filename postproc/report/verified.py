@@ -140,6 +140,17 @@ def show(console: Console, done: Verified, verbose: bool = False) -> None:
         f" {done.tolerance_angle / DEG:g} deg",
         soft_wrap=True,
     )
+    console.print(distance_table(done))
+    for note in sampling_notes(done.compensated):
+        console.print(note, soft_wrap=True)
+    if done.compensated.worst:
+        console.print("worst places of the compensated program")
+        console.print(worst_table(done.compensated))
+    show_findings(console, done.findings, verbose)
+
+
+def distance_table(done: Verified) -> Table:
+    """Both programs: distance of the tool from the path, orientation, stops."""
     table = Table(box=None, pad_edge=False)
     heads = (
         "distance from the path, mm",
@@ -170,28 +181,31 @@ def show(console: Console, done: Verified, verbose: bool = False) -> None:
             "-" if math.isnan(comparison.turn) else f"{comparison.turn / DEG:.4f}",
             *(str(count) for count in (comparison.stops, comparison.backwards, comparison.samples)),
         )
-    console.print(table)
-    console.print(_describe_sampling(done.compensated), soft_wrap=True)
-    comparison = done.compensated
+    return table
+
+
+def worst_table(comparison: PathComparison) -> Table:
+    """The places with the largest errors of one program."""
+    places = Table(box=None, pad_edge=False)
+    for head in ("line", "mm", "axis", "force N"):
+        places.add_column(head, justify="right")
+    for place in comparison.worst:
+        places.add_row(str(place.line), f"{place.error_mm:.4f}", place.axis, f"{place.force_n:.0f}")
+    return places
+
+
+def sampling_notes(comparison: PathComparison) -> list[str]:
+    """How well the figures of a program are known, and what they leave out."""
+    notes = [_describe_sampling(comparison)]
     if comparison.approaches:
-        console.print(
-            f"{comparison.approaches} lead-ins and lead-outs in air, {comparison.approach_length / MM:.1f} mm"
-        )
+        length = comparison.approach_length / MM
+        notes.append(f"{comparison.approaches} lead-ins and lead-outs in air, {length:.1f} mm")
     if comparison.unknown_corners:
-        console.print(
+        notes.append(
             f"{comparison.unknown_corners} points have an unknown approximation distance; both programs are simulated"
-            " through these points",
-            soft_wrap=True,
+            " through these points"
         )
-    if done.compensated.worst:
-        console.print("worst places of the compensated program")
-        places = Table(box=None, pad_edge=False)
-        for head in ("line", "mm", "axis", "force N"):
-            places.add_column(head, justify="right")
-        for place in done.compensated.worst:
-            places.add_row(str(place.line), f"{place.error_mm:.4f}", place.axis, f"{place.force_n:.0f}")
-        console.print(places)
-    show_findings(console, done.findings, verbose)
+    return notes
 
 
 def _describe_sampling(comparison: PathComparison) -> str:

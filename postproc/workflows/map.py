@@ -26,6 +26,9 @@ from postproc.robot.description import find_robot, load_robot
 from postproc.robot.geometries import SerialArm
 from postproc.workflows.preparation import Stage, silent
 
+SMALLEST_RANGE, SMALLEST_TOOL = 20.0, 2.0
+"""[mm] A map or a tool whose largest coordinate is below it was stated in metres."""
+
 
 @dataclass(frozen=True)
 class MapRequest:
@@ -88,6 +91,7 @@ def map_workspace(request: MapRequest, stage: Stage = silent) -> Mapped:
         status=None if free else load.status,
     )
     findings = [
+        *_lengths_in_metres(request),
         *_map_findings(survey, mapped.status, request.picture is not None),
         *model.plausibility_findings(),
     ]
@@ -143,6 +147,22 @@ def _load(request: MapRequest) -> MapLoad:
         linear=request.linear,
         ignore_limits=request.ignore_limits,
     )
+
+
+def _lengths_in_metres(request: MapRequest) -> list[Finding]:
+    """MAP008 for ranges and a tool that nobody maps in mm."""
+    findings = []
+    ranges = [abs(value) for ends in request.ranges_mm for value in ends]
+    tool = [abs(value) for value in request.tool_mm_deg[:3]]
+    for what, values, least in (
+        ("--x, --y and --z", ranges, SMALLEST_RANGE),
+        ("--tool", tool, SMALLEST_TOOL),
+    ):
+        if 0.0 < max(values) < least:
+            largest = max(values)
+            message = f"{what}: the largest coordinate is {largest:g} mm, as if it were in metres"
+            findings.append(Finding("MAP008", message, help=f"{largest:g} m is {1e3 * largest:g} mm"))
+    return findings
 
 
 def _map_findings(survey: WorkspaceMap, status: int | None, drawn: bool) -> list[Finding]:

@@ -263,5 +263,13 @@ CODES = define(
             action="Compare neighbouring cells before you interpret a step.",
             example="A seven-axis arm.",
         ),
+        "MAP008": Code(
+            "warning",
+            "lengths may be in metres",
+            meaning="The ranges, or the tool, are so small as if they were in metres; the options are in mm.",
+            consequence="The map is that of a spot inside the robot's foot, or of a tool without a length.",
+            action="Write lengths in mm: 0.8:2.2 in metres is 800:2200.",
+            example="`--x 0.8:2.2 --y=-1:1 --z 0.5`.",
+        ),
     }
 )

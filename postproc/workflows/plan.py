@@ -36,6 +36,8 @@ from postproc.identification.unknowns import Unknown, asked_for
 from postproc.measurements import Readings, measurements_csv
 from postproc.model import StiffnessModel
 from postproc.output.atomic_write import write_atomically
+from postproc.report.page import beside
+from postproc.report.page_checks import planned_page
 from postproc.report.planned import Planned, discrimination_words
 from postproc.report.report import exit_code, json_bytes
 from postproc.robot.description import Robot, find_robot, load_robot
@@ -96,6 +98,7 @@ class PlanRequest:
     discriminate: tuple[str, str] | None = None
     seed: int = 1
     json: Path | None = None
+    page: Path | None = None
 
 
 def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
@@ -114,16 +117,21 @@ def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
     setups = planned.setups[order]
     readings = _in_sight(offer, planned.model, setups)
     files = {request.output: measurements_csv(readings, _about(request, planned, len(readings)))}
-    pages = [] if request.json is None else [request.json]
+    reports = [path for path in (request.json, request.page) if path is not None]
     planned = replace(
         planned,
         setups=setups,
         readings=len(readings),
         fixed=asked.fixed,
-        outputs=tuple(str(path) for path in (*files, *pages)),
+        outputs=tuple(str(path) for path in (*files, *reports)),
         exit=exit_code(planned.findings),
     )
-    write_atomically({**files, **dict.fromkeys(pages, json_bytes(planned))}, last=request.output)
+    if request.json is not None:
+        files[request.json] = json_bytes(planned)
+    if request.page is not None:
+        links = {"poses to measure (CSV)": request.output, "result (JSON)": request.json}
+        files[request.page] = planned_page(planned, beside(request.page, links))
+    write_atomically(files, last=request.output)
     return planned
 
 
@@ -242,7 +250,7 @@ def _findings(robot: Robot, design: Designs) -> list[Finding]:
 def _spare_inputs(request: PlanRequest) -> None:
     inputs = {place(path) for path in request.measured}
     inputs |= {place(path) for path in (request.program, request.cell) if path is not None}
-    written = [path for path in (request.output, request.json) if path is not None]
+    written = [path for path in (request.output, request.json, request.page) if path is not None]
     for path in written:
         if place(path) in inputs:
             raise Refusal(Finding("FIL007", "the output would replace an input", str(path)))

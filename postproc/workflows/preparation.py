@@ -16,7 +16,7 @@ from postproc.base.geometry import PoseRows, Poses
 from postproc.base.input_files import Inputs, noted
 from postproc.base.read_files import read_text_file
 from postproc.base.units import DEG, MM
-from postproc.cell import Cell, MotionFrames, find_cell, frames_of, load_cell
+from postproc.cell import Cell, MotionFrames, find_cell, frames_of, load_cell, number_literal_tools
 from postproc.compensation.known_error import KnownError
 from postproc.compensation.lost_motion import add_lost_motion
 from postproc.compensation.problem import CompensationProblem
@@ -422,9 +422,9 @@ def _start(cell: Cell, robot: Robot) -> Floats | None:
 
 
 def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpath:
-    """The toolpath with its external axes where they are, and with targets that continue an axis motion filled in from
-    where that one leads."""
-    start = _start(cell, robot)
+    """The toolpath with its external axes where they are, with the numbers of literal tools, and with targets that
+    continue an axis motion filled in from where that one leads."""
+    start, path = _start(cell, robot), number_literal_tools(cell, path)
     path = fill_external_axes(path, cell.external_axes, robot, start, program, cell.path)
     rows = np.flatnonzero(path.partial_targets.inherits_from_row >= 0)
     if not len(rows):

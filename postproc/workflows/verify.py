@@ -12,6 +12,8 @@ from postproc.base.arrays import Floats, Ints
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import DEG, MM
 from postproc.output.atomic_write import write_atomically
+from postproc.report.page import beside
+from postproc.report.page_checks import verified_page
 from postproc.report.report import Spread, exit_code, in_order_of_place, json_bytes
 from postproc.report.verified import PathComparison, Verified, WorstError
 from postproc.verification.differences import Difference, PathManner, in_air, missing, on_cuts
@@ -23,10 +25,17 @@ WORST = 10
 """Places that are listed."""
 
 
-def verify(request: Request, compensated: Path, step: float = STEP, stage: Stage = silent) -> Verified:
+def verify(
+    request: Request,
+    compensated: Path,
+    step: float = STEP,
+    stage: Stage = silent,
+    page: Path | None = None,
+) -> Verified:
     """The path error of ``request.program`` and of ``compensated``, both under the original's forces.
 
-    ``step`` [m]: distance of the first samples.  Raises Refusal, VER001 where the second does not come from the first.
+    ``step`` [m]: distance of the first samples; ``page``: file of the result for a browser.
+    Raises Refusal, VER001 where the second does not come from the first.
     """
     ready = prepare(request)
     stage("reading the compensated program")
@@ -68,11 +77,15 @@ def verify(request: Request, compensated: Path, step: float = STEP, stage: Stage
         ordered,
         exit_code(ordered, request.strict),
     )
+    names = {"original": request.program, "compensated": compensated, "result (JSON)": request.json}
+    files = {} if request.json is None else {request.json: json_bytes(done)}
+    if page is not None:
+        files[page] = verified_page(done, beside(page, names))
     for inputs in (ready.inputs, other.inputs):
-        inputs.refuse_outputs([] if request.json is None else [request.json])
+        inputs.refuse_outputs(list(files))
         inputs.refuse_changed()
-    if request.json is not None:
-        write_atomically({request.json: json_bytes(done)})
+    if files:
+        write_atomically(files)
     return done
 
 

@@ -129,6 +129,11 @@ function readout() {
       const description = words(chosen);
       slider.setAttribute('aria-valuetext', description[0]);
       said.textContent = description.join(' · ');
+      const link = byId('in-program');
+      if (link) {
+        link.href = `#L${motions.line[chosen]}`;
+        link.hidden = !listed(motions.line[chosen]);
+      }
     },
   };
 }

@@ -76,6 +76,7 @@ class Space {
   }
 
   project(wide, high) {
+    this.wide = wide;
     const [right, up, out] = this.axes();
     // as large as the turned box allows
     const spans = [right, up].map((axis) => axis.reduce((sum, a, k) => sum + Math.abs(a) * (this.high[k] - this.low[k]), 0));
@@ -136,7 +137,8 @@ class Space {
     this.sizes(pen);
     this.triad(pen, high);
     this.key(pen, wide, high);
-    this.above.now();
+    if (printing) this.marks(pen); // a printer lays the canvas of the marks over this one
+    else this.above.now();
   }
 
   corner(bits) {
@@ -293,7 +295,7 @@ class Space {
       pen.stroke();
       pen.fillStyle = theme().ink;
       pen.fill();
-      const right = x + 130 > this.canvas.clientWidth;
+      const right = x + 130 > this.wide;
       pen.textAlign = right ? 'right' : 'left';
       halo(pen, `worst, line ${motions.line[worst]}`, x + (right ? -10 : 10), y - 10, theme().ink);
       pen.textAlign = 'left';

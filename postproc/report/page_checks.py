@@ -1,0 +1,125 @@
+"""Pages of a program that was read, of two that were simulated, and of a plan of measurements."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from rich.table import Table
+
+from postproc.base.findings import CODES
+from postproc.base.units import DEG, MM
+from postproc.report import planned as planned_report
+from postproc.report.checked import Checked
+from postproc.report.formatting import count
+from postproc.report.page_results import result_page
+from postproc.report.planned import Planned
+from postproc.report.verified import PathComparison, Verified, distance_table, sampling_notes, worst_table
+
+
+def checked_page(checked: Checked, links: Mapping[str, str]) -> bytes:
+    """The page of a program that was read."""
+    total, refused = len(checked.toolpath), sum(checked.refused.values())
+    kinds, reasons = Table(), Table()
+    for head in ("kind of motion", "motions"):
+        kinds.add_column(head, justify="right" if head == "motions" else "left")
+    for kind, number in checked.kinds.items():
+        kinds.add_row(kind, str(number))
+    for head in ("not corrected because", "code", "motions"):
+        reasons.add_column(head, justify="right" if head == "motions" else "left")
+    for code, number in checked.refused.items():
+        reasons.add_row(CODES[code].title, code, str(number))
+    verdict = f"{count(total, 'motion')}: {total - refused} can be corrected, {refused} not."
+    files = ", ".join(str(document.path) for document in checked.program.documents)
+    return result_page(
+        "check",
+        checked.program.documents[0].path.name,
+        verdict if total else "The program has no motion.",
+        [],
+        checked.exit,
+        [("language", checked.program.dialect), ("files", files)],
+        [kinds, reasons],
+        [],
+        b"",
+        "",
+        checked.findings,
+        {},
+        links,
+    )
+
+
+def verified_page(done: Verified, links: Mapping[str, str]) -> bytes:
+    """The page of two programs that were simulated."""
+    worst = [
+        _worst(one, name) for name, one in (("compensated", done.compensated), ("original", done.original))
+    ]
+    return result_page(
+        "verification",
+        Path(done.compensated_file).name,
+        _verified_words(done),
+        [],
+        done.exit,
+        [
+            ("original", f"{done.original_file}, {count(done.motions, 'motion')}"),
+            ("compensated", f"{done.compensated_file}, {count(done.compensated_motions, 'motion')}"),
+            ("robot", done.robot),
+            ("force", done.force_source),
+            ("tolerance", f"{done.tolerance / MM:g} mm, {done.tolerance_angle / DEG:g} deg"),
+            ("first samples", f"{done.step / MM:g} mm apart"),
+        ],
+        [distance_table(done), *worst],
+        sampling_notes(done.compensated),
+        b"",
+        "",
+        done.findings,
+        {},
+        links,
+    )
+
+
+def planned_page(planned: Planned, links: Mapping[str, str]) -> bytes:
+    """The page of a plan: the intervals that it promises, and the poses in their order."""
+    poses = Table()
+    columns = planned.table()
+    poses.add_column("pose", justify="right")
+    for name in columns:
+        poses.add_column(name.replace("_", " "), justify="right")
+    for number, row in enumerate(zip(*columns.values(), strict=True), start=1):
+        poses.add_row(str(number), *("" if math.isnan(value) else f"{value:.2f}" for value in row))
+    tables = [planned_report.interval_table(planned)]
+    tables += [] if planned.rivals is None else [planned_report.separation_table(planned)]
+    return result_page(
+        "plan",
+        planned.robot,
+        f"{count(planned.poses, 'pose')}, {planned.loads_in_words}: {planned.readings} readings {planned.goal}.",
+        [],
+        planned.exit,
+        planned_report.plan_facts(planned),
+        [*tables, poses],
+        ["Collisions are not checked."],
+        b"",
+        "",
+        planned.findings,
+        {planned.robot: planned.digest},
+        links,
+    )
+
+
+def _verified_words(done: Verified) -> str:
+    if not done.compensated.converged:
+        return "Force and position do not converge everywhere: the errors of the compensated program are not known."
+    before, after = done.original.error.max / MM, done.compensated.error.max / MM
+    if not math.isfinite(after):
+        return "No motion cuts with a force: there is no error to compare."
+    within = after <= done.tolerance / MM
+    return (
+        f"The simulated tool leaves the path by at most {after:.4f} mm, {'within' if within else 'above'} the tolerance"
+        f" of {done.tolerance / MM:g} mm; with the original program by {before:.4f} mm."
+    )
+
+
+def _worst(comparison: PathComparison, name: str) -> Table:
+    table = worst_table(comparison)
+    table.columns[0].header = f"line of the {name} program"
+    return table
