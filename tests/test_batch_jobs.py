@@ -123,7 +123,7 @@ def test_options_and_overrides(shop):
 
 def test_every_option_of_the_main_job_is_there():
     """In a job file, on the command line of a batch, and in the package's function."""
-    own = {"program", "output", "report", "json", "dry_run", "keep_table", "stream"}
+    own = {"program", "output", "report", "json", "dry_run", "keep_table", "stream", "beside", "learned"}
     wanted = {field.name for field in fields(Request)} - own
     assert set(PROGRAM_KEYS) == wanted
     assert wanted <= {parameter.name for parameter in batch.params}

@@ -273,7 +273,7 @@ def test_stated_configurations_that_are_not_the_robots_are_told_once(compensate,
     job.write([line.replace("C 180.000}", "C 180.000,S 6,T 63}") for line in LINES])
     done = compensate(job.program, "--force", "--json", "-")
     told = sorted(f["message"][:12] for f in done.json["findings"] if f["code"] == "KIN007")
-    assert told == ["the stated S", "the stated T"]
+    assert told == ["the stated T", "the stated c"]
 
 
 def test_switching_inside_a_cut_leaves_the_whole_cut(compensate, job):

@@ -151,7 +151,7 @@ MISTAKES = [
             ["part.dat", "--force"], 1, ["name part.src"]),
     Mistake("cell as program", [], ["cell.yaml", "--force"], 1, ["FIL009", "name the program"]),
     Mistake("RAPID module", [put("p.MOD", "%%%\n VERSION:1\n%%%\nMODULE Part\nPROC main()\nENDPROC\nENDMODULE\n")],
-            ["p.MOD", "--force"], 1, ["FIL009", "a RAPID module of ABB", "export KRL or G-code"]),
+            ["p.MOD", "--force"], 1, ["FIL009", "contains no motion (read as rapid)"]),
     Mistake("TP program", [put("p.ls", "/PROG  P\n/MN\n   1:L P[1] 100mm/sec FINE    ;\n/END\n")],
             ["p.ls", "--force"], 1, ["FIL009", "a TP program of Fanuc", "export KRL or G-code"]),
     Mistake("CSV as program", [put("f.csv", "line,fx\n1,2\n")], ["f.csv", "--force"], 1, ["with --force"]),

@@ -17,7 +17,7 @@ import numpy as np
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.learning.candidates import FACTORS, Circumstances, MissingEffect, candidates
 from postproc.learning.causes import Cause, CausePrediction
-from postproc.learning.covariance import Explanation, Layout, Surface, choose_surface
+from postproc.learning.covariance import Explanation, Layout, SmoothField, choose_surface
 
 ROUNDS = 4
 SETTLED = 0.01
@@ -68,7 +68,7 @@ class Attribution:
         return self.prediction.causes
 
     @property
-    def surface(self) -> Surface:
+    def surface(self) -> SmoothField:
         return self.explained.surface
 
     @cached_property
@@ -193,7 +193,7 @@ def choose_surface_without_field(explained: Explanation) -> Explanation:
     """The greatest evidence without a smooth error."""
     from postproc.learning.covariance import WHITES
 
-    every = [explained.with_surface(Surface(0.0, explained.surface.length, float(w))) for w in WHITES]
+    every = [explained.with_surface(SmoothField(0.0, explained.surface.length, float(w))) for w in WHITES]
     return max(every, key=lambda one: one.evidence)
 
 
@@ -203,14 +203,19 @@ def _explained(
     layout: Layout,
     x: Floats,
     kept: Bools,
-    start: Surface | None = None,
+    start: SmoothField | None = None,
 ) -> Explanation:
     """The deviations explained with the prediction linearised at ``x`` (P,), and the surface chosen."""
-    return choose_surface(_linearised(prediction, deviation, layout, x, kept, start or Surface()))
+    return choose_surface(_linearised(prediction, deviation, layout, x, kept, start or SmoothField()))
 
 
 def _linearised(
-    prediction: CausePrediction, deviation: Floats, layout: Layout, x: Floats, kept: Bools, surface: Surface
+    prediction: CausePrediction,
+    deviation: Floats,
+    layout: Layout,
+    x: Floats,
+    kept: Bools,
+    surface: SmoothField,
 ) -> Explanation:
     rows = np.flatnonzero(kept)
     part, own = prediction.part(rows), layout.part(rows)
@@ -236,7 +241,7 @@ def _settle(
 ) -> tuple[Floats, Bools]:
     """The most probable causes (P,), and the points (K,) that are no outliers."""
     scale = prediction.deviations
-    surface = Surface(FIRST_FIELD)
+    surface = SmoothField(FIRST_FIELD)
     for turn in range(ROUNDS):
         explained = _linearised(prediction, deviation, layout, x, kept, surface)
         if turn < 2 and outliers:

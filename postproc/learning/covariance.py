@@ -35,7 +35,7 @@ FIELD_SIZE, WHITE_SIZE = 40e-6, 20e-6
 
 
 @dataclass(frozen=True)
-class Surface:
+class SmoothField:
     """What no cause explains: ``size`` and ``length`` [m] of the smooth field; ``white`` [m] that no two points
     share."""
 
@@ -81,13 +81,13 @@ class Layout:
     def _free(self) -> Floats:
         return self.free @ self.free.T
 
-    def field(self, surface: Surface) -> Floats:
+    def field(self, surface: SmoothField) -> Floats:
         """(K, K) [m2] covariance of the smooth field along the normals."""
         if surface.size == 0.0:
             return np.zeros((len(self.sigma), len(self.sigma)))
         return np.asarray(surface.size**2 * np.exp(-self._square / (2 * surface.length**2)) * self._facing)
 
-    def fields_at(self, surface: Surface, place: Floats) -> Floats:
+    def fields_at(self, surface: SmoothField, place: Floats) -> Floats:
         """(J, K) covariance of the field at places (J, 3) [m] with that at the points, without their normals."""
         square = (
             (place**2).sum(axis=1)[:, None] + (self.place**2).sum(axis=1)[None] - 2 * place @ self.place.T
@@ -99,7 +99,7 @@ class Layout:
         moved = SCATTER * by_force
         return np.where(self.group[:, None] == self.group[None], moved[:, None] * moved[None], 0.0)
 
-    def covariance(self, surface: Surface, by_force: Floats) -> Floats:
+    def covariance(self, surface: SmoothField, by_force: Floats) -> Floats:
         """(K, K) [m2] of everything but the causes; ``by_force`` (K,) [m]: error per share of the force."""
         whole = self.field(surface) + self.scatter(by_force) + self._free
         whole[np.diag_indices_from(whole)] += self.sigma**2 + surface.white**2
@@ -113,7 +113,7 @@ class Explanation:
     numpy.linalg.LinAlgError where that is not positive."""
 
     layout: Layout
-    surface: Surface
+    surface: SmoothField
     rest: Floats
     columns: Floats
     by_force: Floats
@@ -158,7 +158,7 @@ class Explanation:
         """(K,) [m] residual of each deviation predicted from all others."""
         return np.asarray(self.alpha / np.diag(self.inverse))
 
-    def with_surface(self, surface: Surface) -> Explanation:
+    def with_surface(self, surface: SmoothField) -> Explanation:
         """The same with another surface."""
         return Explanation(self.layout, surface, self.rest, self.columns, self.by_force)
 
@@ -189,7 +189,7 @@ def choose_surface(explained: Explanation, rounds: int = 2) -> Explanation:
     return best
 
 
-def _better(best: Explanation, surface: Surface) -> Explanation:
+def _better(best: Explanation, surface: SmoothField) -> Explanation:
     if surface == best.surface:
         return best
     other = best.with_surface(surface)

@@ -36,7 +36,7 @@ FAR, LARGEST, LEAST_SIGMA, MOST_SIGMA = 20_000.0, 5.0, 1e-4, 1.0
 LEAST, MOST = 6, 5000
 """Points of one file."""
 
-_UNIT = re.compile(r"^(?P<name>[a-z]+)\s*[\[(]\s*(?P<unit>[^\])]*)\s*[\])]$")
+_UNIT = re.compile(r"^(?P<name>[a-z]+)\s*[\[(](?P<unit>[^\])]*)[\])]$")
 _UNITS = {"dev": "mm", "sigma": "mm", "t": "s", "temp": "degc", **dict.fromkeys(PLACE, "mm")}
 _KEYED = re.compile(r"([^:=]*+)[:=]\s*+(.*)")
 _HEX = re.compile(r"[0-9a-f]{12,64}\Z")
@@ -151,7 +151,11 @@ def _named(table: CsvTable, needed: Sequence[str] = (*PLACE, *NORMAL, "dev")) ->
     for head, column in table.columns.items():
         unit = _UNIT.match(head)
         name = unit["name"] if unit else head
-        if unit and name in COLUMNS and unit["unit"].lower().replace("°", "deg") != _UNITS.get(name, ""):
+        if (
+            unit
+            and name in COLUMNS
+            and unit["unit"].strip().lower().replace("°", "deg") != _UNITS.get(name, "")
+        ):
             expected = _UNITS.get(name) or "no unit"
             raise table.header_error(f"the unit of column {head!r} is wrong: {expected} is expected")
         if name in columns:

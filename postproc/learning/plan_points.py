@@ -16,9 +16,9 @@ import numpy as np
 
 from postproc.base.arrays import Ints
 from postproc.learning.causes import CausePrediction
-from postproc.learning.covariance import Layout, Surface
+from postproc.learning.covariance import Layout, SmoothField
 
-FIELD = Surface(20e-6, 0.06)
+FIELD = SmoothField(20e-6, 0.06)
 """The smooth error that is expected where nothing is known of it."""
 
 

@@ -9,7 +9,7 @@ from postproc.base.findings import Finding
 from postproc.base.units import MM
 from postproc.learning.attribution import Attribution
 from postproc.learning.causes import CauseKind, CausePrediction
-from postproc.learning.covariance import FIELDS, WHITES, Explanation, Layout, Surface, choose_surface
+from postproc.learning.covariance import FIELDS, WHITES, Explanation, Layout, SmoothField, choose_surface
 from postproc.learning.measured_part import MeasuredPart
 
 LIKELIER = 3.0
@@ -41,7 +41,7 @@ def check_sign(prediction: CausePrediction, deviation: Floats, layout: Layout, f
     )
     likely = [
         choose_surface(
-            Explanation(layout, Surface(), sign * deviation - errors, scaled, by_force), 1
+            Explanation(layout, SmoothField(), sign * deviation - errors, scaled, by_force), 1
         ).evidence
         for sign in (1.0, -1.0)
     ]
@@ -103,7 +103,7 @@ def check_explained(result: Attribution, file: str) -> list[Finding]:
     rest = result.explained.left_out()
     own = result.explained
     alone = Explanation(
-        own.layout, Surface(100e-6, 2.0), result.deviation[result.kept], 0 * own.columns, 0 * own.by_force
+        own.layout, SmoothField(100e-6, 2.0), result.deviation[result.kept], 0 * own.columns, 0 * own.by_force
     )
     aligned = alone.left_out()
     sigma = own.layout.sigma

@@ -36,7 +36,7 @@ def follow_colours(svg: bytes) -> bytes:
                 f" {{ {attribute}: {_name(dark_colour(colour))} !important }}"
             )
     sheet = "<style>@media screen and (prefers-color-scheme: dark) {\n" + "\n".join(rules) + "\n}</style>"
-    start = re.search(r"<svg\b[^>]*>", text)
+    start = re.search(r"<svg\b[^<>]*>", text)
     return svg if start is None else (text[: start.end()] + sheet + text[start.end() :]).encode()
 
 

@@ -13,7 +13,7 @@ from postproc.languages.rapid.syntax_tree import (
     Argument,
     AssignmentStatement,
     Component,
-    Declaration,
+    DataDeclaration,
     For,
     FunctionCall,
     Index,
@@ -47,7 +47,7 @@ class DeclaredData:
     def __init__(self, module: Module, shadowed: frozenset[bytes]) -> None:
         self.types: dict[bytes, bytes] = {}
         self.lines: dict[bytes, int] = {}
-        self._declarations: dict[bytes, Declaration] = {}
+        self._declarations: dict[bytes, DataDeclaration] = {}
         self._values: dict[bytes, Value] = {}
         self.evaluator = Evaluator(self.look, module.records, shadowed)
         self.records: Mapping[bytes, Components] = module.records
@@ -83,7 +83,7 @@ class DeclaredData:
         return self._values[name], declaration.type
 
 
-def first_value(declaration: Declaration, evaluator: Evaluator) -> Value:
+def first_value(declaration: DataDeclaration, evaluator: Evaluator) -> Value:
     """The value of a declaration."""
     if declaration.value is not None:
         return evaluator.value(declaration.value)
@@ -153,7 +153,7 @@ class Usage:
 
     def _statement(self, statement: Any, routine: RapidRoutine) -> None:
         match statement:
-            case Declaration():
+            case DataDeclaration():
                 self._expressions(statement.value, statement.extent)
             case AssignmentStatement():
                 target = statement.target

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from postproc.languages.rapid.syntax_tree import (
     AssignmentStatement,
-    Declaration,
+    DataDeclaration,
     Expression,
     For,
     Goto,
@@ -27,7 +27,7 @@ from postproc.languages.rapid.syntax_tree import (
 NOTHING = Name(b"", 0, 0)
 """A name that nothing has: its value is not known."""
 
-Step = Declaration | AssignmentStatement | Instruction | Remark | NotUnderstood
+Step = DataDeclaration | AssignmentStatement | Instruction | Remark | NotUnderstood
 """A statement that goes on with the next one."""
 
 

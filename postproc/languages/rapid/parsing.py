@@ -12,7 +12,7 @@ from postproc.languages.rapid.expression_syntax import RapidExpressionParser, Sy
 from postproc.languages.rapid.syntax_tree import (
     AssignmentStatement,
     Component,
-    Declaration,
+    DataDeclaration,
     For,
     Goto,
     If,
@@ -260,7 +260,7 @@ class ModuleParser(RapidExpressionParser):
         self.need(b";")
         return Instruction(name.text, arguments, start, self.tokens.before)
 
-    def _declaration(self, start: int) -> Declaration:
+    def _declaration(self, start: int) -> DataDeclaration:
         kind = self.take().text
         type_name = self.name()
         name = self.name()
@@ -272,7 +272,7 @@ class ModuleParser(RapidExpressionParser):
             self.need(b"}")
         value = self.expression() if self.sign(b":=") else None
         self.need(b";")
-        return Declaration(kind, type_name, name, tuple(extent), value, start, self.tokens.before)
+        return DataDeclaration(kind, type_name, name, tuple(extent), value, start, self.tokens.before)
 
     def _if(self, start: int, depth: int) -> If:
         condition = self.expression()

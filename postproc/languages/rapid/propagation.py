@@ -28,7 +28,7 @@ from postproc.languages.rapid.program_state import ELSEWHERE, START, ProgramStat
 from postproc.languages.rapid.syntax_tree import (
     Argument,
     AssignmentStatement,
-    Declaration,
+    DataDeclaration,
     Expression,
     For,
     FunctionCall,
@@ -204,7 +204,7 @@ class Propagation:
             case AssignmentStatement():
                 self._functions(step.value, state)
                 self._assign(step.target, self._evaluator(state).value(step.value), state)
-            case Declaration():
+            case DataDeclaration():
                 if step.value is not None:
                     self._functions(step.value, state)
                 value = first_value(step, self._evaluator(state))
@@ -420,8 +420,8 @@ class Propagation:
             before = routine.name + b"/"
             names = {one.name: (before + one.name, one.type) for one in routine.parameters}
             for statement in walk(routine.body):
-                if isinstance(statement, Declaration | For):
-                    kind = statement.type if isinstance(statement, Declaration) else b"NUM"
+                if isinstance(statement, DataDeclaration | For):
+                    kind = statement.type if isinstance(statement, DataDeclaration) else b"NUM"
                     names[statement.name] = (before + statement.name, kind)
             self._locals[routine.name] = names
         return names

@@ -94,7 +94,7 @@ Expression = (
 
 
 @dataclass(frozen=True, slots=True)
-class Declaration:
+class DataDeclaration:
     """``kind``: CONST, PERS or VAR; ``extent``: of an array, () for others."""
 
     kind: bytes
@@ -197,7 +197,7 @@ class NotUnderstood:
 
 
 Statement = (
-    Declaration
+    DataDeclaration
     | AssignmentStatement
     | Instruction
     | If
@@ -241,7 +241,7 @@ class Module:
     """What a file declares.  ``records``: type -> (component, type); ``name_stop``: where the line of MODULE goes on,
     -1 without one; ``unclear``: places between routines that are not understood."""
 
-    declarations: list[Declaration] = field(default_factory=list)
+    declarations: list[DataDeclaration] = field(default_factory=list)
     routines: list[RapidRoutine] = field(default_factory=list)
     records: dict[bytes, tuple[tuple[bytes, bytes], ...]] = field(default_factory=dict)
     remarks: list[Remark] = field(default_factory=list)

@@ -48,13 +48,13 @@ function filterable(table, body) {
   const rows = [...body.rows];
   input.addEventListener('input', () => {
     const words = input.value.toLowerCase().split(/\s+/).filter(Boolean);
-    let left = 0;
+    let shown = 0;
     for (const row of rows) {
       const text = row.innerText.toLowerCase();
       row.hidden = !words.every((word) => text.includes(word));
-      left += row.hidden ? 0 : 1;
+      shown += row.hidden ? 0 : 1;
     }
-    said.textContent = words.length ? `${left} of ${rows.length} rows` : '';
+    said.textContent = words.length ? `${shown} of ${rows.length} rows` : '';
   });
 }
 
