@@ -275,6 +275,7 @@ ELSEWHERE = (
     "base/input_files.py",
     "report/page.py",
     "robot/write_robot_file.py",
+    "workflows/kinds.py",
 )
 """What is read there is no input: standard streams, sources of the package, records, locks, heads of files that a batch
 looks at, parts of a page, results, files of other systems."""

@@ -17,6 +17,7 @@ from postproc.base.arrays import Floats, Ints
 from postproc.effects.gravity_compensator import GravityCompensator
 from postproc.learning.touched_points import TouchedPoints
 from postproc.model import StiffnessModel
+from postproc.process.force_factors import axes_across
 from postproc.robot.description import COVERAGE
 
 UNSTATED = 0.125
@@ -198,20 +199,6 @@ class CausePrediction:
         most = np.array([MOST if c.is_share() else np.inf for c in self.causes])
         least = np.array([0.0 if c.kind is CauseKind.VALUE else -np.inf for c in self.causes])
         return np.asarray(np.clip(x, np.maximum(-most, least), most))
-
-
-def axes_across(force: Floats, axes: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (K, 3) across each force (K, 3) and each other; the second lies in the plane of the force and z
-    of the base ``axes`` (K, 3, 3), of x where the force points along z.  Zero without a force."""
-    size = np.linalg.norm(force, axis=1, keepdims=True)
-    unit = force / np.where(size > 0, size, 1.0)
-    along_z = np.abs(np.sum(unit * axes[:, :, 2], axis=1)) > 0.99
-    reference = np.where(along_z[:, None], axes[:, :, 0], axes[:, :, 2])
-    second = reference - np.sum(reference * unit, axis=1, keepdims=True) * unit
-    second = np.where(
-        size > 0, second / np.maximum(np.linalg.norm(second, axis=1, keepdims=True), 1e-12), 0.0
-    )
-    return np.cross(unit, second), second
 
 
 @dataclass(frozen=True)

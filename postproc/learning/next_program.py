@@ -9,60 +9,23 @@ at this place only, the smooth displacement that no cause explains.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
-from postproc.base.geometry import Poses, rotation_from_vector, turned
+from postproc.base.geometry import Poses, turned
 from postproc.base.units import MM
 from postproc.compensation.desired_path import DesiredPath
 from postproc.compensation.known_error import KnownError
 from postproc.learning.attribution import Attribution
-from postproc.learning.causes import CauseKind, axes_across
-from postproc.process import Wrenches
+from postproc.learning.causes import CauseKind
+from postproc.process.force_factors import ForceFactors
 from postproc.process.operation_names import OperationNames
 from postproc.toolpath import Toolpath
 
 _SIDE = 0.9
 """Share of the points of an operation that have to lie on one side of the feed."""
-
-
-@dataclass(frozen=True, eq=False)
-class ForceFactors:
-    """By operation: ``factor`` of its force, ``turn`` (2,) [rad] about the axes across it, ``ci95``: half width of
-    the 95 % interval of the factor as a share; ``common``: factor of all others; ``corner``: share added where the feed
-    turns."""
-
-    factor: Mapping[str, float]
-    turn: Mapping[str, tuple[float, float]]
-    common: float = 1.0
-    corner: float = 0.0
-    ci95: Mapping[str, float] = field(default_factory=dict)
-
-    def acting(
-        self, forces: Wrenches, operations: OperationNames, base: Floats, corner: Floats | None = None
-    ) -> Wrenches:
-        """Forces (N) with these factors; base (N, 3, 3): axes of the programmed base; corner (N,) 0..1."""
-        if not forces.any:
-            return forces
-        count = len(forces)
-        rows = np.arange(count)
-        scale = np.array([self.factor.get(name, self.common) for name in operations.names])[operations.which]
-        if corner is not None and self.corner:
-            scale = scale * np.exp(self.corner * corner)
-        turns = np.array([self.turn.get(name, (0.0, 0.0)) for name in operations.names])[operations.which]
-        ends = []
-        for side in (forces.values[rows], forces.start[rows]):
-            moved = side * scale[:, None]
-            first, second = axes_across(side[:, :3], base)
-            rotation = rotation_from_vector(turns[:, :1] * first + turns[:, 1:] * second)
-            moved[:, :3] = turned(rotation, moved[:, :3])
-            ends.append(moved)
-        known = np.array([self.ci95.get(name, np.nan) for name in operations.names])[operations.which]
-        if forces.ci95 is not None:
-            known = np.where(np.isnan(known), forces.ci95, known)
-        return replace(forces, values=ends[0], start=ends[1], ci95=None if np.isnan(known).all() else known)
 
 
 def force_factors(result: Attribution) -> ForceFactors:

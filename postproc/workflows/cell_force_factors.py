@@ -5,8 +5,8 @@ from __future__ import annotations
 from postproc.base.arrays import Floats
 from postproc.cell import Cell
 from postproc.cell.description import OTHERS
-from postproc.learning.next_program import ForceFactors
 from postproc.process import Wrenches
+from postproc.process.force_factors import ForceFactors
 from postproc.process.operation_names import OperationNames, name_operations
 from postproc.process.process_file import read_process
 from postproc.process.stock.stock_section import has_stock
