@@ -80,7 +80,7 @@ class Conditions:
     of its joint, -1..1, as a share of half the gap; -1, 0, 1 where only the sense in which it came is known;
     temperature (N,) [K] over that of the calibration; time (N,) [s] since then; payload_mass (N,) [kg] and payload_com
     (N, 3) [m, flange axes]: what is mounted on the flange; down (N, 3): unit vector of gravity, axes of the robot base,
-    of which only an effect ``by_gravity`` is told; straight down where it is None.
+    of which only an effect ``by_gravity`` knows; straight down where it is None.
     """
 
     spindle: Floats | None = None

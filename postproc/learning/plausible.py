@@ -1,4 +1,4 @@
-"""Deviations that no cause can have made: mistakes of the file, told before anything is learnt from them."""
+"""Deviations that no cause can have made: mistakes of the file, reported before anything is learnt from them."""
 
 from __future__ import annotations
 

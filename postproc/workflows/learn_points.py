@@ -180,8 +180,8 @@ def match(request: Request, job: CutProgram, parts: Sequence[MeasuredPart], know
     group: list[Ints] = []
     for part in parts:
         other, pairing = cutting_program(request, job, part)
-        points, keep, told = _touched(job, part, other, pairing)
-        findings += told
+        points, keep, reported = _touched(job, part, other, pairing)
+        findings += reported
         several.append(points)
         rows.append(keep)
         group.append(number + part.part[keep])
