@@ -376,3 +376,12 @@ def test_a_cut_that_starts_elsewhere_from_run_to_run_is_reported(compensate, job
     job.write([*lines[:13], "LIN {X 50.000,Y 0.000,Z 20.000,A 0.000,B 0.000,C 180.000}", *lines[13:]])
     again = compensate(job.program, "--force", "--json", "-")
     assert "COR023" not in {one["code"] for one in again.json["findings"]}
+
+
+def test_a_feed_force_behind_a_branch_in_the_cut_is_reported(compensate, job):
+    """Where the tool comes from varies, and with it the direction of the force."""
+    branch = [";FORCE -360 50 560 @feed", "IF $IN[1] THEN", "LIN {Y 20.000}", "ENDIF"]
+    job.write([*LINES[:8], *branch, *LINES[9:]])
+    done = compensate(job.program, "--force", "--json", "-")
+    assert done.code == 3, done.err
+    assert any("FRC005" in one["code"] + one["message"] for one in done.json["findings"])

@@ -287,7 +287,9 @@ def turn_to_robot_axes(
         stated.peak,
         measured=stated.error is not None,
         radius=stated.radius,
-        undirected=None if feed is None or not feed.undirected.any() else frozen(feed.undirected),
+        undirected=None
+        if feed is None or not feed.undirected.any()
+        else frozen(feed.undirected, None, np.bool_),
         stock=stated.stock,
     )
 
