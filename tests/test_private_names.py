@@ -1,4 +1,4 @@
-"""Tests use what the package offers: no test reaches for a name that begins with an underscore, of whatever module."""
+"""Tests and modules use what others offer: none reaches for a name of another that begins with an underscore."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 FILES = sorted(Path(__file__).parent.rglob("*.py"))
+MODULES = sorted((Path(__file__).parents[1] / "postproc").rglob("*.py"))
 WITHOUT_PUBLIC_NAME = {
     *(("regex_automaton.py", name) for name in ("_compiler", "_constants", "_parser")),
     ("test_api.py", "report._repr_html_"),
@@ -115,4 +116,18 @@ def test_no_test_uses_a_private_name():
         if (path.name, name) not in WITHOUT_PUBLIC_NAME
     ]
     assert len(FILES) > 100
+    assert not found, "\n".join(found)
+
+
+def test_no_module_uses_a_private_name_of_another():
+    """A class may lie in several files, and a namedtuple has methods that begin with an underscore."""
+    found = []
+    for path in MODULES:
+        text = path.read_text(encoding="utf-8")
+        own = own_names(ast.parse(text)) | {"_replace"}
+        for line, name in private_uses(text):
+            last = name.rpartition(".")[2]
+            if last not in own and not name.startswith(("self.", "cls.")):
+                found.append(f"{path.name}:{line}: {name}")
+    assert len(MODULES) > 300
     assert not found, "\n".join(found)

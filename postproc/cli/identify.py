@@ -21,7 +21,7 @@ FEWEST_DRAWS = 20
 """Fewer draws do not determine an interval."""
 
 
-def _words(_context: click.Context, _option: click.Parameter, text: str) -> tuple[str, ...]:
+def split_words(_context: click.Context, _option: click.Parameter, text: str) -> tuple[str, ...]:
     """``a,b.c`` as its words."""
     words = tuple(word.strip() for word in text.split(","))
     if not all(words):
@@ -47,7 +47,7 @@ def _none_or(least: int) -> Callable[[click.Context, click.Parameter, int | None
     "--effects",
     required=True,
     metavar="EFFECT[.PARAMETER],...",
-    callback=_words,
+    callback=split_words,
     help="Effects to identify, or single parameters of them. An effect that the robot file does not have is added.",
 )
 @readings_options

@@ -20,7 +20,7 @@ from postproc.cli.common import (
     tool_place,
 )
 from postproc.cli.decimal_option import Decimal
-from postproc.cli.identify import _words
+from postproc.cli.identify import split_words
 
 MOST = 200
 """Largest number of poses of a plan."""
@@ -92,7 +92,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     """Two different names."""
     if text is None:
         return None
-    words = _words(context, option, text)
+    words = split_words(context, option, text)
     if len(words) != 2:
         raise click.BadParameter(f"{text[:40]!r} is not two effects: a,b")
     return words
@@ -104,7 +104,7 @@ def _pair(context: click.Context, option: click.Parameter, text: str | None) -> 
     "--effects",
     required=True,
     metavar="EFFECT[.PARAMETER],...",
-    callback=_words,
+    callback=split_words,
     help="Effects to identify, or single parameters of them.",
 )
 @click.option("--poses", required=True, type=click.IntRange(1, MOST), help="Number of poses of the plan.")

@@ -30,8 +30,17 @@ def show_diagnosed(console: Console, result: Diagnosed, verbose: bool = False) -
     """Verdict, paragraph, parameters, evidence, residual patterns, residuals, next poses, findings."""
     console.print(Text(sanitize(headline(result)), style="bold"), soft_wrap=True)
     console.print(Text(sanitize(paragraph(result))), width=min(WIDE, console.width))
-    show_rows(console, ((key, Text(sanitize(value))) for key, value in _rows(result)))
-    tables = (_places, _parameters, _evidence, _alternatives, _refitted, _where, _residuals, _next_poses)
+    show_rows(console, ((key, Text(sanitize(value))) for key, value in fact_rows(result)))
+    tables = (
+        _places,
+        parameter_table,
+        evidence_table,
+        alternatives_table,
+        refitted_table,
+        places_table,
+        residual_table,
+        next_poses_table,
+    )
     for make in tables:
         table = make(result, verbose)
         if table.row_count:
@@ -47,7 +56,7 @@ def show_diagnosed(console: Console, result: Diagnosed, verbose: bool = False) -
         console.print("--next-poses FILE.csv writes the poses to measure next")
 
 
-def _rows(result: Diagnosed) -> Iterator[tuple[str, str]]:
+def fact_rows(result: Diagnosed) -> Iterator[tuple[str, str]]:
     final = result.final
     yield "data", ", ".join(name for name, _ in result.data)
     yield "", campaign_in_words(final.campaign)
@@ -85,7 +94,7 @@ def _places(result: Diagnosed, _verbose: bool) -> Table:
     return table
 
 
-def _parameters(result: Diagnosed, _verbose: bool) -> Table:
+def parameter_table(result: Diagnosed, _verbose: bool) -> Table:
     """One row a parameter, under what it is of."""
     table = _table("missing", "value", "+- 95 %", "unit", "")
     for named in result.clear:
@@ -99,7 +108,7 @@ def _parameters(result: Diagnosed, _verbose: bool) -> Table:
     return table
 
 
-def _evidence(result: Diagnosed, verbose: bool) -> Table:
+def evidence_table(result: Diagnosed, verbose: bool) -> Table:
     """The likelihood gain of each named or rejected candidate, in the fit and on held-out data."""
     table = _table(
         "evidence, 2 ln(likelihood ratio)",
@@ -126,7 +135,7 @@ def _evidence(result: Diagnosed, verbose: bool) -> Table:
     return table
 
 
-def _alternatives(result: Diagnosed, _verbose: bool) -> Table:
+def alternatives_table(result: Diagnosed, _verbose: bool) -> Table:
     """The likelihood gain of each explanation of a set alone."""
     table = _table("indistinguishable", "likelihood gain alone")
     keys = [candidate.key for candidate in result.diagnosis.search.linear.candidates]
@@ -142,7 +151,7 @@ def _alternatives(result: Diagnosed, _verbose: bool) -> Table:
     return table
 
 
-def _refitted(result: Diagnosed, _verbose: bool) -> Table:
+def refitted_table(result: Diagnosed, _verbose: bool) -> Table:
     table = _table("changed in the robot file", "before", "value", "+- 95 %", "unit")
     for estimate in result.verdict.refitted:
         word, size = shown_unit(estimate.unknown.parameter.unit)
@@ -152,7 +161,7 @@ def _refitted(result: Diagnosed, _verbose: bool) -> Table:
     return table
 
 
-def _where(result: Diagnosed, verbose: bool) -> Table:
+def places_table(result: Diagnosed, verbose: bool) -> Table:
     """Patterns in the residuals of the robot file with its own parameters refitted."""
     table = _table("residual depends on", "share", "")
     rows = {one.variable: one for one in result.patterns}
@@ -165,7 +174,7 @@ def _where(result: Diagnosed, verbose: bool) -> Table:
     return table
 
 
-def _residuals(result: Diagnosed, _verbose: bool) -> Table:
+def residual_table(result: Diagnosed, _verbose: bool) -> Table:
     """Residuals before and after: of the fit, of held-out poses."""
     table = _table("residuals, mm", "RMS", "mean", "max", "readings")
     rows = {
@@ -187,7 +196,7 @@ def _residuals(result: Diagnosed, _verbose: bool) -> Table:
     return table
 
 
-def _next_poses(result: Diagnosed, _verbose: bool) -> Table:
+def next_poses_table(result: Diagnosed, _verbose: bool) -> Table:
     planned = result.next_poses
     if planned is None:
         return _table("")

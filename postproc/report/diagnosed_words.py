@@ -15,7 +15,7 @@ from postproc.report.diagnosed import Diagnosed
 from postproc.report.diagnosed_limits import conditional, not_tested
 from postproc.report.formatting import count, fixed, listed, shown_unit
 from postproc.report.formatting import millimetres as _mm
-from postproc.report.terminal import _once
+from postproc.report.terminal import short_names
 
 NOUNS = {
     "joint_compliance": "compliance of {joints}: the gear deflects in proportion to the torque",
@@ -423,7 +423,7 @@ def _changes(moved: Sequence[Estimate]) -> str:
     """``c2 from 0.302 to 0.268 +- 0.003 urad/(N m)``, those that moved most in their interval first."""
     several = sorted(moved, key=lambda e: -abs(e.value - e.unknown.value) / max(e.ci95, 1e-300))[:PARAMETERS]
     entries = []
-    for name, estimate in zip(_once([e.unknown.name for e in several]), several, strict=True):
+    for name, estimate in zip(short_names([e.unknown.name for e in several]), several, strict=True):
         _, size = shown_unit(estimate.unknown.parameter.unit)
         before = fixed(estimate.unknown.value / size, estimate.ci95 / size)
         entries.append(f"{name} from {before} to {with_interval(estimate)}")

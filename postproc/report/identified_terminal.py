@@ -17,7 +17,7 @@ from postproc.identification.validation import WIDER
 from postproc.report.formatting import campaign_in_words, count, fixed, shown_unit, some
 from postproc.report.identified import STRONG, Identified, Sum
 from postproc.report.residuals import Sizes
-from postproc.report.terminal import _once, show_findings, show_rows
+from postproc.report.terminal import short_names, show_findings, show_rows
 from postproc.robot.description import robot_words
 
 IN_TABLES = frozenset({"IDN018", "IDN019", "IDN020", "IDN021", "IDN022", "IDN025", "IDN026"})
@@ -27,12 +27,12 @@ IN_TABLES = frozenset({"IDN018", "IDN019", "IDN020", "IDN021", "IDN022", "IDN025
 def show_identified(console: Console, result: Identified, verbose: bool = False) -> None:
     """The verdict, the data, the parameters, what was not identified, the residuals, and findings."""
     console.print(Text(verdict(result), style="bold"), soft_wrap=True)
-    show_rows(console, ((key, Text(sanitize(value))) for key, value in _rows(result)))
-    console.print(_parameters(result))
-    for line in _notes(result, verbose):
+    show_rows(console, ((key, Text(sanitize(value))) for key, value in fact_rows(result)))
+    console.print(parameter_table(result))
+    for line in note_lines(result, verbose):
         console.print(Text(sanitize(line)), soft_wrap=True)
-    console.print(_residuals(result))
-    for line in _outliers(result, verbose):
+    console.print(residual_table(result))
+    for line in outlier_lines(result, verbose):
         console.print(Text(sanitize(line)), soft_wrap=True)
     show_findings(console, [f for f in result.findings if verbose or f.code not in IN_TABLES], verbose)
     for path in result.outputs:
@@ -69,14 +69,14 @@ def verdict(result: Identified) -> str:
     return f"{sentence} Readings scatter by {scatter}: they show nothing more."
 
 
-def _rows(result: Identified) -> Iterator[tuple[str, str]]:
+def fact_rows(result: Identified) -> Iterator[tuple[str, str]]:
     after = result.after
     yield "data", ", ".join(name for name, _ in result.data)
     yield "", campaign_in_words(after.campaign)
     yield "robot", robot_words(result.robot, result.robot_file)
     yield "effects", ", ".join(result.effects)
     if result.fixed:
-        names = ", ".join(_once(result.fixed))
+        names = ", ".join(short_names(result.fixed))
         yield "fixed", f"{names}: dimensions of hardware without an interval, from the robot file"
     shared = after.shared_error
     together = f"; readings of one pose share another {shared / MM:.3f} mm" if shared > 0 else ""
@@ -92,7 +92,7 @@ def _rows(result: Identified) -> Iterator[tuple[str, str]]:
     yield "intervals", how
 
 
-def _parameters(result: Identified) -> Table:
+def parameter_table(result: Identified) -> Table:
     """One row a parameter, under the name of its effect."""
     table = Table(box=None, pad_edge=False)
     table.add_column("parameter")
@@ -132,16 +132,16 @@ def _cells(result: Identified, estimate: Estimate) -> list[str]:
     ]
 
 
-def _notes(result: Identified, verbose: bool) -> Iterator[str]:
+def note_lines(result: Identified, verbose: bool) -> Iterator[str]:
     """Condition and correlations, excluded parameters and why, and the sums that are known instead."""
     after = result.after
-    pairs = [f"{' / '.join(_once([a, b]))} {size:+.2f}" for a, b, size in result.correlations]
+    pairs = [f"{' / '.join(short_names([a, b]))} {size:+.2f}" for a, b, size in result.correlations]
     strong = "; ".join(some(pairs, verbose)) or "none"
     yield f"condition    {after.condition:.3g}; correlations above {STRONG:g}: {strong}"
     reasons: dict[str, list[str]] = {}
     for dropped in after.dropped:
         reasons.setdefault(dropped.why, []).append(dropped.name)
-    lines = [f"{', '.join(_once(names))}: {why}" for why, names in reasons.items()]
+    lines = [f"{', '.join(short_names(names))}: {why}" for why, names in reasons.items()]
     for line in some(lines, verbose):
         yield f"excluded     {line}"
     for line in some([_sum(one, result) for one in result.sums], verbose):
@@ -162,7 +162,7 @@ def _sum(one: Sum, result: Identified) -> str:
     return f"{text} = {fixed(one.value / size, wide)} +- {fixed(wide, wide)} {word}".rstrip()
 
 
-def _residuals(result: Identified) -> Table:
+def residual_table(result: Identified) -> Table:
     """Residuals before and after: of the fit, of held-out poses, of validation data."""
     table = Table(box=None, pad_edge=False)
     table.add_column("residuals, mm")
@@ -194,7 +194,7 @@ def add_sizes(table: Table, lengths: Mapping[str, Floats]) -> None:
             table.add_row(name, *cells, str(size.readings))
 
 
-def _outliers(result: Identified, verbose: bool) -> Iterator[str]:
+def outlier_lines(result: Identified, verbose: bool) -> Iterator[str]:
     if result.outliers:
         how = (
             "excluded"

@@ -112,7 +112,7 @@ class Mapped(Result):
     def force(self) -> str:
         """``(-360, 0, 560) N, (0, 0, 20) N m @world``; moments only where there are any."""
         parts = [(self.stated[:3], "N"), (self.stated[3:], "N m")]
-        shown = [f"({_list(v)}) {unit}" for v, unit in parts if any(v) or unit == "N"]
+        shown = [f"({number_list(v)}) {unit}" for v, unit in parts if any(v) or unit == "N"]
         return f"{', '.join(shown)} @{self.frame}"
 
     @property
@@ -182,7 +182,7 @@ def show_map(console: Console, mapped: Mapped, verbose: bool = False) -> None:
     head = Table(box=None, show_header=False, pad_edge=False)
     head.add_column(style="bold")
     head.add_column()
-    for key, value in _rows(mapped):
+    for key, value in map_rows(mapped):
         head.add_row(key, Text(value))
     console.print(head)
     if any(quantity.extremes for quantity in mapped.quantities):
@@ -195,7 +195,7 @@ def show_map(console: Console, mapped: Mapped, verbose: bool = False) -> None:
                 cells = [
                     text
                     for extreme in quantity.extremes
-                    for text in (f"{extreme.value / MM:.4f}", _list(mapped.place(extreme.row).values()))
+                    for text in (f"{extreme.value / MM:.4f}", number_list(mapped.place(extreme.row).values()))
                 ]
                 table.add_row(quantity.title, *cells)
         console.print(table)
@@ -206,7 +206,7 @@ def show_map(console: Console, mapped: Mapped, verbose: bool = False) -> None:
                 f"{axis} {round(value, 1) + 0.0:.1f}" + (" mm" if unit == "mm" else "")
                 for (axis, unit), value in zip(mapped.axes, mapped.axis_values[extreme.row], strict=True)
             )
-            place = _list(mapped.place(extreme.row).values())
+            place = number_list(mapped.place(extreme.row).values())
             console.print(
                 Text(f"{name:8} at {place} mm: {extreme.value / MM:.3f} mm, axes {axes} deg"), soft_wrap=True
             )
@@ -215,16 +215,17 @@ def show_map(console: Console, mapped: Mapped, verbose: bool = False) -> None:
         console.print(Text(f"wrote {path}"), soft_wrap=True)
 
 
-def _rows(mapped: Mapped) -> Iterator[tuple[str, str]]:
+def map_rows(mapped: Mapped) -> Iterator[tuple[str, str]]:
     survey, load = mapped.survey, mapped.load
     yield "robot", f"{mapped.robot}, effects: {', '.join(mapped.effects) or 'none'}"
     yield "cells", f"{region(mapped)} in the robot base: {mapped.cells} cells"
     pose = abc_from_rotation(np.stack([load.orientation, load.tool.rotation])) / DEG
-    turned = f", rotated {_list(pose[1])} deg," if np.abs(pose[1]).max() > 1e-9 else ""
+    turned = f", rotated {number_list(pose[1])} deg," if np.abs(pose[1]).max() > 1e-9 else ""
     branch = "" if mapped.status is None else f", S {mapped.status}"
     yield (
         "tool",
-        f"TCP {_list(_mm(load.tool.position))} mm{turned} on the flange, A B C {_list(pose[0])} deg{branch}",
+        f"TCP {number_list(_mm(load.tool.position))} mm{turned} on the flange,"
+        f" A B C {number_list(pose[0])} deg{branch}",
     )
     yield "force", mapped.force
     sign = f"; compensator: sign {mapped.sign}" if mapped.sign else "; no gravity compensator"
@@ -258,7 +259,7 @@ def map_csv(mapped: Mapped) -> bytes:
     heads, columns = [], []
     for names, values, decimals in _blocks(mapped):
         heads += names.split(" ")
-        columns += [_texts(column, decimals) for column in values.T]
+        columns += [fixed_decimals(column, decimals) for column in values.T]
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(heads)
@@ -286,7 +287,7 @@ def _blocks(mapped: Mapped) -> list[tuple[str, Floats, int]]:
     ]
 
 
-def _texts(values: Floats, decimals: int) -> list[str]:
+def fixed_decimals(values: Floats, decimals: int) -> list[str]:
     """Fixed decimals, empty for what is not known, no minus zero."""
     rounded = np.round(values, decimals) + 0.0
     return ["" if value != value else f"{value:.{decimals}f}" for value in rounded.tolist()]
@@ -297,5 +298,5 @@ def _mm(lengths: Floats) -> list[float]:
     return [float(value) for value in np.round(lengths / MM, 9) + 0.0]
 
 
-def _list(values: object) -> str:
+def number_list(values: object) -> str:
     return ", ".join(f"{round(float(value), 6) + 0.0:g}" for value in values)  # type: ignore[attr-defined]

@@ -13,8 +13,8 @@ from postproc.base.units import DEG, MM
 from postproc.report import planned as planned_report
 from postproc.report.checked import Checked
 from postproc.report.formatting import count
-from postproc.report.page_results import result_page
 from postproc.report.planned import Planned
+from postproc.report.result_page import ResultPage
 from postproc.report.verified import PathComparison, Verified, distance_table, sampling_notes, worst_table
 
 
@@ -32,21 +32,15 @@ def checked_page(checked: Checked, links: Mapping[str, str]) -> bytes:
         reasons.add_row(CODES[code].title, code, str(number))
     verdict = f"{count(total, 'motion')}: {total - refused} can be corrected, {refused} not."
     files = ", ".join(str(document.path) for document in checked.program.documents)
-    return result_page(
-        "check",
-        checked.program.documents[0].path.name,
-        verdict if total else "The program has no motion.",
-        [],
-        checked.exit,
-        [("language", checked.program.dialect), ("files", files)],
-        [kinds, reasons],
-        [],
-        b"",
-        "",
-        checked.findings,
-        {},
-        links,
-    )
+    return ResultPage(
+        what="check",
+        title=checked.program.documents[0].path.name,
+        verdict=verdict if total else "The program has no motion.",
+        exit=checked.exit,
+        facts=[("language", checked.program.dialect), ("files", files)],
+        tables=[kinds, reasons],
+        findings=checked.findings,
+    ).html(links)
 
 
 def verified_page(done: Verified, links: Mapping[str, str]) -> bytes:
@@ -54,13 +48,12 @@ def verified_page(done: Verified, links: Mapping[str, str]) -> bytes:
     worst = [
         _worst(one, name) for name, one in (("compensated", done.compensated), ("original", done.original))
     ]
-    return result_page(
-        "verification",
-        Path(done.compensated_file).name,
-        _verified_words(done),
-        [],
-        done.exit,
-        [
+    return ResultPage(
+        what="verification",
+        title=Path(done.compensated_file).name,
+        verdict=_verified_words(done),
+        exit=done.exit,
+        facts=[
             ("original", f"{done.original_file}, {count(done.motions, 'motion')}"),
             ("compensated", f"{done.compensated_file}, {count(done.compensated_motions, 'motion')}"),
             ("robot", done.robot),
@@ -68,14 +61,10 @@ def verified_page(done: Verified, links: Mapping[str, str]) -> bytes:
             ("tolerance", f"{done.tolerance / MM:g} mm, {done.tolerance_angle / DEG:g} deg"),
             ("first samples", f"{done.step / MM:g} mm apart"),
         ],
-        [distance_table(done), *worst],
-        sampling_notes(done.compensated),
-        b"",
-        "",
-        done.findings,
-        {},
-        links,
-    )
+        tables=[distance_table(done), *worst],
+        notes=sampling_notes(done.compensated),
+        findings=done.findings,
+    ).html(links)
 
 
 def planned_page(planned: Planned, links: Mapping[str, str]) -> bytes:
@@ -89,21 +78,18 @@ def planned_page(planned: Planned, links: Mapping[str, str]) -> bytes:
         poses.add_row(str(number), *("" if math.isnan(value) else f"{value:.2f}" for value in row))
     tables = [planned_report.interval_table(planned)]
     tables += [] if planned.rivals is None else [planned_report.separation_table(planned)]
-    return result_page(
-        "plan",
-        planned.robot,
-        f"{count(planned.poses, 'pose')}, {planned.loads_in_words}: {planned.readings} readings {planned.goal}.",
-        [],
-        planned.exit,
-        planned_report.plan_facts(planned),
-        [*tables, poses],
-        ["Collisions are not checked."],
-        b"",
-        "",
-        planned.findings,
-        {planned.robot: planned.digest},
-        links,
-    )
+    return ResultPage(
+        what="plan",
+        title=planned.robot,
+        verdict=f"{count(planned.poses, 'pose')}, {planned.loads_in_words}:"
+        f" {planned.readings} readings {planned.goal}.",
+        exit=planned.exit,
+        facts=planned_report.plan_facts(planned),
+        tables=[*tables, poses],
+        notes=["Collisions are not checked."],
+        findings=planned.findings,
+        digests={planned.robot: planned.digest},
+    ).html(links)
 
 
 def _verified_words(done: Verified) -> str:

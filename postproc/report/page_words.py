@@ -16,7 +16,7 @@ from postproc.report.formatting import count, two_digits
 from postproc.report.page_data import PageData
 from postproc.report.program_verdict import verdict_sentence
 from postproc.report.report import Report
-from postproc.report.terminal import _rows, missing_intervals
+from postproc.report.terminal import missing_intervals, report_rows
 
 LISTED = 8
 """Cuts that are not corrected are listed up to so many."""
@@ -134,7 +134,7 @@ def reasons(data: PageData) -> list[str]:
 
 def program_facts(report: Report) -> list[tuple[str, str]]:
     """The lines that the terminal shows as well."""
-    return [(key, Text.from_markup(value).plain) for key, value in _rows(report)]
+    return [(key, Text.from_markup(value).plain) for key, value in report_rows(report)]
 
 
 def parameter_rows(model: Mapping[str, object]) -> list[dict[str, str]]:

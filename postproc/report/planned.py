@@ -21,7 +21,7 @@ from postproc.model import StiffnessModel
 from postproc.report.formatting import fixed, shown_unit
 from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
-from postproc.report.terminal import _once, show_findings
+from postproc.report.terminal import short_names, show_findings
 
 GOALS = {
     "minimax": "smallest worst ratio of an interval to the wanted one",
@@ -180,7 +180,7 @@ def plan_facts(planned: Planned) -> Iterator[tuple[str, str]]:
     if planned.fixed:
         yield (
             "fixed",
-            f"{', '.join(_once(planned.fixed))}: dimensions of hardware without an interval, from the robot file",
+            f"{', '.join(short_names(planned.fixed))}: dimensions of hardware without an interval, from the robot file",
         )
     yield "goal", GOALS[planned.criterion] + ("" if planned.rivals is None else f": {planned.goal}")
     if planned.rivals is None:

@@ -20,7 +20,7 @@ from postproc.base.units import DEG, MM
 from postproc.identification.campaign import Campaign
 from postproc.identification.noise import Noise
 from postproc.measurements import Readings
-from postproc.report.mapped import _texts
+from postproc.report.mapped import fixed_decimals
 
 PARTS, EACH = 8, 10
 """Into how many parts of about as many readings the range of a joint or load is cut at most, each of ``EACH`` or more.
@@ -111,14 +111,14 @@ def residuals_csv(
         "session": [as_cell(readings.sessions[k]) for k in readings.session],
     }
     for joint in joint_variables(readings):
-        columns[f"{joint.name}_{joint.unit}"] = _texts(joint.values, 6)
+        columns[f"{joint.name}_{joint.unit}"] = fixed_decimals(joint.values, 6)
     measured = np.isfinite(readings.value)
     nothing = np.full((len(readings), 3), np.nan)
     for name, values in residuals.items():
         residual = nothing if values is None else values
         for axis, column in zip("xyz", residual.T, strict=True):
-            columns[f"{name}_d{axis}_mm"] = _texts(column / MM, 6)
-        columns[f"{name}_mm"] = _texts(lengths_of(residual, measured) / MM, 6)
+            columns[f"{name}_d{axis}_mm"] = fixed_decimals(column / MM, 6)
+        columns[f"{name}_mm"] = fixed_decimals(lengths_of(residual, measured) / MM, 6)
     columns |= more
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")

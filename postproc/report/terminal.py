@@ -27,7 +27,7 @@ NAMED = 3
 
 def show(console: Console, report: Report, verbose: bool = False) -> None:
     """The table of one program, its findings, and where things are."""
-    show_rows(console, _rows(report))
+    show_rows(console, report_rows(report))
     if report.worst:
         console.print(_worst(report))
     show_findings(console, report.findings, verbose)
@@ -45,7 +45,7 @@ def show_rows(console: Console, rows: Iterable[tuple[str, str | Text]]) -> None:
     console.print(table)
 
 
-def _rows(report: Report) -> Iterable[tuple[str, str]]:
+def report_rows(report: Report) -> Iterable[tuple[str, str]]:
     cuts = _count(report.cuts, "cut")
     yield (
         "program",
@@ -182,7 +182,9 @@ def describe_budget(uncertainty: Uncertainty) -> str:
         if seen > 0.95:
             break
     parts = [
-        "mostly " + ", ".join(_once(contributions)) if contributions else "no contribution of the intervals"
+        "mostly " + ", ".join(short_names(contributions))
+        if contributions
+        else "no contribution of the intervals"
     ]
     if len(uncertainty.level_unstated) == 1:
         parts.append("the level of 1 interval is not stated")
@@ -196,7 +198,7 @@ def missing_intervals(uncertainty: Uncertainty) -> str:
     names = [(name, length) for name, length in uncertainty.effect_of_10_percent if name != FORCE]
     parts = []
     if names:
-        words = ", ".join(_once([name for name, _ in names[:NAMED]]))
+        words = ", ".join(short_names([name for name, _ in names[:NAMED]]))
         more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
         has = f"has no interval (10 % of it: {two_digits(names[0][1] / MM)} mm)"
         if len(names) > 1:
@@ -211,7 +213,7 @@ def missing_intervals(uncertainty: Uncertainty) -> str:
     return ", ".join(parts)
 
 
-def _once(names: Sequence[str]) -> list[str]:
+def short_names(names: Sequence[str]) -> list[str]:
     """``effect.a, effect.b`` as ``effect.a, b``."""
     effects = [name.partition(".")[0] for name in names]
     return [

@@ -20,6 +20,9 @@ NODES = 2.0 * MM
 LEAST_NODES = 2
 """Intervals of a motion at least."""
 
+TURN = np.radians(15.0)
+"""By how much the path turns from one node to the next, at most."""
+
 SPOT = 1e-6
 """[m] A motion that is not longer only turns the tool."""
 
@@ -51,15 +54,17 @@ class PathGrid:
         count = stop - start
         rows = np.repeat(start - sums(count)[:-1], count) + np.arange(count.sum())
         length = original.desired_path.length[rows]
-        parts = np.maximum(LEAST_NODES, np.ceil(length / NODES)).astype(np.int64)
-        at = sums(parts + 1)
-        row = np.repeat(rows, parts + 1)
-        number = np.arange(len(row)) - np.repeat(at[:-1], parts + 1)
-        share = number / np.repeat(parts, parts + 1)
-        first = at[sums(count)]
+        parts = np.maximum(LEAST_NODES, np.ceil(length / NODES))
+        parts = np.maximum(parts, np.ceil(np.nan_to_num(original.desired_path.sweep[rows]) / TURN))
+        corner = path.corner(np.append(rows, 0))
+        corner = np.maximum(corner[:-1], np.where(np.diff(rows, append=-1) == 1, corner[1:], 0.0))
+        halves = np.where(corner > TURN, np.ceil(0.5 * corner / TURN), 0).astype(np.int64)
+        number, share = path.shares(rows, parts.astype(np.int64), halves, np.ones(len(rows), bool))
+        row, nodes = rows[number], np.bincount(number, minlength=len(rows))
+        first = sums(nodes)[sums(count)]
         before = np.append(0.0, np.cumsum(length))
         own = before[:-1] - np.repeat(before[sums(count)[:-1]], count)
-        arc = np.repeat(own, parts + 1) + share * np.repeat(length, parts + 1)
+        arc = own[number] + share * length[number]
         v, tangent, goals = (np.empty((len(row), 3)) for _ in range(3))
 
         def fill(part: slice) -> None:

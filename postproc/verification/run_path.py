@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Bools, Floats, Ints, sums
 from postproc.base.geometry import Poses, lengths, product, rotation_from_vector, turn_between
 from postproc.compensation.problem import CompensationProblem
 
@@ -73,6 +73,40 @@ class RunPath:
             tangents[some] = along / np.maximum(lengths(along), _NO_LENGTH)[:, None]
         return tangents
 
+    def shares(self, rows: Ints, parts: Ints, halves: Ints, opens: Bools) -> tuple[Ints, Floats]:
+        """Places along the motions ``rows`` (R,): their numbers among these (S,), ascending, and shares (S,).
+
+        The ends of ``parts`` (R,) even parts of each motion, and of ``halves`` (R,) even parts of the halves of the
+        parabolas on it; of its start nothing, as it is the end of another, but where ``opens`` (R,).
+        """
+        number, share = _even(parts)
+        first = np.flatnonzero(opens)
+        numbers, shares = [number, first], [share, np.zeros(len(first))]
+        length = self.task.desired_path.length[rows]
+        following = np.where(rows + 1 < len(self.reach), rows + 1, 0)
+        for at_end, reach in ((False, self.reach[rows]), (True, self.reach[following])):
+            near = np.flatnonzero(reach > 0)
+            own, part = _even(halves[near])
+            part = part * (reach[near] / length[near])[own]
+            numbers.append(near[own])
+            shares.append(1 - part if at_end else part)
+        number, share = np.concatenate(numbers), np.concatenate(shares)
+        order = np.lexsort((share, number))
+        number, share = number[order], share[order]
+        other = np.append(True, (number[1:] != number[:-1]) | (share[1:] > share[:-1] + 1e-9))[: len(number)]
+        return number[other], share[other]
+
+    def corner(self, rows: Ints) -> Floats:
+        """(R,) [rad] by how much the path turns on the parabolas where the motions ``rows`` (R,) start."""
+        angle = np.zeros(len(rows))
+        some = np.flatnonzero(self.reach[rows] > 0)
+        if len(some):
+            at = rows[some]
+            one = self.task.desired_path.tangent(at - 1, np.ones(len(at)))
+            two = self.task.desired_path.tangent(at, np.zeros(len(at)))
+            angle[some] = np.arccos(np.clip(np.sum(one * two, axis=1), -1.0, 1.0))
+        return angle
+
     def _near(self, rows: Ints, share: Floats) -> Iterator[tuple[Ints, Ints, Floats]]:
         """Which of ``rows`` (K,) at the shares (K,) are on the parabola where they start, and then which on the one
         where they end: their numbers, the motions that start at those vertices, and u."""
@@ -88,3 +122,10 @@ class RunPath:
         desired_path, reach = self.task.desired_path, self.reach[vertex]
         before = desired_path.at(vertex - 1, 1 - reach * (1 - u) / desired_path.length[vertex - 1])
         return before, desired_path.at(vertex, reach * u / desired_path.length[vertex])
+
+
+def _even(parts: Ints) -> tuple[Ints, Floats]:
+    """Numbers of owners, and the shares at which even ``parts`` (R,) of them end."""
+    number = np.repeat(np.arange(len(parts)), parts)
+    share = (np.arange(len(number)) - np.repeat(sums(parts)[:-1], parts) + 1) / np.repeat(parts, parts)
+    return number, share

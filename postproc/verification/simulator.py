@@ -257,7 +257,8 @@ class Simulator:
         of the halves of parabolas on them, and where each stretch starts."""
         opens = np.append(True, stretch[1:] != stretch[:-1])[: len(rows)]
         closes = np.append(stretch[1:] != stretch[:-1], True)[: len(rows)]
-        number, share, end = _shares(run, path, rows, parts, opens, halves)
+        number, share = path.shares(rows, parts, halves, opens)
+        end = share == 1.0
         motion, where = rows[number], stretch[number]
         place = place_tool(self.grid, path, where, motion, share)
         before = np.append(0.0, np.where(number[1:] == number[:-1], share[:-1], 0.0))[: len(share)]
@@ -310,46 +311,13 @@ def _rows(start: Ints, stop: Ints) -> Ints:
     return np.repeat(start - sums(count)[:-1], count) + np.arange(count.sum())
 
 
-def _shares(
-    run: CompensationProblem, path: RunPath, rows: Ints, parts: Ints, opens: Bools, halves: Ints
-) -> tuple[Ints, Floats, Bools]:
-    """The samples of the motions ``rows`` (R,): their numbers among these, shares, and whether they are at ends.
-
-    Each motion in ``parts`` (R,) even ones; the halves of the parabolas on it in ``halves`` (R,); of its
-    start nothing, as it is the end of another, but where a stretch ``opens`` (R,).
-    """
-    number, share = _even(parts)
-    first = np.flatnonzero(opens)
-    numbers, shares = [number, first], [share, np.zeros(len(first))]
-    length = run.desired_path.length[rows]
-    following = np.where(rows + 1 < len(path.reach), rows + 1, 0)
-    for at_end, reach in ((False, path.reach[rows]), (True, path.reach[following])):
-        near = np.flatnonzero(reach > 0)
-        own, part = _even(halves[near])
-        part = part * (reach[near] / length[near])[own]
-        numbers.append(near[own])
-        shares.append(1 - part if at_end else part)
-    number, share = np.concatenate(numbers), np.concatenate(shares)
-    order = np.lexsort((share, number))
-    number, share = number[order], share[order]
-    other = np.append(True, (number[1:] != number[:-1]) | (share[1:] > share[:-1] + 1e-9))[: len(number)]
-    number, share = number[other], share[other]
-    return number, share, share == 1.0
-
-
-def _even(parts: Ints) -> tuple[Ints, Floats]:
-    """Numbers of owners, and the shares at which even ``parts`` (R,) of them end."""
-    number = np.repeat(np.arange(len(parts)), parts)
-    share = (np.arange(len(number)) - np.repeat(sums(parts)[:-1], parts) + 1) / np.repeat(parts, parts)
-    return number, share
-
-
 def _often(samples: PathSamples, rows: Ints) -> Ints:
     """(R,) how many times as often the motions ``rows`` (R,) are to be sampled: those about the largest errors
     more, as a peak between two samples would be missed there."""
     often = np.ones(len(rows), np.int64)
-    worst = np.argsort(-samples.distance, kind="stable")[:WORST]
-    at = np.unique(np.searchsorted(rows, samples.motion[worst]))
+    largest = np.zeros(len(rows))
+    np.maximum.at(largest, np.searchsorted(rows, samples.motion), samples.distance)
+    at = np.argsort(-largest, kind="stable")[:WORST]
     for beside in (at - 1, at, at + 1):
         often[np.clip(beside, 0, len(rows) - 1)] = FINER
     return often

@@ -37,7 +37,6 @@ from postproc.measurements import Readings, measurements_csv
 from postproc.model import StiffnessModel
 from postproc.output.atomic_write import write_atomically
 from postproc.report.page import beside
-from postproc.report.page_checks import planned_page
 from postproc.report.planned import Planned, discrimination_words
 from postproc.report.report import exit_code, json_bytes
 from postproc.robot.description import Robot, find_robot, load_robot
@@ -130,6 +129,8 @@ def plan(request: PlanRequest, stage: Stage = silent) -> Planned:
         files[request.json] = json_bytes(planned)
     if request.page is not None:
         links = {"poses to measure (CSV)": request.output, "result (JSON)": request.json}
+        from postproc.report.page_checks import planned_page  # takes its time to load
+
         files[request.page] = planned_page(planned, beside(request.page, links))
     write_atomically(files, last=request.output)
     return planned
