@@ -1,4 +1,4 @@
-"""The kinematic chain: described by Pinocchio, evaluated for whole batches in numpy.
+"""The kinematic chain, evaluated for whole batches in numpy.
 
 A chain is a row of coordinates, each a turn about or a shift along the z axis of its own frame: the motors, and
 between them the extra coordinates that a model asks for by name:
@@ -9,9 +9,9 @@ between them the extra coordinates that a model asks for by name:
     tool.x .y .z .rx .ry .rz         at the TCP, axes of the tool
     spindle.x .y .z                  at the TCP, z along the spindle, tip-ward
 
-Pinocchio's model describes the chain up to the flange and is the reference.  Its joint placements are read back into
-the batch evaluation, which works component-wise on arrays with the states in the last, contiguous axis.  Pinocchio has
-no wheels for Windows: there the placements go to the batch evaluation directly, which are the same numbers.
+The evaluation works component-wise on arrays with the states in the last, contiguous axis.  The same chain as a model
+of Pinocchio is the reference that it is held against; it is made where it is asked for, as Pinocchio takes longer to
+load than most programs to compensate, and has no wheels for Windows.
 """
 
 from __future__ import annotations
@@ -22,11 +22,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-
-try:
-    import pinocchio as pin
-except ImportError:  # no wheel for this system
-    pin = None
 
 from postproc.base.arrays import Bools, Floats
 from postproc.base.geometry import Poses
@@ -110,35 +105,27 @@ class ChainKinematics:
 class Chain:
     """A serial chain of ``joints`` with a ``flange``, and the extra coordinates named in ``extras``.
 
-    names (m,): of the coordinates; motors: where the joints are among them (a slice without extras); model: Pinocchio's
-    model up to the frame ``flange``, None where there is no Pinocchio.  Raises ValueError where ``extras`` names a
-    coordinate that is not there.
+    names (m,): of the coordinates; motors: where the joints are among them (a slice without extras).  Raises ValueError
+    where ``extras`` names a coordinate that is not there.
     """
 
     def __init__(self, joints: Sequence[Joint], flange: Poses, extras: Iterable[str] = ()) -> None:
         wanted = set(extras)
-        self.model: Any = None if pin is None else pin.Model()
         self._at = Poses.identity()
-        self._parent = 0
         self._arm: list[tuple[Floats, Floats, bool]] = []
         names: list[str] = []
         motors: list[int] = []
         names += self._site("base", wanted)
         for joint in joints:
             if f"{joint.name}.growth" in wanted:
-                self._add(f"{joint.name}.growth", _z_along(joint.placement.position), turns=False)
+                self._add(_z_along(joint.placement.position), turns=False)
                 names.append(f"{joint.name}.growth")
             self._at = self._at @ joint.placement
             names += self._site(joint.name, wanted)
             motors.append(len(names))
             names.append(joint.name)
-            self._add(joint.name, np.eye(3), joint.kind == "revolute")
-        tip = self._at @ flange
-        self.flange_id = 0
-        if self.model is not None:
-            frame = pin.Frame("flange", self._parent, 0, _se3(tip), pin.FrameType.OP_FRAME)
-            self.flange_id = self.model.addFrame(frame)
-        self._tip = tip
+            self._add(np.eye(3), joint.kind == "revolute")
+        self._tip = self._at @ flange
         self._tool = [name for name in (f"tool.{axis}" for axis in _SIX) if name in wanted]
         self._spindle = [name for name in ("spindle.x", "spindle.y", "spindle.z") if name in wanted]
         self.names = (*names, *self._tool, *self._spindle)
@@ -164,21 +151,33 @@ class Chain:
         names = []
         for axis, word in enumerate(_SIX):
             if f"{site}.{word}" in wanted:
-                self._add(f"{site}.{word}", _Z_ALONG[axis % 3], turns=axis >= 3)
+                self._add(_Z_ALONG[axis % 3], turns=axis >= 3)
                 names.append(f"{site}.{word}")
         return names
 
-    def _add(self, name: str, axes: Floats, turns: bool) -> None:
+    def _add(self, axes: Floats, turns: bool) -> None:
         """A coordinate about or along the z column of ``axes``; what follows is in the axes before it."""
         placement = self._at @ Poses(axes, np.zeros(3))
-        rotation, translation = placement.rotation, placement.position
-        if self.model is not None:
-            joint = pin.JointModelRZ() if turns else pin.JointModelPZ()
-            self._parent = self.model.addJoint(self._parent, joint, _se3(placement), name)
-            described = self.model.jointPlacements[self._parent]
-            rotation, translation = described.rotation, described.translation
-        self._arm.append((rotation.copy(), translation.copy(), turns))
+        self._arm.append((placement.rotation.copy(), placement.position.copy(), turns))
         self._at = Poses(axes.T, np.zeros(3))
+
+    @cached_property
+    def model(self) -> Any:
+        """Pinocchio's model of the coordinates up to the frame ``flange``.  Raises ImportError without Pinocchio."""
+        import pinocchio as pin
+
+        model, parent = pin.Model(), 0
+        for name, (rotation, translation, turns) in zip(self.names, self._arm, strict=False):
+            joint = pin.JointModelRZ() if turns else pin.JointModelPZ()
+            parent = model.addJoint(parent, joint, pin.SE3(rotation, translation), name)
+        tip = pin.SE3(np.array(self._tip.rotation), np.array(self._tip.position))
+        model.addFrame(pin.Frame("flange", parent, 0, tip, pin.FrameType.OP_FRAME))
+        return model
+
+    @property
+    def flange_id(self) -> int:
+        """Of the frame ``flange`` in ``model``."""
+        return int(self.model.getFrameId("flange"))
 
     def evaluate(self, coordinates: Floats, tool: Poses, spindle: Floats | None = None) -> ChainKinematics:
         """Evaluate at ``coordinates`` (m, N) [rad, m].
@@ -389,7 +388,3 @@ def _z_along(direction: Floats) -> Floats:
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
     x /= np.linalg.norm(x)
     return np.stack([x, np.cross(z, x), z], axis=1)
-
-
-def _se3(pose: Poses) -> Any:
-    return pin.SE3(np.array(pose.rotation), np.array(pose.position))
