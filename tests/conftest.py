@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-import valid_results  # noqa: F401  before what it checks
+import valid_results  # before what it checks
 from tiers import choose_profile, mark_samples
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is there
@@ -31,6 +31,20 @@ def pytest_configure(config):
 @pytest.hookimpl(tryfirst=True)  # before the marks are asked for
 def pytest_collection_modifyitems(items):
     mark_samples(items)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item):
+    """What other processes of a test printed or wrote as a result is what its schema says."""
+    with valid_results.printed_results() as printed:
+        outcome = yield
+    folder = item.funcargs.get("tmp_path")
+    files = [] if folder is None else sorted(Path(folder).rglob("*.json"))
+    faults = [fault for text in printed for fault in valid_results.faults_of_text(text)]
+    for path in files[: valid_results.MOST_FILES]:
+        faults += [f"{path.name}: {fault}" for fault in valid_results.faults_of_file(path)]
+    assert not faults, "\n".join(faults)
+    return outcome
 
 
 CELL = """\

@@ -49,6 +49,7 @@ RUNS = {
     "engage": ["engage", "part.ngc"],
     "learn": ["learn", "part.src", "part1.csv"],
     "batch": ["batch", ".", "--force", "-j", "1"],
+    "watch": ["watch", ".", "--force", "--once", "--settle", "0"],
     "robots": ["robots"],
     "robots, one": ["robots", "kr270_shop.yaml"],
 }  # fmt: skip

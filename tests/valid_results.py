@@ -1,4 +1,5 @@
-"""Every result that a test makes in this process is held against the schema that ``compensate schema`` prints.
+"""Every result that a test makes is held against the schema that ``compensate schema`` prints: in this process as it is
+made, of other processes what they print and what they write into the folder of the test.
 
 It is imported before anything that imports ``complete_result``, which all results pass through.
 """
@@ -6,7 +7,11 @@ It is imported before anything that imports ``complete_result``, which all resul
 from __future__ import annotations
 
 import json
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache, wraps
+from pathlib import Path
 
 from postproc.report import result_keys
 
@@ -21,6 +26,53 @@ def checked(command, result):
     faults = faults_of(json.loads(json.dumps(whole)))
     assert not faults, f"a result of {command} is not what its schema says: {'; '.join(faults)}"
     return whole
+
+
+MOST_FILES = 50
+"""JSON files of a test that are looked at."""
+
+
+@contextmanager
+def printed_results() -> Iterator[list[str | bytes]]:
+    """What processes print that ``subprocess.run`` starts meanwhile."""
+    printed, real = [], subprocess.run
+
+    def run(*words, **options):
+        done = real(*words, **options)
+        if done.returncode in (0, 1, 3) and done.stdout:
+            printed.append(done.stdout)
+        return done
+
+    subprocess.run = run
+    try:
+        yield printed
+    finally:
+        subprocess.run = real
+
+
+def faults_of_text(text: str | bytes) -> list[str]:
+    """Of a result, or of lines that are results; nothing of any other text."""
+    text = text.decode("utf-8", "replace") if isinstance(text, bytes) else text
+    if '"schema_version"' not in text or text[0] != "{":
+        return []
+    for parts in ([text], text.splitlines()):
+        try:
+            results = [json.loads(part) for part in parts]
+        except json.JSONDecodeError:
+            continue
+        return [fault for one in results if _is_result(one) for fault in faults_of(one)]
+    return []
+
+
+def faults_of_file(path: Path) -> list[str]:
+    try:
+        return faults_of_text(path.read_bytes()) if path.stat().st_size else []
+    except OSError:
+        return []
+
+
+def _is_result(value: object) -> bool:
+    return isinstance(value, dict) and "schema_version" in value and value.get("command") in _validators()
 
 
 def faults_of(result):

@@ -20,6 +20,7 @@ RESULTS = (
     "diagnose",
     "learn",
     "batch",
+    "watch",
     "robots",
     "corrections",
 )

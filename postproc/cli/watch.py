@@ -80,6 +80,7 @@ def watch(
     from postproc.batching.hot_folder import HotFolder
     from postproc.batching.job_file import options_of_words
     from postproc.report.batched import RANKS
+    from postproc.report.result_keys import complete_result
 
     if json_to not in (None, "-"):
         raise click.UsageError("--json accepts only - here: one line is written for each program")
@@ -105,7 +106,7 @@ def watch(
         nonlocal worst
         worst = max(worst, outcome.exit, key=RANKS.index)
         if json_to == "-":
-            click.echo(json.dumps(outcome.as_json()))
+            click.echo(json.dumps(complete_result("watch", outcome.as_json())))
         elif not out.quiet:
             click.echo(f"{time.strftime('%H:%M:%S')} {_line(outcome)}")
 

@@ -25,6 +25,7 @@ from postproc.schemas.program_results import (
     predict_schema,
     report_schema,
     verify_schema,
+    watch_schema,
 )
 from postproc.schemas.robot_schema import robot_schema
 from postproc.schemas.robots_schema import robots_schema
@@ -45,6 +46,7 @@ RESULT_SCHEMAS: dict[str, Callable[[], Schema]] = {
     "diagnose": diagnose_schema,
     "learn": learn_schema,
     "batch": batch_schema,
+    "watch": watch_schema,
     "robots": robots_schema,
     "corrections": corrections_schema,
 }

@@ -299,20 +299,30 @@ def verify_schema() -> Schema:
     )
 
 
+_OF_SEVERAL = {
+    "name": word("path of the program in the folder of the batch"),
+    "state": word("state of the program", STATES),
+    **{key: _PROGRAM[key] for key in WORDS_OF_SUMMARY},
+}
+_ONLY_SOME = [
+    key for key in _OF_SEVERAL if key not in ("name", "state", "program", "findings", "outputs", "exit")
+]
+"""Keys of one of several programs that a failed one has not."""
+
+
+def watch_schema() -> Schema:
+    about = "one program of a folder that is watched; each is one line; of a failed one only some keys"
+    return result("watch", about, _OF_SEVERAL, optional=_ONLY_SOME)
+
+
 def batch_schema() -> Schema:
-    one = {
-        "name": word("path of the program in the folder of the batch"),
-        "state": word("state of the program", STATES),
-        **{key: _PROGRAM[key] for key in WORDS_OF_SUMMARY},
-    }
-    always = ("name", "state", "program", "findings", "outputs", "exit")
     return result(
         "batch",
         f"many programs; also summary.json in the folder of the results ({FOLDER})",
         {
             **{state.replace(" ", "_"): integer(f"programs {state}") for state in STATES},
             "programs": array(
-                record(one, "one program", optional=[key for key in one if key not in always]),
+                record(_OF_SEVERAL, "one program", optional=_ONLY_SOME),
                 "programs, in the order of the batch; of a failed one only some keys",
             ),
             "skipped_files": array(word("path"), "files that match and are not programs"),

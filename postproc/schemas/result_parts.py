@@ -100,14 +100,16 @@ def spread(about: str, nullable: bool = False, **more: Schema) -> Schema:
     )
 
 
-def result(command: str, about: str, properties: Mapping[str, Schema]) -> Schema:
+def result(
+    command: str, about: str, properties: Mapping[str, Schema], optional: Sequence[str] = ()
+) -> Schema:
     """The schema of what a command gives with ``--json``: its result, or the rest of it where it failed."""
     envelope = {
         "schema_version": {**integer("version of the keys"), "const": SCHEMA_VERSION},
         "version": word("version of compensate"),
         "command": {"const": command, "description": "command that gives this result"},
     }
-    whole = record({**envelope, **properties}, about)
+    whole = record({**envelope, **properties}, about, optional=optional)
     for place, names in FORMER_KEYS.get(command, {}).items():
         for holder in _holders(whole, place.split(".") if place else []):
             for former, present in names.items():
