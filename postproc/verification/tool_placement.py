@@ -223,7 +223,7 @@ class _Solution:
         below, above = at.copy(), at + 1
         one, two = np.full(len(at), np.nan), np.full(len(at), np.nan)
         enclosed = np.zeros(len(at), bool)
-        for wider in (0, 1, 2, 4, 8):
+        for wider in (0, 1, 2, 4, 8, 16, 32):
             some = np.flatnonzero(~enclosed)
             if not len(some):
                 break
