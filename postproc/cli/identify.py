@@ -22,7 +22,7 @@ FEWEST_DRAWS = 20
 
 
 def split_words(_context: click.Context, _option: click.Parameter, text: str) -> tuple[str, ...]:
-    """``a,b.c`` as its words."""
+    """``a,b.c`` as its words.  Raises BadParameter for an empty word and for one that comes twice."""
     words = tuple(word.strip() for word in text.split(","))
     if not all(words):
         raise click.BadParameter(f"{text[:40]!r} contains an empty name; write effect,effect.parameter")

@@ -288,7 +288,7 @@ def _blocks(mapped: Mapped) -> list[tuple[str, Floats, int]]:
 
 
 def fixed_decimals(values: Floats, decimals: int) -> list[str]:
-    """Fixed decimals, empty for what is not known, no minus zero."""
+    """(N,) ``values`` in fixed decimals, empty for what is not known, no minus zero."""
     rounded = np.round(values, decimals) + 0.0
     return ["" if value != value else f"{value:.{decimals}f}" for value in rounded.tolist()]
 
