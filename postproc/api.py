@@ -255,6 +255,8 @@ def place(
     cell: PathLike | None = None,
     robot: str | None = None,
     output: PathLike | None = None,
+    spin: bool = False,
+    spin_output: PathLike | None = None,
     picture: PathLike | None = None,
     page: PathLike | None = None,
     config_dat: PathLike | None = None,
@@ -267,7 +269,8 @@ def place(
     tool_turn: of part and tool against the present, deg; track: of the linear track, mm; None: as ``room`` of the cell
     states, or as it is; objective: what is small at a good place; direction: interval of the forces' direction over
     which it is averaged, deg [the cell's]; limit_margin, singularity_margin: deg; top: places to list; output: the new
-    cell file.  Raises ValueError for ranges that do not ascend.
+    cell file; spin: what turning the tool about its spindle along the path brings; spin_output: folder for the programs
+    that do.  Raises ValueError for ranges that do not ascend.
 
     >>> import postproc
     >>> sample = "samples/kr270_taught/taught.src"
@@ -299,6 +302,8 @@ def place(
             config_dat=_path(config_dat),
             tare=tare,
             output=_path(output),
+            spin=spin,
+            spin_output=_path(spin_output),
             picture=_path(picture),
             page=_path(page),
             strict=strict,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import product
 from pathlib import Path
 
@@ -114,3 +115,17 @@ class Brute:
                 break
             best = min(best, self.values(places[at], np.arange(count))[1])
         return best, len(places)
+
+
+def soft_wrist(folder: Path, joints: str = "5") -> Path:
+    """The milling sample on a robot whose wrist ``joints`` give way 20 times as much: there the tool's turn matters."""
+    for name in ("bracket.src", "milling.yaml"):
+        (folder / name).write_bytes((ROOT / "samples" / "kr270_milling" / name).read_bytes())
+    cell = (ROOT / "samples" / "kr270_milling" / "cell.yaml").read_text()
+    (folder / "cell.yaml").write_text(cell.replace("robot: kuka_kr270", "robot: soft.yaml", 1))
+    text = (ROOT / "robots" / "kuka_kr270.yaml").read_text()
+    words = rf"(c[{joints}]: \{{value: )([\d.]+)e-6"
+    soft = re.sub(words, lambda found: f"{found[1]}{20 * float(found[2]):.3f}e-6", text)
+    assert soft != text
+    (folder / "soft.yaml").write_text(re.sub(r", ci: [^,]*, ci_level: unstated", "", soft))
+    return folder / "bracket.src"

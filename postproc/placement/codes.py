@@ -102,5 +102,29 @@ CODES = define(
             action="State force_ci95 in the cell, or `ci` in the robot file, or use another --objective.",
             example="--objective uncertainty with a robot file without `ci`.",
         ),
+        "PLC013": Code(
+            "error",
+            "tool cannot be turned along the program",
+            meaning="The text states no turn of the tool about its spindle that could be another one.",
+            consequence="--spin has nothing to rewrite.",
+            action="Omit --spin; a constant turn of the tool frame (--tool-turn) needs no edit of the program.",
+            example="G-code of three axes, or tool vectors, which state a direction alone.",
+        ),
+        "PLC014": Code(
+            "warning",
+            "turned programs are not written",
+            meaning="A turn of the tool along the path is worth it, or is not, but its programs are not written.",
+            consequence="The programs stay as they are.",
+            action="See the message.",
+            example="A force that is stated in the tool frame: it would turn with the tool, the real one does not.",
+        ),
+        "PLC015": Code(
+            "info",
+            "tool may turn along the path",
+            meaning="What a tool that turns about its spindle along the path brings, by the main job's own prediction.",
+            consequence="The programs are rewritten only where --spin-output names a folder.",
+            action="Write them if the gain is worth a longer motion of the wrist.",
+            example="A gain of 8 % by 90 deg over a path of 2 m.",
+        ),
     }
 )

@@ -16,6 +16,8 @@ from postproc.base.arrays import Floats
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.placement.room import FREEDOMS, UNITS, Room
+from postproc.report.placement_spin import WORTH as SPIN_WORTH
+from postproc.report.placement_spin import SpinFigures, spin_sentence
 from postproc.report.report import Spread
 from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
@@ -124,7 +126,8 @@ class Placement(Result):
     checked: places on the paths that the search compared by, and that all listed placements were checked on; margins
     [deg] from limits and singularities; direction [deg]: half width over which the force's direction was averaged;
     spin [m]: the least that the objective could become if the tool turned about its spindle along the path, NaN where
-    that is not asked for."""
+    that is not asked for; spun: what such a turn brings, None where that is not asked for.  Where only the tool may
+    turn there are no places, and the best one is the present."""
 
     headline = ("cell", "base", "objective", "present.score_mm", "best.score_mm", "exit")
 
@@ -135,25 +138,26 @@ class Placement(Result):
     base: int
     objective: str
     motions: int
-    looked: int
-    searched: int
     checked: int
     room: Room
     margins: tuple[float, float]
     direction: float
     present: PlacedFigures
-    places: tuple[PlacedFigures, ...]
-    alone: tuple[SingleFreedom, ...]
-    feed: tuple[FeedTurn, ...]
-    spin: float
-    grid: ScoreGrid | None
+    looked: int = 0
+    searched: int = 0
+    places: tuple[PlacedFigures, ...] = ()
+    alone: tuple[SingleFreedom, ...] = ()
+    feed: tuple[FeedTurn, ...] = ()
+    spin: float = math.nan
+    spun: SpinFigures | None = None
+    grid: ScoreGrid | None = None
     findings: tuple[Finding, ...] = ()
     outputs: tuple[str, ...] = ()
     exit: int = 0
 
     @property
     def best(self) -> PlacedFigures:
-        return self.places[0]
+        return self.places[0] if self.places else self.present
 
     @property
     def reduction(self) -> float:
@@ -203,6 +207,7 @@ class Placement(Result):
                 for one in self.feed
             ],
             "spin_bound_mm": _mm(self.spin),
+            "spin": None if self.spun is None else self.spun.as_json(),
             "findings": [finding.as_json() for finding in self.findings],
             "outputs": list(self.outputs),
             "exit": self.exit,
@@ -251,6 +256,8 @@ def show_placement(console: Console, done: Placement, verbose: bool = False) -> 
 def verdict(done: Placement) -> str:
     """One sentence: from where to where, and what it brings."""
     here, best = (one.figure(done.objective) / MM for one in (done.present, done.best))
+    if not done.places:
+        return f"{OBJECTIVE_WORDS[done.objective]} {here:.3f} mm at the present place"
     if math.isnan(here):
         return f"{OBJECTIVE_WORDS[done.objective]} {best:.3f} mm at the best place; the present one cannot be predicted"
     share = f"{done.reduction:.0%} less" if done.reduction > 0 else "no better"
@@ -270,23 +277,20 @@ def facts(done: Placement) -> Iterator[tuple[str, str]]:
     yield "programs", escape(", ".join(done.programs)) + f", {done.motions} motions"
     yield "robot", escape(done.robot)
     yield "part", escape(f"base {done.base} of {done.cell}")
-    yield (
-        "room",
-        ", ".join(_range(done.room, i) for i in done.room.free)
-        + (
-            f", inside a polygon of {len(done.room.polygon)} corners" if done.room.polygon is not None else ""
-        ),
+    inside = (
+        f", inside a polygon of {len(done.room.polygon)} corners" if done.room.polygon is not None else ""
     )
+    ranges = ", ".join(_range(done.room, i) for i in done.room.free)
+    yield "room", f"{ranges}{inside}" if ranges else "the part stays where it is"
     yield (
         "margins",
         f"{done.margins[0]:g} deg from axis limits, {done.margins[1]:g} deg from singularities",
     )
     averaged = f", averaged over force directions within {done.direction:g} deg" if done.direction else ""
     yield "objective", OBJECTIVE_WORDS[done.objective] + averaged
-    yield (
-        "search",
-        f"{done.looked} placements by {done.searched} places of the paths; the listed ones on all {done.checked}",
-    )
+    if done.places:
+        words = f"{done.looked} placements by {done.searched} places of the paths"
+        yield "search", f"{words}; the listed ones on all {done.checked}"
     if words := spin_words(done):
         yield "tool turn", words
     yield "result", verdict(done)
@@ -359,9 +363,11 @@ def _feed(done: Placement) -> Table:
 
 def spin_words(done: Placement) -> str:
     """What turning the tool about its spindle along the path could bring at the best place; "" where not asked for."""
+    if done.spun is not None:
+        return spin_sentence(done.spun)
     if math.isnan(done.spin):
         return ""
-    if not math.isfinite(done.spin) or done.spin > WORTH * done.best.score:
+    if not math.isfinite(done.spin) or done.spin > SPIN_WORTH * done.best.score:
         return "a tool that turns about its spindle along the path is not worth it"
     least, now = done.spin / MM, done.best.score / MM
     return (

@@ -65,6 +65,23 @@ def place_schema() -> Schema:
         },
         "one cut",
     )
+    spin = record(
+        {
+            "worth": boolean("whether turning the tool along the path is worth it"),
+            "reason": word('why it is not, ""'),
+            "before_mm": quantity("mm", "objective with the tool as it is, by the main job", nullable=True),
+            "after_mm": quantity("mm", "objective with the tool turned, by the main job", nullable=True),
+            "bound_mm": quantity("mm", "least that any turn could leave, by the linear model", nullable=True),
+            "gain": quantity("1", "share of the objective that the turn takes away", nullable=True),
+            "error_mm": spread("predicted error with the tool turned"),
+            "turn_deg": array(quantity("deg", "turn"), "least and largest"),
+            "deg_per_mm": quantity("deg/mm", "fastest turn along the path", nullable=True),
+            "deg_per_s": quantity("deg/s", "fastest turn at the stated feeds", nullable=True),
+            "motions": integer("motions whose orientation changes"),
+        },
+        "a tool that turns about its spindle along the path",
+        nullable=True,
+    )
     return result(
         "place",
         "where a part should lie",
@@ -99,6 +116,7 @@ def place_schema() -> Schema:
                 "least that the objective could become with a tool that turns about its spindle along the path",
                 nullable=True,
             ),
+            "spin": spin,
             **ENDING,
         },
     )

@@ -15,11 +15,13 @@ from postproc.placement.room import FREEDOMS, UNITS
 from postproc.placement.score_places import score_places
 from postproc.placement.search_places import SearchResult, distinct, search_places
 from postproc.report.placement import PlacedFigures, Placement
+from postproc.report.placement_spin import spin_sentence
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.workflows.place_cell import refuse_same_file
 from postproc.workflows.place_compare import compare_freedoms, feed_turns, regret_of, score_grid, spin_bound
 from postproc.workflows.place_exact import exact_figures
 from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, place_problem, stated_direction
+from postproc.workflows.place_spin import SpunPrograms, spin_programs
 from postproc.workflows.preparation import Stage, silent
 
 POOL = 1500
@@ -38,7 +40,14 @@ def place(request: PlaceRequest, stage: Stage = silent) -> Placement:
 
 def _place(request: PlaceRequest, inputs: Inputs, stage: Stage) -> Placement:
     stage("reading")
+    if request.spin_output is not None and not request.spin:
+        message = "a folder for programs with a turned tool is named, and no turn is asked for"
+        raise Refusal(Finding("PLC003", message, str(request.programs[0]), help="add --spin"))
     problem = place_problem(request)
+    if request.spin_output is not None:
+        _refuse_unplaced(problem)
+    if not len(problem.room.free):
+        return _spun_here(problem, inputs, stage)
     result = search_places(problem.model, problem.motions, problem.room, problem.scoring, stage)
     stage("predicting the best places")
     problem = replace(problem, few=result.few)
@@ -49,29 +58,77 @@ def _place(request: PlaceRequest, inputs: Inputs, stage: Stage) -> Placement:
     best = ranked[0]
     stage("comparing freedoms")
     findings = [*lost, *_findings(problem, present, best, dropped)]
-    done = Placement(
-        programs=tuple(str(path) for path in request.programs),
-        robot=problem.prepared[0].robot.name,
-        digest=problem.prepared[0].robot.digest,
-        cell=str(problem.moved.cell.path),
-        base=problem.moved.base,
-        objective=request.objective,
-        motions=sum(len(one.task.toolpath) for one in problem.prepared),
+    done = replace(
+        _whole(problem, present),
         looked=result.looked,
         searched=len(result.few),
-        checked=len(problem.motions),
-        room=problem.room,
-        margins=(request.limit_margin, request.singularity_margin),
-        direction=stated_direction(problem.prepared[0], request),
-        present=present,
         places=tuple(ranked),
         alone=compare_freedoms(problem),
         feed=feed_turns(problem, best.place),
         spin=spin_bound(problem, best.place),
         grid=score_grid(problem, best.place),
-        findings=tuple(in_order_of_place(findings)),
+        findings=tuple(findings),
     )
-    return _written(problem, done, inputs)
+    return _written(problem, *_spun(problem, done, stage), inputs)
+
+
+def _whole(problem: PlaceProblem, present: PlacedFigures) -> Placement:
+    """What is known of a placement before any place was looked for."""
+    request, prepared = problem.request, problem.prepared
+    return Placement(
+        programs=tuple(str(path) for path in request.programs),
+        robot=prepared[0].robot.name,
+        digest=prepared[0].robot.digest,
+        cell=str(problem.moved.cell.path),
+        base=problem.moved.base,
+        objective=request.objective,
+        motions=sum(len(one.task.toolpath) for one in prepared),
+        checked=len(problem.motions),
+        room=problem.room,
+        margins=(request.limit_margin, request.singularity_margin),
+        direction=stated_direction(prepared[0], request),
+        present=present,
+    )
+
+
+def _refuse_unplaced(problem: PlaceProblem) -> None:
+    """Raises Refusal PLC003 where turned programs would be written for a place that no cell file states."""
+    request = problem.request
+    if len(problem.room.free) and request.output is None:
+        message = "programs with a turned tool would be written for a place that no cell file states"
+        help = "write the cell as well, with -o CELL.yaml"
+        raise Refusal(Finding("PLC003", message, str(request.programs[0]), help=help))
+
+
+def _spun_here(problem: PlaceProblem, inputs: Inputs, stage: Stage) -> Placement:
+    """The result where only the tool may turn along the path, and the part stays."""
+    place = problem.room.present
+    stage("predicting the present place")
+    present = exact_figures(problem, None)
+    assert isinstance(present, PlacedFigures)
+    score = score_places(problem.model, problem.motions, problem.room, problem.scoring, place[None])
+    present = replace(present, score=float(score.values[0].mean()))
+    findings = [Finding("PLC001", "collisions are not checked", str(problem.request.programs[0]))]
+    done = replace(_whole(problem, present), feed=feed_turns(problem, place), findings=tuple(findings))
+    return _written(problem, *_spun(problem, done, stage), inputs)
+
+
+def _spun(problem: PlaceProblem, done: Placement, stage: Stage) -> tuple[Placement, SpunPrograms | None]:
+    """``done`` with what a tool that turns along the path brings at its best place, and the programs."""
+    request = problem.request
+    if not request.spin:
+        return done, None
+    stage("turning the tool along the path")
+    spun = spin_programs(problem, done.best.place)
+    file = str(request.programs[0])
+    findings = list(done.findings)
+    if spun.figures.worth:
+        findings.append(Finding("PLC015", spin_sentence(spun.figures), file))
+    if request.spin_output is not None and spun.unwritable is not None:
+        findings.append(spun.unwritable)
+    elif request.spin_output is not None and not spun.texts:
+        findings.append(Finding("PLC014", f"no program is written: {spin_sentence(spun.figures)}", file))
+    return replace(done, spun=spun.figures, findings=tuple(findings)), spun
 
 
 def _present(problem: PlaceProblem) -> tuple[PlacedFigures, list[Finding]]:
@@ -184,17 +241,21 @@ def _findings(
     return found
 
 
-def _written(problem: PlaceProblem, done: Placement, inputs: Inputs) -> Placement:
-    """Writes cell file, picture, page and result together."""
+def _written(problem: PlaceProblem, done: Placement, spun: SpunPrograms | None, inputs: Inputs) -> Placement:
+    """Writes cell file, turned programs, picture, page and result together."""
     request = problem.request
+    done = replace(done, findings=tuple(in_order_of_place(done.findings)))
     done = replace(done, exit=exit_code(done.findings, request.strict))
     if done.exit == 1:
         raise Refusal(*done.findings)
     files: dict[Path, bytes] = {}
     if request.output is not None:
         refuse_same_file(problem.moved.cell, request.output)
-        raw = problem.moved.at(done.places[0].place)
+        raw = problem.moved.at(done.best.place)
         files[request.output] = problem.moved.in_folder(raw, request.output)
+    if request.spin_output is not None and spun is not None and spun.unwritable is None:
+        for path, text in spun.texts.items():
+            files[request.spin_output / path.name] = text
     if request.picture is not None:
         from postproc.report.placement_picture import placement_picture
 
@@ -209,7 +270,14 @@ def _written(problem: PlaceProblem, done: Placement, inputs: Inputs) -> Placemen
         files[request.page] = placement_page(done, beside(request.page, links))
     if request.json is not None:
         files[request.json] = json_bytes(done)
-    inputs.refuse_outputs(names)
-    inputs.refuse_changed()
-    write_atomically(files, still=inputs.refuse_changed)
+    read = [inputs, *(one.inputs for one in problem.prepared)]
+    for one in read:
+        one.refuse_outputs(names)
+
+    def refuse_changed() -> None:
+        for one in read:
+            one.refuse_changed()
+
+    refuse_changed()
+    write_atomically(files, still=refuse_changed)
     return done

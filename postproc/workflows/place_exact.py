@@ -28,16 +28,22 @@ def exact_figures(problem: PlaceProblem, place: Floats | None) -> PlacedFigures 
     request = problem.request
     try:
         prepared = problem.prepared if place is None else prepared_at(problem.moved, place, request)
-        margins = _margins(prepared)
-        if place is not None:
-            for ready in prepared:
-                _check(ready, request)
-        figures = _figures(prepared)
+        figures = figures_of(prepared, None if place is None else request)
     except Refusal as refusal:
         if place is None:
             raise
         return refusal.findings[0]
-    return replace(figures, place=problem.room.present if place is None else place, **margins)
+    return replace(figures, place=problem.room.present if place is None else place)
+
+
+def figures_of(prepared: Sequence[Prepared], request: PlaceRequest | None) -> PlacedFigures:
+    """The figures of the main job, without their place; ``request``: whose margins every motion must keep, None for
+    any.  Raises Refusal as the main job does, PLC002 for a motion that is not feasible."""
+    margins = _margins(prepared)
+    if request is not None:
+        for ready in prepared:
+            _check(ready, request)
+    return replace(_figures(prepared), **margins)
 
 
 def _margins(prepared: Sequence[Prepared]) -> dict[str, Any]:

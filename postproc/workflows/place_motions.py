@@ -152,6 +152,8 @@ def build_motions(ready: Prepared, base: int, turned_tools: bool, track: str | N
     return PartMotions(
         program=np.zeros(len(rows), np.int64),
         line=path.line[rows],
+        row=rows,
+        share=shares,
         target=Poses(np.ascontiguousarray(target.rotation), np.ascontiguousarray(target.position)),
         moves=moving_row[rows],
         tool=task.tool[rows],
@@ -248,7 +250,7 @@ def _tool_axes(ready: Prepared, rows: Ints, frames: Ints) -> Floats:
         if path.frames[frame].pose is not None or number is None or number not in ready.cell.tools:
             line = int(path.line[np.argmax(task.carries & (path.tool == frame))])
             message = "the program states the tool of this cut itself, so a cell file does not turn it"
-            raise Refusal(Finding("PLC003", message, task.file, line, help="omit --tool-turn"))
+            raise Refusal(Finding("PLC003", message, task.file, line, help="omit --tool-turn and --spin"))
         axes[frame] = ready.cell.tools[number].axis
     return np.asarray(axes[path.tool[rows]])
 
