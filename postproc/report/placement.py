@@ -31,6 +31,9 @@ KEYS = ("x_mm", "y_mm", "z_mm", "turn_deg", "tool_turn_deg", "track_mm")
 WORTH = 0.95
 """A turned feed is worth telling where it leaves less than this share of the error."""
 
+SHOWN_TURNS = 9
+"""Of the whole path and of operations, in the table."""
+
 CHECKED = (
     "reach, limits, singularities and configuration of every motion are checked; collisions are NOT checked"
 )
@@ -100,10 +103,11 @@ class SingleFreedom:
 
 @dataclass(frozen=True)
 class FeedTurn:
-    """What turning the feed about the vertical would change: of the whole path (``first`` 0) or of the cut in lines
-    first to last of a program; before [m], angle [rad] of the best direction, after [m]."""
+    """What turning the feed about the vertical would change: of the whole path (``first`` 0) or of an operation, in
+    lines first to last of a program; before [m], angle [rad] of the best direction, after [m]."""
 
     program: str
+    operation: str
     first: int
     last: int
     before: float
@@ -198,6 +202,7 @@ class Placement(Result):
             "feed_turns": [
                 {
                     "program": one.program,
+                    "operation": one.operation,
                     "first_line": one.first,
                     "last_line": one.last,
                     "before_mm": _mm(one.before),
@@ -350,8 +355,11 @@ def _feed(done: Placement) -> Table:
     table = Table(box=None, pad_edge=False)
     for head in ("feed direction at the best place", "turn deg", "now mm", "turned mm"):
         table.add_column(head, justify="left" if head.startswith("feed") else "right")
-    for one in done.feed:
-        what = f"lines {one.first} .. {one.last}" if one.first else "whole path"
+    for one in done.feed[:SHOWN_TURNS]:
+        lines = f"lines {one.first} .. {one.last}"
+        what = (
+            (f"{one.operation.lower()}, {lines}" if one.operation else lines) if one.first else "whole path"
+        )
         name = f"{one.program} " if one.first and len(done.programs) > 1 else ""
         if one.after > WORTH * one.before:
             table.add_row(escape(name + what), "-", f"{one.before / MM:.3f}", "not worth it")

@@ -56,14 +56,15 @@ def place_schema() -> Schema:
     )
     turn = record(
         {
-            "program": word('program of the cut, "" for the whole path'),
-            "first_line": integer("first line of the cut, 0 for the whole path"),
-            "last_line": integer("last line of the cut"),
+            "program": word('program of the operation, "" for the whole path'),
+            "operation": word('name of the operation, "" where the program states none'),
+            "first_line": integer("first line of the operation, 0 for the whole path"),
+            "last_line": integer("last line of the operation"),
             "before_mm": quantity("mm", "objective with the feed as it is", nullable=True),
             "turn_deg": quantity("deg", "best turn of the feed about the vertical"),
             "after_mm": quantity("mm", "objective with the feed turned", nullable=True),
         },
-        "one cut",
+        "one operation",
     )
     spin = record(
         {

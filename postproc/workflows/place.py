@@ -18,8 +18,9 @@ from postproc.report.placement import PlacedFigures, Placement
 from postproc.report.placement_spin import spin_sentence
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.workflows.place_cell import refuse_same_file
-from postproc.workflows.place_compare import compare_freedoms, feed_turns, regret_of, score_grid, spin_bound
+from postproc.workflows.place_compare import compare_freedoms, regret_of, score_grid, spin_bound
 from postproc.workflows.place_exact import exact_figures
+from postproc.workflows.place_feed import feed_turns
 from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, place_problem, stated_direction
 from postproc.workflows.place_spin import SpunPrograms, spin_programs
 from postproc.workflows.preparation import Stage, silent
