@@ -10,6 +10,7 @@
 __version__ = "0.3.0"
 
 __all__ = [
+    "Assignment",
     "Batched",
     "Checked",
     "Diagnosed",
@@ -24,6 +25,7 @@ __all__ = [
     "Report",
     "Verified",
     "__version__",
+    "assign",
     "batch",
     "check",
     "compensate",

@@ -118,6 +118,22 @@ CODES = define(
             action="See the message.",
             example="A force that is stated in the tool frame: it would turn with the tool, the real one does not.",
         ),
+        "PLC016": Code(
+            "error",
+            "no part fits in a place",
+            meaning="At every one of the places each part has a motion that is out of reach or too close to a limit.",
+            consequence="There is nothing to assign.",
+            action="See the messages: they name the motion and the limit of each pair.",
+            example="Three fixtures at the edge of the reach.",
+        ),
+        "PLC017": Code(
+            "warning",
+            "part has no place",
+            meaning="There are fewer places than parts, or none of those that are left is feasible for this part.",
+            consequence="The part is not in the assignment.",
+            action="See the message: it names the motion and the limit at the place that is nearest to feasible.",
+            example="Four parts and three fixtures.",
+        ),
         "PLC015": Code(
             "info",
             "tool may turn along the path",

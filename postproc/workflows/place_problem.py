@@ -36,7 +36,7 @@ class PlaceRequest:
     """What the user asked for.  ranges: freedom -> (from, to) [mm or deg]; objective: one of ``OBJECTIVES``; direction:
     half width [deg] of the interval of the forces' direction, None for the cell's; limit_margin, singularity_margin
     [deg]; output: the new cell file; spin: whether the tool may turn about its spindle along the path; spin_output:
-    folder of the programs that do."""
+    folder of the programs that do; searched: whether places are looked for, not only those that are given."""
 
     programs: tuple[Path, ...]
     force: str | None = None
@@ -57,6 +57,7 @@ class PlaceRequest:
     spin: bool = False
     spin_output: Path | None = None
     strict: bool = False
+    searched: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +199,7 @@ def _room(
     if track is not None and (lower[TRACK] < track[1] or upper[TRACK] > track[2]):
         message = f"the range of the track exceeds its limits {track[1] / MM:g} .. {track[2] / MM:g} mm"
         raise Refusal(Finding("PLC003", message, str(cell.path), help="state a range within the limits"))
-    if not (upper > lower).any() and not request.spin:
+    if request.searched and not request.spin and not (upper > lower).any():
         message = "no freedom has a range: nothing may move"
         help = (
             "use --x a:b, --y a:b, --z a:b, --turn a:b, --tool-turn a:b or --spin, or state room: in the cell"
