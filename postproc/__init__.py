@@ -10,7 +10,6 @@
 __version__ = "0.3.0"
 
 __all__ = [
-    "Assignment",
     "Batched",
     "Checked",
     "Diagnosed",
@@ -19,6 +18,7 @@ __all__ = [
     "Identified",
     "Learned",
     "Mapped",
+    "PartAssignment",
     "Placement",
     "Planned",
     "Refusal",

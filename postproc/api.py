@@ -16,7 +16,7 @@ from postproc.api_place import as_path, assign, place, stated_force
 from postproc.api_robot import diagnose, identify, map, plan
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import MM
-from postproc.report.assignment import Assignment
+from postproc.report.assignment import PartAssignment
 from postproc.report.batched import Batched
 from postproc.report.checked import Checked
 from postproc.report.diagnosed import Diagnosed
@@ -35,7 +35,6 @@ from postproc.workflows.preparation import Request
 PathLike: TypeAlias = str | os.PathLike[str]
 
 __all__ = [
-    "Assignment",
     "Batched",
     "Checked",
     "Diagnosed",
@@ -44,6 +43,7 @@ __all__ = [
     "Identified",
     "Learned",
     "Mapped",
+    "PartAssignment",
     "Placement",
     "Planned",
     "Refusal",

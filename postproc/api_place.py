@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Literal, TypeAlias
 
-from postproc.report.assignment import Assignment
+from postproc.report.assignment import PartAssignment
 from postproc.report.placement import Placement
 
 PathLike: TypeAlias = str | os.PathLike[str]
@@ -32,6 +32,7 @@ def place(
     top: int = 10,
     cell: PathLike | None = None,
     robot: str | None = None,
+    collisions: PathLike | None = None,
     output: PathLike | None = None,
     spin: bool = False,
     spin_output: PathLike | None = None,
@@ -46,7 +47,8 @@ def place(
     paths: one program, or several that share a base; x, y, z: ranges of the base's origin in $WORLD, mm; turn,
     tool_turn: of part and tool against the present, deg; track: of the linear track, mm; None: as ``room`` of the cell
     states, or as it is; objective: what is small at a good place; direction: interval of the forces' direction over
-    which it is averaged, deg [the cell's]; limit_margin, singularity_margin: deg; top: places to list; output: the new
+    which it is averaged, deg [the cell's]; limit_margin, singularity_margin: deg; collisions: URDF with
+    collision shapes; top: places to list; output: the new
     cell file; spin: what turning the tool about its spindle along the path brings; spin_output: folder for the programs
     that do.  Raises ValueError for ranges that do not ascend.
 
@@ -77,6 +79,7 @@ def place(
             top=top,
             cell=as_path(cell),
             robot=robot,
+            collisions=as_path(collisions),
             config_dat=as_path(config_dat),
             tare=tare,
             output=as_path(output),
@@ -99,16 +102,18 @@ def assign(
     singularity_margin: float = 5.0,
     cell: PathLike | None = None,
     robot: str | None = None,
+    collisions: PathLike | None = None,
     cells: PathLike | None = None,
     config_dat: PathLike | None = None,
     tare: bool = False,
     strict: bool = False,
-) -> Assignment:
+) -> PartAssignment:
     """Which part of a batch lies where, as ``compensate assign`` does.
 
     paths: the programs, each of a part; places: name -> x, y, z [mm] of the base's origin in $WORLD, and maybe the turn
     [deg] about the vertical through it against the present; objective: what is added up; limit_margin,
-    singularity_margin: deg; cells: folder for the cell files.  Raises ValueError for a place of another form.
+    singularity_margin: deg; collisions: URDF with collision shapes; cells: folder for the cell files.
+    Raises ValueError for a place of another form.
     """
     from postproc.workflows.place_parts import AssignRequest
     from postproc.workflows.place_parts import assign as run
@@ -128,6 +133,7 @@ def assign(
         singularity_margin=singularity_margin,
         cell=as_path(cell),
         robot=robot,
+        collisions=as_path(collisions),
         config_dat=as_path(config_dat),
         tare=tare,
         strict=strict,

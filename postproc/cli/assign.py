@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import FAR, ROBOT, Out, language_options, number, result_options, tare_option
+from postproc.cli.common import FAR, ROBOT, Out, ending, language_options, number, result_options, tare_option
 from postproc.cli.decimal_option import Decimal
 
 Place = tuple[float, float, float, float]
@@ -64,6 +64,13 @@ def _places(_context: click.Context, _option: click.Parameter, texts: tuple[str,
     metavar="DEG",
     help="Distance from singularities, as an angle of A5.",
 )
+@click.option(
+    "--collisions",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.urdf",
+    callback=ending(".urdf"),
+    help="Check collisions of the arm with itself and with fixed bodies by these shapes [the robot file's URDF].",
+)
 @click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cell's.")
 @language_options
 @tare_option
@@ -82,6 +89,7 @@ def assign(
     objective: str,
     limit_margin: float,
     singularity_margin: float,
+    collisions: Path | None,
     robot: str | None,
     cell: Path | None,
     config_dat: Path | None,
@@ -119,6 +127,7 @@ def assign(
         singularity_margin=singularity_margin,
         cell=cell,
         robot=robot,
+        collisions=collisions,
         config_dat=config_dat,
         tare=tare,
         json=out.json_file,

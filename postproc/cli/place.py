@@ -91,6 +91,13 @@ def _range_option(name: str, about: str) -> Callable[[_Command], _Command]:
     help="Distance from singularities, as an angle of A5.",
 )
 @click.option("--top", type=click.IntRange(1, 100), default=10, show_default=True, help="Places to list.")
+@click.option(
+    "--collisions",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.urdf",
+    callback=ending(".urdf"),
+    help="Check collisions of the arm with itself and with fixed bodies by these shapes [the robot file's URDF].",
+)
 @click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cell's.")
 @language_options
 @tare_option
@@ -137,6 +144,7 @@ def place(
     limit_margin: float,
     singularity_margin: float,
     top: int,
+    collisions: Path | None,
     robot: str | None,
     cell: Path | None,
     config_dat: Path | None,
@@ -183,6 +191,7 @@ def place(
         top=top,
         cell=cell,
         robot=robot,
+        collisions=collisions,
         config_dat=config_dat,
         tare=tare,
         output=output,

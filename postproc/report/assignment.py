@@ -14,7 +14,7 @@ from rich.text import Text
 
 from postproc.base.findings import Finding
 from postproc.base.units import MM
-from postproc.report.placement import CHECKED, OBJECTIVE_WORDS, PlacedFigures
+from postproc.report.placement import OBJECTIVE_WORDS, CheckedShapes, PlacedFigures, checked_words
 from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
 from postproc.report.terminal import show_findings, show_rows
@@ -35,9 +35,10 @@ class Pair:
 
 
 @dataclass(frozen=True, repr=False)
-class Assignment(Result):
+class PartAssignment(Result):
     """The result of ``compensate assign``.  pairs: part by part, of each all places in their order; chosen: the place
-    of each part, "" without one; margins [deg] from limits and singularities."""
+    of each part, "" without one; margins [deg] from limits and singularities; shapes: by which collisions were checked,
+    None where they were not."""
 
     headline = ("objective", "total_mm", "largest_mm", "exit")
 
@@ -47,6 +48,7 @@ class Assignment(Result):
     pairs: tuple[Pair, ...]
     chosen: tuple[str, ...]
     margins: tuple[float, float]
+    shapes: CheckedShapes | None = None
     findings: tuple[Finding, ...] = ()
     outputs: tuple[str, ...] = ()
     exit: int = 0
@@ -67,7 +69,7 @@ class Assignment(Result):
             "programs": list(self.programs),
             "places": list(self.places),
             "objective": self.objective,
-            "collisions_checked": False,
+            "collisions_checked": self.shapes is not None,
             "limit_margin_deg": self.margins[0],
             "singularity_margin_deg": self.margins[1],
             "assignment": [
@@ -104,9 +106,9 @@ class Assignment(Result):
         }
 
 
-def show_assignment(console: Console, done: Assignment, verbose: bool = False) -> None:
+def show_assignment(console: Console, done: PartAssignment, verbose: bool = False) -> None:
     """What was checked, the objective of every pair with the chosen ones marked, what is not feasible, and findings."""
-    console.print(Text(CHECKED, style="bold"), soft_wrap=True)
+    console.print(Text(checked_words(done.shapes), style="bold"), soft_wrap=True)
     total, largest = sum(done.values) / MM, max(done.values) / MM
     rows = [
         ("objective", OBJECTIVE_WORDS[done.objective]),
@@ -134,7 +136,7 @@ def show_assignment(console: Console, done: Assignment, verbose: bool = False) -
         console.print(Text(f"wrote {path}"), soft_wrap=True)
 
 
-def _cell(pair: Pair, done: Assignment) -> str:
+def _cell(pair: Pair, done: PartAssignment) -> str:
     if pair.figures is None:
         return "-"
     mark = " *" if done.chosen[pair.part] == pair.place else "  "

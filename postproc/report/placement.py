@@ -39,6 +39,36 @@ CHECKED = (
 )
 
 
+@dataclass(frozen=True)
+class CheckedShapes:
+    """What collisions were checked by: file of the URDF, links that move and that stand still, and pairs that touch
+    before the program starts and were not checked."""
+
+    file: str
+    moving: tuple[str, ...]
+    fixed: tuple[str, ...]
+    ignored: tuple[tuple[str, str], ...] = ()
+
+    def as_json(self) -> dict[str, object]:
+        return {
+            "file": self.file,
+            "moving": list(self.moving),
+            "fixed": list(self.fixed),
+            "ignored": [list(pair) for pair in self.ignored],
+        }
+
+
+def checked_words(shapes: CheckedShapes | None) -> str:
+    """The first line of the result: what was checked, and what was not."""
+    if shapes is None:
+        return CHECKED
+    fixed = f" and with {', '.join(shapes.fixed)}" if shapes.fixed else ""
+    return (
+        "reach, limits, singularities and configuration of every motion are checked, and collisions of the arm with"
+        f" itself{fixed} by the shapes of {shapes.file}; collisions with part and fixtures are NOT checked"
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class PlacedFigures:
     """One place: place (6,) in the order of ``FREEDOMS`` [m, rad]; score [m]: the objective by the linear model on all
@@ -131,7 +161,8 @@ class Placement(Result):
     [deg] from limits and singularities; direction [deg]: half width over which the force's direction was averaged;
     spin [m]: the least that the objective could become if the tool turned about its spindle along the path, NaN where
     that is not asked for; spun: what such a turn brings, None where that is not asked for.  Where only the tool may
-    turn there are no places, and the best one is the present."""
+    turn there are no places, and the best one is the present.  shapes: by which collisions were checked, None where
+    they were not."""
 
     headline = ("cell", "base", "objective", "present.score_mm", "best.score_mm", "exit")
 
@@ -155,6 +186,7 @@ class Placement(Result):
     spin: float = math.nan
     spun: SpinFigures | None = None
     grid: ScoreGrid | None = None
+    shapes: CheckedShapes | None = None
     findings: tuple[Finding, ...] = ()
     outputs: tuple[str, ...] = ()
     exit: int = 0
@@ -178,7 +210,8 @@ class Placement(Result):
             "cell": self.cell,
             "base": self.base,
             "objective": self.objective,
-            "collisions_checked": False,
+            "collisions_checked": self.shapes is not None,
+            "collision_shapes": None if self.shapes is None else self.shapes.as_json(),
             "motions": self.motions,
             "placements": self.looked,
             "searched_places": self.searched,
@@ -248,7 +281,7 @@ def _known(value: float, decimals: int) -> float | None:
 
 def show_placement(console: Console, done: Placement, verbose: bool = False) -> None:
     """What was checked, the ranked places, what each freedom brings alone, and findings."""
-    console.print(Text(CHECKED, style="bold"), soft_wrap=True)
+    console.print(Text(checked_words(done.shapes), style="bold"), soft_wrap=True)
     show_rows(console, facts(done))
     for table in tables(done):
         if table.row_count:

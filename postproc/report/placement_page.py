@@ -11,21 +11,21 @@ from markupsafe import Markup
 from postproc.report.page import FINDINGS, finding_rows, linked, rendered
 from postproc.report.page_results import shown
 from postproc.report.page_words import badge
-from postproc.report.placement import CHECKED, Placement, facts, tables, verdict
+from postproc.report.placement import Placement, checked_words, facts, tables, verdict
 from postproc.report.placement_picture import placement_picture
 
 
 def placement_page(done: Placement, links: Mapping[str, str]) -> bytes:
     """One page; links: what is beside it, words -> relative path."""
     drawing = placement_picture(done, "svg")
-    sentence = verdict(done)
+    sentence, checked = verdict(done), checked_words(done.shapes)
     return rendered(
         "result.html.j2",
         goes=False,
         what="placement",
         title=", ".join(Path(name).name for name in done.programs),
         verdict=f"{sentence[0].upper()}{sentence[1:]}.",
-        words=[f"{CHECKED[0].upper()}{CHECKED[1:]}."],
+        words=[f"{checked[0].upper()}{checked[1:]}."],
         badge=badge(done.exit, None),
         facts=list(facts(done)),
         tables=[one for one in map(shown, tables(done)) if one.rows],

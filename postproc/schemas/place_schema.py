@@ -93,6 +93,19 @@ def place_schema() -> Schema:
             "base": integer("number of the base that moves"),
             "objective": word("what is small at a good place", OBJECTIVES),
             "collisions_checked": boolean("whether collisions were checked"),
+            "collision_shapes": record(
+                {
+                    "file": word("URDF"),
+                    "moving": array(word("body"), "bodies of the arm"),
+                    "fixed": array(word("body"), "bodies that do not move"),
+                    "ignored": array(
+                        array(word("body"), "a pair"),
+                        "pairs that touch before the program, and are not checked",
+                    ),
+                },
+                "by which collisions were checked",
+                nullable=True,
+            ),
             "motions": integer("motions of all programs"),
             "placements": integer("placements scored"),
             "searched_places": integer("places of the paths by which the search compared"),

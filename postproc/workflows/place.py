@@ -11,6 +11,7 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import Inputs, noted
 from postproc.base.units import DEG
 from postproc.output.atomic_write import write_atomically
+from postproc.placement.collisions import CollisionShapes, colliding_rows
 from postproc.placement.room import FREEDOMS, UNITS
 from postproc.placement.score_places import score_places
 from postproc.placement.search_places import SearchResult, distinct, search_places
@@ -18,6 +19,7 @@ from postproc.report.placement import PlacedFigures, Placement
 from postproc.report.placement_spin import spin_sentence
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.workflows.place_cell import refuse_same_file
+from postproc.workflows.place_collisions import checked_shapes, shape_findings
 from postproc.workflows.place_compare import compare_freedoms, regret_of, score_grid, spin_bound
 from postproc.workflows.place_exact import exact_figures
 from postproc.workflows.place_feed import feed_turns
@@ -49,7 +51,8 @@ def _place(request: PlaceRequest, inputs: Inputs, stage: Stage) -> Placement:
         _refuse_unplaced(problem)
     if not len(problem.room.free):
         return _spun_here(problem, inputs, stage)
-    result = search_places(problem.model, problem.motions, problem.room, problem.scoring, stage)
+    shapes = problem.shapes if isinstance(problem.shapes, CollisionShapes) else None
+    result = search_places(problem.model, problem.motions, problem.room, problem.scoring, stage, shapes)
     stage("predicting the best places")
     problem = replace(problem, few=result.few)
     present, lost = _present(problem)
@@ -89,6 +92,7 @@ def _whole(problem: PlaceProblem, present: PlacedFigures) -> Placement:
         margins=(request.limit_margin, request.singularity_margin),
         direction=stated_direction(prepared[0], request),
         present=present,
+        shapes=checked_shapes(problem.shapes),
     )
 
 
@@ -109,7 +113,7 @@ def _spun_here(problem: PlaceProblem, inputs: Inputs, stage: Stage) -> Placement
     assert isinstance(present, PlacedFigures)
     score = score_places(problem.model, problem.motions, problem.room, problem.scoring, place[None])
     present = replace(present, score=float(score.values[0].mean()))
-    findings = [Finding("PLC001", "collisions are not checked", str(problem.request.programs[0]))]
+    findings = shape_findings(problem.shapes, problem.prepared)
     done = replace(_whole(problem, present), feed=feed_turns(problem, place), findings=tuple(findings))
     return _written(problem, *_spun(problem, done, stage), inputs)
 
@@ -177,9 +181,8 @@ def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding
     """PLC002: which motion and which limit is nearest to feasible; ``dropped``: why the best places are not."""
     request, room = problem.request, problem.room
     if dropped:
-        return replace(
-            dropped[0], message=f"none of {result.looked} places is feasible: {dropped[0].message}"
-        )
+        words = f"of {result.looked} places the {len(dropped)} best ones that are apart are not feasible"
+        return replace(dropped[0], message=f"{words}; of the first, {dropped[0].message}")
     near = result.pool.places[result.pool.order()[:1]]
     whole = score_places(problem.model, problem.motions, room, problem.scoring, near, detailed=True)
     assert whole.lack is not None
@@ -195,7 +198,18 @@ def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding
     where = ", ".join(
         f"{name} {near[0, i] / UNITS[i]:.1f}" for i, name in enumerate(FREEDOMS) if i in room.free
     )
-    if not np.isfinite(limit):
+    hits = (
+        colliding_rows(problem.shapes, problem.model, problem.motions, near)
+        if isinstance(problem.shapes, CollisionShapes) and not whole.lack[0].any()
+        else np.array([-1])
+    )
+    if hits[0] >= 0:
+        line, file = (
+            int(problem.motions.line[hits[0]]),
+            str(request.programs[int(problem.motions.program[hits[0]])]),
+        )
+        what = "collides"
+    elif not np.isfinite(limit):
         what = "is out of reach"
     elif limit < request.limit_margin:
         what = f"is {limit:.1f} deg from the limit of an axis (margin {request.limit_margin:g} deg)"
@@ -215,7 +229,7 @@ def _findings(
     problem: PlaceProblem, present: PlacedFigures, best: PlacedFigures, dropped: list[Finding]
 ) -> list[Finding]:
     request, cell = problem.request, str(problem.moved.cell.path)
-    found = [Finding("PLC001", "collisions are not checked", str(request.programs[0]))]
+    found = shape_findings(problem.shapes, problem.prepared)
     lacks = present.limit_deg < request.limit_margin or present.singular_deg < request.singularity_margin
     if lacks:
         message = (

@@ -31,12 +31,13 @@ MOST_INNER = 400
 @dataclass(frozen=True)
 class MotionMargins:
     """Of all places that a program leads to: limit (M,), singular (M,) [rad]: distances from the next axis limit and
-    the next singularity, -inf out of reach, and the rows (M,) they belong to; wrong (K,): rows whose configuration is
-    not the stated one."""
+    the next singularity, -inf out of reach, the rows (M,) they belong to, and the joint values q (M, n) there, 0 out
+    of reach; wrong (K,): rows whose configuration is not the stated one."""
 
     limit: Floats
     singular: Floats
     rows: Ints
+    q: Floats
     wrong: Ints
 
 
@@ -68,6 +69,7 @@ def motion_margins(task: CompensationProblem) -> MotionMargins:
         np.where(reached, room.min(axis=1), -np.inf),
         np.where(reached, singularity_angle(robot, q), -np.inf),
         every,
+        q,
         np.flatnonzero(wrong | (~track.turn_matches & placed_rows(task) & (path.kind == Kind.PTP))),
     )
 

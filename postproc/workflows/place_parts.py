@@ -14,10 +14,12 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import Inputs, noted
 from postproc.base.input_files import place as real_path
 from postproc.output.atomic_write import write_atomically
+from postproc.placement.collisions import CollisionShapes
 from postproc.placement.room import TURN, UNITS
-from postproc.report.assignment import Assignment, Pair
+from postproc.report.assignment import Pair, PartAssignment
 from postproc.report.placement import PlacedFigures
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
+from postproc.workflows.place_collisions import checked_shapes, shape_findings
 from postproc.workflows.place_exact import exact_figures
 from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, place_problem
 from postproc.workflows.preparation import Stage, silent
@@ -36,14 +38,14 @@ class AssignRequest:
     cells: Path | None = None
 
 
-def assign(request: AssignRequest, stage: Stage = silent) -> Assignment:
+def assign(request: AssignRequest, stage: Stage = silent) -> PartAssignment:
     """The assignment of parts to places with the least sum of their objectives, of the most parts that have a feasible
     place at all.  Raises Refusal, and has then written nothing."""
     with noted() as inputs:
         return _assign(request, inputs, stage)
 
 
-def _assign(request: AssignRequest, inputs: Inputs, stage: Stage) -> Assignment:
+def _assign(request: AssignRequest, inputs: Inputs, stage: Stage) -> PartAssignment:
     common = request.common
     problems = []
     for program in common.programs:
@@ -63,18 +65,20 @@ def _assign(request: AssignRequest, inputs: Inputs, stage: Stage) -> Assignment:
         lacks = [replace(pair.lack, code="PLC016") for pair in pairs if pair.lack is not None]
         raise Refusal(*lacks)
     names = list(request.places)
-    findings = [Finding("PLC001", "collisions are not checked", str(common.programs[0]))]
+    shapes = [problem.shapes for problem in problems]
+    findings = [one for problem in problems[:1] for one in shape_findings(problem.shapes, problem.prepared)]
     for k in np.flatnonzero(chosen < 0).tolist():
         findings.append(
             _without(pairs[k * count : (k + 1) * count], common.objective, str(common.programs[k]))
         )
-    done = Assignment(
+    done = PartAssignment(
         programs=tuple(str(path) for path in common.programs),
         places=tuple(names),
         objective=common.objective,
         pairs=tuple(pairs),
         chosen=tuple(names[at] if at >= 0 else "" for at in chosen.tolist()),
         margins=(common.limit_margin, common.singularity_margin),
+        shapes=checked_shapes(shapes[0]) if all(isinstance(one, CollisionShapes) for one in shapes) else None,
         findings=tuple(in_order_of_place(findings)),
     )
     return _written(request, done, problems, chosen, inputs)
@@ -116,8 +120,8 @@ def _without(pairs: list[Pair], objective: str, program: str) -> Finding:
 
 
 def _written(
-    request: AssignRequest, done: Assignment, problems: list[PlaceProblem], chosen: Ints, inputs: Inputs
-) -> Assignment:
+    request: AssignRequest, done: PartAssignment, problems: list[PlaceProblem], chosen: Ints, inputs: Inputs
+) -> PartAssignment:
     """Writes the cell files and the result together."""
     common = request.common
     done = replace(done, exit=exit_code(done.findings, common.strict))

@@ -17,6 +17,7 @@ from postproc.base.units import DEG, MM
 from postproc.compensation.uncertain_inputs import FORCE, input_uncertainties
 from postproc.effects import ComplianceLaw, Load
 from postproc.model import StiffnessModel
+from postproc.placement.collisions import CollisionShapes
 from postproc.placement.force_turns import turned_forces
 from postproc.placement.part_motions import PartMotions, join_motions
 from postproc.placement.room import FREEDOMS, TRACK, UNITS, Room
@@ -24,6 +25,7 @@ from postproc.placement.score_places import COVERAGE, UNCERTAINTY, InputSpread, 
 from postproc.process.force_sources import not_requested
 from postproc.robot.external_axes import own_column
 from postproc.workflows.place_cell import MovedCell
+from postproc.workflows.place_collisions import collision_shapes
 from postproc.workflows.place_motions import base_of_cuts, build_motions, cell_of_all, track_of
 from postproc.workflows.preparation import Prepared, Request, prepare, read_program
 
@@ -36,7 +38,8 @@ class PlaceRequest:
     """What the user asked for.  ranges: freedom -> (from, to) [mm or deg]; objective: one of ``OBJECTIVES``; direction:
     half width [deg] of the interval of the forces' direction, None for the cell's; limit_margin, singularity_margin
     [deg]; output: the new cell file; spin: whether the tool may turn about its spindle along the path; spin_output:
-    folder of the programs that do; searched: whether places are looked for, not only those that are given."""
+    folder of the programs that do; searched: whether places are looked for, not only those that are given;
+    collisions: URDF with collision shapes, None for the robot file's own."""
 
     programs: tuple[Path, ...]
     force: str | None = None
@@ -58,12 +61,14 @@ class PlaceRequest:
     spin_output: Path | None = None
     strict: bool = False
     searched: bool = True
+    collisions: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class PlaceProblem:
-    """Programs, their cell and what moves: all that places are compared by.  few (K,): the motions that the search
-    ended with."""
+    """Programs, their cell and what moves: all that places are compared by.  shapes: by which collisions are checked, a
+    Finding that states why there are none, None where no URDF is known; few (K,): the motions that the search ended
+    with."""
 
     request: PlaceRequest
     prepared: tuple[Prepared, ...]
@@ -71,6 +76,7 @@ class PlaceProblem:
     room: Room
     motions: PartMotions
     scoring: Scoring
+    shapes: CollisionShapes | Finding | None = None
     few: Ints = field(default_factory=lambda: np.empty(0, np.int64))
 
     @property
@@ -115,7 +121,8 @@ def place_problem(request: PlaceRequest) -> PlaceProblem:
         joint,
     )
     room = _room(request, prepared, motions, ranges, track)
-    return PlaceProblem(request, prepared, moved, room, motions, _scoring(request, prepared, motions))
+    shapes = collision_shapes(request.collisions, first)
+    return PlaceProblem(request, prepared, moved, room, motions, _scoring(request, prepared, motions), shapes)
 
 
 def _track(request: PlaceRequest, prepared: tuple[Prepared, ...]) -> tuple[str, float, float] | None:

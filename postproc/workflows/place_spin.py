@@ -21,7 +21,7 @@ from postproc.placement.spin import SAME, SpinScan, scan_spins
 from postproc.report.placement import PlacedFigures
 from postproc.report.placement_spin import WORTH, SpinFigures
 from postproc.toolpath import Plan
-from postproc.workflows.place_exact import figures_of
+from postproc.workflows.place_exact import figures_of, refuse_collisions
 from postproc.workflows.place_problem import PlaceProblem, prepared_at
 from postproc.workflows.place_spin_check import SHARED_POINTS, check_forces, check_turned
 from postproc.workflows.place_spin_path import (
@@ -98,6 +98,7 @@ def spin_programs(problem: PlaceProblem, place: Floats) -> SpunPrograms:
     )
     try:
         then = figures_of(after, request)
+        refuse_collisions(problem.shapes, after)
     except Refusal as refusal:
         return SpunPrograms(replace(figures, reason=refusal.findings[0].message))
     if lost := _new_findings(before, after):
