@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from place_cases import ROOT, about, program_of, soft_wrist
+from place_cases import about, program_of, soft_wrist
 from plant import Plant
 
 from postproc.base.findings import Refusal
@@ -309,6 +309,22 @@ def test_the_programs_do_not_overwrite_their_own(tmp_path):
 
 
 @pytest.mark.slow
+def test_programs_of_one_name_do_not_overwrite_each_other(tmp_path):
+    program = soft_wrist(tmp_path)
+    (tmp_path / "other").mkdir()
+    other = tmp_path / "other" / program.name
+    other.write_bytes(program.read_bytes())
+    with pytest.raises(Refusal) as refusal:
+        place(
+            PlaceRequest(
+                (program, other), "", cell=tmp_path / "cell.yaml", spin=True, spin_output=tmp_path / "turned"
+            )
+        )
+    assert refusal.value.findings[0].code == "FIL007"
+    assert not (tmp_path / "turned").exists()
+
+
+@pytest.mark.slow
 def test_the_turn_at_the_best_place(tmp_path):
     """A room, a turn at its best place, and both written: the main job finds what is stated."""
     program = soft_wrist(tmp_path)
@@ -327,4 +343,3 @@ def test_the_turn_at_the_best_place(tmp_path):
     again = spun(tmp_path / "new" / program.name, None, cell=tmp_path / "new" / "cell.yaml")
     assert again.present.across.max == pytest.approx(done.spun.after, rel=1e-9)
     assert not again.spun.worth
-    assert (ROOT / "samples").exists()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -103,9 +104,13 @@ def collisions_available() -> bool:
 def read_collision_shapes(path: Path, robot: Robot, start: Floats | None) -> CollisionShapes | Finding:
     """The collision shapes of a URDF; ``start`` (n,) [rad, m]: joint values before the program, at which pairs that
     touch are not checked further.  A Finding PLC018 says why there are none.  Raises Refusal FIL001."""
-    read_file(path)
+    raw = read_file(path)
     if not collisions_available():
         return _none(path, "Pinocchio is not installed with coal")
+    try:
+        ElementTree.fromstring(raw)
+    except ElementTree.ParseError as error:
+        return _none(path, f"the URDF cannot be read: {error}")
     import pinocchio as pin
 
     try:

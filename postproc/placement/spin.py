@@ -67,14 +67,20 @@ class SpinScan:
 
 
 def scan_spins(
-    model: StiffnessModel, motions: PartMotions, room: Room, scoring: Scoring, place: Floats
+    model: StiffnessModel,
+    motions: PartMotions,
+    room: Room,
+    scoring: Scoring,
+    place: Floats,
+    step: float = STEP,
 ) -> SpinScan:
-    """The errors and margins of all ``motions`` with the tool turned against its path, the part at ``place`` (6,).
+    """The errors and margins of all ``motions`` with the tool turned against its path, every ``step`` [rad], the part
+    at ``place`` (6,).
 
     The turns of axes are followed from the posture of now, angle by angle: an axis does not jump by a turn.
     """
-    side = round(MOST / STEP)
-    angle = np.asarray(np.arange(-side, side + 1) * STEP, float)
+    side = round(MOST / step)
+    angle = np.asarray(np.arange(-side, side + 1) * step, float)
     error = np.zeros((len(angle), len(motions)), np.float32)
     size = np.zeros_like(error)
     feasible = np.zeros((len(angle), len(motions)), np.bool_)
@@ -115,9 +121,10 @@ def plan_spin(
     error becomes larger than this; window [rad] of the moving average; spread: steps of the grid to each side of the
     turn that are to be as good.
     """
-    nodes = _Nodes.of(allowance)
+    step = float(scan.angle[1] - scan.angle[0])
+    nodes = _Nodes.of(allowance, step)
     still = len(scan.angle) // 2
-    near = _widened(allowance, pinned, 0.5 * window + STEP)
+    near = _widened(allowance, pinned, 0.5 * window + step)
     allowed = scan.feasible & (scan.error <= most)
     allowed[still] = scan.feasible[still]
     allowed &= ~near | (np.arange(len(scan.angle)) == still)[:, None]
@@ -137,21 +144,22 @@ def plan_spin(
 @dataclass(frozen=True, eq=False)
 class _Nodes:
     """Places that lie within one step of allowance: first (N,) place of each; gap (N - 1,) steps to the next one;
-    middle (N,) [rad] allowance."""
+    middle (N,) [rad] allowance; step [rad]."""
 
     first: Ints
     gap: Ints
     middle: Floats
+    step: float
 
     @staticmethod
-    def of(allowance: Floats) -> _Nodes:
-        cell = np.floor(allowance / STEP).astype(np.int64)
+    def of(allowance: Floats, step: float) -> _Nodes:
+        cell = np.floor(allowance / step).astype(np.int64)
         _, first = np.unique(cell, return_index=True)
-        return _Nodes(first, np.diff(cell[first]), np.asarray((cell[first] + 0.5) * STEP, float))
+        return _Nodes(first, np.diff(cell[first]), np.asarray((cell[first] + 0.5) * step, float), step)
 
     def smooth(self, turn: Floats, allowance: Floats, window: float) -> Floats:
         """(M,) ``turn`` (N,) at the places, averaged over ``window`` [rad] of allowance."""
-        fine = STEP / 5
+        fine = self.step / 5
         count = int(np.ceil((self.middle[-1] - self.middle[0]) / fine)) + 1
         even = self.middle[0] + np.arange(count) * fine
         averaged = uniform_filter1d(

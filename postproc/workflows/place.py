@@ -270,7 +270,10 @@ def _written(problem: PlaceProblem, done: Placement, spun: SpunPrograms | None, 
         files[request.output] = problem.moved.in_folder(raw, request.output)
     if request.spin_output is not None and spun is not None and spun.unwritable is None:
         for path, text in spun.texts.items():
-            files[request.spin_output / path.name] = text
+            target = request.spin_output / path.name
+            if target in files:
+                raise Refusal(Finding("FIL007", "two outputs have the same name", str(target)))
+            files[target] = text
     if request.picture is not None:
         from postproc.report.placement_picture import placement_picture
 

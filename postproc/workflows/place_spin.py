@@ -8,16 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Floats, Ints
 from postproc.base.document import Edits
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import product, rotation_from_vector
-from postproc.base.units import MM
+from postproc.base.units import DEG, MM
 from postproc.languages.permitted import refuse_other
 from postproc.output.write import edited_contents, writing_settings
 from postproc.placement.part_motions import PartMotions
-from postproc.placement.score_places import P95
-from postproc.placement.spin import SAME, SpinScan, scan_spins
+from postproc.placement.score_places import P95, score_places
+from postproc.placement.spin import SAME, STEP, SpinScan, scan_spins
 from postproc.report.placement import PlacedFigures
 from postproc.report.placement_spin import WORTH, SpinFigures
 from postproc.toolpath import Plan
@@ -32,6 +32,11 @@ from postproc.workflows.place_spin_path import (
     spindle_axes,
 )
 from postproc.workflows.preparation import Prepared
+
+MANY, SOME = 20_000, 1000
+"""Places on paths from which on a turn is first looked at on some motions, and how many; a coarse scan follows."""
+
+COARSE = 15 * DEG
 
 MOST_ROUNDS = 5
 """Times that a program is planned again without motions that its text cannot turn."""
@@ -60,17 +65,19 @@ def spin_programs(problem: PlaceProblem, place: Floats) -> SpunPrograms:
     paths = [spin_path(ready, own) for ready, own in zip(before, axes, strict=True)]
     for ready, path in zip(before, paths, strict=True):
         refuse_unturnable(ready, path)
-    scan = scan_spins(problem.model, motions, problem.room, problem.scoring, place)
-    still = scan.error[len(scan.angle) // 2][motions.scored]
-    least = np.where(scan.feasible, scan.error, np.inf)[:, motions.scored].min(axis=0)
-    by_p95 = request.objective == P95
-    still_value, bound = (float(np.percentile(one, 95) if by_p95 else one.max()) for one in (still, least))
-    figures = SpinFigures(now.figure(request.objective), bound=bound)
+    value = now.figure(request.objective)
+    many = len(motions) > MANY
+    # the largest error of all motions is that of some, and no turn takes more from it than from these
+    some = _some(problem, place) if many and request.objective != P95 else None
+    scan, still, bound = _scanned(problem, place, some, COARSE if many and some is None else STEP)
+    if some is not None and not bound > WORTH * still:
+        scan, still, bound = _scanned(problem, place, None, COARSE)
+    figures = SpinFigures(value, bound=bound)
     if not np.isfinite(bound):
         reason = "a motion is closer to a limit or a singularity than the margin, however the tool is turned"
         return SpunPrograms(replace(figures, reason=reason))
-    if bound > WORTH * still_value:
-        reason = f"no turn leaves less than {bound / MM:.3f} of {still_value / MM:.3f} mm"
+    if bound > WORTH * still:
+        reason = f"no turn leaves less than {bound / MM:.3f} of {still / MM:.3f} mm"
         return SpunPrograms(replace(figures, reason=reason))
     texts: dict[Path, bytes] = {}
     turns = []
@@ -109,6 +116,33 @@ def spin_programs(problem: PlaceProblem, place: Floats) -> SpunPrograms:
     if reason := _no_gain(now, then, request.objective):
         return SpunPrograms(replace(figures, reason=reason))
     return SpunPrograms(figures, texts, unwritable)
+
+
+def _scanned(
+    problem: PlaceProblem, place: Floats, rows: Ints | None, step: float
+) -> tuple[SpinScan, float, float]:
+    """The scan of the motions ``rows`` (K,), of all without; [m] the objective with the tool as it is, and the least
+    that any turn could leave, each motion turned as it is best for it."""
+    motions, scoring = problem.motions, problem.scoring
+    if rows is not None:
+        motions, scoring = motions.take(rows), scoring.take(rows)
+    scan = scan_spins(problem.model, motions, problem.room, scoring, place, step)
+    still = scan.error[len(scan.angle) // 2][motions.scored]
+    least = np.where(scan.feasible, scan.error, np.inf)[:, motions.scored].min(axis=0)
+    by_p95 = problem.request.objective == P95
+    now, bound = (float(np.percentile(one, 95) if by_p95 else one.max()) for one in (still, least))
+    return scan, now, bound
+
+
+def _some(problem: PlaceProblem, place: Floats) -> Ints:
+    """(K,) the motions with the largest errors at ``place`` (6,), and others evenly along the programs."""
+    motions = problem.motions
+    scores = score_places(problem.model, motions, problem.room, problem.scoring, place[None], detailed=True)
+    assert scores.error is not None
+    scored = np.flatnonzero(motions.scored)
+    error = scores.error[0].mean(axis=1)[scored]
+    chosen = [scored[np.argsort(-error)[:SOME]], scored[:: max(1, len(scored) // SOME)]]
+    return motions.with_heads(np.unique(np.concatenate(chosen)))
 
 
 def _turned_program(
