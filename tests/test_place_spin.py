@@ -309,6 +309,20 @@ def test_the_programs_do_not_overwrite_their_own(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["soft wrist", "milling"])
+def test_a_large_program_is_looked_at_in_part_first(tmp_path, monkeypatch, soft, name):
+    """Some motions decide whether a turn is worth a scan of all; that one has coarser steps."""
+    _, whole, _ = soft
+    monkeypatch.setattr(place_spin, "MANY", 10)
+    monkeypatch.setattr(place_spin, "SOME", 3)
+    done = spun(soft_wrist(tmp_path) if name == "soft wrist" else program_of(name), None)
+    assert done.spun.worth == (name == "soft wrist")
+    if done.spun.worth:
+        assert done.spun.before == pytest.approx(whole.spun.before)
+        assert done.spun.after <= 1.1 * whole.spun.after
+
+
+@pytest.mark.slow
 def test_programs_of_one_name_do_not_overwrite_each_other(tmp_path):
     program = soft_wrist(tmp_path)
     (tmp_path / "other").mkdir()

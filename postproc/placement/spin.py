@@ -53,6 +53,18 @@ class SpinScan:
         """The places (L,) of them."""
         return SpinScan(self.angle, self.error[:, places], self.size[:, places], self.feasible[:, places])
 
+    def finer(self, parts: int) -> SpinScan:
+        """The same with so many parts of each step: errors linear between the angles, feasible where both ends are."""
+        place = np.arange((len(self.angle) - 1) * parts + 1)
+        low, high, share = (
+            place // parts,
+            -(-place // parts),
+            (place % parts / parts)[:, None].astype(np.float32),
+        )
+        error, size = ((1 - share) * part[low] + share * part[high] for part in (self.error, self.size))
+        angle = np.interp(place / parts, np.arange(len(self.angle)), self.angle)
+        return SpinScan(angle, error, size, self.feasible[low] & self.feasible[high])
+
     def at(self, turn: Floats) -> tuple[Floats, Floats, bool]:
         """(M,) [m] error and size with the tool turned by ``turn`` (M,) [rad], between the angles linearly, and whether
         all are feasible."""

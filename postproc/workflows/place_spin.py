@@ -12,7 +12,7 @@ from postproc.base.arrays import Floats, Ints
 from postproc.base.document import Edits
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import product, rotation_from_vector
-from postproc.base.units import DEG, MM
+from postproc.base.units import MM
 from postproc.languages.permitted import refuse_other
 from postproc.output.write import edited_contents, writing_settings
 from postproc.placement.part_motions import PartMotions
@@ -36,7 +36,8 @@ from postproc.workflows.preparation import Prepared
 MANY, SOME = 20_000, 1000
 """Places on paths from which on a turn is first looked at on some motions, and how many; a coarse scan follows."""
 
-COARSE = 15 * DEG
+COARSE = 3
+"""Steps of the grid of angles that a coarse scan makes at once."""
 
 MOST_ROUNDS = 5
 """Times that a program is planned again without motions that its text cannot turn."""
@@ -69,7 +70,7 @@ def spin_programs(problem: PlaceProblem, place: Floats) -> SpunPrograms:
     many = len(motions) > MANY
     # the largest error of all motions is that of some, and no turn takes more from it than from these
     some = _some(problem, place) if many and request.objective != P95 else None
-    scan, still, bound = _scanned(problem, place, some, COARSE if many and some is None else STEP)
+    scan, still, bound = _scanned(problem, place, some, COARSE if many and some is None else 1)
     if some is not None and not bound > WORTH * still:
         scan, still, bound = _scanned(problem, place, None, COARSE)
     figures = SpinFigures(value, bound=bound)
@@ -119,14 +120,15 @@ def spin_programs(problem: PlaceProblem, place: Floats) -> SpunPrograms:
 
 
 def _scanned(
-    problem: PlaceProblem, place: Floats, rows: Ints | None, step: float
+    problem: PlaceProblem, place: Floats, rows: Ints | None, steps: int
 ) -> tuple[SpinScan, float, float]:
     """The scan of the motions ``rows`` (K,), of all without; [m] the objective with the tool as it is, and the least
-    that any turn could leave, each motion turned as it is best for it."""
+    that any turn could leave, each motion turned as it is best for it; ``steps`` of the grid of angles at once."""
     motions, scoring = problem.motions, problem.scoring
     if rows is not None:
         motions, scoring = motions.take(rows), scoring.take(rows)
-    scan = scan_spins(problem.model, motions, problem.room, scoring, place, step)
+    scan = scan_spins(problem.model, motions, problem.room, scoring, place, steps * STEP)
+    scan = scan.finer(steps) if steps > 1 else scan
     still = scan.error[len(scan.angle) // 2][motions.scored]
     least = np.where(scan.feasible, scan.error, np.inf)[:, motions.scored].min(axis=0)
     by_p95 = problem.request.objective == P95
