@@ -12,9 +12,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+from postproc.api_place import as_path, assign, place, stated_force
 from postproc.api_robot import diagnose, identify, map, plan
 from postproc.base.findings import Finding, Refusal
 from postproc.base.units import MM
+from postproc.report.assignment import PartAssignment
 from postproc.report.batched import Batched
 from postproc.report.checked import Checked
 from postproc.report.diagnosed import Diagnosed
@@ -31,7 +33,6 @@ from postproc.workflows.option_names import SHARED_POINTS, accept_former_names
 from postproc.workflows.preparation import Request
 
 PathLike: TypeAlias = str | os.PathLike[str]
-PlaceRange: TypeAlias = tuple[float, float] | None
 
 __all__ = [
     "Batched",
@@ -42,11 +43,13 @@ __all__ = [
     "Identified",
     "Learned",
     "Mapped",
+    "PartAssignment",
     "Placement",
     "Planned",
     "Refusal",
     "Report",
     "Verified",
+    "assign",
     "batch",
     "check",
     "compensate",
@@ -109,13 +112,13 @@ def compensate(
     return program.compensate(
         Request(
             program=Path(path),
-            force=_force(force),
-            cell=_path(cell),
+            force=stated_force(force),
+            cell=as_path(cell),
             robot=robot,
             gain=_share(gain),
-            output=_path(output),
-            report=_path(report),
-            config_dat=_path(config_dat),
+            output=as_path(output),
+            report=as_path(report),
+            config_dat=as_path(config_dat),
             tare=tare,
             no_insert=no_insert,
             shared_points=_shared_points(shared_points),
@@ -149,11 +152,11 @@ def predict(
     return program.predict(
         Request(
             program=Path(path),
-            force=_force(force),
-            cell=_path(cell),
+            force=stated_force(force),
+            cell=as_path(cell),
             robot=robot,
-            report=_path(report),
-            config_dat=_path(config_dat),
+            report=as_path(report),
+            config_dat=as_path(config_dat),
             tare=tare,
             strict=strict,
             keep_table=True,
@@ -169,7 +172,7 @@ def check(path: PathLike, *, cell: PathLike | None = None, config_dat: PathLike 
     >>> len(checked.toolpath), checked.exit
     (26, 0)
     """
-    return listing.check(Path(path), _path(cell), _path(config_dat))
+    return listing.check(Path(path), as_path(cell), as_path(config_dat))
 
 
 def verify(
@@ -195,12 +198,12 @@ def verify(
 
     request = Request(
         program=Path(original),
-        force=_force(force),
+        force=stated_force(force),
         tare=tare,
-        cell=_path(cell),
+        cell=as_path(cell),
         robot=robot,
         strict=strict,
-        config_dat=_path(config_dat),
+        config_dat=as_path(config_dat),
     )
     return run(request, Path(compensated), step_mm * MM)
 
@@ -226,81 +229,12 @@ def engage(
     return run(
         EngageRequest(
             program=Path(path),
-            process=_path(process),
-            cell=_path(cell),
+            process=as_path(process),
+            cell=as_path(cell),
             robot=robot,
-            config_dat=_path(config_dat),
-            csv=_path(csv),
-            stock_out=_path(stock_out),
-            strict=strict,
-        )
-    )
-
-
-def place(
-    paths: PathLike | Sequence[PathLike],
-    *,
-    force: bool | str = False,
-    x: PlaceRange = None,
-    y: PlaceRange = None,
-    z: PlaceRange = None,
-    turn: PlaceRange = None,
-    tool_turn: PlaceRange = None,
-    track: PlaceRange = None,
-    objective: Literal["across", "max", "p95", "uncertainty"] = "across",
-    direction: float | None = None,
-    limit_margin: float = 5.0,
-    singularity_margin: float = 5.0,
-    top: int = 10,
-    cell: PathLike | None = None,
-    robot: str | None = None,
-    output: PathLike | None = None,
-    picture: PathLike | None = None,
-    page: PathLike | None = None,
-    config_dat: PathLike | None = None,
-    tare: bool = False,
-    strict: bool = False,
-) -> Placement:
-    """Where a part should lie, as ``compensate place`` does.
-
-    paths: one program, or several that share a base; x, y, z: ranges of the base's origin in $WORLD, mm; turn,
-    tool_turn: of part and tool against the present, deg; track: of the linear track, mm; None: as ``room`` of the cell
-    states, or as it is; objective: what is small at a good place; direction: interval of the forces' direction over
-    which it is averaged, deg [the cell's]; limit_margin, singularity_margin: deg; top: places to list; output: the new
-    cell file.  Raises ValueError for ranges that do not ascend.
-
-    >>> import postproc
-    >>> sample = "samples/kr270_taught/taught.src"
-    >>> placed = postproc.place(sample, force=True, x=(1300, 1600), y=(-300, 100), top=3)
-    >>> placed.best.across.max < placed.present.across.max, len(placed.places)
-    (True, 3)
-    """
-    from postproc.workflows.place import place as run
-    from postproc.workflows.place_problem import PlaceRequest
-
-    stated = {"x": x, "y": y, "z": z, "turn": turn, "tool_turn": tool_turn, "track": track}
-    ranges = {name: (float(ends[0]), float(ends[1])) for name, ends in stated.items() if ends is not None}
-    for name, (low, high) in ranges.items():
-        if not low < high:
-            raise ValueError(f"{name} is (from, to) with from < to, and is ({low:g}, {high:g})")
-    several = (paths,) if isinstance(paths, (str, os.PathLike)) else tuple(paths)
-    return run(
-        PlaceRequest(
-            programs=tuple(Path(path) for path in several),
-            force=_force(force),
-            ranges=ranges,
-            objective=objective,
-            direction=direction,
-            limit_margin=limit_margin,
-            singularity_margin=singularity_margin,
-            top=top,
-            cell=_path(cell),
-            robot=robot,
-            config_dat=_path(config_dat),
-            tare=tare,
-            output=_path(output),
-            picture=_path(picture),
-            page=_path(page),
+            config_dat=as_path(config_dat),
+            csv=as_path(csv),
+            stock_out=as_path(stock_out),
             strict=strict,
         )
     )
@@ -334,11 +268,11 @@ def learn(
     several = [measured] if isinstance(measured, (str, os.PathLike)) else list(measured)
     main = Request(
         program=Path(path),
-        force=_force(force),
-        cell=_path(cell),
+        force=stated_force(force),
+        cell=as_path(cell),
         robot=robot,
         gain=_share(gain),
-        config_dat=_path(config_dat),
+        config_dat=as_path(config_dat),
         strict=strict,
     )
     return run(
@@ -346,9 +280,9 @@ def learn(
             main,
             tuple(Path(one) for one in several),
             known_force=known_force,
-            push=_path(push),
-            output=_path(output),
-            csv=_path(csv),
+            push=as_path(push),
+            output=as_path(output),
+            csv=as_path(csv),
             strict=strict,
             dry_run=dry_run,
         )
@@ -382,7 +316,7 @@ def batch(
 
     words = (jobs,) if isinstance(jobs, (str, os.PathLike)) else tuple(jobs)
     options = {
-        "force": None if force is None else _force(force),
+        "force": None if force is None else stated_force(force),
         "robot": robot,
         "cell": None if cell is None else Path(os.path.abspath(cell)),
         "gain": None if gain is None else _share(gain),
@@ -394,7 +328,7 @@ def batch(
         BatchRequest(
             words=tuple(os.fspath(word) for word in words),
             options={key: value for key, value in options.items() if value is not None},
-            output=_path(output),
+            output=as_path(output),
             workers=workers,
             dask=dask,
             fail_fast=fail_fast,
@@ -402,19 +336,6 @@ def batch(
             allow_outside=allow_outside,
         )
     )
-
-
-def _force(force: bool | str) -> str | None:
-    """As ``Request`` has it."""
-    if isinstance(force, str):
-        if not force.strip():
-            raise ValueError("force is empty; use True for the forces that belong to the program")
-        return force
-    return "" if force else None
-
-
-def _path(path: PathLike | None) -> Path | None:
-    return None if path is None else Path(path)
 
 
 def _share(gain: float) -> float:

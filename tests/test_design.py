@@ -15,6 +15,7 @@ ROOMS = {
     "__main__": 13,
     "cli": 12,
     "api": 12,
+    "api_place": 11,
     "api_robot": 11,
     "schemas": 11,
     "codes": 11,

@@ -27,6 +27,7 @@ WORDS = {
     "predict": ["a.src"],
     "verify": ["a.src", "b.src"],
     "place": ["a.src"],
+    "assign": ["a.src", "--at", "a=1,2,3"],
     "learn": ["a.src", "b.csv"],
     "batch": ["a.src"],
     "watch": ["."],

@@ -34,6 +34,9 @@ RUNS = {
     "map": ["map", *MAP, "--z", "500:900", "--force", "0,360,560"],
     "map, out of reach": ["map", *MAP, "--z", "9000", "--force", "0,360,560"],
     "place": ["place", "taught.src", "--force", "--x", "1400:1500", "--y=-150:-50", "--top", "2"],
+    "assign": [
+        "assign", "taught.src", "--force", "--at", "left=1400,-150,600", "--at", "far=4000,0,0", "--cells", "placed"
+    ],
     "identify": [
         "identify", "loads.csv", "--effects", "joint_compliance,gravity_compensator", "--validate", "check.csv",
         "--bootstrap", "20",
@@ -62,6 +65,7 @@ FAILING = {
     "verify": ["verify", "none.src", "none.src"],
     "map": ["map", *MAP, "--z", "0", "--force", "0,0,9", "--robot", "none.yaml"],
     "place": ["place", "none.src", "--force", "--x", "1400:1500"],
+    "assign": ["assign", "none.src", "--force", "--at", "a=1400,0,600"],
     "identify": ["identify", "none.csv", "--effects", "backlash"],
     "plan": ["plan", "--effects", "none", *PLAN],
     "diagnose": ["diagnose", "none.csv"],

@@ -11,6 +11,7 @@ import click
 from postproc import __version__
 from postproc.base.findings import nearest
 from postproc.base.memory import use_mmap_for_large_arrays
+from postproc.cli.assign import assign
 from postproc.cli.batch import batch
 from postproc.cli.check import check
 from postproc.cli.completion import Commands, completion
@@ -39,6 +40,7 @@ COMMANDS = {
     "verify": verify,
     "map": map_,
     "place": place,
+    "assign": assign,
     "engage": engage,
     "identify": identify,
     "plan": plan,
@@ -70,6 +72,7 @@ def main() -> None:
       compensate engage panel.ngc                     what it cuts of its stock, and with which force
       compensate map --robot kuka_kr270 ...           the deflection over the workspace
       compensate place panel.src --force --x 850:1650 where the part deflects the robot least
+      compensate assign a.src b.src --force --at ...  which part of a batch lies where
       compensate identify loads.csv --effects ...     parameters of the robot from measurements
       compensate plan --effects ... --poses 15 ...    the poses and loads worth measuring
       compensate diagnose loads.csv                   the effects that the robot file misses

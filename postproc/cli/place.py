@@ -91,6 +91,13 @@ def _range_option(name: str, about: str) -> Callable[[_Command], _Command]:
     help="Distance from singularities, as an angle of A5.",
 )
 @click.option("--top", type=click.IntRange(1, 100), default=10, show_default=True, help="Places to list.")
+@click.option(
+    "--collisions",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.urdf",
+    callback=ending(".urdf"),
+    help="Check collisions of the arm with itself and with fixed bodies by these shapes [the robot file's URDF].",
+)
 @click.option("--robot", type=ROBOT, metavar="NAME|FILE", help="Use this robot instead of the cell's.")
 @language_options
 @tare_option
@@ -101,6 +108,17 @@ def _range_option(name: str, about: str) -> Callable[[_Command], _Command]:
     metavar="CELL.yaml",
     callback=ending(".yaml", ".yml"),
     help="Write the cell file with the best place, comments kept [only report].",
+)
+@click.option(
+    "--spin",
+    is_flag=True,
+    help="Turn the tool about its spindle along the path: state what it would bring. For rotating tools.",
+)
+@click.option(
+    "--spin-output",
+    type=click.Path(path_type=Path, file_okay=False),
+    metavar="FOLDER",
+    help="With --spin: write the programs with other A, B, C into this folder, if it is worth it.",
 )
 @click.option(
     "--picture",
@@ -126,11 +144,14 @@ def place(
     limit_margin: float,
     singularity_margin: float,
     top: int,
+    collisions: Path | None,
     robot: str | None,
     cell: Path | None,
     config_dat: Path | None,
     tare: bool,
     output: Path | None,
+    spin: bool,
+    spin_output: Path | None,
     picture: Path | None,
     page: Path | None,
     strict: bool,
@@ -140,14 +161,16 @@ def place(
 ) -> None:
     """Find where a part should lie: where PROGRAMS deflect the robot least, before any correction.
 
-    No byte of the programs changes: the base moves in the cell file (`bases`), and the tool frame turns (`tools`). The
-    ranges of `room:` in the cell hold where no option states one. Collisions are not checked.
+    No byte of the programs changes: the base moves in the cell file (`bases`), and the tool frame turns (`tools`);
+    --spin-output alone writes programs. The ranges of `room:` in the cell hold where no option states one. Collisions
+    are not checked.
 
     \b
     Examples:
       compensate place panel.src --force --x 850:1650 --y 50:850
       compensate place panel.src --force --x 850:1650 --y 50:850 --z 600:1000 --turn=-90:90 -o placed.yaml
       compensate place first.src second.src --force --x 850:1650 --tool-turn=-180:180 --page place.html
+      compensate place panel.src --force --spin --spin-output turned
 
     Exit codes: 0 done; 3 something needs review; 1 failed, no place is feasible; 2 wrong command line.
     """
@@ -168,9 +191,12 @@ def place(
         top=top,
         cell=cell,
         robot=robot,
+        collisions=collisions,
         config_dat=config_dat,
         tare=tare,
         output=output,
+        spin=spin,
+        spin_output=spin_output,
         picture=picture,
         page=page,
         json=out.json_file,

@@ -14,6 +14,7 @@ RESULTS = (
     "verify",
     "map",
     "place",
+    "assign",
     "identify",
     "engage",
     "plan",

@@ -205,7 +205,7 @@ def write(
     Raises Refusal FIL008 (what was read back is not what was meant), COR002 (it corrects by more than may be).
     """
     documents, task, result, edits = program.documents, intended.task, intended.result, intended.edits
-    contents = _contents(documents, edits)
+    contents = edited_contents(documents, edits)
     again = _read_back(documents, contents, dialect, settings)
     back = completed(again.toolpath)
     release_free_memory()
@@ -337,7 +337,7 @@ def _mark(program: Program, robot: Robot) -> str:
     return f"{__version__}, robot {robot.name} sha256:{robot.digest[:16]}, source sha256:{source[:16]}"
 
 
-def _contents(documents: tuple[Document, ...], edits: Edits) -> tuple[bytes, ...]:
+def edited_contents(documents: tuple[Document, ...], edits: Edits) -> tuple[bytes, ...]:
     """The bytes of every document with its edits.  Raises Refusal FIL008 if another byte changed."""
     contents = []
     for index, document in enumerate(documents):

@@ -19,7 +19,8 @@ _CONDITIONS = tuple(field.name for field in fields(Conditions))
 class PartMotions:
     """R places that the motions of programs lead to, with the part where it lies now.
 
-    program, line (R,): whose they are.  target: TCP in $WORLD, ``moves`` (R,): with the part; tool: TCP on the flange;
+    program, line, row (R,): whose they are; share (R,): of the motion's path, 1 at its end.
+    target: TCP in $WORLD, ``moves`` (R,): with the part; tool: TCP on the flange;
     axis (R, 3): about which the tool is turned, tool axes, zero for a tool that is not; before: $WORLD in the robot's
     own base; track (3,): by how much that moves with each metre of a track that is not a joint.  status (R,) branch, q
     (R, n) [rad, m] joint values now.  head (R,): the place by which the turns of A1, A4 and A6 are chosen; anchor (R,
@@ -32,6 +33,8 @@ class PartMotions:
 
     program: Ints
     line: Ints
+    row: Ints
+    share: Floats
     target: Poses
     moves: Bools
     tool: Poses

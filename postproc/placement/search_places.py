@@ -9,7 +9,7 @@ Everything is drawn with one seed: the same input gives the same places.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import qmc
@@ -17,6 +17,7 @@ from scipy.stats import qmc
 from postproc.base.arrays import Floats, Ints
 from postproc.base.batches import in_blocks
 from postproc.model import StiffnessModel
+from postproc.placement.collisions import CollisionShapes, colliding_rows
 from postproc.placement.part_motions import PartMotions
 from postproc.placement.refine_places import refine_place
 from postproc.placement.room import Room
@@ -73,9 +74,15 @@ Score = Callable[[Floats], Scores]
 
 
 def search_places(
-    model: StiffnessModel, motions: PartMotions, room: Room, scoring: Scoring, progress: Callable[[str], None]
+    model: StiffnessModel,
+    motions: PartMotions,
+    room: Room,
+    scoring: Scoring,
+    progress: Callable[[str], None],
+    shapes: CollisionShapes | None = None,
 ) -> SearchResult:
-    """The placements of a ``room`` by their scores on all ``motions``."""
+    """The placements of a ``room`` by their scores on all ``motions``; with ``shapes`` one that collides is not
+    feasible."""
     few = choose_motions(motions, FEW if scoring.objective != P95 else 4 * FEW)
     looked, pool = 0, None
     for round_number in range(1, ROUNDS + 1):
@@ -83,10 +90,10 @@ def search_places(
         part, part_scoring = motions.take(few), scoring.take(few)
 
         def score(places: Floats, part: PartMotions = part, some: Scoring = part_scoring) -> Scores:
-            return score_places(model, part, room, some, places)
+            return _clear(shapes, model, part, score_places(model, part, room, some, places))
 
         def detailed(places: Floats, part: PartMotions = part, some: Scoring = part_scoring) -> Scores:
-            return score_places(model, part, room, some, places, detailed=True)
+            return _clear(shapes, model, part, score_places(model, part, room, some, places, detailed=True))
 
         known = score(start_places(room) if pool is None else _kept(room, pool))
         niches = NICHES if pool is None and len(room.free) > 2 else NICHES // 3
@@ -99,12 +106,28 @@ def search_places(
         progress(f"checking all motions, round {round_number}")
         whole = score_places(model, motions, room, scoring, pool.places[chosen], detailed=True)
         added = _decisive(motions, whole, few)
+        if shapes is not None:
+            hits = colliding_rows(shapes, model, motions, whole.places)
+            added = np.union1d(added, np.setdiff1d(hits[hits >= 0], few))
+            whole = replace(whole, violation=whole.violation + (hits >= 0))
         agrees = whole.violation[0] == 0 and whole.value[0] <= AGREES * pool.value[chosen[0]]
         if (agrees and round_number > 1) or (not len(added) and round_number > 1):
             break
         few = motions.with_heads(np.union1d(few, added))
     assert pool is not None
     return SearchResult(few, pool, looked, round_number)
+
+
+def _clear(
+    shapes: CollisionShapes | None, model: StiffnessModel, motions: PartMotions, scores: Scores
+) -> Scores:
+    """``scores`` with the feasible places that collide counted as not feasible by 1."""
+    feasible = np.flatnonzero(scores.violation == 0)
+    if shapes is None or not len(feasible):
+        return scores
+    violation = scores.violation.copy()
+    violation[feasible] += colliding_rows(shapes, model, motions, scores.places[feasible]) >= 0
+    return replace(scores, violation=violation)
 
 
 def _kept(room: Room, pool: Scores) -> Floats:

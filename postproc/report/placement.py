@@ -16,6 +16,8 @@ from postproc.base.arrays import Floats
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
 from postproc.placement.room import FREEDOMS, UNITS, Room
+from postproc.report.placement_spin import WORTH as SPIN_WORTH
+from postproc.report.placement_spin import SpinFigures, spin_sentence
 from postproc.report.report import Spread
 from postproc.report.result import Columns, Result
 from postproc.report.result_keys import complete_result
@@ -29,9 +31,42 @@ KEYS = ("x_mm", "y_mm", "z_mm", "turn_deg", "tool_turn_deg", "track_mm")
 WORTH = 0.95
 """A turned feed is worth telling where it leaves less than this share of the error."""
 
+SHOWN_TURNS = 9
+"""Of the whole path and of operations, in the table."""
+
 CHECKED = (
     "reach, limits, singularities and configuration of every motion are checked; collisions are NOT checked"
 )
+
+
+@dataclass(frozen=True)
+class CheckedShapes:
+    """What collisions were checked by: file of the URDF, links that move and that stand still, and pairs that touch
+    before the program starts and were not checked."""
+
+    file: str
+    moving: tuple[str, ...]
+    fixed: tuple[str, ...]
+    ignored: tuple[tuple[str, str], ...] = ()
+
+    def as_json(self) -> dict[str, object]:
+        return {
+            "file": self.file,
+            "moving": list(self.moving),
+            "fixed": list(self.fixed),
+            "ignored": [list(pair) for pair in self.ignored],
+        }
+
+
+def checked_words(shapes: CheckedShapes | None) -> str:
+    """The first line of the result: what was checked, and what was not."""
+    if shapes is None:
+        return CHECKED
+    fixed = f" and with {', '.join(shapes.fixed)}" if shapes.fixed else ""
+    return (
+        "reach, limits, singularities and configuration of every motion are checked, and collisions of the arm with"
+        f" itself{fixed} by the shapes of {shapes.file}; collisions with part and fixtures are NOT checked"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,10 +133,11 @@ class SingleFreedom:
 
 @dataclass(frozen=True)
 class FeedTurn:
-    """What turning the feed about the vertical would change: of the whole path (``first`` 0) or of the cut in lines
-    first to last of a program; before [m], angle [rad] of the best direction, after [m]."""
+    """What turning the feed about the vertical would change: of the whole path (``first`` 0) or of an operation, in
+    lines first to last of a program; before [m], angle [rad] of the best direction, after [m]."""
 
     program: str
+    operation: str
     first: int
     last: int
     before: float
@@ -124,7 +160,9 @@ class Placement(Result):
     checked: places on the paths that the search compared by, and that all listed placements were checked on; margins
     [deg] from limits and singularities; direction [deg]: half width over which the force's direction was averaged;
     spin [m]: the least that the objective could become if the tool turned about its spindle along the path, NaN where
-    that is not asked for."""
+    that is not asked for; spun: what such a turn brings, None where that is not asked for.  Where only the tool may
+    turn there are no places, and the best one is the present.  shapes: by which collisions were checked, None where
+    they were not."""
 
     headline = ("cell", "base", "objective", "present.score_mm", "best.score_mm", "exit")
 
@@ -135,25 +173,27 @@ class Placement(Result):
     base: int
     objective: str
     motions: int
-    looked: int
-    searched: int
     checked: int
     room: Room
     margins: tuple[float, float]
     direction: float
     present: PlacedFigures
-    places: tuple[PlacedFigures, ...]
-    alone: tuple[SingleFreedom, ...]
-    feed: tuple[FeedTurn, ...]
-    spin: float
-    grid: ScoreGrid | None
+    looked: int = 0
+    searched: int = 0
+    places: tuple[PlacedFigures, ...] = ()
+    alone: tuple[SingleFreedom, ...] = ()
+    feed: tuple[FeedTurn, ...] = ()
+    spin: float = math.nan
+    spun: SpinFigures | None = None
+    grid: ScoreGrid | None = None
+    shapes: CheckedShapes | None = None
     findings: tuple[Finding, ...] = ()
     outputs: tuple[str, ...] = ()
     exit: int = 0
 
     @property
     def best(self) -> PlacedFigures:
-        return self.places[0]
+        return self.places[0] if self.places else self.present
 
     @property
     def reduction(self) -> float:
@@ -170,7 +210,8 @@ class Placement(Result):
             "cell": self.cell,
             "base": self.base,
             "objective": self.objective,
-            "collisions_checked": False,
+            "collisions_checked": self.shapes is not None,
+            "collision_shapes": None if self.shapes is None else self.shapes.as_json(),
             "motions": self.motions,
             "placements": self.looked,
             "searched_places": self.searched,
@@ -194,6 +235,7 @@ class Placement(Result):
             "feed_turns": [
                 {
                     "program": one.program,
+                    "operation": one.operation,
                     "first_line": one.first,
                     "last_line": one.last,
                     "before_mm": _mm(one.before),
@@ -203,6 +245,7 @@ class Placement(Result):
                 for one in self.feed
             ],
             "spin_bound_mm": _mm(self.spin),
+            "spin": None if self.spun is None else self.spun.as_json(),
             "findings": [finding.as_json() for finding in self.findings],
             "outputs": list(self.outputs),
             "exit": self.exit,
@@ -238,7 +281,7 @@ def _known(value: float, decimals: int) -> float | None:
 
 def show_placement(console: Console, done: Placement, verbose: bool = False) -> None:
     """What was checked, the ranked places, what each freedom brings alone, and findings."""
-    console.print(Text(CHECKED, style="bold"), soft_wrap=True)
+    console.print(Text(checked_words(done.shapes), style="bold"), soft_wrap=True)
     show_rows(console, facts(done))
     for table in tables(done):
         if table.row_count:
@@ -251,6 +294,8 @@ def show_placement(console: Console, done: Placement, verbose: bool = False) -> 
 def verdict(done: Placement) -> str:
     """One sentence: from where to where, and what it brings."""
     here, best = (one.figure(done.objective) / MM for one in (done.present, done.best))
+    if not done.places:
+        return f"{OBJECTIVE_WORDS[done.objective]} {here:.3f} mm at the present place"
     if math.isnan(here):
         return f"{OBJECTIVE_WORDS[done.objective]} {best:.3f} mm at the best place; the present one cannot be predicted"
     share = f"{done.reduction:.0%} less" if done.reduction > 0 else "no better"
@@ -270,23 +315,20 @@ def facts(done: Placement) -> Iterator[tuple[str, str]]:
     yield "programs", escape(", ".join(done.programs)) + f", {done.motions} motions"
     yield "robot", escape(done.robot)
     yield "part", escape(f"base {done.base} of {done.cell}")
-    yield (
-        "room",
-        ", ".join(_range(done.room, i) for i in done.room.free)
-        + (
-            f", inside a polygon of {len(done.room.polygon)} corners" if done.room.polygon is not None else ""
-        ),
+    inside = (
+        f", inside a polygon of {len(done.room.polygon)} corners" if done.room.polygon is not None else ""
     )
+    ranges = ", ".join(_range(done.room, i) for i in done.room.free)
+    yield "room", f"{ranges}{inside}" if ranges else "the part stays where it is"
     yield (
         "margins",
         f"{done.margins[0]:g} deg from axis limits, {done.margins[1]:g} deg from singularities",
     )
     averaged = f", averaged over force directions within {done.direction:g} deg" if done.direction else ""
     yield "objective", OBJECTIVE_WORDS[done.objective] + averaged
-    yield (
-        "search",
-        f"{done.looked} placements by {done.searched} places of the paths; the listed ones on all {done.checked}",
-    )
+    if done.places:
+        words = f"{done.looked} placements by {done.searched} places of the paths"
+        yield "search", f"{words}; the listed ones on all {done.checked}"
     if words := spin_words(done):
         yield "tool turn", words
     yield "result", verdict(done)
@@ -346,8 +388,11 @@ def _feed(done: Placement) -> Table:
     table = Table(box=None, pad_edge=False)
     for head in ("feed direction at the best place", "turn deg", "now mm", "turned mm"):
         table.add_column(head, justify="left" if head.startswith("feed") else "right")
-    for one in done.feed:
-        what = f"lines {one.first} .. {one.last}" if one.first else "whole path"
+    for one in done.feed[:SHOWN_TURNS]:
+        lines = f"lines {one.first} .. {one.last}"
+        what = (
+            (f"{one.operation.lower()}, {lines}" if one.operation else lines) if one.first else "whole path"
+        )
         name = f"{one.program} " if one.first and len(done.programs) > 1 else ""
         if one.after > WORTH * one.before:
             table.add_row(escape(name + what), "-", f"{one.before / MM:.3f}", "not worth it")
@@ -359,9 +404,11 @@ def _feed(done: Placement) -> Table:
 
 def spin_words(done: Placement) -> str:
     """What turning the tool about its spindle along the path could bring at the best place; "" where not asked for."""
+    if done.spun is not None:
+        return spin_sentence(done.spun)
     if math.isnan(done.spin):
         return ""
-    if not math.isfinite(done.spin) or done.spin > WORTH * done.best.score:
+    if not math.isfinite(done.spin) or done.spin > SPIN_WORTH * done.best.score:
         return "a tool that turns about its spindle along the path is not worth it"
     least, now = done.spin / MM, done.best.score / MM
     return (

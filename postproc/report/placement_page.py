@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from postproc.report.placement import CHECKED, Placement, facts, tables, verdict
+from postproc.report.placement import Placement, checked_words, facts, tables, verdict
 from postproc.report.placement_picture import placement_picture
 from postproc.report.result_page import ResultPage
 
 
 def placement_page(done: Placement, links: Mapping[str, str]) -> bytes:
     """One page; links: what is beside it, words -> relative path."""
-    sentence = verdict(done)
+    sentence, checked = verdict(done), checked_words(done.shapes)
     return ResultPage(
         what="placement",
         title=", ".join(Path(name).name for name in done.programs),
         verdict=f"{sentence[0].upper()}{sentence[1:]}.",
-        words=[f"{CHECKED[0].upper()}{CHECKED[1:]}."],
+        words=[f"{checked[0].upper()}{checked[1:]}."],
         exit=done.exit,
         facts=list(facts(done)),
         tables=tables(done),

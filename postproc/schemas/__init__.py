@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from postproc.schemas.assign_schema import assign_schema
 from postproc.schemas.cell_schema import cell_schema
 from postproc.schemas.diagnose_schema import diagnose_schema
 from postproc.schemas.engage_schema import engage_schema
@@ -40,6 +41,7 @@ RESULT_SCHEMAS: dict[str, Callable[[], Schema]] = {
     "verify": verify_schema,
     "map": map_schema,
     "place": place_schema,
+    "assign": assign_schema,
     "identify": identify_schema,
     "engage": engage_schema,
     "plan": plan_schema,

@@ -56,14 +56,32 @@ def place_schema() -> Schema:
     )
     turn = record(
         {
-            "program": word('program of the cut, "" for the whole path'),
-            "first_line": integer("first line of the cut, 0 for the whole path"),
-            "last_line": integer("last line of the cut"),
+            "program": word('program of the operation, "" for the whole path'),
+            "operation": word('name of the operation, "" where the program states none'),
+            "first_line": integer("first line of the operation, 0 for the whole path"),
+            "last_line": integer("last line of the operation"),
             "before_mm": quantity("mm", "objective with the feed as it is", nullable=True),
             "turn_deg": quantity("deg", "best turn of the feed about the vertical"),
             "after_mm": quantity("mm", "objective with the feed turned", nullable=True),
         },
-        "one cut",
+        "one operation",
+    )
+    spin = record(
+        {
+            "worth": boolean("whether turning the tool along the path is worth it"),
+            "reason": word('why it is not, ""'),
+            "before_mm": quantity("mm", "objective with the tool as it is, by the main job", nullable=True),
+            "after_mm": quantity("mm", "objective with the tool turned, by the main job", nullable=True),
+            "bound_mm": quantity("mm", "least that any turn could leave, by the linear model", nullable=True),
+            "gain": quantity("1", "share of the objective that the turn takes away", nullable=True),
+            "error_mm": spread("predicted error with the tool turned"),
+            "turn_deg": array(quantity("deg", "turn"), "least and largest"),
+            "deg_per_mm": quantity("deg/mm", "fastest turn along the path", nullable=True),
+            "deg_per_s": quantity("deg/s", "fastest turn at the stated feeds", nullable=True),
+            "motions": integer("motions whose orientation changes"),
+        },
+        "a tool that turns about its spindle along the path",
+        nullable=True,
     )
     return result(
         "place",
@@ -75,6 +93,19 @@ def place_schema() -> Schema:
             "base": integer("number of the base that moves"),
             "objective": word("what is small at a good place", OBJECTIVES),
             "collisions_checked": boolean("whether collisions were checked"),
+            "collision_shapes": record(
+                {
+                    "file": word("URDF"),
+                    "moving": array(word("body"), "bodies of the arm"),
+                    "fixed": array(word("body"), "bodies that do not move"),
+                    "ignored": array(
+                        array(word("body"), "a pair"),
+                        "pairs that touch before the program, and are not checked",
+                    ),
+                },
+                "by which collisions were checked",
+                nullable=True,
+            ),
             "motions": integer("motions of all programs"),
             "placements": integer("placements scored"),
             "searched_places": integer("places of the paths by which the search compared"),
@@ -99,6 +130,7 @@ def place_schema() -> Schema:
                 "least that the objective could become with a tool that turns about its spindle along the path",
                 nullable=True,
             ),
+            "spin": spin,
             **ENDING,
         },
     )

@@ -11,15 +11,20 @@ from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import Inputs, noted
 from postproc.base.units import DEG
 from postproc.output.atomic_write import write_atomically
+from postproc.placement.collisions import CollisionShapes, colliding_rows
 from postproc.placement.room import FREEDOMS, UNITS
 from postproc.placement.score_places import score_places
 from postproc.placement.search_places import SearchResult, distinct, search_places
 from postproc.report.placement import PlacedFigures, Placement
+from postproc.report.placement_spin import spin_sentence
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.workflows.place_cell import refuse_same_file
-from postproc.workflows.place_compare import compare_freedoms, feed_turns, regret_of, score_grid, spin_bound
+from postproc.workflows.place_collisions import checked_shapes, shape_findings
+from postproc.workflows.place_compare import compare_freedoms, regret_of, score_grid, spin_bound
 from postproc.workflows.place_exact import exact_figures
+from postproc.workflows.place_feed import feed_turns
 from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, place_problem, stated_direction
+from postproc.workflows.place_spin import SpunPrograms, spin_programs
 from postproc.workflows.preparation import Stage, silent
 
 POOL = 1500
@@ -38,8 +43,16 @@ def place(request: PlaceRequest, stage: Stage = silent) -> Placement:
 
 def _place(request: PlaceRequest, inputs: Inputs, stage: Stage) -> Placement:
     stage("reading")
+    if request.spin_output is not None and not request.spin:
+        message = "a folder for programs with a turned tool is named, and no turn is asked for"
+        raise Refusal(Finding("PLC003", message, str(request.programs[0]), help="add --spin"))
     problem = place_problem(request)
-    result = search_places(problem.model, problem.motions, problem.room, problem.scoring, stage)
+    if request.spin_output is not None:
+        _refuse_unplaced(problem)
+    if not len(problem.room.free):
+        return _spun_here(problem, inputs, stage)
+    shapes = problem.shapes if isinstance(problem.shapes, CollisionShapes) else None
+    result = search_places(problem.model, problem.motions, problem.room, problem.scoring, stage, shapes)
     stage("predicting the best places")
     problem = replace(problem, few=result.few)
     present, lost = _present(problem)
@@ -49,29 +62,78 @@ def _place(request: PlaceRequest, inputs: Inputs, stage: Stage) -> Placement:
     best = ranked[0]
     stage("comparing freedoms")
     findings = [*lost, *_findings(problem, present, best, dropped)]
-    done = Placement(
-        programs=tuple(str(path) for path in request.programs),
-        robot=problem.prepared[0].robot.name,
-        digest=problem.prepared[0].robot.digest,
-        cell=str(problem.moved.cell.path),
-        base=problem.moved.base,
-        objective=request.objective,
-        motions=sum(len(one.task.toolpath) for one in problem.prepared),
+    done = replace(
+        _whole(problem, present),
         looked=result.looked,
         searched=len(result.few),
-        checked=len(problem.motions),
-        room=problem.room,
-        margins=(request.limit_margin, request.singularity_margin),
-        direction=stated_direction(problem.prepared[0], request),
-        present=present,
         places=tuple(ranked),
         alone=compare_freedoms(problem),
         feed=feed_turns(problem, best.place),
         spin=spin_bound(problem, best.place),
         grid=score_grid(problem, best.place),
-        findings=tuple(in_order_of_place(findings)),
+        findings=tuple(findings),
     )
-    return _written(problem, done, inputs)
+    return _written(problem, *_spun(problem, done, stage), inputs)
+
+
+def _whole(problem: PlaceProblem, present: PlacedFigures) -> Placement:
+    """What is known of a placement before any place was looked for."""
+    request, prepared = problem.request, problem.prepared
+    return Placement(
+        programs=tuple(str(path) for path in request.programs),
+        robot=prepared[0].robot.name,
+        digest=prepared[0].robot.digest,
+        cell=str(problem.moved.cell.path),
+        base=problem.moved.base,
+        objective=request.objective,
+        motions=sum(len(one.task.toolpath) for one in prepared),
+        checked=len(problem.motions),
+        room=problem.room,
+        margins=(request.limit_margin, request.singularity_margin),
+        direction=stated_direction(prepared[0], request),
+        present=present,
+        shapes=checked_shapes(problem.shapes),
+    )
+
+
+def _refuse_unplaced(problem: PlaceProblem) -> None:
+    """Raises Refusal PLC003 where turned programs would be written for a place that no cell file states."""
+    request = problem.request
+    if len(problem.room.free) and request.output is None:
+        message = "programs with a turned tool would be written for a place that no cell file states"
+        help = "write the cell as well, with -o CELL.yaml"
+        raise Refusal(Finding("PLC003", message, str(request.programs[0]), help=help))
+
+
+def _spun_here(problem: PlaceProblem, inputs: Inputs, stage: Stage) -> Placement:
+    """The result where only the tool may turn along the path, and the part stays."""
+    place = problem.room.present
+    stage("predicting the present place")
+    present = exact_figures(problem, None)
+    assert isinstance(present, PlacedFigures)
+    score = score_places(problem.model, problem.motions, problem.room, problem.scoring, place[None])
+    present = replace(present, score=float(score.values[0].mean()))
+    findings = shape_findings(problem.shapes, problem.prepared)
+    done = replace(_whole(problem, present), feed=feed_turns(problem, place), findings=tuple(findings))
+    return _written(problem, *_spun(problem, done, stage), inputs)
+
+
+def _spun(problem: PlaceProblem, done: Placement, stage: Stage) -> tuple[Placement, SpunPrograms | None]:
+    """``done`` with what a tool that turns along the path brings at its best place, and the programs."""
+    request = problem.request
+    if not request.spin:
+        return done, None
+    stage("turning the tool along the path")
+    spun = spin_programs(problem, done.best.place)
+    file = str(request.programs[0])
+    findings = list(done.findings)
+    if spun.figures.worth:
+        findings.append(Finding("PLC015", spin_sentence(spun.figures), file))
+    if request.spin_output is not None and spun.unwritable is not None:
+        findings.append(spun.unwritable)
+    elif request.spin_output is not None and not spun.texts:
+        findings.append(Finding("PLC014", f"no program is written: {spin_sentence(spun.figures)}", file))
+    return replace(done, spun=spun.figures, findings=tuple(findings)), spun
 
 
 def _present(problem: PlaceProblem) -> tuple[PlacedFigures, list[Finding]]:
@@ -119,9 +181,8 @@ def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding
     """PLC002: which motion and which limit is nearest to feasible; ``dropped``: why the best places are not."""
     request, room = problem.request, problem.room
     if dropped:
-        return replace(
-            dropped[0], message=f"none of {result.looked} places is feasible: {dropped[0].message}"
-        )
+        words = f"of {result.looked} places the {len(dropped)} best ones that are apart are not feasible"
+        return replace(dropped[0], message=f"{words}; of the first, {dropped[0].message}")
     near = result.pool.places[result.pool.order()[:1]]
     whole = score_places(problem.model, problem.motions, room, problem.scoring, near, detailed=True)
     assert whole.lack is not None
@@ -137,7 +198,18 @@ def _no_place(problem: PlaceProblem, result: SearchResult, dropped: list[Finding
     where = ", ".join(
         f"{name} {near[0, i] / UNITS[i]:.1f}" for i, name in enumerate(FREEDOMS) if i in room.free
     )
-    if not np.isfinite(limit):
+    hits = (
+        colliding_rows(problem.shapes, problem.model, problem.motions, near)
+        if isinstance(problem.shapes, CollisionShapes) and not whole.lack[0].any()
+        else np.array([-1])
+    )
+    if hits[0] >= 0:
+        line, file = (
+            int(problem.motions.line[hits[0]]),
+            str(request.programs[int(problem.motions.program[hits[0]])]),
+        )
+        what = "collides"
+    elif not np.isfinite(limit):
         what = "is out of reach"
     elif limit < request.limit_margin:
         what = f"is {limit:.1f} deg from the limit of an axis (margin {request.limit_margin:g} deg)"
@@ -157,7 +229,7 @@ def _findings(
     problem: PlaceProblem, present: PlacedFigures, best: PlacedFigures, dropped: list[Finding]
 ) -> list[Finding]:
     request, cell = problem.request, str(problem.moved.cell.path)
-    found = [Finding("PLC001", "collisions are not checked", str(request.programs[0]))]
+    found = shape_findings(problem.shapes, problem.prepared)
     lacks = present.limit_deg < request.limit_margin or present.singular_deg < request.singularity_margin
     if lacks:
         message = (
@@ -184,17 +256,24 @@ def _findings(
     return found
 
 
-def _written(problem: PlaceProblem, done: Placement, inputs: Inputs) -> Placement:
-    """Writes cell file, picture, page and result together."""
+def _written(problem: PlaceProblem, done: Placement, spun: SpunPrograms | None, inputs: Inputs) -> Placement:
+    """Writes cell file, turned programs, picture, page and result together."""
     request = problem.request
+    done = replace(done, findings=tuple(in_order_of_place(done.findings)))
     done = replace(done, exit=exit_code(done.findings, request.strict))
     if done.exit == 1:
         raise Refusal(*done.findings)
     files: dict[Path, bytes] = {}
     if request.output is not None:
         refuse_same_file(problem.moved.cell, request.output)
-        raw = problem.moved.at(done.places[0].place)
+        raw = problem.moved.at(done.best.place)
         files[request.output] = problem.moved.in_folder(raw, request.output)
+    if request.spin_output is not None and spun is not None and spun.unwritable is None:
+        for path, text in spun.texts.items():
+            target = request.spin_output / path.name
+            if target in files:
+                raise Refusal(Finding("FIL007", "two outputs have the same name", str(target)))
+            files[target] = text
     if request.picture is not None:
         from postproc.report.placement_picture import placement_picture
 
@@ -209,7 +288,14 @@ def _written(problem: PlaceProblem, done: Placement, inputs: Inputs) -> Placemen
         files[request.page] = placement_page(done, beside(request.page, links))
     if request.json is not None:
         files[request.json] = json_bytes(done)
-    inputs.refuse_outputs(names)
-    inputs.refuse_changed()
-    write_atomically(files, still=inputs.refuse_changed)
+    read = [inputs, *(one.inputs for one in problem.prepared)]
+    for one in read:
+        one.refuse_outputs(names)
+
+    def refuse_changed() -> None:
+        for one in read:
+            one.refuse_changed()
+
+    refuse_changed()
+    write_atomically(files, still=refuse_changed)
     return done

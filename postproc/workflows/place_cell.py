@@ -24,7 +24,7 @@ FILES = ("robot", "process", "force")
 @dataclass(frozen=True)
 class MovedCell:
     """What of a cell moves.  base: number; tools: numbers of those that are turned; track: name of the external axis,
-    joint: its column among the robot's joints, None for an axis of the cell."""
+    joint: its column among the robot's joints, None for an axis of the cell; decimals of the millimetres written."""
 
     cell: Cell
     raw: bytes
@@ -32,6 +32,7 @@ class MovedCell:
     tools: tuple[int, ...]
     track: str | None = None
     joint: int | None = None
+    decimals: int = 1
 
     def at(self, place: Floats) -> bytes:
         """The bytes of the cell file with the part at ``place`` (6,), in the old file's folder."""
@@ -48,7 +49,7 @@ class MovedCell:
         frame = self.cell.bases[self.base]
         section = top["bases"][_key(top["bases"], self.base)]
         for key, value in zip("xyz", place[:3] / MM, strict=True):
-            _set(section, key, value, 1)
+            _set(section, key, value, self.decimals)
         if place[TURN]:
             turn = rotation_from_vector(np.array([0.0, 0.0, place[TURN]]))
             _set_angles(section, turn @ frame.rotation)

@@ -1,4 +1,4 @@
-"""What else a search for places tells: regret, each freedom alone, the feed direction, the score over x and y."""
+"""What else a search for places tells: regret, each freedom alone, the score over x and y."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.arrays import Floats
 from postproc.base.units import DEG
 from postproc.placement.force_turns import SCENARIOS, turned_forces
 from postproc.placement.room import FREEDOMS, TOOL_TURN, X, Y
 from postproc.placement.score_places import P95, score_places
-from postproc.report.placement import FeedTurn, ScoreGrid, SingleFreedom
+from postproc.report.placement import ScoreGrid, SingleFreedom
 from postproc.workflows.place_problem import PlaceProblem
 
 STEPS, BEST = 201, 8
@@ -25,11 +25,6 @@ MANY = 20_000
 
 GRID = 33
 """Places along x and along y of the picture."""
-
-FEED_STEP = 15
-"""[deg]"""
-
-SHOWN_CUTS = 5
 
 SPIN_STEP, MOST_SPUN = 10, 4000
 """[deg] Turns of the tool that are looked at, and motions."""
@@ -80,72 +75,6 @@ def compare_freedoms(problem: PlaceProblem) -> tuple[SingleFreedom, ...]:
     return tuple(found)
 
 
-def feed_turns(problem: PlaceProblem, place: Floats) -> tuple[FeedTurn, ...]:
-    """What cutting in another direction would change at ``place`` (6,): the whole path, and the cuts with the largest
-    errors, each turned about the vertical where it is; the robot's postures are taken as they are."""
-    motions, scoring = problem.motions, problem.scoring
-    rows = np.flatnonzero(motions.scored)
-    part = motions.take(motions.with_heads(rows))
-    rows = np.flatnonzero(part.scored)
-    angles = np.arange(-90, 90, FEED_STEP)
-    forces = scoring.take(motions.with_heads(np.flatnonzero(motions.scored))).forces[:1]
-    errors = np.empty((len(angles), len(rows)))
-    for k, angle in enumerate(angles.tolist()):
-        turn = _about_z(angle * DEG)
-        fixed = part.world[:, None]
-        turned = replace(
-            part,
-            tangent=part.tangent @ turn.T,
-            start=np.full_like(part.start, np.nan),
-            moment=np.where(fixed, part.moment, part.moment @ turn.T),
-        )
-        some = replace(scoring, forces=np.where(fixed, forces, forces @ turn.T))
-        scores = score_places(problem.model, turned, problem.room, some, place[None], detailed=True)
-        assert scores.error is not None
-        errors[k] = scores.error[0, rows, 0]
-    now = int(np.flatnonzero(angles == 0)[0])
-    program, line = part.program[rows], part.line[rows]
-    breaks = (np.diff(program) != 0) | (np.diff(np.flatnonzero(motions.scored)) > 1) & _apart(problem)
-    cut = np.append(0, np.cumsum(breaks))
-    found = [_turn_of(problem, angles, errors, now, program, line, None)]
-    largest = [(float(errors[now, cut == k].max()), k) for k in range(int(cut[-1]) + 1)]
-    for _, k in sorted(largest, reverse=True)[:SHOWN_CUTS]:
-        found.append(
-            _turn_of(problem, angles, errors[:, cut == k], now, program[cut == k], line[cut == k], k)
-        )
-    return tuple(found)
-
-
-def _apart(problem: PlaceProblem) -> Bools:
-    """(S - 1,) whether motions without force lie between a scored place and the next one."""
-    motions = problem.motions
-    scored = np.flatnonzero(motions.scored)
-    air = np.cumsum(~motions.under_force)
-    return np.asarray(np.diff(air[scored]) > 0)
-
-
-def _turn_of(
-    problem: PlaceProblem,
-    angles: Ints,
-    errors: Floats,
-    now: int,
-    program: Ints,
-    line: Ints,
-    cut: int | None,
-) -> FeedTurn:
-    worst = errors.max(axis=1)
-    best = int(worst.argmin())
-    name = str(problem.request.programs[int(program[0])])
-    return FeedTurn(
-        name if cut is not None else "",
-        int(line.min()) if cut is not None else 0,
-        int(line.max()) if cut is not None else 0,
-        float(worst[now]),
-        float(angles[best]) * DEG,
-        float(worst[best]),
-    )
-
-
 def spin_bound(problem: PlaceProblem, place: Floats) -> float:
     """[m] the least that the objective could become if the tool turned about its spindle along the path, each motion as
     it is best for it: no smooth turn brings more.  NaN where the tool may not be turned.  The part stays at ``place``
@@ -165,11 +94,6 @@ def spin_bound(problem: PlaceProblem, place: Floats) -> float:
     error = np.where(scores.lack > 0, np.inf, scores.error.mean(axis=2))[:, part.scored]
     each = error.min(axis=0)
     return float(np.percentile(each, 95) if some.objective == P95 else each.max())
-
-
-def _about_z(angle: float) -> Floats:
-    cosine, sine = np.cos(angle), np.sin(angle)
-    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
 def score_grid(problem: PlaceProblem, place: Floats) -> ScoreGrid | None:

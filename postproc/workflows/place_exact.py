@@ -14,8 +14,10 @@ from postproc.base.units import DEG
 from postproc.compensation.correct import correct
 from postproc.compensation.path_comparison import along_and_across
 from postproc.compensation.uncertainty import evaluate_uncertainty
+from postproc.placement.collisions import CollisionShapes
 from postproc.report.placement import PlacedFigures
 from postproc.report.report import Spread
+from postproc.workflows.place_collisions import collision_of
 from postproc.workflows.place_motions import motion_margins
 from postproc.workflows.place_problem import PlaceProblem, PlaceRequest, prepared_at
 from postproc.workflows.preparation import Prepared
@@ -28,16 +30,32 @@ def exact_figures(problem: PlaceProblem, place: Floats | None) -> PlacedFigures 
     request = problem.request
     try:
         prepared = problem.prepared if place is None else prepared_at(problem.moved, place, request)
-        margins = _margins(prepared)
+        figures = figures_of(prepared, None if place is None else request)
         if place is not None:
-            for ready in prepared:
-                _check(ready, request)
-        figures = _figures(prepared)
+            refuse_collisions(problem.shapes, prepared)
     except Refusal as refusal:
         if place is None:
             raise
         return refusal.findings[0]
-    return replace(figures, place=problem.room.present if place is None else place, **margins)
+    return replace(figures, place=problem.room.present if place is None else place)
+
+
+def refuse_collisions(shapes: CollisionShapes | Finding | None, prepared: Sequence[Prepared]) -> None:
+    """Raises Refusal PLC002 for the first motion in which two links overlap."""
+    if isinstance(shapes, CollisionShapes):
+        for ready in prepared:
+            if (found := collision_of(shapes, ready)) is not None:
+                raise Refusal(found)
+
+
+def figures_of(prepared: Sequence[Prepared], request: PlaceRequest | None) -> PlacedFigures:
+    """The figures of the main job, without their place; ``request``: whose margins every motion must keep, None for
+    any.  Raises Refusal as the main job does, PLC002 for a motion that is not feasible."""
+    margins = _margins(prepared)
+    if request is not None:
+        for ready in prepared:
+            _check(ready, request)
+    return replace(_figures(prepared), **margins)
 
 
 def _margins(prepared: Sequence[Prepared]) -> dict[str, Any]:

@@ -31,12 +31,13 @@ MOST_INNER = 400
 @dataclass(frozen=True)
 class MotionMargins:
     """Of all places that a program leads to: limit (M,), singular (M,) [rad]: distances from the next axis limit and
-    the next singularity, -inf out of reach, and the rows (M,) they belong to; wrong (K,): rows whose configuration is
-    not the stated one."""
+    the next singularity, -inf out of reach, the rows (M,) they belong to, and the joint values q (M, n) there, 0 out
+    of reach; wrong (K,): rows whose configuration is not the stated one."""
 
     limit: Floats
     singular: Floats
     rows: Ints
+    q: Floats
     wrong: Ints
 
 
@@ -68,6 +69,7 @@ def motion_margins(task: CompensationProblem) -> MotionMargins:
         np.where(reached, room.min(axis=1), -np.inf),
         np.where(reached, singularity_angle(robot, q), -np.inf),
         every,
+        q,
         np.flatnonzero(wrong | (~track.turn_matches & placed_rows(task) & (path.kind == Kind.PTP))),
     )
 
@@ -152,6 +154,8 @@ def build_motions(ready: Prepared, base: int, turned_tools: bool, track: str | N
     return PartMotions(
         program=np.zeros(len(rows), np.int64),
         line=path.line[rows],
+        row=rows,
+        share=shares,
         target=Poses(np.ascontiguousarray(target.rotation), np.ascontiguousarray(target.position)),
         moves=moving_row[rows],
         tool=task.tool[rows],
@@ -248,7 +252,7 @@ def _tool_axes(ready: Prepared, rows: Ints, frames: Ints) -> Floats:
         if path.frames[frame].pose is not None or number is None or number not in ready.cell.tools:
             line = int(path.line[np.argmax(task.carries & (path.tool == frame))])
             message = "the program states the tool of this cut itself, so a cell file does not turn it"
-            raise Refusal(Finding("PLC003", message, task.file, line, help="omit --tool-turn"))
+            raise Refusal(Finding("PLC003", message, task.file, line, help="omit --tool-turn and --spin"))
         axes[frame] = ready.cell.tools[number].axis
     return np.asarray(axes[path.tool[rows]])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from postproc.base.units import DEG, MM
 from postproc.compensation.uncertain_inputs import FORCE, input_uncertainties
 from postproc.effects import ComplianceLaw, Load
 from postproc.model import StiffnessModel
+from postproc.placement.collisions import CollisionShapes
 from postproc.placement.force_turns import turned_forces
 from postproc.placement.part_motions import PartMotions, join_motions
 from postproc.placement.room import FREEDOMS, TRACK, UNITS, Room
@@ -23,6 +25,7 @@ from postproc.placement.score_places import COVERAGE, UNCERTAINTY, InputSpread, 
 from postproc.process.force_sources import not_requested
 from postproc.robot.external_axes import own_column
 from postproc.workflows.place_cell import MovedCell
+from postproc.workflows.place_collisions import collision_shapes
 from postproc.workflows.place_motions import base_of_cuts, build_motions, cell_of_all, track_of
 from postproc.workflows.preparation import Prepared, Request, prepare, read_program
 
@@ -34,7 +37,9 @@ PROBE = 1 * DEG
 class PlaceRequest:
     """What the user asked for.  ranges: freedom -> (from, to) [mm or deg]; objective: one of ``OBJECTIVES``; direction:
     half width [deg] of the interval of the forces' direction, None for the cell's; limit_margin, singularity_margin
-    [deg]; output: the new cell file."""
+    [deg]; output: the new cell file; spin: whether the tool may turn about its spindle along the path; spin_output:
+    folder of the programs that do; searched: whether places are looked for, not only those that are given;
+    collisions: URDF with collision shapes, None for the robot file's own."""
 
     programs: tuple[Path, ...]
     force: str | None = None
@@ -52,13 +57,18 @@ class PlaceRequest:
     picture: Path | None = None
     page: Path | None = None
     json: Path | None = None
+    spin: bool = False
+    spin_output: Path | None = None
     strict: bool = False
+    searched: bool = True
+    collisions: Path | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class PlaceProblem:
-    """Programs, their cell and what moves: all that places are compared by.  few (K,): the motions that the search
-    ended with."""
+    """Programs, their cell and what moves: all that places are compared by.  shapes: by which collisions are checked, a
+    Finding that states why there are none, None where no URDF is known; few (K,): the motions that the search ended
+    with."""
 
     request: PlaceRequest
     prepared: tuple[Prepared, ...]
@@ -66,6 +76,7 @@ class PlaceProblem:
     room: Room
     motions: PartMotions
     scoring: Scoring
+    shapes: CollisionShapes | Finding | None = None
     few: Ints = field(default_factory=lambda: np.empty(0, np.int64))
 
     @property
@@ -89,7 +100,8 @@ def place_problem(request: PlaceRequest) -> PlaceProblem:
         message = "neither the robot nor the cell has a linear track whose place the cell states"
         raise Refusal(Finding("PLC003", message, str(cell.path), help="omit --track"))
     turned = "tool_turn" in ranges
-    parts = [build_motions(one, base, turned, None if track is None else track[0]) for one in prepared]
+    about_spindle = turned or request.spin
+    parts = [build_motions(one, base, about_spindle, None if track is None else track[0]) for one in prepared]
     motions = join_motions(parts)
     if "turn" in ranges:
         motions = replace(motions, world=_world_forces(request, prepared, base, parts))
@@ -109,7 +121,8 @@ def place_problem(request: PlaceRequest) -> PlaceProblem:
         joint,
     )
     room = _room(request, prepared, motions, ranges, track)
-    return PlaceProblem(request, prepared, moved, room, motions, _scoring(request, prepared, motions))
+    shapes = collision_shapes(request.collisions, first)
+    return PlaceProblem(request, prepared, moved, room, motions, _scoring(request, prepared, motions), shapes)
 
 
 def _track(request: PlaceRequest, prepared: tuple[Prepared, ...]) -> tuple[str, float, float] | None:
@@ -126,10 +139,12 @@ def _cell_bytes(path: Path) -> bytes:
     return read_file(path)
 
 
-def prepared_at(moved: MovedCell, place: Floats, request: PlaceRequest) -> tuple[Prepared, ...]:
+def prepared_at(
+    moved: MovedCell, place: Floats, request: PlaceRequest, texts: Mapping[Path, bytes] = MappingProxyType({})
+) -> tuple[Prepared, ...]:
     """All programs as they run with the part at ``place`` (6,): the main job's own preparation of them, on the cell
-    file that would be written.  Raises Refusal as that does."""
-    with noted(), provided({moved.cell.path: moved.at(place)}):
+    file that would be written; ``texts``: what files of the programs contain instead.  Raises Refusal as that does."""
+    with noted(), provided({moved.cell.path: moved.at(place), **texts}):
         return tuple(prepare(_main(request, path)) for path in request.programs)
 
 
@@ -191,9 +206,11 @@ def _room(
     if track is not None and (lower[TRACK] < track[1] or upper[TRACK] > track[2]):
         message = f"the range of the track exceeds its limits {track[1] / MM:g} .. {track[2] / MM:g} mm"
         raise Refusal(Finding("PLC003", message, str(cell.path), help="state a range within the limits"))
-    if not (upper > lower).any():
+    if request.searched and not request.spin and not (upper > lower).any():
         message = "no freedom has a range: nothing may move"
-        help = "use --x a:b, --y a:b, --z a:b, --turn a:b or --tool-turn a:b, or state room: in the cell"
+        help = (
+            "use --x a:b, --y a:b, --z a:b, --turn a:b, --tool-turn a:b or --spin, or state room: in the cell"
+        )
         raise Refusal(Finding("PLC003", message, str(cell.path), help=help))
     return Room(lower, upper, present, polygon)
 

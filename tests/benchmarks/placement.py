@@ -103,11 +103,13 @@ def run(name: str, grid: int, draws: int) -> None:
     ratio = [on_mujoco(one) / figure for one, figure in zip((here, there), figures, strict=True)]
     print(f"  MuJoCo over predicted: {ratio[0]:.4f} at present, {ratio[1]:.4f} at the best place", flush=True)
     if grid:
-        best, count = Brute(program_of(name)).best_of_grid(ranges_around(name), GRIDS[grid])
-        print(
-            f"  grid of {count}: {best * 1e3:.3f} mm; search over grid {done.best.across.max / best:.3f}",
-            flush=True,
-        )
+        least, count = Brute(program_of(name)).best_of_grid(ranges_around(name), GRIDS[grid])
+        for key, one in (("across", done), ("max", largest)):
+            best = least[key]
+            ratio_to = one.best.figure(key) / best
+            print(
+                f"  grid of {count}, {key}: {best * 1e3:.3f} mm; search over grid {ratio_to:.3f}", flush=True
+            )
     if draws:
         wide = place(asked(name, direction=20.0))
         others = np.array([one.place for one in (*done.places, *wide.places)])
