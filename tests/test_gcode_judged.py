@@ -46,10 +46,11 @@ def test_more_made_up_programs_are_read_as_linuxcnc_runs_them(part: int):
 
 @pytest.mark.parametrize("name", MISREADINGS)
 def test_what_was_misread_is_not_any_more(name: str, tmp_path: Path):
-    found = judge(written(MISREADINGS[name]), tmp_path)
-    assert found is not None, "rs274 does not accept it"
-    assert not found.differences
-    assert found.known
+    for delete in (False, True):
+        found = judge(replace(written(MISREADINGS[name]), delete=delete), tmp_path)
+        assert found is not None, "rs274 does not accept it"
+        assert not found.differences
+        assert found.known
 
 
 def test_numbering_the_lines_changes_no_motion(tmp_path: Path):

@@ -132,6 +132,22 @@ class ProgrammedFrame:
         return vector if np.array_equal(turn, np.eye(3)) else vector @ turn.T
 
 
+def either_frame(one: ProgrammedFrame, other: ProgrammedFrame) -> ProgrammedFrame:
+    """What is known where one of two frames is in force, ``other`` after a block that may run: what both have."""
+    same = (one.shift == other.shift) & np.array_equal(one.turn, other.turn)
+    memory = _either_memory(one.memory, other.memory)
+    return ProgrammedFrame(other.turn, np.where(same, one.shift, np.nan), memory)
+
+
+def _either_memory(one: Any, other: Any) -> Any:
+    if isinstance(other, dict):
+        before = one or {}
+        return {name: value if before.get(name) == value else (np.nan,) * 6 for name, value in other.items()}
+    if isinstance(other, np.ndarray):
+        return np.where(other == (np.nan if one is None else one), other, np.nan)
+    return one if other is None else other
+
+
 @dataclass(frozen=True, eq=False)
 class Event:
     """A block that changes the frame: its words (key -> value as written, NaN if UNREAD), its Once bits, its notes.

@@ -29,13 +29,22 @@ from postproc.languages.gcode.blocks import (
     tilted,
 )
 from postproc.languages.gcode.comments import remarks
-from postproc.languages.gcode.control import Control, Event, Feed, Group, Move, Once, ProgrammedFrame
+from postproc.languages.gcode.control import (
+    Control,
+    Event,
+    Feed,
+    Group,
+    Move,
+    Once,
+    ProgrammedFrame,
+    either_frame,
+)
 from postproc.languages.gcode.correctability import Built, bind_names, check_correctability, locked_rows
 from postproc.languages.gcode.cycle_ends import cycle_ends
 from postproc.languages.gcode.diagnostics import diagnostics
 from postproc.languages.gcode.execution import FoldedWords, execute
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
-from postproc.languages.gcode.feeds import Feeds, feeds_before_units
+from postproc.languages.gcode.feeds import Feeds, blend_tolerances, blends, feeds_before_units
 from postproc.languages.gcode.integer_words import integer_words
 from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.modal import modal
@@ -205,7 +214,7 @@ def _followed(
         tilted(given),
         Reasons(len(given)),
     )
-    allowed = _allowed(given)
+    allowed = blend_tolerances(given)
     lengths = tool_lengths(given, tool)
     ends = cycle_ends(given, events, lengths.changes)
     found, differing = FilledRows(len(rows)), 0
@@ -231,7 +240,7 @@ def _followed(
         found.put(
             high - low,
             **_columns(here, where, moves, feeds),
-            blend=_blend(here, own, allowed),
+            blend=blends(here, own, allowed),
             sets=ends.stated(way.sets[own, :3], rows[low:high]),
             lost=way.unknown[own, :3],
         )
@@ -328,8 +337,7 @@ def _change(given: BlockWords, events: Ints) -> Callable[[int, ProgrammedFrame, 
         after = change(event)
         after = replace(after, shift=np.where(np.abs(after.shift) > FARTHEST * MM, np.nan, after.shift))
         if here.modal.flow.reason[0]:
-            same = after.shift == frame.shift
-            return ProgrammedFrame(after.turn, np.where(same, frame.shift, np.nan), after.memory)
+            return either_frame(frame, after)
         return after
 
     return changed
@@ -387,23 +395,12 @@ def _arcs(given: BlockWords, rows: Ints, start: Floats, end: Floats, plane: Ints
             found = arcs(
                 start[some, :3], end[some, :3], plane[some], counter, values, absolute, radius, turns[some]
             )
+        either = (given.modal.force[group][at] < 0) & np.isin(hows, (How.NUMBER, How.INTEGER)).any(axis=1)
+        for array in (found.centre, found.normal, found.sweep):
+            array[either] = np.nan
         for name in ("centre", "normal", "sweep", "wrong"):
             getattr(result, name)[some] = getattr(found, name)
     return result
-
-
-def _allowed(given: BlockWords) -> tuple[Ints, Floats]:
-    """Blocks with a G64 (K,), and what its P allows [m] (K,), NaN where nothing bounds it."""
-    codes = given.words(key("G"))
-    says = codes.block[codes.value == 64.0]
-    return says, given.lengths(key("P"))[says] if len(says) else np.empty(0)
-
-
-def _blend(given: BlockWords, rows: Ints, allowed: tuple[Ints, Floats]) -> Floats:
-    """(N,) [m]: 0 in exact modes, else as ``allowed``."""
-    path = given.modal.force[Group.PATH][rows]
-    at = np.searchsorted(allowed[0], rows + given.start, side="right") - 1
-    return np.where(path == 0, 0.0, np.where(path == 1, np.append(allowed[1], np.nan)[at], np.nan))
 
 
 def _whole(given: BlockWords, rows: Ints) -> dict[int, str]:

@@ -23,6 +23,7 @@ from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
 from postproc.languages.krl.lexing import FRAME_TABLES, Head, Statement, lines, module_name
 from postproc.languages.krl.motion_rows import MotionRows
+from postproc.languages.krl.open_blocks import BUDGET
 from postproc.languages.krl.other_modules import is_module, read_modules, visible
 from postproc.languages.krl.program_flow import ProgramFlow
 from postproc.languages.krl.program_structure import ProgramStructure, program_structure
@@ -85,7 +86,7 @@ def read(
     read = (*documents, *references, *siblings)
     has_tcp = any(_TCP.search(document.raw) for document in read)
     has_turning = any(_TURNING.search(document.raw) for document in read)
-    unfollowed = Unfollowed()
+    unfollowed = Unfollowed(labels=_far_labels(surveyed))
     for reading in range(MOST_READINGS + 1):
         run = ExecutionContext(
             source,
@@ -168,6 +169,16 @@ def _variables(declarations: Declarations, surveyed: ProgramStructure) -> Variab
     for name, entry in changing.items():
         variables.replace(name, entry)
     return variables
+
+
+def _far_labels(surveyed: ProgramStructure) -> set[tuple[int, bytes]]:
+    """The labels to which a GOTO leads back over more statements than are followed again."""
+    found = set()
+    for (start, name), (_, last) in surveyed.jumps.items():
+        at, _ = surveyed.routine_at[start].labels.get(name, (last, ()))
+        if last - at > BUDGET:
+            found.add((start, name))
+    return found
 
 
 def _nothing_followed(surveyed: ProgramStructure) -> Unfollowed:

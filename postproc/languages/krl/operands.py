@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
+from typing import NamedTuple
 
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.expressions import index_text
@@ -39,8 +40,7 @@ class Parts:
     not_understood: bytes = b""
 
 
-@dataclass(frozen=True, slots=True)
-class Operand:
+class Operand(NamedTuple):
     """One target as it is written: what it says, where it is in document 0, and the variable that holds it.
 
     builds: it may leave components to the point before, but what it says is not known.

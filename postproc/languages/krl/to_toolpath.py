@@ -279,11 +279,11 @@ def _number_texts(rows: MotionRows, table: MotionTable, spots: Spots) -> None:
 
 def _finder(rows: MotionRows, table: MotionTable) -> Callable[[int, str, str], Finding]:
     raw, name = rows.document.raw, str(rows.document.path)
+    words, lines = table.word.tolist(), table.line.tolist()
 
     def finding(row: int, code: str, message: str) -> Finding:
-        at = int(table.word[row])
-        column = at - raw.rfind(b"\n", 0, at)
-        return Finding(code, message, name, int(table.line[row]), column)
+        at = words[row]
+        return Finding(code, message, name, lines[row], at - raw.rfind(b"\n", 0, at))
 
     return finding
 
