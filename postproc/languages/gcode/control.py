@@ -191,7 +191,8 @@ class Control:
     from before it; retract: key of what says where a cycle that a block calls by its name retracts to;
     parameter: the letter that is no address with digits and an equals sign but a variable (R1=2); iso: every
     word belongs to a code of its block or to its motion; expressions: the language of its variables and
-    expressions, None where these are not read.
+    expressions, None where these are not read; radius_gap [m]: by how much the radii of an arc at its start and end may
+    differ where mm and where inch are in force.
     """
 
     name: str
@@ -221,3 +222,4 @@ class Control:
     parameter: str = ""
     iso: bool = False
     expressions: ExpressionLanguage | None = None
+    radius_gap: tuple[float, float] = (1e-5, 1e-5)

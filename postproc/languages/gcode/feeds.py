@@ -78,7 +78,8 @@ def blend_tolerances(given: BlockWords) -> tuple[Ints, Floats]:
 
 
 def blends(given: BlockWords, rows: Ints, allowed: tuple[Ints, Floats]) -> Floats:
-    """(N,) [m]: 0 in exact modes, else as ``blend_tolerances``."""
+    """(N,) [m] of the motions in blocks ``rows`` (N,): 0 in exact modes, else ``allowed`` (K,), as ``blend_tolerances``
+    gives it."""
     path = given.modal.force[Group.PATH][rows]
     at = np.searchsorted(allowed[0], rows + given.start, side="right") - 1
     return np.where(path == 0, 0.0, np.where(path == 1, np.append(allowed[1], np.nan)[at], np.nan))

@@ -88,6 +88,7 @@ class RunState:
         self.frames: list[CallFrame] = []
         self.repeats: dict[int, int] = {}
         self.steps = 0
+        self.missing: set[str] = set()  # names of what is called and not here
         self.breaks_while = any(
             statement.verb == Verb.BREAK and shape.construct[block].verb == Verb.WHILE
             for block, statement in shape.statements.items()
