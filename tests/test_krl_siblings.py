@@ -254,6 +254,10 @@ def test_a_base_is_what_the_controller_states_where_the_cell_has_none(tmp_path: 
     (message,) = said(program)
     assert message.endswith("is read for BASE_DATA[3] (where the cell has no such base)")
 
+    named = Document(tmp_path / "$config.dat", BASES.encode())
+    again = KrlDialect().read(program.documents, ReadingSettings(references=(named,)))
+    assert said(again) == said(program)
+
     def place(bases: str) -> list[float]:
         (tmp_path / "cell.yaml").write_text(
             "robot: kuka_kr270\ntools: {3: {x: 0, y: 0, z: 0, a: 0, b: 0, c: 0, axis: +z}}\n" + bases

@@ -61,7 +61,10 @@ CODES = define(
             "call of code that is not read",
             meaning="The called code may move the machine and change modes.",
             consequence="Position and modes are unknown after it until they are set again.",
-            action="Write the subprogram's blocks in place of the call; or set modes and X, Y, Z after it.",
+            action=(
+                "Put the file of the subprogram (POCKET.SPF, O1000.nc) beside the program; or write its blocks in "
+                "place of the call; or set modes and X, Y, Z after it."
+            ),
             example="`M98 P1000`.",
         ),
         "GCO008": Code(

@@ -117,7 +117,7 @@ def read(
     toolpath, text, refusals = to_toolpath(run, places)
     bases = [toolpath.frames[index] for index in np.unique(toolpath.base).tolist() if index >= 0]
     unresolved = _unresolved(run, bases)
-    _report_siblings(run, siblings, bases)
+    _report_siblings(run, references, siblings, bases)
     findings = sorted([*run.findings, *refusals], key=lambda finding: (finding.line, finding.column))
     return Program(
         dialect="krl",
@@ -150,19 +150,27 @@ def _unresolved(run: ExecutionContext, bases: Sequence[FrameRef]) -> frozenset[s
     return frozenset([*map(shown, names), *(f"{shown(name)}()" for name in calls), *entries])
 
 
-def _report_siblings(run: ExecutionContext, siblings: Sequence[Document], bases: Sequence[FrameRef]) -> None:
-    """Says which files beside the program are read, and for what."""
+def _report_siblings(
+    run: ExecutionContext,
+    references: Sequence[Document],
+    siblings: Sequence[Document],
+    bases: Sequence[FrameRef],
+) -> None:
+    """Says which files beside the program are read, and for what; of ``references``, which the user names, for which
+    bases."""
     used: dict[str, list[str]] = {}
     for name in sorted(run.variables.asked & run.declarations.origin.keys() - set(FRAME_TABLES)):
         used.setdefault(run.declarations.origin[name], []).append(shown(name))
     for name, (module, _) in sorted(run.others.routines.items()):
         used.setdefault(module.document.path.name, []).append(f"{shown(name)}()")
+    entries: dict[str, list[str]] = {}
     for base in bases:
         if base.declared is not None and base.number is not None:
             file = run.declarations.bases[base.number][1]
-            used.setdefault(file, []).append(f"BASE_DATA[{base.number}] (where the cell has no such base)")
-    for document in siblings:
-        names = used.get(document.path.name)
+            entries.setdefault(file, []).append(f"BASE_DATA[{base.number}] (where the cell has no such base)")
+    for document in (*references, *siblings):
+        names = [*(used.get(document.path.name, ()) if document in siblings else ())]
+        names += entries.get(document.path.name, ())
         if names:
             more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
             message = f"{document.path} is read for {', '.join(names[:MOST_NAMES])}{more}"

@@ -195,7 +195,7 @@ def _lock(run: ExecutionContext) -> None:
     for row, auxiliary in rows.arcs.items():
         variable_or_none = auxiliary.variable
         if variable_or_none is not None and _root(variable_or_none.name) in read and not auxiliary.locked:
-            rows.arcs[row] = replace(auxiliary, locked=READ_TOO)
+            rows.arcs[row] = auxiliary._replace(locked=READ_TOO)
 
 
 def _root(name: bytes) -> bytes:
@@ -276,7 +276,8 @@ def _number_texts(rows: MotionRows, table: MotionTable, spots: Spots) -> None:
         if node < n:
             spots.text[node] = top(node)
     for row, node in nodes.items():
-        rows.arcs[row] = replace(rows.arcs[row], text=top(node))
+        if (text := top(node)) != rows.arcs[row].text:
+            rows.arcs[row] = rows.arcs[row]._replace(text=text)
 
 
 def _finder(rows: MotionRows, table: MotionTable) -> Callable[[int, str, str], Finding]:
