@@ -98,6 +98,13 @@ def test_what_is_not_certain_is_not_read(tmp_path: Path, call: str, files: dict[
     assert np.isnan(program.toolpath.position[-1]).any()
 
 
+def test_a_file_without_the_subprogram_is_not_said_to_be_read(tmp_path: Path) -> None:
+    program = read(tmp_path, "a.ngc", HEAD + "o<part> call\nX50.\nM2\n", {"part.ngc": "G1 X10.\nM2\n"})
+    assert "GCO032" not in codes(program)
+    assert "GCO007" in codes(program)
+    assert np.isnan(program.toolpath.position[-1]).any()
+
+
 def test_subprograms_call_one_another(tmp_path: Path) -> None:
     files = {
         "O5.nc": "O5\nM98 P6\nM98 P6\nM99\n",

@@ -154,7 +154,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         external=external,
     )
     findings = [
-        *_read_too(document, joined),
+        *_read_too(document, joined, execution.missing),
         *refused.findings(),
         *diagnostics(document, given, rows, tool, named, settings),
     ]
@@ -186,11 +186,13 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
     )
 
 
-def _read_too(document: Document, joined: JoinedText) -> list[Finding]:
-    """Which files beside the program are read."""
+def _read_too(document: Document, joined: JoinedText, missing: frozenset[str]) -> list[Finding]:
+    """Which files beside the program are read, and hold what it calls."""
+    names = [(file, file_name(file.path)) for file in joined.files]
     return [
-        Finding("GCO032", f"{file.path} is read for the call of {file_name(file.path)}", str(document.path))
-        for file in joined.files
+        Finding("GCO032", f"{file.path} is read for the call of {name}", str(document.path))
+        for file, name in names
+        if name not in missing
     ]
 
 
