@@ -320,7 +320,7 @@ def measure(case: Case, size: int, longest: int = LONGEST) -> Cost:
 
 
 def _measured(case: Case, size: int, longest: int, send) -> None:
-    signal.alarm(longest)
+    signal.setitimer(signal.ITIMER_PROF, longest)
     text = case.text(size)
     with tempfile.TemporaryDirectory() as name:
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -51,7 +51,8 @@ def read(begin: Floats, end: Floats, **said: Any) -> reading.ArcGeometry:
         "plane": np.zeros(n, np.int64), "counter": np.ones(n, np.bool_), "ijk": np.full((n, 3), NAN),
         "absolute": np.zeros(n, np.bool_), "radius": np.full(n, NAN), "turns": np.zeros(n),
     }  # fmt: skip
-    return reading.arcs(np.array(begin), np.array(end), **(words | said))
+    plane, *rest = (words | said).values()
+    return reading.arcs(np.array(begin), np.array(end), plane, reading.ArcWords(*rest))
 
 
 def assert_made(found: reading.ArcGeometry, one: dict[str, Any], more: Floats | float = 0.0) -> None:
@@ -246,7 +247,8 @@ def back(arcs: writing.ArcsToWrite, written: writing.WrittenArcs) -> reading.Arc
     by_centre = written.convert | (arcs.form == ArcForm.CENTRE)
     ijk[~by_centre] = NAN
     radius = np.where(by_centre, NAN, number[:, 3] * scale)
-    return reading.arcs(begin, end, arcs.plane, ~arcs.clockwise, ijk, ~arcs.relative, radius, turns)
+    words = reading.ArcWords(~arcs.clockwise, ijk, ~arcs.relative, radius, turns)
+    return reading.arcs(begin, end, arcs.plane, words)
 
 
 @pytest.mark.parametrize("decimals", [2, 3, 4])

@@ -46,10 +46,25 @@ def test_more_made_up_programs_are_read_as_linuxcnc_runs_them(part: int):
 
 @pytest.mark.parametrize("name", MISREADINGS)
 def test_what_was_misread_is_not_any_more(name: str, tmp_path: Path):
-    found = judge(written(MISREADINGS[name]), tmp_path)
-    assert found is not None, "rs274 does not accept it"
-    assert not found.differences
-    assert found.known
+    for delete in (False, True):
+        found = judge(replace(written(MISREADINGS[name]), delete=delete), tmp_path)
+        assert found is not None, "rs274 does not accept it"
+        assert not found.differences
+        assert found.known
+
+
+@pytest.mark.parametrize(
+    ("unit", "radius", "gap"), [("G21", 10, 0.028), ("G21", 5, 0.027), ("G20", 1, 0.0027)]
+)
+def test_radii_may_differ_as_linuxcnc_allows(unit: str, radius: float, gap: float, tmp_path: Path):
+    for more, allowed in ((0.0, True), (0.05 * gap, False)):
+        text = f"{unit} G90 G0 X0 Y0 Z0\nF100 G2 X{2 * radius + gap + more:.5f} Y0 I{radius}\nM2"
+        made = written(text)
+        motions, (_, arc) = execute(made, tmp_path), read(made).rows
+        assert (motions is not None) == allowed
+        assert (arc.code == "") == allowed
+        if allowed:
+            assert not compare(motions, read(made)).differences
 
 
 def test_numbering_the_lines_changes_no_motion(tmp_path: Path):

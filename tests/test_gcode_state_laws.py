@@ -263,6 +263,7 @@ def walked(way: Course, events: list[int]) -> tuple[Floats, Floats, Ints, Ints]:
     begins, ends, sources, frames = [], [], [], []
     for k in range(n):
         if k in events:
+            here = np.where(way.left[k], NAN, here)
             there = frame.to_base(here)
             frame = change(k, frame, there)
             here, number = frame.from_base(there), number + 1

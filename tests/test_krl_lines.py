@@ -407,7 +407,7 @@ def test_the_parts_of_an_aggregate_have_places() -> None:
     assert found.external == ((b"E2", 9.0, b"k[1,2]"),)
     assert found.insert == 1000 + len(text) - 1
     assert found.words == b"S 3,T 2147483647,E2 k[1,2]"
-    assert found.missing == ["A", "C"]
+    assert found.missing == "A, C"
     assert found.numbers is None
     bare = parse(b"{ S 2}", 10, 0)
     assert isinstance(bare, KrlTarget)
@@ -415,7 +415,7 @@ def test_the_parts_of_an_aggregate_have_places() -> None:
     axes = parse(b"{E6AXIS: E1 5}", 0, 0)
     assert isinstance(axes, KrlTarget)
     assert axes.axes == (None,) * 6
-    assert axes.missing == ["A1", "A2", "A3", "A4", "A5", "A6"]
+    assert axes.missing == "A1, A2, A3, A4, A5, A6"
 
 
 WHY = UnknownValue("KRL002", "because")

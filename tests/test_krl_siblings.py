@@ -9,6 +9,8 @@ import pytest
 from postproc.base.document import Document
 from postproc.base.findings import Refusal
 from postproc.batching.files_read import digest_of, readings
+from postproc.cell import frames_of
+from postproc.cell.read_cell import load_cell
 from postproc.languages.dialect import Program, ReadingSettings, read_with_siblings
 from postproc.languages.krl import KrlDialect
 from postproc.toolpath.initial_state import Symbol
@@ -105,7 +107,7 @@ def test_the_cell_goes_before_the_files_and_then_none_is_read(tmp_path: Path) ->
     assert "base [6] tool [5]" in dump(program)[1]
     program = read(tmp_path, HEAD + f"$BASE=BASE_DATA[2]\nLIN {FULL}\n", {"$config.dat": CONFIG})
     assert said(program) == []
-    assert program.unresolved == frozenset()
+    assert program.unresolved == {"BASE_DATA[2]"}
 
 
 def test_what_the_last_run_left_in_a_file_is_not_known(tmp_path: Path) -> None:
@@ -237,3 +239,50 @@ def test_a_compensated_program_has_the_files_of_the_original(tmp_path: Path) -> 
     alone, _ = read_with_siblings(KrlDialect(), documents, ReadingSettings())
     there, _ = read_with_siblings(KrlDialect(), documents, ReadingSettings(), tmp_path)
     assert [dump(one)[0][-8:] for one in (alone, there)] == ["tool [1]", "tool [4]"]
+
+
+BASES = dat("DECL FRAME BASE_DATA[32]\nBASE_DATA[3]={X 100,Y 0,Z 0,A 90,B 0,C 0}\nBASE_DATA[4]={X 1}")
+IN_BASE_3 = "$TOOL=TOOL_DATA[3]\n$BASE=BASE_DATA[3]\nLIN " + FULL + "\n"
+
+
+def test_a_base_is_what_the_controller_states_where_the_cell_has_none(tmp_path: Path) -> None:
+    program = read(tmp_path, IN_BASE_3, {"$config.dat": BASES})
+    path = program.toolpath
+    assert dump(program) == ["LIN X 1 Y 2 Z 3 A 4 B 5 C 6 base [3] tool [3]"]
+    base, tool = path.frames[path.base[0]], path.frames[path.tool[0]]
+    assert (base.pose, tool.declared) == (None, None)
+    (message,) = said(program)
+    assert message.endswith("is read for BASE_DATA[3] (where the cell has no such base)")
+
+    named = Document(tmp_path / "$config.dat", BASES.encode())
+    again = KrlDialect().read(program.documents, ReadingSettings(references=(named,)))
+    assert said(again) == said(program)
+
+    def place(bases: str) -> list[float]:
+        (tmp_path / "cell.yaml").write_text(
+            "robot: kuka_kr270\ntools: {3: {x: 0, y: 0, z: 0, a: 0, b: 0, c: 0, axis: +z}}\n" + bases
+        )
+        found = frames_of(load_cell(tmp_path / "cell.yaml"), path, "part.src").base_in_robot
+        return [*(found.position[0] * 1000).round(6).tolist(), found.rotation[0, 1, 0].round(9)]
+
+    assert place("") == [100, 0, 0, 1]
+    assert place("bases: {3: {x: 7, y: 8, z: 9, a: 0, b: 0, c: 0}}\n") == [7, 8, 9, 0]
+
+
+@pytest.mark.parametrize(
+    ("text", "files"),
+    [
+        (IN_BASE_3, {}),
+        (IN_BASE_3.replace("[3]", "[4]"), {"$config.dat": BASES}),  # omits components
+        (IN_BASE_3, {"$config.dat": BASES, "System/$config.dat": BASES.replace("X 100", "X 101")}),
+        (IN_BASE_3, {"other.dat": BASES}),
+        (IN_BASE_3, {"$config.dat": dat("$BASE_DATA[3]={X 1,Y 2,Z 3,A 0,B 0,C 0}")}),
+    ],
+)
+def test_a_base_that_no_file_states_for_sure_is_that_of_the_cell_alone(
+    tmp_path: Path, text: str, files: dict[str, str]
+) -> None:
+    program = read(tmp_path, text, files)
+    assert [frame.declared for frame in program.toolpath.frames] == [None] * len(program.toolpath.frames)
+    assert not any("BASE_DATA" in message for message in said(program))
+    assert any(name.startswith("BASE_DATA") for name in program.unresolved)

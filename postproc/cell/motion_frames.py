@@ -40,7 +40,8 @@ def frames_of(
 ) -> MotionFrames:
     """The base, tool and spindle axis of every motion of ``toolpath``, which was read from ``file``.
 
-    A frame that the program gives as a pose wins over the cell's of the same number.  Refusal CEL002 for every
+    A frame that the program gives as a pose wins over the cell's of the same number, and that over what the
+    controller's own file declares.  Refusal CEL002 for every
     frame that neither gives and that a motion with a known target uses; without such a motion it is NaN.
     """
     tools = {number: tool.pose for number, tool in cell.tools.items()}
@@ -86,7 +87,8 @@ def _pose(frame: FrameRef, numbered: dict[int, Poses]) -> Poses:
         return frame.pose
     if frame.number == 0:  # $NULLFRAME
         return Poses.identity()
-    return UNKNOWN if frame.number is None else numbered.get(frame.number, UNKNOWN)
+    found = None if frame.number is None else numbered.get(frame.number, frame.declared)
+    return UNKNOWN if found is None else found
 
 
 def _spindle(frame: FrameRef, cell: Cell) -> Floats:
@@ -118,6 +120,7 @@ def _missing(
         number = frame.number
         if (
             frame.pose is not None
+            or frame.declared is not None
             or number is None
             or number == 0
             or number in numbered

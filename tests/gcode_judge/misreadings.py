@@ -4,12 +4,23 @@ from __future__ import annotations
 
 from .blocks import Block, Made
 
+START = "G21 G90 G0 X1 Y2 Z3\nF100\n"
+
 MISREADINGS = {
     "words beside an assignment": "G21 G90 G0 X1 Y2 Z3\nF100\n#1=4 G1 X80\nM2",
     "the place after a canned cycle": "G21 G90 G0 X1 Y2 Z3\nF100 G81 X5 Z-5 R1\nG1 X9\nM2",
     "coordinates after a tool length offset": "G21 G90 G0 X1 Y2 Z3\nF100 G43 H2\nG1 X9\nM2",
     "a code that is computed": "G21 G90 G0 X1 Y2 Z3\nG[55+1]\nG1 X5 Y3 Z2 F100\nM2",
     "a full circle that may run often or never": "G21 G90 G0 X1 Y2 Z3\no1 repeat [2]\nG2 I5 F100\no1 endrepeat\nM2",
+    "G92 in an offset that has just been written": START
+    + "G10 L2 P1 X-13.5\nG92 X4\nX8 Y2 Z2\nG10 L2 P1 X0\nG56 G0 X1 Y2 Z3\nM2",
+    "a shift that a deleted block may have stored": START + "/G92 Y23\nG92.3\nG0 Y-6 Z5\nM2",
+    "R of a cycle in a deleted block": START + "G99 G81 X5 Z-5 R1\n/X3 R94\nX4\nG1 Y3\nX2\nM2",
+    "a DO after a WHILE with a BREAK": START
+    + "#20=0\no1 while [0]\no1 break\no1 endwhile\no2 do\n#20=[#20+1]\nG1 X5\no2 while [#20 lt 3]\nM2",
+    "a CONTINUE after which nothing is known": START
+    + "#20=0\no1 while [#20 lt 4]\n/#20=[#20+1]\n#20=[#20+1]\nG0 X9\no1 continue\no1 endwhile\nM2",
+    "the centre of an arc in a mode that is not known": START + "/G90.1\nG1 X10 Y10\nG3 I-10 J-10\nM2",
 }
 
 

@@ -61,7 +61,14 @@ class Reading:
         """A warning, or a finding of its own, names the line."""
         return any(first <= line <= last for _, first, last in self.findings)
 
+    def may_end_before(self, row: int) -> bool:
+        """A finding says that the program may end before a row."""
+        lines = [row.line for row in self.rows[: row + 1]]
+        ends = [finding[1:] for finding in self.findings if finding[0] == MAY_END]
+        return any(first <= line <= last for first, last in ends for line in lines)
 
+
+MAY_END = "GCO030"
 UNSAID = ("GCO020", "GCO021", "GCO022", "GCO023", "GCO027", "GCO028")
 """Findings that say nothing of a motion: unit and tool that are assumed."""
 
@@ -104,5 +111,6 @@ def read(made: Made) -> Reading:
             continue
         line = finding.line or 0
         span = _LINES.search(finding.message)
-        findings.append((finding.code, line, int(span[2]) if span else line))
+        first = int(span[1]) if span and finding.code == MAY_END else line
+        findings.append((finding.code, first, int(span[2]) if span else line))
     return Reading(tuple(rows), tuple(findings))

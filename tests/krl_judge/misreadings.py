@@ -16,6 +16,21 @@ class Misreading:
 
 MISREADINGS = (
     Misreading(
+        "constant after axes",
+        "With $ORI_TYPE=#CONSTANT a LIN after an axis motion keeps the orientation of that motion, whatever its text"
+        " states; a partial point behind it is read with the angle of the text.",
+        Case(
+            "DEF part()\n"
+            "$ORI_TYPE=#CONSTANT\n"
+            "BAS(#BASE,1)\n"
+            "BAS(#TOOL,1)\n"
+            "PTP {A1 -71,A2 -21,A3 -67,A4 68,A5 -11,A6 76}\n"
+            "LIN {X 193,Y 297,A -14,B -79,C -80}\n"
+            "LIN {Z 224,Y -40,B -33,C -27}\n"
+            "END\n"
+        ),
+    ),
+    Misreading(
         "partial axes",
         "A PTP to some axes moves the robot also where the other axes are not known; a partial point behind it is read"
         " with components from before that PTP.",

@@ -8,6 +8,7 @@ begin and end, d their distance, n the normal of the chord on the side that the 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,8 @@ SAME = 1e-9
 """[m] an arc whose end is as near to its start is a full circle."""
 
 ABSOLUTE, RELATIVE, MOST = 1e-5, 1e-3, 1e-4
-"""[m, 1, m] radii at begin and end may differ by ABSOLUTE, or by RELATIVE of the radius but no more than MOST."""
+"""[m, 1, m] radii at begin and end may differ by ABSOLUTE, or what the control allows instead, or by RELATIVE of the
+radius, but by no more than MOST."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,22 +38,30 @@ class ArcGeometry:
     wrong: Ints
 
 
+class ArcWords(NamedTuple):
+    """What the words of N arcs state.
+
+    counter (N,): G3; ijk (N, 3) [m], NaN where absent; absolute (N,) or (N, 3): of ijk; radius (N,) [m], NaN where
+    absent; turns (N,) whole turns beyond the first.
+    """
+
+    counter: Bools
+    ijk: Floats
+    absolute: Bools
+    radius: Floats
+    turns: Floats
+
+
 def arcs(
-    begin: Floats,
-    end: Floats,
-    plane: Ints,
-    counter: Bools,
-    ijk: Floats,
-    absolute: Bools,
-    radius: Floats,
-    turns: Floats,
+    begin: Floats, end: Floats, plane: Ints, words: ArcWords, gap: Floats | float = ABSOLUTE
 ) -> ArcGeometry:
     """The arcs of N blocks.
 
-    begin, end (N, 3) [m]; plane (N,) 0, 1, 2, -1 not known; counter (N,): G3; ijk (N, 3) [m], NaN where absent;
-    absolute (N,) or (N, 3): of ijk; radius (N,) [m], NaN where absent; turns (N,) whole turns beyond the first.
+    begin, end (N, 3) [m]; plane (N,) 0, 1, 2, -1 not known; gap (N,) [m]: what the control allows the radii at begin
+    and end to differ by, whatever their size.
     """
     n = len(begin)
+    counter, ijk, absolute, radius, turns = words
     wrong = np.zeros(n, np.int64)
     rows = np.arange(n)
     axes = PLANES[np.maximum(plane, 0)]
@@ -78,8 +88,7 @@ def arcs(
         centre = np.where(by_radius[:, None], apex, centre)
         near = np.hypot(*(b - centre).T)
         far = np.hypot(*(e - centre).T)
-        gap = np.abs(near - far)
-        apart = gap > np.minimum(np.maximum(ABSOLUTE, RELATIVE * np.maximum(near, far)), MOST)
+        apart = np.abs(near - far) > np.minimum(np.maximum(gap, RELATIVE * np.maximum(near, far)), MOST)
         short = (np.abs(radius) < d / 2 - ABSOLUTE) | (d < SAME)
 
     start = np.arctan2(b[:, 1] - centre[:, 1], b[:, 0] - centre[:, 0])

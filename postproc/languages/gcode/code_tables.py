@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from postproc.languages.gcode import expression_values, general_lines, offsets
 from postproc.languages.gcode.control import UNKNOWN, Control, Feed, Group, ModalCode, Move, Once
 
@@ -126,6 +128,8 @@ LINUXCNC = Control(
     feed_before_units=True,
     expressions=expression_values.LINUXCNC,
     frame=offsets.one_shift,
+    # CENTER_ARC_RADIUS_TOLERANCE_MM and _INCH of its interp_internal.hh
+    radius_gap=(0.02e-3 * math.sqrt(2), 0.002 * 25.4e-3 * math.sqrt(2)),
 )
 """LinuxCNC, and ISO code that is of no other control."""
 

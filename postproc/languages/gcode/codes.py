@@ -61,7 +61,10 @@ CODES = define(
             "call of code that is not read",
             meaning="The called code may move the machine and change modes.",
             consequence="Position and modes are unknown after it until they are set again.",
-            action="Write the subprogram's blocks in place of the call; or set modes and X, Y, Z after it.",
+            action=(
+                "Put the file of the subprogram (POCKET.SPF, O1000.nc) beside the program; or write its blocks in "
+                "place of the call; or set modes and X, Y, Z after it."
+            ),
             example="`M98 P1000`.",
         ),
         "GCO008": Code(
@@ -284,6 +287,22 @@ CODES = define(
             consequence="Read otherwise the arcs would be others.",
             action="Write G90.1 or G91.1.",
             example="`G3 X5 Y5 I5 J0` after `G1 X10 Y0`.",
+        ),
+        "GCO032": Code(
+            "info",
+            "another file is read too",
+            meaning="A subprogram that the program calls is in a file beside it.",
+            consequence="It is followed, so that what it leaves is known; it is never written.",
+            action="Load the same file on the control.",
+            example="`POCKET` with POCKET.SPF in the folder of the program.",
+        ),
+        "GCO033": Code(
+            "warning",
+            "motion in another file",
+            meaning="The motion is in a subprogram that has a file of its own.",
+            consequence="It is not corrected, as only the program itself is written.",
+            action="Put the subprogram into the file of the program, or correct its file by itself.",
+            example="`M98 P1234` with O1234.nc beside the program.",
         ),
         "SIN001": Code(
             "info",

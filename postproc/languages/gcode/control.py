@@ -132,6 +132,22 @@ class ProgrammedFrame:
         return vector if np.array_equal(turn, np.eye(3)) else vector @ turn.T
 
 
+def either_frame(one: ProgrammedFrame, other: ProgrammedFrame) -> ProgrammedFrame:
+    """What is known where one of two frames is in force, ``other`` after a block that may run: what both have."""
+    same = (one.shift == other.shift) & np.array_equal(one.turn, other.turn)
+    memory = _either_memory(one.memory, other.memory)
+    return ProgrammedFrame(other.turn, np.where(same, one.shift, np.nan), memory)
+
+
+def _either_memory(one: Any, other: Any) -> Any:
+    if isinstance(other, dict):
+        before = one or {}
+        return {name: value if before.get(name) == value else (np.nan,) * 6 for name, value in other.items()}
+    if isinstance(other, np.ndarray):
+        return np.where(other == (np.nan if one is None else one), other, np.nan)
+    return one if other is None else other
+
+
 @dataclass(frozen=True, eq=False)
 class Event:
     """A block that changes the frame: its words (key -> value as written, NaN if UNREAD), its Once bits, its notes.
@@ -175,7 +191,8 @@ class Control:
     from before it; retract: key of what says where a cycle that a block calls by its name retracts to;
     parameter: the letter that is no address with digits and an equals sign but a variable (R1=2); iso: every
     word belongs to a code of its block or to its motion; expressions: the language of its variables and
-    expressions, None where these are not read.
+    expressions, None where these are not read; radius_gap [m]: by how much the radii of an arc at its start and end may
+    differ where mm and where inch are in force.
     """
 
     name: str
@@ -205,3 +222,4 @@ class Control:
     parameter: str = ""
     iso: bool = False
     expressions: ExpressionLanguage | None = None
+    radius_gap: tuple[float, float] = (1e-5, 1e-5)

@@ -10,9 +10,10 @@ import numpy as np
 from postproc.base.arrays import Bools, Ints
 from postproc.base.document import Document
 from postproc.languages.gcode.blocks import AXES, FRAMED, SECOND, BlockWords, Reasons, What
-from postproc.languages.gcode.control import Group, Move, Once
+from postproc.languages.gcode.control import Feed, Group, Move, Once
 from postproc.languages.gcode.execution import Execution
 from postproc.languages.gcode.execution_flow import FlowReason
+from postproc.languages.gcode.feeds import feeds_before_units
 from postproc.languages.gcode.motions import GcodeMotions
 from postproc.languages.gcode.positions import Positions
 from postproc.languages.gcode.refusals import RefusalCollector, RefusalReason, Refusals
@@ -44,7 +45,7 @@ ARCS = {
     6: "the three points of the arc are on one line",
 }
 UNUSED = "a word I, J, K, L, P, Q or R belongs to no code of the block"
-_POSITION = re.compile(rb"#[ \t]*+(?:(?:50[0-6]\d|542\d)(?!\d)|<_(?:abs_)?[xyzabcuvw]>|#|\[)", re.I)
+POSITION = re.compile(rb"#[ \t]*+(?:(?:50[0-6]\d|542\d)(?!\d)|<_(?:abs_)?[xyzabcuvw]>|#|\[)", re.I)
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,6 +279,35 @@ def locked_rows(
     return pins.done(document, blocks.line[rows], blocks.start[rows], blocks.start[rows])
 
 
+_WAY = tuple(key(letter, index) for letter in "ABCIJK" for index in (1, 2, 3))
+"""Words of the way itself: the point between, orientations."""
+
+
+def no_insert_before(given: BlockWords, rows: Ints, foreign: Bools) -> dict[int, str]:
+    """Motions, in the blocks ``rows`` (N,), before which nothing may be inserted, because their block says more than
+    the motion, or is in another file (``foreign`` (B,))."""
+    modal = given.modal
+    more = modal.more | given.noted("assign", "corner", "axis", "polar")
+    others = (one for one in given.control.columns if one not in _WAY)
+    more |= given.has(*(key(letter) for letter in "ESTHDLQUVWM"), *others)
+    word, usual = given.control.turns
+    if word in given.columns:
+        more |= given.number(word) > usual
+    # Machine axes: what is inserted has no words for them.
+    more |= given.has(*(key(letter) for letter in "ABC")) & (modal.force[Group.TCP] != 1)
+    timed = modal.force[Group.FEED] == Feed.INVERSE_TIME
+    found: dict[int, str] = {}
+    for mask, why in (
+        (timed, "F is the time of the whole block (G93)"),
+        (foreign, "its block is in another file"),
+        (more, "its block contains more than the motion"),
+        (modal.flow.entered, "a jump leads to its block"),
+        (feeds_before_units(given), "its F is in the unit from before it"),
+    ):
+        found.update(dict.fromkeys(np.flatnonzero(mask[rows]).tolist(), why))
+    return found
+
+
 def _through(built: Built, refused: Bools, building: Bools) -> Ints:
     """Motions from which ``building`` (N,) ones inherit a coordinate or the orientation through ``refused`` ones."""
     n = len(built.block)
@@ -293,7 +323,7 @@ def _through(built: Built, refused: Bools, building: Bools) -> Ints:
 
 def _reading(document: Document, execution: Execution) -> Ints:
     """Blocks with a variable that holds a position (#5001 to #5069, #5420 to #5428, #<_x>), or is itself computed."""
-    places = [found.start() for found in _POSITION.finditer(document.raw)]
+    places = [found.start() for found in POSITION.finditer(document.raw)]
     starts, order = execution.text.blocks.start, execution.order
     blocks = np.unique(np.searchsorted(starts, places, side="right") - 1).astype(np.int64)
     return blocks if order is None else np.flatnonzero(np.isin(order, blocks))

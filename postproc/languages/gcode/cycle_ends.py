@@ -76,7 +76,8 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
     height = np.stack([given.lengths(one) for one in AXES[:3]], axis=1)
     hows = np.stack([given.how(one) for one in AXES[:3]], axis=1)
     # Where the last coordinate of each axis is stated; words of a cycle along its own axis are depths.
-    sure = given.motion & ~given.machine & absolute & (given.modal.flow.reason == 0)
+    certain = given.modal.flow.reason == 0
+    sure = given.motion & ~given.machine & absolute & certain
     placed = sure[:, None] & np.isin(hows, (How.NUMBER, How.INTEGER))
     placed &= ~(cycle[:, None] & (axis[:, None] == np.arange(3)))
     latest = np.maximum.accumulate(np.where(placed, np.arange(n)[:, None], -1), axis=0)
@@ -96,7 +97,7 @@ def cycle_ends(given: BlockWords, events: Ints, lengths: Bools) -> CycleEnds:
             at_r, before = np.nan, np.nan
         last = drilled[axis[row]] = row
         if has_plane[row]:  # one that is computed is not known
-            at_r = plane[row] if absolute[row] else np.nan
+            at_r = plane[row] if absolute[row] and certain[row] else np.nan
         elif not absolute[row]:
             at_r = np.nan
         if back[row] == 1:

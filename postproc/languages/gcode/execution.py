@@ -30,6 +30,8 @@ from postproc.languages.gcode.statements import NotFollowed, Structure, structur
 from postproc.languages.gcode.variable_values import VariableValues
 from postproc.languages.gcode.words import key
 
+MACRO = 65
+"""G65 calls as M98, with values for variables."""
 RESTARTS = 20
 """How often a program is followed anew with more that may run or not."""
 
@@ -58,7 +60,8 @@ class Execution:
     calls are; reason (E,) FlowReason where they are.  tape (E,): the block belongs to the program.  called (E,):
     the step calls a subprogram that is followed.  entered (E,): a jump leads to the block.  repeated (E,): the
     block runs in other steps as well.  folded: the words whose values are put in.  unknown: names whose value was
-    wanted and is not known, and the block where it was first."""
+    wanted and is not known, and the block where it was first.  missing: names of programs that are called and are not
+    in the text."""
 
     text: Source
     source: Source
@@ -71,10 +74,14 @@ class Execution:
     repeated: Bools
     folded: FoldedWords
     unknown: Mapping[str, int]
+    missing: frozenset[str] = frozenset()
 
 
-def execute(source: Source, control: Control, symbols: Mapping[str, object]) -> Execution:
-    """The run of a program; ``symbols``: values of names that only the controller knows."""
+def execute(
+    source: Source, control: Control, symbols: Mapping[str, object], own: int | None = None
+) -> Execution:
+    """The run of a program; ``symbols``: values of names that only the controller knows; own: blocks of the program
+    itself: those behind them are of other files, and where they do not run they are not in the run."""
     n = len(source.blocks)
     nothing = np.zeros(n, np.bool_)
     tape = tape_blocks(source)
@@ -86,8 +93,10 @@ def execute(source: Source, control: Control, symbols: Mapping[str, object]) -> 
         return plain
     noted = {note.kind for note in source.notes}
     m = source.column(key("M"))
-    calls = np.isin(m.value, (SUBPROGRAM, LOCAL)).any() or (
-        control.calls and source.mask(*control.calls).any()
+    calls = (
+        np.isin(m.value, (SUBPROGRAM, LOCAL)).any()
+        or (source.column(key("G")).value == MACRO).any()
+        or (control.calls and source.mask(*control.calls).any())
     )
     if not noted & {"value", "assign", "if", "open", "close", "while", "jump", "call"} and not calls:
         return plain
@@ -101,7 +110,7 @@ def execute(source: Source, control: Control, symbols: Mapping[str, object]) -> 
         for _ in range(RESTARTS):
             run = RunFlow(source, control, VariableValues(language, known, control.name), shape, opaque)
             try:
-                return _result(run, run.follow(), True)
+                return _result(run, run.follow(), True, own)
             except RunAgain:
                 continue
     except NotFollowed:
@@ -144,8 +153,8 @@ def _in_text_order(run: RunFlow) -> Execution:
     return _result(run, run.n, False)
 
 
-def _result(run: RunFlow, stop: int, followed: bool) -> Execution:
-    """The run as arrays; blocks that do not run come last."""
+def _result(run: RunFlow, stop: int, followed: bool, own: int | None = None) -> Execution:
+    """The run as arrays; blocks that do not run come last, of the first ``own`` ones."""
     n = run.n
     pieces = [np.arange(start, end) for start, end, _ in run.ranges]
     flags = [
@@ -153,7 +162,7 @@ def _result(run: RunFlow, stop: int, followed: bool) -> Execution:
     ]
     order = np.concatenate(pieces) if pieces else np.empty(0, np.int64)
     many = np.bincount(order, minlength=n)
-    rest = np.flatnonzero(many == 0)
+    rest = np.flatnonzero(many[:own] == 0)
     programs = program_starts(run.source)
     later = programs[1] if len(programs) > 1 else n
     why = np.where(rest >= stop, FlowReason.ENDED, FlowReason.SKIPPED).astype(np.int8)
@@ -186,4 +195,5 @@ def _result(run: RunFlow, stop: int, followed: bool) -> Execution:
         many[order] > 1,
         folded,
         run.unknown,
+        frozenset(run.missing),
     )

@@ -68,3 +68,18 @@ def _latest(column: WordColumn, blocks: Ints) -> tuple[Ints, Floats]:
     """The blocks (N,) that state what holds in ``blocks`` (N,), and what; 0 and NaN where none does."""
     at = np.searchsorted(column.block, blocks, side="right") - 1
     return np.maximum(np.append(column.block, -1)[at], 0), np.append(column.value, np.nan)[at]
+
+
+def blend_tolerances(given: BlockWords) -> tuple[Ints, Floats]:
+    """Blocks with a G64 (K,), and what its P allows [m] (K,), NaN where nothing bounds it."""
+    codes = given.words(key("G"))
+    says = codes.block[codes.value == 64.0]
+    return says, given.lengths(key("P"))[says] if len(says) else np.empty(0)
+
+
+def blends(given: BlockWords, rows: Ints, allowed: tuple[Ints, Floats]) -> Floats:
+    """(N,) [m] of the motions in blocks ``rows`` (N,): 0 in exact modes, else ``allowed`` (K,), as ``blend_tolerances``
+    gives it."""
+    path = given.modal.force[Group.PATH][rows]
+    at = np.searchsorted(allowed[0], rows + given.start, side="right") - 1
+    return np.where(path == 0, 0.0, np.where(path == 1, np.append(allowed[1], np.nan)[at], np.nan))

@@ -92,13 +92,16 @@ class Trace:
         at = 0
         for event in (self._events[low:high] - start).tolist():
             self._scan(course, slice(at, event), start, found)
-            self._turn(start + event)
+            self._turn(start + event, course.left[event])
             at = event
         self._scan(course, slice(at, n), start, found)
         return found
 
-    def _turn(self, event: int) -> None:
-        """Goes on in the frame behind ``event``; behind too many nothing is known."""
+    def _turn(self, event: int, left: Bools) -> None:
+        """Goes on in the frame behind ``event``; behind too many nothing is known.  left (6,): coordinates that are
+        unknown already before it."""
+        self._here = np.where(left, np.nan, self._here)
+        self._origin = np.where(left, event, self._origin)
         there = self.frames[-1].to_base(self._here)
         frame = self._change(event, self.frames[-1], there)
         if len(self.frames) == MOST:

@@ -17,7 +17,7 @@ from postproc.base.geometry import Poses, rotation_from_abc
 from postproc.base.units import DEG, MM
 from postproc.languages.dialect import PLAIN, Program, ReadingSettings
 from postproc.languages.gcode import offsets
-from postproc.languages.gcode.arcs import ArcGeometry, arcs, through
+from postproc.languages.gcode.arcs import ArcGeometry, ArcWords, arcs, through
 from postproc.languages.gcode.blocks import (
     AXES,
     SMALL_ANGLE,
@@ -29,13 +29,28 @@ from postproc.languages.gcode.blocks import (
     tilted,
 )
 from postproc.languages.gcode.comments import remarks
-from postproc.languages.gcode.control import Control, Event, Feed, Group, Move, Once, ProgrammedFrame
-from postproc.languages.gcode.correctability import Built, bind_names, check_correctability, locked_rows
+from postproc.languages.gcode.control import (
+    Control,
+    Event,
+    Feed,
+    Group,
+    Move,
+    Once,
+    ProgrammedFrame,
+    either_frame,
+)
+from postproc.languages.gcode.correctability import (
+    Built,
+    bind_names,
+    check_correctability,
+    locked_rows,
+    no_insert_before,
+)
 from postproc.languages.gcode.cycle_ends import cycle_ends
 from postproc.languages.gcode.diagnostics import diagnostics
 from postproc.languages.gcode.execution import FoldedWords, execute
 from postproc.languages.gcode.external_axes import external_axes, moves_external, others_move
-from postproc.languages.gcode.feeds import Feeds, feeds_before_units
+from postproc.languages.gcode.feeds import Feeds, blend_tolerances, blends
 from postproc.languages.gcode.integer_words import integer_words
 from postproc.languages.gcode.lexing import FARTHEST
 from postproc.languages.gcode.modal import modal
@@ -45,8 +60,8 @@ from postproc.languages.gcode.numbered import WorkOffsets, references, tool_leng
 from postproc.languages.gcode.orientation_words import OrientationWords
 from postproc.languages.gcode.positions import Positions, Trace
 from postproc.languages.gcode.refusals import RefusalCollector
-from postproc.languages.gcode.source import scan
 from postproc.languages.gcode.source_map import STATE, FoldedNumbers, GcodeSourceMap
+from postproc.languages.gcode.subprogram_files import JoinedText, file_name, join
 from postproc.languages.gcode.tool_orientation import ToolOrientations
 from postproc.languages.gcode.words import How, Note, key
 from postproc.toolpath import Arcs, EditConstraints, Kind, OrientationControl, Toolpath
@@ -58,10 +73,15 @@ PART = 1 << 14
 def read(documents: tuple[Document, ...], control: Control, settings: ReadingSettings = PLAIN) -> Program:
     """Read a program; never raises on its content."""
     document = documents[0]
-    text = scan(document.raw, control)
+    joined = join(document.raw, settings.siblings, control)
+    text = joined.source
     integers = integer_words(text, control, settings.integer_words)
-    execution = execute(text, control, settings.symbols)
-    source = execution.source
+    execution = execute(text, control, settings.symbols, joined.blocks if joined.files else None)
+    if joined.files and not execution.followed:
+        return read(documents, control, replace(settings, siblings=()))
+    offsets_in_text = execution.source.blocks.start
+    source, foreign = joined.at_the_calls(execution.source)
+    execution = replace(execution, source=source)
     given = blocks(source, modal(execution, control, settings.initial.base), control, integers)
     rows = np.flatnonzero(given.motion).astype(np.int32)
     offset = work_offsets(given)
@@ -73,6 +93,9 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
 
     def followed(given: BlockWords) -> FollowedMotions:
         collector = RefusalCollector(len(rows))
+        for file in joined.files:
+            message = f"the motion is in {file.path.name}, which is read and not written"
+            collector.refuse(joined.of_file(file, offsets_in_text[rows]), "GCO033", message)
         collector.refuse(computed, "GCO005", "a G or M code of the block is computed")
         return _followed(given, rows, offset, base, tool, settings, unbound, collector)
 
@@ -98,7 +121,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         collector.refuse(np.ones(len(rows), np.bool_), "GCO026", message)
     refused = collector.done(document, line, start, lines.first[rows])
     frame_of_base, frame_of_tool, cell_frames = references(base, tool[rows], line, offset.stated)
-    said = remarks(document, source, rows, execution.order is None)
+    said = remarks(document, source, rows, execution.order is None, foreign)
     state = {name: found.taken(name) for name in STATE}
     timed = state["feed_mode"] == Feed.INVERSE_TIME
     path = Toolpath(
@@ -114,7 +137,7 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         constraints=EditConstraints(
             refused=refused,
             locked=locked_rows(document, given, built, collector, execution),
-            no_insert_before={**moves_external(external), **_whole(given, rows)},
+            no_insert_before={**moves_external(external), **no_insert_before(given, rows, foreign)},
             orientation_programmed=found.taken("orientation_programmed"),
             exact_stays=True,
             ptp_may_change_configuration=False,
@@ -130,7 +153,11 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         ),
         external=external,
     )
-    findings = [*refused.findings(), *diagnostics(document, given, rows, tool, named, settings)]
+    findings = [
+        *_read_too(document, joined, execution.missing),
+        *refused.findings(),
+        *diagnostics(document, given, rows, tool, named, settings),
+    ]
     if coordinates:
         message = "I J K are read as coordinates: only so the radii of the arcs agree"
         arc = np.flatnonzero(built.kind == Kind.CIRC)[:1]
@@ -155,7 +182,18 @@ def read(documents: tuple[Document, ...], control: Control, settings: ReadingSet
         said.marker,
         said.marker_at,
         (),
+        execution.missing,
     )
+
+
+def _read_too(document: Document, joined: JoinedText, missing: frozenset[str]) -> list[Finding]:
+    """Which files beside the program are read, and hold what it calls."""
+    names = [(file, file_name(file.path)) for file in joined.files]
+    return [
+        Finding("GCO032", f"{file.path} is read for the call of {name}", str(document.path))
+        for file, name in names
+        if name not in missing
+    ]
 
 
 def _start(settings: ReadingSettings) -> Floats:
@@ -205,7 +243,7 @@ def _followed(
         tilted(given),
         Reasons(len(given)),
     )
-    allowed = _allowed(given)
+    allowed = blend_tolerances(given)
     lengths = tool_lengths(given, tool)
     ends = cycle_ends(given, events, lengths.changes)
     found, differing = FilledRows(len(rows)), 0
@@ -231,7 +269,7 @@ def _followed(
         found.put(
             high - low,
             **_columns(here, where, moves, feeds),
-            blend=_blend(here, own, allowed),
+            blend=blends(here, own, allowed),
             sets=ends.stated(way.sets[own, :3], rows[low:high]),
             lost=way.unknown[own, :3],
         )
@@ -328,8 +366,7 @@ def _change(given: BlockWords, events: Ints) -> Callable[[int, ProgrammedFrame, 
         after = change(event)
         after = replace(after, shift=np.where(np.abs(after.shift) > FARTHEST * MM, np.nan, after.shift))
         if here.modal.flow.reason[0]:
-            same = after.shift == frame.shift
-            return ProgrammedFrame(after.turn, np.where(same, frame.shift, np.nan), after.memory)
+            return either_frame(frame, after)
         return after
 
     return changed
@@ -384,53 +421,15 @@ def _arcs(given: BlockWords, rows: Ints, start: Floats, end: Floats, plane: Ints
             found = through(start[some, :3], via, end[some, :3], turns[some])
         else:
             counter, radius = given.move[at] == Move.COUNTER, given.lengths(key("R"))[at]
-            found = arcs(
-                start[some, :3], end[some, :3], plane[some], counter, values, absolute, radius, turns[some]
-            )
+            words = ArcWords(counter, values, absolute, radius, turns[some])
+            gap = np.asarray(given.control.radius_gap)[(given.length[at] > MM).astype(int)]
+            found = arcs(start[some, :3], end[some, :3], plane[some], words, gap)
+        either = (given.modal.force[group][at] < 0) & np.isin(hows, (How.NUMBER, How.INTEGER)).any(axis=1)
+        for array in (found.centre, found.normal, found.sweep):
+            array[either] = np.nan
         for name in ("centre", "normal", "sweep", "wrong"):
             getattr(result, name)[some] = getattr(found, name)
     return result
-
-
-def _allowed(given: BlockWords) -> tuple[Ints, Floats]:
-    """Blocks with a G64 (K,), and what its P allows [m] (K,), NaN where nothing bounds it."""
-    codes = given.words(key("G"))
-    says = codes.block[codes.value == 64.0]
-    return says, given.lengths(key("P"))[says] if len(says) else np.empty(0)
-
-
-def _blend(given: BlockWords, rows: Ints, allowed: tuple[Ints, Floats]) -> Floats:
-    """(N,) [m]: 0 in exact modes, else as ``allowed``."""
-    path = given.modal.force[Group.PATH][rows]
-    at = np.searchsorted(allowed[0], rows + given.start, side="right") - 1
-    return np.where(path == 0, 0.0, np.where(path == 1, np.append(allowed[1], np.nan)[at], np.nan))
-
-
-def _whole(given: BlockWords, rows: Ints) -> dict[int, str]:
-    """Motions before which nothing may be inserted, because their block says more than the motion."""
-    modal = given.modal
-    more = modal.more | given.noted("assign", "corner", "axis", "polar")
-    others = (one for one in given.control.columns if one not in _WAY)
-    more |= given.has(*(key(letter) for letter in "ESTHDLQUVWM"), *others)
-    word, usual = given.control.turns
-    if word in given.columns:
-        more |= given.number(word) > usual
-    # Machine axes: what is inserted has no words for them.
-    more |= given.has(*(key(letter) for letter in "ABC")) & (modal.force[Group.TCP] != 1)
-    timed = modal.force[Group.FEED] == Feed.INVERSE_TIME
-    found: dict[int, str] = {}
-    for mask, why in (
-        (timed, "F is the time of the whole block (G93)"),
-        (more, "its block contains more than the motion"),
-        (modal.flow.entered, "a jump leads to its block"),
-        (feeds_before_units(given), "its F is in the unit from before it"),
-    ):
-        found.update(dict.fromkeys(np.flatnonzero(mask[rows]).tolist(), why))
-    return found
-
-
-_WAY = tuple(key(letter, index) for letter in "ABCIJK" for index in (1, 2, 3))
-"""Words of the way itself: the point between, orientations."""
 
 
 KINDS = np.full(len(Move) + 1, Kind.OTHER, np.int8)

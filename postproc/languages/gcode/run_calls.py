@@ -8,10 +8,13 @@ from bisect import bisect_left
 import numpy as np
 
 from postproc.base.arrays import Bools
+from postproc.languages.gcode.run_labels import called_name
 from postproc.languages.gcode.run_state import CallFrame, RunState
 from postproc.languages.gcode.statements import FlowStatement, NotFollowed
 
 DEEPEST_CALL = 20
+PACKED = 10_000
+"""M98 P031234 calls O1234 three times."""
 _ARGUMENTS = dict(zip("ABCIJKDEFHMQRSTUVWXYZ", (*range(1, 10), 11, 13, *range(17, 27)), strict=True))
 """Letters of G65 -> the numbers of their variables."""
 
@@ -29,6 +32,8 @@ class RunCalls(RunState):
         if statement is not None:
             self.emit(block, block + 1)
         found = self.called_part(block, verb, statement)
+        if found is None:
+            self.miss(block, verb, statement)
         if block in self.opaque:
             self.perhaps_call(block, verb, statement)
             found = None
@@ -50,9 +55,23 @@ class RunCalls(RunState):
         if statement is None and verb not in ("call", "local", "macro", "named"):
             return
         found = self.called_part(block, verb, statement)
-        if found is not None:
+        if found is None:
+            self.miss(block, verb, statement)
+        else:
             start, stop = found[:2]
             self.perhaps_called.append((start, self.sizes.get(start, stop)))
+
+    def miss(self, block: int, verb: str, statement: FlowStatement | None) -> None:
+        """Notes the name of a program that is called and not in the file."""
+        if statement is not None:
+            self.missing.add(called_name(statement.label))
+            return
+        number = self.word(block, "L" if verb == "named" else "P")
+        if verb == "local" or math.isnan(number) or not 0 < number == math.floor(number):
+            return
+        self.missing.add(f"{'L' if verb == 'named' else ''}{number:.0f}")
+        if verb != "named" and number >= PACKED:
+            self.missing.add(f"{number % PACKED:.0f}")
 
     def called_part(
         self, block: int, verb: str, statement: FlowStatement | None
@@ -89,8 +108,8 @@ class RunCalls(RunState):
             start = self.labels.number(int(number), block)
             return None if start is None else (start, self.n, runs, None)
         part = self.labels.program(f"{number:.0f}")
-        if part is None and number >= 10_000 and math.isnan(count):
-            runs, part = int(number) // 10_000, self.labels.program(f"{int(number) % 10_000}")
+        if part is None and number >= PACKED and math.isnan(count):
+            runs, part = int(number) // PACKED, self.labels.program(f"{int(number) % PACKED}")
         if part is None:
             return None
         if verb == "macro":

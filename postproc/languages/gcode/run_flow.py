@@ -120,7 +120,10 @@ class RunFlow(RunCalls):
             self.repeats.pop(around.start, None)
             return around.stop + 1
         if verb == Verb.CONTINUE:
-            return around.start if around.verb == Verb.WHILE else around.stop
+            if around.verb != Verb.WHILE:
+                return around.stop
+            self.emit(block, block + 1)
+            return self.loop(around, self.shape.statements[around.stop])
         if around.verb == Verb.SUB:
             if not self.frames:
                 raise NotFollowed
@@ -147,7 +150,8 @@ class RunFlow(RunCalls):
         if around.verb == Verb.WHILE:
             holds = self.value(around.text, around.start)
         elif around.verb == Verb.DO:
-            holds = 1.0 if ahead else self.value(around.until, around.stop)
+            # With the BREAK of a WHILE, even one that is passed over, LinuxCNC ends the next DO.
+            holds = 1.0 if ahead else math.nan if self.breaks_while else self.value(around.until, around.stop)
         elif around.verb == Verb.LOOP:
             holds = 1.0
             if not ahead and around.until:

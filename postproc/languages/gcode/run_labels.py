@@ -17,6 +17,18 @@ _ZEROS = re.compile(r"^N?0*(?=\d)")
 _ARCHIVE = re.compile(r"_N_(\w+?)_(?:MPF|SPF)", re.I)
 
 
+_NUMBERED = re.compile(r"O?0*(\d{1,9})")
+
+
+def called_name(text: str) -> str:
+    """The name of a called program as it is compared: in capitals, of a number its digits."""
+    name = text.strip().upper()
+    if name.startswith("O<"):
+        name = name[2:].rstrip(">")
+    number = _NUMBERED.fullmatch(name)
+    return number[1] if number else name
+
+
 class RunLabels:
     """starts: blocks at which the programs of the file start, in their order; the first may start before."""
 

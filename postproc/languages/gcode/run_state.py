@@ -88,6 +88,12 @@ class RunState:
         self.frames: list[CallFrame] = []
         self.repeats: dict[int, int] = {}
         self.steps = 0
+        self.missing: set[str] = set()  # names of what is called and not here
+        self.breaks_while = any(
+            statement.verb == Verb.BREAK and shape.construct[block].verb == Verb.WHILE
+            for block, statement in shape.statements.items()
+            if block in shape.construct
+        )
 
     def _codes(self) -> dict[int, str]:
         """Block -> what its M, G65 or L words do to the flow."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 
 from postproc.base.document import Span
 from postproc.languages.krl.execution_context import ExecutionContext
@@ -55,7 +54,7 @@ def move_on_arc(
         if isinstance(first.target, KrlTarget) and begin_known is not None:
             by = shift(begin_known, first.target, relative_reference(statement, parts).in_tool)
             x, y, z = (old + new for old, new in zip(begin_known, by, strict=False))
-            first = replace(first, target=replace(first.target, values=(x, y, z, None, None, None)))
+            first = first._replace(target=first.target._replace(values=(x, y, z, None, None, None)))
     found, unknown = _arc_path(state, begin_known, first.target, end_point.target, angle)
     if found is None and reason is None and isinstance(end_point.target, KrlTarget):
         reason = unknown
@@ -63,7 +62,7 @@ def move_on_arc(
         # Where the path ends is not where the end point is.
         found = None
         code_of = reason.code if reason is not None else "KRL009"
-        end_point = replace(end_point, target=UnknownValue(code_of, "its path is not known"), builds=True)
+        end_point = end_point._replace(target=UnknownValue(code_of, "its path is not known"), builds=True)
     before = state.sources
     row = enter_motion(run, statement, Kind.CIRC, end_point, reason, blend, found, relative)
     if blend == 0:

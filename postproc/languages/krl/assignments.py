@@ -370,7 +370,7 @@ def _set_variable(run: ExecutionContext, said: Assignment) -> None:
     if not said.path:
         value = _value(run, said.value.rstrip(), said.at)
         if isinstance(value, KrlTarget) and value.missing and run.variables.get(name, path) is not None:
-            missing = ", ".join(value.missing)
+            missing = value.missing
             value = UnknownValue("KRL002", f"the aggregate assigned to {shown(name)} omits {missing}")
         keep(run, name, path, value)
         return

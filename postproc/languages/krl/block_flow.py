@@ -9,7 +9,7 @@ from postproc.languages.krl.assignments import with_clause
 from postproc.languages.krl.execution_context import Flow, SplineBlock
 from postproc.languages.krl.expressions import Value
 from postproc.languages.krl.flow_frames import BlockFrame
-from postproc.languages.krl.lexing import NAME, SPLINES, Statement, kept, value_end
+from postproc.languages.krl.lexing import NAME, SPLINES, Statement, identifiers, kept, value_end
 from postproc.languages.krl.modal_state import ELSEWHERE
 from postproc.languages.krl.open_blocks import BUDGET, OpenBlocks
 from postproc.languages.krl.program_structure import Block
@@ -64,7 +64,8 @@ class BlockFlow(OpenBlocks):
                 return following
         frame = self._push(block, False)
         frame.head = frame.before
-        if frame.head is not None and self.steps > self.most_steps:
+        long = self.steps > self.most_steps or block.end - block.start > BUDGET
+        if frame.head is not None and long:
             frame.head = self._forgotten(frame.head, block)
         frame.mark = run.rows.new_mark()
         return self._enter_pass(frame, item)
@@ -143,8 +144,16 @@ class BlockFlow(OpenBlocks):
                 return block.end + 1
         if word == b"LOOP" and not block.leaves:
             return None
+        if word == b"REPEAT" and not self._can_be_decided(block):
+            return None
         self._push(block, True)
         return pc + 1
+
+    def _can_be_decided(self, block: Block) -> bool:
+        """Whether the condition of an UNTIL is a constant before its loop, or the loop may make it one."""
+        text = self._item(block.end).code[5:]
+        changed = "all" in block.effects or not block.effects.isdisjoint(identifiers(text))
+        return changed or isinstance(self.run.value(text), bool)
 
     def _bounds(self, item: Statement) -> tuple[bytes, list[Value]] | None:
         """Counter, and first value, last value and step of a FOR."""

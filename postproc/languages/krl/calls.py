@@ -88,7 +88,8 @@ class Calls(BlockFlow):
         active = self.activations[-1]
         own = self.stack[active.blocks :]
         inside = [frame for frame in own if frame.block in blocks]
-        single = not self.unfollowed.everything and self._is_single(own)
+        followed = not self.unfollowed.everything and key not in self.unfollowed.labels
+        single = followed and self._is_single(own)
         if single and at <= pc and [frame.block for frame in inside] == list(blocks):
             while self.stack[active.blocks + len(inside) :]:
                 self._pop()

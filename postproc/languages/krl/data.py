@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Set
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from postproc.base.document import Document, Span
@@ -19,6 +19,7 @@ from postproc.languages.krl.lexing import (
     lines,
     statement,
 )
+from postproc.languages.krl.spatial import Numbers
 from postproc.languages.krl.target import (
     AXES,
     COMPONENTS,
@@ -45,7 +46,8 @@ class Declarations:
 
     values: points and constants; records: FDAT, LDAT, PDAT (key -> value); types: as they are declared; lines: name of
     a point with its index -> its declaration's line, where another one can be behind; shared: names that other
-    programs know too; origin: what only another file declares -> that file.
+    programs know too; origin: what only another file declares -> that file; bases: number
+    of an entry of BASE_DATA in the controller's own files -> X..C [mm, deg], and the file.
     """
 
     values: dict[bytes, Entry] = field(default_factory=dict)
@@ -55,6 +57,7 @@ class Declarations:
     declared: set[bytes] = field(default_factory=set)
     shared: set[bytes] = field(default_factory=set)
     origin: dict[bytes, str] = field(default_factory=dict)
+    bases: dict[int, tuple[Numbers, str]] = field(default_factory=dict)
 
 
 def read_references(result: Declarations, documents: Iterable[Document]) -> None:
@@ -154,7 +157,7 @@ def _declare(
         if value:
             point = read_point(value, at, span.file, line)
             if isinstance(point, KrlTarget) and (said.is_global or foreign):
-                point = replace(point, locked="it is GLOBAL, other programs may use it")
+                point = point._replace(locked="it is GLOBAL, other programs may use it")
             _add(result, key, point, span, foreign)
     elif value.startswith(b"{") and identifiers(value):
         _members(result, root, key[len(root) :], value, line)
@@ -180,7 +183,7 @@ def _members(result: Declarations, root: bytes, path: bytes, value: bytes, line:
         elif b"{" not in text[1:] and identifiers(text) <= _POINT_KEYS:
             point = read_point(text, 0, -1, line)
             if isinstance(point, KrlTarget):
-                point = replace(point, locked="")
+                point = point._replace(locked="")
             result.values.setdefault(root, {}).setdefault(name, point)
         else:
             _members(result, root, name, text, line, depth + 1)
@@ -211,7 +214,7 @@ def read_point(value: bytes, at: int, file: int, line: int) -> KrlTarget | Unkno
     if isinstance(target, UnknownValue):
         return UnknownValue("KRL019", f"{where}: {target.message}")
     if file < 0:
-        return replace(target.detached(), locked="it is in a file that is not written")
+        return target.detached()._replace(locked="it is in a file that is not written")
     return target
 
 
@@ -249,7 +252,7 @@ def _kept(value: Value, assigned: set[bytes]) -> Value:
             changed = value.changed(key, NAN, why, (-1, -1, -1), b"")
             if isinstance(changed, UnknownValue):
                 return changed
-            value = replace(changed, unknown=why)
+            value = changed._replace(unknown=why)
     return value
 
 
@@ -269,7 +272,7 @@ def bind_symbols(declarations: Declarations, symbols: Mapping[str, Symbol], own:
             text = b",".join(part + b" " + _literal(value) for part, value in fields.items())
             value: Value = parse(b"{" + text + b"}", 0, -1)
             if isinstance(value, KrlTarget):
-                value = replace(value.detached(), locked="its value is known to the controller only")
+                value = value.detached()._replace(locked="its value is known to the controller only")
         elif declarations.types.get(root) == b"INT":
             value = int(symbol)
         else:

@@ -30,6 +30,8 @@ _TOKEN = re.compile(
     + rb")|(?P<op>==|<>|<=|>=|[-+*/:()\[\],.<>{}]))"
 )
 _NAME = re.compile(NAME + rb"\Z")
+_PART = re.compile(rb"(" + NAME + rb")((?:\[\d{1,18}+\])?+(?:\." + NAME + rb")?+)\Z")
+"""A component or an element with an index of digits: most of what is no number and no name."""
 _COMPARISONS = {
     b"==": lambda a, b: a == b, b"<>": lambda a, b: a != b, b"<": lambda a, b: a < b,
     b">": lambda a, b: a > b, b"<=": lambda a, b: a <= b, b">=": lambda a, b: a >= b,
@@ -71,6 +73,11 @@ def evaluate(text: bytes, lookup: Lookup) -> Value:
     if _NAME.match(text) and text.upper() not in _SYSTEM:
         value = lookup(text.upper(), b"")
         return value if value is not None else _no_constant(text)
+    part = _PART.match(text.strip(b" \t"))
+    if part is not None and (name := part[1].upper()) not in _SYSTEM:
+        path = _path(part[2])
+        value = lookup(name, path)
+        return value if value is not None else _no_constant(name + path)
     try:
         parser = _Parser(text, lookup)
         value = parser.comparison(0)
@@ -97,6 +104,13 @@ def index_text(text: bytes, lookup: Lookup) -> bytes | None:
             return None
         found.append(b"%d" % value)
     return b",".join(found)
+
+
+@lru_cache(maxsize=1024)
+def _path(text: bytes) -> bytes:
+    """What follows a name, upper case, its index without leading zeros."""
+    index, bracket, rest = text.rpartition(b"]")
+    return (b"[%d]" % int(index[1:]) if bracket else b"") + rest.upper()
 
 
 @lru_cache(maxsize=1024)

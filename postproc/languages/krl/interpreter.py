@@ -7,11 +7,13 @@ from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
+import numpy as np
+
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
 from postproc.languages.dialect import MARK, Program
-from postproc.languages.krl.controller_data import start_with
+from postproc.languages.krl.controller_data import declared_bases, start_with
 from postproc.languages.krl.data import (
     Declarations,
     at_the_start,
@@ -23,6 +25,7 @@ from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.flow_frames import Restart, Unfollowed
 from postproc.languages.krl.lexing import FRAME_TABLES, Head, Statement, lines, module_name
 from postproc.languages.krl.motion_rows import MotionRows
+from postproc.languages.krl.open_blocks import BUDGET
 from postproc.languages.krl.other_modules import is_module, read_modules, visible
 from postproc.languages.krl.program_flow import ProgramFlow
 from postproc.languages.krl.program_structure import ProgramStructure, program_structure
@@ -31,6 +34,7 @@ from postproc.languages.krl.target import shown
 from postproc.languages.krl.to_toolpath import to_toolpath
 from postproc.languages.krl.variables import Variables
 from postproc.languages.krl.vectorised import Item
+from postproc.toolpath import FrameRef
 from postproc.toolpath.initial_state import UNSTATED, InitialState, Symbol
 
 NO_SYMBOLS: Mapping[str, Symbol] = MappingProxyType({})
@@ -76,6 +80,7 @@ def read(
     data = [*references, *(one for one in siblings if not is_module(one))]
     read_references(declarations, data)
     bind_symbols(declarations, symbols, own)
+    declarations.bases = declared_bases(data)
     others = read_modules(siblings, data, symbols)
     effects = visible(others, declarations)
     surveyed = program_structure(
@@ -85,7 +90,7 @@ def read(
     read = (*documents, *references, *siblings)
     has_tcp = any(_TCP.search(document.raw) for document in read)
     has_turning = any(_TURNING.search(document.raw) for document in read)
-    unfollowed = Unfollowed()
+    unfollowed = Unfollowed(labels=_far_labels(surveyed))
     for reading in range(MOST_READINGS + 1):
         run = ExecutionContext(
             source,
@@ -108,10 +113,11 @@ def read(
             if reading == MOST_READINGS - 1:
                 unfollowed = _nothing_followed(surveyed)
     _report_structure(run)
-    unresolved = _unresolved(run)
-    _report_siblings(run, siblings)
     marker_at = _marker_at(source, code)
     toolpath, text, refusals = to_toolpath(run, places)
+    bases = [toolpath.frames[index] for index in np.unique(toolpath.base).tolist() if index >= 0]
+    unresolved = _unresolved(run, bases)
+    _report_siblings(run, references, siblings, bases)
     findings = sorted([*run.findings, *refusals], key=lambda finding: (finding.line, finding.column))
     return Program(
         dialect="krl",
@@ -133,24 +139,38 @@ def _directions(code: Sequence[Item]) -> Iterator[tuple[bytes, tuple[bool, ...]]
             yield item.strings.name, tuple(back for _, back in item.strings.parameters)
 
 
-def _unresolved(run: ExecutionContext) -> frozenset[str]:
-    """Names that the program asks for and no file that was read declares; routines with ()."""
+def _unresolved(run: ExecutionContext, bases: Sequence[FrameRef]) -> frozenset[str]:
+    """Names that the program asks for and no file that was read declares; routines with ().  bases: those that the
+    motions have."""
     known = {*FRAME_TABLES, *run.declarations.types, *run.declarations.values, *run.declarations.records}
     known |= {name for routine in run.survey.routine_at.values() for name in routine.types}
     names = {name for name in run.variables.asked - known if not name.startswith(b"$")}
     calls = run.unread | {name for of in run.others.unread.values() for name in of}
-    return frozenset([*map(shown, names), *(f"{shown(name)}()" for name in calls)])
+    entries = (f"BASE_DATA[{one.number}]" for one in bases if one.number and not (one.pose or one.declared))
+    return frozenset([*map(shown, names), *(f"{shown(name)}()" for name in calls), *entries])
 
 
-def _report_siblings(run: ExecutionContext, siblings: Sequence[Document]) -> None:
-    """Says which files beside the program are read, and for what."""
+def _report_siblings(
+    run: ExecutionContext,
+    references: Sequence[Document],
+    siblings: Sequence[Document],
+    bases: Sequence[FrameRef],
+) -> None:
+    """Says which files beside the program are read, and for what; of ``references``, which the user names, for which
+    bases."""
     used: dict[str, list[str]] = {}
     for name in sorted(run.variables.asked & run.declarations.origin.keys() - set(FRAME_TABLES)):
         used.setdefault(run.declarations.origin[name], []).append(shown(name))
     for name, (module, _) in sorted(run.others.routines.items()):
         used.setdefault(module.document.path.name, []).append(f"{shown(name)}()")
-    for document in siblings:
-        names = used.get(document.path.name)
+    entries: dict[str, list[str]] = {}
+    for base in bases:
+        if base.declared is not None and base.number is not None:
+            file = run.declarations.bases[base.number][1]
+            entries.setdefault(file, []).append(f"BASE_DATA[{base.number}] (where the cell has no such base)")
+    for document in (*references, *siblings):
+        names = [*(used.get(document.path.name, ()) if document in siblings else ())]
+        names += entries.get(document.path.name, ())
         if names:
             more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
             message = f"{document.path} is read for {', '.join(names[:MOST_NAMES])}{more}"
@@ -168,6 +188,16 @@ def _variables(declarations: Declarations, surveyed: ProgramStructure) -> Variab
     for name, entry in changing.items():
         variables.replace(name, entry)
     return variables
+
+
+def _far_labels(surveyed: ProgramStructure) -> set[tuple[int, bytes]]:
+    """The labels to which a GOTO leads back over more statements than are followed again."""
+    found = set()
+    for (start, name), (_, last) in surveyed.jumps.items():
+        at, _ = surveyed.routine_at[start].labels.get(name, (last, ()))
+        if last - at > BUDGET:
+            found.add((start, name))
+    return found
 
 
 def _nothing_followed(surveyed: ProgramStructure) -> Unfollowed:

@@ -110,6 +110,9 @@ class Declared(NamedTuple):
     is_constant: bool = False
 
 
+Said = Assignment | Call | Declared | Head | bytes | None
+
+
 class Statement(NamedTuple):
     """One line: its kind, its first word (upper case), its code without comment, and what it says.
 
@@ -122,7 +125,7 @@ class Statement(NamedTuple):
     code: bytes
     line: int
     at: int  # offset of the first byte of the code
-    strings: Assignment | Call | Declared | Head | bytes | None = None
+    strings: Said = None
     comment: bytes = b""
 
 
@@ -198,12 +201,24 @@ def lines(document: Document) -> Iterator[tuple[int, int, int]]:
 
 def statement(raw: bytes, line: int, start: int, stop: int) -> Statement | None:
     """The statement of a line; None for an empty or a header line.  A pure comment is of kind "comment"."""
-    code, comment = split_comment(raw[start:stop].rstrip(b"\r\n"))
+    found = _parts_of(raw[start:stop])
+    if found is None:
+        return None
+    kind, word, code, at, said, comment = found
+    if said is not None and start:
+        said = _further_on(said, start)
+    return Statement(kind, word, code, line, start + at, said, comment)
+
+
+@kept
+def _parts_of(line: bytes) -> tuple[str, bytes, bytes, int, Said, bytes] | None:
+    """Kind, first word, code, its offset, what it says and the comment of a line that starts at byte 0."""
+    code, comment = split_comment(line.rstrip(b"\r\n"))
     stripped = code.lstrip(b" \t\x0c\x0b\x00\r")
-    at = start + len(code) - len(stripped)
+    at = len(code) - len(stripped)
     code = stripped.rstrip(b" \t\x0c\x0b\x00\r")
     if not code:
-        return Statement("comment", b"", b"", line, at, None, comment) if comment else None
+        return ("comment", b"", b"", at, None, comment) if comment else None
     if code.startswith(b"&"):
         return None
     first = _FIRST.match(code)
@@ -211,7 +226,16 @@ def statement(raw: bytes, line: int, start: int, stop: int) -> Statement | None:
     kind, said = _kind(word, code, at)
     if not code.isascii() and kind in ("other", "goto") and has_foreign_letters(code):
         kind, said = _strange(word, code, at)
-    return Statement(kind, word, code, line, at, said, comment)
+    return kind, word, code, at, said, comment
+
+
+def _further_on(said: Said, by: int) -> Said:
+    """What a statement says that starts so many bytes further on."""
+    if isinstance(said, Assignment):
+        return said._replace(at=said.at + by)
+    if isinstance(said, Declared):
+        return said._replace(items=tuple([(key, value, at + by) for key, value, at in said.items]))
+    return said
 
 
 def has_foreign_letters(code: bytes) -> bool:
@@ -219,9 +243,7 @@ def has_foreign_letters(code: bytes) -> bool:
     return not without_strings(code).isascii()
 
 
-def _strange(
-    word: bytes, code: bytes, at: int
-) -> tuple[str, Assignment | Call | Declared | Head | bytes | None]:
+def _strange(word: bytes, code: bytes, at: int) -> tuple[str, Said]:
     plain = _GERMAN.sub(lambda found: b"_" * len(found[0]), code)
     if word != b"GOTO" and len(code) <= LONGEST and not has_foreign_letters(plain):
         first = _FIRST.match(plain)
@@ -240,9 +262,7 @@ def _parameters(text: bytes) -> tuple[tuple[bytes, bool], ...]:
     return tuple(found)
 
 
-def _kind(
-    word: bytes, code: bytes, at: int
-) -> tuple[str, Assignment | Call | Declared | Head | bytes | None]:
+def _kind(word: bytes, code: bytes, at: int) -> tuple[str, Said]:
     found: re.Match[bytes] | None
     if word in MOTIONS:
         # A variable may bear such a name only where no motion can stand.

@@ -93,7 +93,7 @@ class InlineFormState:
     feed: float
 
 
-@dataclass(slots=True)
+@dataclass
 class ModalState:
     """Everything that a motion's meaning depends on besides variables.
 
@@ -131,7 +131,9 @@ class ModalState:
     later_since: int = 0
 
     def copy(self) -> ModalState:
-        return ModalState(*_VALUES(self))
+        other = object.__new__(ModalState)
+        other.__dict__ = self.__dict__.copy()  # there are many, and __init__ takes several times as long
+        return other
 
     def lose_point(self, why: str) -> None:
         self.point = self.axes = self.point_frames = self.anchor = None

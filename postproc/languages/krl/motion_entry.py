@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.external_axes import ALL_LOST, UNSTATED, apart, reached
 from postproc.languages.krl.lexing import Statement
@@ -31,6 +33,12 @@ def _reached(state: ModalState, kind: Kind, values: Numbers | None) -> Numbers |
     if point is not None and point[3:] == values[3:] and not along:
         return values
     return (*values[:3], NAN, NAN, NAN)
+
+
+def _turns_unknown(state: ModalState, kind: Kind, anchor: Anchor) -> bool:
+    """Whether a motion does not end with the angles that its text states."""
+    keeps = state.orientation in NOT_TO_TARGET and kind in (Kind.LIN, Kind.CIRC, Kind.SPL)
+    return keeps and any(angle is not None for angle in anchor.partial_target[3:])
 
 
 def extent(statement: Statement, operand: Operand | None) -> tuple[int, int, int, int]:
@@ -117,7 +125,7 @@ def enter_motion(
     state.external = external
     if axes is not None:
         anchor = Anchor(row)
-    if anchor is not None:
+    if anchor is not None and not _turns_unknown(state, kind, anchor):
         state.anchor, state.point_frames = anchor, (state.base, state.tool)
     state.sources = frozenset([row])
     return row
@@ -156,7 +164,12 @@ def _inherits(stated: KrlTarget | None, relative: bool) -> int:
         return sum([1 << i for i in range(6) if stated.start[i] < 0])
     if None not in stated.values:
         return 0
-    return sum([1 << i for i, value in enumerate(stated.values) if value is None])
+    return _bits(*[value is None for value in stated.values])
+
+
+@lru_cache(maxsize=1024)
+def _bits(*left_out: bool) -> int:
+    return sum([1 << i for i, omitted in enumerate(left_out) if omitted])
 
 
 def _advance(

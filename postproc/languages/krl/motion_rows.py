@@ -24,8 +24,7 @@ FEW = 8
 NO_ARC = (NAN,) * 7
 
 
-@dataclass(frozen=True, slots=True)
-class RowRefusal:
+class RowRefusal(NamedTuple):
     """Why a row is refused; equal ``cause`` and code are reported together."""
 
     code: str

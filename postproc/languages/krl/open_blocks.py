@@ -14,9 +14,9 @@ from postproc.toolpath import Annotation
 BUDGET = 20_000
 """Statements of a file that are followed again, in loops, jumps and calls; as many where it is not known that they
 run."""
-PASSES = 2
-"""Passes over the text, besides twice the budget, before a loop that is not followed forgets what it may change instead
-of finding out what it does."""
+MOST_STEPS = 2 * BUDGET
+"""Statements that are gone over besides once the text: beyond, as with one of more than ``BUDGET`` statements, a loop
+that is not followed forgets at once what it may change instead of finding out what it does."""
 
 _REPEATED = LOOPS | {b"DEF"}
 
@@ -39,7 +39,7 @@ class OpenBlocks:
         self.activations = [self._activation()]
         self.reachable = True
         self.repeating = self.unsure = self.spent = self.spent_unsure = self.steps = 0
-        self.most_steps = PASSES * (len(run.code) + BUDGET)
+        self.most_steps = len(run.code) + MOST_STEPS
         self.seen = bytearray(len(run.code))
         self.jumped = self.shallow = False
         self.text_called: set[bytes] = set()

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import chain
+from typing import NamedTuple
 
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.expressions import index_text
@@ -26,8 +26,7 @@ _LAST_SLUR = re.compile(rb"[ \t,]C_(DIS|VEL|ORI|PTP|SPL)[ \t]*\Z", re.I)
 _HOME = re.compile(rb"X?HOME[1-5]?\Z")
 
 
-@dataclass(frozen=True, slots=True)
-class Parts:
+class Parts(NamedTuple):
     """A motion statement taken apart; offsets in its code.  points: begin and end of what is between commas;
     approximations: approximation words; reference: begin and end of #BASE or #TOOL; clause: WITH and what follows; odd:
     what has no meaning there."""
@@ -39,8 +38,7 @@ class Parts:
     not_understood: bytes = b""
 
 
-@dataclass(frozen=True, slots=True)
-class Operand:
+class Operand(NamedTuple):
     """One target as it is written: what it says, where it is in document 0, and the variable that holds it.
 
     builds: it may leave components to the point before, but what it says is not known.
@@ -159,7 +157,7 @@ def _variable(run: ExecutionContext, found: re.Match[bytes], start: int, end: in
                 end,
                 variable,
             )
-        return Operand(value, start, end, replace(variable, words=value.words))
+        return Operand(value, start, end, variable._replace(words=value.words))
     if isinstance(value, UnknownValue) and has is not None:
         return Operand(
             UnknownValue(value.code, f"point {words}: {value.message}"), start, end, variable, True
@@ -169,13 +167,18 @@ def _variable(run: ExecutionContext, found: re.Match[bytes], start: int, end: in
         why = UnknownValue("KRL002", f"its target {words} is a variable of the controller")
         return Operand(why, start, end, variable, reads)
     if isinstance(value, UnknownValue):
-        return Operand(UnknownValue("KRL003", f"point {words} has no value yet"), start, end, variable)
+        return Operand(_no_point(f"point {words} has no value yet"), start, end, variable)
     if value is not None:
         return Operand(UnknownValue("KRL001", f"{words} is not a point"), start, end)
     if _HOME.match(name) and not path:
         why = UnknownValue("KRL016", f"{words} is a point of the controller; the motion is not corrected")
         return Operand(why, start, end, variable)
-    return Operand(UnknownValue("KRL003", f"point {words} is not declared"), start, end, variable)
+    return Operand(_no_point(f"point {words} is not declared"), start, end, variable)
+
+
+@lru_cache(maxsize=1024)
+def _no_point(message: str) -> UnknownValue:
+    return UnknownValue("KRL003", message)
 
 
 def _computed(run: ExecutionContext, text: bytes, start: int, end: int) -> Operand:

@@ -49,8 +49,12 @@ def varying(state: ModalState, target: KrlTarget, values: Numbers) -> RowRefusal
 
 
 def incomplete(state: ModalState, target: KrlTarget, values: Numbers | None) -> RowRefusal | None:
-    names = ", ".join(target.missing)
-    if target.axes is None and state.point_frames not in (None, (state.base, state.tool)):
+    frames = state.point_frames
+    changed = target.axes is None and frames is not None and frames != (state.base, state.tool)
+    if not changed and values is not None:
+        return None
+    names = target.missing
+    if changed:
         return RowRefusal(
             "KRL017", f"the point omits {names}, and base or tool changed since the point before"
         )

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from postproc.base.document import Span
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.lexing import Statement
@@ -33,7 +31,7 @@ def absolute_target(
         named = statement.code[slice(*parts.reference)].upper().replace(b" ", b"")
         if named not in (b"#BASE", b"#TOOL"):
             why = RowRefusal("KRL008", f"it is a relative motion in {shown(named)}")
-            return replace(operand, target=UnknownValue("KRL008", "")), reason or why
+            return operand._replace(target=UnknownValue("KRL008", "")), reason or why
     if isinstance(moved, UnknownValue):
         return operand, reason
     if moved.axes is not None:
@@ -41,15 +39,15 @@ def absolute_target(
             why = RowRefusal(
                 "KRL008", f"it is relative to axis angles that are not known: {_axes_lost(state)}", "axes"
             )
-            return replace(operand, target=UnknownValue("KRL008", "")), reason or why
+            return operand._replace(target=UnknownValue("KRL008", "")), reason or why
         there = [old + (new or 0.0) for old, new in zip(state.axes, moved.axes, strict=True)]
         absolute = KrlTarget((None,) * 6, axes=six(there), external=moved.external)
-        return replace(operand, target=absolute), reason
+        return operand._replace(target=absolute), reason
     if any(moved.values[3:]):
         why = RowRefusal(
             "KRL008", "it is a relative rotation, which is not documented well enough to be followed", "turn"
         )
-        return replace(operand, target=UnknownValue("KRL008", "")), reason or why
+        return operand._replace(target=UnknownValue("KRL008", "")), reason or why
     varies = state.point is not None and any(value != value for value in state.point[:3])
     if varies or state.point is None or state.point_frames != (state.base, state.tool):
         lost = state.point_unknown
@@ -62,10 +60,10 @@ def absolute_target(
             f"it is a relative motion, and the position before is not known in numbers: {lost}",
             lost,
         )
-        return replace(operand, target=UnknownValue("KRL008", "")), reason or why
+        return operand._replace(target=UnknownValue("KRL008", "")), reason or why
     by = shift(state.point, moved, relative_reference(statement, parts).in_tool)
     x, y, z = (old + new for old, new in zip(state.point, by, strict=False))
-    return replace(operand, target=replace(moved, values=(x, y, z, *state.point[3:]))), reason
+    return operand._replace(target=moved._replace(values=(x, y, z, *state.point[3:]))), reason
 
 
 def shift(point: Numbers, moved: KrlTarget, in_tool: bool) -> Vector:

@@ -11,7 +11,7 @@ from postproc.base.document import Document
 from postproc.base.read_files import list_folder, note_absent, note_listing, read_file
 from postproc.languages.dialect import Program, ReadingSettings
 from postproc.languages.krl.data import DEFAULTS
-from postproc.languages.krl.lexing import identifiers
+from postproc.languages.krl.lexing import FRAME_TABLES, identifiers
 
 ABOVE = 4
 """Folders above the program's in which $config.dat is looked for."""
@@ -38,7 +38,7 @@ def find(program: Program, settings: ReadingSettings, beside: Path | None = None
     read = {_place(one.path) for one in (*program.documents, *settings.references, *settings.siblings)}
     stems = {one.path.stem.lower() for one in (*program.documents, *settings.siblings)}
     names = {name.upper().encode("latin-1") for name in wanted if not name.endswith("()")}
-    names = {name for name in names if not name.startswith(DEFAULTS)}
+    names = {name for name in names if not name.startswith((DEFAULTS, *FRAME_TABLES))}
     modules = {name[:-2].lower() for name in wanted if name.endswith("()")} - stems
     found: list[Document] = []
     if not any("config" in one.path.stem.lower() for one in (*settings.references, *settings.siblings)):

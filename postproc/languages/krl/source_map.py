@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,7 @@ from postproc.base.arrays import Ints
 from postproc.base.document import Offsets, Span
 
 
-@dataclass(frozen=True, slots=True)
-class PointVariable:
+class PointVariable(NamedTuple):
     """A target that the motion line does not write as a plain aggregate: a variable, or an expression of points.
 
     name: the variable as the line names it (``P1``, ``P[2]``, ``S.P``), b"" for an expression.
@@ -29,8 +29,7 @@ class PointVariable:
     words: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Auxiliary:
+class Auxiliary(NamedTuple):
     """The auxiliary point of an arc (X, Y, Z count), and its angle CA.
 
     start, stop, file: as in ``Places``, three components; insert, home: as there; operand: its text in document 0.

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from postproc.languages.krl.lexing import NAME, is_number, number, value_end
 from postproc.languages.krl.spatial import Numbers
@@ -48,8 +48,7 @@ class FrameEntry(UnknownValue):
     number: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class KrlTarget:
+class KrlTarget(NamedTuple):
     """What a point is.
 
     values: X, Y, Z [mm], A, B, C [deg], None where left out, NaN where not known; start, stop, file: byte range and
@@ -73,10 +72,10 @@ class KrlTarget:
     locked: str = ""
 
     @property
-    def missing(self) -> list[str]:
-        """The components that are left out."""
+    def missing(self) -> str:
+        """The names of the components that are left out."""
         names, values = ("A1 A2 A3 A4 A5 A6", self.axes) if self.axes else ("X Y Z A B C", self.values)
-        return [name for name, value in zip(names.split(), values, strict=True) if value is None]
+        return _left_out(names, *[value is None for value in values])
 
     @property
     def numbers(self) -> Numbers | None:
@@ -147,10 +146,10 @@ class KrlTarget:
         at ``place`` (file, start, stop; -1 for an expression)."""
         if key in EXTERNAL:
             others = tuple(item for item in self.external if item[0] != key)
-            return replace(self, external=(*others, (key, value, text)))
+            return self._replace(external=(*others, (key, value, text)))
         if key in _STATES:
             bits = int(value) if value is not None and 0 <= value < 2**31 and value == int(value) else -1
-            return replace(self, status=bits) if key == b"S" else replace(self, turn=bits)
+            return self._replace(status=bits) if key == b"S" else self._replace(turn=bits)
         table, have = (COMPONENTS, self.values) if key in COMPONENTS else (AXES, self.axes)
         if key not in table or have is None or (key in COMPONENTS and self.axes is not None):
             return UnknownValue(
@@ -164,14 +163,19 @@ class KrlTarget:
         if lost is not None and not any(v != v for v in filled):
             lost = None
         if key in AXES:
-            return replace(self, axes=filled, unknown=lost)
+            return self._replace(axes=filled, unknown=lost)
         start, stop, file = (
             (*old[:i], new, *old[i + 1 :])
             for old, new in zip(
                 (self.start, self.stop, self.file), (place[1], place[2], place[0]), strict=True
             )
         )
-        return replace(self, values=filled, start=start, stop=stop, file=file, unknown=lost)
+        return self._replace(values=filled, start=start, stop=stop, file=file, unknown=lost)
+
+
+@lru_cache(maxsize=128)
+def _left_out(names: str, *omitted: bool) -> str:
+    return ", ".join(name for name, left_out in zip(names.split(), omitted, strict=True) if left_out)
 
 
 def known(values: Numbers) -> KrlTarget:

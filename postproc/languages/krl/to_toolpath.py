@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from postproc.base.arrays import Bools, FewRows, Floats, Ints, is_shared
 from postproc.base.findings import Finding
 from postproc.base.units import DEG, MM
+from postproc.languages.krl.controller_data import with_declared_bases
 from postproc.languages.krl.execution_context import ExecutionContext
 from postproc.languages.krl.modal_state import Source
 from postproc.languages.krl.motion_rows import MotionRows, RowRefusal
@@ -46,7 +47,8 @@ def to_toolpath(run: ExecutionContext, places: bool) -> tuple[Toolpath, KrlSourc
     _refuse_several_starts(rows, table, single)
     _lock(run)
     refused = _refused(rows, table)
-    table.base, table.tool, used = _used(table.base, table.tool, run.frames.refs())
+    table.base, frames = with_declared_bases(run.declarations.bases, table.base, run.frames.refs())
+    table.base, table.tool, used = _used(table.base, table.tool, frames)
     table.blend *= MM
     n = len(rows)
     anchor = _sparse((n,), np.int32(-1), {row: at.row for row, at in rows.anchors.items()})
@@ -193,7 +195,7 @@ def _lock(run: ExecutionContext) -> None:
     for row, auxiliary in rows.arcs.items():
         variable_or_none = auxiliary.variable
         if variable_or_none is not None and _root(variable_or_none.name) in read and not auxiliary.locked:
-            rows.arcs[row] = replace(auxiliary, locked=READ_TOO)
+            rows.arcs[row] = auxiliary._replace(locked=READ_TOO)
 
 
 def _root(name: bytes) -> bytes:
@@ -274,16 +276,17 @@ def _number_texts(rows: MotionRows, table: MotionTable, spots: Spots) -> None:
         if node < n:
             spots.text[node] = top(node)
     for row, node in nodes.items():
-        rows.arcs[row] = replace(rows.arcs[row], text=top(node))
+        if (text := top(node)) != rows.arcs[row].text:
+            rows.arcs[row] = rows.arcs[row]._replace(text=text)
 
 
 def _finder(rows: MotionRows, table: MotionTable) -> Callable[[int, str, str], Finding]:
     raw, name = rows.document.raw, str(rows.document.path)
+    words, lines = table.word.tolist(), table.line.tolist()
 
     def finding(row: int, code: str, message: str) -> Finding:
-        at = int(table.word[row])
-        column = at - raw.rfind(b"\n", 0, at)
-        return Finding(code, message, name, int(table.line[row]), column)
+        at = words[row]
+        return Finding(code, message, name, lines[row], at - raw.rfind(b"\n", 0, at))
 
     return finding
 
