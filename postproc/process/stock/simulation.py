@@ -33,6 +33,7 @@ class StockRun:
     where not stated."""
 
     process: StockProcess
+    toolpath: Toolpath
     blank: Blank
     before: Removed | None
     sweeps: MotionSweeps
@@ -70,7 +71,7 @@ def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str)
         *_not_simulated(sweeps, toolpath, program),
         *_lengths(sweeps, process),
     ]
-    return StockRun(process, blank, before, sweeps, engagement, ci95, tuple(findings))
+    return StockRun(process, toolpath, blank, before, sweeps, engagement, ci95, tuple(findings))
 
 
 def _blank(process: StockProcess) -> tuple[Blank, Removed | None]:
