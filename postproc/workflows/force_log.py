@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from postproc.base.arrays import Floats
 from postproc.base.findings import Finding, Refusal
 from postproc.base.geometry import lengths
 from postproc.cell import frames_of
 from postproc.process import wrenches
 from postproc.process.stock.stock_section import has_stock
+from postproc.toolpath import Kind
 from postproc.workflows.preparation import Prepared
 
 
@@ -52,17 +54,28 @@ def _bias(ready: Prepared) -> str:
     solved = solve_coupled(run, paths_of(run), displaced, lever_of(run))
     if isinstance(solved, str):
         return f"their bias is not known, because {solved}"
-    motion = (solved.key // 2).astype(np.int64)
-    meant = lengths(nominal.along(motion, solved.key - 2 * motion)[:, :3])
-    there = lengths(solved.wrench[:, :3])
-    cuts = np.flatnonzero(run.engagement.cuts)
-    both = [np.bincount(motion, values, len(task.toolpath))[cuts] for values in (meant, there)]
-    share = both[1] / np.maximum(both[0], 1e-9) - 1.0
+    meant = lengths(run.engagement.mean[:, :3])
+    there = lengths(_means(solved.key, solved.wrench[:, :3], len(meant)))
+    length = np.bincount(run.sweeps.motion, run.sweeps.length, len(meant))
+    # on an arc the mean force turns with the feed
+    cuts = np.flatnonzero(run.engagement.cuts & (task.toolpath.kind == Kind.LIN) & (meant > 0))
+    if not len(cuts):
+        return "their bias is not known, because no straight motion cuts"
+    share = there[cuts] / meant[cuts] - 1.0
     low, high = int(np.argmin(share)), int(np.argmax(share))
     line = task.toolpath.line[cuts]
-    total = both[1].sum() / both[0].sum() - 1.0
+    total = (there * length)[cuts].sum() / (meant * length)[cuts].sum() - 1.0
     return (
         f"they differ, by the stock of {process.name}, from those of the compensated robot by {100 * total:+.1f} % in"
         f" the mean, from {100 * share[low]:+.0f} % (line {line[low]})"
         f" to {100 * share[high]:+.0f} % (line {line[high]})"
     )
+
+
+def _means(key: Floats, values: Floats, count: int) -> Floats:
+    """(N, C) means of ``values`` (K, C) along N motions; key (K,): twice the motion plus the share of its path."""
+    motion = (key // 2).astype(np.int64)
+    inside = np.flatnonzero(motion[1:] == motion[:-1])
+    width = key[inside + 1] - key[inside]
+    middle = 0.5 * (values[inside] + values[inside + 1]) * width[:, None]
+    return np.stack([np.bincount(motion[inside], part, count) for part in middle.T], axis=1)
