@@ -11,6 +11,7 @@ from postproc.base.batches import each_block
 from postproc.base.units import MM
 from postproc.process.stock.blank import Blank
 from postproc.process.stock.cells import Stock, build_stock
+from postproc.process.stock.chains import chain_contacts
 from postproc.process.stock.collision import collisions
 from postproc.process.stock.contact import (
     CHIP,
@@ -37,6 +38,9 @@ SPACING = 0.5
 
 FINER, UNEVEN = 6, 0.05
 """How many times closer they are on a sweep along which the removed area changes by more than this share."""
+
+ALIKE = 0.02
+"""Short motions are interpolated between places whose removed areas differ by at most this share."""
 
 LEAST_AREA = 1e-5 * MM**2
 """Across the feed: below it nothing is cut."""
@@ -111,12 +115,22 @@ def engage(
         each_block(look, len(sweep), _BLOCK)
         return sweep, weight, found
 
-    sweep, weight, found = look_at(np.flatnonzero(active & (sweeps.rows[:, REMOVES] > 0)), 1)
+    chosen = np.flatnonzero(active & (sweeps.rows[:, REMOVES] > 0))
+    short = sweeps.length[chosen] <= SPACING * radius[chosen]
+    sweep, weight, found = look_at(chosen[~short], 1)
+    short_sweeps = chosen[short]
+    seen = chain_contacts(
+        sweeps, laws, short_sweeps, SPACING * radius, ALIKE, lambda some: look_at(some, 1)[2]
+    )
+    parts = ((sweep, short_sweeps), (weight, sweeps.length[short_sweeps]), (found, seen))
+    sweep, weight, found = (np.concatenate(pair) for pair in parts)
+    order = np.argsort(sweep, kind="stable")
+    sweep, weight, found = sweep[order], weight[order], found[order]
     uneven = _uneven(sweep, found[:, RATE])
     again = np.isin(sweep, uneven)
     finer = look_at(uneven, FINER)
-    parts = zip((sweep[~again], weight[~again], found[~again]), finer, strict=True)
-    sweep, weight, found = (np.concatenate(pair) for pair in parts)
+    pairs = zip((sweep[~again], weight[~again], found[~again]), finer, strict=True)
+    sweep, weight, found = (np.concatenate(pair) for pair in pairs)
     order = np.argsort(sweep, kind="stable")
     sweep, weight, found = sweep[order], weight[order], found[order]
     hits = _hits(stock, sweeps, profiles, heading, live, earlier, radius)
