@@ -4,31 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import stock_cases
-from stock_cases import MM, Poses
+from stock_cases import MM
 
-from postproc.cell import MotionFrames
 from postproc.part.deflected_sweeps import deflect
 from postproc.part.surface import find_surface
 from postproc.part.surface_error import find_errors
-from postproc.process.stock.blank import corners_of
 from postproc.process.stock.cells import build_stock
-from postproc.process.stock.motion_sweeps import find_sweeps
-from postproc.process.stock.stock_section import Edges, StockProcess
 
 LEVER = 40 * MM
 
 
 def sweeps_of(path, blank, *cutters):
     """The sweeps of a toolpath, and its stock."""
-    n = len(path)
-    one = Poses(np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)))
-    frames = MotionFrames(one, one, np.broadcast_to([0.0, 0, -1], (n, 3)))
-    numbered = {i + 1: stock_cases.replace(cutter, number=i + 1) for i, cutter in enumerate(cutters)}
-    edges = {number: Edges(stock_cases.SPEED, stock_cases.ALLOY) for number in numbered}
-    process = StockProcess(
-        None, "box", np.zeros((1, 1)), 2, None, 1.0, None, 1, numbered, edges, np.inf
-    )  # fmt: skip
-    sweeps = find_sweeps(path, frames, process, *corners_of(blank), "test")
+    sweeps, _ = stock_cases.sweeps_of(path, blank, *cutters)
     stock, _ = build_stock(blank, sweeps.rows, np.array([cutter.numbers for cutter in sweeps.cutters]))
     return sweeps, stock
 

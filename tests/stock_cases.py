@@ -67,6 +67,12 @@ def _upright(axis):
 
 def run(path, blank, *cutters, rapid=np.inf, before=None, edges=None):
     """The engagement of a toolpath; the spindle axis is -z of the tool."""
+    sweeps, edges = sweeps_of(path, blank, *cutters, rapid=rapid, edges=edges)
+    return engage(blank, sweeps, path, edges, before)
+
+
+def sweeps_of(path, blank, *cutters, rapid=np.inf, edges=None):
+    """The sweeps of a toolpath, and what the forces of its tools need."""
     n = len(path)
     one = Poses(np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3)))
     frames = MotionFrames(one, one, np.broadcast_to([0.0, 0, -1], (n, 3)))
@@ -76,5 +82,4 @@ def run(path, blank, *cutters, rapid=np.inf, before=None, edges=None):
         None, "box", np.zeros((1, 1)), 2, None, 1.0, None, 1, cutters, edges, rapid
     )  # fmt: skip
     low, high = corners_of(blank)
-    sweeps = find_sweeps(path, frames, process, low, high, "test")
-    return engage(blank, sweeps, path, edges, before)
+    return find_sweeps(path, frames, process, low, high, "test"), edges

@@ -142,6 +142,24 @@ def test_collisions_have_their_line(folder):
     assert not (folder / "out.csv").exists()
 
 
+def test_a_holder_wider_than_its_clearance_has_its_line(folder):
+    """A slot of 5 mm with a holder 4.5 mm above the tip: it is in the stock beside."""
+    state(
+        folder,
+        STOCK + TOOLS.replace("length: 40,", "length: 4.2, shank: 15, holder: {diameter: 40, from: 4.5},"),
+    )
+    result = json.loads(call(folder, "--json", "-", code=3).stdout)
+    assert {"line": 5, "part": "holder"} in result["collisions"]
+    found = [one for one in result["findings"] if one["code"] == "STK012"]
+    assert found
+    assert "the holder is in the stock" in found[0]["message"]
+    call(folder, "--strict", "--csv", folder / "out.csv", code=1)
+    assert not (folder / "out.csv").exists()
+    clear = TOOLS.replace("length: 40,", "length: 5.2, shank: 15, holder: {diameter: 40, from: 5.5},")
+    state(folder, STOCK + clear)
+    assert json.loads(call(folder, "--json", "-").stdout)["collisions"] == []
+
+
 @pytest.mark.parametrize(
     ("text", "code", "words", "line"),
     [

@@ -234,6 +234,32 @@ def test_an_arc_is_cut_as_a_ring():
     assert cut.volume[3] / MM**3 == pytest.approx(new.sum() * 0.05**2 * 5, rel=0.01)
 
 
+def test_short_motions_cut_what_one_long_one_does():
+    """A shoulder in motions of 1 mm across a slot of 5 mm that is open already: each motion's volume, and the force."""
+    slot = [[100, 80, -20], [100, -80, -20]]
+    x = np.arange(60, 141, 1.0)
+    narrow = FLAT.__class__(1, "flat", 2.5 * MM, length=40 * MM, teeth=3, helix=np.pi / 6)
+    points = [*slot, *np.column_stack([x, 0 * x + 62, 0 * x - 5])]
+    tools = [1, 1, *[2] * len(x)]
+    kinds = [Kind.PTP, Kind.LIN, Kind.PTP, *[Kind.LIN] * (len(x) - 1)]
+    cut = run(path_through(points, kinds=kinds, tools=tools), BLOCK, narrow, FLAT)
+    # what the front of the cutter newly covers on the way from x to x + 1, by columns of 10 um
+    fine = np.arange(50.005, 160, 0.01)
+    height = np.arange(54.005, 60, 0.01)
+
+    def reached(end):
+        front = end + np.sqrt(64 - (62 - height) ** 2)
+        return (fine[:, None] < front) & (np.abs(fine - 100) > 2.5)[:, None]
+
+    rows = np.arange(3 + 10, len(points))
+    new = np.array([(reached(x[row - 2]) & ~reached(x[row - 3])).sum() * 1e-4 * 5 for row in rows])
+    assert new.min() < 4  # in the slot
+    assert cut.volume[rows] / MM**3 == pytest.approx(new, abs=0.02 * 30)
+    assert cut.volume[rows].sum() / MM**3 == pytest.approx(new.sum(), rel=0.002)
+    force, _, _ = expected("down", 6 * MM, 5 * MM)
+    assert np.linalg.norm(cut.mean[-2, :3] - force) < 0.005 * np.linalg.norm(force)
+
+
 def test_collisions_have_their_motion():
     """A rapid through the block, a pocket deeper than the edges, and a holder that comes too near."""
     from dataclasses import replace

@@ -100,7 +100,7 @@ def test_the_wall_that_mujoco_cuts_is_the_reported_one(tmp_path, pytestconfig):
     for number in PASSES:
         ends = posted[[number - 2, number - 1], 1:]
         sweeps.append(cut_wall(plant, task, row_of[number], ends, ends[:, 0]))
-    part = find_part_error(task, task.force.stock, None)
+    part = find_part_error(task, task.force.stock, None, as_nominal="the plant has the forces of the task")
     points, error = part.surface.points[part.own] * 1000, part.before.error * 1000
     compare(points, error, sweeps, least=0.5)
 

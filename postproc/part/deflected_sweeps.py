@@ -9,25 +9,11 @@ import numpy as np
 from postproc.base.arrays import Floats, Ints
 from postproc.base.geometry import lengths, rotation_from_vector
 from postproc.base.units import DEG, MM
-from postproc.process.stock.distance import (
-    ANGLE,
-    AXIS,
-    CENTRE,
-    GENERAL,
-    MODE,
-    NORMAL,
-    ROW,
-    STEP,
-    STRAIGHT,
-    TIP_POINT,
-    TURN,
-)
+from postproc.process.stock.displaced import EVEN, displaced_rows
+from postproc.process.stock.distance import ANGLE, AXIS, CENTRE, NORMAL, STEP, TIP_POINT, TURN
 
 Displacement = Callable[[Ints, Floats], tuple[Floats, Floats]]
 """Of motions (K,) at the shares (K,) of their paths: shift of the tip (K, 3) [m] and turn of the tool (K, 3) [rad]."""
-
-EVEN = 0.02e-6
-"""[m] By how much a displacement between two nodes may differ from linear."""
 
 _HALVINGS = 12
 _SHORTEST = 0.02 * MM
@@ -90,46 +76,6 @@ def _moved(motion: Ints, share: Floats, owner: Ints, part: Floats, displacement:
     whole = share[owner]
     at = whole[:, 0] + part * (whole[:, 1] - whole[:, 0])
     return np.concatenate(displacement(motion[owner], at), axis=1)
-
-
-def displaced_rows(rows: Floats, part: Floats, first: Floats, last: Floats, lever: float) -> Floats:
-    """(K, ROW) the parts (K, 2) of sweeps ``rows`` (K, ROW) as sweeps of their own.
-
-    Their ends are displaced by ``first`` and ``last`` (K, 6), shift [m] and turn [rad]; a turn that moves no point
-    within ``lever`` [m] is omitted.
-    """
-    out = np.zeros((len(rows), ROW))
-    out[:, MODE:] = rows[:, MODE:]
-    tips = [tips_of(rows, part[:, side]) + (first, last)[side][:, :3] for side in (0, 1)]
-    axes = [
-        (rotation_from_vector((first, last)[side][:, 3:]) @ axes_of(rows, part[:, side])[..., None])[..., 0]
-        for side in (0, 1)
-    ]
-    out[:, TIP_POINT : TIP_POINT + 3], out[:, STEP : STEP + 3] = tips[0], tips[1] - tips[0]
-    across = np.cross(axes[0], axes[1])
-    sine = lengths(across)
-    angle = np.arctan2(sine, np.einsum("ki,ki->k", axes[0], axes[1]))
-    turns = lever * angle > EVEN
-    out[:, TURN : TURN + 3] = np.where(
-        turns[:, None], across * (angle / np.maximum(sine, 1e-300))[:, None], 0.0
-    )
-    both = axes[0] + axes[1]
-    out[:, AXIS : AXIS + 3] = np.where(turns[:, None], axes[0], both / lengths(both)[:, None])
-    angle = rows[:, ANGLE] * (part[:, 1] - part[:, 0])
-    out[:, ANGLE], out[:, NORMAL : NORMAL + 3] = angle, rows[:, NORMAL : NORMAL + 3]
-    arcs = np.flatnonzero(angle > 0)
-    if len(
-        arcs
-    ):  # the circle in the plane of the old one that goes through both displaced ends by the same angle
-        normal = rows[arcs, NORMAL : NORMAL + 3]
-        chord = out[arcs, STEP : STEP + 3]
-        chord = chord - np.einsum("ki,ki->k", chord, normal)[:, None] * normal
-        centre = tips[0][arcs] + 0.5 * chord
-        out[arcs, CENTRE : CENTRE + 3] = centre + np.cross(normal, chord) / (
-            2 * np.tan(0.5 * angle[arcs, None])
-        )
-    out[:, MODE] = np.where((angle > 0) | turns, GENERAL, STRAIGHT)
-    return out
 
 
 def tips_of(rows: Floats, share: Floats) -> Floats:

@@ -3,6 +3,7 @@ stock."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,12 +22,14 @@ from postproc.compensation.subdivision import Subdivision, subdivided_motions
 class Displacements:
     """Of the tools of a program as it is posted, or with ``division`` as it is compensated.
 
-    in_stock (N, 3, 3): rotation of the programmed base of each motion to the stock.
+    in_stock (N, 3, 3): rotation of the programmed base of each motion to the stock; wrench: of motions (K,) at shares
+    (K,) the wrench (K, 6) in path axes, that of the task where it is None.
     """
 
     task: CompensationProblem
     in_stock: Floats
     division: Subdivision | None = None
+    wrench: Callable[[Ints, Floats], Floats] | None = None
 
     def __call__(self, motion: Ints, share: Floats) -> tuple[Floats, Floats]:
         """Shift (K, 3) [m] and turn (K, 3) [rad] of the tool at the shares (K,) of motions (K,), in the axes of the
@@ -50,8 +53,15 @@ class Displacements:
         """(K, 3, 3) from the robot base to the stock, of motions (K,)."""
         return np.asarray(self.in_stock[motion] @ np.swapaxes(self.task.base[motion].rotation, 1, 2))
 
-    def predicted(self, motion: Ints, share: Floats) -> tuple[Prediction, Poses]:
-        """Where the tool is, and where it is to be, at the shares (K,) of motions (K,)."""
+    def wrench_at(self, motion: Ints, share: Floats) -> Floats:
+        """(K, 6) [N, N m] the wrench at the shares (K,) of motions (K,), in path axes."""
+        return (self.task.force.along if self.wrench is None else self.wrench)(motion, share)
+
+    def predicted(
+        self, motion: Ints, share: Floats, wrench: Floats | None = None
+    ) -> tuple[Prediction, Poses]:
+        """Where the tool is, and where it is to be, at the shares (K,) of motions (K,); under ``wrench`` (K, 6) where
+        it is given."""
         segments = self._segments(motion, share)
         wide = segments.last - segments.first
         inside = np.where(wide > 0, (share - segments.first) / np.where(wide > 0, wide, 1.0), 0.0)
@@ -59,7 +69,7 @@ class Displacements:
         real = task.simulated(
             motion,
             segments.commands(task, inside),
-            task.force.along(motion, share),
+            self.wrench_at(motion, share) if wrench is None else wrench,
             share=share,
             corrected=self.division is not None,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,10 +14,12 @@ from postproc.base.geometry import lengths
 from postproc.base.units import DEG, MM
 from postproc.compensation.problem import CompensationProblem
 from postproc.compensation.subdivision import Subdivision
+from postproc.part.coupled_engagement import CoupledEngagement, Paths, solve_coupled
 from postproc.part.deflected_sweeps import Displacement, axes_of, deflect, tips_of
 from postproc.part.displacement import Displacements
 from postproc.part.part_figures import (
     FEATURES,
+    AsPosted,
     ErrorFigures,
     PartError,
     PartFigures,
@@ -44,8 +47,8 @@ class _Nominal(NamedTuple):
     """What is known of a program before its tools are displaced.
 
     Its surface and the points of it that are ``own`` (K,), with the motion (K,) that made them and the feature (K,)
-    that they belong to; its sweeps ``rows`` (M, ROW) that may reach the part, of motions (M,) and shares (M, 2); the
-    sweeps of earlier programs; lever [m]: how far an edge is from the tip at most.
+    that they belong to; its sweeps ``paths`` that may reach the part; the sweeps of earlier programs; lever [m]: how
+    far an edge is from the tip at most.
     """
 
     run: StockRun
@@ -53,9 +56,7 @@ class _Nominal(NamedTuple):
     own: Ints
     made_by: Ints
     feature: Ints
-    rows: Floats
-    motion: Ints
-    share: Floats
+    paths: Paths
     earlier: Floats
     lever: float
 
@@ -65,25 +66,36 @@ class _UnknownDisplacement(Exception):
 
 
 def find_part_error(
-    task: CompensationProblem, run: StockRun, division: Subdivision | None, count: int = POINTS
+    task: CompensationProblem,
+    run: StockRun,
+    division: Subdivision | None,
+    count: int = POINTS,
+    as_nominal: str = "",
 ) -> PartError | Finding:
     """The error of the part that ``task`` leaves in the stock of ``run``, at about ``count`` points.
 
-    As posted, and with ``division`` as compensated.  PRT001 where it is not known, and why.
+    As posted, with engagement and displacement solved together, unless ``as_nominal`` says why the forces of the task
+    are taken there too; and with ``division`` as compensated, under the forces of the task.  PRT001 where it is not
+    known, and why.
     """
     nominal = _nominal(run, count)
     if not len(nominal.own):
         return Finding("PRT001", "the program leaves no surface of its own on the part", task.file)
     path = task.toolpath
-    cutting = np.unique(nominal.motion[run.engagement.cuts[nominal.motion]])
+    paths = nominal.paths
+    cutting = np.unique(paths.motion[run.engagement.cuts[paths.motion]])
+    displaced = Displacements(task, run.sweeps.in_stock)
     try:
         lost = cutting[~task.desired_path.traceable[cutting]]
         if len(lost):
             raise _UnknownDisplacement(lost)
-        sides = [
-            _side(nominal, Displacements(task, run.sweeps.in_stock, posted))
-            for posted in ([None] if division is None else [None, division])
-        ]
+        posted = as_nominal or solve_coupled(run, paths, displaced, nominal.lever)
+        if isinstance(posted, str):
+            sides = [_side(nominal, displaced, paths)]
+        else:
+            sides = [_side(nominal, replace(displaced, wrench=posted.along), posted.pieces)]
+        if division is not None:
+            sides.append(_side(nominal, replace(displaced, division=division), paths))
     except _UnknownDisplacement as unknown:
         lost = unknown.args[0]
         message = f"the displacement of the tool is not known in {len(lost)} motions that reach the part"
@@ -99,8 +111,21 @@ def find_part_error(
         None if division is None else whole[1],
         _groups(FEATURES, nominal.feature, nominal, sides, task),
         _groups(*_operations(nominal), nominal, sides, task),
+        _as_posted(task, nominal, posted),
     )
-    return PartError(figures, nominal.surface, nominal.own, sides[0], None if division is None else sides[1])
+    after = None if division is None else sides[1]
+    forces = None if isinstance(posted, str) else posted.along
+    return PartError(figures, nominal.surface, nominal.own, sides[0], after, forces)
+
+
+def _as_posted(task: CompensationProblem, nominal: _Nominal, posted: CoupledEngagement | str) -> AsPosted:
+    """The forces as posted against those of the nominal engagement."""
+    motions = np.unique(nominal.paths.motion)
+    ends = [task.force.along(motions, np.full(len(motions), share)) for share in (0.0, 1.0)]
+    largest = float(lengths(np.concatenate(ends)[:, :3]).max(initial=0.0))
+    if isinstance(posted, str):
+        return AsPosted(posted, largest, None, None)
+    return AsPosted("", largest, posted.largest, posted.residual)
 
 
 def _nominal(run: StockRun, count: int) -> _Nominal:
@@ -109,18 +134,28 @@ def _nominal(run: StockRun, count: int) -> _Nominal:
     own = np.flatnonzero(surface.sweep >= len(earlier))
     sweep = surface.sweep[own] - len(earlier)
     slope = np.abs(np.einsum("ki,ki->k", surface.normals[own], run.sweeps.rows[sweep, AXIS : AXIS + 3]))
-    near = _near(run)
     return _Nominal(
         run,
         surface,
         own,
         run.sweeps.motion[sweep],
         np.where(slope >= _FLOOR, 0, np.where(slope <= _WALL, 1, 2)),
-        run.sweeps.rows[near],
-        run.sweeps.motion[near],
-        run.sweeps.share[near],
+        paths_of(run),
         earlier,
-        max(min(cutter.edge_length, _LONGEST) + cutter.radius for cutter in run.sweeps.cutters),
+        lever_of(run),
+    )
+
+
+def lever_of(run: StockRun) -> float:
+    """[m] how far an edge of any tool is from the tip at most."""
+    return max(min(cutter.edge_length, _LONGEST) + cutter.radius for cutter in run.sweeps.cutters)
+
+
+def paths_of(run: StockRun) -> Paths:
+    """The sweeps of a program that may reach the part."""
+    near, sweeps = _near(run), run.sweeps
+    return Paths(
+        sweeps.rows[near], sweeps.motion[near], sweeps.share[near], sweeps.which[near], np.flatnonzero(near)
     )
 
 
@@ -138,8 +173,8 @@ def _near(run: StockRun) -> Bools:
     return np.asarray((rows[:, REMOVES] > 0) & ~apart)
 
 
-def _side(nominal: _Nominal, displacement: Displacement) -> PartSide:
-    """The errors with displaced tools.  Raises _UnknownDisplacement."""
+def _side(nominal: _Nominal, displacement: Displacement, paths: Paths) -> PartSide:
+    """The errors with displaced tools along ``paths``.  Raises _UnknownDisplacement."""
     largest, lost = 0.0, np.zeros(0, np.int64)
 
     def moved(motion: Ints, share: Floats) -> tuple[Floats, Floats]:
@@ -151,7 +186,7 @@ def _side(nominal: _Nominal, displacement: Displacement) -> PartSide:
         largest = max(largest, float((lengths(shift) + nominal.lever * lengths(turn)).max(initial=0.0)))
         return shift, turn
 
-    rows, owner, share = deflect(nominal.rows, nominal.motion, nominal.share, nominal.lever, moved)
+    rows, owner, share = deflect(paths.rows, paths.motion, paths.share, nominal.lever, moved)
     if len(lost):
         raise _UnknownDisplacement(lost)
     surface, own = nominal.surface, nominal.own
@@ -164,7 +199,7 @@ def _side(nominal: _Nominal, displacement: Displacement) -> PartSide:
     )
     sweep = found.sweep - len(nominal.earlier)
     at = np.maximum(sweep, 0)
-    motion = np.where(sweep >= 0, nominal.motion[owner[at]], -1)
+    motion = np.where(sweep >= 0, paths.motion[owner[at]], -1)
     place = share[at, 0] + found.share * (share[at, 1] - share[at, 0])
     arm = surface.points[own] - tips_of(rows[at], np.nan_to_num(found.share))
     return PartSide(found.error, motion, place, arm)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,6 +74,18 @@ class SurfaceGroup:
 
 
 @dataclass(frozen=True)
+class AsPosted:
+    """What is known of the forces as posted, where the robot yields and cuts less than it is meant to.  nominal: why
+    they are those of the nominal engagement, "" where they were solved together with the displacement; force_nominal,
+    force [N]: the largest of both; residual [m]: what remains between both displacements of a place."""
+
+    nominal: str
+    force_nominal: float
+    force: float | None
+    residual: float | None
+
+
+@dataclass(frozen=True)
 class PartFigures:
     """points that the program makes, their grid's spacing [m], their area [m2]; tolerance [m]; as posted, and as
     compensated where it is; features and operations: those that have points."""
@@ -85,6 +98,7 @@ class PartFigures:
     after: SideFigures | None
     features: tuple[SurfaceGroup, ...]
     operations: tuple[SurfaceGroup, ...]
+    as_posted: AsPosted
 
     @property
     def sides(self) -> tuple[tuple[str, SideFigures], ...]:
@@ -126,13 +140,15 @@ class PartSide:
 @dataclass(frozen=True, eq=False)
 class PartError:
     """The error of a part: ``figures``, the ``surface`` with its points that are ``own`` (K,) to the program, and the
-    errors there as posted, and as compensated where it is."""
+    errors there as posted, and as compensated where it is.  posted_wrench: of motions (K,) at shares (K,) the wrench
+    (K, 6) as posted, None where it is that of the task."""
 
     figures: PartFigures
     surface: Surface
     own: Ints
     before: PartSide
     after: PartSide | None
+    posted_wrench: Callable[[Ints, Floats], Floats] | None = None
 
     def vertex_errors(self, side: PartSide) -> Floats:
         """(V,) [m] the largest error, with its sign, around each vertex of the mesh; NaN where the blank is left."""

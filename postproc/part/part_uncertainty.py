@@ -52,12 +52,12 @@ def with_uncertainty(
     known = input_uncertainties(task.model, force.largest, bool(task.carries.any()), stated.vector)
     if not known.entries:
         return part
-    displaced = Displacements(task, run.sweeps.in_stock)
+    displaced = Displacements(task, run.sweeps.in_stock, wrench=part.posted_wrench)
     figures = part.figures
     before = replace(figures.before, ci95=_interval(part, part.before, displaced, known, force))
     after = figures.after
     if after is not None and part.after is not None:
-        displaced = replace(displaced, division=division)
+        displaced = replace(displaced, division=division, wrench=None)
         after = replace(after, ci95=_interval(part, part.after, displaced, known, force))
     return replace(part, figures=replace(figures, before=before, after=after))
 
@@ -110,7 +110,7 @@ def _slopes(
     from_stock = np.swapaxes(displaced.to_stock(motion), 1, 2)
     arm, normal = turned(from_stock, side.arm[chosen]), turned(from_stock, normals)
     wanted = task.desired_path.at(motion, share)
-    wrench, axes = task.force.along(motion, share), task.base[motion].rotation
+    wrench, axes = displaced.wrench_at(motion, share), task.base[motion].rotation
     placed = task.robot_from_path(motion, share)
     held = turned(np.swapaxes(wanted.rotation, 1, 2), arm)  # in the axes of the tool
     if placed is not None:

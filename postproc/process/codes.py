@@ -293,6 +293,17 @@ FORCE_CODES = define(
             action="Name the CSV with --force, or remove what is outdated.",
             example="`;FORCE 0 360 560` in panel.src, and panel.force.csv.",
         ),
+        "FRC032": Code(
+            "info",
+            "bias of logged forces",
+            meaning=(
+                "A robot that yields cuts less than it is meant to, so forces that were logged without compensation"
+                " differ from those of the compensated robot. The log is used as it is."
+            ),
+            consequence="The correction of first passes is too small, that of passes over what they left too large.",
+            action="Log the forces of the compensated program and compensate the original again with them.",
+            example="Logged on a robot of 1 um/N, finishing with ae 0.5 mm: 6 % too small.",
+        ),
     }
 )
 CODES = {**FORCE_CODES, **STOCK_CODES}

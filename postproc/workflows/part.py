@@ -5,6 +5,7 @@ from __future__ import annotations
 from postproc.base.findings import Finding
 from postproc.compensation.subdivision import Subdivision
 from postproc.part.part_figures import PartError
+from postproc.workflows.force_log import logged_force_findings
 from postproc.workflows.preparation import Prepared
 
 
@@ -15,14 +16,16 @@ def part_error_of(
     stock, or where it is not known."""
     task = ready.task
     if task.force.stock is None:
-        return None, ()
+        return None, logged_force_findings(ready)
     from postproc.part.part_error import find_part_error  # numba: only where there is a stock
     from postproc.part.part_uncertainty import StatedIntervals, with_uncertainty
     from postproc.process.stock.simulation import StockRun
 
     run = task.force.stock
     assert isinstance(run, StockRun)
-    part = find_part_error(task, run, division)
+    factored = bool(ready.cell.force_factors) or task.known_error is not None
+    why = "their factors are those of a measured part" if factored else ""
+    part = find_part_error(task, run, division, as_nominal=why)
     if isinstance(part, Finding):
         return None, (part,)
     stated = StatedIntervals(ready.cell.force_ci95, ready.cell.force_vector)

@@ -56,17 +56,20 @@ class Stock(NamedTuple):
     head: Ints
 
 
-def build_stock(blank: Blank, sweeps: Floats, cutters: Floats, reach: float = 0.0) -> tuple[Stock, Floats]:
+def build_stock(
+    blank: Blank, sweeps: Floats, cutters: Floats, reach: float = 0.0, slack: float = 0.0
+) -> tuple[Stock, Floats]:
     """The stock of sweeps (M, 22) by cutters (T, 6), and heights (M, 2) [m] for each sweep.
 
     The heights are the lowest and highest above its tip at which it may meet stock, inf and -inf where it meets none.
-    ``reach`` [m]: distances are known so far at least.
+    ``reach`` [m]: distances are known so far at least.  ``slack`` [m]: by so much the sweeps may still be displaced,
+    each by another shift, without being listed anew.
     """
     low, high = corners_of(blank)
     span = high - low
     radius = float(cutters[:, RADIUS].min()) if len(cutters) else LARGEST_CELL
     size = min(max(CELL * radius, SMALLEST_CELL), LARGEST_CELL)
-    size = max(size, reach, float(np.cbrt(np.prod(span) / MOST_CELLS)))
+    size = max(size, reach, slack, float(np.cbrt(np.prod(span) / MOST_CELLS)))
     while np.prod(np.ceil(span / size)) > 2 * MOST_CELLS:  # thin blanks
         size *= 1.2
     shape = np.maximum(np.ceil(span / size).astype(np.int64), 1)
@@ -77,13 +80,14 @@ def build_stock(blank: Blank, sweeps: Floats, cutters: Floats, reach: float = 0.
     count, covered = np.zeros(cells, np.int64), np.full(cells, np.iinfo(np.int32).max, np.int32)
     _mark_outside(stock, covered)
     live = np.full((len(sweeps), 2), [np.inf, -np.inf])
-    _list(stock, count, covered, live, none, False)
+    _list(stock, count, covered, live, none, False, slack)
     first = np.zeros(cells + 1, np.int64)
     np.cumsum(count, out=first[1:])
     near = np.zeros(max(int(first[-1]), 1), np.int32)
-    _list(stock, first[:-1].copy(), covered, live, near, True)
+    _list(stock, first[:-1].copy(), covered, live, near, True, slack)
     head = np.zeros(len(near), np.int32)
-    _join(first, near, _go_on(sweeps), head)
+    joins = _go_on(sweeps) if slack == 0.0 else np.zeros(len(sweeps), bool)
+    _join(first, near, joins, head)
     return stock._replace(first=first, near=near, head=head), live
 
 
@@ -151,13 +155,15 @@ def sweep_box(sweeps: Floats, cutters: Floats, j: int, box: Floats) -> None:
 
 
 @compiled
-def _list(stock: Stock, count: Ints, covered: Ints, live: Floats, near: Ints, fill: bool) -> None:
+def _list(
+    stock: Stock, count: Ints, covered: Ints, live: Floats, near: Ints, fill: bool, slack: float
+) -> None:
     """The sweeps near each cell counted, or with ``fill`` put into ``near`` from ``count`` on."""
     sweeps, cutters, size = stock.sweeps, stock.cutters, stock.grid[0]
     low = stock.blank.frame[1:4]
     shape = stock.grid[2:].astype(np.int64)
     half = size * np.sqrt(0.75)
-    limit = half + stock.grid[1]
+    limit = half + stock.grid[1] + slack
     box = np.zeros((2, 3))
     first, last = np.zeros(3, np.int64), np.zeros(3, np.int64)
     for s in range(len(sweeps)):
@@ -193,11 +199,11 @@ def _list(stock: Stock, count: Ints, covered: Ints, live: Floats, near: Ints, fi
                     # near is enough: the list of a sweep that is close but does not touch must not stay empty
                     h0 = (x - tip0[0]) * axis0[0] + (y - tip0[1]) * axis0[1] + (z - tip0[2]) * axis0[2]
                     h1 = (x - tip1[0]) * axis1[0] + (y - tip1[1]) * axis1[1] + (z - tip1[2]) * axis1[2]
-                    live[s, 0] = min(live[s, 0], min(h0, h1) - half)
-                    live[s, 1] = max(live[s, 1], max(h0, h1) + half)
+                    live[s, 0] = min(live[s, 0], min(h0, h1) - half - slack)
+                    live[s, 1] = max(live[s, 1], max(h0, h1) + half + slack)
                     if sweeps[s, REMOVES] > 0.0:
                         count[cell] += 1
-                        if d <= -half:
+                        if d <= -half - slack:
                             covered[cell] = s
 
 

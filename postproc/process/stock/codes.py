@@ -142,5 +142,21 @@ CODES = define(
             action="State length, shank and holder.",
             example="`2: {shape: ball, diameter: 10}`.",
         ),
+        "STK018": Code(
+            "info",
+            "tool of a comment",
+            meaning="A comment of the program states the shape of this tool.",
+            consequence="The tool is simulated with it.",
+            action="Compare it with the tool in the spindle; `shape` and `diameter` in the process file come first.",
+            example="`(T1 D=10. CR=0. - ZMIN=-5. - flat end mill)`.",
+        ),
+        "STK019": Code(
+            "warning",
+            "tool differs from its comment",
+            meaning="The process file and a comment of the program describe different tools.",
+            consequence="One of them is wrong: the part, the forces and the correction may be.",
+            action="Correct the process file, or post the program for the tool that is used.",
+            example="`1: {shape: flat, diameter: 16, ...}` for `(T1 D=10. CR=0. - ZMIN=-5. - flat end mill)`.",
+        ),
     }
 )

@@ -21,6 +21,7 @@ angle (-1: no taper) and its cosine."""
 
 _GOLDEN = 0.6180339887498949
 _STEPS = 30  # of golden sections: 1e-6 of the motion
+_PLACE = 1e-9  # m: of the place on a line where it is nearest
 
 
 TIP_POINT, STEP, AXIS, TURN, CENTRE, NORMAL, ANGLE, MODE, CUTTER, REMOVES = 0, 3, 6, 9, 12, 15, 18, 19, 20, 21
@@ -150,12 +151,32 @@ def _straight(sweeps: Floats, cutters: Floats, j: int, x: float, y: float, z: fl
     half = 0.5 * np.sqrt(dd + rise * rise)
     if middle - half > enough or middle <= -enough:
         return middle - half if middle > 0.0 else middle
+    # a convex function is least where it is least nearby: beside the cylinder at the foot on the path of the axis,
+    # below a ball at the foot on the path of its middle
+    corner, flat = cutters[c, CORNER], cutters[c, RADIUS] - cutters[c, CORNER]
+    if cutters[c, TAPER] < 0.0:
+        t = min(max(ud / dd, 0.0), 1.0) if dd > 0.0 else 0.5
+        at, across = height - t * rise, np.sqrt(max(uu - t * (2.0 * ud - t * dd), 0.0))
+        if (
+            at > corner
+            and across - cutters[c, RADIUS] > at - cutters[c, LENGTH]
+            and (flat == 0.0 or across - flat > corner - at)
+        ):
+            return across - cutters[c, RADIUS]
+        if flat == 0.0:
+            t = min(max((ud + (height - corner) * rise) / (dd + rise * rise), 0.0), 1.0)
+            at = height - t * rise
+            if at < corner:
+                return np.sqrt(max(uu - t * (2.0 * ud - t * dd), 0.0) + (corner - at) ** 2) - corner
     low, high = 0.0, 1.0
     t1, t2 = 1.0 - _GOLDEN, _GOLDEN
     f1 = cutter_distance(cutters, c, np.sqrt(max(uu - t1 * (2.0 * ud - t1 * dd), 0.0)), height - t1 * rise)
     f2 = cutter_distance(cutters, c, np.sqrt(max(uu - t2 * (2.0 * ud - t2 * dd), 0.0)), height - t2 * rise)
     best = middle
-    for _ in range(_STEPS):
+    length = 2.0 * half
+    while (high - low) * length > _PLACE:
+        if min(f1, f2) - (high - low) * length > enough:
+            return min(f1, f2) - (high - low) * length
         if f1 < f2:
             high, t2, f2 = t2, t1, f1
             t1 = high - _GOLDEN * (high - low)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from postproc.base.batches import each_block
 from postproc.base.units import MM
 from postproc.process.stock.blank import Blank
 from postproc.process.stock.cells import Stock, build_stock
+from postproc.process.stock.chains import chain_contacts
 from postproc.process.stock.collision import collisions
 from postproc.process.stock.contact import (
     CHIP,
@@ -38,6 +39,9 @@ SPACING = 0.5
 FINER, UNEVEN = 6, 0.05
 """How many times closer they are on a sweep along which the removed area changes by more than this share."""
 
+ALIKE = 0.02
+"""Short motions are interpolated between places whose removed areas differ by at most this share."""
+
 LEAST_AREA = 1e-5 * MM**2
 """Across the feed: below it nothing is cut."""
 
@@ -56,7 +60,7 @@ class EngagedMotions:
     moments about the tip, NaN where feed, teeth, spindle or material are not known; where the force, or without one the
     removed area, is largest: depth (axial), width (across the feed) [m], entry and exit [rad], chip [m]; along (N,
     2, 6): wrench at start and end of a line through the motion; power (N,) [W], the mean; speed (N,) [rad/s].
-    hits: row of a motion -> the parts that collide.
+    hits: row of a motion -> the parts that collide; uneven (U,): sweeps along which the removed area changes.
     """
 
     cuts: Bools
@@ -72,6 +76,7 @@ class EngagedMotions:
     power: Floats
     hits: dict[int, tuple[int, ...]]
     stock: Stock
+    uneven: Ints
 
 
 def engage(
@@ -91,8 +96,8 @@ def engage(
         rows = np.concatenate([shifted, rows])
         cutters = np.concatenate([cutters, before.cutters])
     stock, live = build_stock(blank, np.ascontiguousarray(rows), cutters)
-    profiles = _profiles(sweeps.cutters)
-    laws = _laws(sweeps, toolpath, edges)
+    profiles = profiles_of(sweeps.cutters)
+    laws = laws_of(sweeps, toolpath, edges)
     padded = np.concatenate([np.zeros((earlier, 9)), laws])
     heading = np.concatenate([np.zeros((earlier, 3)), sweeps.heading])
 
@@ -110,19 +115,30 @@ def engage(
         each_block(look, len(sweep), _BLOCK)
         return sweep, weight, found
 
-    sweep, weight, found = look_at(np.flatnonzero(active & (sweeps.rows[:, REMOVES] > 0)), 1)
-    uneven = _uneven(sweep, found[:, RATE])
-    again = np.isin(sweep, uneven)
-    finer = look_at(uneven, FINER)
-    parts = zip((sweep[~again], weight[~again], found[~again]), finer, strict=True)
+    chosen = np.flatnonzero(active & (sweeps.rows[:, REMOVES] > 0))
+    short = sweeps.length[chosen] <= SPACING * radius[chosen]
+    sweep, weight, found = look_at(chosen[~short], 1)
+    short_sweeps = chosen[short]
+    seen = chain_contacts(
+        sweeps, laws, short_sweeps, SPACING * radius, ALIKE, lambda some: look_at(some, 1)[2]
+    )
+    parts = ((sweep, short_sweeps), (weight, sweeps.length[short_sweeps]), (found, seen))
     sweep, weight, found = (np.concatenate(pair) for pair in parts)
     order = np.argsort(sweep, kind="stable")
     sweep, weight, found = sweep[order], weight[order], found[order]
+    uneven = _uneven(sweep, found[:, RATE])
+    again = np.isin(sweep, uneven)
+    finer = look_at(uneven, FINER)
+    pairs = zip((sweep[~again], weight[~again], found[~again]), finer, strict=True)
+    sweep, weight, found = (np.concatenate(pair) for pair in pairs)
+    order = np.argsort(sweep, kind="stable")
+    sweep, weight, found = sweep[order], weight[order], found[order]
     hits = _hits(stock, sweeps, profiles, heading, live, earlier, radius)
-    return _by_motion(len(toolpath), sweeps, sweep, weight, found, laws, edges, hits, stock)
+    cut = _by_motion(len(toolpath), sweeps, sweep, weight, found, laws, edges, hits, stock)
+    return replace(cut, uneven=uneven)
 
 
-def _profiles(cutters: tuple[Cutter, ...]) -> Floats:
+def profiles_of(cutters: tuple[Cutter, ...]) -> Floats:
     """(T, E, 8) the profiles, with unused rows of the part 9."""
     each = [cutter.profile() for cutter in cutters]
     profiles = np.full((len(each), max(map(len, each)) + 1, 8), 9.0)
@@ -131,7 +147,7 @@ def _profiles(cutters: tuple[Cutter, ...]) -> Floats:
     return profiles
 
 
-def _laws(sweeps: MotionSweeps, toolpath: Toolpath, edges: dict[int, Edges]) -> Floats:
+def laws_of(sweeps: MotionSweeps, toolpath: Toolpath, edges: dict[int, Edges]) -> Floats:
     """(M, 9) see ``find_contact``; the feed per tooth is NaN where anything that the force needs is not known."""
     laws = np.zeros((len(sweeps.rows), 9))
     laws[:, 0] = np.nan
@@ -257,6 +273,7 @@ def _by_motion(
         power=np.where(cuts, mean[:, 5] * speed, 0.0),
         hits=hits,
         stock=stock,
+        uneven=np.zeros(0, np.int64),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from postproc.process.stock.motion_sweeps import MotionSweeps, find_sweeps
 from postproc.process.stock.saved_stock import Removed, read_stock, stock_bytes
 from postproc.process.stock.stl import read_stl
 from postproc.process.stock.stock_section import StockProcess, read_stock_process
+from postproc.process.stock.tool_comments import CommentedTool, read_tool_comments
 from postproc.toolpath import Kind, Toolpath
 
 _PARTS = {CUTTING: "the cutter", SHANK: "the shank", HOLDER: "the holder"}
@@ -33,6 +35,7 @@ class StockRun:
     where not stated."""
 
     process: StockProcess
+    toolpath: Toolpath
     blank: Blank
     before: Removed | None
     sweeps: MotionSweeps
@@ -52,7 +55,8 @@ def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str)
     Refusal: of the file; STK002 to STK005, STK016: of the blank; STK006, STK007, STK010: of tools and frames; STK008:
     no motion reaches the stock.
     """
-    process = read_stock_process(path)
+    commented = read_tool_comments(toolpath)
+    process = read_stock_process(path, commented)
     blank, before = _blank(process)
     low, high = corners_of(blank)
     sweeps = find_sweeps(toolpath, frames, process, low, high, program)
@@ -69,8 +73,9 @@ def simulate(path: Path, toolpath: Toolpath, frames: MotionFrames, program: str)
         *_collisions(engagement, toolpath, program),
         *_not_simulated(sweeps, toolpath, program),
         *_lengths(sweeps, process),
+        *_commented(sweeps, commented, program),
     ]
-    return StockRun(process, blank, before, sweeps, engagement, ci95, tuple(findings))
+    return StockRun(process, toolpath, blank, before, sweeps, engagement, ci95, tuple(findings))
 
 
 def _blank(process: StockProcess) -> tuple[Blank, Removed | None]:
@@ -235,6 +240,30 @@ def _lengths(sweeps: MotionSweeps, process: StockProcess) -> list[Finding]:
         )
         for cutter in free
     ]
+
+
+def _commented(sweeps: MotionSweeps, commented: Mapping[int, CommentedTool], program: str) -> list[Finding]:
+    """What is taken from comments of the program, and where the process file states other tools."""
+    findings = []
+    for cutter in sweeps.cutters:
+        tool = commented.get(cutter.number)
+        if tool is None:
+            continue
+        same = (cutter.shape, cutter.radius, cutter.corner) == (tool.shape, tool.radius, tool.corner)
+        near = (
+            cutter.shape == tool.shape
+            and abs(cutter.radius - tool.radius) + abs(cutter.corner - tool.corner) < 1e-6
+        )
+        if same:
+            message = f"tool {cutter.number} is {tool.words}, by this comment"
+            findings.append(Finding("STK018", message, program, tool.line))
+        elif not near:
+            message = (
+                f"by this comment tool {cutter.number} is {tool.words}; the process file states {cutter.shape},"
+                f" diameter {2 * cutter.radius / MM:g} mm, which is used"
+            )
+            findings.append(Finding("STK019", message, program, tool.line))
+    return findings
 
 
 def _beside(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from postproc.base.arrays import Floats, frozen
 from postproc.base.units import DEG, MM
@@ -11,6 +13,7 @@ from postproc.base.yaml_section import YamlSection, load
 from postproc.process.materials import Material
 from postproc.process.process_file import ProcessValues, read_material, read_whole
 from postproc.process.stock.cutters import SHAPES, Cutter
+from postproc.process.stock.tool_comments import CommentedTool
 
 BLANKS = ("box", "cylinder", "stl", "from")
 AXES = ("x", "y", "z")
@@ -56,8 +59,12 @@ def has_stock(path: Path) -> bool:
     return "stock" in load(path)
 
 
-def read_stock_process(path: Path) -> StockProcess:
-    """A process file with a stock: lengths in mm, angles in deg.  Refusal: FIL..., YML... with file, line and key."""
+def read_stock_process(path: Path, commented: Mapping[int, CommentedTool] | None = None) -> StockProcess:
+    """A process file with a stock: lengths in mm, angles in deg.  Refusal: FIL..., YML... with file, line and key.
+
+    commented: tools by the comments of the program, for what the file does not state of them.
+    """
+    commented = {} if commented is None else commented
     top = load(path)
     if "operations" in top and "stock" in top:
         raise top.error("YML004", "excludes 'stock', which computes what operations state", "operations")
@@ -73,7 +80,7 @@ def read_stock_process(path: Path) -> StockProcess:
     numbers, lengthwise, file, scale = _blank(stock, kind, path)
     defaults = top.section("defaults", None)
     defaults.only(*_EDGES, "rapid")
-    tools = top.section("tools")
+    tools = top.section("tools", None) if commented else top.section("tools")
     cutters, edges = {}, {}
     for key in tools:
         if not key.isdecimal() or not int(key):
@@ -82,8 +89,15 @@ def read_stock_process(path: Path) -> StockProcess:
             )
         section = tools.section(key)
         own = ProcessValues(section, defaults)
-        cutters[int(key)] = _cutter(int(key), section, own)
+        known = commented.get(int(key))
+        stated = "shape" in section or "diameter" in section or known is None
+        cutters[int(key)] = _cutter(int(key), section, own, None if stated else known)
         edges[int(key)] = _edges(own)
+    for number, tool in commented.items():
+        if number not in cutters:
+            own = ProcessValues(tools, defaults)
+            cutters[number] = _of_comment(tool, own)
+            edges[number] = _edges(own)
     if not cutters:
         raise top.error("YML003", "states no tool", "tools")
     return StockProcess(
@@ -132,8 +146,10 @@ def _blank(stock: YamlSection, kind: str, path: Path) -> tuple[list[list[float]]
     return [[]], 2, path.parent / stock.text(kind), 1.0
 
 
-def _cutter(number: int, section: YamlSection, own: ProcessValues) -> Cutter:
-    shape = section.text("shape", choices=SHAPES)
+def _cutter(
+    number: int, section: YamlSection, own: ProcessValues, commented: CommentedTool | None = None
+) -> Cutter:
+    shape = section.text("shape", choices=SHAPES) if commented is None else commented.shape
     section.only(
         "shape",
         "diameter",
@@ -149,10 +165,12 @@ def _cutter(number: int, section: YamlSection, own: ProcessValues) -> Cutter:
     def length(key: str, most: float = 1000.0) -> float:
         return section.number(key, low=1e-3, high=most, unit="mm") * MM
 
-    radius = 0.5 * length("diameter")
+    radius = 0.5 * length("diameter") if commented is None else commented.radius
     edge = length("length") if "length" in section else None
     corner, tip, taper = 0.0, 0.0, None
-    if shape == "ball":
+    if commented is not None:
+        corner, taper = commented.corner, commented.taper
+    elif shape == "ball":
         corner = radius
     elif shape == "bull":
         corner = length("corner_radius")
@@ -193,10 +211,28 @@ def _cutter(number: int, section: YamlSection, own: ProcessValues) -> Cutter:
         taper=taper,
         shank=shank,
         holder=holder,
-        teeth=read_whole(own.place("teeth"), "teeth", _MOST_TEETH) if own.has("teeth") else None,
-        helix=own.number("helix") * DEG if own.has("helix") else None,
         line=section.line,
+        **_teeth(own),
     )
+
+
+def _of_comment(tool: CommentedTool, own: ProcessValues) -> Cutter:
+    """A tool of which the file states nothing but its defaults."""
+    return Cutter(
+        number=tool.number,
+        shape=tool.shape,
+        radius=tool.radius,
+        corner=tool.corner,
+        taper=tool.taper,
+        **_teeth(own),
+    )
+
+
+def _teeth(own: ProcessValues) -> dict[str, Any]:
+    return {
+        "teeth": read_whole(own.place("teeth"), "teeth", _MOST_TEETH) if own.has("teeth") else None,
+        "helix": own.number("helix") * DEG if own.has("helix") else None,
+    }
 
 
 def _edges(own: ProcessValues) -> Edges:

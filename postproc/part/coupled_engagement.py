@@ -1,0 +1,264 @@
+"""What a program cuts as it is posted, with a robot that yields: engagement, force and displacement of every place
+solved together, in the order of the program, each in the stock that the displaced tools before it left.
+
+Without a correction the robot yields, cuts less, and the force falls; what remains is cut by later passes.  The model
+is linear in the wrench near the one that it is evaluated at; it is evaluated again at the solution.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.batches import each_block
+from postproc.base.geometry import lengths, turned
+from postproc.base.units import DEG, MM
+from postproc.compensation.mirror import pose_error
+from postproc.part.displacement import Displacements
+from postproc.process.stock.cells import build_stock
+from postproc.process.stock.coupled import AS_STRAIGHT, Nodes, Pieces, solve_pieces
+from postproc.process.stock.displaced import displaced_rows
+from postproc.process.stock.distance import ANGLE, AXIS, CUTTER, MODE, ROW, STEP, TIP_POINT, TURN
+from postproc.process.stock.engagement import laws_of, profiles_of
+from postproc.process.stock.simulation import StockRun
+
+MOST_PIECES = 300_000
+
+SPACING, FINER = 0.5, 4
+"""Radii of the cutter between two places, and how many times closer they are where the nominal cut changes."""
+
+ENOUGH = 0.5e-6
+"""[m] The linear displacement differs from that of the model by less at the solution."""
+
+_STEP, _LEVER = 10.0, 0.05
+"""[N] by which the wrench is varied, and [m] by which moments are."""
+
+_JOINED, _SAME_WAY = 1e-9, 3 * DEG
+"""[m, rad] Motions that join as closely go on under the force with which the one before ends."""
+
+_ROUNDS = 3
+_ATTEMPTS, _NEARER = 8, 4
+_SURE, _LEAST, _MOST = 1.3, 0.3 * MM, 10 * MM
+"""By how far the solution may be from the displacements for which the sweeps near each cell are listed."""
+
+
+class Paths(NamedTuple):
+    """Sweeps that may reach the part, ``rows`` (M, ROW), of motions (M,) and shares (M, 2) of these; which (M,): their
+    cutter; number (M,): which of the sweeps of the program each is."""
+
+    rows: Floats
+    motion: Ints
+    share: Floats
+    which: Ints
+    number: Ints
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledEngagement:
+    """Wrenches of a program as posted, solved at K places with its displacement.
+
+    key (K,): twice the motion plus the share of its path, ascending; wrench (K, 6) [N, N m] in path axes; area (K,)
+    [m2] removed across the feed; residual [m]: the largest difference between both displacements; pieces: the sweeps
+    from one place to the next.
+    """
+
+    key: Floats
+    wrench: Floats
+    area: Floats
+    residual: float
+    pieces: Paths
+
+    def along(self, motion: Ints, share: Floats) -> Floats:
+        """(K, 6) [N, N m] the wrench at the shares (K,) of motions (K,); zero where nothing was solved."""
+        at = 2.0 * motion + share
+        after = np.clip(np.searchsorted(self.key, at), 1, len(self.key) - 1)
+        low, high = self.key[after - 1], self.key[after]
+        within = np.clip((at - low) / np.where(high > low, high - low, 1.0), 0.0, 1.0)[:, None]
+        known = (np.floor(low / 2) == motion) & (at <= high + 1e-9)
+        wrench = (1 - within) * self.wrench[after - 1] + within * self.wrench[after]
+        return np.where(known[:, None], wrench, 0.0)
+
+    @property
+    def largest(self) -> float:
+        """[N] the largest force."""
+        return float(lengths(self.wrench[:, :3]).max(initial=0.0))
+
+
+def solve_coupled(
+    run: StockRun, paths: Paths, displaced: Displacements, lever: float
+) -> CoupledEngagement | str:
+    """The engagement of ``paths`` with tools that ``displaced`` (as posted) says, or why it is not known."""
+    task = displaced.task
+    rows, owner, part = _pieces(run, paths)
+    if len(rows) > MOST_PIECES:
+        return f"the program has {len(rows)} places to solve, at most {MOST_PIECES} are"
+    motion, whole = paths.motion[owner], paths.share[owner]
+    share = whole[:, :1] + part * (whole[:, 1:] - whole[:, :1])
+    fresh = _starts(rows, motion, share)
+    # a place at the end of every piece, and one at the start of those that are fresh
+    first = np.cumsum(fresh + 1) - 1
+    end, start = first, np.where(fresh, first - 1, np.append(0, first[:-1]))
+    count = int(first[-1]) + 1
+    at_motion, at_share = np.zeros(count, np.int64), np.zeros(count)
+    at_motion[end], at_share[end] = motion, share[:, 1]
+    at_motion[start[fresh]], at_share[start[fresh]] = motion[fresh], share[fresh, 0]
+
+    wrench, to_stock = task.force.along(at_motion, at_share), displaced.to_stock(at_motion)
+    slack, solved, known = _LEAST, None, 0
+    for _ in range(_ROUNDS):
+        base, slope = _linear(displaced, at_motion, at_share, wrench, to_stock)
+        if not (np.isfinite(base).all() and np.isfinite(slope).all()):
+            return "the displacement of the tool is not known at all places"
+        guess = _rotated(to_stock, wrench)
+        for attempt in range(_ATTEMPTS):
+            listed = base + np.einsum("kij,kj->ki", slope, guess)
+            solved = Nodes(base, slope, np.ascontiguousarray(guess), np.zeros(count), np.zeros(count))
+            _solve(run, paths, (rows, owner), (start, end, fresh), solved, listed, slack, lever, known)
+            guess, known = solved.wrench, 1
+            moved = base + np.einsum("kij,kj->ki", slope, guess)
+            if _farthest(moved - listed, lever) <= slack:
+                break
+            # around this solution the next lists are shorter than with as much slack as it would have needed
+            slack = _LEAST if attempt < _NEARER else min(_SURE * _farthest(moved - listed, lever), _MOST)
+        wrench = _rotated(np.swapaxes(to_stock, 1, 2), guess)
+        exact = _displacements(displaced, at_motion, at_share, wrench, to_stock)
+        if _farthest(exact - moved, lever) <= ENOUGH:
+            break
+    assert solved is not None
+    key, wrench, area = _by_motion(at_motion, at_share, wrench, solved.area, motion, share, fresh, start)
+    pieces = Paths(rows, motion, share, paths.which[owner], paths.number[owner])
+    return CoupledEngagement(key, wrench, area, float(solved.residual.max()), pieces)
+
+
+def _pieces(run: StockRun, paths: Paths) -> tuple[Floats, Ints, Floats]:
+    """Rows (P, ROW) of the pieces of sweeps, whose they are (P,), and their parts (P, 2)."""
+    length = run.sweeps.length[paths.number]
+    radius = np.array([cutter.radius for cutter in run.sweeps.cutters])[paths.which]
+    uneven = np.isin(paths.number, run.engagement.uneven)
+    finer = np.where(uneven, FINER, 1)
+    count = np.maximum(np.ceil(length * finer / (SPACING * radius)), 1).astype(np.int64)
+    owner = np.repeat(np.arange(len(count)), count)
+    place = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    part = np.stack([place, place + 1], axis=1) / count[owner, None]
+    none = np.zeros((len(owner), 6))
+    rows = displaced_rows(paths.rows[owner], part, none, none, 0.0)
+    same = ~rows[:, TURN : TURN + 3].any(axis=1) | (paths.rows[owner, ANGLE] > 0)
+    rows[same, MODE] = paths.rows[owner[same], MODE]
+    return rows, owner, part
+
+
+def _starts(rows: Floats, motion: Ints, share: Floats) -> Bools:
+    """(P,) pieces that do not go on where the one before ends, in the same direction."""
+    fresh = np.ones(len(rows), bool)
+    within = (motion[1:] == motion[:-1]) & (np.abs(share[1:, 0] - share[:-1, 1]) < 1e-9)
+    tip, step = rows[:, TIP_POINT : TIP_POINT + 3], rows[:, STEP : STEP + 3]
+    lines = (rows[1:, ANGLE] == 0) & (rows[:-1, ANGLE] == 0) & (rows[1:, CUTTER] == rows[:-1, CUTTER])
+    joined = lines & (lengths(tip[1:] - tip[:-1] - step[:-1]) < _JOINED)
+    cosine = np.sum(step[1:] * step[:-1], axis=1)
+    joined &= cosine >= np.cos(_SAME_WAY) * lengths(step[1:]) * lengths(step[:-1])
+    axis = rows[:, AXIS : AXIS + 3]
+    joined &= np.sum(axis[1:] * axis[:-1], axis=1) > np.cos(_SAME_WAY)
+    fresh[1:] = ~(within | joined)
+    return fresh
+
+
+def _linear(
+    displaced: Displacements, motion: Ints, share: Floats, wrench: Floats, to_stock: Floats
+) -> tuple[Floats, Floats]:
+    """base (K, 6) and slope (K, 6, 6) of the displacement about ``wrench`` (K, 6), which is in path axes, as of
+    ``Nodes``."""
+    here = _displacements(displaced, motion, share, wrench, to_stock)
+    slope = np.empty((len(motion), 6, 6))
+    back = np.swapaxes(to_stock, 1, 2)
+    for k in range(6):
+        step = np.zeros(6)
+        step[k] = _STEP if k < 3 else _STEP * _LEVER
+        varied = wrench + _rotated(back, np.broadcast_to(step, wrench.shape))
+        slope[:, :, k] = (_displacements(displaced, motion, share, varied, to_stock) - here) / step[k]
+    in_stock = _rotated(to_stock, wrench)
+    return here - np.einsum("kij,kj->ki", slope, in_stock), slope
+
+
+def _displacements(
+    displaced: Displacements, motion: Ints, share: Floats, wrench: Floats, to_stock: Floats
+) -> Floats:
+    """(K, 6) shift [m] and turn [rad] of the tool in the axes of the stock under ``wrench`` (K, 6) in path axes; zero
+    where the path is not known."""
+    moved = np.zeros((len(motion), 6))
+    known = np.flatnonzero(displaced.traceable[motion])
+
+    def look(part: slice) -> None:
+        at = known[part]
+        real, goal = displaced.predicted(motion[at], share[at], wrench[at])
+        pair = [turned(to_stock[at], one) for one in pose_error(real.pose, goal)]
+        moved[at] = np.where((real.reachable & real.settled)[:, None], np.hstack(pair), np.nan)
+
+    each_block(look, len(known))
+    return moved
+
+
+def _rotated(rotation: Floats, wrench: Floats) -> Floats:
+    """(K, 6) wrenches turned by ``rotation`` (K, 3, 3)."""
+    return np.hstack([turned(rotation, wrench[:, :3]), turned(rotation, wrench[:, 3:])])
+
+
+def _farthest(moved: Floats, lever: float) -> float:
+    """[m] by how far a place within ``lever`` [m] of the tip is displaced at most by ``moved`` (K, 6)."""
+    return float((lengths(moved[:, :3]) + lever * lengths(moved[:, 3:])).max(initial=0.0))
+
+
+def _solve(
+    run: StockRun,
+    paths: Paths,
+    pieces: tuple[Floats, Ints],
+    places: tuple[Ints, Ints, Bools],
+    nodes: Nodes,
+    listed: Floats,
+    slack: float,
+    lever: float,
+    known: int,
+) -> None:
+    """``nodes`` solved, near the displacements ``listed`` (K, 6); places: start, end and fresh of ``Pieces``."""
+    rows, owner = pieces
+    sweeps, before = run.sweeps, run.before
+    cutters = run.engagement.stock.cutters
+    earlier = np.zeros((0, ROW)) if before is None else run.engagement.stock.sweeps[: len(before.rows)]
+    start, end, fresh = places
+    whole = np.broadcast_to([0.0, 1.0], (len(rows), 2))
+    near = displaced_rows(rows, whole, listed[start], listed[end], lever, AS_STRAIGHT)
+    every = np.ascontiguousarray(np.concatenate([earlier, near]))
+    stock, live = build_stock(run.blank, every, cutters, slack=slack)
+    number = paths.number[owner]
+    laws = laws_of(sweeps, run.toolpath, run.process.edges)[number]
+    solve_pieces(
+        stock,
+        profiles_of(sweeps.cutters),
+        Pieces(
+            np.ascontiguousarray(rows),
+            np.ascontiguousarray(laws),
+            np.ascontiguousarray(live[len(earlier) :]),
+            np.ascontiguousarray(sweeps.heading[number]),
+            start.astype(np.int64),
+            end.astype(np.int64),
+            fresh.astype(np.int64),
+            len(earlier),
+            known,
+        ),
+        nodes,
+        lever,
+    )
+
+
+def _by_motion(
+    at_motion: Ints, at_share: Floats, wrench: Floats, area: Floats, motion: Ints, share: Floats, fresh: Bools,
+    start: Ints,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
+    """Keys, wrenches and areas of the places, with the start of motions that go on from the one before."""
+    more = np.flatnonzero(~fresh & np.append(True, motion[1:] != motion[:-1]))
+    key = np.concatenate([2.0 * at_motion + at_share, 2.0 * motion[more] + share[more, 0]])
+    order = np.argsort(key, kind="stable")
+    index = np.concatenate([np.arange(len(at_motion)), start[more]])[order]
+    return key[order], wrench[index], area[index]

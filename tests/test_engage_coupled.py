@@ -1,0 +1,95 @@
+"""Engagement and displacement solved together, against the closed form of a wall under a spring."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("numba")
+
+from scipy.optimize import brentq
+from stock_cases import CHIP, FLAT, KNOWN, MM, Poses, block, path_through, run, sweeps_of
+
+from postproc.part.coupled_engagement import Paths, solve_coupled
+from postproc.process.milling_forces import Engagement, engagement, mean_force
+from postproc.toolpath import Kind
+
+DEPTH, WIDTH = 5.0, 0.5
+LEVER = 40 * MM
+
+
+class Springs:
+    """A robot whose tool yields by ``compliance`` (3, 3) [m/N] times the force, everywhere the same."""
+
+    def __init__(self, count, compliance):
+        self.compliance, self.traceable = compliance, np.ones(count, bool)
+        nothing = SimpleNamespace(along=lambda motion, share: np.zeros((len(motion), 6)))
+        self.task = SimpleNamespace(force=nothing)
+
+    def to_stock(self, motion):
+        return np.broadcast_to(np.eye(3), (len(motion), 3, 3))
+
+    def predicted(self, motion, share, wrench):
+        one = self.to_stock(motion)
+        real = SimpleNamespace(
+            pose=Poses(one, wrench[:, :3] @ self.compliance.T),
+            reachable=np.ones(len(motion), bool),
+            settled=np.ones(len(motion), bool),
+        )
+        return real, Poses(one, np.zeros((len(motion), 3)))
+
+
+def solve(path, blank, compliance, *cutters):
+    """The solution of all motions of a toolpath."""
+    sweeps, edges = sweeps_of(path, blank, *cutters)
+    cut = run(path, blank, *cutters)
+    process = SimpleNamespace(edges=edges)
+    stock = SimpleNamespace(
+        sweeps=sweeps, engagement=cut, toolpath=path, process=process, before=None, blank=blank
+    )
+    number = np.flatnonzero(sweeps.rows[:, 21] > 0)
+    paths = Paths(
+        sweeps.rows[number], sweeps.motion[number], sweeps.share[number], sweeps.which[number], number
+    )
+    return solve_coupled(stock, paths, Springs(len(path), compliance), LEVER)
+
+
+def side_force(width, direction):
+    """[N] The force on the tool away from a wall of which it takes ``width`` [mm], by the closed form of a shoulder."""
+    if width <= 0:
+        return 0.0
+    entry, out = engagement(direction, width * MM, 2 * FLAT.radius)
+    cut = Engagement(2 * FLAT.radius, FLAT.teeth, FLAT.helix, DEPTH * MM, entry, out, KNOWN)
+    fy = mean_force(cut, np.array([CHIP]))[0, 1]
+    return float(fy if direction == "down" else -fy)
+
+
+def wall(passes, direction):
+    """Passes along the same line beside a wall, back through the air; the rows of the passes."""
+    y = 60 + 8 - WIDTH
+    ends = [[30, y, -DEPTH], [60, y, -DEPTH]]
+    first, last = ends if direction == "down" else ends[::-1]
+    points, kinds = [], []
+    for _ in range(passes):
+        points += [first, last]
+        kinds += [Kind.PTP, Kind.LIN]
+    return path_through(points, kinds=kinds), np.arange(1, 2 * passes, 2)
+
+
+@pytest.mark.parametrize("direction", ["down", "up"])
+@pytest.mark.parametrize("compliance", [0.3, 1.0, 3.0])
+def test_a_wall_under_a_spring_and_its_spring_passes(direction, compliance):
+    """Each pass cuts what the displaced one before it left: d = F(left - d) / k, to 1 um."""
+    path, rows = wall(3, direction)
+    c = compliance * 1e-6
+    found = solve(path, block([0, -60, -40], [90, 60, 0]), np.diag([0.0, c, 0.0]), FLAT)
+    left = 0.0
+    for row in rows:
+        # the wall is where the tool passed, short by what it yields; the next pass finds that in addition
+        to_cut = WIDTH if row == 1 else left
+        yields = brentq(lambda d, a=to_cut: c / MM * side_force(a - d, direction) - d, -0.5, to_cut)
+        force = found.along(np.array([row]), np.array([0.6]))[0]
+        assert c / MM * force[1] == pytest.approx(yields, abs=1e-3)
+        assert row > 1 or yields > 0.005
+        left = yields
+    assert found.residual < 1e-6
