@@ -6,12 +6,12 @@ would be cut without any deflection, both with the parabolas of their approximat
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from postproc.base.arrays import Floats, Ints
-from postproc.base.batches import in_blocks
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.batches import each_block, in_blocks
 from postproc.base.geometry import lengths
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.problem import CompensationProblem
@@ -41,15 +41,23 @@ class Corners:
     motion: Ints
     row: Ints
     distance: Floats
-    unknown: np.ndarray
+    unknown: Bools
     difference: Floats
     angle: Floats
+
+    def part(self, chosen: Bools) -> Corners:
+        """Those that are ``chosen`` (K,)."""
+        return Corners(*(getattr(self, each.name)[chosen] for each in fields(self)))
 
 
 def compare_corners(task: CompensationProblem, result: CorrectionResult, division: Subdivision) -> Corners:
     """The approximated corners inside of corrected cuts that round off more than ``LITTLE`` of the tolerance: those of
     the original, and those that corrections and inserted points make of its motions."""
-    motion = find_corners(task, result, division)
+    return compare_corners_at(task, division, find_corners(task, result, division))
+
+
+def compare_corners_at(task: CompensationProblem, division: Subdivision, motion: Ints) -> Corners:
+    """The corners at the ends of ``motion`` (K,)."""
     unknown = np.isnan(approximations(task, division, motion))
 
     def compared(part: slice) -> tuple[Floats, Floats, Floats]:
@@ -64,15 +72,57 @@ def compare_corners(task: CompensationProblem, result: CorrectionResult, divisio
 def evaluate_corners(output: RoundedOutput, motions: Ints) -> tuple[Floats, Floats, Floats]:
     """Of the corners at whose ends ``motions`` (K,) are: their reach (K,) [m], and how far (K,) [m] and (K,) [rad] the
     tool is from the original's path there."""
-    at, many = output.place(motions), len(SAMPLES)
-    reach = output.reach[at]
-    later = SAMPLES > 0
-    segment = np.where(later, at[:, None] + 1, at[:, None])
-    away = reach[:, None] * SAMPLES / output.extent[np.minimum(segment, len(output.extent) - 1)]
-    share = np.where(later, away, 1.0 + away)
-    found = output.deviations(segment.ravel(), share.ravel())
-    off, angle = (lengths(part).reshape(-1, many).max(axis=1) for part in (found.shift, found.turn))
+    at = output.place(motions)
+    reach, later = output.reach[at], SAMPLES > 0
+    segment = np.where(later, np.minimum(at + 1, len(output.extent) - 1)[:, None], at[:, None])
+    away = reach[:, None] * SAMPLES / output.extent[segment]
+    step = np.abs(away).max(axis=1) * (SAMPLES[1] - SAMPLES[0])
+    off, angle = output.peaks(segment, np.where(later, away, 1.0 + away), step[:, None])
     return reach, np.where(reach > 0, off, 0.0), np.where(reach > 0, angle, 0.0)
+
+
+def with_rounded_ends(
+    task: CompensationProblem, result: CorrectionResult, division: Subdivision
+) -> CorrectionResult:
+    """The result with the errors at the corners of ``division`` that were fitted, where no motion leads to its end."""
+    if division.fits is None:
+        return result
+    point = division.fits.point[division.role[division.fits.point] == Role.ORIGINAL]
+    values = {name: getattr(result, name).copy() for name in ("after", "after_angle", "across_after")}
+    row = division.source[point]
+
+    def evaluated(part: slice) -> None:
+        _, off, angle = evaluate_corners(RoundedOutput(task, division, point[part]), point[part])
+        values["after"][row[part]] = values["across_after"][row[part]] = off
+        values["after_angle"][row[part]] = angle
+
+    each_block(evaluated, len(point), BLOCK)
+    return replace(result, **values)
+
+
+def rounded_errors(
+    task: CompensationProblem, result: CorrectionResult, division: Subdivision
+) -> tuple[Ints, Floats, Floats]:
+    """Motions (K,) of a division that start or end in points of fitted corners, or on which the force changes over a
+    ramp, and by how much (K,) [m], (K,) [rad] the tool is off along them at most, as they are rounded."""
+    on = result.corrected & task.desired_path.traceable & (task.desired_path.length > 0) & task.carries
+    fitted = changing = np.empty(0, np.int64)
+    if division.fits is not None:
+        fitted = np.unique(np.concatenate([division.fits.point, division.fits.point + 1]))
+    if task.force.ramps is not None:
+        changing = np.flatnonzero(np.isin(division.source, task.force.ramps.row))
+        changing = np.setdiff1d(changing, fitted)
+    found = []
+    for motion, unknown in ((fitted, np.inf), (changing, 0.0)):
+        some = motion[on[division.source[motion]] & ~division.transitions[motion]]
+
+        def largest(part: slice, some: Ints = some, unknown: float = unknown) -> tuple[Floats, Floats]:
+            return RoundedOutput(task, division, some[part], unknown).largest(some[part])
+
+        parts = [(np.empty(0),) * 2, *in_blocks(largest, len(some), BLOCK)]
+        found.append((some, *(np.concatenate([part[i] for part in parts]) for i in range(2))))
+    motion, off, angle = (np.concatenate([part[i] for part in found]) for i in range(3))
+    return motion, off, angle
 
 
 def find_corners(task: CompensationProblem, result: CorrectionResult, division: Subdivision) -> Ints:
@@ -90,11 +140,12 @@ def find_corners(task: CompensationProblem, result: CorrectionResult, division: 
     def size(part: slice) -> Floats:
         return _cut_off(task, division, motion[part])
 
-    return motion[_largest(np.concatenate([np.empty(0), *in_blocks(size, len(motion))]), task.tolerance)]
+    off = np.concatenate([np.empty(0), *in_blocks(size, len(motion))])
+    return np.asarray(motion[_largest(off, task.tolerance)])
 
 
 def _candidates(
-    task: CompensationProblem, on: np.ndarray, result: CorrectionResult, division: Subdivision
+    task: CompensationProblem, on: Bools, result: CorrectionResult, division: Subdivision
 ) -> Ints:
     """Motions that may round off something: of those between which nothing is inserted, what the directions of the
     original's and the change of the correction say; all others."""
@@ -104,7 +155,7 @@ def _candidates(
     row = np.flatnonzero(on[:-1] & on[1:] & ~(path.approximation[:-1] <= 0))
     plain = ~parted[row] & ~parted[row + 1] & ~task.desired_path.arc[row] & ~task.desired_path.arc[row + 1]
 
-    def rounds(part: slice) -> np.ndarray:
+    def rounds(part: slice) -> Bools:
         some = row[part]
         # of the output's directions by which its motions differ from those of the program, the program's included
         step = [_direction(task, at) for at in (some, some + 1)]

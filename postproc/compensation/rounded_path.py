@@ -26,6 +26,12 @@ ROUNDS, SETTLED = 6, 2e-8
 FLATTEST = 0.05
 """The tool goes along the path by this share at least of what its place under load does."""
 
+AT_ENDS, BETWEEN = np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9)
+"""Where a motion is evaluated: shares of the reach of the parabolas at its ends, and of its length."""
+
+CLOSER, AROUND = 2, np.linspace(-1.0, 1.0, 7)
+"""How often, and where, it is evaluated closer to its largest error."""
+
 NEAREST = 1e-12
 """[m] The extent of a motion that leads nowhere."""
 
@@ -79,10 +85,13 @@ def approximations(task: CompensationProblem, division: Subdivision, motions: In
 
 
 class RoundedOutput:
-    """A part of a division, with its parabolas: ``motions`` (K,) and those beside them."""
+    """A part of a division, with its parabolas: ``motions`` (K,) and those beside them.  ``unknown`` [m]: what an
+    approximation is taken for that nothing states."""
 
-    def __init__(self, task: CompensationProblem, division: Subdivision, motions: Ints) -> None:
-        self.task, self.division = task, division
+    def __init__(
+        self, task: CompensationProblem, division: Subdivision, motions: Ints, unknown: float = np.inf
+    ) -> None:
+        self.task, self.division, self.unknown = task, division, unknown
         near = np.unique(np.clip(motions[:, None] + np.arange(-1, 3), 0, len(division) - 1))
         self.motions = near[task.desired_path.traceable[division.source[near]]]
         self.segments = subdivided_motions(task, division, self.motions)
@@ -97,16 +106,44 @@ class RoundedOutput:
         path = self.task.toolpath
         goes_on = path.continues[source[next_here + 1]] | (source[next_here + 1] == source[next_here])
         at = next_here[goes_on & (path.tool[source[next_here]] == path.tool[source[next_here + 1]])]
-        blend = approximations(self.task, self.division, self.motions[at])
+        blend = np.nan_to_num(approximations(self.task, self.division, self.motions[at]), nan=self.unknown)
         reach[at] = np.fmin(blend, 0.5 * np.minimum(self.extent[at], self.extent[at + 1]))
         return reach
 
     def place(self, motions: Ints) -> Ints:
-        """(K,) where ``motions`` (K,) are in this part; raises where one is not."""
+        """(K,) where ``motions`` (K,) are in this part.  Raises ValueError where one is not."""
         at = np.minimum(np.searchsorted(self.motions, motions), len(self.motions) - 1)
         if not np.array_equal(self.motions[at], motions):
             raise ValueError("a motion is not in this part")
         return at
+
+    def samples(self, at: Ints) -> Floats:
+        """(K, S) shares of the segments ``at`` (K,) at which they are evaluated, parabolas included."""
+        extent, reach = self.extent[at, None], self.reach[at, None]
+        before = np.where(at > 0, self.reach[np.maximum(at - 1, 0)], 0.0)[:, None]
+        between = np.broadcast_to(BETWEEN, (len(at), len(BETWEEN)))
+        return np.concatenate([AT_ENDS * before / extent, 1.0 - AT_ENDS * reach / extent, between], axis=1)
+
+    def largest(self, motions: Ints) -> tuple[Floats, Floats]:
+        """(K,) [m] and (K,) [rad]: by how much the tool under load is off along ``motions`` (K,), from the middle of
+        the parabola at their start to that at their end."""
+        at = self.place(motions)
+        share = self.samples(at)
+        return self.peaks(np.broadcast_to(at[:, None], share.shape), share, 0.5 / (len(BETWEEN) - 1))
+
+    def peaks(self, at: Ints, share: Floats, step: Floats | float) -> tuple[Floats, Floats]:
+        """(K,) [m] and (K,) [rad]: by how much the tool is off at most at the shares (K, S) of the segments ``at``
+        (K, S), and nearer and nearer around the largest: it is steep where the force changes fast."""
+        off, angle = np.zeros(len(at)), np.zeros(len(at))
+        for _ in range(CLOSER + 1):
+            found = self.deviations(at.ravel(), share.ravel())
+            here, turned = (lengths(part).reshape(share.shape) for part in (found.shift, found.turn))
+            off, angle = np.maximum(off, here.max(axis=1)), np.maximum(angle, turned.max(axis=1))
+            peak = here.argmax(axis=1)[:, None]
+            at = np.broadcast_to(np.take_along_axis(at, peak, 1), (len(at), len(AROUND)))
+            share = np.clip(np.take_along_axis(share, peak, 1) + step * AROUND, 0.0, 1.0)
+            step = step * (AROUND[1] - AROUND[0])
+        return off, angle
 
     def blend(self, at: Ints, share: Floats) -> Blend:
         """Where the shares (S,) of the segments ``at`` (S,) lie on parabolas."""
@@ -175,7 +212,9 @@ def original(task: CompensationProblem, row: Ints, share: Floats) -> tuple[Poses
         b = d * t / desired_path.length[one + 1]
         before, after = desired_path.at(one, a), desired_path.at(one + 1, b)
         poses.put(some, interpolate_poses(before, after, t))
-        along = (1.0 - t)[:, None] * desired_path.tangent(one, a) + t[:, None] * desired_path.tangent(one + 1, b)
+        along = (1.0 - t)[:, None] * desired_path.tangent(one, a) + t[:, None] * desired_path.tangent(
+            one + 1, b
+        )
         along = along * d[:, None] + after.position - before.position
         tangent[some] = along / np.maximum(lengths(along), NEAREST)[:, None]
     return poses, tangent
