@@ -70,6 +70,8 @@ def fit_corners(
     fitted = with_corners(task, result, division, chosen, np.ones(len(chosen.corner), bool))
     fitted, after = _fitted(task, fitted)
     better = after < BETTER * chosen.before
+    if not better.any():
+        return result, division
     if not better.all():  # without the points of the others the rest is where it was
         fitted = with_corners(task, result, division, chosen, better, fitted)
     return fitted.result(task, result), fitted.division
