@@ -24,7 +24,9 @@ FREE = Limits(max_growth=100.0, ramp_end=0.5e-3)
 ALONG = np.array([100.0, 250.0, 50.0])
 
 
-def two_sides(distance: float, turn: float, second: np.ndarray = ALONG, **words: object) -> CompensationProblem:
+def two_sides(
+    distance: float, turn: float, second: np.ndarray = ALONG, **words: object
+) -> CompensationProblem:
     """Two motions under force that meet under ``turn`` [rad], approximated from ``distance`` [m] on, after one in air;
     the force goes over from ``ALONG`` to ``second`` on 5 mm."""
     corner = np.array([1.6, -0.1, 0.5])

@@ -72,9 +72,8 @@ class CornerDivision:
         shift, turn = pose_error(poses, task.wanted[rows])
         correction, turns = result.correction.copy(), np.array(result.turn)
         correction[rows], turns[rows] = shift, turn
-        return replace(
-            result, command=_overlaid(result.command, rows, poses), correction=correction, turn=turns
-        )
+        command = _overlaid(result.command, rows, poses)
+        return replace(result, command=command, correction=correction, turn=turns, rounded=rows)
 
 
 def _overlaid(base: Placed, rows: Ints, poses: Poses) -> PoseRows:

@@ -104,13 +104,16 @@ def rounded_errors(
     task: CompensationProblem, result: CorrectionResult, division: Subdivision
 ) -> tuple[Ints, Floats, Floats]:
     """Motions (K,) of a division that start or end in points of fitted corners, or on which the force changes over a
-    ramp, and by how much (K,) [m], (K,) [rad] the tool is off along them at most, as they are rounded."""
+    ramp and approximations are stated, and by how much (K,) [m], (K,) [rad] the tool is off along them at most, as they
+    are rounded."""
     on = result.corrected & task.desired_path.traceable & (task.desired_path.length > 0) & task.carries
     fitted = changing = np.empty(0, np.int64)
     if division.fits is not None:
         fitted = np.unique(np.concatenate([division.fits.point, division.fits.point + 1]))
     if task.force.ramps is not None:
-        changing = np.flatnonzero(np.isin(division.source, task.force.ramps.row))
+        row = np.unique(task.force.ramps.row)
+        stated = np.isfinite(task.toolpath.approximation)
+        changing = np.flatnonzero(np.isin(division.source, row[stated[row] & stated[row - 1]]))
         changing = np.setdiff1d(changing, fitted)
     found = []
     for motion, unknown in ((fitted, np.inf), (changing, 0.0)):
