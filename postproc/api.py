@@ -94,8 +94,8 @@ def compensate(
 
     >>> import postproc
     >>> report = postproc.compensate("samples/kr270_taught/taught.src", force=True, output="out/taught.src")
-    >>> report.exit, report.uncorrected  # 3: its corners are approximated by more than the tolerance
-    (3, 0)
+    >>> report.exit, report.uncorrected
+    (0, 0)
     >>> report.after.max < 0.02e-3 < report.before.max
     True
     >>> any(path.endswith("taught.src") for path in report.outputs)

@@ -41,7 +41,8 @@ class CorrectionResult:
     meant to be turned, NaN after the writing; before, after (N,) [m] predicted position error, NaN where
     nothing is predicted, and before_angle, after_angle (N,) [rad]; deflection (N, 3) [m] before; iterations (N,);
     history (K + 1, N) [m]; findings.  across_after (N,) [m]: the part of the error after across the feed, known after
-    the writing."""
+    the writing.  rounded (R,): rows that end in a point of a fitted corner, where the tool never is: their errors after
+    are those of the rounded path."""
 
     state: Ints
     cut: Ints
@@ -57,6 +58,7 @@ class CorrectionResult:
     history: Floats
     findings: tuple[Finding, ...]
     across_after: Floats = field(default_factory=lambda: np.empty(0))
+    rounded: Ints = field(default_factory=lambda: np.empty(0, np.int64))
 
     @property
     def scope(self) -> Bools:

@@ -148,6 +148,12 @@ def evaluate_transitions(
     source, desired_path = division.source, task.desired_path
     chosen = np.flatnonzero(result.corrected[source] & desired_path.traceable[source] & ~division.transitions)
 
+    rounded = np.zeros(
+        len(division), bool
+    )  # there the correction is one of the rounded path, and not of its points
+    if division.fits is not None:
+        rounded[division.fits.point] = rounded[division.fits.point + 1] = True
+
     def compare(part: slice) -> tuple[float, int, float, int]:
         segments = subdivided_motions(task, division, chosen[part])
         if not len(segments):
@@ -158,7 +164,8 @@ def evaluate_transitions(
         change = lengths((segments.end.position - last) - (segments.start.position - first))
         extent = (segments.last - segments.first) * desired_path.length[segments.rows]
         moves = extent > 0
-        rate = np.where(moves, change / np.where(moves, extent, 1.0), 0.0)
+        even = moves & ~rounded[chosen[part]]
+        rate = np.where(even, change / np.where(moves, extent, 1.0), 0.0)
         speed = rate * task.toolpath.feed[segments.rows]
         ahead = np.sum((segments.end.position - segments.start.position) * (last - first), axis=1)
         worst = int(np.argmax(rate))

@@ -38,6 +38,17 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class CornerFits:
+    """Approximated corners whose points were moved, so that the rounded path follows that of the original.  point (P,):
+    motions of the output that end in such points: the tool is not there; corner (P,): the motion among them at whose
+    end the corner itself is; before (P,): the error there without, in parts of the allowed one."""
+
+    point: Ints
+    corner: Ints
+    before: Floats
+
+
+@dataclass(frozen=True)
 class Subdivision:
     """M motions of the output for the N of the input, see ``Plan``.
 
@@ -45,7 +56,7 @@ class Subdivision:
     base, NaN where a target is not known; centre, normal (M, 3), sweep (M,): corrected arcs in the robot base, NaN for
     all others; moved (M,): the motion is another than in the input.  not_refined: rows that cannot be corrected after
     all, and why.  lead_ins (L,): motions in air of the input that end where the cut after them starts corrected.
-    blend (M,) [m]: of each motion as in a Toolpath, where it was written.
+    blend (M,) [m]: of each motion as in a Toolpath, where it was written.  fits: corners that were fitted.
     """
 
     source: Ints
@@ -60,6 +71,7 @@ class Subdivision:
     not_refined: Mapping[int, Finding] = field(default_factory=dict)
     lead_ins: Ints = field(default_factory=lambda: np.empty(0, np.int64))
     blend: Floats | None = None
+    fits: CornerFits | None = None
 
     def __len__(self) -> int:
         return len(self.source)

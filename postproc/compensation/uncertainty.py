@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from postproc.base.arrays import Floats, Ints
+from postproc.base.geometry import Poses, lengths
 from postproc.cell import ForceVectorInterval
 from postproc.compensation.correct import CorrectionResult
 from postproc.compensation.input_sensitivities import error_sensitivities
@@ -126,7 +127,10 @@ def evaluate_uncertainty(
     share = variance_shares(moves[0], known.covariance)
     budget = _by_name(known.entries, share)
 
-    error, moves = error_sensitivities(task, known.entries, rows, result.command[rows], corrected=True)
+    error, moves = error_sensitivities(
+        task, known.entries, rows, _commands(task, result, rows), corrected=True
+    )
+    error = _with_rounded(result, rows, error)
     moves = force.scaled(moves, known.entries, rows)
     spread = covariances(moves, known.covariance)
     size = np.linalg.norm(error, axis=1)
@@ -143,6 +147,27 @@ def evaluate_uncertainty(
         budget=budget if share.any() else (),
         unstable=int((~sound).sum()),
     )
+
+
+def _commands(task: CompensationProblem, result: CorrectionResult, rows: Ints) -> Poses:
+    """Commands (K) with which the tool comes to the ends of the motions ``rows`` (K,), or nearest to them."""
+    command = result.command[rows]
+    at = np.flatnonzero(np.isin(rows, result.rounded))
+    if len(at):
+        some = rows[at]
+        wanted = task.wanted[some]
+        command = command.copy()
+        command.put(at, task.command(some, wanted, task.wrench[some], task.goal(some, wanted)).command)
+    return command
+
+
+def _with_rounded(result: CorrectionResult, rows: Ints, error: Floats) -> Floats:
+    """``error`` (K, 3) [m] with what remains at fitted corners, in the direction in which most is uncertain."""
+    at = np.flatnonzero(np.isin(rows, result.rounded))
+    error = error.copy()
+    direction = result.deflection[rows[at]]
+    error[at] = direction * (result.after[rows[at]] / np.maximum(lengths(direction), 1e-12))[:, None]
+    return error
 
 
 def _by_name(entries: Sequence[UncertainInput], share: Floats) -> tuple[tuple[str, float], ...]:

@@ -19,7 +19,7 @@ from postproc.base.geometry import PoseRows, Poses
 from postproc.base.memory import release_free_memory
 from postproc.base.units import DEG, MM
 from postproc.cell import Cell
-from postproc.compensation.corners import Corners, compare_corners
+from postproc.compensation.corners import Corners, compare_corners, rounded_errors, with_rounded_ends
 from postproc.compensation.correct import CorrectionResult, MotionOutcome, with_residual
 from postproc.compensation.path_comparison import Transitions, along_and_across, evaluate_transitions
 from postproc.compensation.path_error import path_errors
@@ -213,6 +213,7 @@ def write(
     release_free_memory()
     there = _as_written(task, intended.division, back)
     written = _with_lead_ins(task, with_residual(task, result, there.original_command), there)
+    written = with_rounded_ends(task, written, there)
     written = replace(
         written, turn=np.broadcast_to(np.nan, written.turn.shape)
     )  # it was meant for what is written
@@ -292,6 +293,9 @@ def path_errors_as_written(
         errors[some], angles[some] = path_errors(task, segments, first, uncorrected_share, shown=True)
 
     each_block(fill_errors, len(chosen))
+    if uncorrected_share == 0.0:
+        motions, off, angle = rounded_errors(task, result, division)
+        errors[motions], angles[motions] = off, angle
     return errors, angles
 
 

@@ -31,8 +31,8 @@ def corner_findings(ready: Prepared, written: WrittenProgram) -> list[Finding]:
             )
         message += f" by {off:.4f} mm from that of the original, {limit}"
         help = (
-            "use a smaller approximation distance there, or state a longer force_ramp in the cell if"
-            " the force changes more slowly"
+            "use a smaller approximation distance there, or a smaller feed, with which points may be nearer to each"
+            " other, or state a longer force_ramp in the cell if the force changes more slowly"
         )
         line = int(ready.task.toolpath.line[corners.row[worst]])
         findings.append(Finding(code, message, ready.task.file, line, help=help))

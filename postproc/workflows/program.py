@@ -6,7 +6,7 @@ Nothing is written that was not read back from its own bytes and checked.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -19,6 +19,7 @@ from postproc.base.input_files import place
 from postproc.base.memory import release_free_memory
 from postproc.base.units import MM
 from postproc.compensation.axis_limits import check_limits
+from postproc.compensation.corner_fit import corners_not_improved, fit_corners
 from postproc.compensation.correct import MotionOutcome, correct
 from postproc.compensation.path_comparison import cuts_not_improved
 from postproc.compensation.subdivide import subdivide
@@ -107,8 +108,9 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
     stage("correcting")
     target = _target(request)
     excluded: dict[int, Finding] = {}
+    plain: set[tuple[int, float]] = set()
     while True:
-        intended = _corrected(request, ready, target.stem, excluded)
+        intended = _corrected(request, ready, target.stem, excluded, plain)
         task, edits = intended.task, intended.edits
         stage("writing, and reading back")
         ready = ready.without_text()
@@ -125,10 +127,12 @@ def compensate(request: Request, stage: Stage = silent) -> Report:
         result, division = written.result, written.division
         release_free_memory()
         worse = cuts_not_improved(task, result, division, written.path_error, written.across_before)
-        if not worse:
+        corners = corners_not_improved(task, division)
+        if not worse and not corners:
             break
         excluded |= worse
-        stage("correcting without the cuts that would be no better")
+        plain |= corners
+        stage("correcting without what would be no better")
         ready = ready.with_text()
     program = ready.program
     findings = [
@@ -232,9 +236,15 @@ def _streamed(
     return report
 
 
-def _corrected(request: Request, ready: Prepared, stem: str, worse: Mapping[int, Finding]) -> IntendedProgram:
+def _corrected(
+    request: Request,
+    ready: Prepared,
+    stem: str,
+    worse: Mapping[int, Finding],
+    plain: Collection[tuple[int, float]],
+) -> IntendedProgram:
     """The correction and its edits; what cannot be divided or written as planned stays, and the rest is computed again.
-    worse: rows whose cuts stay as they are, and why."""
+    worse: rows whose cuts stay as they are, and why; plain: corners that are not fitted."""
     task, cell = ready.task, ready.cell
     if worse:
         path = task.toolpath
@@ -256,6 +266,8 @@ def _corrected(request: Request, ready: Prepared, stem: str, worse: Mapping[int,
             )
         release_free_memory()
         division = subdivide(task, result, allowed)
+        release_free_memory()
+        result, division = fit_corners(task, result, division, allowed, plain)
         release_free_memory()
         limit_findings, beyond = check_limits(task, division)
         release_free_memory()

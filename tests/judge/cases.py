@@ -325,6 +325,14 @@ def steps_of_force() -> Callable[[Path], Path]:
     )  # fmt: skip
 
 
+def small_step_of_force() -> Callable[[Path], Path]:
+    """Straight on where the force steps a little: the program has no corner there, its correction has one."""
+    return krl(
+        f"LIN {pose(0, 0, 50)}", f"LIN {pose(0, 0, 0)}", ";FORCE -60 100 -30 @feed", f"LIN {pose(100, 0, 0)} C_DIS",
+        ";FORCE -123 212 -51 @feed", f"LIN {pose(200, 0, 0)}", OFF, f"LIN {pose(200, 0, 50)}", head=("$APO.CDIS=0.5",),
+    )  # fmt: skip
+
+
 def helix(turns: int) -> Callable[[Path], Path]:
     body = [f"G3 X40. Y0. Z{-2.0 * k - 2:.3f} I-40. J0." for k in range(turns)]
     return gcode("G21 G90 G17 G54", "T1 M6", "G0 X40. Y0. Z20.", "G1 Z0. F600", "(FORCE -150 260 -60 @FEED)", *body,
@@ -410,6 +418,7 @@ CASES: list[Case] = [
     *(Case(f"corners, C_DIS {d:g}", square("C_DIS", d)) for d in (0.5, 2.0)),
     Case("half a turn first", turn_over(180.0)),
     Case("steps of force", steps_of_force()),
+    Case("a small step of force", small_step_of_force()),
     *(Case(f"helix, {n} turns", helix(n), judged="position") for n in (1, 4)),
     Case("corners, tolerance 10, no insertions", lambda f: _loose(f), ("--no-insert",), wanted="not worse"),
     Case("panel, tolerance 10, no insertions", lambda f: _loose(f, "kr270_panel", "panel.src"), ("--no-insert",),

@@ -1,0 +1,214 @@
+"""Corners that the controller rounds off are corrected as the rounded paths that they are.
+
+Where the force changes behind a vertex the correction turns there by k [m a m], and the parabola that the controller
+makes of it passes d k / 4 beside the original's.  The points of the output there are moved so that its rounded path,
+under load, follows the rounded path of the original: the path is linear in the points, so that what is off is taken
+away by weighted least squares, the weights raised where most remains (Lawson 1961: the largest error is least), and
+evaluated again.  Where the point alone is not enough, others are inserted beside it (``corner_points``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.batches import blocks, in_blocks
+from postproc.base.geometry import Poses, lengths, product, rotation_from_vector
+from postproc.compensation.corner_division import CornerDivision, with_corners
+from postproc.compensation.corner_points import PointChooser
+from postproc.compensation.corners import compare_corners_at, evaluate_corners, find_corners
+from postproc.compensation.correct import CorrectionResult
+from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.rounded_path import Blend, RoundedOutput, approximations
+from postproc.compensation.subdivision import Limits, Subdivision
+
+ROUNDS, WEIGHINGS = 4, 24
+"""How often the path is evaluated after a fit, and the weights raised within one."""
+
+ALLOWED = 0.9
+"""Share of the tolerance that a corner may take: the path is evaluated as it is run, and digits take little."""
+
+BETTER = 0.9
+"""A fitted corner that keeps more of its error stays as it was."""
+
+RIDGE = 1e-3
+"""Share of the weights that keeps a point that hardly shows where it is."""
+
+BLOCK = 128
+"""Corners fitted together."""
+
+
+def fit_corners(
+    task: CompensationProblem,
+    result: CorrectionResult,
+    division: Subdivision,
+    limits: Limits,
+    plain: Collection[tuple[int, float]] = (),
+) -> tuple[CorrectionResult, Subdivision]:
+    """The result and the division with the points of approximated corners moved, where the path comes nearer to the
+    original's; ``plain``: rows and shares of corners that stay as they are."""
+    if task.gain != 1.0:
+        return result, division
+    motion = find_corners(task, result, division)
+    # of points inserted before exact ends it is known once they are written
+    motion = motion[~np.isnan(task.toolpath.approximation[division.source[motion]])]
+    if plain:
+        place = zip(division.source[motion].tolist(), division.share[motion].tolist(), strict=True)
+        motion = motion[np.array([one not in plain for one in place], bool)]
+    corners = compare_corners_at(task, division, motion)
+    size = _size(task, corners.difference, corners.angle)
+    bad = (size > 1.0) & np.isfinite(size)
+    if not bad.any():
+        return result, division
+    corners = corners.part(bad)
+    free = np.full(len(task.toolpath), not limits.no_insert)
+    free[list(task.toolpath.constraints.no_insert_before)] = False
+    chosen = PointChooser(task, division, limits, free, corners, size[bad]).choose()
+    fitted = with_corners(task, result, division, chosen, np.ones(len(chosen.corner), bool))
+    fitted, after = _fitted(task, fitted)
+    better = after < BETTER * chosen.before
+    if not better.any():
+        return result, division
+    if not better.all():  # without the points of the others the rest is where it was
+        fitted = with_corners(task, result, division, chosen, better, fitted)
+    return fitted.result(task, result), fitted.division
+
+
+def corners_not_improved(task: CompensationProblem, division: Subdivision) -> set[tuple[int, float]]:
+    """Rows and shares of the fitted corners that are no better as ``division`` was written, or whose approximation it
+    does not state."""
+    if division.fits is None:
+        return set()
+    point, corner, before = division.fits.point, division.fits.corner, division.fits.before
+    unknown = np.isnan(approximations(task, division, point))
+
+    def evaluated(part: slice) -> Floats:
+        return _size(task, *evaluate_corners(RoundedOutput(task, division, point[part]), point[part])[1:])
+
+    size = np.concatenate([np.empty(0), *in_blocks(evaluated, len(point), BLOCK)])
+    worse = corner[unknown | (size > before)]
+    return set(zip(division.source[worse].tolist(), division.share[worse].tolist(), strict=True))
+
+
+def _size(task: CompensationProblem, off: Floats, angle: Floats) -> Floats:
+    """(K,) errors in parts of those that are allowed."""
+    return np.asarray(np.maximum(off / task.tolerance, angle / task.tolerance_angle) / ALLOWED)
+
+
+@dataclass(frozen=True)
+class _CornerSamples:
+    """S places of the output, by ascending group (S,): at (S,), the segment; share (S,)."""
+
+    group: Ints
+    at: Ints
+    share: Floats
+
+
+def _fitted(task: CompensationProblem, fitted: CornerDivision) -> tuple[CornerDivision, Floats]:
+    """The best poses that were found for the points of each corner, and what remains (G,), in parts of the allowed
+    error."""
+    best, least = fitted.poses.copy(), np.full(len(fitted.group_start) - 1, np.inf)
+    for number in range(ROUNDS + 1):
+        steps = (np.zeros((len(fitted.motion), 3)), np.zeros((len(fitted.motion), 3)))
+        size = np.full(len(least), np.inf)
+        for part in blocks(len(least), BLOCK):
+            _evaluate(task, fitted, part, size, steps)
+        won = size < least
+        least[won] = size[won]
+        points = np.flatnonzero(won[fitted.group])
+        best.put(points, fitted.poses[points])
+        if number == ROUNDS:
+            break
+        moved = Poses(
+            product(rotation_from_vector(steps[1]), fitted.poses.rotation), fitted.poses.position + steps[0]
+        )
+        fitted = fitted.moved(task, moved)
+    return fitted.moved(task, best), least
+
+
+def _evaluate(
+    task: CompensationProblem,
+    fitted: CornerDivision,
+    part: slice,
+    size: Floats,
+    steps: tuple[Floats, Floats],
+) -> None:
+    """Puts the largest errors of the groups ``part`` into ``size`` (G,), and by how much their points should move
+    (P, 3) [m] and turn (P, 3) [rad] into ``steps``."""
+    first, last = fitted.group_start[part.start], fitted.group_start[part.stop]
+    motions = fitted.motion[first:last]
+    output = RoundedOutput(task, fitted.division, np.unique(np.concatenate([motions, motions + 1])))
+    samples = _samples(fitted, output, part)
+    found = output.deviations(samples.at, samples.share)
+    off, angle = lengths(found.shift), lengths(found.turn)
+    largest = np.zeros(part.stop - part.start)
+    np.maximum.at(largest, samples.group - part.start, _size(task, off, angle))
+    size[part] = largest
+    if not np.isfinite(largest).all():
+        return
+    weights = _weights(fitted, output, samples, part)
+    steps[0][first:last] = _least_largest(weights, found.shift, samples, fitted, part)
+    if task.turn_freely(fitted.row[first:last]):
+        steps[1][first:last] = _least_largest(weights, found.turn, samples, fitted, part)
+
+
+def _samples(fitted: CornerDivision, output: RoundedOutput, part: slice) -> _CornerSamples:
+    """Of the groups ``part``: along all segments beside their points."""
+    low, high = (fitted.group_start[part.start : part.stop + 1][k:] for k in (0, 1))
+    start, stop = fitted.motion[low[: len(high)]], fitted.motion[high - 1] + 1
+    count = stop - start + 1
+    group = np.repeat(np.arange(part.start, part.stop), count)
+    number = np.arange(len(group)) - np.repeat(np.cumsum(count) - count, count)
+    at = output.place(start[group - part.start] + number)
+    share = output.samples(at)
+    many = share.shape[1]
+    return _CornerSamples(np.repeat(group, many), np.repeat(at, many), share.ravel())
+
+
+def _weights(fitted: CornerDivision, output: RoundedOutput, samples: _CornerSamples, part: slice) -> Floats:
+    """(S, W) by how much each of the points of its group moves a sample; W: points of the largest group."""
+    blend: Blend = output.blend(samples.at, samples.share)
+    t, a, b = blend.t, blend.before, blend.after
+    parts = ((-1, (1.0 - t) * (1.0 - a)), (0, (1.0 - t) * a + t * (1.0 - b)), (1, t * b))
+    size = np.diff(fitted.group_start[part.start : part.stop + 1])
+    points = np.arange(size.max())
+    first = fitted.group_start[samples.group]
+    inside = points < size[samples.group - part.start][:, None]
+    index = np.minimum(first[:, None] + points, len(fitted.motion) - 1)
+    own = np.where(inside, fitted.motion[index], -1)
+    motion = output.motions[blend.first]
+    weights = np.zeros(own.shape)
+    for side, value in parts:
+        weights += np.where(own == (motion + side)[:, None], value[:, None], 0.0)
+    return weights
+
+
+def _least_largest(
+    weights: Floats, error: Floats, samples: _CornerSamples, fitted: CornerDivision, part: slice
+) -> Floats:
+    """(P, 3) steps of the points of the groups ``part`` with which the largest of ``error`` (S, 3) + ``weights`` (S, W)
+    steps is least in each."""
+    groups, width = part.stop - part.start, weights.shape[1]
+    edges = np.searchsorted(samples.group, np.arange(part.start, part.stop))
+    group = samples.group - part.start
+    given = np.ones(len(group))
+    best, least = np.zeros((groups, width, 3)), np.full(groups, np.inf)
+    for _ in range(WEIGHINGS):
+        heavy = weights * given[:, None]
+        matrix = np.add.reduceat(heavy[:, :, None] * weights[:, None, :], edges, axis=0)
+        side = np.add.reduceat(heavy[:, :, None] * error[:, None, :], edges, axis=0)
+        ridge = RIDGE * np.maximum(np.trace(matrix, axis1=1, axis2=2) / width, 1e-12)
+        matrix += ridge[:, None, None] * np.eye(width)
+        step = -np.linalg.solve(matrix, side)
+        remains = lengths(error + np.einsum("sw,swk->sk", weights, step[group]))
+        largest = np.maximum(np.maximum.reduceat(remains, edges), 1e-12)
+        won = largest < least
+        best[won], least[won] = step[won], largest[won]
+        given = given * (remains / largest[group])
+        given = np.maximum(given / np.maximum.reduceat(given, edges)[group], 1e-6)
+    size = np.diff(fitted.group_start[part.start : part.stop + 1])
+    inside: Bools = np.arange(width) < size[:, None]
+    return np.asarray(best[inside])

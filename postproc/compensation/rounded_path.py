@@ -1,0 +1,274 @@
+"""The path of approximated motions: of the program, and of its output under load.
+
+An approximated motion leaves its line the distance d before its end point and joins the next one d after it (d: the
+approximation, no more than half of either motion), on a parabola: at its parameter t it is at (1 - t) a + t b, with a
+the place d (1 - t) before the end point on the one motion, b the place d t after it on the other.  Of straight motions
+that is the quadratic Bezier curve with the end point as its control point.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from postproc.base.arrays import Floats, Ints
+from postproc.base.geometry import Poses, lengths
+from postproc.compensation.desired_path import interpolate_poses
+from postproc.compensation.path_error import PathSegments
+from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.subdivision import Subdivision, subdivided_motions
+from postproc.toolpath import Role
+
+ROUNDS, SETTLED = 6, 2e-8
+"""Steps in which the place of the path that the tool is nearest to is looked for; [m] a smaller one is none."""
+
+FLATTEST = 0.05
+"""The tool goes along the path by this share at least of what its place under load does."""
+
+AT_ENDS, BETWEEN = np.linspace(0.0, 1.0, 9), np.linspace(0.0, 1.0, 9)
+"""Where a motion is evaluated: shares of the reach of the parabolas at its ends, and of its length."""
+
+CLOSER, AROUND = 2, np.linspace(-1.0, 1.0, 7)
+"""How often, and where, it is evaluated closer to its largest error."""
+
+NEAREST = 1e-12
+"""[m] The extent of a motion that leads nowhere."""
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """S places of the output under load.  row (S,), share (S,): of the original's path, to which the tool is nearest;
+    shift (S, 3) [m]: of the tool from there, across the path; turn (S, 3) [rad]: against the orientation there."""
+
+    row: Ints
+    share: Floats
+    shift: Floats
+    turn: Floats
+
+
+@dataclass(frozen=True)
+class Blend:
+    """Of S places on motions: on the parabola between the places ``before`` on the motions ``first`` (S,) and ``after``
+    on the motions that follow them, at the parameters ``t`` (S,); those that are on no parabola have t = 0, and the
+    place ``before`` is theirs."""
+
+    first: Ints
+    before: Floats
+    after: Floats
+    t: Floats
+
+
+def extents(segments: PathSegments) -> Floats:
+    """(K,) [m] how long they are."""
+    step = segments.end.position - segments.start.position
+    length = lengths(step)
+    arc = np.flatnonzero(np.isfinite(segments.sweep))
+    rise = np.sum(step[arc] * segments.normal[arc], axis=1)
+    length[arc] = np.hypot(
+        segments.sweep[arc] * lengths(segments.start.position[arc] - segments.centre[arc]), rise
+    )
+    return np.maximum(length, NEAREST)
+
+
+def approximations(task: CompensationProblem, division: Subdivision, motions: Ints) -> Floats:
+    """(K,) [m] from where on the ends of ``motions`` (K,) of a division are approximated, NaN where it is not known:
+    as they are written, or before that as inserted motions will be."""
+    if division.blend is not None:
+        return np.asarray(division.blend[motions])
+    source, path = division.source[motions], task.toolpath
+    blend = path.approximation[source].copy()
+    exact = (division.role[motions] == Role.INTERMEDIATE) & (blend == 0)
+    if not path.constraints.exact_stays:
+        blend[exact] = path.constraints.inserted_approximation[source[exact]]
+    return np.where(division.role[motions] == Role.TRANSITION, np.nan, blend)
+
+
+class RoundedOutput:
+    """A part of a division, with its parabolas: ``motions`` (K,) and those beside them.  ``unknown`` [m]: what an
+    approximation is taken for that nothing states."""
+
+    def __init__(
+        self, task: CompensationProblem, division: Subdivision, motions: Ints, unknown: float = np.inf
+    ) -> None:
+        self.task, self.division, self.unknown = task, division, unknown
+        near = np.unique(np.clip(motions[:, None] + np.arange(-1, 3), 0, len(division) - 1))
+        self.motions = near[task.desired_path.traceable[division.source[near]]]
+        self.segments = subdivided_motions(task, division, self.motions)
+        self.extent = extents(self.segments)
+        self.reach = self._reaches()
+
+    def _reaches(self) -> Floats:
+        """(L,) [m] of the parabola at the end of each; 0 without one."""
+        reach = np.zeros(len(self.motions))
+        next_here = np.flatnonzero(np.diff(self.motions) == 1)
+        source = self.division.source[self.motions]
+        path = self.task.toolpath
+        goes_on = path.continues[source[next_here + 1]] | (source[next_here + 1] == source[next_here])
+        at = next_here[goes_on & (path.tool[source[next_here]] == path.tool[source[next_here + 1]])]
+        blend = np.nan_to_num(approximations(self.task, self.division, self.motions[at]), nan=self.unknown)
+        reach[at] = np.fmin(blend, 0.5 * np.minimum(self.extent[at], self.extent[at + 1]))
+        return reach
+
+    def place(self, motions: Ints) -> Ints:
+        """(K,) where ``motions`` (K,) are in this part.  Raises ValueError where one is not."""
+        at = np.minimum(np.searchsorted(self.motions, motions), len(self.motions) - 1)
+        if not np.array_equal(self.motions[at], motions):
+            raise ValueError("a motion is not in this part")
+        return at
+
+    def samples(self, at: Ints) -> Floats:
+        """(K, S) shares of the segments ``at`` (K,) at which they are evaluated, parabolas included."""
+        extent, reach = self.extent[at, None], self.reach[at, None]
+        before = np.where(at > 0, self.reach[np.maximum(at - 1, 0)], 0.0)[:, None]
+        between = np.broadcast_to(BETWEEN, (len(at), len(BETWEEN)))
+        return np.concatenate([AT_ENDS * before / extent, 1.0 - AT_ENDS * reach / extent, between], axis=1)
+
+    def largest(self, motions: Ints) -> tuple[Floats, Floats]:
+        """(K,) [m] and (K,) [rad]: by how much the tool under load is off along ``motions`` (K,), from the middle of
+        the parabola at their start to that at their end."""
+        at = self.place(motions)
+        share = self.samples(at)
+        return self.peaks(np.broadcast_to(at[:, None], share.shape), share, 0.5 / (len(BETWEEN) - 1))
+
+    def peaks(self, at: Ints, share: Floats, step: Floats | float) -> tuple[Floats, Floats]:
+        """(K,) [m] and (K,) [rad]: by how much the tool is off at most at the shares (K, S) of the segments ``at``
+        (K, S), and nearer and nearer around the largest: it is steep where the force changes fast."""
+        off, angle = np.zeros(len(at)), np.zeros(len(at))
+        for _ in range(CLOSER + 1):
+            found = self.deviations(at.ravel(), share.ravel())
+            here, turned = (lengths(part).reshape(share.shape) for part in (found.shift, found.turn))
+            off, angle = np.maximum(off, here.max(axis=1)), np.maximum(angle, turned.max(axis=1))
+            peak = here.argmax(axis=1)[:, None]
+            at = np.broadcast_to(np.take_along_axis(at, peak, 1), (len(at), len(AROUND)))
+            share = np.clip(np.take_along_axis(share, peak, 1) + step * AROUND, 0.0, 1.0)
+            step = step * (AROUND[1] - AROUND[0])
+        return off, angle
+
+    def blend(self, at: Ints, share: Floats) -> Blend:
+        """Where the shares (S,) of the segments ``at`` (S,) lie on parabolas."""
+        first, before, after, t = at.copy(), share.copy(), np.zeros(len(at)), np.zeros(len(at))
+        joined = (at > 0) & (self.motions[at] == self.motions[np.maximum(at - 1, 0)] + 1)
+        for side in (0, 1):
+            one = at - 1 + side if side else np.maximum(at - 1, 0)
+            reach = self.reach[one]
+            inside = (1.0 - share if side else share) * self.extent[at]
+            some = np.flatnonzero((inside < reach) & (reach > 0) & (joined | bool(side)))
+            k, r = one[some], reach[some]
+            u = 0.5 + (0.5 if not side else -0.5) * inside[some] / r
+            first[some], t[some] = k, u
+            before[some] = 1.0 - r * (1.0 - u) / self.extent[k]
+            after[some] = r * u / self.extent[k + 1]
+        return Blend(first, before, after, t)
+
+    def commands(self, blend: Blend) -> Poses:
+        """(S) the poses to which the controller is sent."""
+        poses = self.segments[blend.first].commands(self.task, blend.before)
+        round_ = np.flatnonzero(blend.t > 0)
+        if len(round_):
+            other = self.segments[blend.first[round_] + 1].commands(self.task, blend.after[round_])
+            poses.put(round_, interpolate_poses(poses[round_], other, blend.t[round_]))
+        return poses
+
+    def deviations(self, at: Ints, share: Floats) -> Deviations:
+        """Of the tool under load at the shares (S,) of the segments ``at`` (S,), parabolas included."""
+        command = self.commands(self.blend(at, share))
+        segments = self.segments[at]
+        return deviations(self.task, command, segments.rows, segments.along(share))
+
+
+def original_blend(task: CompensationProblem, row: Ints, share: Floats) -> tuple[Ints, Floats, Floats]:
+    """Vertices (S,), the rows at whose end they are, and where (S,) on their parabola, -1 to 1, the shares (S,) of the
+    paths of rows (S,) lie (outside of it: farther); the reach (S,) [m] of the parabola."""
+    vertex = np.where(share < 0.5, row - 1, row)
+    reach = original_reach(task, vertex)
+    length = task.desired_path.length[row]
+    away = np.where(share < 0.5, share, share - 1.0) * length
+    return vertex, np.where(reach > 0, away / np.where(reach > 0, reach, 1.0), np.inf), reach
+
+
+def original_reach(task: CompensationProblem, row: Ints) -> Floats:
+    """(S,) [m] of the parabola at the end of the rows (S,) of the program; 0 without one."""
+    desired_path, path = task.desired_path, task.toolpath
+    one = np.clip(row, 0, max(len(path) - 2, 0))
+    two = np.minimum(one + 1, len(path) - 1)
+    goes_on = (row == one) & (two > one) & desired_path.traceable[one] & desired_path.traceable[two]
+    goes_on &= path.continues[two] & (path.tool[one] == path.tool[two])
+    half = 0.5 * np.minimum(desired_path.length[one], desired_path.length[two])
+    return np.where(goes_on, np.fmin(path.approximation[one], half), 0.0)
+
+
+def original(task: CompensationProblem, row: Ints, share: Floats) -> tuple[Poses, Floats]:
+    """The poses (S) of the program's path at the shares (S,) of rows (S,), parabolas included, and unit tangents
+    (S, 3)."""
+    desired_path = task.desired_path
+    poses, tangent = desired_path.at(row, share), desired_path.tangent(row, share)
+    vertex, away, reach = original_blend(task, row, share)
+    some = np.flatnonzero(np.abs(away) < 1.0)
+    if len(some):
+        one, d = vertex[some], reach[some]
+        t = 0.5 + 0.5 * away[some]
+        a = 1.0 - d * (1.0 - t) / desired_path.length[one]
+        b = d * t / desired_path.length[one + 1]
+        before, after = desired_path.at(one, a), desired_path.at(one + 1, b)
+        poses.put(some, interpolate_poses(before, after, t))
+        along = (1.0 - t)[:, None] * desired_path.tangent(one, a) + t[:, None] * desired_path.tangent(
+            one + 1, b
+        )
+        along = along * d[:, None] + after.position - before.position
+        tangent[some] = along / np.maximum(lengths(along), NEAREST)[:, None]
+    return poses, tangent
+
+
+def _moved(task: CompensationProblem, row: Ints, share: Floats, step: Floats) -> tuple[Ints, Floats]:
+    """The places (S,) that lie by ``step`` (S,) [m] farther along the program's path than row (S,), share (S,); no
+    farther than the motions before and after them, of the same cut."""
+    desired_path, path = task.desired_path, task.toolpath
+    length = np.maximum(desired_path.length, NEAREST)
+    share = share + step / length[row]
+    for side in (1, -1):
+        other = np.clip(row + side, 0, len(path) - 1)
+        over = (share > 1.0) if side > 0 else (share < 0.0)
+        later = other if side > 0 else row
+        can = over & (other != row) & desired_path.traceable[other] & path.continues[later]
+        can &= task.carries[other] & (path.tool[other] == path.tool[row])
+        beyond = ((share - 1.0) if side > 0 else -share) * length[row] / length[other]
+        share = np.where(can, beyond if side > 0 else 1.0 - beyond, share)
+        row = np.where(can, other, row)
+    return row, np.clip(share, 0.0, 1.0)
+
+
+def deviations(task: CompensationProblem, command: Poses, row: Ints, share: Floats) -> Deviations:
+    """How the tools at ``command`` (S) under load deviate from the program's path, parabolas included.
+
+    The force belongs to the place of the path that the tool is nearest to, where the path is square to the way to it;
+    it is found by secants along the path, from row (S,) and share (S,) on.
+    """
+    n = len(row)
+    row, share = row.copy(), np.asarray(share, float).copy()
+    found = Deviations(row, share, np.full((n, 3), np.inf), np.full((n, 3), np.inf))
+    last, moved = np.full(n, np.nan), np.full(n, np.nan)
+    active = np.arange(n)
+    for _ in range(ROUNDS):
+        at, where = row[active], share[active]
+        wanted, tangent = original(task, at, where)
+        goal = task.goal(at, wanted, where)
+        here = command if len(active) == n else command[active]
+        real = task.simulated(at, here, task.force.along(at, where), share=where, corrected=True)
+        shift, turn = task.visible_errors(at, real.pose, goal)
+        gap = np.sum(shift * tangent, axis=1)
+        good = real.reachable & real.settled
+        shift = shift - gap[:, None] * tangent
+        found.shift[active] = np.where(good[:, None], shift, np.inf)
+        found.turn[active] = np.where(good[:, None], turn, np.inf)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            slope = (last[active] - gap) / moved[active]
+        slope = np.where(np.isfinite(slope), np.clip(slope, FLATTEST, 1.0 / FLATTEST), 1.0)
+        step = gap / slope
+        going = good & (np.abs(step) > SETTLED)
+        if not going.any():
+            break
+        last[active], moved[active] = gap, step
+        active = active[going]
+        row[active], share[active] = _moved(task, row[active], share[active], step[going])
+    return found

@@ -1,0 +1,198 @@
+"""Approximated corners: fitted, left as they were where that is no better, and never silent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from path_cases import task
+from scipy.spatial.transform import Rotation
+
+from postproc.base.geometry import Poses
+from postproc.compensation.corner_fit import corners_not_improved, fit_corners
+from postproc.compensation.corners import compare_corners, rounded_errors
+from postproc.compensation.correct import correct
+from postproc.compensation.path_comparison import evaluate_transitions
+from postproc.compensation.problem import CompensationProblem
+from postproc.compensation.ramped_forces import add_force_ramps
+from postproc.compensation.subdivide import subdivide
+from postproc.compensation.subdivision import Limits, Subdivision
+from postproc.toolpath import EditConstraints, Kind, Role
+
+FREE = Limits(max_growth=100.0, ramp_end=0.5e-3)
+ALONG = np.array([100.0, 250.0, 50.0])
+
+
+def two_sides(
+    distance: float, turn: float, second: np.ndarray = ALONG, **words: object
+) -> CompensationProblem:
+    """Two motions under force that meet under ``turn`` [rad], approximated from ``distance`` [m] on, after one in air;
+    the force goes over from ``ALONG`` to ``second`` on 5 mm."""
+    corner = np.array([1.6, -0.1, 0.5])
+    points = [
+        corner - [0.1, 0.0, -0.05],
+        corner - [0.1, 0.0, 0.0],
+        corner,
+        corner + 0.1 * np.array([np.cos(turn), np.sin(turn), 0.0]),
+    ]
+    wrench = np.zeros((4, 6))
+    wrench[2, :3], wrench[3, :3] = ALONG, second
+    job = task(
+        points,
+        [False, False, True, True],
+        wrench=wrench,
+        kind=[Kind.PTP, Kind.LIN, Kind.LIN, Kind.LIN],
+        approximation=np.array([0.0, 0.0, distance, distance]),
+        **words,
+    )
+    stepped = replace(job, force=replace(job.force, steps=np.array([False, False, True, True])))
+    return add_force_ramps(stepped, 5e-3)
+
+
+def square(distance: float, **words: object) -> CompensationProblem:
+    turned = Rotation.from_rotvec([0.0, 0.0, np.pi / 2]).apply(ALONG)
+    return two_sides(distance, np.pi / 2, turned, **words)
+
+
+def worst(job: CompensationProblem, result: object, division: Subdivision) -> float:
+    return float(compare_corners(job, result, division).difference.max())  # type: ignore[arg-type]
+
+
+def nearest(job: CompensationProblem, division: Subdivision, distance: float, turn: float) -> float:
+    """[m] Largest distance of the deflected tool from the rounded original around the corner, by brute force: both
+    curves drawn point by point, the force of the place looked for among all of them."""
+    commands = division.command[np.arange(len(division))].position
+    rotation = division.command[np.arange(len(division))].rotation
+
+    def drawn(points: np.ndarray, count: int) -> np.ndarray:
+        """Lines and parabolas through the control points (K, 3), each rounded from ``distance`` on."""
+        length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        reach = np.minimum(distance, 0.5 * np.minimum(length[:-1], length[1:]))
+        t = np.linspace(0, 1, count)[:, None]
+        ways = []
+        for k, d in enumerate(reach):
+            p, q, r = points[k : k + 3]
+            a, b = q - d * (q - p) / length[k], q + d * (r - q) / length[k + 1]
+            ways.append((1 - t) ** 2 * a + 2 * t * (1 - t) * q + t**2 * b)
+        return np.concatenate(ways)
+
+    corner, side = job.wanted[2].position, np.array([np.cos(turn), np.sin(turn), 0.0])
+    s = np.linspace(-12e-3, 12e-3, 12001)
+    before, after = s[:, None] * [1.0, 0.0, 0.0], s[:, None] * side
+    u = ((s + distance) / (2 * distance))[:, None]
+    curve = (1 - u) ** 2 * [-distance, 0, 0] + u**2 * distance * side
+    place = corner + np.where(s[:, None] <= -distance, before, np.where(s[:, None] >= distance, after, curve))
+
+    source = division.source
+    path = drawn(commands[source >= 1], 41)
+    path = path[np.linalg.norm(path - corner, axis=1) < 8e-3]
+    row = np.where(s < 0, 2, 3)
+    share = np.where(s < 0, 1.0 + s / 0.1, s / 0.1)
+    # the deflection hardly depends on where exactly the command is: where it nearly cancels itself
+    turned = rotation[np.flatnonzero(source == 2)[-1]]
+    some = np.arange(0, len(s), 100)
+    at, moved = place[some], np.zeros((len(some), 3))
+    for _ in range(2):
+        pose = Poses(np.tile(turned, (len(some), 1, 1)), at - moved)
+        wrench = job.force.along(row[some], share[some])
+        moved = job.simulated(row[some], pose, wrench, share=share[some]).pose.position - pose.position
+    shift = np.stack([np.interp(s, s[some], moved[:, k]) for k in range(3)], axis=1)
+    # the place that the tool is nearest to, under the force of that place
+    largest = 0.0
+    for one in path:
+        away = one + shift - place
+        tangent = np.gradient(place, axis=0)
+        gap = (away * tangent).sum(axis=1)
+        at = np.flatnonzero((gap[:-1] > 0) & (gap[1:] <= 0))
+        if len(at):
+            largest = max(largest, float(np.linalg.norm(away[at], axis=1).min()))
+    return largest
+
+
+@pytest.mark.parametrize(("distance", "most"), [(0.5e-3, 0.5), (2e-3, 0.2)])
+def test_a_fitted_corner_follows_the_original(distance: float, most: float) -> None:
+    job = square(distance)
+    result = correct(job)
+    plain = subdivide(job, result, FREE)
+    fitted, division = fit_corners(job, result, plain, FREE)
+    before, after = worst(job, result, plain), worst(job, fitted, division)
+    assert before > job.tolerance
+    assert after < min(most * before, job.tolerance)
+    # by brute force: the same figures
+    assert nearest(job, plain, distance, np.pi / 2) == pytest.approx(before, rel=0.05, abs=1e-6)
+    most_after = max(after, float(rounded_errors(job, fitted, division)[1].max()))
+    assert nearest(job, division, distance, np.pi / 2) == pytest.approx(most_after, rel=0.05, abs=1e-6)
+    moves = evaluate_transitions(job, fitted, division)
+    assert (moves.stops, moves.backwards) == (0, 0)
+    steps = np.diff(division.share + division.source)
+    assert (steps > 0).all()
+
+
+def test_straight_on_where_the_force_steps_there_is_a_corner() -> None:
+    """The program does not turn; its correction does."""
+    job = two_sides(0.5e-3, 0.0, 1.5 * ALONG)
+    result = correct(job)
+    plain = subdivide(job, result, FREE)
+    found = compare_corners(job, result, plain)
+    assert 2 in found.row.tolist()
+    assert found.difference[found.row == 2].max() > job.tolerance
+    assert nearest(job, plain, 0.5e-3, 0.0) == pytest.approx(found.difference.max(), rel=0.05)
+    assert worst(job, *fit_corners(job, result, plain, FREE)) < job.tolerance
+
+
+def test_what_is_inserted_keeps_the_shortest_length() -> None:
+    job = square(2e-3)
+    limits = replace(FREE, ramp_end=0.8e-3)
+    result = correct(job)
+    _, division = fit_corners(job, result, subdivide(job, result, limits), limits)
+    inner = np.flatnonzero(division.role == Role.INTERMEDIATE)
+    length = job.desired_path.length[division.source] * division.share
+    same = inner[1:][np.diff(division.source[inner]) == 0]
+    assert len(same)
+    assert (length[same] - length[same - 1]).min() > 0.799e-3
+
+
+def test_without_insertions_no_corner_is_worse() -> None:
+    job = square(0.5e-3)
+    limits = Limits(no_insert=True)
+    result = correct(job)
+    plain = subdivide(job, result, limits)
+    fitted, division = fit_corners(job, result, plain, limits)
+    assert len(division) == len(plain)
+    assert worst(job, fitted, division) <= worst(job, result, plain)
+    locked = replace(
+        job, toolpath=replace(job.toolpath, constraints=EditConstraints(no_insert_before={2: "", 3: ""}))
+    )
+    assert len(fit_corners(locked, result, plain, FREE)[1]) == len(plain)
+
+
+@pytest.mark.parametrize("why", ["gain", "plain", "unknown", "good"])
+def test_a_corner_stays_as_it_was(why: str) -> None:
+    job = square(0.5e-3)
+    if why == "gain":
+        job = replace(job, gain=0.5)
+    elif why == "unknown":
+        job = replace(job, toolpath=replace(job.toolpath, approximation=np.full(4, np.nan)))
+    elif why == "good":
+        job = replace(job, tolerance=1e-3)
+    result = correct(job)
+    plain = subdivide(job, result, FREE)
+    known = {(int(plain.source[m]), float(plain.share[m])) for m in range(len(plain))}
+    fitted, division = fit_corners(job, result, plain, FREE, known if why == "plain" else ())
+    assert division is plain
+    assert fitted is result
+
+
+def test_a_corner_that_is_written_otherwise_is_known() -> None:
+    job = square(0.5e-3)
+    result = correct(job)
+    fitted, division = fit_corners(job, result, subdivide(job, result, FREE), FREE)
+    del fitted
+    blend = np.full(len(division), 0.5e-3)
+    assert not corners_not_improved(job, replace(division, blend=blend))
+    point = division.fits.point  # type: ignore[union-attr]
+    command = division.command[np.arange(len(division))].copy()
+    command.position[point] += [0.0, 0.0, 0.3e-3]
+    assert corners_not_improved(job, replace(division, blend=blend, command=command))
+    assert (2, 1.0) in corners_not_improved(job, replace(division, blend=np.full(len(division), np.nan)))
