@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from postproc.base.arrays import Bools, Floats, Ints
 from postproc.learning.candidates import FACTORS, Circumstances, MissingEffect, candidates
-from postproc.learning.causes import Cause, CausePrediction
+from postproc.learning.causes import Cause, CauseKind, CausePrediction
 from postproc.learning.covariance import Explanation, Layout, SmoothField, choose_surface
 
 ROUNDS = 4
@@ -47,7 +48,8 @@ class Attribution:
 
     prediction: of all points with the causes; deviation (K,) [m]; kept (K,): no outlier; x (P,): the causes in their
     own units, logarithms of shares; covariance (P, P); explained: of the kept points at x; named: effects that joined;
-    rivals: effects that did not, the likeliest first; verdict; standardised (K,): residuals of left-out points.
+    rivals: effects that did not, the likeliest first; verdict; standardised
+    (K,): residuals of left-out points; gain: share of what was learnt that is applied.
     """
 
     prediction: CausePrediction
@@ -62,6 +64,7 @@ class Attribution:
     rivals: tuple[Likelier, ...]
     verdict: str
     standardised: Floats
+    gain: float = 1.0
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -85,13 +88,22 @@ class Attribution:
         """(K,) [m] what the causes explain of each point, corrections of the program included."""
         return self.prediction.errors(self.x)
 
+    @cached_property
+    def by_learning(self) -> Floats:
+        """(K,) [m] what the causes explain beyond what was known of them before."""
+        return self.by_causes - self.prediction.errors(0 * self.x)
+
+    def damped(self, gain: float) -> Attribution:
+        """With ``gain`` of what was learnt: causes and smooth displacement."""
+        return replace(self, x=gain * self.x, gain=gain)
+
     def field_at(self, place: Floats) -> Floats:
         """(J, 3) [m] the smooth displacement at places (J, 3) [m] that no cause explains."""
         if self.surface.size == 0.0:
             return np.zeros((len(place), 3))
         own = self.explained.layout
         return self.explained.layout.fields_at(self.surface, place) @ (
-            own.normal * self.explained.alpha[:, None]
+            self.gain * own.normal * self.explained.alpha[:, None]
         )
 
     @cached_property
@@ -291,7 +303,7 @@ def _gains(explained: Explanation, offered: Sequence[MissingEffect], rows: Ints)
         columns = candidate.columns[rows]
         for factor in FACTORS:
             for start in (explained, bare):
-                gain = start.with_columns(factor * columns).evidence
+                gain = _evidence(start.with_columns(factor * columns), candidate)
                 if gain > best:
                     best, chosen = gain, factor
         gains.append((best, chosen))
@@ -299,8 +311,20 @@ def _gains(explained: Explanation, offered: Sequence[MissingEffect], rows: Ints)
         top = sorted(range(len(gains)), key=lambda i: -gains[i][0])[:3]
         for i in top:
             full = choose_surface(explained.with_columns(gains[i][1] * offered[i].columns[rows]))
-            gains[i] = (max(gains[i][0], full.evidence), gains[i][1])
+            gains[i] = (max(gains[i][0], _evidence(full, offered[i])), gains[i][1])
     return [(gain - explained.evidence, factor) for gain, factor in gains]
+
+
+def _evidence(explained: Explanation, candidate: MissingEffect) -> float:
+    """Of an explanation whose last causes are those of a candidate.  A parameter that has no negative values has half
+    of the normal distribution before and its share above null after: ln p + sum ln(2 Phi(mean / deviation))."""
+    evidence = explained.evidence
+    bounded = [i for i, c in enumerate(candidate.causes, -len(candidate.causes)) if c.kind is CauseKind.VALUE]
+    if bounded:
+        mean, covariance = explained.causes()
+        ratio = mean[bounded] / np.sqrt(np.maximum(np.diag(covariance)[bounded], 1e-12))
+        evidence += float(np.sum(np.log(2.0) + log_ndtr(ratio)))
+    return evidence
 
 
 def _ranked(gains: Sequence[tuple[float, float]]) -> list[tuple[int, tuple[float, float]]]:
