@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Out, ending, insertion_options, program_options
+from postproc.cli.common import Out, ending, insertion_options, page_option, program_options
 from postproc.cli.decimal_option import Decimal
 
 
@@ -60,6 +60,7 @@ from postproc.cli.decimal_option import Decimal
     callback=ending(".csv"),
     help="Measured, explained and remaining deviation of every point, one row each.",
 )
+@page_option
 @click.option(
     "--plan",
     "plan_points",
@@ -86,6 +87,7 @@ def learn(
     known_force: float | None,
     push: Path | None,
     csv_to: Path | None,
+    page: Path | None,
     plan_points: int | None,
     dry_run: bool,
     strict: bool,
@@ -107,7 +109,7 @@ def learn(
       compensate learn panel.src part2.csv            (and the parts of the runs before)
       compensate learn panel.src part1.csv part2.csv --new-history -o next
       compensate learn panel.src points.csv --plan 30 --csv measure.csv
-      compensate learn panel.src part1.csv --known-force 0.1 --csv part1.points.csv
+      compensate learn panel.src part1.csv --known-force 0.1 --page part1.html
 
     Exit codes: 0 done; 3 done, and something needs review; 1 failed, nothing written; 2 wrong command line.
     """
@@ -137,13 +139,16 @@ def learn(
         history=history,
         new_history=new_history,
         csv=csv_to,
+        page=page,
         json=out.json_file,
         strict=strict,
         dry_run=dry_run,
     )
     if plan_points is not None:
-        if json_to is not None or dry_run or output is not None:
-            raise click.UsageError("--plan writes --csv only, and excludes --json, --output and --dry-run")
+        if json_to is not None or dry_run or output is not None or page is not None:
+            raise click.UsageError(
+                "--plan writes --csv only, and excludes --json, --output, --page and --dry-run"
+            )
         from postproc.workflows.learn_plan import plan
 
         with out.refusals(str(program)), out.stages() as stage:

@@ -286,6 +286,16 @@ def _published(
     files[own] = json_bytes(learned)
     if request.csv is not None:
         files[request.csv] = learned_csv(learned)
+    if request.page is not None:
+        from postproc.workflows.learn_page import page_of
+
+        links = {
+            "next program": None if learned.next_program is None else following,
+            "robot file": robot_path if robot_path in files else None,
+            "points (CSV)": request.csv,
+            "result (JSON)": own,
+        }
+        files[request.page] = page_of(learned, job, matched, request.page, links)
     if request.json is not None:
         files[request.json] = json_bytes(learned)
     kept = keep_program(following) if learned.next_program is not None else None
