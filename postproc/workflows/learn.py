@@ -28,6 +28,7 @@ from postproc.process import Wrenches
 from postproc.report.learned import Learned, LearnedPart, learned_csv
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.robot.description import robot_of
+from postproc.workflows.learn_corners import corner_error
 from postproc.workflows.learn_history import Remembered, keep_program, record_path, record_step, remember
 from postproc.workflows.learn_points import CutProgram, Matched, cutting_file, match, read_job
 from postproc.workflows.learn_robot import force_factor_lines, learned_robot_file
@@ -221,17 +222,12 @@ def _learned_inputs(job: CutProgram, matched: Matched, result: Attribution) -> L
     base = task.base[np.arange(len(task.toolpath))].rotation
 
     def forces(stated: Wrenches) -> Wrenches:
-        return factors.acting(stated, job.operations, base, job.corners.of_motions(job.radius))
+        return factors.acting(stated, job.operations, base)
 
-    error = learned_error(
-        result,
-        task.desired_path,
-        job.spindle,
-        job.tool,
-        job.operations,
-        (matched.centre, matched.axes),
-        job.time,
-    )
+    rigid = matched.centre, matched.axes
+    corners = corner_error(job, result, forces(task.force))
+    path = task.desired_path
+    error = learned_error(result, path, job.spindle, job.tool, job.operations, rigid, job.time, corners)
     return LearnedInputs(forces, error)
 
 
