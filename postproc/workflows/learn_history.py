@@ -112,7 +112,9 @@ def _refuse_foreign(history: PartHistory, now: PartHistory, path: Path) -> None:
     if changed or history.force != now.force:
         what = ", ".join(sorted(changed)) if changed else "--force"
         verb = "has" if len(changed) < 2 else "have"
-        message = f"{what} {verb} changed since the earlier parts were learnt from, so their causes are no longer valid"
+        message = (
+            f"{what} {verb} changed since the earlier parts were learnt from: their causes would be wrong"
+        )
         raise _refused(path, message, f"undo the change until the parts are done, or {ANEW}")
 
 

@@ -96,7 +96,9 @@ def read_job(request: Request) -> CutProgram:
     task, cell, path = ready.task, ready.cell, ready.task.toolpath
     program = str(request.program)
     if task.external is not None:
-        message = "external axes move in this program; learning knows the arm only"
+        message = (
+            "external axes carry the robot or the part, and the causes of their errors are not known here"
+        )
         raise Refusal(
             Finding("LRN011", message, program, help="measure a part that is cut with the arm alone")
         )
