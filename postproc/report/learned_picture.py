@@ -76,7 +76,9 @@ def _draw(learned: Learned, shape: PartShape) -> Figure:
         axes.set_title(f"{name}: {rms:.4f} mm RMS", fontsize=10)
         axes.set_aspect("equal")
         axes.set_axis_off()
-    figure.colorbar(drawn, ax=panels.tolist(), label="material left (+) or missing (-), mm", shrink=0.6)
+    figure.colorbar(
+        drawn, ax=panels.tolist(), label="deviation, mm: + more material than nominal, - less", shrink=0.6
+    )
     handles = (
         [Line2D([], [], marker="x", color="black", linestyle="none", label="outlier")] if out.any() else []
     )
