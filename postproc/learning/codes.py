@@ -123,7 +123,7 @@ CODES = define(
             "record of earlier parts does not belong here",
             meaning="The record beside the cell is damaged, or is of another program, cell, robot file or force.",
             consequence="Earlier parts would be explained wrongly, or counted twice.",
-            action="Undo the change, or name all parts that count together with --new-history.",
+            action="Use program, cell and robot file of the earlier parts, or name all parts with --new-history.",
             example="`robot:` of the cell names the file that was learnt from part 1, and part 1 is named again.",
         ),
         "LRN016": Code(
