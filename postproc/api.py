@@ -248,10 +248,13 @@ def learn(
     cell: PathLike | None = None,
     robot: str | None = None,
     gain: float = 1.0,
+    history: PathLike | None = None,
+    new_history: bool = False,
     known_force: float | None = None,
     push: PathLike | None = None,
     output: PathLike | None = None,
     csv: PathLike | None = None,
+    page: PathLike | None = None,
     config_dat: PathLike | None = None,
     strict: bool = False,
     dry_run: bool = False,
@@ -259,8 +262,9 @@ def learn(
     """Learn from measured parts of a program, as ``compensate learn`` does.
 
     path: the original program; measured: CSVs of deviations; known_force: half width of the 95 % interval of all forces
-    as a share; push: readings of a push test; output: folder of the next program, robot file and force factors; csv:
-    one row a point.
+    as a share; push: readings of a push test; gain: share of what was learnt that is applied; history: record of the
+    parts of earlier runs, beside the cell without; new_history: whatever that holds; output: folder of the next
+    program, robot file and force factors; csv: one row a point; page: the result as HTML.
     """
     from postproc.workflows.learn import LearnRequest
     from postproc.workflows.learn import learn as run
@@ -271,7 +275,6 @@ def learn(
         force=stated_force(force),
         cell=as_path(cell),
         robot=robot,
-        gain=_share(gain),
         config_dat=as_path(config_dat),
         strict=strict,
     )
@@ -279,10 +282,14 @@ def learn(
         LearnRequest(
             main,
             tuple(Path(one) for one in several),
+            gain=_share(gain),
+            history=as_path(history),
+            new_history=new_history,
             known_force=known_force,
             push=as_path(push),
             output=as_path(output),
             csv=as_path(csv),
+            page=as_path(page),
             strict=strict,
             dry_run=dry_run,
         )

@@ -208,6 +208,39 @@ def test_a_compensated_program_is_no_original(shop):
     assert not (shop / "learned").exists()
 
 
+UNKNOWN = {
+    "a base that moves with the robot file": (
+        "correct: process",
+        "correct: touched_off\ntouch_points: [[0, 0, 0], [400, 0, 0], [0, 300, 0]]\n"
+        "controller: {absolute_accuracy: false}",
+        "touched_off",
+    ),
+    "a track under the robot": (
+        "correct: process",
+        "correct: process\nexternal_axes:\n  E1: {kind: track, direction: +y, limits: [-5000, 5000], start: 0}",
+        "external axes carry",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", UNKNOWN)
+def test_a_cell_that_learning_does_not_know_is_refused_in_words(shop, case):
+    old, new, words = UNKNOWN[case]
+    cell = shop / "cell.yaml"
+    cell.write_text(cell.read_text().replace(old, new))
+    if "track" in case:
+        program = shop / "part.src"
+        program.write_text(
+            program.read_text().replace(",A -45.000,B 0.000,C 180.000}", ",A -45,B 0,C 180,E1 0}")
+        )
+    before = files(shop)
+    done = call(shop, "part.src", "part1.csv")
+    assert done.exit_code == 1, done.output
+    assert "LRN011" in done.output
+    assert words in " ".join(done.output.split())
+    assert files(shop) == before
+
+
 def test_a_part_counts_once(shop):
     shutil.copy(shop / "part1.csv", shop / "copy.csv")
     done = call(shop, "part.src", "part1.csv", "copy.csv")

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 from conftest import CELL, LINES
@@ -16,7 +19,8 @@ PLAN = (
     *("--tool", "0,500,300"),
 )
 MAP = ("map", "--robot", "kuka_kr270", "--x", "800:2200", "--y=-1000:1000", "--z", 500, "--grid", 8)
-KINDS = ("program", "prediction", "batch", "check", "verify", "plan", "map", "curve")
+KINDS = ("program", "prediction", "batch", "check", "verify", "plan", "map", "curve", "learn")
+SECOND_PART = Path(__file__).resolve().parent.parent / "samples" / "kr270_second_part"
 
 
 @pytest.fixture(scope="module")
@@ -57,6 +61,9 @@ def pages(tmp_path_factory):
         "--page",
         found["curve"],
     )
+    part = folder / "second_part"
+    shutil.copytree(SECOND_PART, part)
+    called("learn", part / "part.src", part / "part1.csv", "--page", found["learn"])
     return found
 
 
@@ -80,7 +87,7 @@ def test_narrow_and_wide_light_and_dark(window, pages, kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", ["program", "prediction", "map"])
+@pytest.mark.parametrize("kind", ["program", "prediction", "map", "learn"])
 def test_on_paper_the_picture_is_there(window, pages, kind):
     """Of a dark screen: the ground is white, and the first picture has ink of more than one colour."""
     pdfium = pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
@@ -92,8 +99,8 @@ def test_on_paper_the_picture_is_there(window, pages, kind):
         assert np.median(image) > 250
         coloured = (image.max(axis=2) - image.min(axis=2)) > 60
         inked.append(coloured)
-    if kind == "map":
-        assert max(one.sum() for one in inked) > 5000
+    if kind in ("map", "learn"):
+        assert max(one.sum() for one in inked) > (5000 if kind == "map" else 2000)
         return
     # the path, in the colours of its scale: dark violet and green, which no chart has
     violet = 0

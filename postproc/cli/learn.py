@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from postproc.cli.common import Out, ending, insertion_options, program_options
+from postproc.cli.common import Out, ending, insertion_options, page_option, program_options
 from postproc.cli.decimal_option import Decimal
 
 
@@ -22,7 +22,22 @@ from postproc.cli.decimal_option import Decimal
     help="Folder of the next program, the new robot file and the force factors [learned/ beside PROGRAM].",
 )
 @click.option(
-    "--gain", type=Decimal(0.0, 1.0), default=1.0, help="Share of the correction that is applied [1]."
+    "--gain",
+    type=Decimal(0.0, 1.0),
+    default=1.0,
+    help="Share of what was learnt that the next program applies [1].",
+)
+@click.option(
+    "--history",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.json",
+    callback=ending(".json"),
+    help="Record of the parts of earlier runs, which count too [<stem>.parts.json beside the cell].",
+)
+@click.option(
+    "--new-history",
+    is_flag=True,
+    help="Replace that record: only the parts that are named count.",
 )
 @click.option(
     "--known-force",
@@ -45,6 +60,7 @@ from postproc.cli.decimal_option import Decimal
     callback=ending(".csv"),
     help="Measured, explained and remaining deviation of every point, one row each.",
 )
+@page_option
 @click.option(
     "--plan",
     "plan_points",
@@ -66,9 +82,12 @@ def learn(
     shared_points: str | None,
     output: Path | None,
     gain: float,
+    history: Path | None,
+    new_history: bool,
     known_force: float | None,
     push: Path | None,
     csv_to: Path | None,
+    page: Path | None,
     plan_points: int | None,
     dry_run: bool,
     strict: bool,
@@ -78,15 +97,19 @@ def learn(
 ) -> None:
     """Learn from MEASURED, deviations of parts that PROGRAM cut: their causes, and a better next program.
 
+    Parts of earlier runs count too: they are in a record beside the cell, and programs that were written are kept under
+    cut/ beside the next one.
+
     PROGRAM is the original, not the compensated one. MEASURED are CSVs with the columns X,Y,Z,NX,NY,NZ,DEV (nominal
     point and outward normal in $BASE, mm) and the comments positive, alignment, cut_with, sha256 and sigma_mm.
 
     \b
     Examples:
       compensate learn panel.src part1.csv
-      compensate learn panel.src part1.csv part2.csv -o next
+      compensate learn panel.src part2.csv            (and the parts of the runs before)
+      compensate learn panel.src part1.csv part2.csv --new-history -o next
       compensate learn panel.src points.csv --plan 30 --csv measure.csv
-      compensate learn panel.src part1.csv --known-force 0.1 --csv part1.points.csv
+      compensate learn panel.src part1.csv --known-force 0.1 --page part1.html
 
     Exit codes: 0 done; 3 done, and something needs review; 1 failed, nothing written; 2 wrong command line.
     """
@@ -102,7 +125,6 @@ def learn(
             force="" if force is None else force,
             cell=cell,
             robot=robot,
-            gain=gain,
             strict=strict,
             no_insert=no_insert,
             shared_points=shared_points or "copy-inline",
@@ -113,14 +135,20 @@ def learn(
         known_force=known_force,
         push=push,
         output=output,
+        gain=gain,
+        history=history,
+        new_history=new_history,
         csv=csv_to,
+        page=page,
         json=out.json_file,
         strict=strict,
         dry_run=dry_run,
     )
     if plan_points is not None:
-        if json_to is not None or dry_run or output is not None:
-            raise click.UsageError("--plan writes --csv only, and excludes --json, --output and --dry-run")
+        if json_to is not None or dry_run or output is not None or page is not None:
+            raise click.UsageError(
+                "--plan writes --csv only, and excludes --json, --output, --page and --dry-run"
+            )
         from postproc.workflows.learn_plan import plan
 
         with out.refusals(str(program)), out.stages() as stage:

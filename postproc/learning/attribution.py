@@ -13,10 +13,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import log_ndtr
 
 from postproc.base.arrays import Bools, Floats, Ints
+from postproc.base.units import MM
 from postproc.learning.candidates import FACTORS, Circumstances, MissingEffect, candidates
-from postproc.learning.causes import Cause, CausePrediction
+from postproc.learning.causes import Cause, CauseKind, CausePrediction
 from postproc.learning.covariance import Explanation, Layout, SmoothField, choose_surface
 
 ROUNDS = 4
@@ -25,6 +27,12 @@ SETTLED = 0.01
 
 OUTLIER, MOST_OUTLIERS = 4.0, 0.1
 """Standardised residual of an outlier, times the scatter of all where that is larger; share of points at most."""
+
+OUTLIERS_EACH = float(np.log(0.01) + np.log(1.0 / (1.0 * MM)))
+"""Logarithm of the probability density of an outlier: one in a hundred, anywhere within a millimetre."""
+
+TOUCHED = 3.0
+"""An effect acts on a point where one standard deviation of it is so many times the scatter of the probe."""
 
 NAMED, AHEAD = np.log(100.0), np.log(10.0)
 """Logarithms: how much likelier the deviations are with an effect that is named than without it (some twenty are
@@ -47,7 +55,8 @@ class Attribution:
 
     prediction: of all points with the causes; deviation (K,) [m]; kept (K,): no outlier; x (P,): the causes in their
     own units, logarithms of shares; covariance (P, P); explained: of the kept points at x; named: effects that joined;
-    rivals: effects that did not, the likeliest first; verdict; standardised (K,): residuals of left-out points.
+    rivals: effects that did not, the likeliest first; verdict; standardised
+    (K,): residuals of left-out points; gain: share of what was learnt that is applied.
     """
 
     prediction: CausePrediction
@@ -62,6 +71,7 @@ class Attribution:
     rivals: tuple[Likelier, ...]
     verdict: str
     standardised: Floats
+    gain: float = 1.0
 
     @property
     def causes(self) -> tuple[Cause, ...]:
@@ -85,13 +95,22 @@ class Attribution:
         """(K,) [m] what the causes explain of each point, corrections of the program included."""
         return self.prediction.errors(self.x)
 
+    @cached_property
+    def by_learning(self) -> Floats:
+        """(K,) [m] what the causes explain beyond what was known of them before."""
+        return self.by_causes - self.prediction.errors(0 * self.x)
+
+    def damped(self, gain: float) -> Attribution:
+        """With ``gain`` of what was learnt: causes and smooth displacement."""
+        return replace(self, x=gain * self.x, gain=gain)
+
     def field_at(self, place: Floats) -> Floats:
         """(J, 3) [m] the smooth displacement at places (J, 3) [m] that no cause explains."""
         if self.surface.size == 0.0:
             return np.zeros((len(place), 3))
         own = self.explained.layout
         return self.explained.layout.fields_at(self.surface, place) @ (
-            own.normal * self.explained.alpha[:, None]
+            self.gain * own.normal * self.explained.alpha[:, None]
         )
 
     @cached_property
@@ -118,11 +137,13 @@ def attribute(
     rivals: list[Likelier] = []
     verdict = "nothing_missing"
     while search:
-        rows = np.flatnonzero(kept)
-        noise = float(np.median(layout.sigma[rows]))
+        noise = float(np.median(layout.sigma[kept]))
         offered = candidates(prediction, x, around, noise, [one.name for one in named])
-        gains = _gains(explained, offered, rows)
-        rivals = [Likelier(offered[i].name, gain) for i, (gain, _) in _ranked(gains)]
+        everything = _linearised(
+            prediction, deviation, layout, x, np.ones(len(kept), bool), explained.surface
+        )
+        gains = _gains(explained, everything, offered, kept)
+        rivals = [Likelier(offered[i].name, gain.gain) for i, gain in _ranked(gains)]
         if not rivals or rivals[0].gain < NAMED:
             break
         if len(rivals) > 1 and rivals[0].gain - rivals[1].gain < AHEAD:
@@ -131,12 +152,12 @@ def attribute(
         if len(named) == MOST_NAMED:
             break
         best = _ranked(gains)[0][0]
-        candidate, factor = offered[best], gains[best][1]
+        candidate, factor = offered[best], gains[best].factor
         wider = [replace(cause, deviation=factor * cause.deviation) for cause in candidate.causes]
         trial = prediction.with_causes(wider, candidate.model)
         try:
             moved, kept_now = _settle(
-                trial, deviation, layout, np.append(x, np.zeros(len(wider))), kept, outliers=True
+                trial, deviation, layout, np.append(x, np.zeros(len(wider))), gains[best].kept, outliers=True
             )
         except np.linalg.LinAlgError:
             break
@@ -282,26 +303,58 @@ def _outliers(explained: Explanation, count: int, gone: int) -> Ints:
     return np.array(sorted(out), np.int64)
 
 
-def _gains(explained: Explanation, offered: Sequence[MissingEffect], rows: Ints) -> list[tuple[float, float]]:
-    """Of each candidate: by how much the evidence grows, and with which factor of its size."""
-    gains = []
-    bare = choose_surface_without_field(explained)
+@dataclass(frozen=True, eq=False)
+class _Gain:
+    """By how much the evidence grows with a candidate, with which factor of its size, and the points (K,) that are then
+    no outliers."""
+
+    gain: float
+    factor: float
+    kept: Bools
+
+
+def _gains(
+    explained: Explanation, everything: Explanation, offered: Sequence[MissingEffect], kept: Bools
+) -> list[_Gain]:
+    """Of each candidate; everything: all points, outliers included.
+
+    An outlier that the candidate acts on may be none with it: points in corners, say, where only a force in corners
+    shows."""
+    present = explained.evidence + OUTLIERS_EACH * int((~kept).sum())
+    found = []
     for candidate in offered:
-        best, chosen = -np.inf, 1.0
-        columns = candidate.columns[rows]
-        for factor in FACTORS:
-            for start in (explained, bare):
-                gain = start.with_columns(factor * columns).evidence
-                if gain > best:
-                    best, chosen = gain, factor
-        gains.append((best, chosen))
-    if gains:
-        top = sorted(range(len(gains)), key=lambda i: -gains[i][0])[:3]
-        for i in top:
-            full = choose_surface(explained.with_columns(gains[i][1] * offered[i].columns[rows]))
-            gains[i] = (max(gains[i][0], full.evidence), gains[i][1])
-    return [(gain - explained.evidence, factor) for gain, factor in gains]
+        touched = np.abs(candidate.columns).max(axis=1) > TOUCHED * np.median(everything.layout.sigma)
+        best = _Gain(-np.inf, 1.0, kept)
+        for points in [kept] + ([kept | touched] if (touched & ~kept).any() else []):
+            rows = np.flatnonzero(points)
+            own = explained if points is kept else everything.part(rows)
+            for start in (own, choose_surface_without_field(own)):
+                for factor in FACTORS:
+                    with_it = start.with_columns(factor * candidate.columns[rows])
+                    gain = evidence_with(with_it, candidate) + OUTLIERS_EACH * int((~points).sum()) - present
+                    if gain > best.gain:
+                        best = _Gain(gain, factor, points)
+        found.append(best)
+    for i, _ in _ranked(found)[:3]:
+        rows, columns = np.flatnonzero(found[i].kept), found[i].factor * offered[i].columns
+        own = explained if found[i].kept is kept else everything.part(rows)
+        full = choose_surface(own.with_columns(columns[rows]))
+        gain = evidence_with(full, offered[i]) + OUTLIERS_EACH * int((~found[i].kept).sum()) - present
+        found[i] = replace(found[i], gain=max(found[i].gain, gain))
+    return found
 
 
-def _ranked(gains: Sequence[tuple[float, float]]) -> list[tuple[int, tuple[float, float]]]:
-    return sorted(((i, (gain, factor)) for i, (gain, factor) in enumerate(gains)), key=lambda one: -one[1][0])
+def evidence_with(explained: Explanation, candidate: MissingEffect) -> float:
+    """Of an explanation whose last causes are those of a candidate.  A parameter that has no negative values has half
+    of the normal distribution before and its share above null after: ln p + sum ln(2 Phi(mean / deviation))."""
+    evidence = explained.evidence
+    bounded = [i for i, c in enumerate(candidate.causes, -len(candidate.causes)) if c.kind is CauseKind.VALUE]
+    if bounded:
+        mean, covariance = explained.causes()
+        ratio = mean[bounded] / np.sqrt(np.maximum(np.diag(covariance)[bounded], 1e-12))
+        evidence += float(np.sum(np.log(2.0) + log_ndtr(ratio)))
+    return evidence
+
+
+def _ranked(gains: Sequence[_Gain]) -> list[tuple[int, _Gain]]:
+    return sorted(enumerate(gains), key=lambda one: -one[1].gain)

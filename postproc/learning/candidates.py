@@ -17,7 +17,7 @@ SIZES = {
     "hysteresis": 4e-5,
     "backlash": 6e-5,
     "base_compliance": 3e-8,
-    "tool_compliance": 1e-8,
+    "tool_compliance": 1e-7,
 }
 """Effect -> standard deviation of its parameters (SI) on a heavy arm."""
 
@@ -83,7 +83,7 @@ def _of_effect(prediction: CausePrediction, x: Floats, name: str, size: float) -
         label = f"{name} of {parameter.joint}" if parameter.joint else name
         if name == "base_compliance" and parameter.unit != "rad/(N m)":
             continue  # shifts of the foot are far smaller than what its tilts do at the tool
-        scale = size if parameter.unit != "rad/(N m)" or name != "base_compliance" else 5e-9
+        scale = size if parameter.unit != "rad/(N m)" or name != "base_compliance" else 5e-8
         groups.setdefault(label, []).append(
             Cause(
                 f"{name}.{parameter.name}",

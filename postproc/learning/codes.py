@@ -118,5 +118,29 @@ CODES = define(
             action="Measure the next part too, and learn from it.",
             example="`# cut_with: original`.",
         ),
+        "LRN015": Code(
+            "error",
+            "record of earlier parts does not belong here",
+            meaning="The record beside the cell is damaged, or is of another program, cell, robot file or force.",
+            consequence="Earlier parts would be explained wrongly, or counted twice.",
+            action="Use program, cell and robot file of the earlier parts, or name all parts with --new-history.",
+            example="`robot:` of the cell names the file that was learnt from part 1, and part 1 is named again.",
+        ),
+        "LRN016": Code(
+            "info",
+            "file of an earlier part has changed",
+            meaning="The content of a measured part is not that of the run before.",
+            consequence="Its present deviations count, those of before do not.",
+            action="Nothing needs to be done if the file was corrected.",
+            example="A row with a typing error that was corrected.",
+        ),
+        "LRN017": Code(
+            "warning",
+            "part exceeds what was promised of it",
+            meaning="The error of a part that was cut by a learnt program exceeds the interval of its promise.",
+            consequence="Something differs from the parts before: tool, fixture, material, temperature, or a cause.",
+            action="Check what changed between the parts before the next one is cut.",
+            example="A new cutter with another radius.",
+        ),
     }
 )

@@ -22,7 +22,11 @@ from postproc.learning.attribution import Attribution
 from postproc.learning.causes import CauseKind
 from postproc.process.force_factors import ForceFactors
 from postproc.process.operation_names import OperationNames
+from postproc.process.wrenches import Wrenches
 from postproc.toolpath import Toolpath
+
+ROUNDED = 2 * MM
+"""Half of the path over which a vertex counts as turned: a force does not step, and a step needs many points."""
 
 _SIDE = 0.9
 """Share of the points of an operation that have to lie on one side of the feed."""
@@ -30,7 +34,7 @@ _SIDE = 0.9
 
 def force_factors(result: Attribution) -> ForceFactors:
     """The factors of an attribution; of an operation that was not measured, what all have in common."""
-    common, corner = 0.0, 0.0
+    common = 0.0
     own: dict[str, float] = {}
     turns: dict[str, list[float]] = {}
     for cause, value in zip(result.causes, result.x.tolist(), strict=True):
@@ -38,14 +42,46 @@ def force_factors(result: Attribution) -> ForceFactors:
             common = value
         elif cause.kind is CauseKind.FORCE and cause.group == "force":
             own[cause.place] = value
-        elif cause.name == "corner_force":
-            corner = value
         elif cause.kind is CauseKind.TURN_1:
             turns.setdefault(cause.place, [0.0, 0.0])[0] = value
         elif cause.kind is CauseKind.TURN_2:
             turns.setdefault(cause.place, [0.0, 0.0])[1] = value
     factor = {name: float(np.exp(common + value)) for name, value in own.items()}
-    return ForceFactors(factor, {k: (v[0], v[1]) for k, v in turns.items()}, float(np.exp(common)), corner)
+    return ForceFactors(factor, {k: (v[0], v[1]) for k, v in turns.items()}, float(np.exp(common)))
+
+
+@dataclass(frozen=True, eq=False)
+class CornerError:
+    """The further displacement where the feed turns: (exp(size c) - 1) G w, c: how far it turns, w: force and moment.
+
+    size: logarithm of the factor of the force in a corner; radius (N,) [m] of the cutter; force (N): w; start, end (N,
+    3, 6) [m/N, m/(N m)]: compliance G at the ends of each motion, linear in between."""
+
+    size: float
+    turns: FeedTurns
+    radius: Floats
+    force: Wrenches
+    start: Floats
+    end: Floats
+
+    def at(self, rows: Ints, share: Floats) -> Floats:
+        """(K, 3) [m] at the shares (K,) of motions ``rows`` (K,)."""
+        more = np.expm1(self.size * self.turns.at(rows, share, self.radius[rows]))
+        along = share[:, None, None]
+        compliance = (1 - along) * self.start[rows] + along * self.end[rows]
+        return np.asarray(more[:, None] * (compliance @ self.force.along(rows, share)[..., None])[..., 0])
+
+
+def corner_size(result: Attribution) -> float:
+    """Logarithm of the factor of the force in corners, 0 where none was learnt."""
+    return next(
+        (
+            x
+            for cause, x in zip(result.causes, result.x.tolist(), strict=True)
+            if cause.name == "corner_force"
+        ),
+        0.0,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +91,7 @@ class LearnedError(KnownError):
     spindle (N, 3): unit vectors, tip-ward, in tool axes; tool (N,): its number; length: number of a tool -> [m]
     by which it is longer; radius: (operation -> side of the feed, -1 or 1) and tool
     -> [m]; base (6,): shift [m] and turn [rad] about ``centre`` (3,) in the axes (3, 3) of the base; drift (3,) [m]
-    over the whole program, with ``time`` (N,) 0..1."""
+    over the whole program, with ``time`` (N,) 0..1; corners: where the force is larger there."""
 
     result: Attribution
     path: DesiredPath
@@ -70,6 +106,7 @@ class LearnedError(KnownError):
     axes: Floats = field(default_factory=lambda: np.eye(3))
     drift: Floats = field(default_factory=lambda: np.zeros(3))
     time: Floats = field(default_factory=lambda: np.zeros(0))
+    corners: CornerError | None = None
 
     def at(self, rows: Ints, wanted: Poses, share: Floats | None = None) -> Floats:
         """(K, 3) [m] of motions ``rows`` (K,) at ``wanted`` (K) poses, at ``share`` (K,) of their paths."""
@@ -87,6 +124,8 @@ class LearnedError(KnownError):
         if self.drift.any():
             before = self.time[np.maximum(rows - 1, 0)]
             moved += (before + along * (self.time[rows] - before))[:, None] * self.drift
+        if self.corners is not None:
+            moved += self.corners.at(rows, along)
         return np.nan_to_num(moved)
 
     def _radial(self, rows: Ints, along: Floats, axis: Floats, tool: Ints) -> Floats:
@@ -110,9 +149,10 @@ def learned_error(
     operations: OperationNames,
     rigid: tuple[Floats, Floats],
     time: Floats,
+    corners: CornerError | None,
 ) -> LearnedError:
     """The known error of an attribution; spindle (N, 3) in tool axes; tool (N,): numbers; rigid: centre (3,) [m] and
-    axes (3, 3) of the base; time (N,) 0..1."""
+    axes (3, 3) of the base; time (N,) 0..1; corners: where a force in corners was learnt."""
     length: dict[int, float] = {}
     radius: dict[int, float] = {}
     base, drift = np.zeros(6), np.zeros(3)
@@ -138,6 +178,7 @@ def learned_error(
         *rigid,
         drift,
         time,
+        corners,
     )
 
 
@@ -162,8 +203,8 @@ def _sides(result: Attribution, path: DesiredPath, operations: OperationNames) -
 
 @dataclass(frozen=True, eq=False)
 class FeedTurns:
-    """Where the feed turns.  station (V,) [m] along the program of each vertex; ``turned`` (V,) [rad]: the sum of all
-    turns up to it; end (N,) [m]: station of the end of each motion; length (N,) [m]."""
+    """Where the feed turns.  station (V,) [m] along the program where a turn starts or ends; ``turned`` (V,) [rad]: the
+    sum of all turns up to it, linear in between; end (N,) [m]: station of the end of each motion; length (N,) [m]."""
 
     station: Floats
     turned: Floats
@@ -184,19 +225,14 @@ class FeedTurns:
         start = np.append(0.0, end[:-1])
         sweep = np.minimum(np.abs(np.nan_to_num(path.sweep)), np.pi)
         station = np.stack([start, 0.5 * (start + end)], axis=1).ravel()
-        return FeedTurns(station, np.cumsum(np.stack([turn, sweep], axis=1).ravel()), end, path.length)
+        turned = np.cumsum(np.stack([turn, sweep], axis=1).ravel())
+        ends = np.stack([station - ROUNDED, station + ROUNDED], axis=1).ravel()
+        sums = np.stack([np.append(0.0, turned[:-1]), turned], axis=1).ravel()
+        return FeedTurns(np.maximum.accumulate(ends), sums, end, path.length)
 
     def at(self, rows: Ints, share: Floats, radius: Floats) -> Floats:
         """(K,) 0..1 how far the feed turns (1: 90 deg) within the radius (K,) [m] of the cutter of the places at the
         shares (K,) of motions ``rows`` (K,)."""
         place = self.end[rows] - (1.0 - share) * self.length[rows]
-        turned = np.append(0.0, self.turned)
-        low = turned[np.searchsorted(self.station, place - radius, side="left")]
-        high = turned[np.searchsorted(self.station, place + radius, side="right")]
+        low, high = (np.interp(place + side * radius, self.station, self.turned) for side in (-1.0, 1.0))
         return np.asarray(np.clip((high - low) / (0.5 * np.pi), 0.0, 1.0))
-
-    def of_motions(self, radius: Floats) -> Floats:
-        """(N,) 0..1 of motions as a whole: those that lie inside of a corner, of cutters of this radius (N,) [m]."""
-        rows = np.arange(len(self.end))
-        short = self.length <= 2 * radius
-        return np.where(short, self.at(rows, np.full(len(rows), 0.5), radius), 0.0)

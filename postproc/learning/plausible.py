@@ -21,7 +21,7 @@ FAR_OUT = 5.0
 LOUD = 3.0
 """Deviations that are so many times the scatter of the probe have something to explain."""
 
-UNEXPLAINED = 0.85
+UNEXPLAINED = 0.6
 """Share of the deviations of left-out points that may remain."""
 
 COPIED, SAME = 0.6, 5e-6

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from postproc.base.arrays import Floats
+from postproc.base.arrays import Bools, Floats
 from postproc.learning.attribution import Attribution
 from postproc.learning.covariance import SCATTER
 
@@ -36,22 +36,39 @@ class Promise:
         return self.after < 0.9 * self.before
 
 
-def promise(result: Attribution, gain: float = 1.0) -> Promise:
-    """What remains if ``gain`` of all that was learnt is corrected."""
+def promise(result: Attribution, last: Bools, gain: float = 1.0) -> Promise:
+    """What remains on a part like those at the points ``last`` (K,), the part that was cut last, if ``gain`` of all
+    that was learnt is applied."""
     explained, layout = result.explained, result.explained.layout
+    own = np.flatnonzero(last[result.kept])
+    rows = result.kept_rows[own]
     prior = explained.columns @ explained.columns.T + layout.field(explained.surface)
-    known = prior - prior @ explained.inverse @ prior
-    taken = np.linalg.qr(layout.free)[0] if layout.free.shape[1] else np.zeros((len(prior), 0))
+    known = (prior - prior @ explained.inverse @ prior)[np.ix_(own, own)]
+    taken = _taken(layout.free[own])
     remains = known - taken @ (taken.T @ known)
     remains = remains - (remains @ taken) @ taken.T
-    scatter = SCATTER * explained.by_force
+    scatter = SCATTER * explained.by_force[own]
     variance = np.maximum(np.diag(remains), 0.0) + scatter**2
-    found = _aligned(result.by_causes[result.kept] + result.by_field[result.kept], taken)
-    measured = _aligned(result.deviation[result.kept], taken)
-    noise = float(np.mean(layout.sigma**2))
-    before = float(np.sqrt(max(float(np.mean(measured**2)) - noise, 0.0)))
-    after = float(np.sqrt(HOPE**2 * np.mean(variance) + np.mean(((1 - gain) * found) ** 2)))
-    return Promise(before, after, LOWER * after, UPPER * after)
+    withheld = (1 - gain) * (result.by_learning + result.by_field)[rows]
+    after = float(np.sqrt(HOPE**2 * np.mean(variance) + np.mean(_aligned(withheld, taken) ** 2)))
+    return Promise(measured_rms(result, last), after, LOWER * after, UPPER * after)
+
+
+def measured_rms(result: Attribution, of: Bools) -> float:
+    """[m] root mean square of the deviations of the points ``of`` (K,) that are no outliers, after the best alignment
+    of the freedoms that were fitted and without the scatter of the probe; 0 without points."""
+    own = np.flatnonzero(of[result.kept])
+    if not len(own):
+        return 0.0
+    layout = result.explained.layout
+    aligned = _aligned(result.deviation[result.kept_rows[own]], _taken(layout.free[own]))
+    return float(np.sqrt(max(float(np.mean(aligned**2)) - float(np.mean(layout.sigma[own] ** 2)), 0.0)))
+
+
+def _taken(free: Floats) -> Floats:
+    """(J, A) orthonormal columns of the freedoms (J, A) that the alignment of these points takes out."""
+    own = free[:, np.abs(free).any(axis=0)]
+    return np.linalg.qr(own)[0] if own.shape[1] else np.zeros((len(free), 0))
 
 
 def _aligned(values: Floats, taken: Floats) -> Floats:

@@ -23,7 +23,7 @@ from postproc.effects.play import play_output, share
 from postproc.model import StiffnessModel
 from postproc.robot.inverse import inverse
 
-LITTLE_GAP = 2e-4
+LITTLE_GAP = 5e-5
 """[rad, m] Gap by which the side of an axis is found where nothing is known of it."""
 
 

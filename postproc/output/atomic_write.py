@@ -69,6 +69,26 @@ def write_atomically(
         raise
 
 
+def replace_file(path: Path, content: bytes, still: Callable[[], None] = lambda: None) -> None:
+    """Write one file over the one that is there: at any moment it is the old one or the new one, never absent.
+
+    For a record that grows from run to run.  ``still`` and what it raises: as ``write_atomically``."""
+    ready = path.with_name(f".{_stem(path)}.{secrets.token_hex(4)}.tmp")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with contextlib.ExitStack() as locks:
+            if _lock_folders({path.parent}, locks):
+                _sweep([path])
+            _write(ready, content)
+            still()
+            _rename(ready, path)
+            _sync_folder(path.parent)
+    except OSError as error:
+        raise _unwritable(path, error) from None
+    finally:
+        _unlink(ready)
+
+
 def sweep(files: Iterable[Path]) -> None:
     """Remove the half-written ``files`` of a run that was killed.
 

@@ -16,26 +16,20 @@ from postproc.process.wrenches import Wrenches
 @dataclass(frozen=True, eq=False)
 class ForceFactors:
     """By operation: ``factor`` of its force, ``turn`` (2,) [rad] about the axes across it, ``ci95``: half width of
-    the 95 % interval of the factor as a share; ``common``: factor of all others; ``corner``: share added where the feed
-    turns."""
+    the 95 % interval of the factor as a share; ``common``: factor of all others."""
 
     factor: Mapping[str, float]
     turn: Mapping[str, tuple[float, float]]
     common: float = 1.0
-    corner: float = 0.0
     ci95: Mapping[str, float] = field(default_factory=dict)
 
-    def acting(
-        self, forces: Wrenches, operations: OperationNames, base: Floats, corner: Floats | None = None
-    ) -> Wrenches:
-        """Forces (N) with these factors; base (N, 3, 3): axes of the programmed base; corner (N,) 0..1."""
+    def acting(self, forces: Wrenches, operations: OperationNames, base: Floats) -> Wrenches:
+        """Forces (N) with these factors; base (N, 3, 3): axes of the programmed base."""
         if not forces.any:
             return forces
         count = len(forces)
         rows = np.arange(count)
         scale = np.array([self.factor.get(name, self.common) for name in operations.names])[operations.which]
-        if corner is not None and self.corner:
-            scale = scale * np.exp(self.corner * corner)
         turns = np.array([self.turn.get(name, (0.0, 0.0)) for name in operations.names])[operations.which]
         ends = []
         for side in (forces.values[rows], forces.start[rows]):

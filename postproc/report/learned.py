@@ -32,6 +32,17 @@ COLUMNS = (
 MOST_RIVALS, MOST_PRODUCTS = 5, 10
 
 
+@dataclass(frozen=True)
+class LearnedPart:
+    """A part: its ``file``, the SHA-256 of the program that cut it, ``rms`` [m] of its error, and the ends [m] of the
+    95 % interval that was promised of it, None where another command wrote its program."""
+
+    file: str
+    program: str
+    rms: float
+    promised: tuple[float, float] | None
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Learned(Result):
     """The result of ``compensate learn``: K points of ``measured``.  line, file (K,): of the measured point; operation,
@@ -51,6 +62,7 @@ class Learned(Result):
     program_line: Ints
     in_base: Floats
     promise: Promise
+    history: tuple[LearnedPart, ...]
     gain: float
     findings: tuple[Finding, ...]
     exit: int
@@ -124,6 +136,7 @@ class Learned(Result):
                 "lower_rms_mm": round(self.promise.lower / MM, 6),
                 "upper_rms_mm": round(self.promise.upper / MM, 6),
             },
+            "history": [_part_entry(one) for one in self.history],
             "gain": self.gain,
             "next_program": None if self.next_program is None else _following(self.next_program),
             "findings": [finding.as_json() for finding in self.findings],
@@ -136,6 +149,17 @@ class Learned(Result):
         """Each cause with its value and its standard deviation after the measurement."""
         result = self.attribution
         return list(zip(result.causes, result.x.tolist(), result.deviations.tolist(), strict=True))
+
+
+def _part_entry(one: LearnedPart) -> dict[str, object]:
+    ends = [None, None] if one.promised is None else [round(end / MM, 6) for end in one.promised]
+    return {
+        "file": one.file,
+        "program_sha256": one.program,
+        "rms_mm": round(one.rms / MM, 6),
+        "promised_lower_rms_mm": ends[0],
+        "promised_upper_rms_mm": ends[1],
+    }
 
 
 def _following(report: Report) -> dict[str, object]:

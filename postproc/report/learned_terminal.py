@@ -56,6 +56,11 @@ def rows(learned: Learned) -> Iterator[tuple[str, str]]:
     smooth = result.by_field
     if np.any(smooth):
         yield "smooth", f"{_rms(smooth)} mm RMS, {result.surface.length / MM:.0f} mm long, without a name"
+    if len(learned.history) > 1:
+        for number, one in enumerate(learned.history, 1):
+            ends = one.promised
+            words = "" if ends is None else f", {ends[0] / MM:.4f} to {ends[1] / MM:.4f} promised"
+            yield f"part {number}", f"{one.rms / MM:.4f} mm RMS{words}: {one.file}"
     promise = learned.promise
     yield (
         "promise",

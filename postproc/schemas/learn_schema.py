@@ -33,6 +33,13 @@ def learn_schema() -> Schema:
         "lower_rms_mm": quantity("mm", "lower end of its 95 % interval"),
         "upper_rms_mm": quantity("mm", "upper end of its 95 % interval"),
     }
+    part = {
+        "file": word("file of the measured part"),
+        "program_sha256": word("SHA-256 of the program that cut it"),
+        "rms_mm": quantity("mm", "its error, without the scatter of the probe, root mean square"),
+        "promised_lower_rms_mm": quantity("mm", "lower end of what was promised of it", nullable=True),
+        "promised_upper_rms_mm": quantity("mm", "upper end of what was promised of it", nullable=True),
+    }
     following = {
         "file": word("file of the next program", nullable=True),
         "corrected": integer("motions that are corrected"),
@@ -72,7 +79,8 @@ def learn_schema() -> Schema:
             ),
             "residual_rms_mm": quantity("mm", "root mean square of what nothing explains"),
             "promise": record(promise, "errors of the next part at the measured points, root mean square"),
-            "gain": quantity("1", "share of the correction that is applied"),
+            "history": array(record(part, "one part"), "the parts in their order"),
+            "gain": quantity("1", "share of what was learnt that the next program applies"),
             "next_program": record(following, "the next program; null where none is written", nullable=True),
             **ENDING,
         },

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,22 +11,26 @@ import numpy as np
 
 from postproc.base.findings import Finding, Refusal
 from postproc.base.input_files import place
+from postproc.base.system import relative_path
 from postproc.base.units import MM
 from postproc.learning.attribution import Attribution, attribute
 from postproc.learning.causes import CausePrediction, PriorKnowledge
+from postproc.learning.history import RecordedStep
 from postproc.learning.measured_part import MeasuredPart, read_measured_part
 from postproc.learning.next_program import force_factors, learned_error
 from postproc.learning.plausible import check_explained, check_sign
-from postproc.learning.promise import Promise, promise
+from postproc.learning.promise import Promise, measured_rms, promise
 from postproc.learning.push_test import with_push_test
 from postproc.learning.unobserved import indistinct
 from postproc.measurements import read_measurements
-from postproc.output.atomic_write import write_atomically
+from postproc.output.atomic_write import replace_file, write_atomically
 from postproc.process import Wrenches
-from postproc.report.learned import Learned, learned_csv
+from postproc.report.learned import Learned, LearnedPart, learned_csv
 from postproc.report.report import exit_code, in_order_of_place, json_bytes
 from postproc.robot.description import robot_of
-from postproc.workflows.learn_points import CutProgram, Matched, match, read_job
+from postproc.workflows.learn_corners import corner_error
+from postproc.workflows.learn_history import Remembered, keep_program, record_path, record_step, remember
+from postproc.workflows.learn_points import CutProgram, Matched, cutting_file, match, read_job
 from postproc.workflows.learn_robot import force_factor_lines, learned_robot_file
 from postproc.workflows.preparation import LearnedInputs, Request, Stage, silent
 from postproc.workflows.program import compensate
@@ -37,14 +42,19 @@ SHOWN = 5
 class LearnRequest:
     """What the user asked for.  ``main``: the program, its cell, force and how it is written; ``measured``: files of
     parts that it cut; ``known_force``: half width of the 95 % interval of all forces as a share, as a gauge showed
-    it; ``push``: readings of a push test."""
+    it; ``push``: readings of a push test; ``gain``: share of what was learnt that the next program applies;
+    ``history``: file of the record of parts, beside the cell without; ``new_history``: whatever it holds."""
 
     main: Request
     measured: tuple[Path, ...]
     known_force: float | None = None
     push: Path | None = None
     output: Path | None = None
+    gain: float = 1.0
+    history: Path | None = None
+    new_history: bool = False
     csv: Path | None = None
+    page: Path | None = None
     json: Path | None = None
     strict: bool = False
     dry_run: bool = False
@@ -54,12 +64,16 @@ def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
     """Causes, values and the next program.  Raises Refusal, and has then written nothing."""
     main = request.main
     stage("reading")
-    parts = [read_measured_part(path) for path in request.measured]
-    _check_parts(parts)
+    named = [read_measured_part(path) for path in request.measured]
+    _check_parts(named)
     job = read_job(main)
+    record = request.history or record_path(job, main.program)
+    remembered = remember(job, main, named, record, request.new_history, _folder(request))
+    parts = remembered.parts
     known = known_before(request, job)
+    programs = [cutting_file(main.program, part, remembered.kept)[1] for part in parts]
     stage("matching points to motions")
-    matched = match(main, job, parts, known)
+    matched = match(main, job, parts, known, remembered.kept)
     prediction = CausePrediction(matched.points, job.ready.model, matched.causes)
     if request.push is not None:
         joints = [(joint.name, joint.kind != "revolute") for joint in job.ready.robot.joints]
@@ -77,9 +91,10 @@ def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
     wrong = check_explained(result, file)
     if wrong:
         raise Refusal(*wrong)
-    promised = promise(result, main.gain)
+    promised = promise(result, matched.file == len(parts) - 1, request.gain)
+    history = _history(parts, programs, remembered, matched, result)
     findings = [*(f for part in parts for f in part.findings), *job.findings, *matched.findings]
-    findings += _findings(parts, matched, result, promised)
+    findings += [*remembered.findings, *_findings(parts, matched, result, promised), *_unkept(parts, history)]
     learned = Learned(
         program=str(main.program),
         robot=job.ready.robot.name,
@@ -93,11 +108,44 @@ def learn(request: LearnRequest, stage: Stage = silent) -> Learned:
         program_line=job.ready.task.toolpath.line[matched.points.row],
         in_base=(matched.points.point - job.ready.task.base[matched.points.row[:1]].position) @ matched.axes,
         promise=promised,
-        gain=main.gain,
+        history=history,
+        gain=request.gain,
         findings=in_order_of_place(findings),
         exit=exit_code(findings, request.strict),
     )
-    return _published(request, job, matched, parts, learned, stage)
+    return _published(request, job, matched, (remembered, programs), learned, stage)
+
+
+def _folder(request: LearnRequest) -> Path:
+    """Of the next program."""
+    return request.output or request.main.program.parent / "learned"
+
+
+def _history(
+    parts: Sequence[MeasuredPart],
+    programs: Sequence[str],
+    remembered: Remembered,
+    matched: Matched,
+    result: Attribution,
+) -> tuple[LearnedPart, ...]:
+    """Each part with its error, and what was promised of it."""
+    rows = []
+    for number, (part, program) in enumerate(zip(parts, programs, strict=True)):
+        step = remembered.history.promised(program)
+        ends = None if step is None else (step.lower_rms_mm * MM, step.upper_rms_mm * MM)
+        rows.append(LearnedPart(part.file.name, program, measured_rms(result, matched.file == number), ends))
+    return tuple(rows)
+
+
+def _unkept(parts: Sequence[MeasuredPart], history: Sequence[LearnedPart]) -> list[Finding]:
+    """Parts that exceed what was promised of them."""
+    findings = []
+    for part, one in zip(parts, history, strict=True):
+        if one.promised is not None and one.rms > one.promised[1]:
+            most = f"{one.promised[1] / MM:.3f} mm"
+            message = f"this part has {one.rms / MM:.3f} mm RMS where at most {most} were promised"
+            findings.append(Finding("LRN017", message, str(part.file)))
+    return findings
 
 
 def _check_parts(parts: Sequence[MeasuredPart]) -> None:
@@ -168,25 +216,18 @@ def _findings(
     return findings
 
 
-def _learned_inputs(
-    request: LearnRequest, job: CutProgram, matched: Matched, result: Attribution
-) -> LearnedInputs:
+def _learned_inputs(job: CutProgram, matched: Matched, result: Attribution) -> LearnedInputs:
     """What the main job is given beside the robot file."""
     task, factors = job.ready.task, force_factors(result)
     base = task.base[np.arange(len(task.toolpath))].rotation
 
     def forces(stated: Wrenches) -> Wrenches:
-        return factors.acting(stated, job.operations, base, job.corners.of_motions(job.radius))
+        return factors.acting(stated, job.operations, base)
 
-    error = learned_error(
-        result,
-        task.desired_path,
-        job.spindle,
-        job.tool,
-        job.operations,
-        (matched.centre, matched.axes),
-        job.time,
-    )
+    rigid = matched.centre, matched.axes
+    corners = corner_error(job, result, forces(task.force))
+    path = task.desired_path
+    error = learned_error(result, path, job.spindle, job.tool, job.operations, rigid, job.time, corners)
     return LearnedInputs(forces, error)
 
 
@@ -194,16 +235,15 @@ def _published(
     request: LearnRequest,
     job: CutProgram,
     matched: Matched,
-    parts: Sequence[MeasuredPart],
+    cut: tuple[Remembered, Sequence[str]],
     learned: Learned,
     stage: Stage,
 ) -> Learned:
-    """Writes the next program by the main job, then what was learnt."""
+    """Writes the next program by the main job, then what was learnt; cut: the parts, and what cut each of them."""
     if learned.exit == 1:
         return learned
-    main, result = request.main, learned.attribution
-    folder = request.output or main.program.parent / "learned"
-    robot = job.ready.robot
+    (remembered, programs), parts = cut, cut[0].parts
+    main, result, folder, robot = request.main, learned.attribution, _folder(request), job.ready.robot
     stem = robot.path.stem.removesuffix("_learned")
     robot_path = folder / f"{stem}_learned.yaml"
     gap = {"before_rms_mm": learned.promise.before / MM, "after_rms_mm": learned.residual_rms / MM}
@@ -215,17 +255,20 @@ def _published(
     if factors:
         files[folder / f"{main.program.stem}.force_factors.yaml"] = factors
     own = folder / f"{main.program.stem}.learned.json"
-    extra = [path for path in (request.csv, request.json) if path is not None]
-    _spare(request, job, [*files, own, *extra])
-    inputs = _learned_inputs(request, job, matched, result)
+    extra = [path for path in (request.csv, request.page, request.json) if path is not None]
+    _spare(request, job, parts, [*files, own, *extra, remembered.path])
+    applied = result.damped(request.gain)
+    inputs = _learned_inputs(job, matched, applied)
     if content is not None:
-        inputs = replace(inputs, robot=robot_of(content, robot_path))
+        acting = learned_robot_file(applied, robot, parts, gap, robot_path) or content
+        inputs = replace(inputs, robot=robot_of(acting, robot_path))
+    following = folder / main.program.name
+    if not request.dry_run:
+        keep_program(following)
     if learned.promise.better:
         stage("compensating the next program")
         report = compensate(
-            replace(
-                main, output=folder / main.program.name, learned=inputs, dry_run=request.dry_run, json=None
-            ),
+            replace(main, output=following, learned=inputs, dry_run=request.dry_run, json=None),
             stage,
         )
         findings = in_order_of_place([*learned.findings, *report.findings])
@@ -235,20 +278,48 @@ def _published(
     if request.dry_run:
         return learned
     outputs = () if learned.next_program is None else learned.next_program.outputs
-    learned = replace(learned, outputs=(*outputs, *map(str, [*files, own, *extra])))
+    learned = replace(learned, outputs=(*outputs, *map(str, [*files, own, *extra, remembered.path])))
     files[own] = json_bytes(learned)
     if request.csv is not None:
         files[request.csv] = learned_csv(learned)
+    if request.page is not None:
+        from postproc.workflows.learn_page import page_of
+
+        links = {
+            "next program": None if learned.next_program is None else following,
+            "robot file": robot_path if robot_path in files else None,
+            "points (CSV)": request.csv,
+            "result (JSON)": own,
+        }
+        files[request.page] = page_of(learned, job, matched, request.page, links)
     if request.json is not None:
         files[request.json] = json_bytes(learned)
+    kept = keep_program(following) if learned.next_program is not None else None
+    record = record_step(remembered, programs, _step(learned, remembered.path, kept))
+    if request.new_history and remembered.raw is not None:
+        files[remembered.path.with_suffix(".json.old")] = remembered.raw
     job.ready.inputs.refuse_changed()
-    write_atomically(files, last=own)
+    write_atomically(files, last=own, still=remembered.refuse_changed)
+    replace_file(remembered.path, record.as_bytes(), remembered.refuse_changed)
     return learned
 
 
-def _spare(request: LearnRequest, job: CutProgram, outputs: Sequence[Path]) -> None:
+def _step(learned: Learned, record: Path, kept: Path | None) -> RecordedStep:
+    """This run, for the record; kept: the copy of the next program."""
+    ends = learned.promise
+    after, lower, upper = (round(value / MM, 6) for value in (ends.after, ends.lower, ends.upper))
+    step = RecordedStep(len(learned.data), learned.attribution.verdict, after, lower, upper)
+    if kept is None:
+        return step
+    digest = hashlib.sha256(kept.read_bytes()).hexdigest()
+    return replace(step, file=Path(relative_path(kept, record.parent)).as_posix(), sha256=digest)
+
+
+def _spare(
+    request: LearnRequest, job: CutProgram, parts: Sequence[MeasuredPart], outputs: Sequence[Path]
+) -> None:
     """Raises Refusal FIL007 for an output that is an input, or that is named twice."""
     push = [] if request.push is None else [request.push]
-    job.ready.inputs.refuse_outputs(outputs, [*request.measured, *push])
+    job.ready.inputs.refuse_outputs(outputs, [*(part.file for part in parts), *push])
     if len({place(path) for path in outputs}) < len(outputs):
         raise Refusal(Finding("FIL007", "two results have the same name", str(outputs[0])))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,9 @@ from postproc.verification.pairing import Different, Pairing, pair_motions
 from postproc.workflows.cell_force_factors import operations_of
 from postproc.workflows.learn_commands import commands_at
 from postproc.workflows.preparation import Prepared, Request, prepare
+
+SHORT = 12
+"""Digits of a SHA-256 that name a kept program."""
 
 WIDE = 0.5 * MM
 """Distance at which a point is still compared with the surface, to see whether it is a measured place."""
@@ -92,7 +96,9 @@ def read_job(request: Request) -> CutProgram:
     task, cell, path = ready.task, ready.cell, ready.task.toolpath
     program = str(request.program)
     if task.external is not None:
-        message = "external axes move in this program; learning knows the arm only"
+        message = (
+            "external axes carry the robot or the part, and the causes of their errors are not known here"
+        )
         raise Refusal(
             Finding("LRN011", message, program, help="measure a part that is cut with the arm alone")
         )
@@ -171,15 +177,22 @@ def _cutters(ready: Prepared, used: Ints, program: str) -> tuple[tuple[Cutter, .
     return tuple(cutters), tuple(findings)
 
 
-def match(request: Request, job: CutProgram, parts: Sequence[MeasuredPart], known: PriorKnowledge) -> Matched:
-    """The points of all parts, in the state in which the robot left them.  Raises Refusal LRN002, LRN003, LRN004."""
+def match(
+    request: Request,
+    job: CutProgram,
+    parts: Sequence[MeasuredPart],
+    known: PriorKnowledge,
+    kept: Sequence[Path] = (),
+) -> Matched:
+    """The points of all parts, in the state in which the robot left them; ``kept``: of ``cutting_file``.  Raises
+    Refusal LRN002, LRN003, LRN004."""
     findings: list[Finding] = []
     several: list[TouchedPoints] = []
     rows: list[Ints] = []
     number = 0
     group: list[Ints] = []
     for part in parts:
-        other, pairing = cutting_program(request, job, part)
+        other, pairing = cutting_program(request, job, part, kept)
         points, keep, reported = _touched(job, part, other, pairing)
         findings += reported
         several.append(points)
@@ -245,25 +258,35 @@ def _free(rigid: Floats, part: Ints, fixed: Bools) -> Floats:
     return np.stack(columns, axis=1) if columns else np.zeros((len(part), 0))
 
 
-def cutting_program(
-    request: Request, job: CutProgram, part: MeasuredPart
-) -> tuple[Prepared | None, Pairing | None]:
-    """The program that cut ``part``, None for the original.  Raises Refusal LRN002."""
-    main = request.program
-    path = main
+def cutting_file(main: Path, part: MeasuredPart, kept: Sequence[Path] = ()) -> tuple[Path, str]:
+    """The file of the program that cut ``part``, and its SHA-256; ``kept``: folders with copies of programs by the
+    start of their SHA-256.  Raises Refusal LRN002."""
+    places = [main]
     if part.cut_with:
         places = [folder / part.cut_with for folder in (part.file.parent, main.parent)]
-        path = next((place for place in places if place.is_file()), places[0])
-        if not path.is_file():
-            message = f"# cut_with: {part.cut_with} is neither beside this file nor beside {main.name}"
-            raise Refusal(
-                Finding("LRN002", message, str(part.file), help="name the program that cut the part")
-            )
-    digest = hashlib.sha256(read_text_file(path)).hexdigest()
-    if not digest.startswith(part.program_digest):
-        message = f"{path.name} is not the program that cut this part: its SHA-256 starts with {digest[:12]}"
-        help = f"the file states {part.program_digest[:12]}; name the program as it ran, not a later one"
-        raise Refusal(Finding("LRN002", message, str(part.file), help=help))
+    places += [folder / part.program_digest[:SHORT] / main.name for folder in kept]
+    found = [path for path in places if path.is_file()]
+    for path in found:
+        digest = hashlib.sha256(read_text_file(path)).hexdigest()
+        if digest.startswith(part.program_digest):
+            return path, digest
+    if not found:
+        message = f"# cut_with: {part.cut_with} is neither beside this file nor beside {main.name}"
+        raise Refusal(Finding("LRN002", message, str(part.file), help="name the program that cut the part"))
+    digest = hashlib.sha256(read_text_file(found[0])).hexdigest()
+    message = (
+        f"{found[0].name} is not the program that cut this part: its SHA-256 starts with {digest[:SHORT]}"
+    )
+    help = f"the file states {part.program_digest[:SHORT]}; name the program as it ran, not a later one"
+    raise Refusal(Finding("LRN002", message, str(part.file), help=help))
+
+
+def cutting_program(
+    request: Request, job: CutProgram, part: MeasuredPart, kept: Sequence[Path] = ()
+) -> tuple[Prepared | None, Pairing | None]:
+    """The program that cut ``part``, None for the original; ``kept``: of ``cutting_file``.  Raises Refusal LRN002."""
+    main = request.program
+    path, _ = cutting_file(main, part, kept)
     if path.resolve() == main.resolve():
         return None, None
     cell = job.ready.cell.path

@@ -18,11 +18,10 @@ from postproc.workflows.learn_commands import commands_at
 from postproc.workflows.learn_points import CutProgram, cutting_program, read_job
 from postproc.workflows.preparation import Request
 
-from .shop import RADIUS
 from .truth import SCATTER, Truth
 
 CORNER = 8.0
-"""[mm] from a corner of the path within which the cutter is in it."""
+"""[mm] along the path from a corner, within which the cutter is in it."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,7 @@ def cut(
     scatter = {name: 1 + SCATTER * rng.normal() for name in job.operations.names}
     errors = np.empty(len(point))
     corner = _corners(surface)
-    sense = np.sign(states.direction)
+    sense = _senses(surface, np.maximum(truth.hardware.width, truth.hardware.gap))
     tcp = task.tool[surface.row]
     for k in range(len(point)):
         name = job.operations.names[job.operations.which[surface.row[k]]]
@@ -113,17 +112,40 @@ _WAVES = np.array([[1.0, 0.4, 0.0], [-0.3, 1.0, 0.0], [0.7, 0.7, 0.0]]) * 2 * np
 
 
 def _corners(surface: Surface) -> np.ndarray:
-    """(K,) 1 where the cutter is in a corner of a pocket when it cuts the point."""
-    path = surface.program.ready.task.desired_path
-    tip = path.at(surface.row, surface.share).position
+    """(K,) 1 where the cutter is within CORNER of a corner along its own path when it cuts the point."""
+    task = surface.program.ready.task
+    path, carries = task.desired_path, task.carries
+    end = np.cumsum(path.length)
+    tip = end[surface.row] - (1.0 - surface.share) * path.length[surface.row]
     near = np.zeros(len(tip))
-    for row in range(1, len(surface.program.tool)):
-        if surface.program.ready.task.carries[row] and surface.program.ready.task.carries[row - 1]:
+    for row in range(1, len(carries)):
+        if carries[row] and carries[row - 1]:
             one, other = path.tangent(np.array([row - 1, row]), np.array([1.0, 0.0]))
             if one @ other < 0.7:
-                start = path.start[np.array([row])].position[0]
-                near[np.linalg.norm(tip - start, axis=1) < 1e-3 * max(CORNER, RADIUS)] = 1.0
+                near[np.abs(tip - end[row - 1]) < 1e-3 * CORNER] = 1.0
     return near
+
+
+def _senses(surface: Surface, width: np.ndarray) -> np.ndarray:
+    """(K, 6) -1..1 side on which each gear lies, in the order of the motions, with the whole ``width`` (6,) [rad] of
+    its loop."""
+    q = surface.program.ready.task.track.q
+    half = 0.5 * np.maximum(width, 1e-9)
+    output = np.zeros(6)
+    started = False
+    senses = np.zeros((len(surface.row), 6))
+    for row in range(len(q)):
+        if not np.isfinite(q[row]).all():
+            started = False
+            continue
+        if not started:
+            output, started = q[row].copy(), True
+            continue
+        for k in np.flatnonzero(surface.row == row):
+            motor = q[row - 1] + surface.share[k] * (q[row] - q[row - 1])
+            senses[k] = (motor - np.clip(output, motor - half, motor + half)) / half
+        output = np.clip(output, q[row] - half, q[row] + half)
+    return senses
 
 
 def _turned(force: np.ndarray, up: np.ndarray, angle: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,8 @@ from postproc.learning.touched_points import touched_points
 from .cutting import Surface, aligned_rms, cut, probe, surface_of, write_csv
 from .mirrors import interpolated, smoothed
 from .shop import AWAY, surface_points, write_shop
-from .truth import HIDDEN, draw_truth
+from .truth import HIDDEN, draw_forces, draw_truth
+from .visible import visible_gain
 
 POINTS = 140
 """Points of the surface at which parts are compared; the measured ones are some of them, or more are drawn."""
@@ -36,7 +38,9 @@ OPTIONS: dict[str, dict[str, Any]] = {
     "outliers": {"count": 100, "outliers": 0.03},
     "smooth": {"count": 100, "smooth": 3e-5},
     "place": {"count": 100, "place": True},
-    "third": {"count": 100, "parts": 3},
+    "other": {"count": 100, "other": True},
+    "third": {"count": 60, "parts": 4},
+    "half": {"count": 60, "gain": 0.5},
     **{name: {"count": 120, "hidden": (name,)} for name in HIDDEN},
     "two": {"count": 120, "hidden": 2},
     "sign": {"count": 100, "wrong": "sign"},
@@ -75,7 +79,8 @@ class Learner:
 
 
 def prepare_shops(folder: Path) -> tuple[Path, Path]:
-    """Two shops with the same part at two places, each with its program compensated by the shipped robot file."""
+    """Two shops with the same part at two places, each with its program compensated by the shipped robot file, and in
+    the first one another part of other operations."""
     from postproc.workflows.preparation import Request
     from postproc.workflows.program import compensate
 
@@ -84,6 +89,7 @@ def prepare_shops(folder: Path) -> tuple[Path, Path]:
         program = write_shop(folder / name, **({} if base is None else {"base": base}))
         compensate(Request(program, force=""))
         places.append(program.parent)
+    write_shop(places[0] / "other", pockets="DE")
     return places[0], places[1]
 
 
@@ -127,8 +133,11 @@ def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dic
         (shop / name).write_text("\n".join(text) + "\n")
     out = f"learned_{row}"
     shutil.rmtree(shop / out, ignore_errors=True)
-    told = learner.ask(shop, [name], out)
+    asked = {"gain": options.get("gain", 1.0), "new_history": True}
+    told = learner.ask(shop, [name], out, **asked)
     answer |= told
+    if hidden:
+        answer["visible"] = visible_gain(home, truth, programs[0], shop / name, chosen)
     if not told["refused"]:
         answer["covered"] = _covered(told["causes"], truth)
     if told["refused"] or "wrong" in options:
@@ -138,6 +147,7 @@ def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dic
     for number in range(2, options.get("parts", 2) + 1):
         following = shop / out / "part.src" if told["written"] else programs[-1]
         kept = shop / f"{row}_part{number}.src"
+        programs.append(kept)
         shutil.copy(following, kept)
         after = cut(home, truth, plant, kept, rng)
         parts.append(aligned_rms(home, after))
@@ -145,12 +155,14 @@ def draw(row: str, seed: int, shops: tuple[Path, Path], learner: Learner) -> dic
             name = f"{row}_{number}.csv"
             write_csv(shop / name, home, chosen, probe(home, after, chosen, noise, rng), kept, noise)
             measured.append(name)
-            told = learner.ask(shop, measured, out)
+            told = learner.ask(shop, measured, out, **asked)
             if told["refused"]:
                 break
     answer["after"], answer["parts"] = parts[-1], parts
     again = cut(home, truth, plant, programs[0], rng)
     answer |= _others(home, again, chosen, deviation, noise, told)
+    if options.get("other"):
+        answer |= _other_operations(shops[0], rng, truth, plant, out)
     if options.get("place"):
         answer |= _elsewhere(shops, (point, normal, feature), truth, plant, rng, told, out, learner)
     return answer
@@ -255,3 +267,29 @@ def _elsewhere(
     compensate(request)
     after = aligned_rms(away, cut(away, truth, plant, shops[1] / "transferred" / "part.src", rng))
     return {"place_before": before, "place_after": after}
+
+
+def _other_operations(
+    home: Path, rng: np.random.Generator, truth: Any, plant: Any, out: str
+) -> dict[str, float]:
+    """RMS [m] of another part, whose operations have forces of their own, with the shipped robot file and with what was
+    learnt at home."""
+    from postproc.workflows.preparation import Request
+    from postproc.workflows.program import compensate
+
+    folder = home / "other"
+    other = surface_of(folder, *surface_points(POINTS, rng, "DE"))
+    names = [name for name in other.program.operations.names if name != "tool 1"]
+    truth = replace(truth, **draw_forces(rng, names))
+    cell = folder / "cell_learned.yaml"
+    cell.write_text((folder / "cell.yaml").read_text() + (home / out / "part.force_factors.yaml").read_text())
+    learned = list((home / out).glob("*_learned.yaml"))
+    sizes = {}
+    for key, own, robot in (
+        ("other_before", folder / "cell.yaml", None),
+        ("other_after", cell, str(learned[0]) if learned else None),
+    ):
+        output = folder / key / "part.src"
+        compensate(Request(folder / "part.src", force="", cell=own, robot=robot, output=output))
+        sizes[key] = aligned_rms(other, cut(other, truth, plant, output, rng))
+    return sizes

@@ -14,6 +14,8 @@ POCKETS = {
     "A": (60.0, 50.0, 160.0, 120.0),
     "B": (300.0, 60.0, 180.0, 100.0),
     "C": (120.0, 240.0, 260.0, 110.0),
+    "D": (100.0, 80.0, 220.0, 90.0),
+    "E": (200.0, 230.0, 150.0, 140.0),
 }
 """Corner and size [mm]."""
 
@@ -21,6 +23,8 @@ FORCES = {"FLOOR": (-30.0, 62.0, -18.0), "WALL": (48.0, 55.0, -8.0)}
 """[N] in the feed frame."""
 
 DEPTH = 12.0
+NEAREST = 9.0
+"""[mm] of a point of a wall from the corner, which the cutter rounds."""
 
 CELL = """\
 robot: kuka_kr270
@@ -124,13 +128,10 @@ def surface_points(
             features.append(f"FLOOR {name}")
             continue
         z = rng.uniform(-DEPTH + 1.0, -1.0)
-        side, along = rng.integers(4), rng.uniform(0.12, 0.88)
-        place = [
-            (x + along * wide, y),
-            (x + wide, y + along * high),
-            (x + along * wide, y + high),
-            (x, y + along * high),
-        ]
+        side, along = rng.integers(4), rng.random()
+        right = x + NEAREST + along * (wide - 2 * NEAREST)
+        up = y + NEAREST + along * (high - 2 * NEAREST)
+        place = [(right, y), (x + wide, up), (right, y + high), (x, up)]
         normal = [(0.0, 1.0), (-1.0, 0.0), (0.0, -1.0), (1.0, 0.0)]
         points.append([*place[side], z])
         normals.append([*normal[side], 0.0])

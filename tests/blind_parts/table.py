@@ -9,6 +9,9 @@ import numpy as np
 
 SAMPLES = 2000
 
+TELLING = float(np.log(100.0))
+"""An effect can be told where the truth itself would be so much likelier (logarithm)."""
+
 
 def percent(value: float) -> str:
     return f"{100 * value:.0f}"
@@ -31,7 +34,7 @@ def share_interval(count: int, of: int) -> str:
     p, z = count / of, 1.96
     middle, half = p + z * z / (2 * of), z * np.sqrt(p * (1 - p) / of + z * z / (4 * of * of))
     low, high = ((middle + sign * half) / (1 + z * z / of) for sign in (-1, 1))
-    return f"{percent(p)} ({percent(low)}..{percent(high)})"
+    return f"{percent(p)} ({percent(max(low, 0.0))}..{percent(high)})"
 
 
 NAMES = {
@@ -74,7 +77,7 @@ def lines_of(answers: Sequence[dict[str, Any]]) -> list[str]:
             share_interval(int(worse), len(done)), share_interval(kept, len(done)), refused,
         ]  # fmt: skip
         text.append("| " + " | ".join(cells) + " |")
-    return text + _place(answers) + _names(answers) + _coverage(answers)
+    return text + _place(answers) + _other(answers) + _parts(answers) + _names(answers) + _coverage(answers)
 
 
 def _place(answers: Sequence[dict[str, Any]]) -> list[str]:
@@ -90,30 +93,65 @@ def _place(answers: Sequence[dict[str, Any]]) -> list[str]:
     ]
 
 
+def _other(answers: Sequence[dict[str, Any]]) -> list[str]:
+    done = [one for one in answers if "other_after" in one]
+    if not done:
+        return []
+    removed = np.array([1 - one["other_after"] / one["other_before"] for one in done])
+    worse = sum(bool(value < 0) for value in removed)
+    return [
+        "",
+        f"other operations, of which nothing is claimed: {median_interval(removed)} % removed, worse"
+        f" {share_interval(worse, len(done))} % ({len(done)} draws)",
+    ]
+
+
+def _parts(answers: Sequence[dict[str, Any]]) -> list[str]:
+    """Errors of the parts one after another."""
+    text = []
+    for row in dict.fromkeys(one["row"] for one in answers if len(one.get("parts", [])) > 1):
+        own = [one for one in answers if one["row"] == row and len(one.get("parts", [])) > 1]
+        most = max(len(one["parts"]) for one in own)
+        sizes = np.array([[one["before"], *one["parts"]] for one in own if len(one["parts"]) == most])
+        middle, high = 1e6 * np.median(sizes, axis=0), 1e6 * np.quantile(sizes, 0.95, axis=0)
+        words = ", ".join(f"{m:.1f} ({h:.1f})" for m, h in zip(middle, high, strict=True))
+        text += ["", f"{row}: parts 1 to {most + 1}, um RMS, median (95th percentile): {words}"]
+    return text
+
+
+def _kind(name: str) -> str:
+    """The effect of a name, without its joint."""
+    return next((one for one, effect in NAMES.items() if name.startswith(effect)), name)
+
+
 def _names(answers: Sequence[dict[str, Any]]) -> list[str]:
+    """What is named, by what is hidden: all draws, and those in which it can be told at all."""
     seen = [one for one in answers if "named" in one]
-    null = [one for one in seen if not one["hidden"]]
+    hidden = dict.fromkeys(tuple(one["hidden"]) for one in seen)
+    heads = [*NAMES, "engagement", "drift"]
     text = [
         "",
-        "| hidden | draws | right name % | no name % | wrong name % |",
-        "| --- | --- | --- | --- | --- |",
+        "| hidden | draws | can be told % | of these right % | wrong name % of all | ambiguous % | unknown %"
+        " | named: " + " | ".join(heads) + " |",
+        "| --- |" + " --- |" * (6 + len(heads)),
     ]
-    kinds = dict.fromkeys(tuple(one["hidden"]) for one in seen if len(one["hidden"]) == 1)
-    for kind in kinds:
+    for kind in sorted(hidden):
         own = [one for one in seen if tuple(one["hidden"]) == kind]
-        right = sum(bool(one["named"]) and all(right_name(n, kind) for n in one["named"]) for one in own)
-        none = sum(not one["named"] for one in own)
+        able = [one for one in own if one.get("visible", 0.0) > TELLING]
+        right = sum(bool(one["named"]) and all(right_name(n, kind) for n in one["named"]) for one in able)
+        wrong = sum(any(not right_name(n, kind) for n in one["named"]) for one in own)
+        names = [{_kind(name) for name in one["named"]} for one in own]
+        verdicts = [sum(one["verdict"] == word for one in own) for word in ("ambiguous", "unknown")]
         cells = [
-            kind[0],
+            " and ".join(kind) or "nothing",
             str(len(own)),
-            *(share_interval(n, len(own)) for n in (right, none, len(own) - right - none)),
+            share_interval(len(able), len(own)) if kind else "-",
+            share_interval(right, len(able)),
+            share_interval(wrong, len(own)),
+            *(percent(count / len(own)) for count in verdicts),
+            *(str(sum(head in each for each in names)) for head in heads),
         ]
         text.append("| " + " | ".join(cells) + " |")
-    wrong = sum(bool(one["named"]) for one in null)
-    text.append(
-        f"| nothing | {len(null)} | - | {share_interval(len(null) - wrong, len(null))}"
-        f" | {share_interval(wrong, len(null))} |"
-    )
     return text
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from plant import Hardware, Plant, Spring, kr270
@@ -52,6 +53,14 @@ def filed_compliances() -> np.ndarray:
     return np.array([term.values[f"c{i}"] for i in range(1, 7)])
 
 
+def draw_forces(rng: np.random.Generator, operations: list[str]) -> dict[str, Any]:
+    """``factor`` and ``turn`` of a truth."""
+    return {
+        "factor": {name: rng.uniform(1 - FORCE_OFF, 1 + FORCE_OFF) for name in operations},
+        "turn": {name: rng.uniform(-TURN_OFF, TURN_OFF, 2) for name in operations},
+    }
+
+
 def draw_truth(
     rng: np.random.Generator, operations: list[str], hidden: tuple[str, ...] = (), smooth: float = 0.0
 ) -> Truth:
@@ -60,8 +69,7 @@ def draw_truth(
     truth = Truth(
         compliance=filed * rng.uniform(1 - C_OFF, 1 + C_OFF, 6),
         spring=rng.uniform(1 - C_OFF, 1 + C_OFF),
-        factor={name: rng.uniform(1 - FORCE_OFF, 1 + FORCE_OFF) for name in operations},
-        turn={name: rng.uniform(-TURN_OFF, TURN_OFF, 2) for name in operations},
+        **draw_forces(rng, operations),
         radius=rng.normal(0, RADIUS_OFF),
         length=rng.normal(0, LENGTH_OFF),
         hidden=hidden,
@@ -77,10 +85,10 @@ def draw_truth(
             one[joint] = rng.uniform(3e-5, 8e-5)
             parts["gap"] = one
         elif name == "base":
-            one[3:5] = rng.uniform(1e-8, 4e-8, 2)
+            one[3:5] = rng.uniform(0.5e-7, 2e-7, 2)
             parts["base"] = one
         elif name == "radial":
-            parts["radial"] = rng.uniform(1e-8, 3e-8)
+            parts["radial"] = rng.uniform(1e-7, 4e-7)
     if "corner_force" in hidden:
         truth = replace(truth, corner=rng.uniform(0.3, 0.7))
     wobble = np.column_stack([rng.normal(0, smooth, 3), rng.uniform(0, 2 * np.pi, 3)])

@@ -12,7 +12,7 @@ import numpy as np
 def main() -> None:
     """Each line of standard input is a task {folder, measured, options}; each answer a line of JSON."""
     import postproc
-    from postproc.learning.covariance import Explanation, Surface
+    from postproc.learning.covariance import Explanation, SmoothField
 
     for line in sys.stdin:
         task = json.loads(line)
@@ -31,7 +31,7 @@ def main() -> None:
         result = learned.attribution
         whole = result.explained
         named = len(result.causes) - sum(len(one.causes) for one in result.candidates)
-        alone = Explanation(whole.layout, Surface(), whole.rest, whole.columns[:, :named], whole.by_force)
+        alone = Explanation(whole.layout, SmoothField(), whole.rest, whole.columns[:, :named], whole.by_force)
         mean = alone.causes()[0] * result.prediction.deviations[:named]
         answer = {
             "refused": [],

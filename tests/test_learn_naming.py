@@ -1,0 +1,70 @@
+"""Effects that a part may hide: one that shows is named and corrected, one that has no place is not."""
+
+import numpy as np
+import pytest
+from blind_parts.cutting import aligned_rms, cut, probe, surface_of, write_csv
+from blind_parts.shop import surface_points, write_shop
+from blind_parts.truth import draw_truth
+
+import postproc
+from postproc.learning.candidates import MissingEffect
+from postproc.learning.causes import Cause, CauseKind
+from postproc.learning.next_program import FeedTurns
+
+
+def test_a_corner_reaches_as_far_as_the_cutter():
+    """Two vertices of a quarter turn, 100 mm apart, and a path of 1 m: 1 within the radius, 0 beyond, 1/2 at it."""
+    station = np.array([0.448, 0.452, 0.548, 0.552])
+    turned = 0.5 * np.pi * np.array([0.0, 1.0, 1.0, 2.0])
+    turns = FeedTurns(station, turned, np.array([1.0]), np.array([1.0]))
+    share = np.array([0.30, 0.4395, 0.442, 0.445, 0.45, 0.458, 0.47, 0.5, 0.55, 0.7])
+    weight = turns.at(np.zeros(10, int), share, np.full(10, 0.008))
+    assert weight == pytest.approx([0, 0, 0.5, 1, 1, 0.5, 0, 0, 1, 0], abs=0.13)
+    wide = turns.at(np.zeros(1, int), np.array([0.5]), np.array([0.06]))
+    assert wide == pytest.approx([1.0])
+
+
+def test_a_size_that_cannot_be_negative_gains_nothing_from_it():
+    """The same column with either sign: the evidence of the one that the data contradict is far below that of none."""
+    from postproc.learning.attribution import evidence_with
+    from postproc.learning.covariance import Explanation, Layout, SmoothField
+
+    rng = np.random.default_rng(0)
+    count = 60
+    place = rng.uniform(0, 0.3, (count, 3))
+    normal = np.tile([0.0, 0.0, 1.0], (count, 1))
+    layout = Layout(place, normal, np.full(count, 1e-5), np.zeros((count, 0)), np.zeros(count, int))
+    column = 3e-5 * np.sign(rng.normal(size=(count, 1)))
+    rest = 1.2 * column[:, 0] + rng.normal(0, 1e-5, count)
+    bare = Explanation(layout, SmoothField(), rest, np.zeros((count, 0)), np.zeros(count))
+    cause = Cause("backlash.b1", "effect", CauseKind.VALUE, 6e-5, "rad")
+    gains = {}
+    for sign in (1.0, -1.0):
+        candidate = MissingEffect("backlash of A1", (cause,), None, sign * column, True)
+        gains[sign] = evidence_with(bare.with_columns(sign * column), candidate) - bare.evidence
+    assert gains[1.0] > 100
+    assert gains[-1.0] < gains[1.0] - 100
+
+
+@pytest.mark.slow
+def test_a_force_in_corners_is_named_and_corrected(tmp_path):
+    """Its points are few, and look like outliers until it is known."""
+    program = write_shop(tmp_path / "shop")
+    first = postproc.compensate(program, force=True) and program.parent / "compensated" / "part.src"
+    rng = np.random.default_rng([4, 4711])
+    surface = surface_of(program.parent, *surface_points(140, rng))
+    truth = draw_truth(rng, list(surface.program.operations.names), ("corner_force",))
+    plant = truth.plant()
+    before = cut(surface, truth, plant, first, rng)
+    chosen = rng.choice(140, 120, replace=False)
+    write_csv(
+        program.parent / "m.csv", surface, chosen, probe(surface, before, chosen, 1e-5, rng), first, 1e-5
+    )
+    learned = postproc.learn(program, program.parent / "m.csv")
+    assert [one.name for one in learned.attribution.named] == ["corner_force"]
+    named = next(one for one in learned.to_dict()["causes"] if one["cause"] == "corner_force")
+    assert named["lower"] < 1 + truth.corner < named["upper"] or named["value"] == pytest.approx(
+        1 + truth.corner, rel=0.05
+    )
+    after = cut(surface, truth, plant, program.parent / "learned" / "part.src", rng)
+    assert aligned_rms(surface, after) < 0.35 * aligned_rms(surface, before)
