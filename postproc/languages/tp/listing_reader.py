@@ -119,9 +119,8 @@ def _statements(document: Document, listing: TpListing, run: TpPropagation) -> l
 def _assumed(document: Document, rows: TpRows) -> list[Finding]:
     """That frames of points were taken, once."""
     for row, name in rows.assumed.items():
-        message = (
-            f"{name}_NUM is not known here; the frames of the points are taken ({len(rows.assumed)} motions)"
-        )
+        more = f", and at {len(rows.assumed) - 1} other motions" if len(rows.assumed) > 1 else ""
+        message = f"{name}_NUM is not known here{more}; the frames of the points are taken"
         return [row_finding(document, rows, row, "FTP017", message)]
     return []
 

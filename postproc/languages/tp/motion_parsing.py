@@ -24,7 +24,7 @@ _ACTION = (
     rb"(?:CALL[ \t]++[A-Z_][A-Z0-9_]*+(?:[ \t]*+\([^()]*+\))?+|POINT_LOGIC"
     rb"|[A-Z]{1,2}"
     + _REGISTER
-    + rb"[ \t]*+=[ \t]*+(?:ON|OFF|PULSE(?:,[0-9.]++sec)?+|[0-9]++|A?+R"
+    + rb"[ \t]*+=[ \t]*+(?:ON|OFF|PULSE(?:[ \t]*+,[ \t]*+[0-9.]++[ \t]*+sec)?+|[0-9]++|A?+R"
     + _REGISTER
     + rb"))"
 )
@@ -33,8 +33,8 @@ _CARRIED = re.compile(
 )
 _WRIST = re.compile(rb"[ \t]*+Wjnt\b", re.I)
 _OWN = re.compile(
-    rb"[ \t]*+(?:(?:TB|TA)[ \t]*+[0-9]*+\.?+[0-9]*+[ \t]*+sec,[ \t]*+" + _ACTION
-    + rb"|DB[ \t]*+-?+[0-9]*+\.?+[0-9]*+[ \t]*+mm,[ \t]*+" + _ACTION
+    rb"[ \t]*+(?:(?:TB|TA)[ \t]*+[0-9]*+\.?+[0-9]*+[ \t]*+sec[ \t]*+,[ \t]*+" + _ACTION
+    + rb"|DB[ \t]*+-?+[0-9]*+\.?+[0-9]*+[ \t]*+mm[ \t]*+,[ \t]*+" + _ACTION
     + rb"|(?:Arc|Weld)[ \t]++(?:Start|End)[ \t]*+(?:" + _REGISTER + rb")?+|SPOT" + _REGISTER + rb"|BREAK\b)",
     re.I,
 )  # fmt: skip

@@ -6,7 +6,8 @@ import re
 from dataclasses import dataclass, field
 
 _HEAD = re.compile(
-    rb"\s*+P\[[ \t]*+([0-9]++)[ \t]*+(:[ \t]*+(?:\"[^\"\r\n]*+\"|[^\]\"\r\n]*+))?+[ \t]*+\]\s*+\{"
+    rb"\s*+P[ \t]*+\[[ \t]*+([0-9]++)[ \t]*+(:[ \t]*+(?:\"[^\"\r\n]*+\"|[^\]\"\r\n]*+))?+[ \t]*+\]\s*+\{",
+    re.I,
 )
 _GROUP = re.compile(rb"\s*+GP[ \t]*+([0-9]++)[ \t]*+:", re.I)
 _FRAME = re.compile(rb"\s*+(UF|UT)[ \t]*+:[ \t]*+([0-9]++|F)\b", re.I)
@@ -18,7 +19,7 @@ _VALUE = re.compile(
 )
 _COMMA = re.compile(rb"\s*+,")
 _END = re.compile(rb"\s*+\}\s*+;")
-_NEXT = re.compile(rb"^[ \t]*+P\[", re.M)
+_NEXT = re.compile(rb"^[ \t]*+P[ \t]*+\[", re.M | re.I)
 _FLAGS = re.compile(
     rb"\s*+([FN])\s*+([UD])\s*+([TB])\s*+,\s*+(-?[0-9]++)\s*+,\s*+(-?[0-9]++)\s*+,\s*+(-?[0-9]++)\s*+", re.I
 )

@@ -39,7 +39,7 @@ class StatementFlow:
             self._check_jumps()
         self.blocks: list[tuple[int, int]] = []
         self.block_at: dict[int, int] = {}
-        if self.problem is None:
+        if self.problem is None and statements:
             self._cut()
 
     def _find_labels(self) -> None:

@@ -71,10 +71,11 @@ _LIMIT = re.compile(rb"(?:JOINT|LINEAR)_MAX_SPEED\b.*", re.I | re.S)
 _POINT_READ = re.compile(rb"(?<![A-Z])P[ \t]*+\[[ \t]*+([0-9]++)?+", re.I)
 _PLACE = re.compile(rb"\b[LJC]POS\b", re.I)
 _STARTS = re.compile(
-    rb"(Weave|Track|Touch Offset|Search Start|SOFTFLOAT|MIG EYE|LINE|CTRL|FORCE CTRL)\b.*", re.I | re.S
+    rb"(Weave|Track|Touch[ \t]++Offset|Search[ \t]++Start|SOFTFLOAT|MIG[ \t]++EYE|LINE|FORCE[ \t]++CTRL)\b.*",
+    re.I | re.S,
 )
 _STOPS = re.compile(
-    rb"(?:(Weave|Track|Touch Offset|SOFTFLOAT|MIG EYE|FORCE CTRL)[ \t]++End|(Search)[ \t]++End)\b.*",
+    rb"(?:(Weave|Track|Touch[ \t]++Offset|SOFTFLOAT|MIG[ \t]++EYE|FORCE[ \t]++CTRL)[ \t]++End|(Search)[ \t]++End)\b.*",
     re.I | re.S,
 )
 _MAY_DISPLACE = re.compile(
@@ -103,7 +104,7 @@ def parse_statement(statement: NumberedStatement) -> TpStatement:
     if motion is not None:
         return motion
     if is_motion_like(text):
-        return StatementNotRead()
+        return StatementNotRead(moves=True)
     return _parse(text.strip())
 
 
@@ -153,14 +154,18 @@ def _parse_settings(text: bytes) -> TpStatement:
     if _LIMIT.fullmatch(text):
         return OverrideStatement(None)
     if (found := _STOPS.fullmatch(text)) is not None:
-        return DisplacementSwitch((found[1] or found[2]).upper(), False)
+        return DisplacementSwitch(_name(found[1] or found[2]), False)
     if (found := _STARTS.fullmatch(text)) is not None:
-        return DisplacementSwitch(found[1].upper().removesuffix(b" START"), True)
+        return DisplacementSwitch(_name(found[1]), True)
     return (
         OtherStatement()
         if _OTHER.fullmatch(text)
         else StatementNotRead(_MAY_DISPLACE.search(text) is not None)
     )
+
+
+def _name(words: bytes) -> bytes:
+    return b" ".join(words.upper().split()).removesuffix(b" START")
 
 
 def _action(text: bytes) -> TpStatement:

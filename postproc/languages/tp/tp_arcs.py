@@ -102,7 +102,7 @@ def _check_turn(rows: TpRows, row: int, start: int, rotation: Floats) -> None:
     turn = turn_between(rotation[[start]], rotation[[row]])[0]
     total = float(turn @ turn)
     share = 0.0 if total < 1e-18 else float(turn_between(rotation[[start]], via[None])[0] @ turn) / total
-    even = rotation[start] @ rotation_from_vector(min(max(share, 0.0), 1.0) * turn)
+    even = rotation_from_vector(min(max(share, 0.0), 1.0) * turn) @ rotation[start]
     off = float(np.linalg.norm(turn_between(even[None], via[None])))
     if off > EVEN:
         message = f"the orientation at its auxiliary point is {off / DEG:.2f} deg off the even turn from start to end"

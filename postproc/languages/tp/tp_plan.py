@@ -102,7 +102,7 @@ class TpPlanNumbers:
         place = centre + (back @ radius[..., None])[..., 0]
         start = plan.rotation[np.maximum(motions - 1, 0)]
         turn = rotation_from_vector(0.5 * turn_between(start, plan.rotation[motions]))
-        angles = abc_from_rotation(start @ turn, near[:, 5:2:-1] * DEG)[:, ::-1] / DEG
+        angles = abc_from_rotation(turn @ start, near[:, 5:2:-1] * DEG)[:, ::-1] / DEG
         return np.concatenate([place / MM, angles], axis=1)
 
     def unfit_arc(self, motion: int) -> str:

@@ -193,6 +193,8 @@ class TpPropagation:
                 if recording:
                     self.calls.setdefault(at, one.name)
                 return replace(state, base=None, tool=None, registers=(), last=frozenset([ELSEWHERE]))
+            case StatementNotRead(moves=True):
+                return replace(state, last=frozenset([at]))
             case StatementNotRead():
                 if recording:
                     self.unread.add(at)

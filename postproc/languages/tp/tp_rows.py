@@ -9,7 +9,6 @@ import numpy as np
 from postproc.base.arrays import Floats
 from postproc.base.document import Document
 from postproc.languages.tp.listing import TpListing
-from postproc.languages.tp.motion_parsing import is_motion_like
 from postproc.languages.tp.position_data import (
     CARTESIAN,
     EXTERNAL,
@@ -92,9 +91,7 @@ class RowBuilder:
     def build(self) -> TpRows:
         rows = self.rows
         for at, one in enumerate(self.flow.statements):
-            if isinstance(one, TpMove) or (
-                isinstance(one, StatementNotRead) and is_motion_like(self.listing.statements[at].text)
-            ):
+            if isinstance(one, TpMove) or (isinstance(one, StatementNotRead) and one.moves):
                 self._add(at, one if isinstance(one, TpMove) else None)
         n = len(rows)
         rows.numbers, rows.vias = np.full((n, 6), np.nan), np.full((n, 6), np.nan)

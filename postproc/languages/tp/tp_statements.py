@@ -185,9 +185,11 @@ class OtherStatement:
 
 @dataclass(frozen=True, slots=True)
 class StatementNotRead:
-    """A statement that is not understood.  ``displaces``: it may displace the targets after it."""
+    """A statement that is not understood.  ``displaces``: it may displace the targets after it; ``moves``: it starts as
+    a motion does."""
 
     displaces: bool = False
+    moves: bool = False
 
 
 TpStatement = (

@@ -131,7 +131,8 @@ def _locked(
     locked: dict[int, Finding] = {}
 
     def lock(row: int, code: str, message: str) -> None:
-        locked.setdefault(row, row_finding(document, rows, row, code, message))
+        if row not in rows.problems:
+            locked.setdefault(row, row_finding(document, rows, row, code, message))
 
     for row in rows.problems:
         move = rows.moves[row]
