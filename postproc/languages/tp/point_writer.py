@@ -39,12 +39,9 @@ class _PointWriter:
         touched, way = task.touched()
         task.refuse_forbidden(touched, way)
         divided = np.flatnonzero(task.plan.role != Role.ORIGINAL)
-        rewritten = self._rewritten_runs(
-            {*np.flatnonzero(touched | way).tolist(), *task.plan.source[divided].tolist()}
-        )
-        chosen = np.union1d(np.flatnonzero(touched | way), np.array(sorted(rewritten), np.int64)).astype(
-            np.int64
-        )
+        moved = np.flatnonzero(touched | way)
+        rewritten = self._rewritten_runs(set(moved.tolist()), set(task.plan.source[divided].tolist()))
+        chosen = np.array(sorted({*moved.tolist(), *rewritten}), np.int64)
         edits = list(self._in_text(chosen, rewritten))
         lines = self._inserted(divided)
         if self.held:
@@ -55,11 +52,12 @@ class _PointWriter:
             edits.append(Edit(Span(0, at, at), b"".join(self.points.texts)))
         return EditedTargets(Edits.joined(edits))
 
-    def _rewritten_runs(self, rows: set[int]) -> set[int]:
-        """Rows of runs of A motions of which one is moved or divided: their points are no longer on one circle, so that
-        the run is written as L and C."""
+    def _rewritten_runs(self, moved: set[int], divided: set[int]) -> set[int]:
+        """Rows of runs of A motions of which one is moved, or an arc divided: their points are no longer on one circle,
+        so that the run is written as L and C."""
         runs = self.task.places.runs
-        return {one for row in rows if row in runs for one in runs[row]}
+        arcs = {row for row in divided if row in runs and row != runs[row][0]}
+        return {one for row in moved | arcs if row in runs for one in runs[row]}
 
     def _in_text(self, rows: np.ndarray, rewritten: set[int]) -> Iterator[Edit]:
         """Edits of the points of ``rows`` (K,), and of the form of those that are ``rewritten``."""

@@ -150,11 +150,12 @@ class TpPlanNumbers:
 
 
 class NewPoints:
-    """Points that are added to /POS, with numbers above those of the file."""
+    """Points that are added to /POS, with numbers above those that the file has or names."""
 
     def __init__(self, task: TpPlanNumbers) -> None:
         self.task = task
-        self.next = max(task.places.positions, default=0) + 1
+        places = task.places
+        self.next = max([0, *places.positions, *places.uses, *places.read]) + 1
         self.texts: list[bytes] = []
 
     def add(self, source: TpPosition, literals: Mapping[bytes, bytes], named: bool = False) -> int:
