@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -222,3 +224,13 @@ def test_programs_in_other_languages_are_not_claimed() -> None:
     for name in ("krl/arcs.src", "fanuc/program.nc", "rapid/arc.mod"):
         path = CASES.parent / name
         assert detect(path, path.read_bytes()) is not TP
+
+
+def test_the_sample_can_be_made_again_and_is_understood() -> None:
+    folder = CASES.parents[2] / "samples" / "m900ib_pocket"
+    made = subprocess.run([sys.executable, folder / "make_pocket.py"], check=True, capture_output=True)
+    raw = (folder / "pocket.ls").read_bytes()
+    assert made.stdout.splitlines() == raw.splitlines()
+    program = read(raw)
+    assert len(program.toolpath) == 25
+    assert not program.findings
