@@ -32,7 +32,8 @@ def point(n: int, *values: str | float, name: str = "", more: str = "") -> str:
     x, y, z, w, p, r = (*values, *("0.000", "0.000", "0.000", "180.000", "0.000", "0.000")[len(values) :])
     label = f'P[{n}:"{name}"]' if name else f"P[{n}]"
     return (
-        f"{label}{{\n   GP1:\n\tUF : 1, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX = {x}  mm,\tY = {y}  mm,\tZ = {z}  mm,\n"
+        f"{label}{{\n   GP1:\n\tUF : 1, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n"
+        f"\tX = {x}  mm,\tY = {y}  mm,\tZ = {z}  mm,\n"
         f"\tW = {w} deg,\tP = {p} deg,\tR = {r} deg{more}\n}};\n"
     )
 

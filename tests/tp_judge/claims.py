@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from tp_judge.machine import DoneMotion
 
 from postproc.languages.dialect import Program
+from tp_judge.machine import DoneMotion
 
 
 def disagreements(program: Program, done: list[DoneMotion]) -> list[str]:

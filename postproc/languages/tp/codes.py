@@ -39,7 +39,7 @@ CODES = define(
             "point is not complete",
             "The point does not state all of its numbers, is there twice, or its configuration is not read.",
             _STAYS,
-            "Teach the point again, or write X, Y, Z, W, P, R and a configuration such as 'N U T, 0, 0, 0'.",
+            "Set the point again, or write X, Y, Z, W, P, R and a configuration such as 'N U T, 0, 0, 0'.",
             "`X = ********  mm` of a point that was never taught.",
         ),
         "FTP005": _warning(
@@ -110,7 +110,7 @@ CODES = define(
             "path of the tool to axes",
             "The point states axes, and the motion is a line or an arc.",
             _STAYS,
-            "Teach the point in X, Y, Z, W, P, R.",
+            "Write the point as X, Y, Z, W, P, R.",
             "`L P[1] 100mm/sec FINE ;` with `P[1]{ GP1: UF : 1, UT : 1, J1= 0.000 deg, ...`.",
         ),
         "FTP015": _warning(
@@ -153,8 +153,8 @@ CODES = define(
             "`LINE_COUNT = 12;` of a program with 14 lines.",
         ),
         "FTP020": _warning(
-            "program assigns a frame",
-            "The program assigns the user frame or the tool of the motion.",
+            "program sets a frame",
+            "The user frame or the tool of the motion is set by the program.",
             "The place of the target in the cell is unknown, so the motion is not corrected.",
             "State the frame in the controller and in the cell, and remove the assignment.",
             "`UFRAME[1]=PR[5] ;`.",

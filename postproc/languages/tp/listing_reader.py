@@ -8,10 +8,10 @@ from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.base.memory import without_garbage_collection
 from postproc.languages.dialect import EditSyntax, Program, ReadingSettings
-from postproc.languages.tp.listing import TpListing, read_listing
 from postproc.languages.tp.position_data import TpPosition, read_positions
 from postproc.languages.tp.statement_flow import StatementFlow
 from postproc.languages.tp.statement_parsing import parse_statement
+from postproc.languages.tp.tp_listing import TpListing, read_listing
 from postproc.languages.tp.tp_propagation import TpPropagation, TpState
 from postproc.languages.tp.tp_remarks import find_marker
 from postproc.languages.tp.tp_rows import RowBuilder, TpRows, read_points

@@ -19,6 +19,7 @@ _VALUE = re.compile(
 )
 _COMMA = re.compile(rb"\s*+,")
 _END = re.compile(rb"\s*+\}\s*+;")
+_CLOSE = re.compile(rb"\}\s*+;")
 _NEXT = re.compile(rb"^[ \t]*+P[ \t]*+\[", re.M | re.I)
 _FLAGS = re.compile(
     rb"\s*+([FN])\s*+([UD])\s*+([TB])\s*+,\s*+(-?[0-9]++)\s*+,\s*+(-?[0-9]++)\s*+,\s*+(-?[0-9]++)\s*+", re.I
@@ -120,7 +121,7 @@ def _position(raw: bytes, head: re.Match[bytes], stop: int) -> TpPosition:
         after = _item(raw, at, stop, one)
         if after < 0:
             one.problem = f"P[{one.number}] is not understood"
-            later = _END.search(raw, at, stop)
+            later = _CLOSE.search(raw, at, stop)
             following = _NEXT.search(raw, at, stop)
             ends = [found for found in (later and later.end(), following and following.start()) if found]
             one.stop = min(ends, default=stop)

@@ -21,6 +21,10 @@ END = -1
 """In the place of a statement: the end of the program."""
 
 
+MOST_JUMPS = 50_000
+"""Places to which computed jumps may lead, all together."""
+
+
 class StatementFlow:
     """The blocks of a program, each of statements that run from its first to its last.
 
@@ -93,6 +97,9 @@ class StatementFlow:
                 return []
 
     def _check_jumps(self) -> None:
+        computed = sum(None in self.targets(one) for one in self.statements)
+        if computed * len(self.labels) > MOST_JUMPS:
+            self._refuse(0, "too many computed jumps may lead to too many labels")
         for at, one in enumerate(self.statements):
             for label in self.targets(one):
                 if label is not None and label not in self.labels:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from postproc.languages.tp.listing import NumberedStatement
 from postproc.languages.tp.motion_parsing import is_motion_like, parse_motion
+from postproc.languages.tp.tp_listing import NumberedStatement
 from postproc.languages.tp.tp_statements import (
     BlockElse,
     BlockEnd,

@@ -118,7 +118,7 @@ def _run(rows: TpRows, run: list[int], position: Floats, arcs: tuple[Floats, Flo
     elif any(row in rows.problems for row in run) or np.isnan(position[run]).any():
         why = "a point of its run of A motions is not known"
     elif len({(rows.base[row], rows.tool[row]) for row in run}) > 1:
-        why = "its run of A motions changes the frame or the tool"
+        why = "the frame or the tool is another one within its run of A motions"
     if not why:
         points = position[run]
         first, middle, last = (points[[k]] for k in (0, len(run) // 2, -1))

@@ -135,7 +135,8 @@ class TpPlanNumbers:
         return touched, way
 
     def refuse_forbidden(self, touched: Bools, way: Bools) -> None:
-        """Raises ValueError where the plan moves or divides what cannot be: a defect of the caller."""
+        """touched, way (N,): as of ``touched``.  Raises ValueError where the plan moves or divides what cannot be: a
+        defect of the caller."""
         path, plan = self.path, self.plan
         fixed = path.constraints
         moved = {row for row in (*fixed.refused, *fixed.locked) if touched[row]}

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from postproc.base.document import Document, Span
 from postproc.base.findings import Finding
 from postproc.languages.dialect import MARK
-from postproc.languages.tp.listing import TpListing
+from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import TpPropagation
 from postproc.languages.tp.tp_rows import TpRows
 from postproc.languages.tp.tp_statements import TpMove, TpRemark

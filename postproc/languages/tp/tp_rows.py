@@ -8,7 +8,6 @@ import numpy as np
 
 from postproc.base.arrays import Floats
 from postproc.base.document import Document
-from postproc.languages.tp.listing import TpListing
 from postproc.languages.tp.position_data import (
     CARTESIAN,
     EXTERNAL,
@@ -18,6 +17,7 @@ from postproc.languages.tp.position_data import (
     configuration_flags,
 )
 from postproc.languages.tp.statement_flow import StatementFlow
+from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import CONTRADICTORY, ELSEWHERE, START, TpPropagation, TpState
 from postproc.languages.tp.tp_statements import PositionUse, StatementNotRead, TpMove, TpStatement
 from postproc.toolpath import LOST, FrameRef, Kind
@@ -183,10 +183,10 @@ class RowBuilder:
             rows.refuse(row, "FTP004", position.problem)
             return None
         if self.every_point or number in self.assigned:
-            rows.refuse(row, "FTP002", f"the program assigns P[{number}] where it runs")
+            rows.refuse(row, "FTP002", f"P[{number}] is set by the program where it runs")
             return None
         if len(position.groups) > 1 or position.groups[0].number != 1:
-            rows.refuse(row, "FTP011", f"P[{number}] moves other motion groups than the first one")
+            rows.refuse(row, "FTP011", f"P[{number}] is of other motion groups than the first one")
             return None
         return position.groups[0]
 
@@ -245,7 +245,7 @@ class RowBuilder:
             )
             return -1
         if (is_tool, number) in self.frames_set or (is_tool, -1) in self.frames_set:
-            rows.refuse(row, "FTP020", f"the program itself assigns {name}[{number}]")
+            rows.refuse(row, "FTP020", f"{name}[{number}] is set by the program itself")
             return -1
         if selected is None and row not in rows.problems:
             rows.assumed.setdefault(row, name)

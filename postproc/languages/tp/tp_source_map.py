@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from postproc.base.arrays import Floats
-from postproc.languages.tp.listing import TpListing
 from postproc.languages.tp.position_data import TpPosition
+from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_rows import TpRows
 from postproc.languages.tp.tp_statements import TpMove
 

@@ -12,8 +12,8 @@ from postproc.base.document import Document
 from postproc.base.findings import Finding
 from postproc.base.geometry import rotation_from_abc
 from postproc.base.units import DEG, MM
-from postproc.languages.tp.listing import TpListing
 from postproc.languages.tp.tp_arcs import arcs_of
+from postproc.languages.tp.tp_listing import TpListing
 from postproc.languages.tp.tp_propagation import TpPropagation
 from postproc.languages.tp.tp_remarks import annotate
 from postproc.languages.tp.tp_rows import TpRows
