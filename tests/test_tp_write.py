@@ -359,6 +359,7 @@ def same_as_krl(folder: Path, seed: int) -> int:
     return int(moving.sum()) if exits[0] == 0 else 0
 
 
+@pytest.mark.slow
 def test_a_path_in_tp_is_corrected_as_the_same_path_in_krl(tmp_path: Path) -> None:
     assert same_as_krl(tmp_path / "one", 3) > 8
 
@@ -438,3 +439,48 @@ def test_a_joint_follows_only_one_before_it(name: str, tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text(re.sub(r"J3: .*", name, text))
     with pytest.raises(Refusal):
         load_robot(tmp_path / "robot.yaml")
+
+
+SOFT = """
+effects:
+  - effect: joint_compliance
+    parameters:
+"""
+
+
+@pytest.mark.slow
+def test_the_main_job_on_a_soft_fanuc_is_read_back_and_verified(tmp_path: Path) -> None:
+    """The sample, on its robot with an invented compliance: shared points, arcs and axis positions."""
+    sample = Path(__file__).parents[1] / "samples" / "m900ib_pocket"
+    text = (sample / "pocket.ls").read_text()
+    assert text.count("P[2:above]") == 3
+    (tmp_path / "pocket.ls").write_text(text.replace("FORCE 120 260 -60", "FORCE 120 860 -60"))
+    values = (3.7e-7, 2.6e-7, 3.5e-7, 1.5e-6, 1.9e-6, 2.5e-6)
+    soft = [f"      c{k}: {{value: {c}, unit: rad/(N m), source: invented}}\n" for k, c in enumerate(values, 1)]
+    (tmp_path / "soft.yaml").write_text(find_robot(FANUC, None).read_text() + SOFT + "".join(soft))
+    cell = (sample / "cell.yaml").read_text().replace("fanuc_m900ib_700  ", "soft.yaml  ")
+    (tmp_path / "cell.yaml").write_text(cell + "max_growth: 6\n")
+    report = postproc.compensate(tmp_path / "pocket.ls", force=True)
+    assert report.exit == 0
+    out = tmp_path / "compensated" / "pocket.ls"
+    program = read(out.read_text())
+    assert program.marker is not None
+    assert {finding.code for finding in program.findings} == set()
+    verified = postproc.verify(tmp_path / "pocket.ls", out, force=True)
+    figures = verified.to_dict()
+    assert figures["original"]["max"] > 0.5
+    assert figures["compensated"]["max"] < 0.02
+    errors = report.to_dict()
+    assert errors["error_before_mm"]["max"] > 0.5
+    assert errors["error_after_mm"]["max"] < 0.005
+
+
+def test_a_zero_force_writes_the_same_bytes(tmp_path: Path) -> None:
+    sample = Path(__file__).parents[1] / "samples" / "m900ib_pocket"
+    for name in ("pocket.ls", "cell.yaml"):
+        (tmp_path / name).write_bytes((sample / name).read_bytes())
+    raw = re.sub(rb"!FORCE [^;]*;", b"!FORCE 0 0 0 ;", (tmp_path / "pocket.ls").read_bytes())
+    (tmp_path / "pocket.ls").write_bytes(raw)
+    postproc.compensate(tmp_path / "pocket.ls", force=True, output=tmp_path / "out" / "pocket.ls")
+    written_file = tmp_path / "out" / "pocket.ls"
+    assert written_file.read_bytes() == raw
