@@ -456,7 +456,9 @@ def test_the_main_job_on_a_soft_fanuc_is_read_back_and_verified(tmp_path: Path) 
     assert text.count("P[2:above]") == 3
     (tmp_path / "pocket.ls").write_text(text.replace("FORCE 120 260 -60", "FORCE 120 860 -60"))
     values = (3.7e-7, 2.6e-7, 3.5e-7, 1.5e-6, 1.9e-6, 2.5e-6)
-    soft = [f"      c{k}: {{value: {c}, unit: rad/(N m), source: invented}}\n" for k, c in enumerate(values, 1)]
+    soft = [
+        f"      c{k}: {{value: {c}, unit: rad/(N m), source: invented}}\n" for k, c in enumerate(values, 1)
+    ]
     (tmp_path / "soft.yaml").write_text(find_robot(FANUC, None).read_text() + SOFT + "".join(soft))
     cell = (sample / "cell.yaml").read_text().replace("fanuc_m900ib_700  ", "soft.yaml  ")
     (tmp_path / "cell.yaml").write_text(cell + "max_growth: 6\n")

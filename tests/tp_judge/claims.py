@@ -24,7 +24,7 @@ def disagreements(program: Program, done: list[DoneMotion]) -> list[str]:
                 wrong.append(f"line {motion.line}: it runs, and the reader says that it does not")
         else:
             wrong += [f"line {motion.line}: {what}" for what in _motion(program, row, motion)]
-        at = -2 if motion.after_call else -1 if before is None else before
+        at = -2 if motion.from_elsewhere else -1 if before is None else before
         if path.continues[row]:
             if at != row - 1:
                 wrong.append(f"line {motion.line}: it starts after row {at}, not after the row before it")

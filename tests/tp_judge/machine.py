@@ -27,7 +27,7 @@ class DoneMotion:
     stops: bool
     force: str | None
     displaced: bool
-    after_call: bool
+    from_elsewhere: bool
 
 
 class TpMachine:
@@ -232,7 +232,7 @@ class TpMachine:
                 corner == "FINE", self.force, self.weaves or any("Offset" in word for word in rest), self.called,
             )
         )  # fmt: skip
-        self.called = False
+        self.called = self.done[-1].displaced  # where it ends is not in the text
 
     def _speed(self, word: str) -> float | None:
         for unit, factor in (("mm/sec", 1.0), ("cm/min", 10 / 60), ("inch/min", 25.4 / 60)):

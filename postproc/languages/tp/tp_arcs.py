@@ -81,7 +81,7 @@ def _apart(starts: Floats, vias: Floats, ends: Floats) -> np.ndarray:
 def _start(rows: TpRows, row: int, kinds: Ints) -> int:
     """The row where an arc starts; -1 where that is not known, which refuses it."""
     before = rows.before[row]
-    if len(before) != 1 or before[0] < 0 or kinds[before[0]] == Kind.AXIS:
+    if before != (row - 1,) or row == 0 or kinds[row - 1] == Kind.AXIS:
         rows.refuse(row, "FTP012", "the position at its start is not known in numbers")
         return -1
     start = before[0]

@@ -168,8 +168,11 @@ class TpPropagation:
     def _step(self, at: int, one: TpStatement, state: TpState, recording: bool) -> TpState:
         match one:
             case TpMove():
-                last = frozenset([at]) if one.skip is None else frozenset([ELSEWHERE])
-                return replace(state, last=last)
+                # where a displaced or interrupted motion ends is not in the text
+                ends = (
+                    {ELSEWHERE} if one.problem is not None else {at, ELSEWHERE} if state.displaced else {at}
+                )
+                return replace(state, last=frozenset(ends))
             case TpRemark():
                 return _remark(one, state)
             case FrameSelection():
