@@ -38,6 +38,8 @@ class _PointWriter:
         task = self.task
         touched, way = task.touched()
         task.refuse_forbidden(touched, way)
+        arcs = np.flatnonzero(np.isfinite(task.path.arcs.sweep))
+        way[arcs] |= touched[arcs - 1]  # the tool is to turn evenly from the new start
         divided = np.flatnonzero(task.plan.role != Role.ORIGINAL)
         moved = np.flatnonzero(touched | way)
         rewritten = self._rewritten_runs(set(moved.tolist()), set(task.plan.source[divided].tolist()))
