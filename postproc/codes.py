@@ -16,6 +16,7 @@ from postproc.languages import codes as dialects
 from postproc.languages.gcode import codes as gcode
 from postproc.languages.krl import codes as krl
 from postproc.languages.rapid import codes as rapid
+from postproc.languages.tp import codes as tp
 from postproc.learning import codes as learning
 from postproc.measurements import codes as measurements
 from postproc.model import codes as model
@@ -37,6 +38,7 @@ TABLES: tuple[Mapping[str, Code], ...] = tuple(
         krl,
         gcode,
         rapid,
+        tp,
         robot,
         model,
         forces,

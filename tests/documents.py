@@ -78,6 +78,7 @@ def list_documents(root: Path = ROOT) -> list[Path]:
         root / "README.md",
         *(root / top / "README.md" for top in ("samples", "robots", "postproc", "tests")),
     ]
+    found.append(root / "postproc" / "languages" / "README.md")
     found += sorted((root / "samples").glob("*/README.md"))
     return [path.relative_to(root) for path in found]
 

@@ -23,10 +23,13 @@ MARK = "COMPENSATED by compensate "
 @dataclass(frozen=True)
 class EditSyntax:
     """What edits are checked by where the language has no addresses: the sign with which a comment starts, and the
-    signs after which a number of a target is.  Empty: comments after ; or in (), numbers after X, Y, Z, ..."""
+    signs after which a number of a target is.  Empty: comments after ; or in (), numbers after X, Y, Z, ...
+    points: the first line of a section of points after all motions, and the line after its points, before which further
+    points may come; 0 where the language has none."""
 
     comment: bytes = b""
     numbers_after: bytes = b""
+    points: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True)

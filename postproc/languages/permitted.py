@@ -43,7 +43,8 @@ def refuse_other(program: Program, edits: Edits, letters: bytes) -> None:
 
     - a number in the place of a number, or of an expression, after the address of a coordinate, outside of comments;
     - in the line of a motion, outside of comments: words and targets, of the dialect's ``letters``;
-    - whole lines of such words before the line of a motion or a spline block, or whole lines in a companion.
+    - whole lines of such words before the line of a motion or a spline block, or after the last point of a section of
+      points; or whole lines in a companion.
 
     Where the language has no addresses (``EditSyntax``), the number of a coordinate is one in a list.
     """
@@ -51,6 +52,8 @@ def refuse_other(program: Program, edits: Edits, letters: bytes) -> None:
     for index, document in enumerate(program.documents):
         own = edits.of(index)
         moving = _lines_of_motions(program.toolpath, document) if index == 0 else None
+        if moving is not None and program.edit_syntax.points[1]:
+            moving[program.edit_syntax.points[1]] = True
         look = _Look(document, own, words, moving, program.edit_syntax)
         for wrong in in_blocks(look.first_wrong, len(own), EDITS):
             if wrong >= 0:

@@ -138,7 +138,9 @@ class _LineCheck:
         self.inserted = np.sort(path.inserted_before[division.source[~division.original]])
         before, after = program.documents[0], again.documents[0]
         marked = program.marker is None and again.marker is not None
-        more = len(after.line_starts) - len(before.line_starts)
+        more = (again.edit_syntax.points[0] or len(after.line_starts)) - (
+            program.edit_syntax.points[0] or len(before.line_starts)
+        )
         if more != len(self.inserted) + marked:
             words = f"{len(self.inserted)} inserted motions occupy {more - marked} lines"
             raise Refusal(Finding("FIL008", words, self.file))

@@ -142,11 +142,11 @@ def all_axes(robot: Robot, axes: Floats, external: Floats) -> Floats:
     """(N, n) values of all joints from the six (N, 6) that a program states and ``external`` (N,), that of the external
     joint."""
     if robot.external is None:
-        return axes
+        return robot.joint_values(axes)
     values = np.full((len(axes), len(robot.joints)), np.nan)
     values[:, robot.programmed] = axes
     values[:, robot.external] = external
-    return values
+    return robot.joint_values(values)
 
 
 def _follow_on(

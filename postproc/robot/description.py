@@ -125,6 +125,15 @@ class Robot:
         stated = [np.nan if axis.speed is None else axis.speed for axis in self.axes]
         return np.array(stated or [np.nan] * len(self.joints))
 
+    def joint_values(self, programmed: Floats) -> Floats:
+        """(N, n) [rad, m] values between the links, from those (N, n) that programs and the pendant show."""
+        values = programmed
+        for column, axis in enumerate(self.axes):
+            if axis.follows is not None:
+                values = values.copy() if values is programmed else values
+                values[:, column] = programmed[:, column] + values[:, axis.follows]
+        return values
+
     @cached_property
     def nominal_chain(self) -> Chain:
         """The joints and the flange that the controller believes in."""

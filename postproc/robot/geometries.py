@@ -36,7 +36,10 @@ class Joint:
 @dataclass(frozen=True)
 class Axis:
     """A joint as its controller counts it: sign * value + offset is the angle or the travel of the geometry [rad, m].
-    ``speed`` [rad/s, m/s]: the fastest that it moves, None where the file does not state it."""
+    ``speed`` [rad/s, m/s]: the fastest that it moves, None where the file does not state it.
+    ``follows``: column of the joint to whose value programs do not count that of this one: the value between the links
+    is the programmed one plus that of the joint it follows (J3 of a Fanuc, which counts from the level); None without.
+    """
 
     name: str
     lower: float
@@ -45,6 +48,7 @@ class Axis:
     sign: float = 1.0
     offset: float = 0.0
     speed: float | None = None
+    follows: int | None = None
 
 
 @dataclass(frozen=True)

@@ -156,7 +156,7 @@ def read_axes(section: YamlSection) -> tuple[Axis, ...]:
     """The joints in the order of the chain: [lower, upper], or {limits, kind, unit, sign, offset, speed}."""
     section.text("source")
     factor = unit_factor(section, "rad")
-    axes = []
+    axes: list[Axis] = []
     for name in section:
         if name in ("source", "unit", "external"):
             continue
@@ -164,18 +164,19 @@ def read_axes(section: YamlSection) -> tuple[Axis, ...]:
             raise section.error(
                 "YML002", "is not a name of a joint; write a letter, then letters, digits, _", name
             )
-        axes.append(_axis(section, name, factor))
+        axes.append(_axis(section, name, factor, [axis.name for axis in axes]))
     _check_order(section, [axis.name for axis in axes])
     return tuple(axes)
 
 
-def _axis(section: YamlSection, name: str, factor: float) -> Axis:
+def _axis(section: YamlSection, name: str, factor: float, before: list[str]) -> Axis:
     if section.is_list(name):
         given, key, kind, sign, offset = section, name, "revolute", 1.0, 0.0
-        speed = None
+        speed, follows = None, None
     else:
         given, key = section.section(name), "limits"
-        given.only("limits", "kind", "unit", "sign", "offset", "speed")
+        given.only("limits", "kind", "unit", "sign", "offset", "speed", "follows")
+        follows = before.index(given.text("follows", choices=before)) if "follows" in given else None
         kind = given.text("kind", "revolute", ("revolute", "prismatic"))
         if kind == "prismatic" or "unit" in given:
             factor = unit_factor(given, "m" if kind == "prismatic" else "rad")
@@ -195,7 +196,9 @@ def _axis(section: YamlSection, name: str, factor: float) -> Axis:
         raise given.error("YML004", "an axis limit or offset exceeds 1000 deg; is it the right unit?", at)
     if kind == "prismatic" and max(largest, abs(offset)) > MAX_TRAVEL:
         raise given.error("YML004", "an axis limit or offset exceeds 200 m; is it the right unit?", at)
-    return Axis(name, lower * factor, upper * factor, kind, sign, offset, speed)
+    if follows is not None and kind != "revolute":
+        raise given.error("YML004", "only a revolute joint can follow another one", "follows")
+    return Axis(name, lower * factor, upper * factor, kind, sign, offset, speed, follows)
 
 
 def _check_order(section: YamlSection, names: list[str]) -> None:

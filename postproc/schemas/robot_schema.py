@@ -87,6 +87,7 @@ def _axis(kind: str, si_unit: str, required: tuple[str, ...]) -> Schema:
             "unit": text(choices=words_for(si_unit)),
             "sign": {"enum": [1, -1]},
             "offset": number(),
+            "follows": text("the joint before on top of whose value programs count this one"),
         },
         ["limits", *required],
     )
@@ -99,7 +100,7 @@ _JOINTS = mapping(
         "external": text("the joint of seven that the program does not move"),
     },
     ["source", "unit"],
-    "the joints in the order of the chain: [lower, upper], or limits with kind, unit, sign, offset",
+    "the joints in the order of the chain: [lower, upper], or limits with kind, unit, sign, offset, follows",
     {
         f"^(?!(?:source|unit|external)$){_JOINT}": {
             "anyOf": [

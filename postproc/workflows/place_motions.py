@@ -238,7 +238,7 @@ def _heads(ready: Prepared, rows: Ints, at_end: Bools) -> tuple[Ints, Floats, In
     last = np.searchsorted(on_axes, row) - 1
     known = np.flatnonzero(last >= 0)
     if start is not None:
-        anchor[heads] = start
+        anchor[heads] = robot.joint_values(start[None])[0]
     anchor[heads[known]] = task.track.q[on_axes[last[known]]]
     return head, anchor, sign
 

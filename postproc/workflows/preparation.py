@@ -418,7 +418,7 @@ def _start(cell: Cell, robot: Robot) -> Floats | None:
         )
         raise Refusal(Finding("YML004", message, str(cell.path), cell.start_line))
     units = np.array([DEG if joint.kind == "revolute" else MM for joint in robot.joints])
-    return np.asarray(stated * units)
+    return np.asarray(robot.joint_values((stated * units)[None])[0])
 
 
 def completed(path: Toolpath, cell: Cell, robot: Robot, program: Path) -> Toolpath:

@@ -1,0 +1,214 @@
+"""A plan as edits: numbers of points that serve one motion, new points elsewhere, inserted and renumbered lines."""
+
+from __future__ import annotations
+
+from codecs import BOM_UTF8
+from collections.abc import Iterator
+
+import numpy as np
+
+from postproc.base.document import Edit, Edits, Span
+from postproc.base.findings import Finding
+from postproc.languages.dialect import EditedTargets, Plan, Program, Role, WritingSettings
+from postproc.languages.tp.position_data import TpPosition
+from postproc.languages.tp.tp_plan import CHUNK, NewPoints, SixNumbers, TpPlanNumbers
+from postproc.languages.tp.tp_statements import TpMove
+from postproc.toolpath import Kind
+
+HELP = "Give each motion its own point."
+FLOWING = b"CNT100"
+"""Of inserted points at which the robot does not stop, where the motion itself does."""
+
+
+def edit_targets(program: Program, plan: Plan, writing: WritingSettings) -> EditedTargets:
+    """The edits after which the program makes the motions of ``plan``.
+
+    Raises ValueError if a row is asked to move, or to be divided, that cannot: a defect of the caller.
+    """
+    return _PointWriter(program, plan, writing).edited()
+
+
+class _PointWriter:
+    def __init__(self, program: Program, plan: Plan, writing: WritingSettings) -> None:
+        self.task = TpPlanNumbers(program, plan, writing)
+        self.points = NewPoints(self.task)
+        self.held: dict[int, Finding] = {}
+
+    def edited(self) -> EditedTargets:
+        task = self.task
+        touched, way = task.touched()
+        task.refuse_forbidden(touched, way)
+        arcs = np.flatnonzero(np.isfinite(task.path.arcs.sweep))
+        way[arcs] |= touched[arcs - 1]  # the tool is to turn evenly from the new start
+        divided = np.flatnonzero(task.plan.role != Role.ORIGINAL)
+        moved = np.flatnonzero(touched | way)
+        rewritten = self._rewritten_runs(set(moved.tolist()), set(task.plan.source[divided].tolist()))
+        chosen = np.array(sorted({*moved.tolist(), *rewritten}), np.int64)
+        edits = list(self._in_text(chosen, rewritten))
+        lines = self._inserted(divided)
+        if self.held:
+            return EditedTargets((), self.held)
+        edits += self._numbered(lines, bool(edits))
+        if self.points.texts:
+            at = task.places.listing.points[1]
+            edits.append(Edit(Span(0, at, at), b"".join(self.points.texts)))
+        return EditedTargets(Edits.joined(edits))
+
+    def _rewritten_runs(self, moved: set[int], divided: set[int]) -> set[int]:
+        """Rows of runs of A motions of which one is moved, or an arc divided: their points are no longer on one circle,
+        so that the run is written as L and C."""
+        runs = self.task.places.runs
+        arcs = {row for row in divided if row in runs and row != runs[row][0]}
+        return {one for row in moved | arcs if row in runs for one in runs[row]}
+
+    def _in_text(self, rows: np.ndarray, rewritten: set[int]) -> Iterator[Edit]:
+        """Edits of the points of ``rows`` (K,), and of the form of those that are ``rewritten``."""
+        task = self.task
+        for at in range(0, len(rows), CHUNK):
+            part = rows[at : at + CHUNK]
+            there = task.own[part]
+            wanted = task.wanted(part, there)
+            arcs = np.isfinite(task.plan.sweep[there]) & (task.path.kind[part] == Kind.CIRC)
+            vias = np.full((len(part), 6), np.nan)
+            near = np.where(
+                np.isnan(task.places.vias[part]), task.places.numbers[part], task.places.vias[part]
+            )
+            if arcs.any():
+                vias[arcs] = task.vias(there[arcs], near[arcs])
+            for k, row in enumerate(part.tolist()):
+                move = task.move(row)
+                numbers = self._numbers(
+                    task.point(row), task.places.numbers[row].tolist(), wanted[k].tolist()
+                )
+                yield from self._point(row, move, -1, task.point(row), numbers)
+                if task.path.kind[row] == Kind.CIRC:
+                    yield from self._via(row, move, int(there[k]), vias[k].tolist(), row in rewritten)
+                elif row in rewritten:
+                    yield Edit(Span(0, *move.head), b"L")
+
+    def _numbers(self, point: TpPosition, own: list[float], wanted: list[float]) -> SixNumbers:
+        return SixNumbers(own, wanted, self.task.decimals(point))
+
+    def _via(
+        self, row: int, move: TpMove, motion: int, wanted: list[float], rewritten: bool
+    ) -> Iterator[Edit]:
+        task = self.task
+        if rewritten:
+            self._check_arc(row, motion)
+            yield Edit(Span(0, *move.head), b"C P[%d]" % self._middle(row, wanted))
+            return
+        via = task.places.points[row][1]
+        if via is None:
+            raise ValueError(f"row {row} has no auxiliary point")
+        numbers = self._numbers(via, task.places.vias[row].tolist(), wanted)
+        if numbers.changed():
+            self._check_arc(row, motion)
+            yield from self._point(row, move, 0, via, numbers)
+
+    def _middle(self, row: int, wanted: list[float]) -> int:
+        """The number of a new point for the middle of an arc."""
+        point = self.task.point(row)
+        own = self.task.places.numbers[row].tolist()
+        return self.points.add(point, self._numbers(point, own, wanted).changed())
+
+    def _check_arc(self, row: int, motion: int) -> None:
+        unfit = self.task.unfit_arc(motion)
+        if unfit:
+            self.hold(row, unfit, "FTP012")
+
+    def _point(
+        self, row: int, move: TpMove, which: int, point: TpPosition, numbers: SixNumbers
+    ) -> Iterator[Edit]:
+        """The edits of a point: its literals, or the number of a new point in the motion."""
+        changed = numbers.changed()
+        if not changed:
+            return
+        why = self._why_not_in_place(point)
+        if not why:
+            spans = point.groups[0].spans
+            yield from (Edit(Span(0, *spans[name]), text) for name, text in changed.items())
+        elif self.task.writing.shared_points == "keep":
+            self.hold(row, why)
+        else:
+            number = self.points.add(point, changed, named=True)
+            yield Edit(Span(0, *move.points[which].span), b"%d" % number)
+
+    def _why_not_in_place(self, point: TpPosition) -> str:
+        """Why the numbers of a point cannot be edited; "" where they can."""
+        places = self.task.places
+        if point.number in places.read or places.any_read:
+            return f"other statements read P[{point.number}] too"
+        if places.uses[point.number] > 1:
+            return f"P[{point.number}] is shared by several motions"
+        return ""
+
+    def _inserted(self, motions: np.ndarray) -> dict[int, list[bytes]]:
+        """Row -> texts of the motions before it, after their line numbers."""
+        task = self.task
+        lines: dict[int, list[bytes]] = {}
+        for at in range(0, len(motions), CHUNK):
+            part = motions[at : at + CHUNK]
+            rows = task.plan.source[part]
+            wanted = task.wanted(rows, part)
+            arcs = (task.plan.role[part] == Role.INTERMEDIATE) & (task.path.kind[rows] == Kind.CIRC)
+            vias = np.full((len(part), 6), np.nan)
+            if arcs.any():
+                vias[arcs] = task.vias(part[arcs], task.places.numbers[rows[arcs]])
+            external = None if task.plan.external is None else task.plan.external[part]
+            for k, (motion, row) in enumerate(zip(part.tolist(), rows.tolist(), strict=True)):
+                now = [] if external is None else external[k].tolist()
+                text = self._line(motion, row, wanted[k].tolist(), vias[k].tolist(), now)
+                lines.setdefault(row, []).append(text)
+        return lines
+
+    def _line(self, motion: int, row: int, wanted: list[float], via: list[float], now: list[float]) -> bytes:
+        task = self.task
+        move, point = task.move(row), task.point(row)
+        literals = self._numbers(point, task.places.numbers[row].tolist(), wanted).changed()
+        if now:
+            external = self.points.external(point, now, task.path.external[row].tolist())
+            if external is None:
+                self.hold(row, "the external axes of an inserted motion are not known in numbers", "FTP022")
+            literals |= external or {}
+        form = b"L"
+        if via[0] == via[0]:
+            self._check_arc(row, motion)
+            form = b"C P[%d]" % self._middle(row, via)
+        number = self.points.add(point, literals)
+        passing = FLOWING if task.path.stops[row] else move.termination
+        rounding = passing if task.plan.flows[motion] else b"FINE"
+        words = [form, b"P[%d]" % number, move.speed, rounding, *([move.carried] if move.carried else [])]
+        return b" ".join(words) + b"    ;"
+
+    def _numbered(self, lines: dict[int, list[bytes]], edited: bool) -> Iterator[Edit]:
+        """Edits that insert lines, count all lines anew, and keep LINE_COUNT; the mark will be the first line."""
+        task = self.task
+        listing, document = task.places.listing, task.program.documents[0]
+        if not lines and not edited:
+            return
+        before = {int(task.path.line[row]): texts for row, texts in lines.items()}
+        count = 1 if task.program.marker is None else 0
+        for one in listing.statements:
+            width = one.number[1] - one.number[0]
+            start = len(BOM_UTF8) if one.line_start == 0 and task.raw.startswith(BOM_UTF8) else one.line_start
+            for text in before.get(one.line, ()):
+                count += 1
+                number = str(count).rjust(width).encode()
+                yield Edit(Span(0, start, start), number + b":" + text + document.newline)
+            if one.number[0] < 0:
+                continue
+            count += 1
+            if int(task.raw[slice(*one.number)]) != count:
+                yield Edit(Span(0, *one.number), str(count).rjust(width).encode())
+        span = listing.attributes.get(b"LINE_COUNT")
+        if (
+            span is not None
+            and task.raw[slice(*span)].strip() == b"%d" % listing.count
+            and count != listing.count
+        ):
+            yield Edit(Span(0, span[0], span[0] + len(b"%d" % listing.count)), b"%d" % count)
+
+    def hold(self, row: int, why: str, code: str = "FTP015") -> None:
+        document = self.task.program.documents[0]
+        place = document.place(self.task.move(row).head[0])
+        self.held.setdefault(row, Finding(code, why, str(document.path), *place, HELP))

@@ -1,0 +1,180 @@
+"""The points of /POS: their groups, frames, configurations and numbers, each with its place in the text."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+_HEAD = re.compile(
+    rb"\s*+P[ \t]*+\[[ \t]*+([0-9]++)[ \t]*+(:[ \t]*+(?:\"[^\"\r\n]*+\"|[^\]\"\r\n]*+))?+[ \t]*+\]\s*+\{",
+    re.I,
+)
+_GROUP = re.compile(rb"\s*+GP[ \t]*+([0-9]++)[ \t]*+:", re.I)
+_FRAME = re.compile(rb"\s*+(UF|UT)[ \t]*+:[ \t]*+([0-9]++|F)\b", re.I)
+_CONFIG = re.compile(rb"\s*+CONFIG[ \t]*+:[ \t]*+'([^'\r\n]*+)'", re.I)
+_NUMBER = rb"[-+]?+(?:[0-9]++\.?+[0-9]*+|\.[0-9]++)(?:E[-+]?+[0-9]++)?+"
+_VALUE = re.compile(
+    rb"\s*+(X|Y|Z|W|P|R|J[1-9]|E[1-9])[ \t]*+=[ \t]*+(" + _NUMBER + rb"|\*++)[ \t]*+(mm|deg)?+",
+    re.I,
+)
+_COMMA = re.compile(rb"\s*+,")
+_END = re.compile(rb"\s*+\}\s*+;")
+_CLOSE = re.compile(rb"\}\s*+;")
+_NEXT = re.compile(rb"^[ \t]*+P[ \t]*+\[", re.M | re.I)
+_FLAGS = re.compile(
+    rb"\s*+([FN])\s*+([UD])\s*+([TB])\s*+,\s*+(-?[0-9]++)\s*+,\s*+(-?[0-9]++)\s*+,\s*+(-?[0-9]++)\s*+", re.I
+)
+CARTESIAN = (b"X", b"Y", b"Z", b"W", b"P", b"R")
+JOINTS = tuple(b"J%d" % axis for axis in range(1, 7))
+EXTERNAL = tuple(b"E%d" % axis for axis in range(1, 7))
+_UNITS = {
+    **dict.fromkeys(CARTESIAN[:3], b"mm"),
+    **dict.fromkeys(CARTESIAN[3:], b"deg"),
+    **dict.fromkeys(JOINTS, b"deg"),
+}
+
+
+@dataclass(slots=True)
+class PositionGroup:
+    """What a point says of one motion group.
+
+    ``frames``: UF and UT -> number, None where it holds in any (F); ``config``: the text of the configuration;
+    ``values``: name -> value [mm, deg], None where it is not set (*); ``spans``: name -> start and stop of the literal.
+    """
+
+    number: int
+    frames: dict[bytes, int | None] = field(default_factory=dict)
+    config: bytes | None = None
+    values: dict[bytes, float | None] = field(default_factory=dict)
+    spans: dict[bytes, tuple[int, int]] = field(default_factory=dict)
+
+    @property
+    def is_joint(self) -> bool:
+        return b"J1" in self.values
+
+    def numbers(self, names: tuple[bytes, ...]) -> tuple[float, ...] | None:
+        """The values of ``names``; None where one is missing or not set."""
+        found = [self.values.get(name) for name in names]
+        return (
+            None
+            if any(value is None for value in found)
+            else tuple(value for value in found if value is not None)
+        )
+
+
+@dataclass(slots=True)
+class TpPosition:
+    """A point.  start, stop: its bytes, from the P on to its semicolon; ``number_span``: of its number; ``comment``: of
+    the colon and the name after it, empty without; ``problem``: why its numbers are not known, "" where they are."""
+
+    number: int
+    start: int
+    stop: int
+    number_span: tuple[int, int]
+    comment: tuple[int, int]
+    groups: list[PositionGroup] = field(default_factory=list)
+    problem: str = ""
+
+    def group(self, number: int) -> PositionGroup | None:
+        return next((group for group in self.groups if group.number == number), None)
+
+
+def read_positions(raw: bytes, start: int, stop: int) -> tuple[dict[int, TpPosition], list[int]]:
+    """The points between two bytes by their numbers, and where text starts that is no point."""
+    positions: dict[int, TpPosition] = {}
+    strange: list[int] = []
+    at = start
+    while True:
+        head = _HEAD.match(raw, at, stop)
+        if head is None:
+            rest = re.compile(rb"\s*+").match(raw, at, stop)
+            at = stop if rest is None else rest.end()
+            if at >= stop:
+                return positions, strange
+            strange.append(at)
+            after = _NEXT.search(raw, at + 1, stop)
+            if after is None:
+                return positions, strange
+            at = after.start()
+            continue
+        one = _position(raw, head, stop)
+        at = one.stop
+        known = positions.get(one.number)
+        if known is not None:
+            known.problem = f"P[{one.number}] is in the file twice"
+        else:
+            positions[one.number] = one
+
+
+def _position(raw: bytes, head: re.Match[bytes], stop: int) -> TpPosition:
+    start = head.start() + len(head[0]) - len(head[0].lstrip())
+    comment = head.span(2) if head[2] is not None else (head.end(1), head.end(1))
+    one = TpPosition(int(head[1][:9]), start, head.end(), head.span(1), comment)
+    at = head.end()
+    while True:
+        end = _END.match(raw, at, stop)
+        if end is not None:
+            one.stop = end.end()
+            if not one.groups:
+                one.problem = f"P[{one.number}] has no group"
+            return one
+        after = _item(raw, at, stop, one)
+        if after < 0:
+            one.problem = f"P[{one.number}] is not understood"
+            later = _CLOSE.search(raw, at, stop)
+            following = _NEXT.search(raw, at, stop)
+            ends = [found for found in (later and later.end(), following and following.start()) if found]
+            one.stop = min(ends, default=stop)
+            return one
+        comma = _COMMA.match(raw, after, stop)
+        at = after if comma is None else comma.end()
+
+
+def _item(raw: bytes, at: int, stop: int, one: TpPosition) -> int:
+    """Where an item ends; -1 where there is none that is known, or it is there twice."""
+    found = _GROUP.match(raw, at, stop)
+    if found is not None:
+        number = int(found[1][:9])
+        if one.group(number) is not None:
+            return -1
+        one.groups.append(PositionGroup(number))
+        return found.end()
+    if not one.groups:
+        return -1
+    group = one.groups[-1]
+    found = _FRAME.match(raw, at, stop)
+    if found is not None:
+        name = found[1].upper()
+        if name in group.frames:
+            return -1
+        group.frames[name] = None if found[2] in (b"F", b"f") else int(found[2][:9])
+        return found.end()
+    found = _CONFIG.match(raw, at, stop)
+    if found is not None:
+        if group.config is not None:
+            return -1
+        group.config = found[1]
+        return found.end()
+    return _number(raw, at, stop, group)
+
+
+def _number(raw: bytes, at: int, stop: int, group: PositionGroup) -> int:
+    found = _VALUE.match(raw, at, stop)
+    if found is None:
+        return -1
+    name, unit = found[1].upper(), (found[3] or b"").lower()
+    if name in group.values or unit != _UNITS.get(name, unit) or not unit:
+        return -1
+    group.values[name] = None if found[2].startswith(b"*") else float(found[2])
+    group.spans[name] = found.span(2)
+    return found.end()
+
+
+def configuration_flags(config: bytes) -> tuple[int, tuple[int, int, int]] | None:
+    """The flags 4 B + 2 D + F of a configuration (0: N U T), and its turns of axes 1, 4, 6; None where it is none."""
+    found = _FLAGS.fullmatch(config)
+    if found is None:
+        return None
+    flags = (found[3].upper() == b"B") * 4 + (found[2].upper() == b"D") * 2 + (found[1].upper() == b"F")
+    turns = tuple(int(found[k][:9]) for k in (4, 5, 6))
+    return flags, (turns[0], turns[1], turns[2])

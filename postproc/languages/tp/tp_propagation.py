@@ -1,0 +1,227 @@
+"""Frames, registers and comments in force, propagated over the flow of a TP program.
+
+Every statement is run with what holds on all paths that lead to it.  A motion has one fact, which holds in all of its
+executions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+
+from postproc.languages.tp.statement_flow import END, StatementFlow
+from postproc.languages.tp.tp_statements import (
+    ConditionalStatement,
+    DisplacementSwitch,
+    FrameSelection,
+    LoopStart,
+    Operand,
+    OverrideStatement,
+    PositionUse,
+    ProgramCall,
+    RegisterAssignment,
+    RegisterExpression,
+    RegisterOperand,
+    StatementNotRead,
+    TpMove,
+    TpRemark,
+    TpStatement,
+)
+
+START, ELSEWHERE = -1, -2
+"""In the place of a motion: the start of the program; what the program does not contain."""
+
+
+class Contradictory(IntEnum):
+    """In the place of a comment in force: it differs with the path of the program."""
+
+    CONTRADICTORY = 0
+
+
+CONTRADICTORY = Contradictory.CONTRADICTORY
+Said = TpRemark | Contradictory | None
+
+
+@dataclass(frozen=True, slots=True)
+class TpState:
+    """``base``, ``tool``: the selected numbers, None where they are not known; ``registers``: number -> value of those
+    that are known; ``displaced``: what displaces targets; ``override``: factor of speeds, None where it is not known;
+    ``last``: statements of the motions after which the robot is here."""
+
+    base: int | None = None
+    tool: int | None = None
+    registers: tuple[tuple[int, float], ...] = ()
+    displaced: frozenset[bytes] = frozenset()
+    override: float | None = 1.0
+    force: Said = None
+    switch: Said = None
+    last: frozenset[int] = frozenset([START])
+
+    def joined(self, other: TpState) -> TpState:
+        """What holds where two paths meet."""
+        if self == other:
+            return self
+        return TpState(
+            self.base if self.base == other.base else None,
+            self.tool if self.tool == other.tool else None,
+            tuple(sorted(set(self.registers) & set(other.registers))),
+            self.displaced | other.displaced,
+            self.override if self.override == other.override else None,
+            self.force if self.force == other.force else CONTRADICTORY,
+            self.switch if self.switch == other.switch else CONTRADICTORY,
+            self.last | other.last,
+        )
+
+    def value(self, operand: Operand) -> float | None:
+        if isinstance(operand, RegisterOperand):
+            return dict(self.registers).get(operand.number)
+        return operand
+
+    def result(self, expression: RegisterExpression) -> float | None:
+        """The value of an expression; None where it is not known."""
+        one = self.value(expression.first)
+        if not expression.operation or one is None:
+            return one
+        two = self.value(expression.second)
+        if two is None:
+            return None
+        match expression.operation:
+            case b"+":
+                return one + two
+            case b"-":
+                return one - two
+            case b"*":
+                return one * two
+        return None  # divisions round as the controller does
+
+    def with_register(self, number: int, value: float | None) -> TpState:
+        """Another value of a register, None where it is not known; number -1: any of them may have another one."""
+        known = {} if number < 0 else {key: old for key, old in self.registers if key != number}
+        if value is not None and abs(value) < 1e9:
+            known[number] = value
+        return replace(self, registers=tuple(sorted(known.items())))
+
+
+@dataclass(slots=True)
+class TpPropagation:
+    """``before``: statement -> what holds before it, of motions and comments that are run; ``calls``: statement ->
+    program that the file does not contain; ``reads``: statement that reads where the robot is -> motions after which;
+    ``unread``: statements that are not understood."""
+
+    flow: StatementFlow
+    before: dict[int, TpState] = field(default_factory=dict)
+    calls: dict[int, str] = field(default_factory=dict)
+    reads: dict[int, frozenset[int]] = field(default_factory=dict)
+    unread: set[int] = field(default_factory=set)
+
+    def run(self, state: TpState) -> None:
+        """Follows the program from its first statement."""
+        if self.flow.problem is not None or not self.flow.blocks:
+            return
+        starts: dict[int, TpState] = {0: state}
+        pending = {0}
+        while pending:
+            block = min(pending)
+            pending.remove(block)
+            for there, after in self._through(block, starts[block], False):
+                known = starts.get(there)
+                new = after if known is None else known.joined(after)
+                if new != known:
+                    starts[there] = new
+                    pending.add(there)
+        for block in sorted(starts):
+            self._through(block, starts[block], True)
+
+    def _through(self, block: int, state: TpState, recording: bool) -> list[tuple[int, TpState]]:
+        """The blocks that follow one, and what holds there."""
+        first, last = self.flow.blocks[block]
+        for at in range(first, last):
+            one = self.flow.statements[at]
+            if recording and isinstance(one, TpMove | TpRemark | StatementNotRead):
+                self.before[at] = state
+            if at == last - 1:
+                return self._leave(at, one, state, recording)
+            state = self._step(at, one, state, recording)
+        return []
+
+    def _leave(self, at: int, one: TpStatement, state: TpState, recording: bool) -> list[tuple[int, TpState]]:
+        after = self.flow.after(at)
+        states = dict.fromkeys(after, state)
+        if isinstance(one, ConditionalStatement):
+            done = self._step(at, one.action, state, recording)
+            holds = _decided(one, state)
+            leads = self.flow.targets(one)
+            if leads:
+                jumps, follow = set(after[1:]), after[0]
+                states = dict.fromkeys(after, state)
+                if holds is not None:
+                    states = dict.fromkeys(jumps if holds else {follow}, state)
+            elif END in after and len(after) == 2:
+                states = {there: state for there in after if holds is None or (there == END) == holds}
+            else:
+                states = {after[0]: done if holds else state if holds is False else state.joined(done)}
+        else:
+            done = self._step(at, one, state, recording)
+            states = dict.fromkeys(after, done)
+        return [(self.flow.block_at[there], new) for there, new in states.items() if there != END]
+
+    def _step(self, at: int, one: TpStatement, state: TpState, recording: bool) -> TpState:
+        match one:
+            case TpMove():
+                # where a displaced or interrupted motion ends is not in the text
+                ends = (
+                    {ELSEWHERE} if one.problem is not None else {at, ELSEWHERE} if state.displaced else {at}
+                )
+                return replace(state, last=frozenset(ends))
+            case TpRemark():
+                return _remark(one, state)
+            case FrameSelection():
+                value = state.result(one.value)
+                number = int(value) if value is not None and value == int(value) and value >= 0 else None
+                return replace(state, tool=number) if one.is_tool else replace(state, base=number)
+            case RegisterAssignment():
+                return state.with_register(one.register, state.result(one.value))
+            case LoopStart():
+                return state.with_register(one.register, None)
+            case PositionUse():
+                if one.reads_place and recording:
+                    self.reads[at] = self.reads.get(at, frozenset()) | state.last
+                return state if one.register is None else state.with_register(one.register, None)
+            case OverrideStatement():
+                return replace(state, override=None if one.percent is None else one.percent / 100.0)
+            case DisplacementSwitch():
+                changed = state.displaced | {one.name} if one.starts else state.displaced - {one.name}
+                return replace(state, displaced=frozenset(changed))
+            case ProgramCall():
+                if recording:
+                    self.calls.setdefault(at, one.name)
+                return replace(state, base=None, tool=None, registers=(), last=frozenset([ELSEWHERE]))
+            case StatementNotRead(moves=True):
+                return replace(state, last=frozenset([at]))
+            case StatementNotRead():
+                if recording:
+                    self.unread.add(at)
+                lost = state.displaced | ({b"a statement that is not understood"} if one.displaces else set())
+                state = replace(state, override=None, displaced=frozenset(lost))
+                return replace(state, base=None, tool=None, registers=(), last=frozenset([ELSEWHERE]))
+        return state
+
+
+def _remark(one: TpRemark, state: TpState) -> TpState:
+    words = one.text.replace("\t", " ").replace(",", " ").split(" ")
+    if words[0].upper() == "FORCE":
+        return replace(state, force=one)
+    if words[0].upper() == "COMPENSATE":
+        return replace(state, switch=one)
+    return state
+
+
+def _decided(one: ConditionalStatement, state: TpState) -> bool | None:
+    """Whether a condition holds; None where it is not known."""
+    if one.condition is None:
+        return None
+    left, sign, right = one.condition
+    a, b = state.value(left), state.value(right)
+    if a is None or b is None:
+        return None
+    return {b"=": a == b, b"<>": a != b, b"<": a < b, b">": a > b, b"<=": a <= b, b">=": a >= b}[sign]

@@ -1,0 +1,86 @@
+"""Comments: what speaks to this tool, and the mark of a compensated program."""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from postproc.base.document import Document, Span
+from postproc.base.findings import Finding
+from postproc.languages.dialect import MARK
+from postproc.languages.tp.tp_listing import TpListing
+from postproc.languages.tp.tp_propagation import TpPropagation
+from postproc.languages.tp.tp_rows import TpRows
+from postproc.languages.tp.tp_statements import TpMove, TpRemark
+from postproc.toolpath import Annotation
+
+_SPEAKS = re.compile(r"(?:FORCE|COMPENSATE)(?![A-Za-z0-9_])", re.I)
+
+
+class TpRemarks(NamedTuple):
+    annotations: tuple[Annotation, ...]
+    comments: tuple[Annotation, ...]
+
+
+def annotate(
+    document: Document, listing: TpListing, run: TpPropagation, rows: TpRows
+) -> tuple[TpRemarks, list[Finding]]:
+    """The comments at the rows before which they are.
+
+    A motion that runs with another FORCE or COMPENSATE comment than the last one in the text above it gets that comment
+    again; one that runs without any below one in the text is refused.
+    """
+    annotations: list[Annotation] = []
+    comments: list[Annotation] = []
+    findings: list[Finding] = []
+    shown: dict[str, TpRemark | None] = {"FORCE": None, "COMPENSATE": None}
+    row = 0
+    for at, one in enumerate(run.flow.statements):
+        if isinstance(one, TpRemark):
+            line = listing.statements[at].line
+            word = _SPEAKS.match(one.text)
+            if word is None:
+                if one.text and not one.text.startswith(MARK):
+                    comments.append(Annotation(row, one.text, line))
+            elif at in run.before:
+                annotations.append(Annotation(row, one.text, line))
+                shown[word[0].upper()] = one
+            else:
+                message = f"the comment {one.text[:40]!r} is where no statement is run"
+                findings.append(Finding("FTP016", message, str(document.path), *document.place(one.start)))
+        elif at in rows.row_of:
+            row = rows.row_of[at]
+            annotations += _repeated(rows, row, shown, document) if isinstance(one, TpMove) else []
+            row += 1
+    return TpRemarks(tuple(annotations), tuple(comments)), findings
+
+
+def _repeated(
+    rows: TpRows, row: int, shown: dict[str, TpRemark | None], document: Document
+) -> list[Annotation]:
+    """Comments in force at a row that are not the last ones in the text above."""
+    state = rows.states[row]
+    if state is None or row in rows.problems:
+        return []
+    found = []
+    for word, said in (("FORCE", state.force), ("COMPENSATE", state.switch)):
+        if said is shown[word]:
+            continue
+        if isinstance(said, TpRemark):
+            found.append(Annotation(row, said.text, document.place(said.start)[0]))
+            shown[word] = said
+        else:
+            rows.refuse(row, "FTP006", f"no {word} comment is in force, below one in the text")
+    return found
+
+
+def find_marker(listing: TpListing, run: TpPropagation) -> Span | None:
+    """The first comment of a compensated program: its sign and its text."""
+    raw = listing.raw
+    for one in run.flow.statements:
+        if isinstance(one, TpRemark) and one.text.startswith(MARK.strip()):
+            stop = one.stop
+            while raw[stop - 1] in b" \t":
+                stop -= 1
+            return Span(0, one.start, stop)
+    return None

@@ -1,0 +1,195 @@
+"""The rows of a TP program as a Toolpath, and what keeps them from being edited."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from postproc.base.arrays import Bools, FewRows
+from postproc.base.document import Document
+from postproc.base.findings import Finding
+from postproc.base.geometry import rotation_from_abc
+from postproc.base.units import DEG, MM
+from postproc.languages.tp.tp_arcs import arcs_of
+from postproc.languages.tp.tp_listing import TpListing
+from postproc.languages.tp.tp_propagation import TpPropagation
+from postproc.languages.tp.tp_remarks import annotate
+from postproc.languages.tp.tp_rows import TpRows
+from postproc.toolpath import (
+    Configuration,
+    EditConstraints,
+    OrientationControl,
+    OrientationMode,
+    Toolpath,
+)
+
+OTHER_PATHS = "several paths of the program lead to it or from the motion before it"
+
+
+def toolpath_of(
+    document: Document, listing: TpListing, run: TpPropagation, rows: TpRows
+) -> tuple[Toolpath, dict[int, tuple[int, ...]], list[Finding]]:
+    """The motions, the runs of A motions (row -> rows), and the findings."""
+    n = len(rows)
+    remarks, findings = annotate(document, listing, run, rows)
+    position = rows.numbers[:, :3] * MM
+    rotation = rotation_from_abc(rows.numbers[:, 5:2:-1] * DEG) if n else np.empty((0, 3, 3))
+    kinds = np.array(rows.kinds, np.int8)
+    arcs, runs = arcs_of(rows, position, rotation, kinds)
+    continues = _continues(rows.before)
+    refused = {row: row_finding(document, rows, row, *rows.problems[row]) for row in sorted(rows.problems)}
+    wrist = np.array([move is not None and move.wrist for move in rows.moves], np.bool_)
+    path = Toolpath(
+        kind=kinds,
+        position=position,
+        rotation=rotation,
+        axes=FewRows(
+            np.array(sorted(rows.axes), np.int32),
+            np.array([rows.axes[row] for row in sorted(rows.axes)]).reshape(-1, 6) * DEG,
+            n,
+        ),
+        feed=np.array(rows.feed) * MM,
+        base=np.array(rows.base, np.int32),
+        tool=np.array(rows.tool, np.int32),
+        line=np.array(rows.lines, np.int32),
+        frames=tuple(rows.frames),
+        arcs=arcs,
+        constraints=EditConstraints(
+            refused=refused,
+            locked=_locked(document, listing, run, rows, runs),
+            no_insert_before=_not_before(rows, continues, refused),
+        ),
+        orientation_control=OrientationControl(
+            mode=np.where(wrist, OrientationMode.JOINT, OrientationMode.VAR).astype(np.int8)
+        ),
+        configuration=Configuration(
+            {"nut": np.array(rows.nut, np.int32), "revolutions": np.array(rows.revolutions, np.int32)}
+        ),
+        external=rows.external,
+        approximation=np.array([rows.approximation(row) for row in range(n)]) * MM,
+        stops=np.array([rows.stops(row) for row in range(n)], np.bool_),
+        continues=continues,
+        predecessors={
+            row: rows.before[row] for row in range(n) if not continues[row] and rows.moves[row] is not None
+        },
+        annotations=remarks.annotations,
+        comments=remarks.comments,
+    )
+    findings += _grouped(rows, refused)
+    return _only_used(path), runs, findings
+
+
+def row_finding(document: Document, rows: TpRows, row: int, code: str, message: str) -> Finding:
+    return Finding(code, message, str(document.path), rows.lines[row], rows.columns[row])
+
+
+def _continues(before: list[tuple[int, ...]]) -> Bools:
+    """(N,) each motion surely starts where the row before it ends, and no other motion starts there."""
+    followers: dict[int, int] = {}
+    for places in before:
+        for one in places:
+            followers[one] = followers.get(one, 0) + 1
+    found = [places == (row - 1,) and followers[row - 1] == 1 for row, places in enumerate(before)]
+    return np.array(found, np.bool_)
+
+
+def _not_before(rows: TpRows, continues: Bools, refused: Mapping[int, Finding]) -> dict[int, str]:
+    """Rows before which nothing can be inserted."""
+    whole: dict[int, str] = {}
+    for row, move in enumerate(rows.moves):
+        if row in refused or move is None:
+            continue
+        if not continues[row]:
+            whole[row] = OTHER_PATHS
+        elif move.own:
+            whole[row] = "its options count from its own start (TB, TA, DB, Arc Start)"
+        elif move.unit in (b"sec", b"msec"):
+            whole[row] = "its time is stated"
+        elif move.form == b"J":
+            whole[row] = "its path is that of the axes"
+        elif rows.nut[row] < 0 or rows.revolutions[row] < 0:
+            whole[row] = "its configuration is not read"
+        elif row and rows.nut[row - 1] >= 0 and _differs(rows, row):
+            whole[row] = "its configuration is not that of the motion before"
+    return whole
+
+
+def _differs(rows: TpRows, row: int) -> bool:
+    return (rows.nut[row], rows.revolutions[row]) != (rows.nut[row - 1], rows.revolutions[row - 1])
+
+
+def _locked(
+    document: Document,
+    listing: TpListing,
+    run: TpPropagation,
+    rows: TpRows,
+    runs: Mapping[int, tuple[int, ...]],
+) -> dict[int, Finding]:
+    """Rows from whose end a refused arc starts, or where the program reads the position."""
+    locked: dict[int, Finding] = {}
+
+    def lock(row: int, code: str, message: str) -> None:
+        if row not in rows.problems:
+            locked.setdefault(row, row_finding(document, rows, row, code, message))
+
+    for row in rows.problems:
+        move = rows.moves[row]
+        if move is None or move.form not in (b"C", b"A"):
+            continue
+        others = [one for one in runs.get(row, ()) if one not in rows.problems]
+        for one in (*rows.before[row], *others):
+            if one >= 0:
+                lock(
+                    one,
+                    "FTP012",
+                    f"the arc in line {rows.lines[row]} starts at this end point and is not corrected",
+                )
+    for at, places in sorted(run.reads.items()):
+        for place in sorted(places):
+            if place >= 0:
+                message = f"line {listing.statements[at].line} reads the end position of this motion"
+                lock(rows.row_of[place], "FTP002", message)
+    return dict(sorted(locked.items()))
+
+
+def _only_used(path: Toolpath) -> Toolpath:
+    """Without the frames that no motion has: nobody needs to know their pose."""
+    used = np.unique(np.concatenate([path.base, path.tool]))
+    used = used[used >= 0]
+    new = np.full(len(path.frames) + 1, -1, np.int32)
+    new[used] = np.arange(len(used))
+    frames = tuple(path.frames[i] for i in used.tolist())
+    return replace(path, base=new[path.base], tool=new[path.tool], frames=frames)
+
+
+def _grouped(rows: TpRows, refused: Mapping[int, Finding]) -> list[Finding]:
+    """The refusals, those of one code and cause as one finding."""
+    groups: dict[tuple[str, str], list[int]] = {}
+    for row, finding in refused.items():
+        groups.setdefault((finding.code, finding.message), []).append(row)
+    found = []
+    for chosen in groups.values():
+        first = refused[chosen[0]]
+        if len(chosen) > 1:
+            lines = [rows.lines[row] for row in chosen]
+            message = f"{first.message}; {len(chosen)} motions, lines {min(lines)} to {max(lines)}"
+            first = replace(first, message=message)
+        found.append(first)
+    return found
+
+
+def external_moves(document: Document, rows: TpRows) -> list[Finding]:
+    """External axes that do not stay where they are first."""
+    moving = []
+    for axis in range(6):
+        values = rows.external[:, axis]
+        stated = values[~np.isnan(values)]
+        if len(stated) and (not np.isfinite(stated).all() or (stated != stated[0]).any()):
+            moving.append((int(np.argmax(~np.isnan(values) & (values != stated[0]))), f"E{axis + 1}"))
+    if not moving:
+        return []
+    verb = "moves" if len(moving) == 1 else "move"
+    message = f"{', '.join(name for _, name in moving)} {verb}; the cell must state what external axes carry"
+    return [row_finding(document, rows, min(moving)[0], "FTP022", message)]

@@ -1,0 +1,26 @@
+! FTP004
+/PROG  BACK_CONFIGURATION
+/ATTR
+OWNER		= MNEDITOR;
+COMMENT		= "case";
+PROG_SIZE	= 0;
+CREATE		= DATE 24-01-01  TIME 12:00:00;
+FILE_NAME	= ;
+VERSION		= 0;
+LINE_COUNT	= 3;
+MEMORY_SIZE	= 0;
+PROTECT		= READ_WRITE;
+DEFAULT_GROUP	= 1,*,*,*,*;
+CONTROL_CODE	= 00000000 00000000;
+/MN
+   1:  UFRAME_NUM=1 ;
+   2:  UTOOL_NUM=1 ;
+   3:J P[2] 50% FINE ;
+/POS
+P[2]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U B, 0, 0, 0',
+	X =     1.000  mm,	Y =     0.000  mm,	Z =     0.000  mm,
+	W =   180.000 deg,	P =     0.000 deg,	R =     0.000 deg
+};
+/END

@@ -1,0 +1,55 @@
+! FTP001
+/PROG  MANY_STATEMENTS
+/ATTR
+OWNER		= MNEDITOR;
+COMMENT		= "case";
+PROG_SIZE	= 0;
+CREATE		= DATE 24-01-01  TIME 12:00:00;
+FILE_NAME	= ;
+VERSION		= 0;
+LINE_COUNT	= 32;
+MEMORY_SIZE	= 0;
+PROTECT		= READ_WRITE;
+DEFAULT_GROUP	= 1,*,*,*,*;
+CONTROL_CODE	= 00000000 00000000;
+/MN
+   1:  UFRAME_NUM=1 ;
+   2:  UTOOL_NUM=1 ;
+   3:  HAND OPEN 0 ;
+   4:  HAND OPEN 1 ;
+   5:  HAND OPEN 2 ;
+   6:  HAND OPEN 3 ;
+   7:  HAND OPEN 4 ;
+   8:  HAND OPEN 5 ;
+   9:  HAND OPEN 6 ;
+  10:  HAND OPEN 7 ;
+  11:  HAND OPEN 8 ;
+  12:  HAND OPEN 9 ;
+  13:  HAND OPEN 10 ;
+  14:  HAND OPEN 11 ;
+  15:  HAND OPEN 12 ;
+  16:  HAND OPEN 13 ;
+  17:  HAND OPEN 14 ;
+  18:  HAND OPEN 15 ;
+  19:  HAND OPEN 16 ;
+  20:  HAND OPEN 17 ;
+  21:  HAND OPEN 18 ;
+  22:  HAND OPEN 19 ;
+  23:  HAND OPEN 20 ;
+  24:  HAND OPEN 21 ;
+  25:  HAND OPEN 22 ;
+  26:  HAND OPEN 23 ;
+  27:  HAND OPEN 24 ;
+  28:  HAND OPEN 25 ;
+  29:  HAND OPEN 26 ;
+  30:  HAND OPEN 27 ;
+  31:  HAND OPEN 28 ;
+  32:  HAND OPEN 29 ;
+/POS
+P[2]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =   100.000  mm,	Y =    20.000  mm,	Z =    -5.000  mm,
+	W =   180.000 deg,	P =     0.000 deg,	R =     0.000 deg
+};
+/END

@@ -1,0 +1,26 @@
+! FTP014
+/PROG  PATH_TO_AXES
+/ATTR
+OWNER		= MNEDITOR;
+COMMENT		= "case";
+PROG_SIZE	= 0;
+CREATE		= DATE 24-01-01  TIME 12:00:00;
+FILE_NAME	= ;
+VERSION		= 0;
+LINE_COUNT	= 3;
+MEMORY_SIZE	= 0;
+PROTECT		= READ_WRITE;
+DEFAULT_GROUP	= 1,*,*,*,*;
+CONTROL_CODE	= 00000000 00000000;
+/MN
+   1:  UFRAME_NUM=1 ;
+   2:  UTOOL_NUM=1 ;
+   3:L P[1] 50mm/sec FINE ;
+/POS
+P[1]{
+   GP1:
+	UF : 1, UT : 1,	
+	J1=     0.000 deg,	J2=     0.000 deg,	J3=     0.000 deg,
+	J4=     0.000 deg,	J5=   -90.000 deg,	J6=     0.000 deg
+};
+/END

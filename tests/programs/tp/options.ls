@@ -1,0 +1,53 @@
+/PROG  OPTIONS
+/ATTR
+OWNER		= MNEDITOR;
+COMMENT		= "case";
+PROG_SIZE	= 0;
+CREATE		= DATE 24-01-01  TIME 12:00:00;
+FILE_NAME	= ;
+VERSION		= 0;
+LINE_COUNT	= 11;
+MEMORY_SIZE	= 0;
+PROTECT		= READ_WRITE;
+DEFAULT_GROUP	= 1,*,*,*,*;
+CONTROL_CODE	= 00000000 00000000;
+/MN
+   1:  UFRAME_NUM=1 ;
+   2:  UTOOL_NUM=1 ;
+   3:L P[2] 50mm/sec CNT100 ACC80 ;
+   4:L P[3] 50mm/sec CNT100 ACC R[2] PTH ;
+   5:L P[4] 50mm/sec FINE Wjnt ;
+   6:L P[5] 50mm/sec FINE TB .50sec,DO[3]=ON ;
+   7:L P[2] 50mm/sec CNT50 TA 0.2sec,CALL OPEN(1) ;
+   8:L P[3] 50mm/sec CNT50 DB 10.0mm,DO[1]=PULSE,0.5sec ;
+   9:L P[4] 50mm/sec FINE
+    :  Arc Start[6]    ;
+  10:L P[5] WELD_SPEED CNT100
+    :  Arc End[1,2.5]    ;
+  11:L P[2] 50mm/sec CNT100 PSPD120 BREAK ;
+/POS
+P[2]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =   100.000  mm,	Y =    20.000  mm,	Z =    -5.000  mm,
+	W =   180.000 deg,	P =     0.000 deg,	R =     0.000 deg
+};
+P[3]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =   200.000  mm,	Y =    30.000  mm,	Z =    -5.000  mm,
+	W =   180.000 deg,	P =     0.000 deg,	R =     0.000 deg
+};
+P[4]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =   300.000  mm,	Y =    40.000  mm,	Z =    -5.000  mm,
+	W =   180.000 deg,	P =     0.000 deg,	R =     0.000 deg
+};
+P[5]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =   400.000  mm,	Y =    50.000  mm,	Z =    -5.000  mm,
+	W =   180.000 deg,	P =     0.000 deg,	R =     0.000 deg
+};
+/END

@@ -1,0 +1,37 @@
+/PROG  SELECT_CONTINUED
+/ATTR
+OWNER		= MNEDITOR;
+COMMENT		= "case";
+PROG_SIZE	= 0;
+CREATE		= DATE 24-01-01  TIME 12:00:00;
+FILE_NAME	= ;
+VERSION		= 0;
+LINE_COUNT	= 7;
+MEMORY_SIZE	= 0;
+PROTECT		= READ_WRITE;
+DEFAULT_GROUP	= 1,*,*,*,*;
+CONTROL_CODE	= 00000000 00000000;
+/MN
+   1:  UFRAME_NUM=1 ;
+   2:  UTOOL_NUM=1 ;
+   3:  SELECT R[1]=1,JMP LBL[1] ;
+    :         =2,JMP LBL[2] ;
+    :         ELSE,JMP LBL[2] ;
+   4:  LBL[1] ;
+   5:L P[2] 50mm/sec FINE ;
+   6:  LBL[2] ;
+   7:L P[3] 50mm/sec FINE ;
+/POS
+P[2]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =   100.000  mm,	Y =    20.000  mm,	Z =    -5.000  mm,
+	W =   180.000 deg,	P =     0.000 deg,	R =     0.000 deg
+};
+P[3]{
+   GP1:
+	UF : 1, UT : 1,		CONFIG : 'N U T, 0, 0, 0',
+	X =   200.000  mm,	Y =    30.000  mm,	Z =    -5.000  mm,
+	W =   180.000 deg,	P =     0.000 deg,	R =     0.000 deg
+};
+/END
