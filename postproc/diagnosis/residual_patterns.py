@@ -12,7 +12,7 @@ from postproc.base.units import DEG, MM
 from postproc.diagnosis.selection import basis_of, outside
 from postproc.identification.campaign import Campaign
 from postproc.identification.fit import Fit
-from postproc.robot.chain import generalized_force
+from postproc.robot.chain import ChainKinematics, generalized_force
 
 BINS, POSES = 6, 6
 """Parts that a variable is divided into at most, and poses in each at least."""
@@ -124,8 +124,10 @@ def patterns(
     loaded = bool(readings.wrench.any())
     for i, joint in enumerate(fitted.model.robot.joints):
         row = chain.motor_rows[i]
-        axis = swept.axes[row].T
-        turn = axis if joint.kind != "revolute" else np.cross(axis, points - swept.origins[row].T)
+        turn = _turn(swept, row, points)
+        for follower, leader, ratio in chain.couplings:
+            if leader == row:
+                turn = turn + ratio * _turn(swept, follower, points)
         if campaign.tracked:
             frames = fitted.point.given.frames.rotation[readings.session]
             turn = (frames @ turn[:, :, None])[:, :, 0]
@@ -145,6 +147,12 @@ def patterns(
             yield name, values, None, (unit, 1.0)
     if len(readings.sessions) > 1:
         yield "session", readings.session.astype(float), None, ("", 1.0)
+
+
+def _turn(swept: ChainKinematics, row: int, points: Floats) -> Floats:
+    """(R, 3) what a coordinate moves ``points`` (R, 3) [m] by, per rad or m."""
+    axis = swept.axes[row].T
+    return np.cross(axis, points - swept.origins[row].T) if swept.turns[row] else axis
 
 
 def _parts(values: Floats, count: int) -> tuple[Ints, Floats]:

@@ -9,6 +9,9 @@ between them the extra coordinates that a model asks for by name:
     tool.x .y .z .rx .ry .rz         at the TCP, axes of the tool
     spindle.x .y .z                  at the TCP, z along the spindle, tip-ward
 
+A joint without a motor (``Passive``) is a coordinate too.  A linkage or a gear makes it move with the joints that it
+follows, whatever moves these: their motors or a load.  What pushes it therefore pushes them.
+
 Pinocchio's model describes the chain up to the flange and is the reference.  Its joint placements are read back into
 the batch evaluation, which works component-wise on arrays with the states in the last, contiguous axis.  Pinocchio has
 no wheels for Windows: there the placements go to the batch evaluation directly, which are the same numbers.
@@ -48,7 +51,7 @@ class ChainKinematics:
     shift; apart (m,): it has another origin than the one before it; spindles: how many of them, the last ones, are the
     spindle's; position (3, N) [m] of the TCP; mount (3, N) [m]: the same without what the spindle's coordinates shift
     it, where the tool's body is; flange: three columns (3, N) and position (3, N) [m] of the flange; links: the three
-    columns (3, N) of the frame after each motor.
+    columns (3, N) of the frame after each motor; couplings: as of ``Chain``.
     """
 
     axes: tuple[Floats, ...]
@@ -60,6 +63,7 @@ class ChainKinematics:
     mount: Floats
     flange: tuple[tuple[Floats, ...], Floats]
     links: tuple[tuple[Floats, ...], ...]
+    couplings: tuple[tuple[int, int, float], ...]
     _columns: tuple[Floats, ...]
     _tool: Floats | None
 
@@ -81,6 +85,7 @@ class ChainKinematics:
         w = sum of s_i z_i over the turns; dp = sum of s_i z_i x (p - p_i) over the turns, and of s_i z_i over the
         shifts.  The error has the size of the step's square.
         """
+        step = followed(step, self.couplings)
         turn, shift, spindle_shift = (np.zeros((3, step.shape[1])) for _ in range(3))
         mounted, at = len(self.axes) - self.spindles, 0
         while at < len(self.axes):
@@ -111,8 +116,8 @@ class Chain:
     """A serial chain of ``joints`` with a ``flange``, and the extra coordinates named in ``extras``.
 
     names (m,): of the coordinates; motors: where the joints are among them (a slice without extras); model: Pinocchio's
-    model up to the frame ``flange``, None where there is no Pinocchio.  Raises ValueError where ``extras`` names a
-    coordinate that is not there.
+    model up to the frame ``flange``, None where there is no Pinocchio; couplings: (row of a joint without a motor, row
+    of a joint that it follows, ratio).  Raises ValueError where ``extras`` names a coordinate that is not there.
     """
 
     def __init__(self, joints: Sequence[Joint], flange: Poses, extras: Iterable[str] = ()) -> None:
@@ -124,7 +129,13 @@ class Chain:
         names: list[str] = []
         motors: list[int] = []
         names += self._site("base", wanted)
+        followers: list[tuple[int, tuple[tuple[str, float], ...]]] = []
         for joint in joints:
+            for passive in joint.passive:
+                self._at = self._at @ passive.placement
+                followers.append((len(names), passive.follows))
+                names.append(passive.name)
+                self._add(passive.name, np.eye(3), passive.kind == "revolute")
             if f"{joint.name}.growth" in wanted:
                 self._add(f"{joint.name}.growth", _z_along(joint.placement.position), turns=False)
                 names.append(f"{joint.name}.growth")
@@ -146,6 +157,9 @@ class Chain:
         if unknown:
             raise ValueError(f"a chain has no coordinates {sorted(unknown)}")
         self.index = {name: i for i, name in enumerate(self.names)}
+        self.couplings = tuple(
+            (row, self.index[name], ratio) for row, follows in followers for name, ratio in follows
+        )
         self.motors = slice(0, len(motors)) if motors == list(range(len(motors))) else np.array(motors)
         self.motor_rows = np.array(motors)
         turns = [*(turns for *_, turns in self._arm), *(name[5] == "r" for name in self._tool)]
@@ -187,6 +201,7 @@ class Chain:
         axes (tool z without it).
         """
         count = coordinates.shape[1]
+        coordinates = followed(coordinates, self.couplings)
         axes: list[Floats] = []
         origins: list[Floats] = []
         # what all states share has one column until a coordinate differs between them
@@ -239,6 +254,7 @@ class Chain:
             mount,
             flange,
             tuple(links),
+            self.couplings,
             _of_all(columns, count),
             beyond,
         )
@@ -273,10 +289,14 @@ class Chain:
 
 
 def jacobian(swept: ChainKinematics) -> Floats:
-    """Geometric Jacobians (N, 6, m) of the TCP: column [z x (p - p_i); z] of a turn, [z; 0] of a shift."""
+    """Geometric Jacobians (N, 6, m) of the TCP: column [z x (p - p_i); z] of a turn, [z; 0] of a shift; of a joint
+    that others follow, the sum with theirs."""
     turns, axes = swept.turns[:, None, None], np.array(swept.axes)
     lever = np.cross(axes, swept.position[None] - np.array(swept.origins), axis=1)
     linear, angular = np.where(turns, lever, axes), np.where(turns, axes, 0.0)
+    for row, leader, ratio in swept.couplings:
+        linear[leader] += ratio * linear[row]
+        angular[leader] += ratio * angular[row]
     return np.moveaxis(np.concatenate([linear, angular], axis=1), (0, 1, 2), (2, 1, 0))
 
 
@@ -303,7 +323,24 @@ def generalized_force(swept: ChainKinematics, point: Floats, wrench: Floats) -> 
             np.multiply(zx, fx, out=own)
             own += zy * fy
             own += zz * fz
+    add_to_leaders(force, swept.couplings)
     return force
+
+
+def followed(coordinates: Floats, couplings: Sequence[tuple[int, int, float]]) -> Floats:
+    """(m, N) [rad, m] where joints without a motor are, with the ``coordinates`` (m, N) of those that they follow."""
+    if not couplings:
+        return coordinates
+    coordinates = coordinates.copy()
+    for row, leader, ratio in couplings:
+        coordinates[row] += ratio * coordinates[leader]
+    return coordinates
+
+
+def add_to_leaders(force: Floats, couplings: Sequence[tuple[int, int, float]]) -> None:
+    """Add to ``force`` (m, N) [N m, N], in place, on each joint what pushes those that follow it (virtual work)."""
+    for row, leader, ratio in couplings:
+        force[leader] += ratio * force[row]
 
 
 def cross(a: Floats, b: Floats) -> Floats:

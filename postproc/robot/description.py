@@ -20,7 +20,7 @@ from postproc.base.yaml_section import YamlSection, parsed, read
 from postproc.robot.chain import Chain
 from postproc.robot.geometries import Axis, Geometry, Joint, KukaVariant, SerialArm
 from postproc.robot.provenance import Identification, correlations, read_identification
-from postproc.robot.read_geometry import geometry_kind, read_axes, read_geometry, unit_factor
+from postproc.robot.read_geometry import driven, geometry_kind, read_geometry, read_joints, unit_factor
 
 COVERAGE = 1.96
 """Half width of a 95 % interval over the standard deviation (normal distribution)."""
@@ -133,6 +133,11 @@ class Robot:
         return Chain(joints, self.nominal.flange())
 
     @property
+    def is_programmable(self) -> bool:
+        """Whether a program's six axis values, or one pose, say where its joints are."""
+        return len(self.programmed) == 6
+
+    @property
     def programmed(self) -> Ints:
         """(6,) columns of the joints that a program's six axis values are: all but the external one."""
         return np.array([i for i in range(len(self.joints)) if i != self.external])
@@ -190,6 +195,16 @@ def load_robot(path: Path) -> Robot:
     return robot_of(read(path), path)
 
 
+def check_programmable(robot: Robot) -> None:
+    """Raises Refusal KIN012 for an arm that six axis values do not place."""
+    if not robot.is_programmable:
+        message = (
+            f"{robot.name} has {len(robot.joints)} joints with a motor; programs and maps need six,"
+            " or seven with an external one"
+        )
+        raise Refusal(Finding("KIN012", message, str(robot.path)))
+
+
 def robot_of(raw: bytes, path: Path) -> Robot:
     """The robot of a file ``path`` that holds ``raw``; the file itself need not be there.  Raises Refusal with file,
     line and key."""
@@ -208,8 +223,9 @@ def robot_of(raw: bytes, path: Path) -> Robot:
     )
     geometry = top.section("geometry")
     kind = geometry_kind(geometry)
-    axes = read_axes(top.section("joints"))
-    arm, others = read_geometry(geometry, kind, axes, top.section("joints"))
+    listed = read_joints(top.section("joints"))
+    axes = driven(listed)
+    arm, others = read_geometry(geometry, kind, listed, top.section("joints"))
     nominal = arm
     if "controller" in top:
         controller = top.section("controller")
@@ -218,7 +234,7 @@ def robot_of(raw: bytes, path: Path) -> Robot:
             raise controller.error(
                 "YML004", f"the controller's geometry must be of the same kind, {kind}", believed
             )
-        nominal, more = read_geometry(controller, kind, axes, top.section("joints"))
+        nominal, more = read_geometry(controller, kind, listed, top.section("joints"))
         others += more
     names = [axis.name for axis in axes]
     limits = [(axis.lower, axis.upper) for axis in axes]

@@ -106,6 +106,16 @@ _JOINTS = mapping(
                 numbers(2, 2, "lower and upper limit"),
                 _axis("revolute", "rad", ()),
                 _axis("prismatic", "m", ("kind", "unit")),
+                mapping(
+                    {
+                        "follows": mapping({}, [], "ratio to each joint that moves it", {_JOINT: number()}),
+                        "kind": {"enum": ["revolute", "prismatic"]},
+                        "unit": text(choices=(*words_for("rad"), *words_for("m"))),
+                        "offset": number(),
+                    },
+                    ["follows"],
+                    "a joint without a motor, which a linkage or a gear moves",
+                ),
             ]
         }
     },
