@@ -128,6 +128,7 @@ def patterns(
         for follower, leader, ratio in chain.couplings:
             if leader == row:
                 turn = turn + ratio * _turn(swept, follower, points)
+        turn = np.where(readings.based[:, None], 0.0, turn)
         if campaign.tracked:
             frames = fitted.point.given.frames.rotation[readings.session]
             turn = (frames @ turn[:, :, None])[:, :, 0]

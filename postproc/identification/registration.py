@@ -87,7 +87,7 @@ def _turned_targets(
     """The axes of targets whose turn is not stated: the mean over all readings."""
     readings, turns = campaign.readings, given.turns.copy()
     assert readings.rotation is not None
-    rotation = predicted.rotation[campaign.at]
+    rotation = campaign.turned(predicted, campaign.at)
     if campaign.tracked:
         rotation = given.frames.rotation[readings.session] @ rotation
     for k in np.flatnonzero(~campaign.turn_known):

@@ -350,6 +350,8 @@ def _placed(one: Placed, kind: str) -> dict[str, object]:
     if one.angles is not None and one.angles_ci95 is not None:
         entry |= {axis: float(v) for axis, v in zip("abc", one.angles, strict=True)}
         entry |= {f"r{axis}_ci95": float(v) for axis, v in zip("xyz", one.angles_ci95, strict=True)}
+    if kind == "target":
+        entry["on_base"] = one.on_base
     return entry
 
 

@@ -32,7 +32,7 @@ except ImportError:  # no wheel for this system
     pin = None
 
 from postproc.base.arrays import Bools, Floats
-from postproc.base.geometry import Poses
+from postproc.base.geometry import Poses, rotation_from_vector
 from postproc.robot.geometries import Joint
 
 TOOL = Poses.identity()
@@ -272,6 +272,20 @@ class Chain:
             across = across / np.sqrt(np.sum(across * across, axis=0))
             three = [across, np.cross(along, across, axis=0), along]
         return [three["xyz".index(name[-1])] for name in self._spindle]
+
+    def base(self, coordinates: Floats) -> Poses:
+        """Where the robot base is (N) at ``coordinates`` (m, N) [rad, m], in the frame that it has at zero."""
+        count = coordinates.shape[1]
+        rotation, position = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
+        for name in self.names:
+            if not name.startswith("base."):
+                break
+            axis, value = "xyz".index(name[-1]), coordinates[self.index[name]]
+            if name[5] == "r":
+                rotation = rotation @ rotation_from_vector(value[:, None] * np.eye(3)[axis])
+            else:
+                position = position + value[:, None] * rotation[:, :, axis]
+        return Poses(rotation, position)
 
     def placed(self, q: Floats) -> Floats:
         """Coordinates (m, N) of a rigid robot with its motors at ``q`` (N, n) [rad]."""

@@ -170,8 +170,12 @@ def diagnose_schema() -> Schema:
                 record(
                     {
                         "target": word("name of the target"),
-                        **{axis: quantity("mm", "place on the flange") for axis in "xyz"},
+                        **{
+                            axis: quantity("mm", "place on the flange, or in the robot base")
+                            for axis in "xyz"
+                        },
                         **{f"{axis}_ci95": quantity("mm", "95 % interval") for axis in "xyz"},
+                        "on_base": boolean("whether it is fixed to the robot base instead of the flange"),
                     },
                     "one target",
                 ),

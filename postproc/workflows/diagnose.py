@@ -261,7 +261,7 @@ def _like(measured: Measured, planned: Readings) -> Readings:
         planned,
         in_robot_frame=before.in_robot_frame,
         tool=before.tool,
-        places=dict(before.places),
+        places={name: place for name, place in before.places.items() if name not in before.on_base},
         time=None if before.time is None else empty,
         temperature=None if before.temperature is None else empty,
         direction=direction,
@@ -281,13 +281,14 @@ def _offer(measured: Measured, base: Fit) -> CandidateSetups:
     """What was measured with: targets, weights, scatter."""
     readings, campaign = measured.readings, measured.campaign
     in_flange = campaign.tool.rotation @ base.point.given.places[:, :, None]
+    moving = ~campaign.on_base
     loads = hung_weights(readings)
     if len(loads) > LOADS:
         loads = loads[np.linspace(0, len(loads) - 1, LOADS).round().astype(int)]
     return CandidateSetups(
         tool=campaign.tool,
-        targets=readings.targets,
-        places=in_flange[:, :, 0] + campaign.tool.position,
+        targets=tuple(name for name in readings.targets if name not in readings.on_base),
+        places=(in_flange[:, :, 0] + campaign.tool.position)[moving],
         rough=campaign.tracked,
         loads=loads if len(loads) else np.zeros(1),
         each_load=False,
