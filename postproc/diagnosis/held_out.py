@@ -18,6 +18,9 @@ SEEN = 1e-8
 
 OUTLIER_LIMIT = 5.0
 
+SCATTERS = 0.01
+"""Probability that scatter alone makes the largest residual of all poses larger."""
+
 USUAL = 3.0
 """Times what was found of an effect that it is expected to be, of readings that were left out."""
 
@@ -56,7 +59,9 @@ def held_out_gain(search: Search, last: Explained, group: int, part: Ints | None
 
 def worst_ratio(search: Search, last: Explained, group: int, part: Ints) -> float:
     """The largest residual of a pose left out with the group, over that without it; part (R,): as of
-    ``held_out_gain``."""
+    ``held_out_gain``.  Where the scatter is known, what it makes of the largest pose is no growth."""
+    from scipy.special import chdtri
+
     linear = search.linear
     rows = len(linear.residual) - linear.priors
     of = np.append(np.repeat(part, rows // len(part)), np.full(linear.priors, -1))
@@ -67,8 +72,12 @@ def worst_ratio(search: Search, last: Explained, group: int, part: Ints) -> floa
         away = _left_out(matrix, linear.residual, of)[:rows]
         return float(np.sqrt(np.bincount(pose, away**2).max()))
 
-    without = largest([g for g in last.groups if g != group])
-    return largest(last.groups) / without if without > 0 else 1.0
+    counts = np.bincount(pose[linear.residual[:rows] != 0.0], minlength=1).max()
+    floor = (
+        np.sqrt(chdtri(counts, SCATTERS / search.base.campaign.poses)) if search.linear.problem.known else 0.0
+    )
+    without = max(largest([g for g in last.groups if g != group]), floor)
+    return max(largest(last.groups), floor) / without if without > 0 else 1.0
 
 
 def _left_out(matrix: Floats, target: Floats, part: Ints) -> Floats:

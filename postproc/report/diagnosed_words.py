@@ -166,7 +166,7 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
     if planned is None:
         yield (
             "No pose within the limits, with the loads used so far, distinguishes them better than the scatter: other"
-            " loads or targets may."
+            f" loads or targets may{_limited(result)}."
         )
         return
     first, second = (candidate.label for candidate in planned.between)
@@ -175,7 +175,7 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
         yield (
             f"The best {count(len(planned.poses), 'pose')} with the loads used so far would not distinguish them: there"
             f" {first} and {second} differ by {apart:.1f} standard deviations, {SETTLES:.1f} are required. Other loads"
-            " or targets, or less scatter, may."
+            f" or targets, or less scatter, may{_limited(result)}."
         )
         return
     where = f" ({result.next_poses_file})" if result.next_poses_file else ""
@@ -188,6 +188,11 @@ def _ambiguous(result: Diagnosed) -> Iterator[str]:
             f"They leave the ranges measured so far of {listed(planned.beyond)}, within which nothing distinguishes"
             " the two: check that the arm, its cables and the target are free there."
         )
+
+
+def _limited(result: Diagnosed) -> str:
+    """Which loads are not proposed."""
+    return f" ({'; '.join(result.load_limits)})" if result.load_limits else ""
 
 
 def _unknown(result: Diagnosed) -> Iterator[str]:

@@ -91,7 +91,8 @@ class Robot:
     All values of joints are the controller's (see ``geometries``).  ``external``: column of the joint of seven that a
     program does not place the flange with; it is where the program has the external axis of its name (E1..E6), and
     without one it stays where it was.  ``identified``: runs of the tool that gave it new
-    values, in order.  ``raw``: the bytes of the file.
+    values, in order.  ``raw``: the bytes of the file.  ``rated_payload`` [kg]: the heaviest that it may carry, None
+    where the file does not state it.
     """
 
     name: str
@@ -110,6 +111,7 @@ class Robot:
     external: int | None = None
     masses: tuple[Mass, ...] = ()
     masses_source: str = ""
+    rated_payload: float | None = None
     mechanisms: tuple[Mechanism, ...] = ()
     identified: tuple[Identification, ...] = ()
     raw: bytes = field(default=b"", repr=False)
@@ -216,6 +218,7 @@ def robot_of(raw: bytes, path: Path) -> Robot:
         "geometry",
         "controller",
         "joints",
+        "rated_payload",
         "masses",
         "effects",
         "mechanisms",
@@ -256,12 +259,25 @@ def robot_of(raw: bytes, path: Path) -> Robot:
         effects=tuple(EffectEntry(section.text("effect"), section) for section in top.sections("effects")),
         axes=axes,
         external=_external(arm),
+        rated_payload=_rated_payload(top),
         masses=_masses(top.section("masses"), names, arm) if "masses" in top else (),
         masses_source=top.section("masses").text("source") if "masses" in top else "",
         mechanisms=_mechanisms(top, names),
         identified=tuple(read_identification(section) for section in top.sections("identified")),
         raw=raw,
     )
+
+
+def _rated_payload(top: YamlSection) -> float | None:
+    if "rated_payload" not in top:
+        return None
+    section = top.section("rated_payload")
+    section.only("value", "unit", "source")
+    section.text("source")
+    value = section.number("value") * unit_factor(section, "kg")
+    if value <= 0:
+        raise section.error("YML004", "must be above 0", "value")
+    return value
 
 
 def _external(arm: Geometry) -> int | None:

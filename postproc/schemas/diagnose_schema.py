@@ -135,8 +135,8 @@ def diagnose_schema() -> Schema:
             ),
             "next_poses": array(
                 by_name(
-                    quantity("as in name", "deg, mm or kg; DIR columns: -1, 0, +1"),
-                    "one pose: axes, load, direction of approach",
+                    quantity("as in name", "deg, mm, kg or N; DIR columns: -1, 0, +1"),
+                    "one pose: axes, load, pull if there is one, direction of approach",
                 ),
                 "poses to measure next",
                 nullable=True,

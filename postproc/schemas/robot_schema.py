@@ -204,6 +204,11 @@ def robot_schema() -> Schema:
                 {"type": "object", "required": ["effect"], "oneOf": [_effect(name) for name in EFFECTS]},
                 "causes of the arm's deviation from the controller's geometry",
             ),
+            "rated_payload": mapping(
+                {"value": number(low=0.0), "unit": text(choices=words_for("kg")), "source": _SOURCE},
+                ["value", "unit", "source"],
+                "the heaviest that the robot may carry",
+            ),
             "mechanisms": listed(_MECHANISM, "hardware whose effect may or may not be modelled"),
             "identified": listed(_IDENTIFIED),
         },
