@@ -112,7 +112,9 @@ def diagnose(
 
 def _fitted_to(campaign: Campaign, fitted: Fit) -> Fit:
     """A fit of some readings, fitted to all of them; what those do not give keeps its value."""
-    found = fit(campaign, fitted.model, fitted.unknowns, given=fitted.point.given, near=True)
+    found = fit(
+        campaign, fitted.model, fitted.unknowns, given=fitted.point.given, near=True, factor=fitted.factor
+    )
     return replace(found, asked=fitted.asked, dropped=(*fitted.dropped, *found.dropped))
 
 

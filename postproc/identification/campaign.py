@@ -123,6 +123,14 @@ class Campaign:
         new.nuisance_names = tuple(new._nuisance_names())
         return new
 
+    def seen_in(self, rows: Ints) -> Campaign:
+        """The campaign with the readings ``rows`` (K,) only; its states stay, and so does what is predicted of them."""
+        new = copy(self)
+        new.readings = self.readings.part(rows)
+        new.at, new.pose = self.at[rows], self.pose[rows]
+        new.still = None if self.still is None else self.still[rows]
+        return new
+
     def shifted(self, by: Floats) -> Campaign:
         """The campaign with its measured positions and rotations moved by ``by`` (R, 3 or 6) [m, rad]."""
         new = copy(self)
