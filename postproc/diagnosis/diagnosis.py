@@ -101,7 +101,9 @@ def diagnose(
             if not by <= AGREES * scatter
         ]
         agreed = not differ
-        if differ:
+        if len(differ) == len(names):
+            final = base
+        elif differ:
             final = without_effects(campaign, final, differ)
     # where an effect is missing in a model its own parameters compensate for that
     moved = refitted(final) if verdict.word not in ("ambiguous", "unknown") else ()

@@ -20,6 +20,13 @@ BINS, POSES = 6, 6
 CHANCE = 0.01
 SHOWN = 8
 
+FEW = 3
+"""Readings that a part needs to be named."""
+
+SIDE, SIDES = ("side", 1.0), {-1: "places from above", 0: "places of unknown side", 1: "places from below"}
+READING = ("reading", 1.0)
+"""Units of a sense of approach, and of the number of a reading, and how the former are called."""
+
 FLIPS = 4000
 """Times that chance is asked."""
 
@@ -82,7 +89,7 @@ def residual_patterns(
             by_chance = float(fdtrc(rank, max(1, against.freedom), explained / rank / against.factor))
         share = 1.0 - (1.0 - explained / squares) * rows / (rows - rank)
         if by_chance * len(tried) < chance and share > 0:
-            words = _words(fitted.point.residual[:, :3], part, parts, unit)
+            words = pattern_words(fitted.point.residual[:, :3], part, parts, unit)
             if variable in ("order", "time") and goes_with_poses(values, campaign.readings.q):
                 words += "; but the poses were taken in such an order: measure again in random order"
             clear_patterns.append(ResidualPattern(variable, words, float(share)))
@@ -138,11 +145,11 @@ def patterns(
             yield f"{joint.name} over its torque", torque[row], turn, ("N m", 1.0)
         sense = campaign.conditions.direction
         if sense is not None and np.ptp(sense[campaign.at, i]) > 0:
-            yield f"{joint.name} over its approach", sense[campaign.at, i], turn, ("", 1.0)
+            yield f"{joint.name} over its approach", sense[campaign.at, i], turn, SIDE
     force = np.linalg.norm(readings.wrench[:, :3], axis=1)
     if np.ptp(force) > 0:
         yield "load", force, None, ("N", 1.0)
-    yield "order", np.arange(len(readings), dtype=float), None, ("", 1.0)
+    yield "order", np.arange(1.0, len(readings) + 1), None, READING
     for name, values, unit in (("time", readings.time, "s"), ("temperature", readings.temperature, "degC")):
         if values is not None and np.ptp(values) > 0:
             yield name, values, None, (unit, 1.0)
@@ -174,15 +181,22 @@ def _columns(part: Ints, parts: int, turns: Floats | None) -> Floats:
     return np.asarray(np.eye(3)[None, :, :, None] * on[:, None, None, :]).reshape(len(part), 3, -1)
 
 
-def _words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float]) -> str:
-    count = range(len(parts))
+def pattern_words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float]) -> str:
+    enough = min(FEW, int(np.bincount(part).max()))
     size = np.array(
-        [np.sqrt(3 * np.nanmean(residual[part == k] ** 2)) if (part == k).any() else np.nan for k in count]
+        [
+            np.sqrt(3 * np.nanmean(residual[part == k] ** 2)) if (part == k).sum() >= enough else np.nan
+            for k in range(len(parts))
+        ]
     )
     most, least = int(np.nanargmax(size)), int(np.nanargmin(size))
 
     def span(k: int) -> str:
         low, high = parts[k] / unit[1]
+        if unit == SIDE:
+            return SIDES[int(low)]
+        if unit == READING:
+            return f"readings {np.ceil(low):.0f} .. {np.floor(high):.0f}"
         return f"{low:.4g}{f' .. {high:.4g}' if high > low else ''}{f' {unit[0]}' if unit[0] else ''}"
 
     return f"{size[most] / MM:.3g} mm at {span(most)}, {size[least] / MM:.3g} mm at {span(least)}"

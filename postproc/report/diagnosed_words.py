@@ -227,11 +227,11 @@ def _class_of_geometry(result: Diagnosed) -> Iterator[str]:
         e for e in result.final.estimates if e.unknown.gauge and e.ci95 > WIDE * (e.unknown.prior or np.inf)
     ]
     if hidden and any(one.candidate.joint == EVERY for one in result.verdict.named):
-        names = listed([e.unknown.parameter.name for e in hidden[:PARAMETERS]])
-        more = f" and {len(hidden) - PARAMETERS} more" if len(hidden) > PARAMETERS else ""
+        names = [e.unknown.parameter.name for e in hidden[:PARAMETERS]]
+        more = [f"{len(hidden) - PARAMETERS} more"] if len(hidden) > PARAMETERS else []
         yield (
             "Some lengths, twists and zeros predict the same together: the values are the smallest plausible ones, and"
-            f" their intervals hold all others; the readings hardly determine {names}{more} alone."
+            f" their intervals hold all others; the readings hardly determine {listed([*names, *more])} alone."
         )
 
 
@@ -274,8 +274,9 @@ def _fixed(named: Named) -> str:
 
 def noun(named: Named) -> str:
     """What the effect is, and where."""
-    joints = listed(named.joints) if named.joints else "the joints" if named.candidate.joint == EVERY else ""
-    return NOUNS[named.effect].format(joints=joints)
+    last = named.candidate.up_to_joint
+    whole = f"the joints up to {last}" if last else "the joints"
+    return NOUNS[named.effect].format(joints=listed(named.joints) if named.joints else whole)
 
 
 def _parameters(named: Named) -> str:
