@@ -21,6 +21,9 @@ OUTLIER_LIMIT = 5.0
 SCATTERS = 0.01
 """Probability that scatter alone makes the largest residual of all poses larger."""
 
+REGIONS, LLOYD = 4, 10
+"""Regions of the joints' space that are left out in turn, and steps of their search."""
+
 USUAL = 3.0
 """Times what was found of an effect that it is expected to be, of readings that were left out."""
 
@@ -126,15 +129,30 @@ def _misfit(matrix: Floats, target: Floats, part: Ints, variance: float) -> floa
 
 def regions_of(search: Search) -> Ints | None:
     """(R,) a region of the joints' space for each reading; None with too few poses."""
-    from scipy.cluster.vq import kmeans2
-
     campaign = search.base.campaign
     if campaign.poses < 24:
         return None
     q = campaign.readings.q
     spread = np.where(np.ptp(q, axis=0) > 1e-9, np.ptp(q, axis=0), 1.0)
-    _, label = kmeans2(q / spread, 4, minit="++", rng=np.random.default_rng(0))
-    return label if min(np.bincount(label, minlength=4)) > 0 else None
+    label = _clusters(q / spread, REGIONS)
+    return label if min(np.bincount(label, minlength=REGIONS)) > 0 else None
+
+
+def _clusters(points: Floats, count: int) -> Ints:
+    """(R,) of ``count`` clusters of ``points`` (R, n), by Lloyd's iteration from points far from each other."""
+    away = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    first: list[int] = []
+    for _ in range(count):
+        first.append(int(np.argmax(away)))
+        to_last = np.linalg.norm(points - points[first[-1]], axis=1)
+        away = to_last if len(first) == 1 else np.minimum(away, to_last)
+    centres = points[first]
+    label = np.zeros(len(points), np.int64)
+    for _ in range(LLOYD):
+        label = np.argmin(((points[:, None] - centres) ** 2).sum(axis=2), axis=1)
+        own = [points[label == k] for k in range(count)]
+        centres = np.array([one.mean(axis=0) if len(one) else centres[k] for k, one in enumerate(own)])
+    return label
 
 
 def sessions_of(search: Search) -> Ints | None:
