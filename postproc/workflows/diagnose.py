@@ -350,7 +350,7 @@ def heaviest(request: DiagnoseRequest, robot: Robot) -> float:
 
 
 def within_payload(loads: Floats, payload: float) -> Floats:
-    """Those of ``loads`` (L,) [kg] that the robot may carry."""
+    """(K,) [kg] those of ``loads`` (L,) that the robot may carry."""
     return loads[loads <= payload]
 
 

@@ -37,9 +37,8 @@ LARGE = 1e-3
 
 def loss_of(answer: dict, accept, needed) -> int:
     """How little an answer is worth against the truth: 0 it names what is there, or rightly nothing; 1 that stands in a
-    set of explanations; 2 it does not occur; 3 something is named, or stands in a set
-    of nothing but such, that is not there.  That more remains than could be
-    named is a statement of its own, and is no loss."""
+    set of explanations; 2 it does not occur; 3 something is named, or is all that a set has, that is not there.  That
+    more remains than could be named is a statement of its own, and is no loss."""
     names, sets = pairs(answer), sets_of(answer)
     false = [one for one in sets if not any(fits(pair, accept) for pair in one)]
     if false or any(not fits(name, accept) for name in names):
