@@ -17,7 +17,7 @@ CODES = define(
         "DIA004": Code(
             "info",
             "searched in a part of the readings",
-            meaning="The search uses whole poses at random where there are thousands of readings, as many of each session.",
+            meaning="Where there are thousands of readings the search uses whole poses at random.",
             consequence="What it chooses is fitted to all readings; an effect of one region may be missed.",
             action="Diagnose the readings of a region by themselves where one is suspected.",
             example="1,500 of 10,000 readings.",

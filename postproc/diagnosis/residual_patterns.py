@@ -182,8 +182,8 @@ def _columns(part: Ints, parts: int, turns: Floats | None) -> Floats:
 
 
 def pattern_words(residual: Floats, part: Ints, parts: Floats, unit: tuple[str, float]) -> str:
-    """Where the ``residual`` (R, 3) [m] is largest and smallest, of the ``part`` (R,) that each reading is in; ``parts``
-    (k, 2): where these start and end."""
+    """Where the ``residual`` (R, 3) [m] is largest and smallest, of the ``part`` (R,) that each reading is in;
+    ``parts`` (k, 2): where these start and end."""
     enough = min(FEW, int(np.bincount(part).max()))
     size = np.array(
         [
