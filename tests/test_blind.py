@@ -267,10 +267,10 @@ def test_what_was_run_is_not_run_again(tmp_path):
 def test_a_zero_that_stated_lengths_express_is_their_own():
     """A robot file that states all lengths and twists, and a zero of A2 that it does not: turning what follows A2 is a
     shift of A3 and a zero there."""
-    run = next(made(c) for c in cases("single", 60, 1) if c.effects == ("joint_offset",))
+    run = next(made(c) for c in cases.cases("single", 60, 1) if c.effects == ("joint_offset",))
     ((hidden, size),) = run.hidden
     assert run.oracle.is_own(hidden, size)
-    other = next(made(c) for c in cases("single", 60, 1) if c.effects == ("transmission_error",))
+    other = next(made(c) for c in cases.cases("single", 60, 1) if c.effects == ("transmission_error",))
     ((hidden, size),) = other.hidden
     assert not other.oracle.is_own(hidden, size)
     changed = {"verdict": "nothing_missing", "refitted": [{"parameter": "link_geometry.dx3"}]}
@@ -287,7 +287,7 @@ def test_a_zero_that_stated_lengths_express_is_their_own():
 @pytest.mark.slow
 def test_what_a_whole_arm_predicts_alike_is_an_equal_rival():
     """A weight on the flange and first moments of all links: the oracle tells them as little apart as anybody."""
-    case = next(c for c in cases("single", 60, 1) if c.effects == ("payload",))
+    case = next(c for c in cases.cases("single", 60, 1) if c.effects == ("payload",))
     run = made(case)
     nearest = verdicts.nearest(run, 0, run.readings.value - run.without)[0]
     assert (nearest.effect, nearest.joint, nearest.margin) == ("link_gravity", "", 0.0)
